@@ -1,0 +1,25 @@
+#include "understory/recording/recording.h"
+
+namespace understory {
+namespace {
+
+struct TimeOf {
+  TimeNs operator()(const ScanPtr& scan) const { return scan->end(); }
+  TimeNs operator()(const ImuSample& sample) const { return sample.stamp; }
+  TimeNs operator()(const GnssFix& fix) const { return fix.stamp; }
+  TimeNs operator()(const MagSample& sample) const { return sample.stamp; }
+};
+
+}  // namespace
+
+TimeNs event_time(const Event& event) {
+  return std::visit(TimeOf{}, event);
+}
+
+void Recording::skip(std::uint64_t count) {
+  for (std::uint64_t i = 0; i < count; ++i) {
+    if (!next()) return;
+  }
+}
+
+}  // namespace understory

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace understory {
+
+// CPU time of the calling thread and of the whole process so far, in seconds.
+[[nodiscard]] double thread_cpu_seconds();
+[[nodiscard]] double process_cpu_seconds();
+// Largest resident memory of the process so far, in megabytes (1e6 bytes).
+[[nodiscard]] double peak_memory_mb();
+
+// Mean, percentiles (nearest rank) and largest of a set of values; zeros for an empty set.
+struct Distribution {
+  std::size_t count = 0;
+  double mean = 0.0;
+  double p50 = 0.0;
+  double p99 = 0.0;
+  double max = 0.0;
+};
+[[nodiscard]] Distribution distribution_of(std::vector<double> values);
+
+// Wall and CPU milliseconds of each run of each named stage. Thread-safe. Values are kept as
+// floats: memory does not grow over a working day because each stage keeps at most 65,536 of them,
+// thinned evenly once it is full.
+class StageTimes {
+ public:
+  struct Sample {
+    float wall_ms = 0.0F;
+    float cpu_ms = 0.0F;
+  };
+  void add(const std::string& stage, double wall_ms, double cpu_ms);
+  [[nodiscard]] std::vector<std::string> stages() const;
+  [[nodiscard]] std::vector<Sample> samples(const std::string& stage) const;
+  [[nodiscard]] double total_wall_ms(const std::string& stage) const;
+
+ private:
+  struct Series {
+    std::vector<Sample> samples;
+    std::uint64_t seen = 0;
+    std::uint64_t stride = 1;
+    double total_wall_ms = 0.0;
+  };
+  mutable std::mutex mutex_;
+  std::map<std::string, Series> series_;
+};
+
+// Adds the time from construction to destruction to `times`. CPU time is the process's, so that the
+// work of helper threads is counted with the stage that asked for it.
+class ScopedTimer {
+ public:
+  ScopedTimer(StageTimes& times, std::string stage);
+  ~ScopedTimer();
+  ScopedTimer(const ScopedTimer&) = delete;
+  ScopedTimer& operator=(const ScopedTimer&) = delete;
+  [[nodiscard]] double wall_ms() const;
+
+ private:
+  StageTimes& times_;
+  std::string stage_;
+  std::chrono::steady_clock::time_point start_;
+  double cpu_start_;
+};
+
+}  // namespace understory
