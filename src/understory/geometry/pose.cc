@@ -114,6 +114,13 @@ Pose Pose::from_matrix(const Eigen::Matrix4d& matrix) {
           Eigen::Vector3d(matrix.topRightCorner<3, 1>())};
 }
 
+Pose Pose::from_unit(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
+  Pose pose;
+  pose.rotation_ = rotation;
+  pose.translation_ = translation;
+  return pose;
+}
+
 Eigen::Matrix4d Pose::matrix() const {
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   matrix.topLeftCorner<3, 3>() = rotation_matrix();

@@ -33,6 +33,9 @@ class Pose {
   Pose(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation)
       : Pose(Eigen::Quaterniond(rotation), translation) {}
   [[nodiscard]] static Pose from_matrix(const Eigen::Matrix4d& matrix);
+  // From a quaternion that is known to have unit length; its bits are kept.
+  [[nodiscard]] static Pose from_unit(const Eigen::Quaterniond& rotation,
+                                      const Eigen::Vector3d& translation);
 
   [[nodiscard]] const Eigen::Quaterniond& rotation() const { return rotation_; }
   [[nodiscard]] Eigen::Matrix3d rotation_matrix() const { return rotation_.toRotationMatrix(); }

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "understory/util/log.h"
+#include "understory/util/progress.h"
+
+namespace understory {
+
+// Exit codes of the program (design: command line).
+inline constexpr int kExitDone = 0;
+inline constexpr int kExitDefect = 1;
+inline constexpr int kExitUsage = 2;
+inline constexpr int kExitBadInput = 3;
+inline constexpr int kExitUntrusted = 4;
+
+// What every subcommand is given: messages and progress go to stderr, results to stdout.
+struct CommandContext {
+  Log& log;
+  ProgressSink progress;
+  StopRequested stop_requested;  // true after Ctrl-C
+  int threads = 0;               // 0 = all of the machine
+};
+
+// The work of the chosen subcommand; returns an exit code or throws an Error.
+using Command = std::function<int(CommandContext&)>;
+
+// Each subcommand is one file with one function that adds it to the program: its options, a footer
+// with an example, and a callback that sets `chosen`.
+void add_map_command(CLI::App& app, Command& chosen);
+void add_demo_command(CLI::App& app, Command& chosen);
+void add_info_command(CLI::App& app, Command& chosen);
+void add_convert_command(CLI::App& app, Command& chosen);
+void add_simulate_command(CLI::App& app, Command& chosen);
+void add_register_command(CLI::App& app, Command& chosen);
+void add_inventory_command(CLI::App& app, Command& chosen);
+void add_evaluate_command(CLI::App& app, Command& chosen);
+
+}  // namespace understory

@@ -1,0 +1,68 @@
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "understory/cli/command.h"
+#include "understory/cli/terminal.h"
+#include "understory/util/error.h"
+#include "understory/util/parallel.h"
+#include "understory/util/version.h"
+
+namespace understory {
+namespace {
+
+int complain(int code, const std::string& message) {
+  std::fprintf(stderr, "error: %s\n", message.c_str());
+  return code;
+}
+
+// The one place where errors become exit codes.
+int run_guarded(const Command& command, CommandContext& context) {
+  try {
+    int code = kExitDone;
+    with_threads(context.threads, [&] { code = command(context); });
+    return code;
+  } catch (const ConfigError& error) {
+    return complain(kExitUsage, error.what());
+  } catch (const InputError& error) {
+    return complain(kExitBadInput, error.what());
+  } catch (const OutputError& error) {
+    return complain(kExitBadInput, error.what());
+  } catch (const std::bad_alloc&) {
+    return complain(kExitDefect, "out of memory");
+  } catch (const std::exception& error) {
+    return complain(kExitDefect,
+                    std::string("a defect of the program, please report it: ") + error.what());
+  }
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Lidar SLAM and tree mapping under the forest canopy", "understory"};
+  app.set_version_flag("--version", kVersion);
+  app.require_subcommand(1);
+  app.fallthrough();
+  int threads = 0;
+  bool quiet = false;
+  bool verbose = false;
+  app.add_option("--threads", threads, "Threads to use (0 = all of the machine)")
+      ->check(CLI::Range(0, 1024));
+  app.add_flag("--quiet", quiet, "No progress and no information on stderr");
+  app.add_flag("--verbose", verbose, "Debug messages on stderr");
+  Command chosen;
+  // In the order of the help page; each lives in a file of its own.
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitDone : kExitUsage;
+  }
+  Log log(terminal_log(verbose, quiet));
+  CommandContext context{log, terminal_progress(quiet), install_stop_handler(), threads};
+  return run_guarded(chosen, context);
+}
+
+}  // namespace
+}  // namespace understory
+
+int main(int argc, char** argv) {
+  return understory::run(argc, argv);
+}

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "understory/util/log.h"
+#include "understory/util/progress.h"
+
+namespace understory {
+
+// Messages on stderr: "warning: ...", "error: ..."; debug messages only if `verbose`.
+[[nodiscard]] Log::Sink terminal_log(bool verbose, bool quiet);
+
+// Progress on stderr: one line that is rewritten on a terminal, a line every ten seconds otherwise,
+// with rate and remaining time.
+[[nodiscard]] ProgressSink terminal_progress(bool quiet);
+
+// Makes Ctrl-C (and SIGTERM) ask for a clean end; a second one ends the program at once.
+[[nodiscard]] StopRequested install_stop_handler();
+
+}  // namespace understory

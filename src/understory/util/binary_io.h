@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "understory/util/error.h"
+
+namespace understory {
+
+// Plain bytes in the machine's own order: for checkpoints, which are read by the program that wrote
+// them. Fixed-size Eigen matrices and other trivially laid-out values go through `put_raw`.
+class BinaryWriter {
+ public:
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  void put(const T& value) { bytes_.append(reinterpret_cast<const char*>(&value), sizeof(T)); }
+  void put(const std::string& text) {
+    put(static_cast<std::uint64_t>(text.size()));
+    bytes_ += text;
+  }
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  void put(const std::vector<T>& values) {
+    put(static_cast<std::uint64_t>(values.size()));
+    bytes_.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+  }
+  // `count` doubles, e.g. of a fixed-size Eigen matrix (matrix.data(), matrix.size()).
+  void put_doubles(const double* values, std::size_t count) {
+    bytes_.append(reinterpret_cast<const char*>(values), count * sizeof(double));
+  }
+  [[nodiscard]] const std::string& bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+// Reads what BinaryWriter wrote, in the same order. Throws InputError (naming `origin` and the
+// byte) where the bytes end too early.
+class BinaryReader {
+ public:
+  BinaryReader(std::string bytes, std::string origin)
+      : bytes_(std::move(bytes)), origin_(std::move(origin)) {}
+
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  [[nodiscard]] T get() {
+    T value;
+    std::memcpy(static_cast<void*>(&value), take(sizeof(T)), sizeof(T));
+    return value;
+  }
+  [[nodiscard]] std::string get_string() {
+    const auto size = get<std::uint64_t>();
+    return {take(size), static_cast<std::size_t>(size)};
+  }
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  [[nodiscard]] std::vector<T> get_vector() {
+    const auto size = get<std::uint64_t>();
+    if (size > bytes_.size() / sizeof(T)) fail();
+    std::vector<T> values(size);
+    if (size > 0)
+      std::memcpy(static_cast<void*>(values.data()), take(size * sizeof(T)), size * sizeof(T));
+    return values;
+  }
+  void get_doubles(double* values, std::size_t count) {
+    std::memcpy(values, take(count * sizeof(double)), count * sizeof(double));
+  }
+  [[nodiscard]] bool at_end() const { return position_ == bytes_.size(); }
+
+ private:
+  [[noreturn]] void fail() const {
+    throw InputError(origin_, "at byte " + std::to_string(position_), "ends too early");
+  }
+  const char* take(std::uint64_t size) {
+    if (size > bytes_.size() - position_) fail();
+    const char* at = bytes_.data() + position_;
+    position_ += static_cast<std::size_t>(size);
+    return at;
+  }
+
+  std::string bytes_;
+  std::string origin_;
+  std::size_t position_ = 0;
+};
+
+}  // namespace understory
