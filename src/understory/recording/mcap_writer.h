@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "understory/recording/recording.h"
+
+namespace understory {
+
+enum class McapCompression { kNone, kLz4, kZstd };
+
+struct McapWriterOptions {
+  McapCompression compression = McapCompression::kZstd;
+  int zstd_level = 1;                       // 1..19
+  std::size_t chunk_size_bytes = 4U << 20;  // a chunk is closed once it holds that much
+};
+
+// Writes the project's native recording: MCAP with ROS 2 messages (CDR), chunks with CRC, message
+// and chunk indexes, statistics and a summary, on the topics /lidar, /imu, /mag, /gnss,
+// /gnss/quality and /tf_static. A message's log time is its event_time: a scan's is its end.
+//
+// Events are to be written in the order of their event_time; other orders are kept as they come.
+// Every method throws OutputError if the file cannot be written (disk full, no permission). What was
+// written before stays readable: an unfinished file is read up to its last whole chunk.
+// Not thread-safe.
+class McapWriter {
+ public:
+  explicit McapWriter(const std::string& path, const McapWriterOptions& options = {});
+  // Finishes the file if `finish` was not called; errors are swallowed then.
+  ~McapWriter();
+  McapWriter(const McapWriter&) = delete;
+  McapWriter& operator=(const McapWriter&) = delete;
+
+  // Goes out as /tf_static (body frame to each sensor whose place is known) before the next event.
+  void set_rig(const Rig& rig);
+
+  void write(const Scan& scan);
+  void write(const ImuSample& sample);
+  void write(const GnssFix& fix);  // /gnss/quality and /gnss
+  void write(const MagSample& sample);
+  void write(const Event& event);
+
+  // Closes the last chunk, writes index and summary, and syncs the file to the disk.
+  void finish();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace understory
