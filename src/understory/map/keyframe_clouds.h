@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "understory/util/time.h"
+
+namespace understory {
+
+// One point of a keyframe's cloud, in the body frame at the keyframe's stamp, metres.
+struct KeyframePoint {
+  float x = 0.0F;
+  float y = 0.0F;
+  float z = 0.0F;
+  std::uint16_t intensity = 0;
+  std::uint16_t t_10us = 0;  // since the keyframe's stamp, in steps of 10 microseconds
+};
+
+struct KeyframeCloud {
+  std::int32_t id = 0;
+  TimeNs stamp = 0;
+  std::vector<KeyframePoint> points;
+};
+
+// The keyframes' full clouds on disk, appended one after another, so that memory does not grow with
+// the length of a run. What was appended before `flush` survives a crash of the program.
+// Not thread-safe. Throws OutputError where the disk is full, InputError where the file is damaged.
+class KeyframeClouds {
+ public:
+  // Opens `path`; keeps the first `keep` clouds that are there and cuts off the rest (0 = all).
+  KeyframeClouds(const std::filesystem::path& path, std::size_t keep);
+
+  void append(const KeyframeCloud& cloud);
+  void flush();
+  [[nodiscard]] std::size_t size() const { return offsets_.size(); }
+  // The i-th appended cloud.
+  [[nodiscard]] KeyframeCloud read(std::size_t i) const;
+  [[nodiscard]] std::uint64_t bytes() const { return end_; }
+
+ private:
+  void index_existing(std::size_t keep);
+
+  std::filesystem::path path_;
+  mutable std::fstream file_;
+  std::vector<std::uint64_t> offsets_;
+  std::uint64_t end_ = 0;
+};
+
+}  // namespace understory

@@ -1,0 +1,120 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "understory/map/keyframe_clouds.h"
+#include "understory/map/map_tiles.h"
+#include "understory/util/error.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+std::filesystem::path scratch(const std::string& name) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / "understory_map_test";
+  std::filesystem::create_directories(folder);
+  return folder / name;
+}
+
+KeyframeCloud cloud_of(int id, std::size_t points) {
+  KeyframeCloud cloud{id, 100 * id, {}};
+  for (std::size_t i = 0; i < points; ++i) {
+    cloud.points.push_back(
+        {static_cast<float>(id), static_cast<float>(i), 0.5F, static_cast<std::uint16_t>(i), 7});
+  }
+  return cloud;
+}
+
+TEST(KeyframeClouds, ReadsBackInAnyOrder) {
+  KeyframeClouds clouds(scratch("a.bin"), 0);
+  for (int id = 0; id < 5; ++id)
+    clouds.append(cloud_of(id, static_cast<std::size_t>(10 * id)));
+  for (const std::size_t i : {4U, 0U, 2U}) {
+    const KeyframeCloud cloud = clouds.read(i);
+    EXPECT_EQ(cloud.id, static_cast<int>(i));
+    EXPECT_EQ(cloud.stamp, static_cast<TimeNs>(100 * i));
+    ASSERT_EQ(cloud.points.size(), 10 * i);
+    if (i > 0) {
+      EXPECT_EQ(cloud.points.back().y, static_cast<float>(10 * i - 1));
+    }
+  }
+}
+
+TEST(KeyframeClouds, ReopeningCutsOffWhatTheCheckpointDoesNotKnow) {
+  {
+    KeyframeClouds clouds(scratch("b.bin"), 0);
+    for (int id = 0; id < 5; ++id)
+      clouds.append(cloud_of(id, 10));
+    clouds.flush();
+  }
+  KeyframeClouds clouds(scratch("b.bin"), 3);
+  EXPECT_EQ(clouds.size(), 3U);
+  clouds.append(cloud_of(9, 4));
+  EXPECT_EQ(clouds.read(3).id, 9);
+  EXPECT_EQ(clouds.read(2).id, 2);
+  EXPECT_EQ(std::filesystem::file_size(scratch("b.bin")), clouds.bytes());
+}
+
+TEST(KeyframeClouds, ATruncatedFileIsAnInputError) {
+  {
+    KeyframeClouds clouds(scratch("c.bin"), 0);
+    for (int id = 0; id < 2; ++id)
+      clouds.append(cloud_of(id, 10));
+    clouds.flush();
+  }
+  std::filesystem::resize_file(scratch("c.bin"), std::filesystem::file_size(scratch("c.bin")) - 1);
+  EXPECT_THROW(KeyframeClouds(scratch("c.bin"), 2), InputError);
+}
+
+TEST(MapTiles, HandsBackEveryPointOnceInOrderOfTiles) {
+  MapTiles tiles(scratch("tiles"), {10.0, 0.0});
+  Random random(3);
+  double sum = 0.0;
+  for (int i = 0; i < 10'000; ++i) {
+    const MapPoint p{random.uniform(-50, 50), random.uniform(-50, 50), random.uniform(0, 5), i, 1};
+    sum += p.x + p.y;
+    tiles.add(p);
+  }
+  std::size_t count = 0;
+  double sum_back = 0.0;
+  std::set<TimeNs> stamps;
+  std::pair<int, int> last{-1000, -1000};
+  tiles.for_each([&](MapTiles::TileIndex index, const std::vector<MapPoint>& points) {
+    const std::pair<int, int> yx{index.second, index.first};
+    EXPECT_LT(last, yx);
+    last = yx;
+    for (const MapPoint& p : points) {
+      EXPECT_EQ(static_cast<int>(std::floor(p.x / 10.0)), index.first);
+      sum_back += p.x + p.y;
+      stamps.insert(p.stamp);
+      ++count;
+    }
+  });
+  EXPECT_EQ(count, 10'000U);
+  EXPECT_EQ(stamps.size(), 10'000U);
+  EXPECT_NEAR(sum_back, sum, 1e-2);
+}
+
+TEST(MapTiles, ThinsToTheFirstPointOfEachCube) {
+  MapTiles tiles(scratch("thin"), {10.0, 0.1});
+  tiles.add({1.01, 1.01, 0.01, 1, 0});
+  tiles.add({1.02, 1.03, 0.04, 2, 0});
+  tiles.add({1.02, 1.03, 0.14, 3, 0});
+  std::vector<TimeNs> kept;
+  tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+    for (const MapPoint& p : points)
+      kept.push_back(p.stamp);
+  });
+  EXPECT_EQ(kept, (std::vector<TimeNs>{1, 3}));
+}
+
+TEST(MapTiles, RefusesPlacesThatAreNotNumbers) {
+  MapTiles tiles(scratch("nan"), {10.0, 0.1});
+  tiles.add({std::nan(""), 0, 0, 1, 0});
+  tiles.add({0, INFINITY, 0, 1, 0});
+  EXPECT_EQ(tiles.points_added(), 0U);
+}
+
+}  // namespace
+}  // namespace understory

@@ -1,0 +1,115 @@
+#include "understory/map/map_tiles.h"
+
+#include <cmath>
+#include <fstream>
+#include <unordered_set>
+
+#include "understory/util/error.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+constexpr std::uint64_t kBufferedPoints = 4'000'000;  // 96 MB over all tiles
+
+}  // namespace
+
+struct MapTiles::Record {
+  float x, y, z;
+  std::uint16_t intensity;
+  TimeNs stamp;
+};
+
+struct MapTiles::Tile {
+  std::vector<Record> buffer;
+  std::uint64_t written = 0;  // records in its file
+};
+
+MapTiles::MapTiles(std::filesystem::path folder, const Config& config)
+    : folder_(std::move(folder)), config_(config) {
+  std::error_code error;
+  std::filesystem::remove_all(folder_, error);
+  std::filesystem::create_directories(folder_, error);
+  if (error) throw OutputError(folder_.string(), "cannot be created: " + error.message());
+}
+
+MapTiles::~MapTiles() {
+  std::error_code ignored;  // leftovers of a temporary folder are no reason to fail
+  std::filesystem::remove_all(folder_, ignored);
+}
+
+void MapTiles::add(const MapPoint& point) {
+  const double i = std::floor(point.x / config_.tile_m);
+  const double j = std::floor(point.y / config_.tile_m);
+  if (!(std::abs(i) < 1e9 && std::abs(j) < 1e9)) return;  // not a finite place
+  const TileIndex index{static_cast<std::int32_t>(i), static_cast<std::int32_t>(j)};
+  tiles_[index].buffer.push_back({static_cast<float>(point.x - i * config_.tile_m),
+                                  static_cast<float>(point.y - j * config_.tile_m),
+                                  static_cast<float>(point.z), point.intensity, point.stamp});
+  ++points_added_;
+  if (++buffered_ < kBufferedPoints) return;
+  for (auto& [at, tile] : tiles_)
+    write_out(at, tile);
+  buffered_ = 0;
+}
+
+std::filesystem::path MapTiles::file_of(TileIndex index) const {
+  return folder_ / (std::to_string(index.first) + "_" + std::to_string(index.second) + ".tile");
+}
+
+void MapTiles::write_out(TileIndex index, Tile& tile) {
+  if (tile.buffer.empty()) return;
+  const std::filesystem::path path = file_of(index);
+  std::ofstream file(path, std::ios::binary | std::ios::app);
+  file.write(reinterpret_cast<const char*>(tile.buffer.data()),
+             static_cast<std::streamsize>(tile.buffer.size() * sizeof(Record)));
+  file.close();
+  if (!file) throw OutputError(path.string(), "cannot be written (is the disk full?)");
+  tile.written += tile.buffer.size();
+  std::vector<Record>().swap(tile.buffer);
+}
+
+std::vector<MapTiles::Record> MapTiles::load(TileIndex index, const Tile& tile) const {
+  std::vector<Record> records(tile.written);
+  if (tile.written > 0) {
+    const std::filesystem::path path = file_of(index);
+    std::ifstream file(path, std::ios::binary);
+    file.read(reinterpret_cast<char*>(records.data()),
+              static_cast<std::streamsize>(tile.written * sizeof(Record)));
+    if (!file) throw InputError(path.string(), "", "a temporary tile cannot be read back");
+  }
+  records.insert(records.end(), tile.buffer.begin(), tile.buffer.end());
+  return records;
+}
+
+std::vector<MapPoint> MapTiles::thinned(TileIndex index, std::vector<Record> records) const {
+  std::unordered_set<std::uint64_t> taken;
+  taken.reserve(records.size());
+  std::vector<MapPoint> points;
+  const auto cell = [&](float value) {
+    return static_cast<std::uint64_t>(
+        static_cast<std::int64_t>(std::floor(static_cast<double>(value) / config_.thin_m)));
+  };
+  for (const Record& r : records) {
+    if (config_.thin_m > 0.0 &&
+        !taken.insert(hash_numbers(cell(r.x), cell(r.y), cell(r.z))).second) {
+      continue;
+    }
+    points.push_back({index.first * config_.tile_m + static_cast<double>(r.x),
+                      index.second * config_.tile_m + static_cast<double>(r.y),
+                      static_cast<double>(r.z), r.stamp, r.intensity});
+  }
+  return points;
+}
+
+void MapTiles::for_each(const std::function<void(TileIndex, const std::vector<MapPoint>&)>& visit) {
+  std::map<TileIndex, const Tile*> in_order;  // by y, then x
+  for (const auto& [index, tile] : tiles_)
+    in_order[{index.second, index.first}] = &tile;
+  for (const auto& [swapped, tile] : in_order) {
+    const TileIndex index{swapped.second, swapped.first};
+    visit(index, thinned(index, load(index, *tile)));
+  }
+}
+
+}  // namespace understory

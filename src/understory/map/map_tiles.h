@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "understory/util/time.h"
+
+namespace understory {
+
+// A point of the finished map, world frame, metres. Coordinates are relative to the tile's corner
+// in single precision and exact to 1e-6 m there.
+struct MapPoint {
+  double x = 0.0;
+  double y = 0.0;
+  double z = 0.0;
+  TimeNs stamp = 0;
+  std::uint16_t intensity = 0;
+};
+
+// Sorts the points of a map of any size into square tiles, on disk where they are many, and hands
+// the tiles back one by one, thinned: at most one point (the first that was measured) in each cube
+// of `thin_m`. Memory is that of one tile and of the write buffers.
+class MapTiles {
+ public:
+  struct Config {
+    double tile_m = 20.0;
+    double thin_m = 0.02;  // 0 = keep every point
+  };
+  using TileIndex = std::pair<std::int32_t, std::int32_t>;  // x, y in tiles
+
+  // `folder` is made, and removed again by the destructor.
+  MapTiles(std::filesystem::path folder, const Config& config);
+  ~MapTiles();
+  MapTiles(const MapTiles&) = delete;
+  MapTiles& operator=(const MapTiles&) = delete;
+
+  void add(const MapPoint& point);
+  // Calls `visit` with each non-empty tile's points, tiles in order of y then x. To be called after
+  // the last `add`; may be called again.
+  void for_each(const std::function<void(TileIndex, const std::vector<MapPoint>&)>& visit);
+  [[nodiscard]] std::uint64_t points_added() const { return points_added_; }
+
+ private:
+  struct Record;
+  struct Tile;
+  void write_out(TileIndex index, Tile& tile);
+  [[nodiscard]] std::filesystem::path file_of(TileIndex index) const;
+  [[nodiscard]] std::vector<Record> load(TileIndex index, const Tile& tile) const;
+  [[nodiscard]] std::vector<MapPoint> thinned(TileIndex index, std::vector<Record> records) const;
+
+  std::filesystem::path folder_;
+  Config config_;
+  std::map<TileIndex, Tile> tiles_;
+  std::uint64_t points_added_ = 0;
+  std::uint64_t buffered_ = 0;
+};
+
+}  // namespace understory

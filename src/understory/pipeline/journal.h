@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "understory/geometry/pose.h"
+#include "understory/util/time.h"
+
+namespace understory {
+
+// How a scan's pose came about.
+enum class ScanOutcome : std::uint8_t {
+  kMatched,    // a lidar match went into the state
+  kGated,      // the match made the velocity jump and was dropped (P2-8)
+  kUnmatched,  // no usable match; the prediction stands in
+};
+
+// What the run remembers of each scan. Poses are in the odometry frame; the correction of the second
+// graph is applied on output.
+struct ScanRecord {
+  TimeNs stamp = 0;
+  std::int32_t keyframe = -1;  // the last keyframe at that time (its own if it became one)
+  ScanOutcome outcome = ScanOutcome::kMatched;
+  std::uint8_t degenerate_directions = 0;
+  std::uint16_t iterations = 0;
+  std::array<double, 4> rotation{0, 0, 0, 1};  // x y z w
+  std::array<double, 3> translation{};
+  std::array<double, 3> velocity{};
+  std::array<double, 3> gyro_bias{};
+  std::array<double, 3> accel_bias{};
+  std::array<double, 21> covariance{};  // upper triangle, row by row, rotation first, body frame
+  float fitness_m2 = 0.0F;
+  float inlier_ratio = 0.0F;
+  float wall_ms = 0.0F;
+  float cpu_ms = 0.0F;
+  std::uint32_t points = 0;          // of the scan as read
+  std::uint32_t matched_points = 0;  // after the voxel filter
+
+  [[nodiscard]] Pose odom_from_body() const;
+  void set_pose(const Pose& odom_from_body);
+  [[nodiscard]] Matrix6d pose_covariance() const;
+  void set_covariance(const Matrix6d& covariance);
+};
+
+// Append-only file of ScanRecords, so that memory does not grow with the length of a run.
+class Journal {
+ public:
+  // Opens `path` and keeps the first `keep` records that are there (0: starts anew).
+  Journal(const std::filesystem::path& path, std::uint64_t keep);
+  void append(const ScanRecord& record);
+  void flush();
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  void for_each(const std::function<void(const ScanRecord&)>& visit) const;
+
+ private:
+  std::filesystem::path path_;
+  std::ofstream file_;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace understory
