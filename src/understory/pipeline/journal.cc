@@ -19,7 +19,8 @@ Matrix6d ScanRecord::pose_covariance() const {
   Matrix6d matrix;
   std::size_t k = 0;
   for (int i = 0; i < 6; ++i) {
-    for (int j = i; j < 6; ++j) matrix(i, j) = matrix(j, i) = covariance[k++];
+    for (int j = i; j < 6; ++j)
+      matrix(i, j) = matrix(j, i) = covariance[k++];
   }
   return matrix;
 }
@@ -27,7 +28,8 @@ Matrix6d ScanRecord::pose_covariance() const {
 void ScanRecord::set_covariance(const Matrix6d& matrix) {
   std::size_t k = 0;
   for (int i = 0; i < 6; ++i) {
-    for (int j = i; j < 6; ++j) covariance[k++] = matrix(i, j);
+    for (int j = i; j < 6; ++j)
+      covariance[k++] = matrix(i, j);
   }
 }
 
@@ -37,8 +39,8 @@ Journal::Journal(const std::filesystem::path& path, std::uint64_t keep) : path_(
     std::error_code error;
     const std::uint64_t bytes = std::filesystem::file_size(path, error);
     if (error || bytes < keep * sizeof(ScanRecord)) {
-      throw InputError(path.string(), "", "holds fewer scans than its checkpoint says (" +
-                                              std::to_string(keep) + ")");
+      throw InputError(path.string(), "",
+                       "holds fewer scans than its checkpoint says (" + std::to_string(keep) + ")");
     }
     std::filesystem::resize_file(path, keep * sizeof(ScanRecord));
     mode = std::ios::binary | std::ios::app;

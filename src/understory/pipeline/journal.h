@@ -18,8 +18,8 @@ enum class ScanOutcome : std::uint8_t {
   kUnmatched,  // no usable match; the prediction stands in
 };
 
-// What the run remembers of each scan. Poses are in the odometry frame; the correction of the second
-// graph is applied on output.
+// What the run remembers of each scan. Poses are in the odometry frame; the correction of the
+// second graph is applied on output.
 struct ScanRecord {
   TimeNs stamp = 0;
   std::int32_t keyframe = -1;  // the last keyframe at that time (its own if it became one)
