@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
+#include "understory/geometry/stamped_pose.h"
 #include "understory/sensor/imu_sample.h"
 #include "understory/sensor/rig.h"
 #include "understory/util/binary_io.h"
@@ -23,11 +24,6 @@ struct NavState {
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();          // rad/s, frame of the IMU
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();         // m/s^2, frame of the IMU
   Matrix6d pose_covariance = Matrix6d::Zero();  // right perturbation, rotation first (body frame)
-};
-
-struct StampedPose {
-  TimeNs stamp = 0;
-  Pose world_from_body;
 };
 
 // What matching one scan to the local map said.

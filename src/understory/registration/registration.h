@@ -4,12 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
 
 namespace understory {
-
-// Points in single precision, metres, relative to an origin near them (body or local frame).
-using Points = std::vector<Eigen::Vector3f>;
 
 // What is believed of the pose before matching; added to the cost as a Gaussian.
 struct PosePrior {
