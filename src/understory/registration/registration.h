@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <string>
-#include <vector>
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
@@ -18,6 +17,7 @@ struct PosePrior {
 enum class RegistrationStatus {
   kConverged,
   kIterationLimit,  // the step had not become small; the pose is still the best found
+  kDegenerate,      // nothing at all constrains the pose; pose = guess
   kTooFewPoints,    // source or target too small to match; pose = guess
   kTooFewMatches,   // hardly any source point near the target; pose = guess
 };
@@ -28,7 +28,12 @@ struct RegistrationResult {
   std::string reason;  // for the log and the report, empty if converged
   Pose target_from_source;
   Matrix6d information = Matrix6d::Zero();  // right perturbation at the solution, 1/rad^2, 1/m^2
-  double fitness_m2 = 0.0;    // mean squared distance of matched points, P4 (36); lower is better
+  // Mean squared distance of matched points from what they matched, P4 (36); lower is better. NDT:
+  // from the mean of the nearest cell; ICP: from the nearest target point.
+  double fitness_m2 = 0.0;
+  // The same along the directions that the target's surface constrains (point to plane); 0 for a
+  // perfect match, unlike fitness_m2, which never falls below the spacing of the target.
+  double surface_residual_m2 = 0.0;
   double inlier_ratio = 0.0;  // share of source points with a match, 0..1
   int iterations = 0;
   // Unit directions of the tangent space (rotation first, rotation scaled by the mean range of the

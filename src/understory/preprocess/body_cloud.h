@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "understory/geometry/points.h"
+#include "understory/util/time.h"
+
+namespace understory {
+
+// A deskewed scan: all returns in the body frame as it stood at `stamp`. Parallel arrays, one entry
+// a return, in the order of the scan.
+struct BodyCloud {
+  TimeNs stamp = 0;
+  Points points;                 // metres, body frame at `stamp`
+  std::vector<float> intensity;  // as the sensor gives it
+  std::vector<float> range;      // metres from the lidar's origin when measured
+  std::vector<std::uint16_t> ring;
+  std::vector<std::uint32_t> t_ns;  // since `stamp`
+
+  [[nodiscard]] std::size_t size() const { return points.size(); }
+  [[nodiscard]] bool empty() const { return points.empty(); }
+  void resize(std::size_t n) {
+    points.resize(n);
+    intensity.resize(n);
+    range.resize(n);
+    ring.resize(n);
+    t_ns.resize(n);
+  }
+};
+
+}  // namespace understory

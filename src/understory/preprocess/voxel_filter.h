@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "understory/preprocess/body_cloud.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+enum class VoxelPoint {
+  kMean,           // mean of the points of the voxel, P4 section 3.1.1
+  kNearestToMean,  // the measured point nearest to that mean
+  kFirst,          // the first point that fell into the voxel
+};
+
+struct VoxelFilterConfig {
+  double voxel_size_m = 0.4;
+  double range_min_m = 0.5;
+  double range_max_m = 120.0;
+  VoxelPoint point = VoxelPoint::kMean;
+  int min_points = 1;  // voxels with fewer are left out
+};
+void describe(ConfigTable& table, VoxelFilterConfig& config);
+
+// One point a voxel, in the order in which the voxels were first met. Keeps its hash table between
+// calls, so that a call costs no allocation beyond its result. Not thread-safe: one per thread.
+class VoxelFilter {
+ public:
+  // Ranges are measured from the lidar where the cloud has them.
+  [[nodiscard]] BodyCloud filter(const BodyCloud& cloud, const VoxelFilterConfig& config);
+  // Without range limits; points only. `keep` returns indices instead: the point of each voxel that
+  // VoxelPoint names (kMean counts as kNearestToMean).
+  [[nodiscard]] Points filter(const Points& points, double voxel_size_m);
+  [[nodiscard]] std::vector<std::uint32_t> keep(const Points& points, double voxel_size_m,
+                                                VoxelPoint point = VoxelPoint::kFirst);
+
+ private:
+  struct Voxel {
+    float sum[3];  // from the corner of the voxel
+    float intensity;
+    std::uint32_t count;
+    std::uint32_t index;  // of the first point, later of the chosen one
+    float best;           // squared distance of the chosen point from the mean
+    std::uint32_t range_count_unused;
+  };
+  struct Slot {
+    std::uint64_t key;
+    std::uint32_t epoch;
+    std::uint32_t voxel;
+  };
+  void start(std::size_t points);
+  std::uint32_t find_or_add(std::uint64_t key, std::uint32_t index);
+  void grow();
+  void accumulate(const Points& points, const std::vector<float>* intensity,
+                  const std::vector<float>* range, const VoxelFilterConfig& config);
+
+  std::vector<Slot> slots_;
+  std::vector<Voxel> voxels_;
+  std::vector<std::uint64_t> keys_;  // of the voxels
+  std::vector<std::uint32_t> voxel_of_point_;
+  std::uint32_t epoch_ = 0;
+  std::uint64_t mask_ = 0;
+};
+
+// At most `limit` of the indices 0..n-1, spread evenly over them with a random phase per interval
+// (stratified sampling), sorted. The same seed gives the same choice.
+[[nodiscard]] std::vector<std::uint32_t> decimate(std::size_t n, std::size_t limit,
+                                                  std::uint64_t seed);
+
+}  // namespace understory

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "understory/registration/registration.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+struct IcpConfig {
+  enum class Metric { kPointToPoint, kPointToPlane };
+
+  Metric metric = Metric::kPointToPlane;
+  double max_distance_m = 1.0;  // farther neighbours are no match
+  double kernel_m = 0.1;        // scale of the Geman-McClure kernel
+  int normal_neighbours = 10;
+  double max_planarity = 0.1;  // smallest / middle eigenvalue; above it a point has no normal and
+                               // is matched point to point
+  int max_iterations = 50;
+  double step_translation_m = 2e-4;
+  double step_rotation_rad = 2e-5;
+  double degenerate_ratio = 0.01;
+  int min_matches = 50;
+};
+void describe(ConfigTable& table, IcpConfig& config);
+
+// Target of ICP: points with a search tree and normals. Immutable, shared between threads.
+class IcpTarget {
+ public:
+  IcpTarget(const Points& points, const IcpConfig& config);
+  ~IcpTarget();
+  IcpTarget(const IcpTarget&) = delete;
+  IcpTarget& operator=(const IcpTarget&) = delete;
+  struct Tree;
+  [[nodiscard]] const Tree& tree() const { return *tree_; }
+
+ private:
+  std::unique_ptr<Tree> tree_;
+};
+
+// Iterative closest points with a robust kernel, for the last refinement of loop closures.
+// Parallel; same bits for any number of threads. Thread-safe.
+[[nodiscard]] RegistrationResult register_icp(const IcpTarget& target, const Points& source,
+                                              const Pose& guess,
+                                              const std::optional<PosePrior>& prior,
+                                              const IcpConfig& config);
+
+}  // namespace understory

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "understory/registration/ndt_map.h"
+#include "understory/registration/registration.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+struct NdtConfig {
+  enum class Search {
+    k1,
+    k7,
+    k8,
+    k27
+  };  // own cell; with face neighbours; the 2x2x2 cells around
+      // the point; with all neighbours
+  enum class Hessian { kGaussNewton, kNewton };
+
+  Search search = Search::k8;
+  Hessian hessian = Hessian::kGaussNewton;
+  // Share of points expected to match nothing, P4 after (41) [Magnusson 2009, (6.8)].
+  double outlier_ratio = 0.3;
+  int max_iterations = 30;
+  double step_translation_m = 5e-4;  // converged when a step is smaller than both
+  double step_rotation_rad = 5e-5;
+  double max_step_m = 0.5;         // longest step; rotations scaled by the mean range
+  double degenerate_ratio = 0.01;  // a direction with less than this share of the strongest
+                                   // direction's information counts as undetermined
+  int min_matches = 50;
+};
+void describe(ConfigTable& table, NdtConfig& config);
+
+// Matches a source cloud to the target, P4 (41): minimises the sum over points of
+// -log(mixture of the cell's normal and a uniform distribution), plus the prior's Mahalanobis
+// distance, by damped Newton steps that never raise the cost. Source points should be thinned by a
+// voxel filter first. Parallel; same bits for any number of threads. Thread-safe.
+[[nodiscard]] RegistrationResult register_ndt(const NdtMap& target, const Points& source,
+                                              const Pose& guess,
+                                              const std::optional<PosePrior>& prior,
+                                              const NdtConfig& config);
+
+// Coarse to fine: each map in turn, the answer of one is the guess of the next.
+[[nodiscard]] RegistrationResult register_ndt(std::span<const NdtMapPtr> targets,
+                                              const Points& source, const Pose& guess,
+                                              const std::optional<PosePrior>& prior,
+                                              const NdtConfig& config);
+
+}  // namespace understory

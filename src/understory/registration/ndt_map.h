@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "understory/geometry/points.h"
+#include "understory/geometry/pose.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+struct NdtMapConfig {
+  double cell_size_m = 1.0;     // edge of a cell
+  int min_points = 5;           // cells with fewer have no distribution
+  double sigma_floor_m = 0.03;  // a surface is never taken to be thinner: sensor and pose noise
+};
+void describe(ConfigTable& table, NdtMapConfig& config);
+
+// What a cell tells about a point in it. The information of its normal distribution (P4 (40)) is
+// kept as rows: information = sum over rows of row * row^T, where row = eigenvector / sigma, and
+// directions that say nothing (along a surface, or as wide as the cell itself) have no row.
+struct NdtCell {
+  Eigen::Vector3f mean;                // from the centre of the cell, metres
+  std::uint32_t count = 0;             // points
+  int rows = 0;                        // 0 to 3; 0: the cell matches but does not constrain
+  std::array<Eigen::Vector3f, 3> row;  // 1/m
+};
+
+// Target of NDT: a grid of normal distributions. Immutable and shared between threads; made by
+// NdtMapBuilder. Cells are addressed by integers: floor(coordinate / cell_size).
+class NdtMap {
+ public:
+  [[nodiscard]] double cell_size() const { return cell_size_; }
+  [[nodiscard]] std::size_t size() const { return cells_.size(); }
+  [[nodiscard]] bool empty() const { return cells_.empty(); }
+  // The cell at integer coordinates, or null.
+  [[nodiscard]] const NdtCell* find(int x, int y, int z) const;
+  // All cells and their coordinates, in the order of first insertion.
+  [[nodiscard]] const std::vector<NdtCell>& cells() const { return cells_; }
+  [[nodiscard]] const std::vector<std::array<int, 3>>& coordinates() const { return coordinates_; }
+  // Mean of a cell in the map frame.
+  [[nodiscard]] Eigen::Vector3d mean(std::size_t index) const;
+
+ private:
+  friend class NdtMapBuilder;
+  double cell_size_ = 1.0;
+  std::vector<NdtCell> cells_;
+  std::vector<std::array<int, 3>> coordinates_;
+  std::vector<std::uint32_t> slots_;  // index + 1 into cells_, 0 = free
+  std::uint64_t mask_ = 0;
+};
+using NdtMapPtr = std::shared_ptr<const NdtMap>;
+
+// Collects points into cells and makes snapshots. Sums are kept from the centre of each cell, so
+// that precision does not depend on how far the map reaches. Not thread-safe itself; works in
+// parallel inside, with the same bits for any number of threads.
+class NdtMapBuilder {
+ public:
+  explicit NdtMapBuilder(const NdtMapConfig& config);
+  ~NdtMapBuilder();
+  NdtMapBuilder(NdtMapBuilder&&) noexcept;
+  NdtMapBuilder& operator=(NdtMapBuilder&&) noexcept;
+
+  // Adds points given in a source frame (a keyframe's body).
+  void insert(const Points& points_in_source, const Pose& map_from_source);
+  // Forgets the cells farther than that from the centre (map frame).
+  void remove_beyond(const Eigen::Vector3d& center, double radius_m);
+  void clear();
+  // The map as it is now. Only cells changed since the last snapshot, and their neighbours, are
+  // worked out again.
+  [[nodiscard]] NdtMapPtr snapshot();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// One cloud of a map and where it is.
+struct PlacedCloud {
+  const Points* points_in_source = nullptr;
+  Pose map_from_source;
+};
+[[nodiscard]] NdtMapPtr build_ndt_map(std::span<const PlacedCloud> clouds,
+                                      const NdtMapConfig& config);
+
+}  // namespace understory
