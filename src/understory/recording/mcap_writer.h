@@ -21,9 +21,9 @@ struct McapWriterOptions {
 // /gnss/quality and /tf_static. A message's log time is its event_time: a scan's is its end.
 //
 // Events are to be written in the order of their event_time; other orders are kept as they come.
-// Every method throws OutputError if the file cannot be written (disk full, no permission). What was
-// written before stays readable: an unfinished file is read up to its last whole chunk.
-// Not thread-safe.
+// Every method throws OutputError if the file cannot be written (disk full, no permission). What
+// was written before stays readable: an unfinished file is read up to its last whole chunk. Not
+// thread-safe.
 class McapWriter {
  public:
   explicit McapWriter(const std::string& path, const McapWriterOptions& options = {});
