@@ -1,0 +1,43 @@
+# Flags in two targets: understory_flags for everything that shares types (standard, instruction
+# set, sanitizers), understory_own_code for our own files only (warnings).
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+if(NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  find_program(CCACHE_PROGRAM ccache)
+  mark_as_advanced(CCACHE_PROGRAM)
+  if(CCACHE_PROGRAM)
+    set(CMAKE_C_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
+    set(CMAKE_CXX_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
+  endif()
+endif()
+
+add_library(understory_flags INTERFACE)
+add_library(understory_own_code INTERFACE)
+target_compile_options(understory_own_code INTERFACE
+  -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+  $<$<BOOL:${UNDERSTORY_WARNINGS_AS_ERRORS}>:-Werror>)
+find_package(Threads REQUIRED)
+target_link_libraries(understory_flags INTERFACE Threads::Threads)
+
+if(UNDERSTORY_SANITIZERS)
+  target_compile_options(understory_flags INTERFACE
+    -fsanitize=${UNDERSTORY_SANITIZERS} -fno-omit-frame-pointer)
+  target_link_options(understory_flags INTERFACE -fsanitize=${UNDERSTORY_SANITIZERS})
+  if(UNDERSTORY_SANITIZERS MATCHES "undefined")
+    target_compile_options(understory_flags INTERFACE -fno-sanitize-recover=undefined)
+  endif()
+endif()
+
+# Linking with lld takes a tenth of the time of the default linker.
+find_program(LLD_PROGRAM ld.lld)
+mark_as_advanced(LLD_PROGRAM)
+if(LLD_PROGRAM)
+  add_link_options(-fuse-ld=lld)
+endif()

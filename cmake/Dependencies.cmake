@@ -1,0 +1,78 @@
+# Every third-party library as an imported target, so that its headers count as system headers.
+#   Eigen3::Eigen TBB::tbb spdlog::spdlog fmt::fmt understory::nanoflann understory::cgal
+#   understory::gdal understory::proj understory::embree understory::fastcdr understory::lz4
+#   understory::zstd understory::bz2 ZLIB::ZLIB understory::pcap SQLite::SQLite3
+#   understory::yaml understory::cli11 understory::json GTest::gtest_main
+#   understory::gtsam understory::laszip
+include(Gtsam)
+include(Laszip)
+
+# understory_find(<name> HEADER <file> [LIBRARY <name>] [SUFFIXES <include subfolder>])
+# For packages without a usable CMake file of their own.
+function(understory_find name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "HEADER;LIBRARY" "SUFFIXES")
+  string(TOUPPER ${name} upper)
+  find_path(${upper}_HEADERS NAMES ${arg_HEADER} PATH_SUFFIXES ${arg_SUFFIXES} REQUIRED)
+  mark_as_advanced(${upper}_HEADERS)
+  add_library(understory_dep_${name} INTERFACE IMPORTED GLOBAL)
+  add_library(understory::${name} ALIAS understory_dep_${name})
+  if(NOT ${upper}_HEADERS STREQUAL "/usr/include")
+    target_include_directories(understory_dep_${name} SYSTEM INTERFACE "${${upper}_HEADERS}")
+  endif()
+  if(arg_LIBRARY)
+    find_library(${upper}_LIBRARY ${arg_LIBRARY} REQUIRED)
+    mark_as_advanced(${upper}_LIBRARY)
+    target_link_libraries(understory_dep_${name} INTERFACE "${${upper}_LIBRARY}")
+  endif()
+endfunction()
+
+# understory_dependency(<name> <target>...): gives package targets our own name.
+function(understory_dependency name)
+  add_library(understory_dep_${name} INTERFACE IMPORTED GLOBAL)
+  add_library(understory::${name} ALIAS understory_dep_${name})
+  target_link_libraries(understory_dep_${name} INTERFACE ${ARGN})
+endfunction()
+
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(TBB REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(BZip2 REQUIRED)
+find_package(SQLite3 REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(fastcdr REQUIRED)
+understory_dependency(bz2 BZip2::BZip2)
+understory_dependency(fastcdr fastcdr)
+understory_dependency(yaml $<IF:$<TARGET_EXISTS:yaml-cpp::yaml-cpp>,yaml-cpp::yaml-cpp,yaml-cpp>)
+understory_find(nanoflann HEADER nanoflann.hpp)
+understory_find(json HEADER nlohmann/json.hpp)
+understory_find(cli11 HEADER CLI/CLI.hpp)
+understory_find(lz4 HEADER lz4frame.h LIBRARY lz4)
+understory_find(zstd HEADER zstd.h LIBRARY zstd)
+understory_find(pcap HEADER pcap/pcap.h LIBRARY pcap)
+understory_find(proj HEADER proj.h LIBRARY proj)
+understory_find(gdal HEADER gdal_priv.h LIBRARY gdal SUFFIXES gdal)
+
+# CGAL header-only with the number types it needs; its own CMake file would set global flags.
+understory_find(cgal HEADER CGAL/Delaunay_triangulation_3.h LIBRARY gmp)
+find_library(MPFR_LIBRARY mpfr REQUIRED)
+mark_as_advanced(MPFR_LIBRARY)
+target_link_libraries(understory_dep_cgal INTERFACE "${MPFR_LIBRARY}")
+
+# Embree 4 (Debian 13) and 3 (Debian 12) differ in the header's folder and a few calls.
+find_path(EMBREE_HEADERS NAMES embree4/rtcore.h embree3/rtcore.h REQUIRED)
+if(EXISTS "${EMBREE_HEADERS}/embree4/rtcore.h")
+  understory_find(embree HEADER embree4/rtcore.h LIBRARY embree4)
+  target_compile_definitions(understory_dep_embree INTERFACE UNDERSTORY_EMBREE_VERSION=4)
+else()
+  understory_find(embree HEADER embree3/rtcore.h LIBRARY embree3)
+  target_compile_definitions(understory_dep_embree INTERFACE UNDERSTORY_EMBREE_VERSION=3)
+endif()
+
+if(UNDERSTORY_TESTS)
+  find_package(GTest REQUIRED)
+endif()
+if(UNDERSTORY_BENCHMARKS)
+  find_package(benchmark REQUIRED)
+endif()

@@ -1,0 +1,40 @@
+# understory::gtsam: the system's GTSAM 4.2 or newer where there is one, else the one that
+# tools/deps/build.sh put into the cache. Decides UNDERSTORY_MARCH too, because whatever shares
+# Eigen types must be compiled for one instruction set: Eigen's alignment follows from it.
+set(UNDERSTORY_DEPS "" CACHE PATH "folder of dependencies built by tools/deps/build.sh")
+if(NOT UNDERSTORY_DEPS)
+  execute_process(COMMAND "${CMAKE_CURRENT_SOURCE_DIR}/tools/deps/build.sh" --where
+                  OUTPUT_VARIABLE understory_deps_default OUTPUT_STRIP_TRAILING_WHITESPACE
+                  COMMAND_ERROR_IS_FATAL ANY)
+  set(UNDERSTORY_DEPS "${understory_deps_default}")
+endif()
+
+find_package(GTSAM 4.2 QUIET CONFIG)
+if(GTSAM_FOUND)
+  find_package(GTSAM_UNSTABLE 4.2 QUIET CONFIG)
+  add_library(understory_gtsam INTERFACE)
+  target_link_libraries(understory_gtsam INTERFACE
+                        gtsam $<$<TARGET_EXISTS:gtsam_unstable>:gtsam_unstable>)
+  set(understory_march_default "")
+else()
+  execute_process(COMMAND "${CMAKE_CURRENT_SOURCE_DIR}/tools/deps/build.sh" --march
+                  OUTPUT_VARIABLE understory_march_default OUTPUT_STRIP_TRAILING_WHITESPACE
+                  COMMAND_ERROR_IS_FATAL ANY)
+  add_library(understory_gtsam INTERFACE)
+  if(EXISTS "${UNDERSTORY_DEPS}/lib/cmake/gtsam/gtsam-targets.cmake")
+    find_package(Boost 1.67 REQUIRED COMPONENTS serialization)
+    find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+    include("${UNDERSTORY_DEPS}/lib/cmake/gtsam/gtsam-targets.cmake")
+    target_link_libraries(understory_gtsam INTERFACE understory_deps::gtsam)
+  else()
+    message(WARNING "no GTSAM in the system or in ${UNDERSTORY_DEPS}: graph and odometry will not "
+                    "build. Run ./run setup, which builds it once.")
+  endif()
+endif()
+add_library(understory::gtsam ALIAS understory_gtsam)
+
+set(UNDERSTORY_MARCH "${understory_march_default}" CACHE STRING
+    "instruction set of the whole program (-march=), the same as GTSAM's")
+if(UNDERSTORY_MARCH)
+  target_compile_options(understory_flags INTERFACE -march=${UNDERSTORY_MARCH})
+endif()

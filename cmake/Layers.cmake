@@ -1,0 +1,96 @@
+# understory_layer(<name> SOURCES ... [TESTS ...] [DEPENDS ...] [LIBRARIES ...] [PRIVATE_LIBRARIES ...])
+# One folder under src/understory is one static library understory_<name> (alias understory::<name>).
+#   SOURCES            explicit .cc files; without any the layer is headers only
+#   TESTS              x_test.cc beside x.cc; together the GoogleTest program test_<name>
+#   DEPENDS            layers before it in the order of the top CMakeLists.txt (PUBLIC)
+#   LIBRARIES          third-party targets that its headers need (PUBLIC)
+#   PRIVATE_LIBRARIES  third-party targets that only its .cc files need
+function(understory_layer name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" ""
+                        "SOURCES;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES;TEST_LIBRARIES")
+  if(arg_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "understory_layer(${name}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
+  endif()
+  list(TRANSFORM arg_DEPENDS PREPEND understory::)
+
+  set(target understory_${name})
+  if(arg_SOURCES)
+    add_library(${target} STATIC ${arg_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(${target} PRIVATE understory_own_code ${arg_PRIVATE_LIBRARIES})
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(understory::${name} ALIAS ${target})
+  target_link_libraries(${target} ${scope} understory_flags ${arg_DEPENDS} ${arg_LIBRARIES})
+  target_include_directories(${target} ${scope} "${PROJECT_SOURCE_DIR}/src")
+
+  if(arg_TESTS AND UNDERSTORY_TESTS)
+    understory_test(test_${name} SOURCES ${arg_TESTS} LAYERS ${name}
+                    LIBRARIES ${arg_TEST_LIBRARIES} ${arg_PRIVATE_LIBRARIES})
+  endif()
+endfunction()
+
+# understory_test(<target> SOURCES ... [LAYERS ...] [LIBRARIES ...] [TIMEOUT <seconds>])
+# A GoogleTest program whose cases ctest finds one by one. Tests that need the example data look in
+# the environment variable UNDERSTORY_DATA, else in ../shared/data beside the source tree, and skip
+# when it is absent.
+function(understory_test target)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LAYERS;LIBRARIES")
+  if(NOT UNDERSTORY_TESTS)
+    return()
+  endif()
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 120)
+  endif()
+  list(TRANSFORM arg_LAYERS PREPEND understory::)
+  add_executable(${target} ${arg_SOURCES})
+  target_link_libraries(${target} PRIVATE understory_own_code ${arg_LAYERS} ${arg_LIBRARIES}
+                                          GTest::gtest_main)
+  target_compile_definitions(${target} PRIVATE
+                             UNDERSTORY_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+                             UNDERSTORY_PROGRAM="${PROJECT_BINARY_DIR}/understory")
+  set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
+  gtest_discover_tests(${target} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+                       PROPERTIES TIMEOUT ${arg_TIMEOUT})
+endfunction()
+
+# understory_program(<target> SOURCES ... [LAYERS ...] [LIBRARIES ...])
+# The command-line tool: lies at the root of the build folder and is installed.
+function(understory_program target)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LAYERS;LIBRARIES")
+  list(TRANSFORM arg_LAYERS PREPEND understory::)
+  add_executable(${target} ${arg_SOURCES})
+  target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}/src")
+  target_link_libraries(${target} PRIVATE understory_own_code understory_flags ${arg_LAYERS}
+                                          ${arg_LIBRARIES})
+  target_compile_definitions(${target} PRIVATE UNDERSTORY_VERSION="${PROJECT_VERSION}")
+  set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}")
+  install(TARGETS ${target} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+endfunction()
+
+# understory_benchmark(<target> SOURCES ... [LAYERS ...] [LIBRARIES ...])
+# A Google Benchmark program in <build>/benchmarks.
+function(understory_benchmark target)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LAYERS;LIBRARIES")
+  list(TRANSFORM arg_LAYERS PREPEND understory::)
+  add_executable(${target} ${arg_SOURCES})
+  target_link_libraries(${target} PRIVATE understory_own_code ${arg_LAYERS} ${arg_LIBRARIES}
+                                          benchmark::benchmark_main)
+  set_target_properties(${target} PROPERTIES
+                        RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/benchmarks")
+endfunction()
+
+# understory_fuzz(<name> SOURCE <file> [LAYERS ...] [CORPUS <folder>])
+# A libFuzzer target fuzz_<name> in <build>/fuzz; tools/fuzz.sh runs all that are there.
+function(understory_fuzz name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "SOURCE" "LAYERS;LIBRARIES")
+  list(TRANSFORM arg_LAYERS PREPEND understory::)
+  add_executable(fuzz_${name} ${arg_SOURCE})
+  target_link_libraries(fuzz_${name} PRIVATE understory_own_code ${arg_LAYERS} ${arg_LIBRARIES})
+  target_compile_definitions(fuzz_${name} PRIVATE UNDERSTORY_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
+  set_target_properties(fuzz_${name} PROPERTIES
+                        RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/fuzz")
+endfunction()

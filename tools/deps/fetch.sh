@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# fetch.sh FOLDER PACKAGE...: the upstream tarballs of Debian source packages from a newer release
+# than this machine runs, through apt and from the mirror that the machine itself uses. apt checks
+# their signatures as it does for everything else. Needs no root: all of apt's own state for the
+# newer release lies in a private folder, so that the machine's package lists stay as they are.
+set -euo pipefail
+suite=${UNDERSTORY_SOURCE_SUITE:-trixie}
+folder=$1
+shift
+mkdir -p "$folder"
+
+have_all() {
+  local package
+  for package; do compgen -G "$folder/${package}_*.orig.tar.*" >/dev/null || return 1; done
+}
+if have_all "$@"; then exit 0; fi
+
+private=$(mktemp -d)
+trap 'rm -rf "$private"' EXIT
+mkdir -p "$private/lists/partial" "$private/cache/archives/partial" "$private/parts"
+in_private=(-o "Dir::State::Lists=$private/lists" -o "Dir::Cache=$private/cache" -o "APT::Sandbox::User=")
+
+# The mirror in the machine's configuration, whichever form (.sources or .list) that has. apt tells
+# it only for lists that it holds; a machine that holds none gets them in the private folder.
+mirror() {
+  apt-get "$@" indextargets --format '$(ORIGIN)|$(LABEL)|$(COMPONENT)|$(REPO_URI)' 2>/dev/null |
+    awk -F'|' '$1 == "Debian" && $2 == "Debian" && $3 == "main" {print $4; exit}'
+}
+uri=$(mirror)
+if [[ -z $uri ]]; then
+  apt-get -q "${in_private[@]}" update >/dev/null
+  uri=$(mirror "${in_private[@]}")
+fi
+if [[ -z $uri ]]; then
+  echo "fetch.sh: apt on this machine knows no Debian mirror (tried: apt-get indextargets)" >&2
+  exit 1
+fi
+
+keyring=/usr/share/keyrings/debian-archive-keyring.gpg
+{
+  printf 'Types: deb-src\nURIs: %s\nSuites: %s\nComponents: main\n' "$uri" "$suite"
+  if [[ -e $keyring ]]; then printf 'Signed-By: %s\n' "$keyring"; fi
+} >"$private/parts/newer.sources"
+only_newer=("${in_private[@]}" -o "Dir::Etc::SourceList=/dev/null" -o "Dir::Etc::SourceParts=$private/parts")
+apt-get -q "${only_newer[@]}" update
+cd "$folder"
+apt-get -q "${only_newer[@]}" source --tar-only "$@"
+if ! have_all "$@"; then
+  echo "fetch.sh: $suite on this machine's mirror has no tarball of: $*" >&2
+  exit 1
+fi
