@@ -2,7 +2,7 @@
 #   Eigen3::Eigen TBB::tbb spdlog::spdlog fmt::fmt understory::nanoflann understory::cgal
 #   understory::gdal understory::proj understory::embree understory::fastcdr understory::lz4
 #   understory::zstd understory::bz2 ZLIB::ZLIB understory::pcap SQLite::SQLite3
-#   understory::yaml understory::cli11 understory::json GTest::gtest_main
+#   yaml-cpp CLI11::CLI11 nlohmann_json::nlohmann_json GTest::gtest_main
 #   understory::gtsam understory::laszip
 include(Gtsam)
 include(Laszip)
@@ -42,12 +42,16 @@ find_package(BZip2 REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(fastcdr REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
 understory_dependency(bz2 BZip2::BZip2)
 understory_dependency(fastcdr fastcdr)
-understory_dependency(yaml $<IF:$<TARGET_EXISTS:yaml-cpp::yaml-cpp>,yaml-cpp::yaml-cpp,yaml-cpp>)
+# yaml-cpp 0.8 renamed its target.
+if(NOT TARGET yaml-cpp)
+  add_library(yaml-cpp INTERFACE IMPORTED GLOBAL)
+  target_link_libraries(yaml-cpp INTERFACE yaml-cpp::yaml-cpp)
+endif()
 understory_find(nanoflann HEADER nanoflann.hpp)
-understory_find(json HEADER nlohmann/json.hpp)
-understory_find(cli11 HEADER CLI/CLI.hpp)
 understory_find(lz4 HEADER lz4frame.h LIBRARY lz4)
 understory_find(zstd HEADER zstd.h LIBRARY zstd)
 understory_find(pcap HEADER pcap/pcap.h LIBRARY pcap)
