@@ -4,7 +4,7 @@
 #   build.sh --where    prints the folder that this machine's build belongs in
 #   build.sh --march    prints the instruction set that the folder is built for (may be empty)
 # The folder's name is a hash of everything that decides its content: versions, flags, compiler,
-# Eigen and these scripts. UNDERSTORY_CACHE moves the cache, UNDERSTORY_MARCH names another
+# Eigen and the two CMake files. UNDERSTORY_CACHE moves the cache, UNDERSTORY_MARCH names another
 # instruction set ("none" for the compiler's default).
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -31,7 +31,7 @@ key() {
     uname -m; march; echo "$gtsam_flags"; "${CXX:-g++}" -dumpfullversion 2>/dev/null || true
     eigen_version
     ls /usr/include/boost/version.hpp 2>/dev/null && grep 'define BOOST_LIB_VERSION' /usr/include/boost/version.hpp
-    cat "$here/build.sh" "$here/fetch.sh" "$here/gtsam/CMakeLists.txt" "$here/laszip/CMakeLists.txt"
+    cat "$here/gtsam/CMakeLists.txt" "$here/laszip/CMakeLists.txt"
   } | sha256sum | cut -c1-16
 }
 
