@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "understory/util/log.h"
+
+namespace understory {
+
+// A whole point cloud as a file holds it. Coordinates of point i in the file's frame (a coordinate
+// system, or the sensor's) are origin + points[i]: the origin in double takes up the large part, so
+// that floats keep tenths of a millimetre. All other columns are either empty or one per point.
+struct PointCloudFile {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3f> points;       // metres, relative to origin; finite
+  std::vector<float> intensity;              // as the file has it
+  std::vector<std::uint8_t> classification;  // ASPRS classes, LAS only
+  std::vector<double> gps_time;              // LAS: GPS time as stored (week or adjusted standard)
+  std::string coordinate_system;             // LAS: "EPSG:25832" or WKT; empty if not given
+  std::string format;                        // "LAZ 1.4, point format 6", "PCD binary"
+};
+
+// Reads .las, .laz, .pcd, .ply or KITTI .bin (told by content, .bin by name). Points that are NaN
+// or infinite are left out. A file that breaks off gives the points up to there and a warning
+// ("recording.damaged"); throws InputError if no point can be had from it.
+[[nodiscard]] PointCloudFile read_cloud(const std::string& path, Log& log);
+
+}  // namespace understory
