@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "understory/forest/ground.h"
+#include "understory/forest/stem_detector.h"
+#include "understory/forest/tree.h"
+#include "understory/util/log.h"
+#include "understory/util/progress.h"
+
+namespace understory {
+
+struct InventoryConfig {
+  GroundConfig ground;
+  StemDetectorConfig stems;
+  double canopy_cell_m = 0.5;
+};
+void describe(ConfigTable& table, InventoryConfig& config);
+
+// What the cloud can tell about the stand. Expected outcomes (nothing found, too sparse) are told
+// in `remarks`, in words for a forester.
+struct InventoryResult {
+  GroundModel ground;
+  Raster canopy;  // highest point above ground per cell, NaN where none
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // of slices and stems, world frame
+  std::vector<Tree> trees;                           // by id; ids from 1 in order of position
+  std::vector<StemFit> stems;                        // of the same index as trees
+  std::vector<SlicePoint> slices;  // the thinned points between 0.5 m and 3.5 m that were searched
+  std::uint64_t points = 0;
+  double area_m2 = 0.0;  // cells in which the slices hold points, holes filled
+  std::vector<std::string> remarks;
+};
+
+// Ground, canopy, trees of a whole cloud: three runs through it. Deterministic for any number of
+// threads.
+[[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
+                                             const InventoryConfig& config,
+                                             const ProgressSink& progress = {});
+
+}  // namespace understory

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "understory/util/time.h"
+
+namespace understory {
+
+// A point on its way into map.laz.
+struct LasPoint {
+  double x = 0.0;
+  double y = 0.0;
+  double z = 0.0;
+  TimeNs stamp = 0;
+  std::uint16_t intensity = 0;
+  std::uint8_t classification = 1;  // LAS: 1 unclassified, 2 ground, 3-5 vegetation
+};
+
+struct LasOptions {
+  // Written into the header; choose a round number of metres near the data. Coordinates further
+  // than 2,147 km from it do not fit and are an OutputError.
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  double scale_m = 0.001;
+  std::string crs_wkt;  // OGC WKT of the coordinate system; empty = local frame, none written
+  // Stamps are written as adjusted standard GPS time if they are of this century (Unix time), else
+  // as seconds as they are.
+  std::string generating_software = "understory";
+};
+
+// LAS 1.4, point format 6, compressed where the path ends in .laz. Points are handed over one after
+// another and not held. The file appears with `commit`. Not thread-safe.
+class LasWriter {
+ public:
+  LasWriter(const std::filesystem::path& path, const LasOptions& options);
+  ~LasWriter();
+  LasWriter(const LasWriter&) = delete;
+  LasWriter& operator=(const LasWriter&) = delete;
+
+  void add(const LasPoint& point);
+  void commit();
+  [[nodiscard]] std::uint64_t points() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace understory

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace understory {
+
+// The map seen from above, gathered point by point in bounded memory: the grid starts fine and is
+// coarsened by two whenever the stand outgrows it. Ground grey by its shape, vegetation green by
+// its height. Deterministic: does not depend on the order of points.
+class MapPicture {
+ public:
+  explicit MapPicture(double finest_cell_m = 0.05, int largest_side = 1400);
+
+  // `height_m` above ground, NaN where the ground is unknown.
+  void add(double x, double y, double z, double height_m);
+
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  [[nodiscard]] double cell_m() const { return cell_m_; }
+  // Western, southern edge and size in metres of the picture.
+  [[nodiscard]] double x0() const;
+  [[nodiscard]] double y0() const;
+  [[nodiscard]] double width_m() const;
+  [[nodiscard]] double height_m() const;
+  // Transparent where nothing was seen.
+  [[nodiscard]] std::string png() const;
+
+ private:
+  struct Cell {
+    float ground_z = 0.0F;
+    float top_m = 0.0F;
+    std::uint32_t ground = 0;
+    std::uint32_t vegetation = 0;
+  };
+  void grow(int column, int row);
+  void coarsen();
+
+  double cell_m_;
+  int largest_side_;
+  int column0_ = 0, row0_ = 0, columns_ = 0, rows_ = 0;
+  std::vector<Cell> cells_;
+  std::uint64_t count_ = 0;
+  double z_sum_origin_ = 0.0;
+};
+
+}  // namespace understory

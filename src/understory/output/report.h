@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "understory/forest/inventory.h"
+#include "understory/output/map_picture.h"
+#include "understory/output/run_summary.h"
+#include "understory/util/time.h"
+
+namespace understory {
+
+// One scan of the run as the report shows it (world frame, finished trajectory).
+struct ReportScan {
+  TimeNs stamp = 0;
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();
+  float wall_ms = 0.0F;
+  float inlier_ratio = std::numeric_limits<float>::quiet_NaN();  // NaN: the scan had no match
+  float fitness_m2 = std::numeric_limits<float>::quiet_NaN();
+  bool weak = false;  // gated, unmatched or degenerate: position is mostly a prediction
+};
+
+// A loop that was tried.
+struct ReportLoop {
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to = Eigen::Vector3d::Zero();
+  TimeNs from_stamp = 0;
+  TimeNs to_stamp = 0;
+  bool accepted = false;
+  double correction_m = 0.0;  // by how much it disagreed with the trajectory before
+  std::string reason;         // why rejected
+};
+
+// Errors against a known truth (simulated or surveyed). Series may be empty.
+struct ReportTruth {
+  std::string alignment;  // "none (the first pose as recorded)", "SE(3)" ...
+  double ape_rmse_m = std::numeric_limits<double>::quiet_NaN();
+  double ape_max_m = std::numeric_limits<double>::quiet_NaN();
+  double drift_end_m = std::numeric_limits<double>::quiet_NaN();
+  double drift_percent = std::numeric_limits<double>::quiet_NaN();
+  std::vector<std::pair<double, double>> ape_over_time;   // seconds since start, metres
+  std::vector<std::pair<std::string, std::string>> more;  // name, value with unit
+};
+
+// All that the report shows. What is empty is left out of the page.
+struct ReportInput {
+  std::string title;      // name of the recording or cloud
+  std::string made_from;  // "MCAP, OS-0-128, 2,410 scans" in words
+  RunSummary summary;
+  const MapPicture* picture = nullptr;         // not owned
+  const InventoryResult* inventory = nullptr;  // not owned
+  std::vector<ReportScan> scans;
+  double sensor_period_ms = 0.0;  // 0: unknown
+  std::vector<ReportLoop> loops;
+  bool loop_closure_enabled = true;
+  std::optional<ReportTruth> truth;
+  bool north_is_up = false;  // only where the world frame is east-north-up
+};
+
+// One self-contained page: no network, no scripts needed to read it (one small script sorts the
+// tree table). Throws OutputError.
+void write_report(const std::filesystem::path& path, const ReportInput& input);
+[[nodiscard]] std::string report_html(const ReportInput& input);
+
+}  // namespace understory

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "understory/util/log.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+
+enum class RunStatus { kComplete, kPartial, kUntrusted };
+[[nodiscard]] std::string to_string(RunStatus status);
+
+struct InputHash {
+  std::string file;
+  std::uint64_t bytes = 0;
+  std::string sha256;
+};
+
+// SHA-256 of a file's bytes, lower-case hexadecimal. Throws InputError if it cannot be read.
+[[nodiscard]] InputHash hash_input(const std::filesystem::path& path);
+
+struct StageSummary {
+  Distribution wall_ms;
+  Distribution cpu_ms;
+  double total_wall_s = 0.0;
+};
+[[nodiscard]] std::map<std::string, StageSummary> summarise(const StageTimes& times);
+
+using Figure = std::variant<std::int64_t, double, std::string, bool>;
+
+// What run.json says. Warnings are one per kind.
+struct RunSummary {
+  std::string command;  // "map", "inventory", "correct"
+  std::string version;
+  RunStatus status = RunStatus::kComplete;
+  std::vector<std::string> reasons;  // empty if complete
+  std::vector<Log::Warning> warnings;
+  std::string config_yaml;  // resolved, every key
+  std::vector<InputHash> inputs;
+  std::uint64_t scans = 0;
+  std::uint64_t poses = 0;
+  double recording_s = 0.0;
+  double wall_s = 0.0;
+  double cpu_s = 0.0;
+  double peak_memory_mb = 0.0;
+  std::map<std::string, StageSummary> stages;
+  std::map<std::string, Figure> counts;   // keyframes, loops_accepted, map_points, trees ...
+  std::map<std::string, Figure> quality;  // inlier_ratio_mean, ape_rmse_m ...
+  std::string crs_wkt;                    // empty = local frame
+};
+
+// Writes run.json (keys of docs/outputs.md); NaN becomes null.
+void write_run_json(const std::filesystem::path& path, const RunSummary& summary);
+[[nodiscard]] std::string run_json(const RunSummary& summary);
+
+}  // namespace understory
