@@ -50,6 +50,7 @@ int run(int argc, char** argv) {
   app.add_flag("--verbose", verbose, "Debug messages on stderr");
   Command chosen;
   // In the order of the help page; each lives in a file of its own.
+  add_simulate_command(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

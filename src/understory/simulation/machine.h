@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "understory/simulation/carrier.h"
+#include "understory/simulation/scene.h"
+
+namespace understory {
+
+// The carrier's own parts in the lidar's view, in the body frame: round bars (capsules) and boxes.
+class Machine {
+ public:
+  // A walker has none; a harvester has wheels, a cabin and a boom that moves along `boom`.
+  Machine(const CarrierConfig& config, const BoomPath& boom);
+
+  // The parts at one moment, to be met by rays given in the body frame.
+  struct Bar {
+    Eigen::Vector3d from;
+    Eigen::Vector3d to;
+    double radius_m;
+  };
+  struct Parts {
+    std::vector<Bar> bars;
+  };
+  [[nodiscard]] bool empty() const { return !present_; }
+  [[nodiscard]] Parts at(double time_s) const;
+
+  // Replaces `hit` where a part is nearer (or where nothing was hit).
+  static void cast(const Parts& parts, const Eigen::Vector3d& origin,
+                   const Eigen::Vector3d& direction, double near_m, double far_m, Hit& hit);
+
+ private:
+  bool present_ = false;
+  BoomPath boom_;
+};
+
+}  // namespace understory

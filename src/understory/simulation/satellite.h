@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "understory/sensor/gnss_fix.h"
+#include "understory/simulation/carrier.h"
+#include "understory/simulation/counter_noise.h"
+#include "understory/simulation/scene.h"
+
+namespace understory {
+
+// Geodetic coordinates (latitude, longitude in degrees, height above the WGS 84 ellipsoid) of a
+// point given east, north, up of an origin.
+[[nodiscard]] Eigen::Vector3d geodetic_from_enu(const OriginConfig& origin,
+                                                const Eigen::Vector3d& point_in_enu);
+
+// The GNSS receiver under trees: slow and fast errors correlated in time, both growing with the
+// share of the sky that the stand hides, height worse than plane, outages, and a covariance that
+// promises too much. Fixes come one after another.
+class SatelliteReceiver {
+ public:
+  // `path` and `scene` must outlive the receiver.
+  SatelliteReceiver(const SiteConfig& config, const CarrierPath& path, const ForestScene& scene,
+                    TimeNs start);
+
+  [[nodiscard]] TimeNs next_stamp() const;
+  // The next fix, or nothing during an outage.
+  std::optional<GnssFix> next();
+
+  // What stands behind the last fix, for tests and reports.
+  [[nodiscard]] double last_cover() const { return cover_; }
+  [[nodiscard]] const Eigen::Vector3d& last_error_enu() const { return error_; }
+
+ private:
+  void walk(double dt_s);
+  [[nodiscard]] bool in_outage(double dt_s, CounterNoise& noise);
+
+  GnssConfig config_;
+  OriginConfig origin_;
+  const CarrierPath& path_;
+  const ForestScene& scene_;
+  TimeNs start_;
+  std::uint64_t seed_;
+  Eigen::Vector3d slow_;  // unit variance
+  Eigen::Vector3d fast_;
+  Eigen::Vector3d error_ = Eigen::Vector3d::Zero();
+  double cover_ = 0.0;
+  double outage_left_s_ = 0.0;
+  std::int64_t count_ = 0;
+};
+
+}  // namespace understory

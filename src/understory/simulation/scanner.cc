@@ -1,0 +1,275 @@
+#include "understory/simulation/scanner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr std::int64_t kBlockFirings = 16;
+
+}  // namespace
+
+// The rays of a few firings, in the order in which they are traced, and what came back.
+struct Scanner::Block {
+  std::vector<Ray> rays;  // beam by beam, rays_per_beam each
+  std::vector<Hit> hits;
+  std::vector<Eigen::Vector3f> direction_in_lidar;  // reported, by beam
+  std::vector<Eigen::Vector3f> origin_in_lidar;     // by firing
+  std::vector<std::uint32_t> t_ns;                  // by beam
+  std::vector<ScanPoint> points;
+  std::vector<std::uint64_t> stems;  // tree << 16 | ring of each return from a stem
+};
+
+struct Scanner::Echo {
+  float range_m = 0.0F;
+  float energy = 0.0F;  // reflectivity x cosine x share of the beam
+  float cosine = 1.0F;
+  int tree = 0;
+  Surface surface = Surface::kNone;
+};
+
+Pose mount_pose(const std::vector<double>& place_m, const std::vector<double>& rpy_deg) {
+  const Eigen::Quaterniond rotation =
+      Eigen::AngleAxisd(rpy_deg[2] * kDegree, Eigen::Vector3d::UnitZ()) *
+      Eigen::AngleAxisd(rpy_deg[1] * kDegree, Eigen::Vector3d::UnitY()) *
+      Eigen::AngleAxisd(rpy_deg[0] * kDegree, Eigen::Vector3d::UnitX());
+  return {rotation, Eigen::Vector3d(place_m[0], place_m[1], place_m[2])};
+}
+
+Scanner::Scanner(const SiteConfig& config, const ForestScene& scene, const CarrierPath& path,
+                 const Machine& machine, TimeNs start)
+    : config_(config.lidar),
+      scene_(scene),
+      path_(path),
+      machine_(machine),
+      start_(start),
+      seed_(hash_numbers(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kLidar))),
+      model_(make_lidar_model(config.lidar)),
+      body_from_lidar_(mount_pose(config.lidar.mount_m, config.lidar.mount_rpy_deg)) {}
+
+TimeNs Scanner::stamp(std::int64_t scan) const {
+  return start_ + model_.firing_time(model_.firings(scan).first);
+}
+
+TimeNs Scanner::end(std::int64_t scan) const {
+  return start_ + model_.firing_time(model_.firings(scan).end - 1) +
+         static_cast<TimeNs>(model_.beams.back().delay_ns);
+}
+
+SimulatedScan Scanner::cast(std::int64_t number) const {
+  const LidarModel::Firings firings = model_.firings(number);
+  const auto blocks_count =
+      static_cast<std::size_t>((firings.end - firings.first + kBlockFirings - 1) / kBlockFirings);
+  std::vector<Block> blocks(blocks_count);
+  parallel_for(blocks_count, 1, [&](std::size_t b) {
+    const std::int64_t first = firings.first + static_cast<std::int64_t>(b) * kBlockFirings;
+    cast_block(number, first, std::min(firings.end, first + kBlockFirings), blocks[b]);
+  });
+
+  auto scan = std::make_shared<Scan>();
+  scan->stamp = stamp(number);
+  scan->ring_count = static_cast<int>(model_.beams.size());
+  std::vector<std::uint64_t> stems;
+  std::size_t total = 0;
+  for (const Block& block : blocks)
+    total += block.points.size();
+  scan->points.reserve(total);
+  for (const Block& block : blocks) {
+    scan->points.insert(scan->points.end(), block.points.begin(), block.points.end());
+    stems.insert(stems.end(), block.stems.begin(), block.stems.end());
+  }
+  std::sort(stems.begin(), stems.end());
+  SimulatedScan result{std::move(scan), {}};
+  for (std::size_t i = 0; i < stems.size();) {
+    std::size_t same = i;
+    while (same < stems.size() && stems[same] == stems[i])
+      ++same;
+    const int tree = static_cast<int>(stems[i] >> 16);
+    const int returns = static_cast<int>(same - i);
+    if (result.stems.empty() || result.stems.back().tree != tree) {
+      result.stems.push_back({tree, 0, 0, 0});
+    }
+    StemReturns& stem = result.stems.back();
+    stem.rings += 1;
+    stem.rings_with_3 += returns >= 3 ? 1 : 0;
+    stem.returns += returns;
+    i = same;
+  }
+  return result;
+}
+
+void Scanner::cast_block(std::int64_t scan, std::int64_t first, std::int64_t end,
+                         Block& block) const {
+  make_rays(scan, first, end, block);
+  block.hits.resize(block.rays.size());
+  scene_.cast(block.rays.data(), block.rays.size(), static_cast<float>(config_.min_range_m),
+              static_cast<float>(config_.max_range_m), block.hits.data());
+  if (!machine_.empty()) meet_machine(first, block);
+  const std::size_t beams = model_.beams.size();
+  for (std::size_t i = 0; i < block.t_ns.size(); ++i) {
+    const auto firing = static_cast<std::uint64_t>(first) + i / beams;
+    read_beam(CounterNoise(seed_, firing, i % beams), i, block);
+  }
+}
+
+void Scanner::make_rays(std::int64_t scan, std::int64_t first, std::int64_t end,
+                        Block& block) const {
+  const std::size_t beams = model_.beams.size();
+  const auto firings = static_cast<std::size_t>(end - first);
+  const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
+  block.rays.reserve(firings * beams * rays_per_beam);
+  block.direction_in_lidar.reserve(firings * beams);
+  const TimeNs scan_time = stamp(scan) - start_;
+  const double spread = 0.25e-3 * config_.divergence_mrad;  // one standard deviation
+  const double exit = 0.25 * config_.beam_exit_m;
+  for (std::size_t f = 0; f < firings; ++f) {
+    const std::int64_t firing = first + static_cast<std::int64_t>(f);
+    const TimeNs firing_time = model_.firing_time(firing);
+    CounterNoise jitter(seed_ + 1, static_cast<std::uint64_t>(firing), 0);
+    const double shake = config_.azimuth_jitter_deg * kDegree * jitter.normal();
+    Pose world_from_lidar;
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+    for (std::size_t b = 0; b < beams; ++b) {
+      const Beam& beam = model_.beams[b];
+      const TimeNs time = firing_time + static_cast<TimeNs>(beam.delay_ns);
+      const double head = model_.azimuth(static_cast<double>(time));
+      if (b == 0 || !model_.beams_at_once) {
+        world_from_lidar = path_.pose(to_seconds(time)) * body_from_lidar_;
+        origin = model_.beam_origin_m * Eigen::Vector3d(std::cos(head), std::sin(head), 0.0);
+      }
+      if (b == 0) block.origin_in_lidar.push_back(origin.cast<float>());
+      const double reported = head + beam.azimuth_offset_rad;
+      const double flat = std::cos(beam.elevation_rad);
+      const double up = std::sin(beam.elevation_rad);
+      const auto towards = [&](double azimuth) {
+        return Eigen::Vector3d(flat * std::cos(azimuth), flat * std::sin(azimuth), up);
+      };
+      block.direction_in_lidar.push_back(towards(reported).cast<float>());
+      block.t_ns.push_back(static_cast<std::uint32_t>(time - scan_time));
+      const Eigen::Vector3d centre = towards(reported + shake);
+      const Eigen::Vector3d side(-std::sin(reported), std::cos(reported), 0.0);
+      const Eigen::Vector3d rise = centre.cross(side);
+      CounterNoise footprint(seed_ + 2, static_cast<std::uint64_t>(firing), b);
+      for (std::size_t k = 0; k < rays_per_beam; ++k) {
+        const double u = footprint.normal();
+        const double v = footprint.normal();
+        const Eigen::Vector3d offset = u * side + v * rise;
+        const Eigen::Vector3d direction = (centre + spread * offset).normalized();
+        block.rays.push_back({(world_from_lidar * (origin + exit * offset)).cast<float>(),
+                              (world_from_lidar.rotation() * direction).cast<float>()});
+      }
+    }
+  }
+}
+
+void Scanner::meet_machine(std::int64_t first, Block& block) const {
+  const std::size_t beams = model_.beams.size();
+  const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
+  const std::size_t per_firing = beams * rays_per_beam;
+  for (std::size_t f = 0; f * per_firing < block.rays.size(); ++f) {
+    const double time = to_seconds(model_.firing_time(first + static_cast<std::int64_t>(f)));
+    const Machine::Parts parts = machine_.at(time);
+    for (std::size_t i = f * per_firing; i < (f + 1) * per_firing; ++i) {
+      const std::size_t beam = i / rays_per_beam;
+      const Eigen::Vector3d direction =
+          body_from_lidar_.rotation() * block.direction_in_lidar[beam].cast<double>();
+      const Eigen::Vector3d origin = body_from_lidar_ * block.origin_in_lidar[f].cast<double>();
+      Machine::cast(parts, origin, direction, config_.min_range_m, config_.max_range_m,
+                    block.hits[i]);
+    }
+  }
+}
+
+// Hits of one beam that lie within a pulse's length merge into one echo; the strongest is reported.
+Scanner::Echo Scanner::strongest(const Hit* hits) const {
+  struct Piece {
+    float range_m;
+    float energy;
+    const Hit* hit;
+  };
+  const auto count = static_cast<std::size_t>(config_.rays_per_beam);
+  Piece pieces[64];
+  std::size_t used = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (hits[k].surface == Surface::kNone) continue;
+    const float energy = hits[k].reflectivity * std::max(0.08F, hits[k].cosine);
+    pieces[used++] = {hits[k].range_m, energy / static_cast<float>(count), &hits[k]};
+  }
+  if (used > 1) {
+    std::sort(pieces, pieces + used,
+              [](const Piece& a, const Piece& b) { return a.range_m < b.range_m; });
+  }
+  Echo best;
+  float best_signal = 0.0F;
+  for (std::size_t k = 0; k < used;) {
+    Echo echo;
+    float strongest_piece = 0.0F;
+    float sum = 0.0F;
+    std::size_t last = k;
+    while (last < used && pieces[last].range_m - pieces[k].range_m <= config_.pulse_m) {
+      const Piece& piece = pieces[last];
+      echo.energy += piece.energy;
+      sum += piece.energy * piece.range_m;
+      if (piece.energy > strongest_piece) {
+        strongest_piece = piece.energy;
+        echo.tree = piece.hit->tree;
+        echo.surface = piece.hit->surface;
+        echo.cosine = piece.hit->cosine;
+      }
+      ++last;
+    }
+    echo.range_m = sum / echo.energy;
+    const float signal = echo.energy / (echo.range_m * echo.range_m);
+    if (signal > best_signal) {
+      best_signal = signal;
+      best = echo;
+    }
+    k = last;
+  }
+  return best;
+}
+
+void Scanner::read_beam(CounterNoise noise, std::size_t beam_number, Block& block) const {
+  const Echo echo =
+      strongest(&block.hits[beam_number * static_cast<std::size_t>(config_.rays_per_beam)]);
+  if (echo.surface == Surface::kNone) return;
+  // Whether the echo rises above the noise: half of them do at the threshold.
+  const float threshold = static_cast<float>(config_.range_10_percent_m);
+  const float signal = 10.0F * echo.energy * threshold * threshold / (echo.range_m * echo.range_m);
+  const float steep = signal * signal * signal;
+  if (noise.uniform() * (1.0F + steep) > steep) return;
+  if (noise.uniform() < static_cast<float>(config_.dropout)) return;
+
+  const float cosine = std::max(0.1F, echo.cosine);
+  const float tangent = std::sqrt(1.0F - cosine * cosine) / cosine;
+  float sd = std::hypot(static_cast<float>(config_.range_sd_m),
+                        static_cast<float>(config_.range_sd_per_m) * echo.range_m) *
+             (1.0F + static_cast<float>(config_.incidence_gain) * std::min(tangent, 4.0F));
+  if (echo.surface == Surface::kStem || echo.surface == Surface::kDeadWood) {
+    sd = std::hypot(sd, static_cast<float>(config_.bark_sd_m));
+  }
+  float range = echo.range_m + sd * noise.normal();
+  if (config_.range_step_m > 0.0) {
+    const auto step = static_cast<float>(config_.range_step_m);
+    range = std::round(range / step) * step;
+  }
+  if (range < config_.min_range_m || range > config_.max_range_m) return;
+
+  const std::size_t beams = model_.beams.size();
+  const Beam& beam = model_.beams[beam_number % beams];
+  const Eigen::Vector3f point =
+      block.origin_in_lidar[beam_number / beams] + range * block.direction_in_lidar[beam_number];
+  const float brightness = 255.0F * echo.energy * (1.0F + 0.06F * noise.normal());
+  block.points.push_back({point.x(), point.y(), point.z(), std::clamp(brightness, 0.0F, 255.0F),
+                          block.t_ns[beam_number], beam.ring, 0, 0});
+  if (echo.tree > 0) {
+    block.stems.push_back(static_cast<std::uint64_t>(echo.tree) << 16 | beam.ring);
+  }
+}
+
+}  // namespace understory

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "understory/sensor/scan.h"
+#include "understory/simulation/carrier.h"
+#include "understory/simulation/counter_noise.h"
+#include "understory/simulation/lidar_model.h"
+#include "understory/simulation/machine.h"
+#include "understory/simulation/scene.h"
+
+namespace understory {
+
+// What one scan got of one stem.
+struct StemReturns {
+  int tree = 0;
+  int rings = 0;         // beams with at least one return from the stem
+  int rings_with_3 = 0;  // beams with at least three
+  int returns = 0;
+};
+
+struct SimulatedScan {
+  ScanPtr scan;
+  std::vector<StemReturns> stems;  // by increasing id
+};
+
+// A spinning lidar carried through the forest. Every firing is cast from the true pose at its own
+// time. A scan is a function of its number alone: any order, any number of threads, same bytes.
+class Scanner {
+ public:
+  // All references must outlive the scanner. `start` is the time of the path's zero.
+  Scanner(const SiteConfig& config, const ForestScene& scene, const CarrierPath& path,
+          const Machine& machine, TimeNs start);
+
+  // Nominal times of a scan: its first firing and its last beam in the field of view.
+  [[nodiscard]] TimeNs stamp(std::int64_t scan) const;
+  [[nodiscard]] TimeNs end(std::int64_t scan) const;
+
+  [[nodiscard]] SimulatedScan cast(std::int64_t scan) const;
+
+  [[nodiscard]] const Pose& body_from_lidar() const { return body_from_lidar_; }
+  [[nodiscard]] const LidarModel& model() const { return model_; }
+
+ private:
+  struct Block;
+  struct Echo;
+  void cast_block(std::int64_t scan, std::int64_t first, std::int64_t end, Block& block) const;
+  void make_rays(std::int64_t scan, std::int64_t first, std::int64_t end, Block& block) const;
+  void meet_machine(std::int64_t first, Block& block) const;
+  void read_beam(CounterNoise noise, std::size_t beam, Block& block) const;
+  [[nodiscard]] Echo strongest(const Hit* hits) const;
+
+  const LidarConfig config_;
+  const ForestScene& scene_;
+  const CarrierPath& path_;
+  const Machine& machine_;
+  TimeNs start_;
+  std::uint64_t seed_;
+  LidarModel model_;
+  Pose body_from_lidar_;
+};
+
+// The pose of a sensor from its place and its roll, pitch, yaw in degrees.
+[[nodiscard]] Pose mount_pose(const std::vector<double>& place_m,
+                              const std::vector<double>& rpy_deg);
+
+}  // namespace understory

@@ -1,0 +1,417 @@
+#include "understory/simulation/scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "understory/simulation/counter_noise.h"
+#include "understory/simulation/embree.h"
+#include "understory/simulation/shapes.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr unsigned kGroundGeometry = 0;
+constexpr unsigned kStemGeometry = 1;
+constexpr unsigned kWoodGeometry = 2;
+
+struct Vertex4 {
+  float x, y, z, radius;
+};
+
+// Round cones (spheres joined by their tangent cones) between consecutive points.
+struct Cones {
+  std::vector<Vertex4> points;
+  std::vector<unsigned> first;  // index of the first point of each cone
+  void add(const Eigen::Vector3d& place, double radius) {
+    points.push_back({static_cast<float>(place.x()), static_cast<float>(place.y()),
+                      static_cast<float>(place.z()), static_cast<float>(radius)});
+  }
+  void join() { first.push_back(static_cast<unsigned>(points.size()) - 1); }  // to the next point
+};
+
+template <typename T>
+T* buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t count) {
+  void* memory = rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T),
+                                         std::max<std::size_t>(count, 1));
+  UNDERSTORY_CHECK(memory != nullptr);
+  return static_cast<T*>(memory);
+}
+
+RTCGeometry terrain_geometry(RTCDevice device, const Terrain& terrain) {
+  const int columns = terrain.columns();
+  const int rows = terrain.rows();
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* vertices =
+      buffer<Eigen::Vector3f>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3,
+                              static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column)
+      *vertices++ = terrain.vertex(column, row).cast<float>();
+  }
+  auto* triangles = buffer<Eigen::Vector3i>(
+      geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
+      2 * static_cast<std::size_t>(columns - 1) * static_cast<std::size_t>(rows - 1));
+  for (int row = 0; row + 1 < rows; ++row) {
+    for (int column = 0; column + 1 < columns; ++column) {
+      const int sw = row * columns + column;
+      *triangles++ = {sw, sw + 1, sw + columns + 1};
+      *triangles++ = {sw, sw + columns + 1, sw + columns};
+    }
+  }
+  return geometry;
+}
+
+RTCGeometry cone_geometry(RTCDevice device, const Cones& cones) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
+  std::copy(
+      cones.points.begin(), cones.points.end(),
+      buffer<Vertex4>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, cones.points.size()));
+  std::copy(cones.first.begin(), cones.first.end(),
+            buffer<unsigned>(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT, cones.first.size()));
+  return geometry;
+}
+
+RTCGeometry shape_geometry(RTCDevice device, const Shape& shape) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  std::copy(shape.vertices.begin(), shape.vertices.end(),
+            buffer<Eigen::Vector3f>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3,
+                                    shape.vertices.size()));
+  std::copy(shape.triangles.begin(), shape.triangles.end(),
+            buffer<Eigen::Vector3i>(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
+                                    shape.triangles.size()));
+  return geometry;
+}
+
+// Attaches and lets go of a finished geometry; returns its number in the scene.
+unsigned attach(RTCScene scene, RTCGeometry geometry) {
+  rtcCommitGeometry(geometry);
+  const unsigned id = rtcAttachGeometry(scene, geometry);
+  rtcReleaseGeometry(geometry);
+  return id;
+}
+
+// A crown shape and the size it was grown for.
+struct CrownShape {
+  Species species;
+  CrownSize size;
+  RTCScene scene;
+};
+
+CrownSize size_class(Species species, double height_m) {
+  CrownSize size;
+  size.height_m = height_m;
+  const double dbh = 0.0115 * height_m;
+  switch (species) {
+    case Species::kPine:
+      size.crown_base_m = 0.57 * height_m;
+      size.crown_radius_m = 0.55 + 4.6 * dbh;
+      break;
+    case Species::kSpruce:
+      size.crown_base_m = std::min(0.5 * height_m, 2.2);
+      size.crown_radius_m = 0.6 + 5.0 * dbh;
+      break;
+    case Species::kBirch:
+      size.crown_base_m = 0.47 * height_m;
+      size.crown_radius_m = 0.6 + 6.0 * dbh;
+      break;
+  }
+  return size;
+}
+
+}  // namespace
+
+class ForestScene::Impl {
+ public:
+  Impl(const StandConfig& config, const Terrain& terrain, const Stand& stand, std::uint64_t seed) {
+    // One thread builds, so that the tree of boxes does not depend on how many there are.
+    device_ = rtcNewDevice("threads=1,set_affinity=0");
+    UNDERSTORY_CHECK(device_ != nullptr);
+    top_ = rtcNewScene(device_);
+    add_static(terrain, stand);
+    grow_shapes(config, seed);
+    add_crowns(stand);
+    add_plants(stand);
+    rtcSetSceneFlags(top_, RTC_SCENE_FLAG_ROBUST);
+    rtcCommitScene(top_);
+    UNDERSTORY_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
+  }
+
+  ~Impl() {
+    rtcReleaseScene(top_);
+    for (const RTCScene scene : scenes_)
+      rtcReleaseScene(scene);
+    rtcReleaseDevice(device_);
+  }
+
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void cast16(const Ray* rays, std::size_t count, float near_m, float far_m, Hit* hits) const {
+    alignas(64) RTCRayHit16 packet;
+    alignas(64) int valid[16];
+    for (std::size_t i = 0; i < 16; ++i) {
+      const Ray& ray = rays[i < count ? i : 0];
+      valid[i] = i < count ? -1 : 0;
+      packet.ray.org_x[i] = ray.origin.x();
+      packet.ray.org_y[i] = ray.origin.y();
+      packet.ray.org_z[i] = ray.origin.z();
+      packet.ray.dir_x[i] = ray.direction.x();
+      packet.ray.dir_y[i] = ray.direction.y();
+      packet.ray.dir_z[i] = ray.direction.z();
+      packet.ray.tnear[i] = near_m;
+      packet.ray.tfar[i] = far_m;
+      packet.ray.time[i] = 0.0F;
+      packet.ray.mask[i] = 0xffffffffU;
+      packet.ray.id[i] = 0;
+      packet.ray.flags[i] = 0;
+      packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+      packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    embree_intersect16(valid, top_, &packet);
+    for (std::size_t i = 0; i < count; ++i)
+      hits[i] = read_hit(packet, i, rays[i]);
+  }
+
+  [[nodiscard]] bool occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& to) const {
+    RTCRay ray{};
+    ray.org_x = origin.x();
+    ray.org_y = origin.y();
+    ray.org_z = origin.z();
+    ray.dir_x = to.x();
+    ray.dir_y = to.y();
+    ray.dir_z = to.z();
+    ray.tnear = 0.05F;
+    ray.tfar = 60.0F;
+    ray.mask = 0xffffffffU;
+    embree_occluded1(top_, &ray);
+    return ray.tfar < 0.0F;
+  }
+
+ private:
+  // What an instance is: its surface, how it is turned, and how bright.
+  struct Instance {
+    Surface surface;
+    float cos_yaw;
+    float sin_yaw;
+    float reflectivity;
+  };
+
+  [[nodiscard]] Hit read_hit(const RTCRayHit16& packet, std::size_t i, const Ray& ray) const {
+    Hit hit;
+    if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return hit;
+    const Instance& instance = instances_[packet.hit.instID[0][i]];
+    const Eigen::Vector3f normal(packet.hit.Ng_x[i], packet.hit.Ng_y[i], packet.hit.Ng_z[i]);
+    const Eigen::Vector3f turned(instance.cos_yaw * normal.x() - instance.sin_yaw * normal.y(),
+                                 instance.sin_yaw * normal.x() + instance.cos_yaw * normal.y(),
+                                 normal.z());
+    hit.range_m = packet.ray.tfar[i];
+    const float length = turned.norm();
+    hit.cosine =
+        length > 0.0F ? std::min(1.0F, std::abs(turned.dot(ray.direction)) / length) : 0.5F;
+    hit.surface = instance.surface;
+    hit.reflectivity = instance.reflectivity;
+    if (instance.surface == Surface::kGround) read_static(packet, i, hit);
+    return hit;
+  }
+
+  void read_static(const RTCRayHit16& packet, std::size_t i, Hit& hit) const {
+    const unsigned primitive = packet.hit.primID[i];
+    if (packet.hit.geomID[i] == kStemGeometry) {
+      hit.surface = Surface::kStem;
+      hit.tree = cone_tree_[primitive];
+      hit.reflectivity = bark_[static_cast<std::size_t>(hit.tree)];
+    } else if (packet.hit.geomID[i] == kWoodGeometry) {
+      hit.surface = Surface::kDeadWood;
+      hit.reflectivity = 0.32F;
+    } else {
+      // Litter, moss and soil in patches.
+      hit.reflectivity =
+          0.22F + 0.18F * static_cast<float>(hash_numbers(primitive) >> 40) * 0x1p-24F;
+    }
+  }
+
+  void add_static(const Terrain& terrain, const Stand& stand) {
+    RTCScene scene = new_scene();
+    UNDERSTORY_CHECK(attach(scene, terrain_geometry(device_, terrain)) == kGroundGeometry);
+    Cones stems;
+    bark_.assign(stand.trees.size() + 1, 0.3F);
+    for (const Tree& tree : stand.trees)
+      add_stem(tree, stems);
+    // Always present, so that geometry numbers stay what they are: a cone below the ground.
+    stems.add({0.0, 0.0, -1000.0}, 0.01);
+    stems.join();
+    cone_tree_.push_back(0);
+    stems.add({0.0, 0.0, -1000.5}, 0.01);
+    UNDERSTORY_CHECK(attach(scene, cone_geometry(device_, stems)) == kStemGeometry);
+    Cones wood;
+    for (const Wood& piece : stand.dead_wood) {
+      wood.add(piece.from, piece.radius_from_m);
+      wood.join();
+      wood.add(piece.to, piece.radius_to_m);
+    }
+    if (!wood.first.empty()) {
+      UNDERSTORY_CHECK(attach(scene, cone_geometry(device_, wood)) == kWoodGeometry);
+    }
+    rtcCommitScene(scene);
+    add_instance(scene, Eigen::Matrix<float, 3, 4>(Eigen::Matrix<float, 3, 4>::Identity()),
+                 {Surface::kGround, 1.0F, 0.0F, 0.3F});
+  }
+
+  void add_stem(const Tree& tree, Cones& stems) {
+    bark_[static_cast<std::size_t>(tree.id)] = static_cast<float>(tree.bark_reflectivity);
+    std::vector<double> heights = {-0.3, 0.0, 0.12, 0.3, 0.6, 1.0};
+    const double step = std::max(0.5, (tree.height_m - 1.0) / 24.0);
+    for (double h = 1.0 + step; h < tree.height_m; h += step)
+      heights.push_back(h);
+    heights.push_back(tree.height_m);
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      const double above = std::max(0.0, heights[i]);
+      Eigen::Vector3d centre = tree.centre(above);
+      centre.z() = tree.foot.z() + heights[i];
+      stems.add(centre, std::max(0.004, 0.5 * tree.diameter(above)));
+      if (i + 1 < heights.size()) {
+        stems.join();
+        cone_tree_.push_back(tree.id);
+      }
+    }
+  }
+
+  void grow_shapes(const StandConfig& config, std::uint64_t seed) {
+    constexpr std::array kHeights = {6.0, 10.0, 14.0, 18.0, 23.0};
+    std::uint64_t number = 0;
+    for (const Species species : {Species::kPine, Species::kSpruce, Species::kBirch}) {
+      for (const double height : kHeights) {
+        for (int variant = 0; variant < 2; ++variant) {
+          Random random(hash_numbers(seed, stream_of(NoiseStream::kShapes)), ++number);
+          CrownSize size = size_class(species, height);
+          size.foliage = config.foliage;
+          size.dead_branches = config.dead_branches;
+          crowns_.push_back({species, size, shape_scene(grow_crown(species, size, random))});
+        }
+      }
+    }
+    for (const PlantKind kind :
+         {PlantKind::kSeedling, PlantKind::kShrub, PlantKind::kGroundPlants}) {
+      for (int variant = 0; variant < 3; ++variant) {
+        Random random(hash_numbers(seed, stream_of(NoiseStream::kShapes)), ++number);
+        plants_.push_back(shape_scene(grow_plant(kind, random)));
+      }
+    }
+  }
+
+  void add_crowns(const Stand& stand) {
+    for (const Tree& tree : stand.trees) {
+      const CrownShape* best = nullptr;
+      double nearest = 1e9;
+      for (std::size_t i = 0; i < crowns_.size(); ++i) {
+        if (crowns_[i].species != tree.species) continue;
+        // Trees of odd and even numbers take different variants.
+        const double distance = std::abs(crowns_[i].size.height_m - tree.height_m) +
+                                ((static_cast<int>(i) ^ tree.id) & 1 ? 1e-3 : 0.0);
+        if (distance < nearest) {
+          nearest = distance;
+          best = &crowns_[i];
+        }
+      }
+      add_crown(tree, *best);
+    }
+  }
+
+  // The grown shape, stretched to the tree's height and crown, turned and sheared with its lean.
+  void add_crown(const Tree& tree, const CrownShape& crown) {
+    const auto cos_yaw = static_cast<float>(std::cos(tree.yaw_rad));
+    const auto sin_yaw = static_cast<float>(std::sin(tree.yaw_rad));
+    const auto wide = static_cast<float>(tree.crown_radius_m / crown.size.crown_radius_m);
+    const auto high = static_cast<float>(tree.height_m / crown.size.height_m);
+    Eigen::Matrix<float, 3, 4> world_from_shape;
+    world_from_shape.col(0) << wide * cos_yaw, wide * sin_yaw, 0.0F;
+    world_from_shape.col(1) << -wide * sin_yaw, wide * cos_yaw, 0.0F;
+    world_from_shape.col(2) << high * static_cast<float>(tree.lean.x()),
+        high * static_cast<float>(tree.lean.y()), high;
+    world_from_shape.col(3) = tree.foot.cast<float>();
+    const float leaf = tree.species == Species::kBirch ? 0.5F : 0.42F;
+    add_instance(crown.scene, world_from_shape, {Surface::kFoliage, cos_yaw, sin_yaw, leaf});
+  }
+
+  void add_plants(const Stand& stand) {
+    for (std::size_t i = 0; i < stand.plants.size(); ++i) {
+      const Plant& plant = stand.plants[i];
+      const auto cos_yaw = static_cast<float>(std::cos(plant.yaw_rad));
+      const auto sin_yaw = static_cast<float>(std::sin(plant.yaw_rad));
+      const auto high = static_cast<float>(plant.height_m);
+      const float wide = plant.kind == PlantKind::kGroundPlants ? 1.0F : high;
+      Eigen::Matrix<float, 3, 4> world_from_shape;
+      world_from_shape.col(0) << wide * cos_yaw, wide * sin_yaw, 0.0F;
+      world_from_shape.col(1) << -wide * sin_yaw, wide * cos_yaw, 0.0F;
+      world_from_shape.col(2) << 0.0F, 0.0F, high;
+      world_from_shape.col(3) = plant.foot.cast<float>();
+      add_instance(plants_[3 * static_cast<std::size_t>(plant.kind) + i % 3], world_from_shape,
+                   {Surface::kPlant, cos_yaw, sin_yaw, 0.45F});
+    }
+  }
+
+  RTCScene new_scene() {
+    RTCScene scene = rtcNewScene(device_);
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    scenes_.push_back(scene);
+    return scene;
+  }
+
+  RTCScene shape_scene(const Shape& shape) {
+    RTCScene scene = new_scene();
+    attach(scene, shape_geometry(device_, shape));
+    rtcCommitScene(scene);
+    return scene;
+  }
+
+  void add_instance(RTCScene scene, const Eigen::Matrix<float, 3, 4>& world_from_shape,
+                    const Instance& instance) {
+    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(geometry, scene);
+    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, world_from_shape.data());
+    const unsigned id = attach(top_, geometry);
+    UNDERSTORY_CHECK(id == instances_.size());
+    instances_.push_back(instance);
+  }
+
+  RTCDevice device_ = nullptr;
+  RTCScene top_ = nullptr;
+  std::vector<RTCScene> scenes_;
+  std::vector<CrownShape> crowns_;
+  std::vector<RTCScene> plants_;  // three of each kind
+  std::vector<Instance> instances_;
+  std::vector<int> cone_tree_;  // id of the tree of each cone
+  std::vector<float> bark_;     // reflectivity by id
+};
+
+ForestScene::ForestScene(const StandConfig& config, const Terrain& terrain, const Stand& stand,
+                         std::uint64_t seed)
+    : impl_(std::make_unique<Impl>(config, terrain, stand, seed)) {}
+ForestScene::~ForestScene() = default;
+
+void ForestScene::cast(const Ray* rays, std::size_t count, float near_m, float far_m,
+                       Hit* hits) const {
+  for (std::size_t i = 0; i < count; i += 16) {
+    impl_->cast16(rays + i, std::min<std::size_t>(16, count - i), near_m, far_m, hits + i);
+  }
+}
+
+double ForestScene::canopy_cover(const Eigen::Vector3d& place) const {
+  constexpr int kDirections = 96;
+  constexpr double kGolden = 2.399963229728653;  // radians
+  const double lowest = std::sin(15.0 * std::numbers::pi / 180.0);
+  int hidden = 0;
+  for (int i = 0; i < kDirections; ++i) {
+    const double z = lowest + (1.0 - lowest) * (i + 0.5) / kDirections;
+    const double r = std::sqrt(1.0 - z * z);
+    const Eigen::Vector3d direction(r * std::cos(kGolden * i), r * std::sin(kGolden * i), z);
+    hidden += impl_->occluded(place.cast<float>(), direction.cast<float>()) ? 1 : 0;
+  }
+  return static_cast<double>(hidden) / kDirections;
+}
+
+}  // namespace understory

@@ -1,0 +1,235 @@
+#include "understory/simulation/simulator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "understory/simulation/carrier.h"
+#include "understory/simulation/inertial.h"
+#include "understory/simulation/machine.h"
+#include "understory/simulation/route.h"
+#include "understory/simulation/satellite.h"
+#include "understory/simulation/scanner.h"
+#include "understory/simulation/scene.h"
+#include "understory/simulation/stand.h"
+#include "understory/simulation/terrain.h"
+#include "understory/simulation/truth.h"
+
+namespace understory {
+namespace {
+
+constexpr double kTerrainMargin = 12.0;  // of ground around the stand, metres
+
+std::uint64_t seed_of(const SiteConfig& site) {
+  return static_cast<std::uint64_t>(site.seed);
+}
+
+void note(TopicReport& report, TimeNs stamp) {
+  if (report.messages == 0) report.first_stamp = stamp;
+  if (report.messages > 0) {
+    report.longest_gap = std::max(report.longest_gap, stamp - report.last_stamp);
+  }
+  report.last_stamp = stamp;
+  ++report.messages;
+}
+
+}  // namespace
+
+class Simulator::Impl {
+ public:
+  explicit Impl(const SiteConfig& config)
+      : site(config),
+        start(from_start(config.origin.start_time_s)),
+        route(config.carrier, seed_of(config)),
+        terrain(config.terrain, 0.5 * config.stand.size_x_m + kTerrainMargin,
+                0.5 * config.stand.size_y_m + kTerrainMargin, seed_of(config)),
+        stand(grow_stand(config.stand, config.carrier, terrain, route, seed_of(config))),
+        plan(plan_carrier(config, route, terrain)),
+        scene(config.stand, terrain, stand, seed_of(config)),
+        machine(config.carrier, plan.boom),
+        scanner(config, scene, plan.path, machine, start),
+        imu(config, plan.path, start),
+        gnss(config, plan.path, scene, start) {
+    duration_s = config.duration_s > 0.0 ? config.duration_s : plan.path.duration_s() - 0.5;
+    end = start + from_seconds(duration_s);
+    describe_rig();
+    describe_topics();
+    next_fix = find_fix();
+  }
+
+  // The next event; a scan is cast only if `wanted`. Returns false at the end.
+  bool advance(bool wanted, std::optional<Event>& event) {
+    const TimeNs imu_time = imu.next_stamp();
+    const TimeNs fix_time = next_fix ? next_fix->stamp : std::numeric_limits<TimeNs>::max();
+    const TimeNs scan_time = scanner.end(scan_number);
+    const TimeNs first = std::min({imu_time, fix_time, scan_time});
+    if (first >= end) return false;
+    if (imu_time == first) {
+      take_imu(wanted, event);
+    } else if (fix_time == first) {
+      note(reports[2], fix_time);
+      if (wanted) event = *next_fix;
+      next_fix = find_fix();
+    } else {
+      take_scan(wanted, event);
+    }
+    now = first;
+    return true;
+  }
+
+  const SiteConfig site;
+  const TimeNs start;
+  double duration_s = 0.0;
+  TimeNs end = 0;
+  const Route route;
+  const Terrain terrain;
+  const Stand stand;
+  const CarrierPlan plan;
+  const ForestScene scene;
+  const Machine machine;
+  const Scanner scanner;
+  InertialSensor imu;
+  SatelliteReceiver gnss;
+  std::optional<GnssFix> next_fix;
+  std::int64_t scan_number = 0;
+  TimeNs now = 0;
+  Rig rig;
+  std::vector<TopicReport> reports;
+  std::vector<ScanTruth> truths;
+  // Biases at the stamps of scans that are not finished yet.
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> biases;
+
+ private:
+  static TimeNs from_start(double start_time_s) {
+    const double whole = std::floor(start_time_s);
+    return static_cast<TimeNs>(whole) * kNsPerSecond + from_seconds(start_time_s - whole);
+  }
+
+  void take_imu(bool wanted, std::optional<Event>& event) {
+    const TimeNs stamp = imu.next_stamp();
+    while (scanner.stamp(static_cast<std::int64_t>(biases.size())) <= stamp)
+      biases.emplace_back(imu.gyro_bias(), imu.accel_bias());
+    note(reports[1], stamp);
+    if (wanted) {
+      event = imu.next();
+    } else {
+      imu.skip();
+    }
+  }
+
+  void take_scan(bool wanted, std::optional<Event>& event) {
+    ScanTruth truth;
+    truth.stamp = scanner.stamp(scan_number);
+    const CarrierState state = plan.path.state(to_seconds(truth.stamp - start));
+    truth.world_from_body = state.world_from_body;
+    truth.velocity = state.velocity;
+    const std::size_t at = std::min(static_cast<std::size_t>(scan_number), biases.size() - 1);
+    truth.gyro_bias = biases[at].first;
+    truth.accel_bias = biases[at].second;
+    note(reports[0], truth.stamp);
+    if (wanted) {
+      SimulatedScan simulated = scanner.cast(scan_number);
+      reports[0].points += simulated.scan->points.size();
+      truth.stems = std::move(simulated.stems);
+      event = std::move(simulated.scan);
+    }
+    truths.push_back(std::move(truth));
+    ++scan_number;
+  }
+
+  std::optional<GnssFix> find_fix() {
+    while (site.gnss.enabled && gnss.next_stamp() < end) {
+      if (std::optional<GnssFix> fix = gnss.next()) return fix;
+    }
+    return std::nullopt;
+  }
+
+  void describe_rig() {
+    rig.body_frame = site.carrier.body;
+    rig.body_from_lidar = scanner.body_from_lidar();
+    rig.body_from_imu = imu.body_from_imu();
+    rig.body_from_gnss =
+        Pose(Eigen::Quaterniond::Identity(),
+             Eigen::Vector3d(site.gnss.mount_m[0], site.gnss.mount_m[1], site.gnss.mount_m[2]));
+    rig.lidar_model = site.lidar.model == "OS0-128" ? "OS-0-128" : site.lidar.model;
+    rig.lidar_extrinsic_source = "simulation";
+    rig.imu_extrinsic_source = "simulation";
+    rig.gnss_extrinsic_source = "simulation";
+  }
+
+  void describe_topics() {
+    reports.resize(3);
+    reports[0].name = "/lidar";
+    reports[0].type = "simulated " + site.lidar.model;
+    reports[0].frame = "lidar";
+    reports[0].role = "lidar";
+    reports[0].conventions = "t: ns since stamp; stamp = first firing";
+    reports[1].name = "/imu";
+    reports[1].type = "simulated IMU";
+    reports[1].frame = "imu";
+    reports[1].role = "imu";
+    reports[1].conventions = "rad/s, m/s^2, specific force";
+    reports[2].name = "/gnss";
+    reports[2].type = "simulated GNSS";
+    reports[2].frame = "gnss";
+    reports[2].role = "gnss";
+    reports[2].conventions = "WGS 84, ellipsoidal height";
+  }
+};
+
+Simulator::Simulator(const SiteConfig& config) : impl_(std::make_unique<Impl>(config)) {}
+Simulator::~Simulator() = default;
+
+std::optional<Event> Simulator::next() {
+  std::optional<Event> event;
+  impl_->advance(true, event);
+  return event;
+}
+
+void Simulator::skip(std::uint64_t count) {
+  std::optional<Event> nothing;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    if (!impl_->advance(false, nothing)) return;
+  }
+}
+
+const Rig& Simulator::rig() const {
+  return impl_->rig;
+}
+
+std::vector<TopicReport> Simulator::topics() const {
+  std::vector<TopicReport> reports = impl_->reports;
+  if (!impl_->site.gnss.enabled) reports.pop_back();
+  return reports;
+}
+
+std::string Simulator::format() const {
+  return "simulation (" + impl_->site.lidar.model + ", seed " + std::to_string(impl_->site.seed) +
+         ")";
+}
+
+double Simulator::progress() const {
+  if (impl_->now == 0) return 0.0;
+  return std::clamp(to_seconds(impl_->now - impl_->start) / impl_->duration_s, 0.0, 1.0);
+}
+
+const SiteConfig& Simulator::site() const {
+  return impl_->site;
+}
+
+double Simulator::duration_s() const {
+  return impl_->duration_s;
+}
+
+void Simulator::write_truth(const std::string& folder) const {
+  write_truth_folder(folder, impl_->site, impl_->stand, impl_->terrain, impl_->truths);
+}
+
+std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {
+  const SimulationUri parts = parse_simulation_uri(uri);
+  auto simulator = std::make_unique<Simulator>(load_site(parts.site, parts.settings));
+  log.debug("simulating " + parts.site + ", " + std::to_string(simulator->duration_s()) + " s");
+  return simulator;
+}
+
+}  // namespace understory

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/recording/recording.h"
+#include "understory/simulation/site.h"
+
+namespace understory {
+
+// A forest that is scanned while one reads: events in the order of their time (a scan's is its
+// nominal end), made when they are asked for. The same site and seed give the same bytes, whatever
+// the number of threads. Not thread-safe; casting a scan uses the current task arena.
+class Simulator : public Recording {
+ public:
+  explicit Simulator(const SiteConfig& config);
+  ~Simulator() override;
+
+  [[nodiscard]] std::optional<Event> next() override;
+  // Skipped scans are not cast: cheap.
+  void skip(std::uint64_t count) override;
+  [[nodiscard]] const Rig& rig() const override;
+  [[nodiscard]] std::vector<TopicReport> topics() const override;
+  [[nodiscard]] std::string format() const override;
+  [[nodiscard]] double progress() const override;
+
+  [[nodiscard]] const SiteConfig& site() const;
+  [[nodiscard]] double duration_s() const;
+
+  // Writes the truth of what has been read so far into a folder, which is made if need be:
+  // trajectory.tum, velocity.csv, imu_bias.csv (at every scan's stamp, skipped ones too),
+  // returns.csv.gz (of the scans that were cast: a skipped scan has no returns), trees.csv,
+  // dtm.tif, site.yaml. Throws OutputError.
+  void write_truth(const std::string& folder) const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// Opens "sim:SITE?key=value&..." (SITE: a shipped site or a YAML file). Throws InputError for an
+// unknown site, ConfigError for wrong keys.
+[[nodiscard]] std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log);
+
+}  // namespace understory

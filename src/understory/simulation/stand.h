@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "understory/simulation/route.h"
+#include "understory/simulation/site.h"
+#include "understory/simulation/terrain.h"
+
+namespace understory {
+
+enum class Species { kPine, kSpruce, kBirch };
+[[nodiscard]] std::string species_name(Species species);
+
+// One standing tree, in the world frame.
+struct Tree {
+  int id = 0;                                      // 1, 2, ...
+  Eigen::Vector3d foot = Eigen::Vector3d::Zero();  // centre of the stem on the ground
+  Species species = Species::kPine;
+  double dbh_m = 0.0;  // diameter 1.3 m above the foot
+  double height_m = 0.0;
+  double crown_base_m = 0.0;  // above the foot
+  double crown_radius_m = 0.0;
+  Eigen::Vector2d lean = Eigen::Vector2d::Zero();   // metres sideways per metre of height
+  Eigen::Vector2d sweep = Eigen::Vector2d::Zero();  // bow of the stem at half its height, metres
+  double yaw_rad = 0.0;                             // turns its crown
+  double bark_reflectivity = 0.3;
+
+  // Diameter of the stem at a height above the foot, metres; 0 at the top.
+  [[nodiscard]] double diameter(double height_m_above_foot) const;
+  // Centre of the stem at that height, world frame.
+  [[nodiscard]] Eigen::Vector3d centre(double height_m_above_foot) const;
+  // Tilt of the stem's lowest 3 m against the vertical.
+  [[nodiscard]] double lean_deg() const;
+};
+
+// A piece of dead wood: a cone from one end to the other.
+struct Wood {
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to = Eigen::Vector3d::Zero();
+  double radius_from_m = 0.1;
+  double radius_to_m = 0.1;
+};
+
+enum class PlantKind { kSeedling, kShrub, kGroundPlants };
+struct Plant {
+  PlantKind kind = PlantKind::kShrub;
+  Eigen::Vector3d foot = Eigen::Vector3d::Zero();
+  double height_m = 1.0;
+  double yaw_rad = 0.0;
+};
+
+struct Stand {
+  std::vector<Tree> trees;
+  std::vector<Wood> dead_wood;  // stumps and logs
+  std::vector<Plant> plants;
+};
+
+// Places trees and undergrowth at random in the stand's rectangle, clear of the route.
+[[nodiscard]] Stand grow_stand(const StandConfig& config, const CarrierConfig& carrier,
+                               const Terrain& terrain, const Route& route, std::uint64_t seed);
+
+}  // namespace understory

@@ -1,0 +1,153 @@
+#include "understory/simulation/truth.h"
+
+#include <fmt/format.h>
+#include <gdal_priv.h>
+#include <zlib.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+void write_text(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw OutputError(path, "cannot be written");
+}
+
+void write_gzip(const std::string& path, const std::string& text) {
+  gzFile file = gzopen(path.c_str(), "wb6");
+  if (file == nullptr) throw OutputError(path, "cannot be opened for writing");
+  std::size_t written = 0;
+  bool good = true;
+  while (good && written < text.size()) {
+    const auto piece = static_cast<unsigned>(std::min<std::size_t>(text.size() - written, 1 << 20));
+    good = gzwrite(file, text.data() + written, piece) == static_cast<int>(piece);
+    written += piece;
+  }
+  good = gzclose(file) == Z_OK && good;
+  if (!good) throw OutputError(path, "cannot be written");
+}
+
+std::string trajectory_text(const std::vector<ScanTruth>& scans) {
+  std::string text;
+  for (const ScanTruth& scan : scans) {
+    const Eigen::Vector3d& p = scan.world_from_body.translation();
+    const Eigen::Quaterniond& q = scan.world_from_body.rotation();
+    text +=
+        fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                    format_seconds(scan.stamp), p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
+  }
+  return text;
+}
+
+std::string velocity_text(const std::vector<ScanTruth>& scans) {
+  std::string text = "timestamp,vx,vy,vz\n";
+  for (const ScanTruth& scan : scans) {
+    text += fmt::format("{},{:.9f},{:.9f},{:.9f}\n", format_seconds(scan.stamp), scan.velocity.x(),
+                        scan.velocity.y(), scan.velocity.z());
+  }
+  return text;
+}
+
+std::string bias_text(const std::vector<ScanTruth>& scans) {
+  std::string text = "timestamp,gx,gy,gz,ax,ay,az\n";
+  for (const ScanTruth& scan : scans) {
+    text +=
+        fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", format_seconds(scan.stamp),
+                    scan.gyro_bias.x(), scan.gyro_bias.y(), scan.gyro_bias.z(), scan.accel_bias.x(),
+                    scan.accel_bias.y(), scan.accel_bias.z());
+  }
+  return text;
+}
+
+std::string returns_text(const std::vector<ScanTruth>& scans) {
+  std::string text = "timestamp,tree_id,rings,rings_with_3,returns\n";
+  for (const ScanTruth& scan : scans) {
+    const std::string stamp = format_seconds(scan.stamp);
+    for (const StemReturns& stem : scan.stems) {
+      text += fmt::format("{},{},{},{},{}\n", stamp, stem.tree, stem.rings, stem.rings_with_3,
+                          stem.returns);
+    }
+  }
+  return text;
+}
+
+std::string trees_text(const Stand& stand, const std::vector<ScanTruth>& scans) {
+  std::map<int, int> observations;
+  for (const ScanTruth& scan : scans) {
+    for (const StemReturns& stem : scan.stems)
+      ++observations[stem.tree];
+  }
+  std::string text =
+      "id,x,y,z,dbh_m,dbh_sd_m,height_m,lean_deg,observations,x_sd_m,y_sd_m,species\n";
+  for (const Tree& tree : stand.trees) {
+    const auto seen = observations.find(tree.id);
+    text += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.4f},0,{:.3f},{:.3f},{},0,0,{}\n", tree.id,
+                        tree.foot.x(), tree.foot.y(), tree.foot.z(), tree.dbh_m, tree.height_m,
+                        tree.lean_deg(), seen == observations.end() ? 0 : seen->second,
+                        species_name(tree.species));
+  }
+  return text;
+}
+
+// Heights at the middle of cells of half a metre, in the truth's own frame (east, north; no
+// coordinate system).
+void write_terrain(const std::string& path, const Terrain& terrain) {
+  constexpr double kCell = 0.5;
+  const Eigen::Vector3d low = terrain.vertex(0, 0);
+  const Eigen::Vector3d high = terrain.vertex(terrain.columns() - 1, terrain.rows() - 1);
+  const int width = static_cast<int>((high.x() - low.x()) / kCell);
+  const int height = static_cast<int>((high.y() - low.y()) / kCell);
+  std::vector<float> cells;
+  cells.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int row = 0; row < height; ++row) {
+    for (int column = 0; column < width; ++column) {
+      const double x = low.x() + kCell * (column + 0.5);
+      const double y = high.y() - kCell * (row + 0.5);
+      cells.push_back(static_cast<float>(terrain.height(x, y)));
+    }
+  }
+  GDALAllRegister();
+  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+  UNDERSTORY_CHECK(driver != nullptr);
+  const char* options[] = {"COMPRESS=DEFLATE", "PREDICTOR=3", "TILED=YES", nullptr};
+  GDALDataset* dataset =
+      driver->Create(path.c_str(), width, height, 1, GDT_Float32, const_cast<char**>(options));
+  if (dataset == nullptr) throw OutputError(path, "cannot be created");
+  double transform[6] = {low.x(), kCell, 0.0, high.y(), 0.0, -kCell};
+  dataset->SetGeoTransform(transform);
+  const CPLErr written = dataset->GetRasterBand(1)->RasterIO(
+      GF_Write, 0, 0, width, height, cells.data(), width, height, GDT_Float32, 0, 0);
+  GDALClose(dataset);
+  if (written != CE_None) throw OutputError(path, "cannot be written");
+}
+
+}  // namespace
+
+void write_truth_folder(const std::string& folder, const SiteConfig& site, const Stand& stand,
+                        const Terrain& terrain, const std::vector<ScanTruth>& scans) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw OutputError(folder, "cannot be made: " + error.message());
+  write_text(folder + "/trajectory.tum", trajectory_text(scans));
+  write_text(folder + "/velocity.csv", velocity_text(scans));
+  write_text(folder + "/imu_bias.csv", bias_text(scans));
+  write_gzip(folder + "/returns.csv.gz", returns_text(scans));
+  write_text(folder + "/trees.csv", trees_text(stand, scans));
+  write_terrain(folder + "/dtm.tif", terrain);
+  SiteConfig copy = site;
+  ConfigTable table;
+  describe(table, copy);
+  write_text(folder + "/site.yaml", table.to_yaml(false));
+}
+
+}  // namespace understory

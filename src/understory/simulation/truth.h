@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+#include "understory/simulation/scanner.h"
+#include "understory/simulation/site.h"
+#include "understory/simulation/stand.h"
+#include "understory/simulation/terrain.h"
+#include "understory/util/time.h"
+
+namespace understory {
+
+// The truth about one scan.
+struct ScanTruth {
+  TimeNs stamp = 0;
+  Pose world_from_body;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // world
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
+  std::vector<StemReturns> stems;
+};
+
+// Writes the truth folder (docs/simulation.md). Throws OutputError.
+void write_truth_folder(const std::string& folder, const SiteConfig& site, const Stand& stand,
+                        const Terrain& terrain, const std::vector<ScanTruth>& scans);
+
+}  // namespace understory
