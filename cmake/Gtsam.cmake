@@ -1,7 +1,8 @@
 # understory::gtsam: the system's GTSAM 4.2 or newer where there is one, else the one that
 # tools/deps/build.sh put into the cache. Decides UNDERSTORY_MARCH too, because whatever shares
 # Eigen types must be compiled for one instruction set: Eigen's alignment follows from it.
-set(UNDERSTORY_DEPS "" CACHE PATH "folder of dependencies built by tools/deps/build.sh")
+# UNDERSTORY_DEPS may name another folder; the default is asked for anew at each configuration,
+# because it changes with the versions and flags.
 if(NOT UNDERSTORY_DEPS)
   execute_process(COMMAND "${CMAKE_CURRENT_SOURCE_DIR}/tools/deps/build.sh" --where
                   OUTPUT_VARIABLE understory_deps_default OUTPUT_STRIP_TRAILING_WHITESPACE
@@ -22,10 +23,12 @@ else()
                   COMMAND_ERROR_IS_FATAL ANY)
   add_library(understory_gtsam INTERFACE)
   if(EXISTS "${UNDERSTORY_DEPS}/lib/cmake/gtsam/gtsam-targets.cmake")
-    find_package(Boost 1.67 REQUIRED COMPONENTS serialization)
+    find_package(Boost 1.67 REQUIRED COMPONENTS serialization timer)
     find_package(Eigen3 3.4 REQUIRED NO_MODULE)
     include("${UNDERSTORY_DEPS}/lib/cmake/gtsam/gtsam-targets.cmake")
     target_link_libraries(understory_gtsam INTERFACE understory_deps::gtsam)
+    file(READ "${UNDERSTORY_DEPS}/march" understory_gtsam_march)
+    string(STRIP "${understory_gtsam_march}" understory_gtsam_march)
   else()
     message(WARNING "no GTSAM in the system or in ${UNDERSTORY_DEPS}: graph and odometry will not "
                     "build. Run ./run setup, which builds it once.")
@@ -35,6 +38,11 @@ add_library(understory::gtsam ALIAS understory_gtsam)
 
 set(UNDERSTORY_MARCH "${understory_march_default}" CACHE STRING
     "instruction set of the whole program (-march=), the same as GTSAM's")
+if(DEFINED understory_gtsam_march AND NOT UNDERSTORY_MARCH STREQUAL understory_gtsam_march)
+  message(FATAL_ERROR "UNDERSTORY_MARCH is '${UNDERSTORY_MARCH}', but GTSAM in the cache was built "
+                      "for '${understory_gtsam_march}'. Set the environment variable "
+                      "UNDERSTORY_MARCH and run ./run setup, or leave it to the default.")
+endif()
 if(UNDERSTORY_MARCH)
   target_compile_options(understory_flags INTERFACE -march=${UNDERSTORY_MARCH})
 endif()

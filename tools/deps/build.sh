@@ -69,7 +69,6 @@ main() {
   prefix=$work/prefix
   rm -rf "$work" "$where"
   mkdir -p "$work"
-  echo "dependencies: fetching the sources of GTSAM and LASzip" >&2
   "$here/fetch.sh" "$cache/sources" gtsam laszip >&2
   for tarball in "$cache"/sources/{gtsam,laszip}_*.orig.tar.*; do tar -xf "$tarball" -C "$work"; done
   echo "dependencies: building LASzip" >&2

@@ -15,6 +15,7 @@ have_all() {
 }
 if have_all "$@"; then exit 0; fi
 
+echo "fetch: source tarballs of $* from $suite, through apt"
 private=$(mktemp -d)
 trap 'rm -rf "$private"' EXIT
 mkdir -p "$private/lists/partial" "$private/cache/archives/partial" "$private/parts"

@@ -39,23 +39,26 @@ class VoxelFilter {
 
  private:
   struct Voxel {
-    float sum[3];  // from the corner of the voxel
-    float intensity;
+    float sum[3];     // from the first point of the voxel
+    float intensity;  // sum
+    float range;      // sum
+    float best;       // squared distance of the chosen point from the mean
     std::uint32_t count;
-    std::uint32_t index;  // of the first point, later of the chosen one
-    float best;           // squared distance of the chosen point from the mean
-    std::uint32_t range_count_unused;
+    std::uint32_t first;  // index of the first point
+    std::uint32_t chosen;
   };
   struct Slot {
     std::uint64_t key;
     std::uint32_t epoch;
     std::uint32_t voxel;
   };
+  static constexpr std::uint32_t kNone = 0xffffffffU;
   void start(std::size_t points);
   std::uint32_t find_or_add(std::uint64_t key, std::uint32_t index);
   void grow();
-  void accumulate(const Points& points, const std::vector<float>* intensity,
-                  const std::vector<float>* range, const VoxelFilterConfig& config);
+  template <typename InRange>
+  void sort_into_voxels(const Points& points, double voxel_size_m, const InRange& in_range);
+  void choose_nearest_to_mean(const Points& points);
 
   std::vector<Slot> slots_;
   std::vector<Voxel> voxels_;

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "understory/recording/velodyne_clock.h"
+#include "understory/recording/velodyne_tables.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/scan.h"
 #include "understory/util/log.h"
@@ -15,14 +17,12 @@
 
 namespace understory {
 
-enum class VelodyneModel { kUnknown, kVlp16, kHdl32e, kPuckHiRes, kVlp32c };
-
 struct VelodyneConfig {
   // Azimuth (clockwise from above) at which a scan ends and the next begins.
   double scan_start_deg = 0.0;
   double min_range_m = 0.1;  // nearer returns are of the housing
   // Adds the height at which each beam leaves the optics (VLP-16 manual, "Vertical Correction"; up
-  // to 11 mm). Off: all beams leave the origin, as ROS 2 drivers compute their clouds.
+  // to 11 mm). Off: all beams leave the origin, as the nebula driver for ROS 2 has it.
   bool vertical_offsets = true;
   // Factory bytes are believed where this is kUnknown.
   VelodyneModel model = VelodyneModel::kUnknown;
@@ -31,29 +31,28 @@ struct VelodyneConfig {
 // Turns Velodyne data packets (1206 bytes of UDP payload; single, last and dual return) into scans.
 //
 // Points are in the frame of ROS drivers: x where the azimuth is 0 (away from the cable), y left,
-// z up; metres. Times are of each firing, azimuths interpolated between the packet's blocks at the
-// rate measured inside the packet. Rings count from the lowest beam up. In dual-return packets the
-// strongest return has return_index 0, the last one 1; where both are the same only one is kept.
+// z up; metres. Times are of each firing, azimuths interpolated between the packet's blocks. Rings
+// count from the lowest beam up. In dual-return packets the brighter return has return_index 0, the
+// other 1; where both are the same only one is kept.
 //
 // Absolute time: the packet's microseconds since the hour are joined with the hour of position
 // packets that have a valid fix, else of the `stamp` given with the packet. Where sensor clock and
-// stamp differ by more than a second (no GNSS at the sensor) and there are no position packets, the
-// sensor's clock gives the differences and the stamps, smoothed, the offset.
+// stamp differ by more than a second (no GNSS at the sensor), the sensor's clock gives the
+// differences, and the stamps, smoothed, the offset.
 // Damaged packets are passed over with a warning ("recording.damaged"). Not thread-safe.
 class VelodyneDecoder {
  public:
   static constexpr std::size_t kDataPacketSize = 1206;
   static constexpr std::size_t kPositionPacketSize = 512;
 
-  // `source` names the stream in warnings ("drive.pcap", "drive.bag /velodyne_packets").
+  // `source` names the stream in warnings ("drive.pcap", "drive.bag: /velodyne_packets").
   VelodyneDecoder(const VelodyneConfig& config, std::string source, Log& log);
 
   // `stamp` is when the packet was received. Any bytes of any size are survived.
   void add_packet(const std::uint8_t* data, std::size_t size, TimeNs stamp);
-  // A position packet; the fix in its NMEA sentence, if it holds a new and valid one. `set_clock`
-  // = false leaves the decoder's time base alone.
-  std::optional<GnssFix> add_position_packet(const std::uint8_t* data, std::size_t size,
-                                             TimeNs stamp, bool set_clock = true);
+  // A position packet: joins its time of day with the data packets' clock if the sensor is locked
+  // to it, and gives the fix in its NMEA sentence, if that is a new and valid one.
+  std::optional<GnssFix> add_position_packet(const std::uint8_t* data, std::size_t size);
 
   // The next finished scan, or null. Call until null after each packet.
   [[nodiscard]] ScanPtr take_scan();
@@ -61,32 +60,36 @@ class VelodyneDecoder {
   void finish();
 
   [[nodiscard]] VelodyneModel model() const { return model_; }
-  // "VLP-16", "HDL-32E", "VLP-32C", "" before the first packet.
-  [[nodiscard]] std::string model_name() const;
-  // "dual return; firing times from the manual; time from position packets" for `info`.
+  // "VLP-16", "HDL-32E"; "" before the first packet.
+  [[nodiscard]] const std::string& model_name() const { return table_.name; }
+  // For `info`: "dual return; time from position packets; ...".
   [[nodiscard]] std::string conventions() const;
+  // Packets decoded so far.
   [[nodiscard]] std::uint64_t packets() const { return packets_; }
 
  private:
+  static constexpr std::size_t kBlocks = 12;
   struct Block {
-    int azimuth_cdeg = 0;
-    const std::uint8_t* returns = nullptr;
-  };
-  struct PacketView {
-    std::array<Block, 12> blocks;
-    bool dual = false;
-    TimeNs stamp = 0;
+    const std::uint8_t* returns = nullptr;  // null: damaged
+    double azimuth_cdeg = 0.0;
     double cdeg_per_us = 0.0;
   };
+  using Blocks = std::array<Block, kBlocks>;
+  struct Shot {
+    double azimuth_cdeg = 0.0;
+    TimeNs time = 0;
+  };
 
-  [[nodiscard]] bool accept_format(const std::uint8_t* data, TimeNs stamp);
-  [[nodiscard]] bool read_blocks(const std::uint8_t* data, PacketView& packet);
-  [[nodiscard]] TimeNs packet_time(std::uint32_t microseconds, TimeNs stamp);
-  void decode_blocks(const PacketView& packet);
-  void decode_firings(const PacketView& packet, std::size_t block, int firing);
-  void add_return(const PacketView& packet, std::size_t block, int firing, int laser,
-                  double azimuth_cdeg, TimeNs time, std::uint8_t return_index);
-  void advance_azimuth(double azimuth_cdeg);
+  [[nodiscard]] bool accept_model(std::uint8_t product_byte);
+  [[nodiscard]] Blocks read_blocks(const std::uint8_t* data);
+  [[nodiscard]] double sequence_start_us(std::size_t block, int sequence) const;
+  void set_rates(Blocks& blocks);
+  void decode_sequence(const Blocks& blocks, std::size_t block, int sequence, TimeNs packet_time);
+  void add_returns(const std::uint8_t* first, const std::uint8_t* second, std::size_t laser,
+                   const Shot& shot);
+  void add_return(const std::uint8_t* raw, std::size_t laser, const Shot& shot,
+                  std::uint8_t return_index);
+  void turn_to(double azimuth_cdeg, TimeNs time);
   void close_scan();
   void damaged(const std::string& what);
 
@@ -94,19 +97,17 @@ class VelodyneDecoder {
   std::string source_;
   Log& log_;
   VelodyneModel model_ = VelodyneModel::kUnknown;
+  VelodyneModel contradicting_ = VelodyneModel::kUnknown;
+  VelodyneTable table_;
+  VelodyneClock clock_;
+  bool dual_ = false;
   std::uint8_t return_mode_ = 0;
   std::uint64_t packets_ = 0;
-
-  std::optional<TimeNs> hour_;  // UTC hour of the last position packet, at hour_seen_
-  TimeNs hour_seen_us_ = 0;     // its microseconds since the hour
-  bool free_running_ = false;   // sensor clock unrelated to the stamps
-  TimeNs offset_ = 0;           // stamp minus unwrapped sensor time, smoothed
-  TimeNs unwrapped_us_ = -1;    // sensor time without the wrap at the hour
-  std::uint32_t last_us_ = 0;
-  bool time_from_position_ = false;
-  std::int64_t last_fix_second_ = -1;
-
-  double last_azimuth_cdeg_ = -1.0;
+  std::uint64_t received_ = 0;
+  TimeNs last_fix_ = -1;
+  double rate_cdeg_per_us_ = 0.36;
+  double turned_cdeg_ = -1.0;  // azimuth since the scan's start angle; -1: no scan yet
+  TimeNs scan_begin_ = 0;
   std::vector<ScanPoint> points_;  // of the scan in progress
   std::vector<TimeNs> point_times_;
   std::deque<ScanPtr> finished_;

@@ -30,6 +30,9 @@ struct NdtConfig {
   double degenerate_ratio = 0.01;  // a direction with less than this share of the strongest
                                    // direction's information counts as undetermined
   int min_matches = 50;
+  // Neighbouring points see the same cell and share its error: this share of them counts as
+  // independent. Scales the matching cost against the prior, and the information.
+  double independent_share = 0.1;
 };
 void describe(ConfigTable& table, NdtConfig& config);
 
@@ -47,5 +50,21 @@ void describe(ConfigTable& table, NdtConfig& config);
                                               const Points& source, const Pose& guess,
                                               const std::optional<PosePrior>& prior,
                                               const NdtConfig& config);
+
+// The cost that register_ndt minimises (prior left out), with its gradient and Hessian with respect
+// to a right perturbation. For tests and for those who optimise it with other terms.
+struct NdtCost {
+  double cost = 0.0;
+  Vector6d gradient = Vector6d::Zero();
+  Matrix6d hessian = Matrix6d::Zero();
+  std::size_t matched = 0;         // points with at least one cell
+  double nearest_squared = 0.0;    // sum over matched points, see RegistrationResult::fitness_m2
+  double weight = 0.0;             // sum of weights
+  double weighted_residual = 0.0;  // sum of weight * squared normalised residual
+  double weighted_rows = 0.0;      // sum of weight * rows
+  double surface_squared = 0.0;    // sum of weight * squared distance from the surface, m^2
+};
+[[nodiscard]] NdtCost ndt_cost(const NdtMap& target, const Points& source,
+                               const Pose& target_from_source, const NdtConfig& config);
 
 }  // namespace understory

@@ -8,6 +8,7 @@
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
+#include "understory/geometry/voxel_key.h"
 #include "understory/util/config.h"
 
 namespace understory {
@@ -20,13 +21,15 @@ struct NdtMapConfig {
 void describe(ConfigTable& table, NdtMapConfig& config);
 
 // What a cell tells about a point in it. The information of its normal distribution (P4 (40)) is
-// kept as rows: information = sum over rows of row * row^T, where row = eigenvector / sigma, and
-// directions that say nothing (along a surface, or as wide as the cell itself) have no row.
+// kept as rows: information = sum over rows of row * row^T, where row = eigenvector / sigma.
+// Directions in which the cell says nothing have no row: along a surface or a stem, where the
+// spread of the points is that of the cell's box, not of the world; and along the ground for what
+// one or two rings of the lidar left on it.
 struct NdtCell {
   Eigen::Vector3f mean;                // from the centre of the cell, metres
   std::uint32_t count = 0;             // points
   int rows = 0;                        // 0 to 3; 0: the cell matches but does not constrain
-  std::array<Eigen::Vector3f, 3> row;  // 1/m
+  std::array<Eigen::Vector3f, 3> row;  // 1/m, most certain first
 };
 
 // Target of NDT: a grid of normal distributions. Immutable and shared between threads; made by
@@ -37,8 +40,16 @@ class NdtMap {
   [[nodiscard]] std::size_t size() const { return cells_.size(); }
   [[nodiscard]] bool empty() const { return cells_.empty(); }
   // The cell at integer coordinates, or null.
-  [[nodiscard]] const NdtCell* find(int x, int y, int z) const;
-  // All cells and their coordinates, in the order of first insertion.
+  [[nodiscard]] const NdtCell* find(int x, int y, int z) const {
+    if (slots_.empty()) return nullptr;
+    const std::uint64_t key = voxel_key(x, y, z);
+    for (std::uint64_t at = voxel_hash(key) & mask_;; at = (at + 1) & mask_) {
+      const Slot& slot = slots_[at];
+      if (slot.cell_plus_1 == 0) return nullptr;
+      if (slot.key == key) return &cells_[slot.cell_plus_1 - 1];
+    }
+  }
+  // All cells with enough points, and their coordinates, in the order of first insertion.
   [[nodiscard]] const std::vector<NdtCell>& cells() const { return cells_; }
   [[nodiscard]] const std::vector<std::array<int, 3>>& coordinates() const { return coordinates_; }
   // Mean of a cell in the map frame.
@@ -46,10 +57,14 @@ class NdtMap {
 
  private:
   friend class NdtMapBuilder;
+  struct Slot {
+    std::uint64_t key = 0;
+    std::uint32_t cell_plus_1 = 0;  // 0 = free
+  };
   double cell_size_ = 1.0;
   std::vector<NdtCell> cells_;
   std::vector<std::array<int, 3>> coordinates_;
-  std::vector<std::uint32_t> slots_;  // index + 1 into cells_, 0 = free
+  std::vector<Slot> slots_;
   std::uint64_t mask_ = 0;
 };
 using NdtMapPtr = std::shared_ptr<const NdtMap>;
@@ -69,8 +84,8 @@ class NdtMapBuilder {
   // Forgets the cells farther than that from the centre (map frame).
   void remove_beyond(const Eigen::Vector3d& center, double radius_m);
   void clear();
-  // The map as it is now. Only cells changed since the last snapshot, and their neighbours, are
-  // worked out again.
+  // The map as it is now. Only what changed since the last snapshot is worked out again; the
+  // outcome is the same as if all were.
   [[nodiscard]] NdtMapPtr snapshot();
 
  private:

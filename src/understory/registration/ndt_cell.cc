@@ -1,0 +1,107 @@
+#include "understory/registration/ndt_cell.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace understory::internal {
+namespace {
+
+// Ratios of variances. A trace of one ring is far thinner than long; two rings through one cell of
+// a rough ground still are; a patch of surface with a handful of points is not.
+constexpr double kLineRatio = 0.05;   // middle / largest below it: a line
+constexpr double kPlaneRatio = 0.15;  // smallest / middle below it: a surface
+constexpr double kPoleCosine = 0.7;   // lines steeper than 45 degrees are stems, not rings
+
+struct Shape {
+  Eigen::Vector3d variance;  // ascending
+  Eigen::Matrix3d axes;      // columns
+};
+
+Shape shape_of(const Eigen::Matrix3d& covariance) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(covariance);
+  return {solver.eigenvalues().cwiseMax(0.0), solver.eigenvectors()};
+}
+
+bool is_line(const Shape& shape) {
+  return shape.variance[1] < kLineRatio * shape.variance[2];
+}
+
+bool is_plane(const Shape& shape) {
+  return shape.variance[0] < kPlaneRatio * shape.variance[1];
+}
+
+void add_row(NdtCell& cell, const Eigen::Vector3d& direction, double information) {
+  if (information <= 0.0) return;
+  cell.row[static_cast<std::size_t>(cell.rows++)] =
+      (direction * std::sqrt(information)).cast<float>();
+}
+
+// A line that is no stem: what surrounds it may show the surface on which it lies.
+void add_row_of_surroundings(NdtCell& cell, const Eigen::Matrix3d& covariance, double floor,
+                             const MomentsAround& around) {
+  for (const int reach : {1, 2}) {
+    const CellMoments moments = around(reach);
+    const Shape shape = shape_of(moments.covariance());
+    if (is_line(shape)) continue;
+    if (!is_plane(shape)) return;
+    const Eigen::Vector3d normal = shape.axes.col(0);
+    const double own = normal.dot(covariance * normal);
+    add_row(cell, normal, 1.0 / (std::max(own, shape.variance[0]) + floor));
+    return;
+  }
+}
+
+}  // namespace
+
+void CellMoments::add(const CellMoments& other, const Eigen::Vector3d& offset) {
+  const double a = offset.x();
+  const double b = offset.y();
+  const double c = offset.z();
+  n += other.n;
+  x += other.x + other.n * a;
+  y += other.y + other.n * b;
+  z += other.z + other.n * c;
+  xx += other.xx + 2.0 * a * other.x + other.n * a * a;
+  yy += other.yy + 2.0 * b * other.y + other.n * b * b;
+  zz += other.zz + 2.0 * c * other.z + other.n * c * c;
+  xy += other.xy + a * other.y + b * other.x + other.n * a * b;
+  xz += other.xz + a * other.z + c * other.x + other.n * a * c;
+  yz += other.yz + b * other.z + c * other.y + other.n * b * c;
+}
+
+Eigen::Matrix3d CellMoments::covariance() const {
+  const Eigen::Vector3d m = mean();
+  Eigen::Matrix3d products;
+  products << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  return (products - n * m * m.transpose()) / std::max(1.0, n - 1.0);
+}
+
+NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
+                  const MomentsAround& around) {
+  NdtCell cell;
+  cell.count = static_cast<std::uint32_t>(moments.n);
+  cell.mean = moments.mean().cast<float>();
+  const Eigen::Matrix3d covariance = moments.covariance();
+  const Shape shape = shape_of(covariance);
+  const double floor = config.sigma_floor_m * config.sigma_floor_m;
+  // A cell evenly filled has this variance and says nothing.
+  const double box = config.cell_size_m * config.cell_size_m / 12.0 + floor;
+
+  if (is_line(shape)) {
+    if (std::abs(shape.axes.col(2).z()) < kPoleCosine) {
+      add_row_of_surroundings(cell, covariance, floor, around);
+      return cell;
+    }
+  } else if (is_plane(shape)) {
+    add_row(cell, shape.axes.col(0), 1.0 / (shape.variance[0] + floor) - 1.0 / box);
+    return cell;
+  }
+  const double longest = std::min(shape.variance[2] + floor, box);
+  for (int i = 0; i < 2; ++i)
+    add_row(cell, shape.axes.col(i), 1.0 / (shape.variance[i] + floor) - 1.0 / longest);
+  return cell;
+}
+
+}  // namespace understory::internal

@@ -1,0 +1,103 @@
+#include "understory/registration/solve.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "understory/util/parallel.h"
+
+namespace understory::internal {
+namespace {
+
+// Units in which a step of 1 is one metre for rotations too.
+Vector6d scale_of(double range_m) {
+  Vector6d scale;
+  scale << Eigen::Vector3d::Constant(1.0 / range_m), Eigen::Vector3d::Ones();
+  return scale;
+}
+
+// Solves (H + damping) step = -g in the basis of H's eigenvectors, so that indefinite and singular
+// Hessians need no special case: negative curvature is turned round, none at all gives no step.
+Vector6d damped_step(const Quadratic& at, const Vector6d& scale, double damping) {
+  const Matrix6d hessian = scale.asDiagonal() * at.hessian * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(hessian);
+  const Vector6d curvature = solver.eigenvalues().cwiseAbs();
+  const double strongest = curvature.maxCoeff();
+  if (!(strongest > 0.0)) return Vector6d::Zero();
+  Vector6d along = solver.eigenvectors().transpose() * scale.cwiseProduct(at.gradient);
+  for (int i = 0; i < 6; ++i) {
+    along[i] =
+        curvature[i] < 1e-9 * strongest ? 0.0 : -along[i] / (curvature[i] + damping * strongest);
+  }
+  return scale.cwiseProduct(solver.eigenvectors() * along);
+}
+
+void shorten(Vector6d& step, const StepLimits& limits) {
+  const double length = std::max(step.tail<3>().norm(), limits.range_m * step.head<3>().norm());
+  if (length > limits.max_step_m) step *= limits.max_step_m / length;
+}
+
+bool small(const Vector6d& step, const StepLimits& limits) {
+  return step.tail<3>().norm() < limits.step_translation_m &&
+         step.head<3>().norm() < limits.step_rotation_rad;
+}
+
+}  // namespace
+
+Minimum minimise(const Evaluate& evaluate, const Pose& guess, const StepLimits& limits) {
+  Minimum best{guess, evaluate(guess), 0, false};
+  double damping = 0.0;
+  while (best.iterations < limits.max_iterations) {
+    const Vector6d scale = scale_of(limits.range_m);
+    Vector6d step = damped_step(best.at, scale, damping);
+    shorten(step, limits);
+    const Pose pose = best.pose * Pose::exp(step);
+    const Quadratic at = evaluate(pose);
+    ++best.iterations;
+    if (at.cost <= best.at.cost) {
+      best.pose = pose;
+      best.at = at;
+      damping = damping < 1e-6 ? 0.0 : damping * 0.1;
+    } else {
+      damping = std::max(1e-3, damping * 10.0);
+    }
+    // A step this small is the end whether it gained or not: the cost is not smooth below it.
+    if (small(step, limits)) {
+      best.converged = true;
+      break;
+    }
+  }
+  return best;
+}
+
+void add_prior(const PosePrior& prior, const Pose& pose, Quadratic& to) {
+  const Vector6d difference = right_difference(pose, prior.target_from_source);
+  const Matrix6d jacobian = se3_right_jacobian_inverse(difference);
+  const Matrix6d weighted = jacobian.transpose() * prior.information;
+  to.cost += 0.5 * difference.dot(prior.information * difference);
+  to.gradient += weighted * difference;
+  to.hessian += weighted * jacobian;
+}
+
+Eigen::Matrix<double, 6, Eigen::Dynamic> degenerate_directions(const Matrix6d& information,
+                                                               double range_m, double ratio) {
+  const Vector6d scale = scale_of(range_m);
+  const Matrix6d scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(scaled);
+  const double limit = ratio * std::max(solver.eigenvalues()[5], 1e-12);
+  Eigen::Index count = 0;
+  while (count < 6 && solver.eigenvalues()[count] < limit)
+    ++count;
+  return solver.eigenvectors().leftCols(count);
+}
+
+double mean_range(const Points& points) {
+  if (points.empty()) return 1.0;
+  const double sum = ordered_sum(points.size(), 4096, 0.0, [&](double& total, std::size_t i) {
+    total += static_cast<double>(points[i].norm());
+  });
+  return std::max(0.1, sum / static_cast<double>(points.size()));
+}
+
+}  // namespace understory::internal

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "understory/registration/registration.h"
+
+namespace understory::internal {
+
+// Cost of a pose with its gradient and a positive semidefinite (or exact) Hessian with respect to a
+// right perturbation.
+struct Quadratic {
+  double cost = 0.0;
+  Vector6d gradient = Vector6d::Zero();
+  Matrix6d hessian = Matrix6d::Zero();
+};
+using Evaluate = std::function<Quadratic(const Pose&)>;
+
+struct StepLimits {
+  int max_iterations = 30;
+  double step_translation_m = 5e-4;
+  double step_rotation_rad = 5e-5;
+  double max_step_m = 0.5;
+  double range_m = 10.0;  // makes rotations comparable with translations
+};
+
+struct Minimum {
+  Pose pose;
+  Quadratic at;
+  int iterations = 0;
+  bool converged = false;
+};
+
+// Damped Newton (Levenberg-Marquardt): steps that would raise the cost are shortened until they do
+// not, so it always ends at a pose no worse than the guess. Directions without any information are
+// not moved along.
+[[nodiscard]] Minimum minimise(const Evaluate& evaluate, const Pose& guess,
+                               const StepLimits& limits);
+
+// Adds 1/2 |log(prior^-1 pose)|^2 in the metric of the prior's information.
+void add_prior(const PosePrior& prior, const Pose& pose, Quadratic& to);
+
+// Unit directions, rotation scaled by `range_m`, whose information is below `ratio` of the largest.
+[[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> degenerate_directions(
+    const Matrix6d& information, double range_m, double ratio);
+
+// Mean distance of points from their origin; 1 for none.
+[[nodiscard]] double mean_range(const Points& points);
+
+}  // namespace understory::internal
