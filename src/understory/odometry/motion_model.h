@@ -153,7 +153,8 @@ struct MotionConfig {
   LidarNoiseConfig lidar;
   // P2-8. A match that changes the velocity by more than this against the reference is dropped
   // (the paper's reference is the previous state); 0 turns the gate off.
-  double velocity_gate_m_s = 0.7;
+  double velocity_gate_m_s = 1.0;
+  double angular_gate_deg_s = 30.0;  // the same for the turn since the last scan
   VelocityGateReference velocity_gate_reference = VelocityGateReference::kPrediction;
   int velocity_gate_patience = 5;  // drops in a row before a match is believed after all
   bool level_world = true;         // allow new_world_from_old_world in the first seconds

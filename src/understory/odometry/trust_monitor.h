@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "understory/odometry/motion_model.h"
+
+namespace understory {
+
+// Compares what the IMU says with what the lidar says, to find swapped axes, wrong extrinsics and
+// wrong units. Rotation: turns between scans by matching against integrated rates. Gravity: the
+// mean specific force over a second, turned into the world by the lidar's attitude, must point the
+// same way at all times and have the length of gravity. Not thread-safe.
+class TrustMonitor {
+ public:
+  explicit TrustMonitor(double gravity_m_s2) : gravity_(gravity_m_s2) {}
+
+  // Turn of the IMU from scan to scan, as rotation vectors in its frame at the first scan: from
+  // matching and from the gyroscope.
+  void add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro);
+  // Mean specific force between two scans with the attitude by matching in its middle.
+  void add_force(const Eigen::Quaterniond& world_from_imu, const Eigen::Vector3d& force_in_imu,
+                 double duration_s);
+
+  // The judgement so far; stays untrusted once it is.
+  [[nodiscard]] const ImuTrust& trust() const { return trust_; }
+  // True if the gyroscope itself is fine but its axes are not where the rig says they are.
+  [[nodiscard]] bool axes_wrong() const { return axes_wrong_; }
+
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  void judge_turns();
+  void judge_forces();
+  void distrust(const std::string& reason);
+
+  double gravity_;
+  ImuTrust trust_;
+  bool axes_wrong_ = false;
+  // Sums over turns: outer product of gyro and lidar, squares, and the total angle, radians.
+  Eigen::Matrix3d product_ = Eigen::Matrix3d::Zero();
+  double lidar_square_ = 0.0;
+  double gyro_square_ = 0.0;
+  double error_square_ = 0.0;
+  double total_angle_ = 0.0;
+  int turns_ = 0;
+  // The second being gathered, then sums over the unit vectors of the finished ones.
+  Eigen::Vector3d force_world_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d force_imu_ = Eigen::Vector3d::Zero();
+  double force_time_ = 0.0;
+  Eigen::Vector3d directions_world_ = Eigen::Vector3d::Zero();
+  double length_sum_ = 0.0;
+  int seconds_ = 0;
+};
+
+}  // namespace understory
