@@ -1,0 +1,108 @@
+#include "understory/odometry/dense_odometry.h"
+
+#include <cmath>
+
+namespace understory {
+
+void describe(ConfigTable& table, DenseOdometryConfig& config) {
+  table.section("preprocess", [&] {
+    table.section("voxel", [&] { describe(table, config.voxel); });
+    table.add("machine_boxes_file", config.machine_boxes_file,
+              "YAML of boxes around the machine whose points are dropped; empty: none");
+  });
+  table.section("ndt", [&] {
+    describe(table, config.ndt);
+    table.add("min_inlier_ratio", config.min_inlier_ratio, {0.0, 1.0}, "",
+              "least share of a scan's points near the map for a match to count");
+    table.add("coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "cells",
+              "prediction error (1 sigma) above which the coarse map is asked first");
+    table.add("prior_weight", config.prior_weight, {0.0, 1.0}, "",
+              "weight of the prediction inside the match");
+  });
+  table.section("motion", [&] {
+    table.add("imu_enabled", config.imu_enabled, "use the IMU of the recording");
+    describe(table, config.motion);
+  });
+}
+
+DenseOdometry::DenseOdometry(const DenseOdometryConfig& config, const Rig& rig, StageTimes& times,
+                             Log& log)
+    : config_(config),
+      rig_(rig),
+      times_(times),
+      uses_imu_(config.imu_enabled && rig.body_from_imu.has_value()) {
+  motion_ = uses_imu_ ? make_imu_smoother(config.motion, rig, &log)
+                      : make_constant_velocity_model(config.motion, &log);
+  if (!config.machine_boxes_file.empty()) boxes_ = read_machine_boxes(config.machine_boxes_file);
+}
+
+void DenseOdometry::add_imu(const ImuSample& sample) {
+  if (uses_imu_) motion_->add_imu(sample);
+}
+
+DenseEstimate DenseOdometry::process(const Scan& scan, const LocalMapSnapshot& local_map) {
+  DenseEstimate estimate;
+  const double cpu_start = process_cpu_seconds();
+  {
+    const ScopedTimer timer(times_, "odometry");
+    preprocess(scan, estimate);
+    if (!local_map.empty()) match(local_map, motion_->predict(scan.stamp), estimate);
+    std::optional<LidarFactor> factor;
+    if (estimate.matched) {
+      factor = LidarFactor{estimate.match.target_from_source, estimate.match.fitness_m2,
+                           estimate.match.information};
+    }
+    {
+      const ScopedTimer smoothing(times_, "smoothing");
+      estimate.update = motion_->add_scan(scan.stamp, factor);
+    }
+    estimate.state = estimate.update.state;
+    last_matched_ = estimate.matched;
+    estimate.wall_ms = timer.wall_ms();
+  }
+  estimate.cpu_ms = 1e3 * (process_cpu_seconds() - cpu_start);
+  return estimate;
+}
+
+void DenseOdometry::preprocess(const Scan& scan, DenseEstimate& estimate) {
+  const ScopedTimer timer(times_, "preprocess");
+  std::vector<std::uint8_t> keep;
+  if (!boxes_.empty()) keep = outside_machine(scan, rig_, boxes_);
+  const std::vector<StampedPose> path = motion_->predict_path(scan.stamp, scan.end());
+  estimate.cloud = deskew(scan, rig_, path, keep, config_.deskew).cloud;
+  estimate.thinned = filter_.filter(estimate.cloud, config_.voxel).points;
+}
+
+void DenseOdometry::match(const LocalMapSnapshot& local_map, const NavState& predicted,
+                          DenseEstimate& estimate) {
+  const ScopedTimer timer(times_, "matching");
+  const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
+  const double finest = local_map.back()->cell_size();
+  const bool coarse = !last_matched_ || sigma > config_.coarse_above_sigma * finest;
+  std::optional<PosePrior> prior;
+  if (config_.prior_weight > 0.0) {
+    const Matrix6d loose = predicted.pose_covariance + 1e-9 * Matrix6d::Identity();
+    prior = PosePrior{predicted.world_from_body, config_.prior_weight * loose.inverse()};
+  }
+  const std::span<const NdtMapPtr> maps(local_map);
+  estimate.match = register_ndt(coarse ? maps : maps.last(1), estimate.thinned,
+                                predicted.world_from_body, prior, config_.ndt);
+  estimate.matched =
+      estimate.match.usable() && estimate.match.inlier_ratio >= config_.min_inlier_ratio;
+}
+
+void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
+  motion_->move_world(new_world_from_old_world);
+}
+
+void DenseOdometry::save(BinaryWriter& writer) const {
+  writer.put(last_matched_);
+  motion_->save(writer);
+}
+
+void DenseOdometry::load(BinaryReader& reader) {
+  last_matched_ = reader.get<bool>();
+  motion_->load(reader);
+}
+
+}  // namespace understory

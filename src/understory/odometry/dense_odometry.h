@@ -1,0 +1,88 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/odometry/motion_model.h"
+#include "understory/preprocess/body_cloud.h"
+#include "understory/preprocess/deskew.h"
+#include "understory/preprocess/machine_boxes.h"
+#include "understory/preprocess/voxel_filter.h"
+#include "understory/registration/ndt.h"
+#include "understory/sensor/rig.h"
+#include "understory/sensor/scan.h"
+#include "understory/util/config.h"
+#include "understory/util/log.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+
+// What scans are matched to: the same map at several cell sizes, coarse to fine.
+using LocalMapSnapshot = std::vector<NdtMapPtr>;
+
+struct DenseOdometryConfig {
+  VoxelFilterConfig voxel;     // thins a scan before matching
+  NdtConfig ndt;
+  DeskewConfig deskew;
+  MotionConfig motion;
+  bool imu_enabled = true;     // false: the IMU of the recording is passed over
+  std::string machine_boxes_file;  // YAML, P4-8; empty: none
+  // A match counts only with this share of the scan's points near the map.
+  double min_inlier_ratio = 0.3;
+  // The coarse maps are asked first where the prediction may be off by more than this share of the
+  // finest cell (one sigma), or the last scan found no match.
+  double coarse_above_sigma = 0.25;
+  // Weight of the prediction in the match, 0 = it is only the start. In directions that a scan
+  // leaves undetermined the prior keeps the match from wandering.
+  double prior_weight = 0.0;
+};
+void describe(ConfigTable& table, DenseOdometryConfig& config);
+
+// All that is known of one scan once it has a pose.
+struct DenseEstimate {
+  NavState state;             // at the scan's stamp
+  MotionUpdate update;
+  RegistrationResult match;   // status kTooFewPoints where there was no map to match to
+  bool matched = false;       // the match was usable and was offered to the motion model
+  BodyCloud cloud;            // every return outside the machine, deskewed, body frame at the stamp
+  Points thinned;             // what was matched, body frame at the stamp
+  double wall_ms = 0.0;
+  double cpu_ms = 0.0;
+};
+
+// Dense lidar-inertial odometry, P4 F2 (left graph) and P2 section 2: predict, deskew, thin, match to
+// the local map, smooth. The local map is the caller's; one scan after another in order of time.
+// Not thread-safe; parallel inside.
+class DenseOdometry {
+ public:
+  // The rig decides whether there is an IMU (body_from_imu). `times` and `log` must outlive it.
+  DenseOdometry(const DenseOdometryConfig& config, const Rig& rig, StageTimes& times, Log& log);
+
+  void add_imu(const ImuSample& sample);
+  [[nodiscard]] DenseEstimate process(const Scan& scan, const LocalMapSnapshot& local_map);
+  // The local map was moved by this (loop closure): the estimate moves along.
+  void move_world(const Pose& new_world_from_old_world);
+
+  [[nodiscard]] const MotionModel& motion() const { return *motion_; }
+  [[nodiscard]] bool uses_imu() const { return uses_imu_; }
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  void preprocess(const Scan& scan, DenseEstimate& estimate);
+  void match(const LocalMapSnapshot& local_map, const NavState& predicted,
+             DenseEstimate& estimate);
+
+  DenseOdometryConfig config_;
+  Rig rig_;
+  StageTimes& times_;
+  bool uses_imu_;
+  std::unique_ptr<MotionModel> motion_;
+  std::vector<MachineBox> boxes_;
+  VoxelFilter filter_;
+  bool last_matched_ = false;
+};
+
+}  // namespace understory
