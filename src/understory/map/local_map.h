@@ -1,0 +1,54 @@
+#pragma once
+
+#include <vector>
+
+#include "understory/geometry/points.h"
+#include "understory/geometry/pose.h"
+#include "understory/registration/ndt_map.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+struct LocalMapConfig {
+  // Edges of the cells of the maps that scans are matched to, coarse to fine.
+  std::vector<double> cell_sizes_m = {2.0, 1.0};
+  NdtMapConfig cells;      // cell_size_m is taken from the list above
+  // Accumulate: every keyframe within the radius stays, however old; recent: only the last
+  // keyframes, thinned by a voxel grid of their positions (P4 section 3.1.1, Local Map).
+  enum class Method { kAccumulate, kRecent };
+  Method method = Method::kAccumulate;
+  double radius_m = 80.0;          // accumulate: cells farther from the body are forgotten
+  int recent_keyframes = 15;       // recent: theta_lm
+  double recent_spacing_m = 2.0;   // recent: one keyframe per cube of this edge
+};
+void describe(ConfigTable& table, LocalMapConfig& config);
+
+// A keyframe's thinned cloud and where it is.
+struct PlacedPoints {
+  const Points* points_in_body = nullptr;
+  Pose world_from_body;
+};
+
+// The map around the carrier that scans are matched to, made of keyframes. Hands out immutable
+// snapshots that stay valid while it goes on. Not thread-safe itself.
+class LocalMap {
+ public:
+  explicit LocalMap(const LocalMapConfig& config);
+
+  // Adds a keyframe and forgets what has become too far from it.
+  void insert(const PlacedPoints& keyframe);
+  // Made from these keyframes alone, in their order, as if inserted one after another.
+  void rebuild(const std::vector<PlacedPoints>& keyframes);
+  [[nodiscard]] std::vector<NdtMapPtr> snapshot();
+
+ private:
+  LocalMapConfig config_;
+  std::vector<NdtMapBuilder> builders_;
+};
+
+// Which of the keyframes at these positions (oldest first) P4's local map is made of: of the most
+// recent `recent_keyframes` the one nearest to the mean of each cube of `recent_spacing_m`.
+[[nodiscard]] std::vector<std::size_t> recent_keyframes(
+    const std::vector<Eigen::Vector3d>& positions, const LocalMapConfig& config);
+
+}  // namespace understory
