@@ -37,29 +37,23 @@ LocalMap::LocalMap(const LocalMapConfig& config) : config_(config) {
   }
 }
 
-void LocalMap::insert(const PlacedPoints& keyframe) {
+void LocalMap::insert(const PlacedPoints& keyframe, bool forget) {
   for (NdtMapBuilder& builder : builders_) {
     builder.insert(*keyframe.points_in_body, keyframe.world_from_body);
-    builder.remove_beyond(keyframe.world_from_body.translation(), config_.radius_m);
+    if (forget) builder.remove_beyond(keyframe.world_from_body.translation(), config_.radius_m);
   }
 }
 
-void LocalMap::rebuild(const std::vector<PlacedPoints>& keyframes) {
-  for (NdtMapBuilder& builder : builders_) {
+void LocalMap::clear() {
+  for (NdtMapBuilder& builder : builders_)
     builder.clear();
-    for (const PlacedPoints& keyframe : keyframes) {
-      builder.insert(*keyframe.points_in_body, keyframe.world_from_body);
-    }
-    if (!keyframes.empty()) {
-      builder.remove_beyond(keyframes.back().world_from_body.translation(), config_.radius_m);
-    }
-  }
 }
 
 std::vector<NdtMapPtr> LocalMap::snapshot() {
   std::vector<NdtMapPtr> maps;
   maps.reserve(builders_.size());
-  for (NdtMapBuilder& builder : builders_) maps.push_back(builder.snapshot());
+  for (NdtMapBuilder& builder : builders_)
+    maps.push_back(builder.snapshot());
   return maps;
 }
 
@@ -69,7 +63,8 @@ std::vector<std::size_t> recent_keyframes(const std::vector<Eigen::Vector3d>& po
   const std::size_t first = positions.size() > wanted ? positions.size() - wanted : 0;
   std::vector<std::size_t> chosen;
   if (positions.size() <= wanted || config.recent_spacing_m <= 0.0) {
-    for (std::size_t i = first; i < positions.size(); ++i) chosen.push_back(i);
+    for (std::size_t i = first; i < positions.size(); ++i)
+      chosen.push_back(i);
     return chosen;
   }
   std::map<std::array<long, 3>, std::vector<std::size_t>> cubes;
@@ -83,7 +78,8 @@ std::vector<std::size_t> recent_keyframes(const std::vector<Eigen::Vector3d>& po
   }
   for (const auto& [cube, members] : cubes) {
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (const std::size_t i : members) mean += positions[i] / static_cast<double>(members.size());
+    for (const std::size_t i : members)
+      mean += positions[i] / static_cast<double>(members.size());
     chosen.push_back(*std::min_element(members.begin(), members.end(), [&](auto a, auto b) {
       return (positions[a] - mean).squaredNorm() < (positions[b] - mean).squaredNorm();
     }));

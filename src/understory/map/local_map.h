@@ -12,14 +12,14 @@ namespace understory {
 struct LocalMapConfig {
   // Edges of the cells of the maps that scans are matched to, coarse to fine.
   std::vector<double> cell_sizes_m = {2.0, 1.0};
-  NdtMapConfig cells;      // cell_size_m is taken from the list above
+  NdtMapConfig cells;  // cell_size_m is taken from the list above
   // Accumulate: every keyframe within the radius stays, however old; recent: only the last
   // keyframes, thinned by a voxel grid of their positions (P4 section 3.1.1, Local Map).
   enum class Method { kAccumulate, kRecent };
   Method method = Method::kAccumulate;
-  double radius_m = 80.0;          // accumulate: cells farther from the body are forgotten
-  int recent_keyframes = 15;       // recent: theta_lm
-  double recent_spacing_m = 2.0;   // recent: one keyframe per cube of this edge
+  double radius_m = 80.0;         // accumulate: cells farther from the body are forgotten
+  int recent_keyframes = 15;      // recent: theta_lm
+  double recent_spacing_m = 2.0;  // recent: one keyframe per cube of this edge
 };
 void describe(ConfigTable& table, LocalMapConfig& config);
 
@@ -35,10 +35,9 @@ class LocalMap {
  public:
   explicit LocalMap(const LocalMapConfig& config);
 
-  // Adds a keyframe and forgets what has become too far from it.
-  void insert(const PlacedPoints& keyframe);
-  // Made from these keyframes alone, in their order, as if inserted one after another.
-  void rebuild(const std::vector<PlacedPoints>& keyframes);
+  // Adds a keyframe and, if `forget`, drops the cells that are too far from it.
+  void insert(const PlacedPoints& keyframe, bool forget);
+  void clear();
   [[nodiscard]] std::vector<NdtMapPtr> snapshot();
 
  private:

@@ -23,11 +23,11 @@ namespace understory {
 using LocalMapSnapshot = std::vector<NdtMapPtr>;
 
 struct DenseOdometryConfig {
-  VoxelFilterConfig voxel;     // thins a scan before matching
+  VoxelFilterConfig voxel;  // thins a scan before matching
   NdtConfig ndt;
   DeskewConfig deskew;
   MotionConfig motion;
-  bool imu_enabled = true;     // false: the IMU of the recording is passed over
+  bool imu_enabled = true;         // false: the IMU of the recording is passed over
   std::string machine_boxes_file;  // YAML, P4-8; empty: none
   // A match counts only with this share of the scan's points near the map.
   double min_inlier_ratio = 0.3;
@@ -42,18 +42,18 @@ void describe(ConfigTable& table, DenseOdometryConfig& config);
 
 // All that is known of one scan once it has a pose.
 struct DenseEstimate {
-  NavState state;             // at the scan's stamp
+  NavState state;  // at the scan's stamp
   MotionUpdate update;
-  RegistrationResult match;   // status kTooFewPoints where there was no map to match to
-  bool matched = false;       // the match was usable and was offered to the motion model
-  BodyCloud cloud;            // every return outside the machine, deskewed, body frame at the stamp
-  Points thinned;             // what was matched, body frame at the stamp
+  RegistrationResult match;  // status kTooFewPoints where there was no map to match to
+  bool matched = false;      // the match was usable and was offered to the motion model
+  BodyCloud cloud;           // every return outside the machine, deskewed, body frame at the stamp
+  Points thinned;            // what was matched, body frame at the stamp
   double wall_ms = 0.0;
   double cpu_ms = 0.0;
 };
 
-// Dense lidar-inertial odometry, P4 F2 (left graph) and P2 section 2: predict, deskew, thin, match to
-// the local map, smooth. The local map is the caller's; one scan after another in order of time.
+// Dense lidar-inertial odometry, P4 F2 (left graph) and P2 section 2: predict, deskew, thin, match
+// to the local map, smooth. The local map is the caller's; one scan after another in order of time.
 // Not thread-safe; parallel inside.
 class DenseOdometry {
  public:
@@ -72,8 +72,7 @@ class DenseOdometry {
 
  private:
   void preprocess(const Scan& scan, DenseEstimate& estimate);
-  void match(const LocalMapSnapshot& local_map, const NavState& predicted,
-             DenseEstimate& estimate);
+  void match(const LocalMapSnapshot& local_map, const NavState& predicted, DenseEstimate& estimate);
 
   DenseOdometryConfig config_;
   Rig rig_;

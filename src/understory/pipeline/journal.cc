@@ -4,15 +4,15 @@
 
 namespace understory {
 
-Pose ScanRecord::odom_from_body() const {
+Pose ScanRecord::keyframe_from_body() const {
   return Pose::from_unit({rotation[3], rotation[0], rotation[1], rotation[2]},
                          {translation[0], translation[1], translation[2]});
 }
 
-void ScanRecord::set_pose(const Pose& odom_from_body) {
-  const Eigen::Quaterniond& q = odom_from_body.rotation();
+void ScanRecord::set_pose(const Pose& keyframe_from_body) {
+  const Eigen::Quaterniond& q = keyframe_from_body.rotation();
   rotation = {q.x(), q.y(), q.z(), q.w()};
-  Eigen::Map<Eigen::Vector3d>(translation.data()) = odom_from_body.translation();
+  Eigen::Map<Eigen::Vector3d>(translation.data()) = keyframe_from_body.translation();
 }
 
 Matrix6d ScanRecord::pose_covariance() const {

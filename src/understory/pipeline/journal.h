@@ -18,11 +18,12 @@ enum class ScanOutcome : std::uint8_t {
   kUnmatched,  // no usable match; the prediction stands in
 };
 
-// What the run remembers of each scan. Poses are in the odometry frame; the correction of the
-// second graph is applied on output.
+// What the run remembers of each scan. Pose and velocity are in the frame of the last keyframe
+// before it, so that they stay true when keyframes are moved.
 struct ScanRecord {
   TimeNs stamp = 0;
-  std::int32_t keyframe = -1;  // the last keyframe at that time (its own if it became one)
+  std::int32_t keyframe = 0;  // the last keyframe before the scan; for the first scan its own
+  std::uint8_t becomes_keyframe = 0;
   ScanOutcome outcome = ScanOutcome::kMatched;
   std::uint8_t degenerate_directions = 0;
   std::uint16_t iterations = 0;
@@ -39,8 +40,8 @@ struct ScanRecord {
   std::uint32_t points = 0;          // of the scan as read
   std::uint32_t matched_points = 0;  // after the voxel filter
 
-  [[nodiscard]] Pose odom_from_body() const;
-  void set_pose(const Pose& odom_from_body);
+  [[nodiscard]] Pose keyframe_from_body() const;
+  void set_pose(const Pose& keyframe_from_body);
   [[nodiscard]] Matrix6d pose_covariance() const;
   void set_covariance(const Matrix6d& covariance);
 };

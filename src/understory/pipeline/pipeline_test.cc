@@ -37,7 +37,7 @@ TEST(Journal, GivesBackWhatWasWrittenBitForBit) {
   int i = 0;
   journal.for_each([&](const ScanRecord& record) {
     EXPECT_EQ(record.stamp, i);
-    EXPECT_EQ(record.odom_from_body().matrix(), record_of(i).odom_from_body().matrix());
+    EXPECT_EQ(record.keyframe_from_body().matrix(), record_of(i).keyframe_from_body().matrix());
     EXPECT_EQ(record.pose_covariance(), record_of(i).pose_covariance());
     EXPECT_EQ(record.pose_covariance()(4, 1), 0.5);
     ++i;

@@ -1,0 +1,79 @@
+#include "understory/pipeline/mapping_config.h"
+
+#include <algorithm>
+
+#include "understory/pipeline/profiles.h"
+#include "understory/util/error.h"
+
+namespace understory {
+
+ConfigTable mapping_table(MappingConfig& config) {
+  ConfigTable table;
+  table.section("time_repair", [&] { EventOrderer::describe(table, config.time_repair); });
+  describe(table, config.odometry);
+  KeyframeMap::describe(table, config.keyframe_map);
+  table.section("map", [&] {
+    table.add("enabled", config.map_enabled, "write map.laz and what is made from it");
+    table.add("range_max_m", config.map_range_max_m, {1.0, 1000.0}, "m",
+              "farther returns do not enter the finished map");
+    table.add("keyframe_thin_m", config.keyframe_thin_m, {0.0, 1.0}, "m",
+              "one point per cube of this edge of each keyframe; 0: all");
+    table.add("thin_m", config.map.thin_m, {0.0, 1.0}, "m",
+              "one point per cube of this edge of the finished map; 0: all");
+    table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
+  });
+  table.section("trees", [&] {
+    table.add("enabled", config.trees_enabled, "find the trees of the finished map");
+  });
+  table.section("run", [&] {
+    table.add("checkpoint_interval_s", config.checkpoint_interval_s, {0.1, 5.0}, "s",
+              "of recording between checkpoints");
+    table.add("lost_after_scans", config.lost_after_scans, {1, 100000}, "scans",
+              "unmatched scans in a row after which a new piece of map begins");
+    table.add("realtime_queue_scans", config.realtime_queue_scans, {1, 1000}, "scans",
+              "--realtime: scans that may wait; older ones are dropped");
+  });
+  return table;
+}
+
+std::vector<std::string> profile_names() {
+  std::vector<std::string> names;
+  for (const auto& profile : shipped_profiles())
+    names.emplace_back(profile.name);
+  return names;
+}
+
+std::string profile_text(const std::string& name) {
+  for (const auto& profile : shipped_profiles()) {
+    if (name == profile.name) return std::string(profile.yaml);
+  }
+  std::string known;
+  for (const std::string& each : profile_names())
+    known += (known.empty() ? "" : ", ") + each;
+  throw ConfigError({"--profile " + name + ": unknown; there are " + known});
+}
+
+MappingConfig read_mapping_config(const std::string& profile, const std::string& file,
+                                  const std::vector<std::string>& settings) {
+  MappingConfig config;
+  ConfigTable table = mapping_table(config);
+  std::vector<std::string> problems;
+  const auto gather = [&](const auto& read) {
+    try {
+      read();
+    } catch (const ConfigError& error) {
+      problems.insert(problems.end(), error.problems().begin(), error.problems().end());
+    }
+  };
+  gather([&] {
+    if (!profile.empty()) table.read_yaml(profile_text(profile), "profile " + profile);
+  });
+  gather([&] {
+    if (!file.empty()) table.read_file(file);
+  });
+  gather([&] { table.set(settings); });
+  if (!problems.empty()) throw ConfigError(problems);
+  return config;
+}
+
+}  // namespace understory

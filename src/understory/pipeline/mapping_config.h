@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "understory/map/keyframe_map.h"
+#include "understory/map/map_tiles.h"
+#include "understory/odometry/dense_odometry.h"
+#include "understory/preprocess/event_orderer.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+// Everything that can be set for `understory map`. Each part is described where it belongs; this is
+// only their sum.
+struct MappingConfig {
+  EventOrderer::Config time_repair;
+  DenseOdometryConfig odometry;
+  KeyframeMap::Config keyframe_map;
+  MapTiles::Config map;
+  double keyframe_thin_m = 0.02;  // thins a keyframe's cloud before it is stored
+  double map_range_max_m = 60.0;  // farther returns do not enter the finished map
+  bool map_enabled = true;        // write map.laz and what is made from it
+  bool trees_enabled = true;
+  double checkpoint_interval_s = 4.0;  // of recording; at most 5 s are processed again
+  int lost_after_scans = 30;           // unmatched scans in a row after which a new segment begins
+  int realtime_queue_scans = 3;
+};
+
+// The table of all keys, bound to `config`.
+[[nodiscard]] ConfigTable mapping_table(MappingConfig& config);
+
+// Names of the shipped profiles, and their YAML text. Throws ConfigError for an unknown name.
+[[nodiscard]] std::vector<std::string> profile_names();
+[[nodiscard]] std::string profile_text(const std::string& name);
+
+// Defaults, then the profile, then the file, then the settings ("key=value"). Empty = none.
+[[nodiscard]] MappingConfig read_mapping_config(const std::string& profile, const std::string& file,
+                                                const std::vector<std::string>& settings);
+
+}  // namespace understory

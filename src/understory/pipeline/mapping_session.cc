@@ -1,0 +1,212 @@
+#include "understory/pipeline/mapping_session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "understory/sensor/sensor_io.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kMostWaitingImu = 20'000;
+constexpr std::size_t kFewPoints = 100;
+
+std::uint16_t clamp_to_u16(double value) {
+  return static_cast<std::uint16_t>(std::clamp(value, 0.0, 65'535.0));
+}
+
+}  // namespace
+
+MappingSession::MappingSession(const MappingConfig& config, std::filesystem::path folder, Log& log)
+    : config_(config),
+      folder_(std::move(folder)),
+      log_(log),
+      map_(config.keyframe_map, folder_, times_, log) {}
+
+void MappingSession::handle(const Event& event, const Rig& rig) {
+  if (const auto* sample = std::get_if<ImuSample>(&event)) {
+    ++counts_.imu_samples;
+    if (started()) {
+      odometry_->add_imu(*sample);
+    } else {
+      waiting_imu_.push_back(*sample);
+      if (waiting_imu_.size() > kMostWaitingImu) waiting_imu_.pop_front();
+    }
+  } else if (const auto* fix = std::get_if<GnssFix>(&event)) {
+    fixes_.push_back(*fix);
+  } else if (const auto* scan = std::get_if<ScanPtr>(&event)) {
+    if (!started()) {
+      journal_ = std::make_unique<Journal>(folder_ / "journal.bin", 0);
+      clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", 0);
+      map_.start();
+      start(rig);
+      for (const ImuSample& waiting : waiting_imu_)
+        odometry_->add_imu(waiting);
+      waiting_imu_.clear();
+    }
+    on_scan(**scan);
+  }
+}
+
+void MappingSession::start(const Rig& rig) {
+  rig_ = rig;
+  odometry_ = std::make_unique<DenseOdometry>(config_.odometry, rig_, times_, log_);
+}
+
+void MappingSession::on_scan(const Scan& scan) {
+  const ScopedTimer timer(times_, "scan");
+  const double cpu_start = process_cpu_seconds();
+  DenseEstimate estimate = odometry_->process(scan, map_.local_map());
+  if (estimate.update.status == MotionStatus::kIgnored) return;
+  ScanRecord record;
+  record.stamp = scan.stamp;
+  record.points = static_cast<std::uint32_t>(scan.points.size());
+  record.matched_points = static_cast<std::uint32_t>(estimate.thinned.size());
+  note_outcome(estimate, record);
+  update_map(estimate, record);
+  record.wall_ms = static_cast<float>(timer.wall_ms());
+  record.cpu_ms = static_cast<float>(1e3 * (process_cpu_seconds() - cpu_start));
+  journal_->append(record);
+  last_scan_end_ = scan.end();
+}
+
+void MappingSession::note_outcome(const DenseEstimate& estimate, ScanRecord& record) {
+  ++counts_.scans;
+  counts_.points += record.points;
+  record.fitness_m2 = static_cast<float>(estimate.match.fitness_m2);
+  record.inlier_ratio = static_cast<float>(estimate.match.inlier_ratio);
+  record.iterations = static_cast<std::uint16_t>(estimate.match.iterations);
+  record.degenerate_directions =
+      static_cast<std::uint8_t>(estimate.match.degenerate_directions.cols());
+  record.set_covariance(estimate.state.pose_covariance);
+  if (estimate.thinned.size() < kFewPoints) {
+    ++counts_.empty_scans;
+    log_.warn("scan.few_points",
+              fmt::format("scan at {} has only {} usable points", format_seconds(record.stamp),
+                          estimate.thinned.size()));
+  }
+  record.outcome = ScanOutcome::kMatched;
+  if (estimate.update.status == MotionStatus::kVelocityGate) {
+    record.outcome = ScanOutcome::kGated;
+    ++counts_.gated;
+    log_.warn("match.velocity_gate",
+              fmt::format("match of the scan at {} dropped: {}", format_seconds(record.stamp),
+                          estimate.update.reason));
+  } else if (!estimate.matched && !map_.local_map().empty()) {
+    record.outcome = ScanOutcome::kUnmatched;
+    ++counts_.unmatched;
+    log_.warn("match.none",
+              fmt::format("scan at {} could not be matched ({:.0f} % of its points "
+                          "near the map){}",
+                          format_seconds(record.stamp), 100.0 * estimate.match.inlier_ratio,
+                          estimate.match.reason.empty() ? "" : ": " + estimate.match.reason));
+  }
+}
+
+void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& record) {
+  NavState state = estimate.state;
+  if (estimate.update.new_world_from_old_world) {
+    map_.move_world(*estimate.update.new_world_from_old_world);
+  }
+  const bool good =
+      record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
+  counts_.lost_in_a_row = good ? 0 : counts_.lost_in_a_row + 1;
+  bool wanted = good && map_.wants(state.world_from_body);
+  if (counts_.lost_in_a_row >= static_cast<std::uint64_t>(config_.lost_after_scans) &&
+      estimate.thinned.size() >= kFewPoints) {
+    log_.warn("map.segment", fmt::format("lost at {}: a new piece of map begins there, joined to "
+                                         "the old one by a prediction only",
+                                         format_seconds(record.stamp)));
+    map_.start_segment();
+    ++counts_.segments;
+    counts_.lost_in_a_row = 0;
+    wanted = true;
+  }
+  // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop
+  // closure, levelling) moves the scans with them.
+  const bool first = map_.keyframes().empty();
+  const Pose reference = first ? state.world_from_body : map_.keyframes().back().world_from_body;
+  record.keyframe = first ? 0 : static_cast<std::int32_t>(map_.keyframes().size()) - 1;
+  record.set_pose(reference.inverse() * state.world_from_body);
+  const Eigen::Quaterniond keyframe_from_world = reference.rotation().conjugate();
+  Eigen::Map<Eigen::Vector3d>(record.velocity.data()) =
+      keyframe_from_world * state.velocity_in_world;
+  Eigen::Map<Eigen::Vector3d>(record.gyro_bias.data()) = state.gyro_bias;
+  Eigen::Map<Eigen::Vector3d>(record.accel_bias.data()) = state.accel_bias;
+  if (!wanted) return;
+  record.becomes_keyframe = 1;
+  store_cloud(estimate);
+  const auto moved = map_.add(record.stamp, state.world_from_body, estimate.thinned);
+  if (moved) odometry_->move_world(*moved);
+}
+
+void MappingSession::store_cloud(const DenseEstimate& estimate) {
+  const ScopedTimer timer(times_, "store");
+  const BodyCloud& cloud = estimate.cloud;
+  KeyframeCloud stored{static_cast<std::int32_t>(map_.keyframes().size()), cloud.stamp, {}};
+  if (config_.map_enabled) {
+    std::vector<std::uint32_t> kept;
+    if (config_.keyframe_thin_m > 0.0) {
+      kept = cloud_filter_.keep(cloud.points, config_.keyframe_thin_m);
+    } else {
+      kept.resize(cloud.size());
+      for (std::uint32_t i = 0; i < kept.size(); ++i)
+        kept[i] = i;
+    }
+    const auto nearest = static_cast<float>(config_.odometry.voxel.range_min_m);
+    const auto farthest = static_cast<float>(config_.map_range_max_m);
+    stored.points.reserve(kept.size());
+    for (const std::uint32_t i : kept) {
+      if (cloud.range[i] < nearest || cloud.range[i] > farthest) continue;
+      const Eigen::Vector3f& p = cloud.points[i];
+      stored.points.push_back({p.x(), p.y(), p.z(), clamp_to_u16(cloud.intensity[i]),
+                               clamp_to_u16(static_cast<double>(cloud.t_ns[i]) * 1e-4)});
+    }
+  }
+  clouds_->append(stored);
+}
+
+void MappingSession::flush() {
+  if (!started()) return;
+  journal_->flush();
+  clouds_->flush();
+  map_.flush();
+}
+
+void MappingSession::save(BinaryWriter& writer) const {
+  writer.put(static_cast<std::uint64_t>(fixes_.size()));
+  for (const GnssFix& fix : fixes_) put_fix(writer, fix);
+  writer.put(counts_);
+  writer.put(last_scan_end_);
+  writer.put(started());
+  writer.put(static_cast<std::uint64_t>(waiting_imu_.size()));
+  for (const ImuSample& sample : waiting_imu_)
+    put_imu(writer, sample);
+  if (!started()) return;
+  writer.put(journal_->size());
+  writer.put(static_cast<std::uint64_t>(clouds_->size()));
+  map_.save(writer);
+  odometry_->save(writer);
+}
+
+void MappingSession::load(BinaryReader& reader, const Rig& rig) {
+  const auto fixes = reader.get<std::uint64_t>();
+  for (std::uint64_t i = 0; i < fixes; ++i) fixes_.push_back(get_fix(reader));
+  counts_ = reader.get<MappingCounts>();
+  last_scan_end_ = reader.get<TimeNs>();
+  const bool was_started = reader.get<bool>();
+  const auto waiting = reader.get<std::uint64_t>();
+  for (std::uint64_t i = 0; i < waiting; ++i)
+    waiting_imu_.push_back(get_imu(reader));
+  if (!was_started) return;
+  journal_ = std::make_unique<Journal>(folder_ / "journal.bin", reader.get<std::uint64_t>());
+  clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", reader.get<std::uint64_t>());
+  map_.load(reader);
+  start(rig);
+  odometry_->load(reader);
+}
+
+}  // namespace understory

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "understory/map/keyframe_clouds.h"
+#include "understory/map/keyframe_map.h"
+#include "understory/odometry/dense_odometry.h"
+#include "understory/pipeline/journal.h"
+#include "understory/pipeline/mapping_config.h"
+#include "understory/preprocess/event_orderer.h"
+#include "understory/recording/recording.h"
+#include "understory/sensor/gnss_fix.h"
+#include "understory/util/log.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+
+// Counts of one run, for run.json and for what to distrust.
+struct MappingCounts {
+  std::uint64_t scans = 0;
+  std::uint64_t unmatched = 0;    // no usable match; the prediction stands in
+  std::uint64_t gated = 0;        // dropped by the velocity gate (P2-8)
+  std::uint64_t empty_scans = 0;  // hardly any point left after preprocessing
+  std::uint64_t segments = 1;     // pieces of map that hang together by predictions only
+  std::uint64_t lost_in_a_row = 0;
+  std::uint64_t imu_samples = 0;
+  std::uint64_t points = 0;
+};
+
+// The moving part of a mapping run: takes events in order of time and keeps positioning (first
+// graph), keyframes and local map (second graph) and the journal going. Its whole state can be
+// saved; the files in `folder` belong to it. Not thread-safe.
+class MappingSession {
+ public:
+  MappingSession(const MappingConfig& config, std::filesystem::path folder, Log& log);
+
+  // `rig` is looked at when the first scan comes.
+  void handle(const Event& event, const Rig& rig);
+
+  // State to go on from; `flush` has made the files safe to the same point.
+  void flush();
+  void save(BinaryWriter& writer) const;
+  // Instead of `handle`ing from the start.
+  void load(BinaryReader& reader, const Rig& rig);
+
+  [[nodiscard]] bool started() const { return odometry_ != nullptr; }
+  [[nodiscard]] const Rig& rig() const { return rig_; }
+  [[nodiscard]] const MappingCounts& counts() const { return counts_; }
+  [[nodiscard]] const KeyframeMap& map() const { return map_; }
+  [[nodiscard]] KeyframeMap& map() { return map_; }
+  [[nodiscard]] const Journal& journal() const { return *journal_; }
+  [[nodiscard]] const KeyframeClouds& clouds() const { return *clouds_; }
+  [[nodiscard]] const std::vector<GnssFix>& fixes() const { return fixes_; }
+  [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
+  [[nodiscard]] StageTimes& times() { return times_; }
+  // Set after each scan, for progress and latency.
+  [[nodiscard]] TimeNs last_scan_end() const { return last_scan_end_; }
+
+ private:
+  void start(const Rig& rig);
+  void on_scan(const Scan& scan);
+  void update_map(const DenseEstimate& estimate, ScanRecord& record);
+  void store_cloud(const DenseEstimate& estimate);
+  void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
+
+  MappingConfig config_;
+  std::filesystem::path folder_;
+  Log& log_;
+  StageTimes times_;
+  Rig rig_;
+  std::deque<ImuSample> waiting_imu_;  // before the first scan
+  std::unique_ptr<DenseOdometry> odometry_;
+  KeyframeMap map_;
+  std::unique_ptr<Journal> journal_;
+  std::unique_ptr<KeyframeClouds> clouds_;
+  VoxelFilter cloud_filter_;
+  std::vector<GnssFix> fixes_;
+  MappingCounts counts_;
+  TimeNs last_scan_end_ = 0;
+};
+
+}  // namespace understory

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace understory {
+
+struct ShippedProfile {
+  std::string_view name;
+  std::string_view yaml;
+};
+
+// The files of configs/profiles, built into the program (cmake/Embed.cmake).
+[[nodiscard]] std::span<const ShippedProfile> shipped_profiles();
+
+}  // namespace understory
