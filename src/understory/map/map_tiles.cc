@@ -39,6 +39,7 @@ MapTiles::~MapTiles() {
 }
 
 void MapTiles::add(const MapPoint& point) {
+  UNDERSTORY_CHECK(!thinned_);
   const double i = std::floor(point.x / config_.tile_m);
   const double j = std::floor(point.y / config_.tile_m);
   if (!(std::abs(i) < 1e9 && std::abs(j) < 1e9)) return;  // not a finite place
@@ -82,33 +83,50 @@ std::vector<MapTiles::Record> MapTiles::load(TileIndex index, const Tile& tile) 
   return records;
 }
 
-std::vector<MapPoint> MapTiles::thinned(TileIndex index, std::vector<Record> records) const {
+std::vector<MapTiles::Record> MapTiles::thinned(const std::vector<Record>& records) const {
   std::unordered_set<std::uint64_t> taken;
   taken.reserve(records.size());
-  std::vector<MapPoint> points;
   const auto cell = [&](float value) {
     return static_cast<std::uint64_t>(
         static_cast<std::int64_t>(std::floor(static_cast<double>(value) / config_.thin_m)));
   };
+  std::vector<Record> kept;
   for (const Record& r : records) {
-    if (config_.thin_m > 0.0 &&
-        !taken.insert(hash_numbers(cell(r.x), cell(r.y), cell(r.z))).second) {
-      continue;
-    }
-    points.push_back({index.first * config_.tile_m + static_cast<double>(r.x),
-                      index.second * config_.tile_m + static_cast<double>(r.y),
-                      static_cast<double>(r.z), r.stamp, r.intensity});
+    if (taken.insert(hash_numbers(cell(r.x), cell(r.y), cell(r.z))).second) kept.push_back(r);
   }
-  return points;
+  return kept;
+}
+
+void MapTiles::thin_all() {
+  thinned_ = true;
+  if (config_.thin_m <= 0.0) return;
+  for (auto& [index, tile] : tiles_) {
+    std::vector<Record> kept = thinned(load(index, tile));
+    const bool on_disk = tile.written > 0;
+    if (on_disk) {
+      std::filesystem::remove(file_of(index));
+      tile.written = 0;
+    }
+    tile.buffer = std::move(kept);
+    if (on_disk) write_out(index, tile);
+  }
 }
 
 void MapTiles::for_each(const std::function<void(TileIndex, const std::vector<MapPoint>&)>& visit) {
+  if (!thinned_) thin_all();
   std::map<TileIndex, const Tile*> in_order;  // by y, then x
   for (const auto& [index, tile] : tiles_)
     in_order[{index.second, index.first}] = &tile;
+  std::vector<MapPoint> points;
   for (const auto& [swapped, tile] : in_order) {
     const TileIndex index{swapped.second, swapped.first};
-    visit(index, thinned(index, load(index, *tile)));
+    points.clear();
+    for (const Record& r : load(index, *tile)) {
+      points.push_back({index.first * config_.tile_m + static_cast<double>(r.x),
+                        index.second * config_.tile_m + static_cast<double>(r.y),
+                        static_cast<double>(r.z), r.stamp, r.intensity});
+    }
+    visit(index, points);
   }
 }
 

@@ -39,8 +39,8 @@ class MapTiles {
   MapTiles& operator=(const MapTiles&) = delete;
 
   void add(const MapPoint& point);
-  // Calls `visit` with each non-empty tile's points, tiles in order of y then x. To be called after
-  // the last `add`; may be called again.
+  // Calls `visit` with each non-empty tile's points, tiles in order of y then x. May be called
+  // again, but after the first call no point may be added.
   void for_each(const std::function<void(TileIndex, const std::vector<MapPoint>&)>& visit);
   [[nodiscard]] std::uint64_t points_added() const { return points_added_; }
 
@@ -48,15 +48,17 @@ class MapTiles {
   struct Record;
   struct Tile;
   void write_out(TileIndex index, Tile& tile);
+  void thin_all();
   [[nodiscard]] std::filesystem::path file_of(TileIndex index) const;
   [[nodiscard]] std::vector<Record> load(TileIndex index, const Tile& tile) const;
-  [[nodiscard]] std::vector<MapPoint> thinned(TileIndex index, std::vector<Record> records) const;
+  [[nodiscard]] std::vector<Record> thinned(const std::vector<Record>& records) const;
 
   std::filesystem::path folder_;
   Config config_;
   std::map<TileIndex, Tile> tiles_;
   std::uint64_t points_added_ = 0;
   std::uint64_t buffered_ = 0;
+  bool thinned_ = false;
 };
 
 }  // namespace understory
