@@ -22,9 +22,7 @@ ConfigTable mapping_table(MappingConfig& config) {
               "one point per cube of this edge of the finished map; 0: all");
     table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
   });
-  table.section("trees", [&] {
-    table.add("enabled", config.trees_enabled, "find the trees of the finished map");
-  });
+  table.section("inventory", [&] { describe(table, config.inventory); });
   table.section("run", [&] {
     table.add("checkpoint_interval_s", config.checkpoint_interval_s, {0.1, 5.0}, "s",
               "of recording between checkpoints");

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/forest/inventory.h"
 #include "understory/map/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/odometry/dense_odometry.h"
@@ -21,7 +22,7 @@ struct MappingConfig {
   double keyframe_thin_m = 0.02;  // thins a keyframe's cloud before it is stored
   double map_range_max_m = 60.0;  // farther returns do not enter the finished map
   bool map_enabled = true;        // write map.laz and what is made from it
-  bool trees_enabled = true;
+  InventoryConfig inventory;
   double checkpoint_interval_s = 4.0;  // of recording; at most 5 s are processed again
   int lost_after_scans = 30;           // unmatched scans in a row after which a new segment begins
   int realtime_queue_scans = 3;

@@ -178,7 +178,8 @@ void MappingSession::flush() {
 
 void MappingSession::save(BinaryWriter& writer) const {
   writer.put(static_cast<std::uint64_t>(fixes_.size()));
-  for (const GnssFix& fix : fixes_) put_fix(writer, fix);
+  for (const GnssFix& fix : fixes_)
+    put_fix(writer, fix);
   writer.put(counts_);
   writer.put(last_scan_end_);
   writer.put(started());
@@ -194,7 +195,8 @@ void MappingSession::save(BinaryWriter& writer) const {
 
 void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   const auto fixes = reader.get<std::uint64_t>();
-  for (std::uint64_t i = 0; i < fixes; ++i) fixes_.push_back(get_fix(reader));
+  for (std::uint64_t i = 0; i < fixes; ++i)
+    fixes_.push_back(get_fix(reader));
   counts_ = reader.get<MappingCounts>();
   last_scan_end_ = reader.get<TimeNs>();
   const bool was_started = reader.get<bool>();

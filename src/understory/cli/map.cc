@@ -1,0 +1,88 @@
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "understory/cli/command.h"
+#include "understory/cli/outcome.h"
+#include "understory/pipeline/mapping.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+struct MapOptions {
+  std::string recording;
+  std::string run_folder;
+  std::string resume;
+  std::string profile;
+  std::string config_file;
+  std::vector<std::string> settings;
+  std::string front_end = "dense";
+  bool realtime = false;
+  bool overwrite = false;
+  bool print_config = false;
+  OpenOptions open;
+};
+
+MappingConfig resolved(const MapOptions& options) {
+  return read_mapping_config(options.profile, options.config_file, options.settings);
+}
+
+int run_map(const MapOptions& options, CommandContext& context) {
+  if (options.print_config) {
+    MappingConfig config = resolved(options);
+    std::fputs(mapping_table(config).to_yaml(true).c_str(), stdout);
+    return kExitDone;
+  }
+  if (!options.resume.empty()) {
+    return report_outcome(
+        resume_mapping(options.resume, context.log, context.progress, context.stop_requested));
+  }
+  if (options.recording.empty() || options.run_folder.empty()) {
+    throw ConfigError({"understory map needs a RECORDING and -o RUN (or --resume RUN)"});
+  }
+  MappingRequest request;
+  request.recording = options.recording;
+  request.run_folder = options.run_folder;
+  request.config = resolved(options);
+  request.config_yaml = mapping_table(request.config).to_yaml(false);
+  request.open = options.open;
+  request.realtime = options.realtime;
+  request.overwrite = options.overwrite;
+  return report_outcome(
+      run_mapping(request, context.log, context.progress, context.stop_requested));
+}
+
+}  // namespace
+
+void add_map_command(CLI::App& app, Command& chosen) {
+  auto* command = app.add_subcommand("map", "Map a recording: trajectory, map, trees, report");
+  const auto options = std::make_shared<MapOptions>();
+  command->add_option("RECORDING", options->recording,
+                      "Recording (file, folder or sim:SITE?seed=N)");
+  command->add_option("-o,--output", options->run_folder, "Run folder to write");
+  command->add_option("--resume", options->resume, "Go on where a killed run stopped");
+  command->add_option("--profile", options->profile, "Shipped settings: handheld, harvester, ...");
+  command->add_option("--config", options->config_file, "YAML file of settings");
+  command->add_option("--set", options->settings, "One setting, key=value (may be repeated)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false)
+      ->take_all();
+  command->add_option("--front-end", options->front_end, "How scans are positioned")
+      ->check(CLI::IsMember({"dense"}));
+  command->add_flag("--realtime", options->realtime,
+                    "Play the recording at sensor speed; late scans are dropped");
+  command->add_flag("--overwrite", options->overwrite,
+                    "Start anew although the run folder holds an unfinished run");
+  command->add_flag("--print-config", options->print_config,
+                    "Print every setting with default, unit, range and meaning");
+  add_open_options(*command, options->open);
+  command->footer(
+      "Example:\n  understory map plot7.mcap -o plot7 --profile handheld\n"
+      "  understory map sim:handheld?seed=3 -o run --set loop_closure.enabled=false");
+  command->callback([&chosen, options] {
+    chosen = [options](CommandContext& context) { return run_map(*options, context); };
+  });
+}
+
+}  // namespace understory

@@ -1,0 +1,150 @@
+#include "understory/pipeline/mapping.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "understory/pipeline/mapping_session.h"
+#include "understory/pipeline/realtime_player.h"
+#include "understory/pipeline/run_state.h"
+#include "understory/pipeline/run_writer.h"
+#include "understory/pipeline/source.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+// The pieces of one run, and the loop that drives them.
+class MappingRun {
+ public:
+  MappingRun(const MappingRequest& request, RunState state, Log& log, const ProgressSink& progress,
+             const StopRequested& stop_requested)
+      : request_(request),
+        log_(log),
+        progress_(progress),
+        stop_requested_(stop_requested),
+        state_(std::move(state)),
+        orderer_(request.config.time_repair, log),
+        session_(request.config, state_.work(), log) {
+    open();
+  }
+
+  // Events in the order of the recording -> events in order of time -> poses, keyframes, map.
+  MappingOutcome run() {
+    bool stopped = false;
+    while (!(stopped = stop_requested_ && stop_requested_())) {
+      std::optional<Event> event = source_->next();
+      if (!event) break;
+      ++events_;
+      orderer_.push(std::move(*event));
+      while (auto ready = orderer_.pop())
+        handle(*ready);
+      checkpoint_if_due();
+    }
+    if (!stopped) {
+      orderer_.finish();
+      while (auto ready = orderer_.pop())
+        handle(*ready);
+    }
+    return finish(stopped);
+  }
+
+ private:
+  void open() {
+    source_ = open_source(request_.recording, request_.open, log_);
+    if (state_.events() > 0) {
+      source_->skip(state_.events());
+      state_.restore(session_, orderer_, log_, source_->rig());
+      events_ = state_.events();
+    } else {
+      state_.save(request_, session_, orderer_, log_, 0);  // makes the run resumable from the start
+    }
+    if (request_.realtime) {
+      auto player = std::make_unique<RealtimePlayer>(
+          std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans));
+      player_ = player.get();
+      source_ = std::move(player);
+    }
+  }
+
+  void handle(const Event& event) {
+    const TimeNs before = session_.last_scan_end();
+    session_.handle(event, source_->rig());
+    if (session_.last_scan_end() == before) return;
+    if (player_ != nullptr) latencies_ms_.push_back(player_->latency_ms(session_.last_scan_end()));
+    report_progress();
+  }
+
+  void checkpoint_if_due() {
+    const TimeNs due =
+        state_.last_checkpoint() + from_seconds(request_.config.checkpoint_interval_s);
+    if (session_.last_scan_end() >= due) {
+      state_.save(request_, session_, orderer_, log_, events_);
+    }
+  }
+
+  void report_progress() const {
+    if (!progress_) return;
+    const double share = source_->progress();
+    const auto done = static_cast<double>(session_.counts().scans);
+    progress_({"mapping", done, share > 0.0 ? done / share : 0.0, "scans",
+               fmt::format("{} keyframes", session_.map().keyframes().size())});
+  }
+
+  MappingOutcome finish(bool stopped) {
+    if (session_.counts().scans == 0) {
+      state_.remove();
+      throw InputError(request_.recording, "", no_scan_reason());
+    }
+    session_.flush();
+    RunFacts facts;
+    facts.stopped = stopped;
+    facts.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    facts.format = source_->format();
+    facts.time_repair = orderer_.report();
+    facts.latencies_ms = latencies_ms_;
+    facts.realtime = player_ != nullptr;
+    facts.dropped_scans = player_ != nullptr ? player_->dropped_scans() : 0;
+    MappingOutcome outcome = write_run(request_, session_, facts, *source_, log_, progress_);
+    state_.remove();
+    return outcome;
+  }
+
+  [[nodiscard]] std::string no_scan_reason() const {
+    std::string topics;
+    for (const TopicReport& topic : source_->topics()) {
+      topics += (topics.empty() ? "" : ", ") + topic.name + " (" + topic.type + ")";
+    }
+    return "no lidar scan could be read from it" +
+           (topics.empty() ? std::string() : "; it holds " + topics);
+  }
+
+  const MappingRequest& request_;
+  Log& log_;
+  const ProgressSink& progress_;
+  const StopRequested& stop_requested_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  RunState state_;
+  EventOrderer orderer_;
+  MappingSession session_;
+  std::unique_ptr<Recording> source_;
+  RealtimePlayer* player_ = nullptr;  // source_, if it is one
+  std::uint64_t events_ = 0;
+  std::vector<double> latencies_ms_;
+};
+
+}  // namespace
+
+MappingOutcome run_mapping(const MappingRequest& request, Log& log, const ProgressSink& progress,
+                           const StopRequested& stop_requested) {
+  return MappingRun(request, RunState::create(request), log, progress, stop_requested).run();
+}
+
+MappingOutcome resume_mapping(const std::filesystem::path& run_folder, Log& log,
+                              const ProgressSink& progress, const StopRequested& stop_requested) {
+  MappingRequest request;
+  RunState state = RunState::reopen(run_folder, request);
+  return MappingRun(request, std::move(state), log, progress, stop_requested).run();
+}
+
+}  // namespace understory

@@ -1,0 +1,112 @@
+#include "understory/pipeline/run_state.h"
+
+#include "understory/pipeline/checkpoint.h"
+#include "understory/util/error.h"
+#include "understory/util/version.h"
+
+namespace understory {
+namespace {
+
+constexpr const char* kCheckpoint = "checkpoint.bin";
+
+void put_request(BinaryWriter& writer, const MappingRequest& request) {
+  const OpenOptions& open = request.open;
+  for (const std::string& text :
+       {std::string(kVersion), request.recording, request.config_yaml, open.metadata_file,
+        open.lidar_topic, open.imu_topic, open.gnss_topic, open.extrinsics_file}) {
+    writer.put(text);
+  }
+  writer.put(open.rate_hz);
+  writer.put(request.realtime);
+}
+
+void get_request(BinaryReader& reader, const std::filesystem::path& path, MappingRequest& request) {
+  const std::string version = reader.get_string();
+  if (version != kVersion) {
+    throw InputError(
+        path.string(), "",
+        "was written by version " + version + ", this is " + kVersion + ": map the recording anew");
+  }
+  request.recording = reader.get_string();
+  request.config_yaml = reader.get_string();
+  OpenOptions& open = request.open;
+  for (std::string* text : {&open.metadata_file, &open.lidar_topic, &open.imu_topic,
+                            &open.gnss_topic, &open.extrinsics_file}) {
+    *text = reader.get_string();
+  }
+  open.rate_hz = reader.get<double>();
+  request.realtime = reader.get<bool>();
+  mapping_table(request.config).read_yaml(request.config_yaml, path.string());
+}
+
+}  // namespace
+
+RunState RunState::create(const MappingRequest& request) {
+  const std::filesystem::path work = request.run_folder / "work";
+  if (std::filesystem::exists(work / kCheckpoint) && !request.overwrite) {
+    throw OutputError(request.run_folder.string(),
+                      "holds an unfinished run; go on with `understory map --resume " +
+                          request.run_folder.string() + "` or give --overwrite to start anew");
+  }
+  std::error_code error;
+  std::filesystem::remove_all(work, error);
+  std::filesystem::create_directories(work, error);
+  if (error) throw OutputError(work.string(), "cannot be created: " + error.message());
+  return RunState(work);
+}
+
+RunState RunState::reopen(const std::filesystem::path& run_folder, MappingRequest& request) {
+  RunState state(run_folder / "work");
+  const std::filesystem::path path = state.work_ / kCheckpoint;
+  BinaryReader reader(read_checkpoint(path), path.string());
+  request.run_folder = run_folder;
+  get_request(reader, path, request);
+  state.events_ = reader.get<std::uint64_t>();
+  state.last_checkpoint_ = reader.get<TimeNs>();
+  state.state_ = reader.get_string();
+  return state;
+}
+
+void RunState::restore(MappingSession& session, EventOrderer& orderer, Log& log,
+                       const Rig& rig) const {
+  if (events_ == 0) return;
+  BinaryReader reader(state_, (work_ / kCheckpoint).string());
+  std::vector<Log::Warning> warnings(reader.get<std::uint64_t>());
+  for (Log::Warning& warning : warnings) {
+    warning.key = reader.get_string();
+    warning.first_message = reader.get_string();
+    warning.count = reader.get<std::uint64_t>();
+  }
+  orderer.load(reader);
+  session.load(reader, rig);
+  log.restore(warnings);
+}
+
+void RunState::save(const MappingRequest& request, MappingSession& session,
+                    const EventOrderer& orderer, const Log& log, std::uint64_t events) {
+  session.flush();
+  BinaryWriter state;
+  const auto warnings = log.warnings();
+  state.put(static_cast<std::uint64_t>(warnings.size()));
+  for (const Log::Warning& warning : warnings) {
+    state.put(warning.key);
+    state.put(warning.first_message);
+    state.put(static_cast<std::uint64_t>(warning.count));
+  }
+  orderer.save(state);
+  session.save(state);
+  last_checkpoint_ = session.last_scan_end();
+  BinaryWriter writer;
+  put_request(writer, request);
+  writer.put(events);
+  writer.put(last_checkpoint_);
+  writer.put(state.bytes());
+  write_checkpoint(work_ / kCheckpoint, writer.bytes());
+}
+
+void RunState::remove() {
+  std::error_code ignored;  // what is left over harms nobody
+  std::filesystem::remove_all(work_, ignored);
+}
+
+}  // namespace understory

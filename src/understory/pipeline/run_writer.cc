@@ -1,0 +1,308 @@
+#include "understory/pipeline/run_writer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/forest/inventory.h"
+#include "understory/output/geo_files.h"
+#include "understory/output/las_writer.h"
+#include "understory/output/map_picture.h"
+#include "understory/output/report.h"
+#include "understory/output/run_tables.h"
+#include "understory/pipeline/finished_map.h"
+#include "understory/pipeline/finished_trajectory.h"
+#include "understory/pipeline/run_judgement.h"
+#include "understory/pipeline/source.h"
+#include "understory/util/version.h"
+
+namespace understory {
+namespace {
+
+// What walking through the finished trajectory yields for report and run.json.
+struct TrajectoryFacts {
+  std::vector<ReportScan> scans;
+  double length_m = 0.0;
+  double duration_s = 0.0;
+  double period_ms = 0.0;  // median time between scans
+  double inlier_ratio_mean = 0.0;
+  double fitness_rms_m = 0.0;
+  std::uint64_t weak = 0;
+};
+
+ReportScan report_scan(const FinishedScan& scan) {
+  const ScanRecord& record = *scan.record;
+  ReportScan row;
+  row.stamp = record.stamp;
+  row.position = scan.world_from_body.translation().cast<float>();
+  row.wall_ms = record.wall_ms;
+  if (record.iterations > 0) {
+    row.inlier_ratio = record.inlier_ratio;
+    row.fitness_m2 = record.fitness_m2;
+  }
+  row.weak = record.outcome != ScanOutcome::kMatched || record.degenerate_directions > 0;
+  return row;
+}
+
+double median_period_ms(const std::vector<ReportScan>& scans) {
+  std::vector<TimeNs> steps;
+  for (std::size_t i = 1; i < scans.size(); ++i) {
+    steps.push_back(scans[i].stamp - scans[i - 1].stamp);
+  }
+  if (steps.empty()) return 0.0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return 1e3 * to_seconds(*middle);
+}
+
+// trajectory.tum and states.csv.gz.
+TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
+                                 const MappingSession& session) {
+  TumWriter trajectory(folder / "trajectory.tum");
+  StatesWriter states(folder / "states.csv.gz");
+  TrajectoryFacts facts;
+  double inliers = 0.0;
+  double squares = 0.0;
+  std::uint64_t matched = 0;
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  for_each_finished_scan(
+      session.journal(), session.map().keyframes(), [&](const FinishedScan& scan) {
+        const ScanRecord& record = *scan.record;
+        trajectory.add({record.stamp, scan.world_from_body});
+        states.add({record.stamp, scan.velocity_in_world,
+                    Eigen::Vector3d::Map(record.gyro_bias.data()),
+                    Eigen::Vector3d::Map(record.accel_bias.data()), record.pose_covariance()});
+        facts.scans.push_back(report_scan(scan));
+        const Eigen::Vector3d position = scan.world_from_body.translation();
+        if (facts.scans.size() > 1) facts.length_m += (position - last).norm();
+        last = position;
+        if (record.iterations > 0) {
+          ++matched;
+          inliers += static_cast<double>(record.inlier_ratio);
+          squares += static_cast<double>(record.fitness_m2);
+        }
+        if (facts.scans.back().weak) ++facts.weak;
+      });
+  trajectory.commit();
+  states.commit();
+  if (matched > 0) {
+    facts.inlier_ratio_mean = inliers / static_cast<double>(matched);
+    facts.fitness_rms_m = std::sqrt(squares / static_cast<double>(matched));
+  }
+  facts.period_ms = median_period_ms(facts.scans);
+  facts.duration_s = to_seconds(facts.scans.back().stamp - facts.scans.front().stamp);
+  return facts;
+}
+
+void write_graph(const std::filesystem::path& folder, const KeyframeMap& map) {
+  TumWriter poses(folder / "keyframes.tum");
+  std::vector<GraphVertex> vertices;
+  std::vector<GraphEdge> edges;
+  for (const Keyframe& keyframe : map.keyframes()) {
+    const int id = static_cast<int>(vertices.size());
+    poses.add({keyframe.stamp, keyframe.world_from_body});
+    vertices.push_back({id, keyframe.world_from_body, id == 0});
+    if (id > 0) {
+      edges.push_back({id - 1, id, keyframe.previous_from_this, keyframe.covariance.inverse()});
+    }
+  }
+  poses.commit();
+  write_g2o(folder / "graph.g2o", vertices, edges);
+}
+
+void write_fixes(const std::filesystem::path& folder, const std::vector<GnssFix>& fixes) {
+  if (fixes.empty()) return;
+  GnssWriter writer(folder / "gnss.csv");
+  for (const GnssFix& fix : fixes) {
+    GnssRow row;
+    row.fix = fix;
+    row.reason =
+        fix.quality == 0 ? "no fix" : "positions are not used: the map is in a local frame";
+    writer.add(row);
+  }
+  writer.commit();
+}
+
+// The finished cloud as the forest layer wants it.
+PointBlocks blocks_of(MapTiles& tiles) {
+  return [&tiles](const PointVisitor& visit) {
+    std::vector<Eigen::Vector3d> block;
+    tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+      block.clear();
+      for (const MapPoint& p : points)
+        block.emplace_back(p.x, p.y, p.z);
+      visit(block);
+    });
+  };
+}
+
+std::uint64_t write_map(const std::filesystem::path& folder, MapTiles& tiles,
+                        const GroundModel& ground, MapPicture& picture,
+                        const ProgressSink& progress) {
+  LasWriter writer(folder / "map.laz", LasOptions{});
+  double done = 0.0;
+  tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+    for (const MapPoint& p : points) {
+      const double height = ground.height_above({p.x, p.y, p.z});
+      const std::uint8_t las_class = ground.las_class(height);
+      writer.add({p.x, p.y, p.z, p.stamp, p.intensity, las_class});
+      picture.add(p.x, p.y, p.z, height);
+    }
+    done += static_cast<double>(points.size());
+    if (progress) progress({"writing map.laz", done / 1e6, 0.0, "million points", ""});
+  });
+  writer.commit();
+  return writer.points();
+}
+
+// Hashes of the recording's files; none for the simulator.
+std::vector<InputHash> hash_inputs(const std::string& recording) {
+  std::vector<InputHash> hashes;
+  if (is_simulation(recording)) return hashes;
+  std::vector<std::filesystem::path> files;
+  if (std::filesystem::is_directory(recording)) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(recording)) {
+      if (entry.is_regular_file()) files.push_back(entry.path());
+    }
+    std::sort(files.begin(), files.end());
+  } else {
+    files.emplace_back(recording);
+  }
+  for (const auto& file : files)
+    hashes.push_back(hash_input(file));
+  return hashes;
+}
+
+void fill_counts(RunSummary& summary, const MappingSession& session, const RunFacts& facts) {
+  const MappingCounts& counts = session.counts();
+  const auto count = [&](const char* name, std::uint64_t value) {
+    summary.counts[name] = static_cast<std::int64_t>(value);
+  };
+  count("keyframes", session.map().keyframes().size());
+  count("scans_unmatched", counts.unmatched);
+  count("scans_velocity_gated", counts.gated);
+  count("scans_with_few_points", counts.empty_scans);
+  count("segments", counts.segments);
+  count("imu_samples", counts.imu_samples);
+  count("gnss_fixes", session.fixes().size());
+  count("lidar_points", counts.points);
+  static constexpr const char* kNames[] = {"lidar", "imu", "gnss", "mag"};
+  for (std::size_t s = 0; s < EventOrderer::kStreams; ++s) {
+    const EventOrderer::StreamReport& stream = facts.time_repair.streams[s];
+    const std::string name = kNames[s];
+    count((name + "_duplicates").c_str(), stream.duplicates);
+    count((name + "_reordered").c_str(), stream.reordered);
+    count((name + "_too_late").c_str(), stream.late);
+    count((name + "_clock_jumps").c_str(), stream.clock_jumps);
+    count((name + "_gaps").c_str(), stream.gaps);
+  }
+  if (facts.realtime) count("scans_dropped", facts.dropped_scans);
+}
+
+void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const RunFacts& facts) {
+  summary.quality["length_m"] = trajectory.length_m;
+  summary.quality["inlier_ratio_mean"] = trajectory.inlier_ratio_mean;
+  summary.quality["match_distance_rms_m"] = trajectory.fitness_rms_m;
+  summary.quality["weak_scans_percent"] =
+      100.0 * static_cast<double>(trajectory.weak) / static_cast<double>(trajectory.scans.size());
+  if (!facts.realtime) return;
+  const Distribution latency = distribution_of(facts.latencies_ms);
+  summary.quality["latency_ms_mean"] = latency.mean;
+  summary.quality["latency_ms_p50"] = latency.p50;
+  summary.quality["latency_ms_p99"] = latency.p99;
+  summary.quality["latency_ms_max"] = latency.max;
+}
+
+RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
+                         const RunFacts& facts, const TrajectoryFacts& trajectory, const Log& log) {
+  RunSummary summary;
+  summary.command = "map";
+  summary.version = kVersion;
+  summary.config_yaml = request.config_yaml;
+  summary.inputs = hash_inputs(request.recording);
+  summary.scans = session.counts().scans;
+  summary.poses = session.journal().size();
+  summary.recording_s = trajectory.duration_s;
+  const RunJudgement judgement = judge_run(session, facts, log);
+  summary.status = judgement.status;
+  summary.reasons = judgement.reasons;
+  fill_counts(summary, session, facts);
+  fill_quality(summary, trajectory, facts);
+  return summary;
+}
+
+std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& trajectory,
+                             const InventoryResult& inventory,
+                             const std::filesystem::path& folder) {
+  std::string text = fmt::format("{} scans over {:.1f} m and {:.0f} s", summary.scans,
+                                 trajectory.length_m, trajectory.duration_s);
+  const auto scan = summary.stages.find("scan");
+  if (scan != summary.stages.end()) {
+    text += fmt::format(", {:.0f} ms a scan (99 %: {:.0f} ms)", scan->second.wall_ms.mean,
+                        scan->second.wall_ms.p99);
+  }
+  text += fmt::format("\n{} trees\n", inventory.trees.size());
+  for (const std::string& reason : summary.reasons) {
+    text += "not to be trusted: " + reason + "\n";
+  }
+  return text + "report: " + (folder / "report.html").string();
+}
+
+}  // namespace
+
+MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
+                         const RunFacts& facts, Recording& source, Log& log,
+                         const ProgressSink& progress) {
+  const std::filesystem::path& folder = request.run_folder;
+  StageTimes& times = session.times();
+  const TrajectoryFacts trajectory = write_trajectory(folder, session);
+  write_graph(folder, session.map());
+  write_fixes(folder, session.fixes());
+  InventoryResult inventory;
+  MapPicture picture;
+  RunSummary summary = summarise_run(request, session, facts, trajectory, log);
+  if (request.config.map_enabled) {
+    std::unique_ptr<MapTiles> tiles;
+    {
+      const ScopedTimer timer(times, "finish_gather_map");
+      tiles = make_finished_map(session.clouds(), session.map().keyframes(), request.config.map,
+                                folder / "work" / "tiles", progress);
+    }
+    {
+      const ScopedTimer timer(times, "finish_inventory");
+      inventory = take_inventory(blocks_of(*tiles), request.config.inventory, progress);
+    }
+    const ScopedTimer timer(times, "finish_write_map");
+    summary.counts["map_points"] =
+        static_cast<std::int64_t>(write_map(folder, *tiles, inventory.ground, picture, progress));
+    write_trees_csv(folder / "trees.csv", inventory.trees);
+    if (!inventory.ground.terrain.empty()) {
+      write_geotiff(folder / "dtm.tif", inventory.ground.terrain, "");
+      write_geotiff(folder / "chm.tif", inventory.canopy, "");
+    }
+  }
+  summary.counts["trees"] = static_cast<std::int64_t>(inventory.trees.size());
+  summary.warnings = log.warnings();
+  summary.stages = summarise(times);
+  summary.wall_s = facts.wall_s;
+  summary.cpu_s = process_cpu_seconds();
+  summary.peak_memory_mb = peak_memory_mb();
+  write_run_json(folder / "run.json", summary);
+
+  ReportInput report;
+  report.title = std::filesystem::path(request.recording).filename().string();
+  report.made_from = fmt::format(
+      "{}, {}{} scans", facts.format,
+      source.rig().lidar_model.empty() ? "" : source.rig().lidar_model + ", ", summary.scans);
+  report.summary = summary;
+  if (!picture.empty()) report.picture = &picture;
+  if (request.config.map_enabled) report.inventory = &inventory;
+  report.scans = trajectory.scans;
+  report.sensor_period_ms = trajectory.period_ms;
+  write_report(folder / "report.html", report);
+  return {summary.status, summary.reasons, folder / "report.html",
+          terminal_summary(summary, trajectory, inventory, folder)};
+}
+
+}  // namespace understory

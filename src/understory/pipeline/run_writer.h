@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "understory/pipeline/mapping.h"
+#include "understory/pipeline/mapping_session.h"
+#include "understory/preprocess/event_orderer.h"
+#include "understory/recording/recording.h"
+
+namespace understory {
+
+// What the driving loop knows of a run beside the session.
+struct RunFacts {
+  bool stopped = false;  // ended by the user
+  double wall_s = 0.0;
+  std::string format;  // of the recording
+  EventOrderer::Report time_repair;
+  bool realtime = false;
+  std::vector<double> latencies_ms;  // one per scan, --realtime only
+  std::uint64_t dropped_scans = 0;
+};
+
+// Writes the run folder (design: formats): trajectory, states, keyframes, graph, fixes, map, trees,
+// terrain, run.json, report. Every file appears whole or not at all.
+[[nodiscard]] MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
+                                       const RunFacts& facts, Recording& source, Log& log,
+                                       const ProgressSink& progress);
+
+}  // namespace understory
