@@ -12,8 +12,8 @@ Pose along_x(double x) {
 }
 
 // Keyframes at 0 s and 10 s, ten metres apart by odometry; scans every second.
-struct Run {
-  Run() : journal(path(), 0) {
+struct ShortRun {
+  ShortRun() : journal(path(), 0) {
     keyframes.resize(2);
     keyframes[0].stamp = 0;
     keyframes[1].stamp = 10 * kNsPerSecond;
@@ -47,7 +47,7 @@ struct Run {
 };
 
 TEST(FinishedTrajectory, IsTheOdometryWhereNothingMoved) {
-  const Run run;
+  const ShortRun run;
   const auto poses = run.poses();
   ASSERT_EQ(poses.size(), 16U);
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -56,14 +56,15 @@ TEST(FinishedTrajectory, IsTheOdometryWhereNothingMoved) {
 }
 
 TEST(FinishedTrajectory, SpreadsACorrectionByPowersAndCarriesItOn) {  // P0 (19, 20)
-  Run run;
+  ShortRun run;
   Vector6d xi;
   xi << 0.0, 0.0, 0.2, 1.0, 0.5, 0.0;
   const Pose correction = Pose::exp(xi);
   run.keyframes[1].world_from_body = along_x(10.0) * correction;
   const auto poses = run.poses();
   for (std::size_t i = 0; i <= 10; ++i) {
-    const Pose expected = along_x(static_cast<double>(i)) * Pose::exp(0.1 * i * xi);
+    const Pose expected =
+        along_x(static_cast<double>(i)) * Pose::exp(0.1 * static_cast<double>(i) * xi);
     EXPECT_LT((poses[i].matrix() - expected.matrix()).norm(), 1e-12) << i;
   }
   for (std::size_t i = 11; i < poses.size(); ++i) {
@@ -73,9 +74,9 @@ TEST(FinishedTrajectory, SpreadsACorrectionByPowersAndCarriesItOn) {  // P0 (19,
 }
 
 TEST(FinishedTrajectory, VelocityTurnsWithItsKeyframe) {
-  Run run;
+  ShortRun run;
   run.keyframes[1].world_from_body =
-      Pose(so3_exp({0, 0, M_PI / 2}), run.keyframes[1].world_from_body.translation());
+      Pose(so3_exp({0, 0, 1.5707963267948966}), run.keyframes[1].world_from_body.translation());
   Eigen::Vector3d last;
   for_each_finished_scan(run.journal, run.keyframes,
                          [&](const FinishedScan& scan) { last = scan.velocity_in_world; });
