@@ -203,7 +203,7 @@ class McapWriter::Impl {
   }
 
   void put_message(TopicId topic, std::uint64_t log_time, const ByteBuffer& message) {
-    if (counts_[topic] == 0) {
+    if (index_[topic].empty()) {  // every chunk can be read without the others
       put_schema(chunk_, topic);
       put_channel(chunk_, topic);
     }

@@ -12,8 +12,9 @@ enum class McapCompression { kNone, kLz4, kZstd };
 
 struct McapWriterOptions {
   McapCompression compression = McapCompression::kZstd;
-  int zstd_level = 1;                       // 1..19
-  std::size_t chunk_size_bytes = 4U << 20;  // a chunk is closed once it holds that much
+  int zstd_level = 1;  // 1..19
+  // A chunk is closed once it holds that much; a damaged chunk is lost as a whole.
+  std::size_t chunk_size_bytes = 1U << 20;
 };
 
 // Writes the project's native recording: MCAP with ROS 2 messages (CDR), chunks with CRC, message

@@ -33,7 +33,10 @@ struct TopicReport {
   TimeNs last_stamp = 0;
   TimeNs longest_gap = 0;
   std::uint64_t backward_steps = 0;  // stamps that go back in time
+  std::uint64_t duplicates = 0;      // stamps equal to the one before
+  std::uint64_t unreadable = 0;      // messages that could not be decoded
   std::uint64_t points = 0;          // lidar only
+  std::uint64_t empty_points = 0;    // lidar only: NaN or zero range, dropped
 };
 
 // A recording opened for reading: a stream of events, in the order of the file. The stream may

@@ -1,0 +1,203 @@
+#include "understory/recording/extrinsics.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <deque>
+#include <numbers>
+#include <vector>
+
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr const char* kBaseFrame = "base_link";
+
+class ExtrinsicsFile {
+ public:
+  explicit ExtrinsicsFile(const std::string& path) : path_(path) {}
+
+  void apply(const YAML::Node& root, Rig& rig) {
+    if (!root.IsMap()) {
+      problem("", "expected keys such as body_from_lidar");
+      return;
+    }
+    for (const auto& entry : root) {
+      const auto key = entry.first.as<std::string>("");
+      const YAML::Node& value = entry.second;
+      const std::string source = "extrinsics file " + path_;
+      if (key == "body_frame") {
+        rig.body_frame = value.as<std::string>("");
+      } else if (key == "lidar_model") {
+        rig.lidar_model = value.as<std::string>("");
+      } else if (key == "body_from_lidar") {
+        rig.body_from_lidar = read_pose(value, key);
+        rig.lidar_extrinsic_source = source;
+      } else if (key == "body_from_imu") {
+        rig.body_from_imu = read_pose(value, key);
+        rig.imu_extrinsic_source = source;
+      } else if (key == "body_from_gnss") {
+        rig.body_from_gnss = read_pose(value, key);
+        rig.gnss_extrinsic_source = source;
+      } else {
+        problem(key,
+                "unknown key; expected body_frame, lidar_model, body_from_lidar, body_from_imu or "
+                "body_from_gnss");
+      }
+    }
+  }
+
+  void throw_problems() const {
+    if (!problems_.empty()) throw ConfigError(problems_);
+  }
+
+ private:
+  void problem(const std::string& key, const std::string& what) {
+    problems_.push_back(path_ + ": " + (key.empty() ? "" : key + ": ") + what);
+  }
+
+  std::vector<double> numbers(const YAML::Node& node, const std::string& key, std::size_t count) {
+    try {
+      const auto values = node.as<std::vector<double>>();
+      bool finite = values.size() == count;
+      for (const double value : values)
+        finite = finite && std::isfinite(value);
+      if (finite) return values;
+    } catch (const YAML::Exception&) {
+      // Told below.
+    }
+    problem(key, "expected " + std::to_string(count) + " numbers");
+    return {};
+  }
+
+  Pose read_pose(const YAML::Node& node, const std::string& key) {
+    Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+    if (!node.IsMap()) {
+      problem(key, "expected translation_m and a rotation");
+      return {};
+    }
+    for (const auto& entry : node) {
+      const auto name = entry.first.as<std::string>("");
+      const std::string full = key + "." + name;
+      if (name == "translation_m") {
+        const auto v = numbers(entry.second, full, 3);
+        if (!v.empty()) translation = {v[0], v[1], v[2]};
+      } else if (name == "rotation_xyzw" || name == "rpy_deg" || name == "matrix") {
+        rotation = read_rotation(entry.second, name, full);
+      } else {
+        problem(full, "unknown key; expected translation_m, rotation_xyzw, rpy_deg or matrix");
+      }
+    }
+    return {rotation, translation};
+  }
+
+  Eigen::Quaterniond read_rotation(const YAML::Node& node, const std::string& name,
+                                   const std::string& full) {
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+    if (name == "rpy_deg") {
+      const auto v = numbers(node, full, 3);
+      if (v.empty()) return rotation;
+      const auto turn = [](double deg, const Eigen::Vector3d& axis) {
+        return Eigen::AngleAxisd(deg * std::numbers::pi / 180.0, axis);
+      };
+      return turn(v[2], Eigen::Vector3d::UnitZ()) * turn(v[1], Eigen::Vector3d::UnitY()) *
+             turn(v[0], Eigen::Vector3d::UnitX());
+    }
+    if (name == "rotation_xyzw") {
+      const auto v = numbers(node, full, 4);
+      if (v.empty()) return rotation;
+      rotation = Eigen::Quaterniond(v[3], v[0], v[1], v[2]);
+      if (std::abs(rotation.norm() - 1.0) > 0.01) problem(full, "expected a unit quaternion");
+      return rotation;
+    }
+    const auto v = numbers(node, full, 9);
+    if (v.empty()) return rotation;
+    Eigen::Matrix3d matrix;
+    for (int i = 0; i < 9; ++i)
+      matrix(i / 3, i % 3) = v[static_cast<std::size_t>(i)];
+    if ((matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).norm() > 0.01 ||
+        matrix.determinant() < 0.0) {
+      problem(full, "expected a rotation matrix");
+      return rotation;
+    }
+    return Eigen::Quaterniond(matrix);
+  }
+
+  std::string path_;
+  std::vector<std::string> problems_;
+};
+
+}  // namespace
+
+void TransformTree::add(const std::string& parent, const std::string& child,
+                        const Pose& parent_from_child) {
+  if (parent == child || parent.empty() || child.empty()) return;
+  edges_[parent].try_emplace(child, parent_from_child);
+  edges_[child].try_emplace(parent, parent_from_child.inverse());
+}
+
+std::optional<Pose> TransformTree::find(const std::string& target,
+                                        const std::string& source) const {
+  if (target == source) return Pose();
+  std::map<std::string, Pose> target_from{{target, Pose()}};
+  std::deque<std::string> open{target};
+  while (!open.empty()) {
+    const std::string frame = open.front();
+    open.pop_front();
+    const auto edges = edges_.find(frame);
+    if (edges == edges_.end()) continue;
+    for (const auto& [next, frame_from_next] : edges->second) {
+      if (target_from.count(next) > 0) continue;
+      const Pose pose = target_from.at(frame) * frame_from_next;
+      if (next == source) return pose;
+      target_from.emplace(next, pose);
+      open.push_back(next);
+    }
+  }
+  return std::nullopt;
+}
+
+Rig rig_from_transforms(const TransformTree& tree, const SensorFrames& frames) {
+  Rig rig;
+  std::string body = frames.lidar;
+  rig.body_frame = "lidar";
+  if (tree.has_frame(kBaseFrame) && tree.find(kBaseFrame, frames.lidar)) {
+    body = rig.body_frame = kBaseFrame;
+  } else if (!frames.imu.empty() && tree.find(frames.imu, frames.lidar)) {
+    body = frames.imu;
+    rig.body_frame = "imu";
+  }
+  // A sensor whose messages carry the body's own frame sits in it.
+  const auto source = [&](const std::string& frame) {
+    return frame == body ? std::string("is the body frame") : std::string("/tf_static");
+  };
+  if (body != frames.lidar) {
+    rig.body_from_lidar = *tree.find(body, frames.lidar);
+    rig.lidar_extrinsic_source = "/tf_static";
+  } else {
+    rig.lidar_extrinsic_source = "is the body frame";
+  }
+  if (!frames.imu.empty()) rig.body_from_imu = tree.find(body, frames.imu);
+  if (rig.body_from_imu) rig.imu_extrinsic_source = source(frames.imu);
+  if (!frames.gnss.empty()) rig.body_from_gnss = tree.find(body, frames.gnss);
+  if (rig.body_from_gnss) rig.gnss_extrinsic_source = source(frames.gnss);
+  return rig;
+}
+
+void apply_extrinsics_file(const std::string& path, Rig& rig) {
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(path);
+  } catch (const YAML::BadFile&) {
+    throw InputError(path, "", "the extrinsics file cannot be read");
+  } catch (const YAML::Exception& error) {
+    throw ConfigError({path + ": " + error.what()});
+  }
+  ExtrinsicsFile file(path);
+  file.apply(root, rig);
+  file.throw_problems();
+}
+
+}  // namespace understory

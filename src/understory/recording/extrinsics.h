@@ -1,0 +1,49 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "understory/sensor/rig.h"
+
+namespace understory {
+
+// Fixed transforms between named frames, as /tf_static gives them.
+class TransformTree {
+ public:
+  // The first transform between two frames stays.
+  void add(const std::string& parent, const std::string& child, const Pose& parent_from_child);
+  // target_from_source along any chain of transforms, either way; nothing if there is none.
+  [[nodiscard]] std::optional<Pose> find(const std::string& target,
+                                         const std::string& source) const;
+  [[nodiscard]] bool has_frame(const std::string& frame) const { return edges_.count(frame) > 0; }
+  [[nodiscard]] bool empty() const { return edges_.empty(); }
+
+ private:
+  std::map<std::string, std::map<std::string, Pose>> edges_;  // [a][b] = a_from_b
+};
+
+// The frames of the sensors' messages; empty where there is no such sensor.
+struct SensorFrames {
+  std::string lidar;
+  std::string imu;
+  std::string gnss;
+};
+
+// The rig by the frames: base_link is the body where it is connected to the lidar, else the IMU
+// where that is, else the lidar.
+[[nodiscard]] Rig rig_from_transforms(const TransformTree& tree, const SensorFrames& frames);
+
+// Puts the extrinsics of a YAML file over those of the recording:
+//     body_frame: base_link
+//     lidar_model: VLP-16
+//     body_from_lidar: {translation_m: [0, 0, 1.2], rotation_xyzw: [0, 0, 0, 1]}
+//     body_from_imu: {translation_m: [0, 0, 0], rpy_deg: [0, 0, 90]}
+//     body_from_gnss: {translation_m: [0, 0, 2]}
+// A rotation is given as rotation_xyzw, rpy_deg (fixed axes x, y, z) or matrix (nine numbers, row
+// by row); without one it is none. Throws ConfigError with all that is wrong, InputError if the
+// file cannot be read.
+void apply_extrinsics_file(const std::string& path, Rig& rig);
+
+}  // namespace understory

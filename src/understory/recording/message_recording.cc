@@ -1,0 +1,364 @@
+#include "understory/recording/message_recording.h"
+
+#include <cmath>
+#include <deque>
+#include <map>
+#include <utility>
+
+#include "understory/recording/extrinsics.h"
+#include "understory/recording/message_decode.h"
+#include "understory/recording/message_survey.h"
+#include "understory/recording/packet_topic.h"
+#include "understory/recording/point_cloud.h"
+#include "understory/recording/topic_statistics.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr double kGravity = 9.80665;
+constexpr TimeNs kFixWait = kNsPerSecond / 5;
+constexpr TimeNs kSameFix = kNsPerSecond / 1000;
+
+const char* role_name(TopicRole role) {
+  switch (role) {
+    case TopicRole::kCloud:
+    case TopicRole::kVelodynePackets:
+    case TopicRole::kNebulaPackets:
+      return "lidar";
+    case TopicRole::kImu:
+      return "imu";
+    case TopicRole::kMag:
+      return "mag";
+    case TopicRole::kNavSatFix:
+    case TopicRole::kGpsFix:
+      return "gnss";
+    case TopicRole::kTransforms:
+      return "tf";
+    default:
+      return "ignored";
+  }
+}
+
+// Joins positions (NavSatFix) with the quality that comes on another topic (GPSFix).
+class FixJoiner {
+ public:
+  void expect_quality() { has_quality_topic_ = true; }
+
+  void add_position(GnssFix fix, TimeNs now, std::deque<Event>& events) {
+    flush(events);
+    if (!std::isfinite(fix.latitude_deg) || !std::isfinite(fix.longitude_deg)) fix.quality = 0;
+    waiting_ = fix;
+    waiting_since_ = now;
+    if (!has_quality_topic_ || join()) flush(events);
+  }
+  void add_quality(const GnssFix& quality, std::deque<Event>& events) {
+    quality_ = quality;
+    if (waiting_ && join()) flush(events);
+  }
+  void pass_time(TimeNs now, std::deque<Event>& events) {
+    if (waiting_ && (now < waiting_since_ || now - waiting_since_ > kFixWait)) flush(events);
+  }
+  void flush(std::deque<Event>& events) {
+    if (waiting_) events.emplace_back(*waiting_);
+    waiting_.reset();
+  }
+
+ private:
+  bool join() {
+    if (!quality_ || std::abs(quality_->stamp - waiting_->stamp) > kSameFix) return false;
+    if (waiting_->quality > 0) waiting_->quality = quality_->quality;
+    waiting_->satellites = quality_->satellites;
+    waiting_->hdop = quality_->hdop;
+    waiting_->vdop = quality_->vdop;
+    waiting_->track_deg = quality_->track_deg;
+    waiting_->speed_m_s = quality_->speed_m_s;
+    if (!waiting_->covariance.allFinite()) waiting_->covariance = quality_->covariance;
+    return true;
+  }
+
+  bool has_quality_topic_ = false;
+  std::optional<GnssFix> waiting_;
+  TimeNs waiting_since_ = 0;
+  std::optional<GnssFix> quality_;
+};
+
+class MessageRecording : public Recording {
+ public:
+  MessageRecording(std::string file, const MessageSourceFactory& open, const OpenOptions& options,
+                   Log& log)
+      : file_(std::move(file)), log_(log) {
+    Log quiet;  // the same damage will be met again when reading
+    const auto ahead = open(quiet);
+    survey_ = survey_messages(*ahead);
+    choice_ = choose_topics(survey_, options, file_, log_);
+    if (!choice_.quality.empty()) fixes_.expect_quality();
+    source_ = open(log_);
+    make_rig(options, ahead->sensor_metadata());
+    judge_lidar();
+    judge_imu();
+    survey_.topics.clear();
+  }
+
+  std::optional<Event> next() override {
+    RawMessage message;
+    while (events_.empty()) {
+      if (!source_->next(message)) {
+        fixes_.flush(events_);
+        if (packets_) packets_->finish(events_);
+        break;
+      }
+      fixes_.pass_time(message.log_time, events_);
+      take(message);
+    }
+    if (events_.empty()) return std::nullopt;
+    Event event = std::move(events_.front());
+    events_.pop_front();
+    return event;
+  }
+
+  [[nodiscard]] const Rig& rig() const override { return rig_; }
+  [[nodiscard]] std::vector<TopicReport> topics() const override {
+    std::vector<TopicReport> reports;
+    for (const auto& [name, statistics] : topics_)
+      reports.push_back(statistics.report());
+    return reports;
+  }
+  [[nodiscard]] std::string format() const override { return source_->format(); }
+  [[nodiscard]] double progress() const override { return source_->progress(); }
+
+ private:
+  void make_rig(const OpenOptions& options, const std::map<std::string, std::string>& metadata) {
+    const auto frame_of = [&](const std::string& topic) {
+      const TopicSurvey* found = survey_.find(topic);
+      return found == nullptr ? std::string() : found->frame;
+    };
+    rig_ = rig_from_transforms(survey_.transforms, {frame_of(choice_.lidar), frame_of(choice_.imu),
+                                                    frame_of(choice_.gnss)});
+    const auto model = metadata.find("lidar_model");
+    if (model != metadata.end()) rig_.lidar_model = model->second;
+    const auto rings = metadata.find("ring_count");
+    if (rings != metadata.end()) ring_count_ = std::atoi(rings->second.substr(0, 6).c_str());
+    if (!options.extrinsics_file.empty()) apply_extrinsics_file(options.extrinsics_file, rig_);
+    if (!choice_.imu.empty() && !choice_.lidar.empty() && !rig_.body_from_imu)
+      log_.warn("recording.no_imu_extrinsics",
+                file_ + ": nothing tells where the IMU (" + frame_of(choice_.imu) +
+                    ") sits relative to the lidar (" + frame_of(choice_.lidar) +
+                    "): give --extrinsics FILE");
+  }
+
+  void judge_lidar() {
+    const TopicSurvey* lidar = survey_.find(choice_.lidar);
+    if (lidar == nullptr || lidar->role != TopicRole::kCloud) return;
+    const TopicSurvey* imu = survey_.find(choice_.imu);
+    set_convention(detect_point_times(lidar->time_field, lidar->time_type, lidar->clouds,
+                                      imu == nullptr ? std::vector<TimeNs>() : imu->delays));
+  }
+
+  void set_convention(TimeConvention convention) {
+    convention_ = std::move(convention);
+    if (convention_->warning.empty()) return;
+    const bool missing = convention_->kind == TimeConvention::Kind::kNone;
+    log_.warn(missing ? "recording.no_point_times" : "recording.point_times",
+              file_ + ": " + choice_.lidar + ": " + convention_->warning);
+  }
+
+  // Sensors that give multiples of gravity instead of m/s^2 are told by the mean over two seconds,
+  // which no carrier keeps at a tenth of gravity.
+  void judge_imu() {
+    const TopicSurvey* imu = survey_.find(choice_.imu);
+    if (imu == nullptr || imu->delays.size() < 20) return;
+    const double mean = imu->specific_force_sum / static_cast<double>(imu->delays.size());
+    imu_text_ = "m/s^2, rad/s";
+    if (mean < 0.5 || mean > 2.0) return;
+    imu_scale_ = kGravity;
+    imu_text_ = "accelerations in g, converted to m/s^2; rad/s";
+    log_.warn("imu.in_g", file_ + ": " + choice_.imu +
+                              ": the accelerations are in g; converted to m/s^2 (x 9.80665)");
+  }
+
+  void take(const RawMessage& message) {
+    const TopicRole role = role_of(*message.channel);
+    TopicStatistics& topic = statistics_of(*message.channel, role);
+    if (!is_chosen(message.channel->topic, role)) {
+      topic.add_stamp(message.log_time);
+      return;
+    }
+    const MessageReader reader(message.data, message.channel->serialization);
+    bool decoded = true;
+    switch (role) {
+      case TopicRole::kCloud:
+        decoded = take_cloud(topic, reader, message.log_time);
+        break;
+      case TopicRole::kVelodynePackets:
+        decoded = take_packets(topic, decode_velodyne_scan(reader));
+        break;
+      case TopicRole::kNebulaPackets:
+        decoded = take_packets(topic, decode_nebula_packets(reader));
+        break;
+      case TopicRole::kImu:
+        decoded = take_imu(topic, reader);
+        break;
+      case TopicRole::kMag:
+        decoded = take_mag(topic, reader);
+        break;
+      case TopicRole::kNavSatFix:
+      case TopicRole::kGpsFix:
+        decoded = take_gnss(topic, role, message, reader);
+        break;
+      case TopicRole::kTransforms:
+        topic.add_stamp(message.log_time);
+        break;
+      default:
+        break;
+    }
+    if (decoded) return;
+    ++topic.report().unreadable;
+    log_.warn("recording.unreadable_message",
+              file_ + ": " + message.channel->topic + ": a message of " +
+                  std::to_string(message.data.size()) + " bytes is no whole " +
+                  message.channel->type + "; passed over");
+  }
+
+  // The first message of a kind that the first seconds did not have makes its topic the one used.
+  bool is_chosen(const std::string& topic, TopicRole role) {
+    const auto adopt = [&](std::string& chosen) {
+      if (chosen.empty()) chosen = topic;
+      return chosen == topic;
+    };
+    switch (role) {
+      case TopicRole::kCloud:
+      case TopicRole::kVelodynePackets:
+      case TopicRole::kNebulaPackets:
+        return adopt(choice_.lidar);
+      case TopicRole::kImu:
+        return adopt(choice_.imu);
+      case TopicRole::kNavSatFix:
+        return adopt(choice_.gnss);
+      case TopicRole::kGpsFix:
+        return choice_.gnss.empty() || choice_.gnss == topic ? adopt(choice_.gnss)
+                                                             : adopt(choice_.quality);
+      case TopicRole::kMag:
+      case TopicRole::kTransforms:
+        return true;
+      default:
+        return false;
+    }
+  }
+
+  TopicStatistics& statistics_of(const MessageChannel& channel, TopicRole role) {
+    const auto found = topics_.find(channel.topic);
+    if (found != topics_.end()) return found->second;
+    TopicReport report;
+    report.name = channel.topic;
+    report.type = channel.type;
+    report.role = is_chosen(channel.topic, role) ? role_name(role) : "ignored";
+    return topics_.emplace(channel.topic, TopicStatistics(report)).first->second;
+  }
+
+  bool take_cloud(TopicStatistics& topic, const MessageReader& reader, TimeNs log_time) {
+    const auto cloud = decode_point_cloud2(reader);
+    if (!cloud) return false;
+    const auto layout = CloudLayout::find(*cloud);
+    if (!layout) return false;
+    if (!convention_)
+      set_convention(detect_point_times(layout->time_field(), layout->time_type(),
+                                        {measure_times(*cloud, *layout, log_time)}, {}));
+    ConvertedCloud converted = convert_cloud(*cloud, *layout, *convention_);
+    ring_count_ = std::max(ring_count_, converted.scan->ring_count);
+    converted.scan->ring_count = ring_count_;
+    if (converted.bad_times > 0)
+      log_.warn("recording.bad_point_times",
+                file_ + ": " + topic.report().name + ": " + std::to_string(converted.bad_times) +
+                    " points of the scan at " + format_seconds(converted.scan->stamp) +
+                    " have impossible times; dropped");
+    topic.add_stamp(cloud->header.stamp);
+    topic.report().frame = cloud->header.frame;
+    topic.report().conventions = convention_->text;
+    topic.report().points += converted.scan->points.size();
+    topic.report().empty_points += converted.without_return;
+    events_.emplace_back(ScanPtr(std::move(converted.scan)));
+    return true;
+  }
+
+  bool take_packets(TopicStatistics& topic, const std::optional<PacketsMessage>& message) {
+    if (!message) return false;
+    if (!packets_)
+      packets_ = std::make_unique<PacketTopic>(file_ + " " + topic.report().name, log_);
+    topic.add_stamp(message->header.stamp);
+    topic.report().frame = message->header.frame;
+    topic.report().points += packets_->add(*message, events_);
+    topic.report().conventions = packets_->conventions();
+    if (rig_.lidar_model.empty()) rig_.lidar_model = packets_->model();
+    return true;
+  }
+
+  bool take_imu(TopicStatistics& topic, const MessageReader& reader) {
+    auto imu = decode_imu(reader);
+    if (!imu) return false;
+    topic.add_stamp(imu->sample.stamp);
+    topic.report().frame = imu->header.frame;
+    topic.report().conventions = imu_text_ + (imu->sample.orientation ? "; with orientation" : "");
+    if (!imu->sample.specific_force.allFinite() || !imu->sample.angular_rate.allFinite()) {
+      log_.warn("imu.not_finite", file_ + ": " + topic.report().name + ": a sample at " +
+                                      format_seconds(imu->sample.stamp) +
+                                      " is not finite; dropped");
+      return true;
+    }
+    imu->sample.specific_force *= imu_scale_;
+    events_.emplace_back(imu->sample);
+    return true;
+  }
+
+  bool take_mag(TopicStatistics& topic, const MessageReader& reader) {
+    const auto mag = decode_magnetic_field(reader);
+    if (!mag) return false;
+    topic.add_stamp(mag->sample.stamp);
+    topic.report().frame = mag->header.frame;
+    topic.report().conventions = "tesla";
+    if (mag->sample.field.allFinite()) events_.emplace_back(mag->sample);
+    return true;
+  }
+
+  bool take_gnss(TopicStatistics& topic, TopicRole role, const RawMessage& message,
+                 const MessageReader& reader) {
+    const auto gnss =
+        role == TopicRole::kGpsFix ? decode_gps_fix(reader) : decode_nav_sat_fix(reader);
+    if (!gnss) return false;
+    topic.add_stamp(gnss->fix.stamp);
+    topic.report().frame = gnss->header.frame;
+    topic.report().conventions = "WGS 84, height above the ellipsoid";
+    if (role == TopicRole::kGpsFix && message.channel->topic != choice_.gnss) {
+      topic.report().conventions = "quality of the fixes";
+      fixes_.expect_quality();
+      fixes_.add_quality(gnss->fix, events_);
+    } else {
+      fixes_.add_position(gnss->fix, message.log_time, events_);
+    }
+    return true;
+  }
+
+  std::string file_;
+  Log& log_;
+  MessageSurvey survey_;
+  TopicChoice choice_;
+  std::unique_ptr<MessageSource> source_;
+  Rig rig_;
+  std::optional<TimeConvention> convention_;
+  int ring_count_ = 0;
+  double imu_scale_ = 1.0;
+  std::string imu_text_ = "m/s^2, rad/s (assumed)";
+  std::map<std::string, TopicStatistics> topics_;
+  std::deque<Event> events_;
+  FixJoiner fixes_;
+  std::unique_ptr<PacketTopic> packets_;
+};
+
+}  // namespace
+
+std::unique_ptr<Recording> open_messages(const std::string& file, const MessageSourceFactory& open,
+                                         const OpenOptions& options, Log& log) {
+  return std::make_unique<MessageRecording>(file, open, options, log);
+}
+
+}  // namespace understory

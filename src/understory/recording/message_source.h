@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "understory/recording/message_reader.h"
+#include "understory/util/log.h"
+#include "understory/util/time.h"
+
+namespace understory {
+
+// A topic of a container file (MCAP, ROS 1 bag, ROS 2 .db3).
+struct MessageChannel {
+  std::string topic;
+  std::string type;  // as the file names it: "sensor_msgs/msg/Imu", "sensor_msgs/Imu"
+  Serialization serialization = Serialization::kCdr;
+  bool readable = true;  // false: an encoding other than CDR or ROS 1
+};
+
+struct RawMessage {
+  std::shared_ptr<const MessageChannel> channel;
+  TimeNs log_time = 0;  // when it was recorded
+  ByteSpan data;        // valid until the next call of `next`
+};
+
+// The messages of a container file in the order of their log times, as far as they stand close to
+// each other in the file. Memory is bounded. Damage is passed over with a warning (keys
+// "recording.damaged" and "recording.truncated") that names the file and the byte.
+class MessageSource {
+ public:
+  virtual ~MessageSource() = default;
+  [[nodiscard]] virtual bool next(RawMessage& message) = 0;
+  [[nodiscard]] virtual std::string format() const = 0;  // "MCAP (ros2, zstd)"
+  [[nodiscard]] virtual double progress() const = 0;     // 0 to 1
+  // What the file itself says of its sensors (kSensorMetadata of our own recordings).
+  [[nodiscard]] virtual std::map<std::string, std::string> sensor_metadata() const { return {}; }
+};
+
+// Opens the same messages from the start; called once to look ahead and once to read.
+using MessageSourceFactory = std::function<std::unique_ptr<MessageSource>(Log&)>;
+
+}  // namespace understory

@@ -1,0 +1,233 @@
+#include "understory/recording/message_survey.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "understory/recording/message_decode.h"
+#include "understory/recording/point_cloud.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kEnoughClouds = 8;
+constexpr std::size_t kMostSamples = 2000;
+constexpr std::uint64_t kMostBytes = 256ULL << 20;
+constexpr TimeNs kEnoughTime = 2 * kNsPerSecond;
+constexpr TimeNs kMostTime = 60 * kNsPerSecond;
+
+class Surveyor {
+ public:
+  explicit Surveyor(MessageSurvey& survey) : survey_(survey) {}
+
+  void add(const RawMessage& message) {
+    TopicSurvey& topic = topic_of(*message.channel);
+    ++topic.messages;
+    if (!message.channel->readable) return;
+    const MessageReader reader(message.data, message.channel->serialization);
+    switch (topic.role) {
+      case TopicRole::kCloud:
+        return add_cloud(topic, reader, message.log_time);
+      case TopicRole::kVelodynePackets:
+        return add_packets(topic, decode_velodyne_scan(reader));
+      case TopicRole::kNebulaPackets:
+        return add_packets(topic, decode_nebula_packets(reader));
+      case TopicRole::kImu:
+        return add_imu(topic, reader, message.log_time);
+      case TopicRole::kNavSatFix:
+        return add_frame(topic, decode_nav_sat_fix(reader));
+      case TopicRole::kGpsFix:
+        return add_frame(topic, decode_gps_fix(reader));
+      case TopicRole::kTransforms:
+        return add_transforms(reader);
+      default:
+        return;
+    }
+  }
+
+  [[nodiscard]] std::size_t most_clouds() const {
+    std::size_t most = 0;
+    for (const TopicSurvey& topic : survey_.topics)
+      most = std::max(
+          {most, topic.clouds.size(), is_packets(topic.role) ? topic.messages : std::size_t{0}});
+    return most;
+  }
+
+ private:
+  static bool is_packets(TopicRole role) {
+    return role == TopicRole::kVelodynePackets || role == TopicRole::kNebulaPackets;
+  }
+
+  TopicSurvey& topic_of(const MessageChannel& channel) {
+    const auto [at, is_new] = index_.try_emplace(channel.topic, survey_.topics.size());
+    if (is_new) {
+      survey_.topics.emplace_back();
+      survey_.topics.back().topic = channel.topic;
+      survey_.topics.back().role = role_of(channel);
+    }
+    return survey_.topics[at->second];
+  }
+
+  static void add_cloud(TopicSurvey& topic, const MessageReader& reader, TimeNs log_time) {
+    const auto cloud = decode_point_cloud2(reader);
+    if (!cloud) return;
+    topic.frame = cloud->header.frame;
+    const auto layout = CloudLayout::find(*cloud);
+    if (!layout) return;
+    topic.time_field = layout->time_field();
+    topic.time_type = layout->time_type();
+    if (cloud->point_step > 0) topic.points += cloud->data.size() / cloud->point_step;
+    if (topic.clouds.size() < kMostSamples)
+      topic.clouds.push_back(measure_times(*cloud, *layout, log_time));
+  }
+
+  static void add_packets(TopicSurvey& topic, const std::optional<PacketsMessage>& message) {
+    if (!message) return;
+    topic.frame = message->header.frame;
+    topic.points += 384 * message->packets.size();  // a Velodyne packet holds as many
+  }
+
+  static void add_imu(TopicSurvey& topic, const MessageReader& reader, TimeNs log_time) {
+    const auto imu = decode_imu(reader);
+    if (!imu || topic.delays.size() >= kMostSamples) return;
+    topic.frame = imu->header.frame;
+    topic.delays.push_back(log_time - imu->sample.stamp);
+    if (imu->sample.specific_force.allFinite())
+      topic.specific_force_sum += imu->sample.specific_force.norm();
+  }
+
+  template <typename Message>
+  static void add_frame(TopicSurvey& topic, const std::optional<Message>& message) {
+    if (message) topic.frame = message->header.frame;
+  }
+
+  void add_transforms(const MessageReader& reader) {
+    const auto transforms = decode_transforms(reader);
+    if (!transforms) return;
+    for (const TransformMessage& each : *transforms)
+      survey_.transforms.add(each.parent, each.child, each.parent_from_child);
+  }
+
+  MessageSurvey& survey_;
+  std::map<std::string, std::size_t> index_;
+};
+
+// "sensor_msgs/msg/Imu" and "sensor_msgs/Imu" are the same.
+std::string short_type(const std::string& type) {
+  std::string name = type;
+  const std::size_t middle = name.find("/msg/");
+  if (middle != std::string::npos) name.erase(middle, 4);
+  return name;
+}
+
+bool is_lidar(TopicRole role) {
+  return role == TopicRole::kCloud || role == TopicRole::kVelodynePackets ||
+         role == TopicRole::kNebulaPackets;
+}
+
+// Chooses among the topics that `wanted` accepts: the one named, else that of the highest `score`.
+template <typename Wanted, typename Score>
+std::string choose(const MessageSurvey& survey, const std::string& named, const std::string& what,
+                   const std::string& file, Log& log, const Wanted& wanted, const Score& score) {
+  std::string known;
+  const TopicSurvey* best = nullptr;
+  std::size_t count = 0;
+  for (const TopicSurvey& topic : survey.topics) {
+    if (!wanted(topic.role)) continue;
+    ++count;
+    known += (known.empty() ? "" : ", ") + topic.topic;
+    if (topic.topic == named) return named;
+    if (best == nullptr || score(topic) > score(*best)) best = &topic;
+  }
+  if (!named.empty())
+    throw InputError(file, "topic " + named,
+                     "no such " + what + " topic" + (known.empty() ? "" : "; there are " + known));
+  if (count > 1)
+    log.warn("recording.several_" + what + "_topics",
+             file + ": several " + what + " topics (" + known + "); using " + best->topic);
+  return best == nullptr ? "" : best->topic;
+}
+
+}  // namespace
+
+TopicRole role_of(const MessageChannel& channel) {
+  static const std::map<std::string, TopicRole> kRoles = {
+      {"sensor_msgs/PointCloud2", TopicRole::kCloud},
+      {"velodyne_msgs/VelodyneScan", TopicRole::kVelodynePackets},
+      {"nebula_msgs/NebulaPackets", TopicRole::kNebulaPackets},
+      {"sensor_msgs/Imu", TopicRole::kImu},
+      {"sensor_msgs/MagneticField", TopicRole::kMag},
+      {"sensor_msgs/NavSatFix", TopicRole::kNavSatFix},
+      {"gps_msgs/GPSFix", TopicRole::kGpsFix},
+      {"gps_common/GPSFix", TopicRole::kGpsFix},
+      {"tf2_msgs/TFMessage", TopicRole::kTransforms},
+      {"tf/tfMessage", TopicRole::kTransforms},
+  };
+  if (!channel.readable) return TopicRole::kIgnored;
+  const auto found = kRoles.find(short_type(channel.type));
+  if (found == kRoles.end()) return TopicRole::kIgnored;
+  // Only what never changes is an extrinsic.
+  const bool is_static = channel.topic.find("tf_static") != std::string::npos;
+  if (found->second == TopicRole::kTransforms && !is_static) return TopicRole::kIgnored;
+  return found->second;
+}
+
+const TopicSurvey* MessageSurvey::find(const std::string& topic) const {
+  for (const TopicSurvey& each : topics) {
+    if (each.topic == topic) return &each;
+  }
+  return nullptr;
+}
+
+MessageSurvey survey_messages(MessageSource& source) {
+  MessageSurvey survey;
+  Surveyor surveyor(survey);
+  RawMessage message;
+  std::uint64_t bytes = 0;
+  std::optional<TimeNs> start;
+  int late = 0;  // more than one, because a single log time may be damaged
+  while (source.next(message)) {
+    surveyor.add(message);
+    bytes += message.data.size();
+    if (!start) start = message.log_time;
+    const TimeNs elapsed = message.log_time - *start;
+    const bool enough = elapsed >= kEnoughTime && surveyor.most_clouds() >= kEnoughClouds;
+    late += enough || elapsed >= kMostTime ? 1 : 0;
+    if (late > 3 || bytes >= kMostBytes) break;
+  }
+  return survey;
+}
+
+TopicChoice choose_topics(const MessageSurvey& survey, const OpenOptions& options,
+                          const std::string& file, Log& log) {
+  TopicChoice choice;
+  // A lidar without times per point is worth less than any with them.
+  choice.lidar = choose(
+      survey, options.lidar_topic, "lidar", file, log, is_lidar, [](const TopicSurvey& topic) {
+        const bool timed = topic.role != TopicRole::kCloud || !topic.time_field.empty();
+        return std::pair(timed, topic.points);
+      });
+  const auto most_messages = [](const TopicSurvey& topic) { return topic.messages; };
+  choice.imu = choose(
+      survey, options.imu_topic, "imu", file, log,
+      [](TopicRole role) { return role == TopicRole::kImu; }, most_messages);
+  const auto has = [&](TopicRole wanted) {
+    return std::any_of(survey.topics.begin(), survey.topics.end(),
+                       [&](const TopicSurvey& topic) { return topic.role == wanted; });
+  };
+  const TopicSurvey* named = survey.find(options.gnss_topic);
+  const bool by_gps_fix =
+      named != nullptr ? named->role == TopicRole::kGpsFix : !has(TopicRole::kNavSatFix);
+  const TopicRole gnss_role = by_gps_fix ? TopicRole::kGpsFix : TopicRole::kNavSatFix;
+  choice.gnss = choose(
+      survey, options.gnss_topic, "gnss", file, log,
+      [&](TopicRole role) { return role == gnss_role; }, most_messages);
+  if (!by_gps_fix && has(TopicRole::kGpsFix))
+    choice.quality = choose(
+        survey, "", "gnss_quality", file, log,
+        [](TopicRole role) { return role == TopicRole::kGpsFix; }, most_messages);
+  return choice;
+}
+
+}  // namespace understory

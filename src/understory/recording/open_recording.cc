@@ -1,0 +1,48 @@
+#include <filesystem>
+
+#include "understory/recording/byte_source.h"
+#include "understory/recording/mcap_format.h"
+#include "understory/recording/mcap_reader.h"
+#include "understory/recording/message_recording.h"
+#include "understory/recording/recording.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kKnownKinds =
+    "expected an MCAP file, a ROS 1 bag, a ROS 2 bag (.db3 or its folder), a PCAP capture, a cloud "
+    "(.pcd, .ply, .las, .laz, .bin) or a folder of clouds";
+
+bool starts_with(ByteSpan head, std::string_view magic) {
+  return head.size() >= magic.size() && std::memcmp(head.data(), magic.data(), magic.size()) == 0;
+}
+
+std::unique_ptr<Recording> open_file_recording(const std::string& path, const OpenOptions& options,
+                                               Log& log) {
+  const auto file = open_file(path);
+  if (file->size() == 0) throw InputError(path, "", "the file is empty");
+  std::vector<std::uint8_t> head;
+  file->read(0, 32, head);
+  const std::string_view mcap_magic(reinterpret_cast<const char*>(mcap::kMagic),
+                                    sizeof(mcap::kMagic));
+  if (starts_with(head, mcap_magic))
+    return open_messages(
+        path, [path](Log& sink) { return read_mcap(open_file(path), sink); }, options, log);
+  throw InputError(path, "at byte 0", kKnownKinds);
+}
+
+}  // namespace
+
+std::unique_ptr<Recording> open_recording(const std::string& path, const OpenOptions& options,
+                                          Log& log) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) throw InputError(path, "", "no such file or folder");
+  if (fs::is_directory(status)) throw InputError(path, "", kKnownKinds);
+  return open_file_recording(path, options, log);
+}
+
+}  // namespace understory
