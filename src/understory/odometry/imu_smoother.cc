@@ -32,6 +32,17 @@ Eigen::Vector3d mean_force(const std::vector<InertialSample>& samples) {
   return time > 0.0 ? Eigen::Vector3d(sum / time) : sum;
 }
 
+// How the gyroscope alone turned, bias and all.
+Eigen::Vector3d raw_turn(const std::vector<InertialSample>& samples) {
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    rotation =
+        rotation * so3_exp(0.5 * (samples[i].angular_rate() + samples[i - 1].angular_rate()) *
+                           to_seconds(samples[i].stamp - samples[i - 1].stamp));
+  }
+  return so3_log(rotation.normalized());
+}
+
 // One sampling interval without covariances, for paths.
 ImuState step_state(const ImuState& from, const InertialSample& a, const InertialSample& b,
                     const Eigen::Vector3d& gravity) {
@@ -257,15 +268,12 @@ std::string ImuSmoother::gate(const Prediction& predicted, const ImuState& befor
 
 void ImuSmoother::watch(TimeNs stamp, const MotionInterval& interval,
                         const std::optional<PoseFactor>& lidar) {
-  if (!lidar) {
-    last_match_.reset();
-    return;
-  }
+  if (!lidar) return;
   const bool was_trusted = monitor_.trust().trusted;
   if (last_match_ && last_match_->stamp == latest().stamp && !interval.samples.empty()) {
     const Eigen::Quaterniond turned =
         last_match_->world_from_imu.rotation().conjugate() * lidar->world_from_imu.rotation();
-    monitor_.add_turn(so3_log(turned), so3_log(interval.motion.rotation));
+    monitor_.add_turn(so3_log(turned), raw_turn(interval.samples), interval.motion.duration);
     monitor_.add_force(
         last_match_->world_from_imu.rotation().slerp(0.5, lidar->world_from_imu.rotation()),
         mean_force(interval.samples), interval.motion.duration);
@@ -274,8 +282,67 @@ void ImuSmoother::watch(TimeNs stamp, const MotionInterval& interval,
   if (was_trusted && !monitor_.trust().trusted && log_ != nullptr) {
     log_->warn("imu.untrusted",
                monitor_.trust().reason +
-                   (monitor_.axes_wrong() ? "; the rest of the run does without the IMU" : ""));
+                   (!monitor_.usable() ? "; the rest of the run does without the IMU" : ""));
   }
+}
+
+// After matches have insisted against the prediction for long, or the IMU turned out to be
+// unusable, nothing that the estimate says of the motion is worth keeping.
+void ImuSmoother::restart_at(TimeNs stamp, const PoseFactor& lidar,
+                             const Eigen::Vector3d& velocity) {
+  ImuState state = latest();
+  state.stamp = stamp;
+  state.world_from_imu = lidar.world_from_imu;
+  state.velocity = velocity;
+  InitialUncertainty sigma;
+  sigma.rotation_rad = std::sqrt(lidar.covariance.diagonal().head<3>().maxCoeff());
+  sigma.position_m = std::sqrt(lidar.covariance.diagonal().tail<3>().maxCoeff());
+  sigma.velocity_m_s = 1.0;
+  sigma.gyro_bias_rad_s = config_.imu.gyro_bias_sigma_rad_s;
+  sigma.accel_bias_m_s2 = config_.imu.accel_bias_sigma_m_s2;
+  if (!use_imu()) {
+    state.gyro_bias.setZero();
+    state.accel_bias.setZero();
+  }
+  const Eigen::Vector3d up = -gravity().normalized();
+  isam_.reset();
+  window_.start(state, up, sigma);
+}
+
+MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interval,
+                                      const PoseFactor& lidar,
+                                      const Eigen::Vector3d& match_velocity) {
+  const ImuState before = latest();
+  const Prediction predicted = predict_full(stamp);
+  const WindowSmoother backup = window_;
+  add_state(stamp, interval, lidar);
+  MotionUpdate update;
+  update.status = MotionStatus::kAccepted;
+  update.reason = gate(predicted, before, lidar, update.velocity_jump_m_s);
+  if (update.reason.empty()) {
+    dropped_in_a_row_ = 0;
+    return update;
+  }
+  if (dropped_in_a_row_ >= config_.velocity_gate_patience) {
+    dropped_in_a_row_ = 0;
+    restart_at(stamp, lidar, match_velocity);
+    update.reason.clear();
+    if (log_ != nullptr)
+      log_->warn("odometry.restart",
+                 "the matches insist against the prediction; the estimate of "
+                 "the motion starts anew at " +
+                     format_seconds(stamp) + " s");
+    return update;
+  }
+  update.status = MotionStatus::kVelocityGate;
+  ++dropped_in_a_row_;
+  if (isam_) {
+    isam_->drop_latest_lidar();
+  } else {
+    window_ = backup;
+    add_state(stamp, interval, std::nullopt);
+  }
+  return update;
 }
 
 MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor>& factor) {
@@ -287,37 +354,33 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
     return update;
   }
   std::optional<PoseFactor> lidar;
+  Eigen::Vector3d match_velocity = before.velocity;
   if (factor) {
     const Matrix6d adjoint = body_from_imu_.inverse().adjoint();
     lidar = PoseFactor{factor->world_from_body * body_from_imu_,
                        adjoint * lidar_covariance(*factor, config_.lidar) * adjoint.transpose()};
+    if (last_match_) {
+      match_velocity =
+          (lidar->world_from_imu.translation() - last_match_->world_from_imu.translation()) /
+          to_seconds(stamp - last_match_->stamp);
+    }
   }
   MotionInterval interval = make_interval(before.stamp, stamp);
+  const bool was_usable = use_imu();
   watch(stamp, interval, lidar);
-  if (!use_imu() && !interval.samples.empty()) interval = make_interval(before.stamp, stamp);
   note_silence(interval, stamp);
-  learn_vertical(interval);
-  const Prediction predicted = predict_full(stamp);
 
   MotionUpdate update;
-  update.status = lidar ? MotionStatus::kAccepted : MotionStatus::kPredicted;
-  if (!lidar) update.reason = "no match";
-  const WindowSmoother backup = window_;
-  add_state(stamp, interval, lidar);
-  if (lidar) {
-    update.reason = gate(predicted, before, *lidar, update.velocity_jump_m_s);
-    if (!update.reason.empty() && dropped_in_a_row_ < config_.velocity_gate_patience) {
-      update.status = MotionStatus::kVelocityGate;
-      ++dropped_in_a_row_;
-      if (isam_) {
-        isam_->drop_latest_lidar();
-      } else {
-        window_ = backup;
-        add_state(stamp, interval, std::nullopt);
-      }
+  if (was_usable && !use_imu()) {
+    restart_at(stamp, *lidar, match_velocity);
+    update.status = MotionStatus::kAccepted;
+  } else {
+    learn_vertical(interval);
+    if (lidar) {
+      update = add_matched(stamp, interval, *lidar, match_velocity);
     } else {
-      dropped_in_a_row_ = 0;
-      update.reason.clear();
+      update.reason = "no match";
+      add_state(stamp, interval, std::nullopt);
     }
   }
   const Eigen::Quaterniond turned =
@@ -327,14 +390,14 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
   if (config_.level_world) level(update);
   hand_over_to_isam();
   Prediction now = predict_full(stamp);
-  if (!interval.samples.empty())
+  if (!interval.samples.empty() && use_imu())
     now.angular_rate = interval.samples.back().angular_rate() - now.state.gyro_bias;
   update.state = to_nav(now);
   return update;
 }
 
 void ImuSmoother::level(MotionUpdate& update) {
-  if (levelled_ || !vertical_since_ || isam_) return;
+  if (levelled_ || !vertical_since_ || isam_ || !use_imu()) return;
   const double age = to_seconds(latest().stamp - *vertical_since_);
   const double sigma = std::sqrt(window_.tilt_covariance().diagonal().maxCoeff());
   if (age < kLevelFirst_s || (age < kLevelLast_s && sigma > kLevelSigma)) return;
@@ -355,7 +418,7 @@ void ImuSmoother::hand_over_to_isam() {
 }
 
 Eigen::Quaterniond ImuSmoother::level_from_world() const {
-  if (!vertical_since_) return Eigen::Quaterniond::Identity();
+  if (!vertical_since_ || !use_imu()) return Eigen::Quaterniond::Identity();
   return Eigen::Quaterniond::FromTwoVectors(-gravity(), Eigen::Vector3d::UnitZ());
 }
 

@@ -38,7 +38,7 @@ class ImuSmoother : public MotionModel {
     Pose world_from_imu;
   };
 
-  [[nodiscard]] bool use_imu() const { return !monitor_.axes_wrong(); }
+  [[nodiscard]] bool use_imu() const { return monitor_.usable(); }
   [[nodiscard]] const ImuState& latest() const;
   [[nodiscard]] const Matrix15d& covariance() const;
   [[nodiscard]] Eigen::Vector3d gravity() const;
@@ -51,11 +51,14 @@ class ImuSmoother : public MotionModel {
   MotionUpdate begin(TimeNs stamp);
   void learn_vertical(const MotionInterval& interval);
   [[nodiscard]] MotionInterval make_interval(TimeNs from, TimeNs to) const;
+  MotionUpdate add_matched(TimeNs stamp, const MotionInterval& interval, const PoseFactor& lidar,
+                           const Eigen::Vector3d& match_velocity);
   void add_state(TimeNs stamp, const MotionInterval& interval,
                  const std::optional<PoseFactor>& lidar);
   [[nodiscard]] std::string gate(const Prediction& predicted, const ImuState& before,
                                  const PoseFactor& lidar, double& jump) const;
   void watch(TimeNs stamp, const MotionInterval& interval, const std::optional<PoseFactor>& lidar);
+  void restart_at(TimeNs stamp, const PoseFactor& lidar, const Eigen::Vector3d& velocity);
   void note_silence(const MotionInterval& interval, TimeNs stamp);
   void level(MotionUpdate& update);
   void hand_over_to_isam();

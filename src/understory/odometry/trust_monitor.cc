@@ -16,38 +16,73 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kSmallestTurn = 0.3 * kDegree;
 constexpr double kEnoughTurning = 30.0 * kDegree;
 constexpr int kEnoughTurns = 10;
+constexpr double kEnoughUnexplained = 120.0 * kDegree;  // before a verdict without a cause
+constexpr double kLargestBias = 0.06;                   // rad/s
 // Share of the turning that is unexplained: below kGood all is well; above kBad something is wrong.
 constexpr double kBad = 0.4;
 constexpr double kGood = 0.25;
 // Gravity over whole seconds: walking and driving swing it by a few degrees.
 constexpr int kEnoughSeconds = 10;
+constexpr int kEnoughForLength = 3;
 constexpr double kForceSpread = 15.0 * kDegree;
 constexpr double kLengthTolerance = 0.15;
 
-// The signed permutation of axes that explains the lidar's turns best, as the largest sum of the
-// matching elements of the product matrix, and how it reads: "x=+y y=-x z=+z".
+// What is left of the turns' squares if the gyroscope's axes are turned by `lidar_from_gyro`. A
+// constant difference may be its bias, up to what a bias can be, and is taken out.
+struct TurnSums {
+  const Eigen::Matrix3d& product;  // sum of gyro * lidar^T
+  const Eigen::Vector3d& lidar;
+  const Eigen::Vector3d& gyro;
+  double lidar_square;
+  double gyro_square;
+  double count;
+  double largest_bias;  // radians per turn
+};
+
+double unexplained(const TurnSums& sums, const Eigen::Matrix3d& lidar_from_gyro) {
+  Eigen::Vector3d bias = (sums.gyro - lidar_from_gyro.transpose() * sums.lidar) / sums.count;
+  if (bias.norm() > sums.largest_bias) bias *= sums.largest_bias / bias.norm();
+  const Eigen::Matrix3d product = sums.product - bias * sums.lidar.transpose();
+  const double gyro_square =
+      sums.gyro_square - 2.0 * bias.dot(sums.gyro) + sums.count * bias.squaredNorm();
+  return sums.lidar_square + gyro_square - 2.0 * (lidar_from_gyro * product).trace();
+}
+
+// One way in which the axes might be turned, and how it reads: "x=+y y=-x z=+z".
 struct AxesGuess {
-  double agreement = -1e300;
+  double left = 1e300;
   std::string text;
 };
 
-AxesGuess best_axes(const Eigen::Matrix3d& product) {
+AxesGuess best_axes(const TurnSums& sums) {
   const std::array<const char*, 3> names{"x", "y", "z"};
-  std::array<int, 3> order{0, 1, 2};
+  std::array<std::size_t, 3> order{0, 1, 2};
   AxesGuess best;
   do {
-    double sum = 0.0;
-    std::string text;
-    for (int lidar = 0; lidar < 3; ++lidar) {
-      const double element = product(order[static_cast<std::size_t>(lidar)], lidar);
-      sum += std::abs(element);
-      text += std::string(lidar > 0 ? " " : "") + names[static_cast<std::size_t>(lidar)] +
-              (element < 0.0 ? "=-" : "=+") +
-              names[static_cast<std::size_t>(order[static_cast<std::size_t>(lidar)])];
+    for (unsigned signs = 0; signs < 8; ++signs) {
+      Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
+      std::string text;
+      for (std::size_t row = 0; row < 3; ++row) {
+        const bool minus = (signs >> row & 1U) != 0;
+        turn(static_cast<int>(row), static_cast<int>(order[row])) = minus ? -1.0 : 1.0;
+        text += std::string(row > 0 ? " " : "") + names[row] + (minus ? "=-" : "=+") +
+                names[order[row]];
+      }
+      const double left = unexplained(sums, turn);
+      if (left < best.left) best = {left, text};
     }
-    if (sum > best.agreement) best = {sum, text};
   } while (std::next_permutation(order.begin(), order.end()));
   return best;
+}
+
+// The best rotation (Kabsch), with the common part in the data or taken out as a bias.
+Eigen::Matrix3d best_rotation(const TurnSums& sums, bool centred) {
+  Eigen::Matrix3d product = sums.product;
+  if (centred) product -= sums.gyro * sums.lidar.transpose() / sums.count;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
+  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) signs.z() = -1.0;
+  return svd.matrixV() * signs.asDiagonal() * svd.matrixU().transpose();
 }
 
 std::string degrees(double radians) {
@@ -62,43 +97,52 @@ void TrustMonitor::distrust(const std::string& reason) {
   trust_.reason = reason;
 }
 
-void TrustMonitor::add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro) {
+void TrustMonitor::add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
+                            double duration_s) {
   const double angle = std::max(by_lidar.norm(), by_gyro.norm());
   if (angle < kSmallestTurn) return;
   product_ += by_gyro * by_lidar.transpose();
   lidar_square_ += by_lidar.squaredNorm();
   gyro_square_ += by_gyro.squaredNorm();
-  error_square_ += (by_lidar - by_gyro).squaredNorm();
+  lidar_sum_ += by_lidar;
+  gyro_sum_ += by_gyro;
+  turn_time_ += duration_s;
   total_angle_ += angle;
   ++turns_;
   if (trust_.trusted && turns_ >= kEnoughTurns && total_angle_ > kEnoughTurning) judge_turns();
 }
 
 void TrustMonitor::judge_turns() {
+  const TurnSums sums{product_,
+                      lidar_sum_,
+                      gyro_sum_,
+                      lidar_square_,
+                      gyro_square_,
+                      static_cast<double>(turns_),
+                      kLargestBias * turn_time_ / turns_};
   const double all = std::max(lidar_square_, gyro_square_);
-  if (error_square_ < kBad * kBad * all) return;
-  // What would be left with the axes turned freely (Kabsch), or swapped and mirrored.
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(product_, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) signs.z() = -1.0;
-  const double sum = lidar_square_ + gyro_square_;
-  const double left_turned = sum - 2.0 * svd.singularValues().dot(signs);
-  const AxesGuess axes = best_axes(product_);
-  const double left_swapped = sum - 2.0 * axes.agreement;
-  const Eigen::Matrix3d lidar_from_gyro =
-      svd.matrixV() * signs.asDiagonal() * svd.matrixU().transpose();
+  const double left = unexplained(sums, Eigen::Matrix3d::Identity());
+  if (left < kBad * kBad * all) return;
+  Eigen::Matrix3d rotation = best_rotation(sums, false);
+  const Eigen::Matrix3d centred = best_rotation(sums, true);
+  if (unexplained(sums, centred) < unexplained(sums, rotation)) rotation = centred;
+  const AxesGuess axes = best_axes(sums);
   const double limit = kGood * kGood * all;
-  std::string cause = "; none of the ways to turn its axes explains it";
-  if (left_swapped < limit) {
-    axes_wrong_ = true;
+  std::string cause;
+  if (axes.left < limit) {
+    usable_ = false;
     cause = "; its axes look swapped: to agree with the lidar they would be " + axes.text;
-  } else if (left_turned < limit) {
-    axes_wrong_ = true;
-    cause = "; the IMU looks mounted " + degrees(Eigen::AngleAxisd(lidar_from_gyro).angle()) +
+  } else if (unexplained(sums, rotation) < limit) {
+    usable_ = false;
+    cause = "; the IMU looks mounted about " + degrees(Eigen::AngleAxisd(rotation).angle()) +
             " degrees from where its extrinsics say";
+  } else if (total_angle_ < kEnoughUnexplained) {
+    return;
+  } else {
+    cause = "; none of the ways to turn its axes explains it";
   }
   distrust("gyroscope and lidar disagree on how the sensor turned (" +
-           std::to_string(static_cast<int>(std::lround(100.0 * std::sqrt(error_square_ / all)))) +
+           std::to_string(static_cast<int>(std::lround(100.0 * std::sqrt(left / all)))) +
            " % unexplained over " + degrees(total_angle_) + " degrees of turning)" + cause);
 }
 
@@ -115,16 +159,18 @@ void TrustMonitor::add_force(const Eigen::Quaterniond& world_from_imu,
   force_world_.setZero();
   force_imu_.setZero();
   force_time_ = 0.0;
-  if (trust_.trusted && seconds_ >= kEnoughSeconds) judge_forces();
+  if (trust_.trusted && seconds_ >= kEnoughForLength) judge_forces();
 }
 
 void TrustMonitor::judge_forces() {
   const double length = length_sum_ / seconds_;
   if (std::abs(length - gravity_) > kLengthTolerance * gravity_) {
+    usable_ = false;
     distrust("mean specific force is " + std::to_string(length) + " m/s^2 instead of " +
              std::to_string(gravity_) + ": wrong unit, gravity taken out, or scale");
     return;
   }
+  if (seconds_ < kEnoughSeconds) return;
   // Root mean square angle from the mean direction, from the length of the mean unit vector.
   const double spread = std::sqrt(std::max(0.0, 2.0 - 2.0 * directions_world_.norm() / seconds_));
   if (spread > kForceSpread)
@@ -135,12 +181,12 @@ void TrustMonitor::judge_forces() {
 void TrustMonitor::save(BinaryWriter& writer) const {
   writer.put(trust_.trusted);
   writer.put(trust_.reason);
-  writer.put(axes_wrong_);
+  writer.put(usable_);
   writer.put_doubles(product_.data(), 9);
-  for (const double value : {lidar_square_, gyro_square_, error_square_, total_angle_})
+  for (const double value : {lidar_square_, gyro_square_, turn_time_, total_angle_})
     writer.put(value);
   writer.put(turns_);
-  for (const auto* v : {&force_world_, &force_imu_, &directions_world_})
+  for (const auto* v : {&force_world_, &force_imu_, &directions_world_, &lidar_sum_, &gyro_sum_})
     writer.put_doubles(v->data(), 3);
   writer.put(force_time_);
   writer.put(length_sum_);
@@ -150,12 +196,12 @@ void TrustMonitor::save(BinaryWriter& writer) const {
 void TrustMonitor::load(BinaryReader& reader) {
   trust_.trusted = reader.get<bool>();
   trust_.reason = reader.get_string();
-  axes_wrong_ = reader.get<bool>();
+  usable_ = reader.get<bool>();
   reader.get_doubles(product_.data(), 9);
-  for (double* value : {&lidar_square_, &gyro_square_, &error_square_, &total_angle_})
+  for (double* value : {&lidar_square_, &gyro_square_, &turn_time_, &total_angle_})
     *value = reader.get<double>();
   turns_ = reader.get<int>();
-  for (auto* v : {&force_world_, &force_imu_, &directions_world_})
+  for (auto* v : {&force_world_, &force_imu_, &directions_world_, &lidar_sum_, &gyro_sum_})
     reader.get_doubles(v->data(), 3);
   force_time_ = reader.get<double>();
   length_sum_ = reader.get<double>();

@@ -17,16 +17,18 @@ class TrustMonitor {
   explicit TrustMonitor(double gravity_m_s2) : gravity_(gravity_m_s2) {}
 
   // Turn of the IMU from scan to scan, as rotation vectors in its frame at the first scan: from
-  // matching and from the gyroscope.
-  void add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro);
+  // matching and from the gyroscope without any estimate of its bias (an estimate that follows the
+  // lidar would hide what is looked for).
+  void add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro, double duration_s);
   // Mean specific force between two scans with the attitude by matching in its middle.
   void add_force(const Eigen::Quaterniond& world_from_imu, const Eigen::Vector3d& force_in_imu,
                  double duration_s);
 
   // The judgement so far; stays untrusted once it is.
   [[nodiscard]] const ImuTrust& trust() const { return trust_; }
-  // True if the gyroscope itself is fine but its axes are not where the rig says they are.
-  [[nodiscard]] bool axes_wrong() const { return axes_wrong_; }
+  // False if the IMU is sure to do harm: its axes are not where the rig says, or its unit is wrong.
+  // (A disagreement that nothing explains may be the lidar's fault; then the IMU stays in use.)
+  [[nodiscard]] bool usable() const { return usable_; }
 
   void save(BinaryWriter& writer) const;
   void load(BinaryReader& reader);
@@ -38,12 +40,15 @@ class TrustMonitor {
 
   double gravity_;
   ImuTrust trust_;
-  bool axes_wrong_ = false;
-  // Sums over turns: outer product of gyro and lidar, squares, and the total angle, radians.
+  bool usable_ = true;
+  // Sums over turns: outer product of gyro and lidar, squares, vectors, and the total angle,
+  // radians.
   Eigen::Matrix3d product_ = Eigen::Matrix3d::Zero();
   double lidar_square_ = 0.0;
   double gyro_square_ = 0.0;
-  double error_square_ = 0.0;
+  Eigen::Vector3d lidar_sum_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gyro_sum_ = Eigen::Vector3d::Zero();
+  double turn_time_ = 0.0;
   double total_angle_ = 0.0;
   int turns_ = 0;
   // The second being gathered, then sums over the unit vectors of the finished ones.
