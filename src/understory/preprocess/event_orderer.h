@@ -17,14 +17,15 @@ namespace understory {
 // Time repair. Events come in the order of the recording, which may be shuffled within limits, hold
 // duplicates, and come from clocks that jump; they leave in the order of time.
 //
-// - An event leaves once no stream that is alive can bring an earlier one: every stream has passed
-//   its time, or the newest time seen is `window_s` ahead.
-// - A scan's time is its end, and it leaves after the first IMU sample at or past that end, so that
-//   deskewing never lacks samples; unless the IMU has been silent for `imu_silence_s`.
-// - Same stream and same stamp: the second is dropped. Later than what already left: dropped.
-// - A stream whose stamps step away from its own past and from the other streams has a clock jump:
-//   its stamps are shifted so that it goes on at its usual rate. If the other streams step along,
-//   it is a gap in the recording and the stamps stand.
+// - An event leaves once the newest time seen is `window_s` ahead of it. With a window of 0 every
+//   stream is taken to be in order by itself, for least delay.
+// - A scan's time is its end, and it leaves right after the first IMU sample at or past that end, so
+//   that deskewing never lacks samples; unless the IMU has been silent for `imu_silence_s`.
+// - Same stream and same stamp: the second is dropped. Earlier than what already left: dropped.
+// - A stream whose stamps step away by more than `clock_jump_s` from its own past and from the other
+//   sensors has a clock jump: its stamps are shifted so that it goes on at its usual rate, until it
+//   jumps back. If lidar and IMU step forward together, it is a gap in the recording and the stamps
+//   stand; backward together, all are shifted. A single stamp far off is dropped.
 // Everything that was mended is counted and goes to the log under keys "time.*". The outcome
 // depends on the order of the pushes alone. Not thread-safe.
 class EventOrderer {
@@ -46,6 +47,7 @@ class EventOrderer {
     std::uint64_t duplicates = 0;  // dropped
     std::uint64_t late = 0;        // too late to be put right, dropped
     std::uint64_t clock_jumps = 0;
+    std::uint64_t glitches = 0;  // single stamps far off, dropped
     std::uint64_t gaps = 0;
     TimeNs longest_gap = 0;
   };
@@ -70,37 +72,46 @@ class EventOrderer {
  private:
   struct Pending {
     TimeNs time = 0;  // event time on the mended clock
+    int rank = 0;     // among events of the same time: sensors before scans
     std::uint64_t order = 0;
     Stream stream = kLidar;
+    TimeNs stamp = 0;  // on the mended clock
     Event event;
   };
   struct Clock {
     bool seen = false;
-    TimeNs newest = 0;       // mended stamp of the newest event
-    TimeNs newest_time = 0;  // mended event time of the newest event
-    TimeNs period = 0;       // running estimate of the usual step
+    TimeNs newest = 0;       // newest stamp, on the mended clock
+    TimeNs newest_time = 0;  // newest event time
+    TimeNs period = 0;       // running mean of the usual step, 0 = unknown
     TimeNs offset = 0;       // mended = raw + offset
+    TimeNs released = 0;     // stamp of the last one that left
+    bool any_released = false;
   };
 
-  void push_checked(Event event, Stream stream);
+  void accept(Event event, Stream stream);
   [[nodiscard]] bool suspicious(Stream stream, TimeNs raw) const;
-  void settle_suspects(Stream stream, TimeNs raw);
-  void shift_clock(Stream stream, TimeNs raw);
-  void release_suspects();
+  [[nodiscard]] std::optional<TimeNs> reference(Stream stream) const;
+  // Decides what the waiting suspects are: `other` is a stamp of another sensor that came after
+  // them, or nothing if none will come.
+  void settle(std::optional<TimeNs> other);
+  void shift(Stream stream, TimeNs raw, std::optional<TimeNs> other);
+  void drop_suspects();
   void note_step(Stream stream, TimeNs stamp);
-  void insert(Pending pending);
+  [[nodiscard]] bool drop(const Pending& pending);
   [[nodiscard]] bool safe(const Pending& pending) const;
-  [[nodiscard]] std::optional<TimeNs> other_newest(Stream stream) const;
+  [[nodiscard]] std::optional<std::size_t> next_to_leave();
+  [[nodiscard]] bool covered(const Pending& scan);
 
   Config config_;
   Log* log_;
   Report report_;
   std::array<Clock, kStreams> clocks_;
-  std::deque<Pending> pending_;  // sorted by (time, stream, order)
+  std::deque<Pending> pending_;  // sorted by time, rank, order
   std::vector<Event> suspects_;  // of one stream, waiting for a word from another
-  std::optional<Stream> suspect_stream_;
-  TimeNs newest_ = 0;    // newest event time of any stream
-  TimeNs released_ = 0;  // time of the last event that left
+  Stream suspect_stream_ = kLidar;
+  TimeNs newest_ = 0;  // newest event time of lidar and IMU (of any where neither is)
+  bool any_seen_ = false;
+  TimeNs released_ = 0;  // latest time that left, scans apart
   bool any_released_ = false;
   bool finished_ = false;
   std::uint64_t pushes_ = 0;

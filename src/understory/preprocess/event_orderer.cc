@@ -1,0 +1,347 @@
+#include "understory/preprocess/event_orderer.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <tuple>
+
+#include "understory/preprocess/event_bytes.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr std::array<const char*, EventOrderer::kStreams> kNames = {"lidar", "imu", "gnss", "mag"};
+// A stream that talks this much while no other does has nobody to be compared with.
+constexpr std::size_t kMostSuspects = 1000;
+// Streams of different sensors start within this many times the smallest jump.
+constexpr TimeNs kStartFactor = 5;
+
+TimeNs ns(double seconds) {
+  return static_cast<TimeNs>(seconds * 1e9);
+}
+
+TimeNs stamp_of(const Event& event) {
+  return std::visit(
+      [](const auto& value) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, ScanPtr>)
+          return value->stamp;
+        else
+          return value.stamp;
+      },
+      event);
+}
+
+void move_stamp(Event& event, TimeNs offset) {
+  if (offset == 0) return;
+  std::visit(
+      [&](auto& value) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, ScanPtr>) {
+          auto moved = std::make_shared<Scan>(*value);
+          moved->stamp += offset;
+          value = std::move(moved);
+        } else {
+          value.stamp += offset;
+        }
+      },
+      event);
+}
+
+std::string seconds(TimeNs time) {
+  const std::string text = std::to_string(static_cast<double>(time) * 1e-9);
+  return text.substr(0, text.size() - 3) + " s";
+}
+
+}  // namespace
+
+void EventOrderer::describe(ConfigTable& table, Config& config) {
+  table.add("window_s", config.window_s, {0.0, 10.0}, "s",
+            "how far out of order messages may be; 0 = each sensor is in order, for least delay");
+  table.add("imu_silence_s", config.imu_silence_s, {0.0, 10.0}, "s",
+            "a scan waits at most this long for the IMU to cover its end");
+  table.add("clock_jump_s", config.clock_jump_s, {0.1, 1000.0}, "s",
+            "smallest step of one sensor's clock that counts as a jump");
+  table.add("gap_scans", config.gap_scans, {1.5, 100.0}, "periods",
+            "a longer step between scans is reported as a gap");
+  table.add("imu_gap_s", config.imu_gap_s, {0.01, 10.0}, "s",
+            "a longer step between IMU samples is reported as a gap");
+}
+
+EventOrderer::EventOrderer(const Config& config, Log& log) : config_(config), log_(&log) {}
+
+std::optional<TimeNs> EventOrderer::reference(Stream stream) const {
+  std::optional<TimeNs> newest;
+  for (const Stream other : {kLidar, kImu}) {
+    if (other == stream || !clocks_[other].seen) continue;
+    newest = std::max(newest.value_or(clocks_[other].newest), clocks_[other].newest);
+  }
+  return newest;
+}
+
+bool EventOrderer::suspicious(Stream stream, TimeNs raw) const {
+  const Clock& clock = clocks_[stream];
+  const TimeNs jump = ns(config_.clock_jump_s);
+  const std::optional<TimeNs> other = reference(stream);
+  const TimeNs stamp = raw + clock.offset;
+  if (!clock.seen) return other && std::abs(stamp - *other) > kStartFactor * jump;
+  if (std::abs(stamp - clock.newest) <= jump) return false;
+  // After an outage of its own a stream comes back where the others are.
+  return !(other && stamp > clock.newest && std::abs(stamp - *other) <= jump);
+}
+
+void EventOrderer::push(Event event) {
+  UNDERSTORY_CHECK(!finished_);
+  const auto stream = static_cast<Stream>(event.index());
+  ++report_.streams[stream].received;
+  const TimeNs raw = stamp_of(event);
+  if (!suspects_.empty()) {
+    if (stream == suspect_stream_) {
+      if (suspicious(stream, raw)) {
+        suspects_.push_back(std::move(event));
+        if (suspects_.size() >= kMostSuspects) settle(std::nullopt);
+        return;
+      }
+      drop_suspects();
+    } else if (stream == kLidar || stream == kImu) {
+      settle(raw + clocks_[stream].offset);
+    }
+  }
+  if (!suspicious(stream, raw)) {
+    accept(std::move(event), stream);
+    return;
+  }
+  if (!suspects_.empty()) {  // two streams at odds, and neither is the lidar or the IMU
+    ++report_.streams[stream].glitches;
+    return;
+  }
+  suspects_.push_back(std::move(event));
+  suspect_stream_ = stream;
+  const bool first_word = !clocks_[stream].seen;
+  const std::optional<TimeNs> other = reference(stream);
+  if (first_word || !other || (stream != kLidar && stream != kImu)) settle(other);
+}
+
+void EventOrderer::drop_suspects() {
+  report_.streams[suspect_stream_].glitches += suspects_.size();
+  log_->warn("time.glitch", std::string(kNames[suspect_stream_]) + ": stamp " +
+                                seconds(stamp_of(suspects_.front())) +
+                                " is far from its neighbours; message dropped");
+  suspects_.clear();
+}
+
+void EventOrderer::settle(std::optional<TimeNs> other) {
+  const Stream stream = suspect_stream_;
+  Clock& clock = clocks_[stream];
+  const TimeNs raw = stamp_of(suspects_.front());
+  const TimeNs stamp = raw + clock.offset;
+  const bool forward = stamp > clock.newest;
+  const bool together =
+      clock.seen && (!other || std::abs(*other - stamp) < std::abs(*other - clock.newest));
+  if (together && !forward) {
+    // All clocks went back: all go on from where they were.
+    const TimeNs step = clock.newest + clock.period - stamp;
+    for (Clock& each : clocks_)
+      each.offset += step;
+    ++report_.streams[stream].clock_jumps;
+    log_->warn("time.clock_back", "the clock of the recording went back by " +
+                                      seconds(clock.newest - stamp) + "; stamps shifted");
+  } else if (!together) {
+    shift(stream, raw, other);
+  }
+  std::vector<Event> waiting;
+  waiting.swap(suspects_);
+  for (Event& event : waiting)
+    accept(std::move(event), stream);
+}
+
+void EventOrderer::shift(Stream stream, TimeNs raw, std::optional<TimeNs> other) {
+  Clock& clock = clocks_[stream];
+  const TimeNs before = clock.offset;
+  if (other && std::abs(raw - *other) <= ns(config_.clock_jump_s))
+    clock.offset = 0;  // back on the common clock
+  else
+    clock.offset = (clock.seen ? clock.newest + clock.period : other.value_or(raw)) - raw;
+  ++report_.streams[stream].clock_jumps;
+  log_->warn("time.clock_jump", std::string(kNames[stream]) + ": its clock jumped by " +
+                                    seconds(before - clock.offset) +
+                                    " against the other sensors; stamps shifted");
+}
+
+void EventOrderer::note_step(Stream stream, TimeNs stamp) {
+  Clock& clock = clocks_[stream];
+  StreamReport& report = report_.streams[stream];
+  const TimeNs step = stamp - clock.newest;
+  if (step <= 0) {
+    ++report.reordered;
+    log_->warn("time.reordered", std::string(kNames[stream]) + ": message at " + seconds(stamp) +
+                                     " came after a later one; put in order");
+    return;
+  }
+  const TimeNs limit =
+      stream == kImu ? ns(config_.imu_gap_s)
+                     : static_cast<TimeNs>(config_.gap_scans * static_cast<double>(clock.period));
+  if ((stream == kLidar || stream == kImu) && clock.period > 0 && step > limit) {
+    ++report.gaps;
+    report.longest_gap = std::max(report.longest_gap, step);
+    log_->warn(std::string("time.gap_") + kNames[stream], std::string(kNames[stream]) +
+                                                              ": nothing for " + seconds(step) +
+                                                              " before " + seconds(stamp));
+  } else if (step < ns(config_.clock_jump_s)) {
+    clock.period = clock.period == 0 ? step : clock.period + (step - clock.period) / 16;
+  }
+}
+
+bool EventOrderer::drop(const Pending& pending) {
+  StreamReport& report = report_.streams[pending.stream];
+  const Clock& clock = clocks_[pending.stream];
+  const auto same = [&](const Pending& other) {
+    return other.stream == pending.stream && other.stamp == pending.stamp;
+  };
+  if ((clock.any_released && pending.stamp == clock.released) ||
+      std::any_of(pending_.begin(), pending_.end(), same)) {
+    ++report.duplicates;
+    log_->warn("time.duplicate", std::string(kNames[pending.stream]) + ": second message at " +
+                                     seconds(pending.stamp) + " dropped");
+    return true;
+  }
+  const bool late = pending.stream == kLidar ? clock.any_released && pending.stamp < clock.released
+                                             : any_released_ && pending.time < released_;
+  if (late) {
+    ++report.late;
+    log_->warn("time.late", std::string(kNames[pending.stream]) + ": message at " +
+                                seconds(pending.stamp) + " came too late to be used");
+  }
+  return late;
+}
+
+void EventOrderer::accept(Event event, Stream stream) {
+  Clock& clock = clocks_[stream];
+  move_stamp(event, clock.offset);
+  Pending pending;
+  pending.time = event_time(event);
+  pending.stamp = stamp_of(event);
+  pending.rank = stream == kLidar ? 1 : 0;
+  pending.order = pushes_++;
+  pending.stream = stream;
+  pending.event = std::move(event);
+  if (drop(pending)) return;
+  if (clock.seen) note_step(stream, pending.stamp);
+  clock.newest = clock.seen ? std::max(clock.newest, pending.stamp) : pending.stamp;
+  clock.newest_time = clock.seen ? std::max(clock.newest_time, pending.time) : pending.time;
+  clock.seen = true;
+  newest_ = any_seen_ ? std::max(newest_, pending.time) : pending.time;
+  any_seen_ = true;
+  const auto key = [](const Pending& p) { return std::tuple(p.time, p.rank, p.order); };
+  auto at = pending_.end();
+  while (at != pending_.begin() && key(*std::prev(at)) > key(pending))
+    --at;
+  pending_.insert(at, std::move(pending));
+}
+
+bool EventOrderer::safe(const Pending& pending) const {
+  return finished_ || newest_ - pending.time >= ns(config_.window_s);
+}
+
+// Whether a scan may leave as far as the IMU is concerned.
+bool EventOrderer::covered(const Pending& scan) {
+  const Clock& imu = clocks_[kImu];
+  if (imu.any_released && imu.released >= scan.time) return true;
+  if (finished_ || newest_ - scan.time > ns(config_.imu_silence_s)) {
+    if (imu.seen) {
+      ++report_.scans_without_imu;
+      log_->warn("time.imu_silent",
+                 "no IMU sample past the end of the scan at " + seconds(scan.stamp));
+    }
+    return true;
+  }
+  return false;
+}
+
+std::optional<std::size_t> EventOrderer::next_to_leave() {
+  if (pending_.empty() || !safe(pending_.front())) return std::nullopt;
+  if (pending_.front().stream != kLidar) return 0;
+  // The sensors go on until the IMU covers the scan.
+  const Clock& imu = clocks_[kImu];
+  const bool behind = !(imu.any_released && imu.released >= pending_.front().time);
+  for (std::size_t i = 1; behind && i < pending_.size(); ++i) {
+    if (pending_[i].stream == kLidar) continue;
+    if (pending_[i].time - pending_.front().time > ns(config_.imu_silence_s)) break;
+    const auto is_imu = [](const Pending& pending) { return pending.stream == kImu; };
+    const auto from = pending_.begin() + static_cast<std::ptrdiff_t>(i);
+    if (std::none_of(from, pending_.end(), is_imu)) break;
+    return safe(pending_[i]) ? std::optional<std::size_t>(i) : std::nullopt;
+  }
+  return covered(pending_.front()) ? std::optional<std::size_t>(0) : std::nullopt;
+}
+
+std::optional<Event> EventOrderer::pop() {
+  const std::optional<std::size_t> next = next_to_leave();
+  if (!next) return std::nullopt;
+  const auto at = pending_.begin() + static_cast<std::ptrdiff_t>(*next);
+  Clock& clock = clocks_[at->stream];
+  clock.released = at->stamp;
+  clock.any_released = true;
+  ++report_.streams[at->stream].released;
+  if (at->stream != kLidar) {
+    released_ = any_released_ ? std::max(released_, at->time) : at->time;
+    any_released_ = true;
+  }
+  Event event = std::move(at->event);
+  pending_.erase(at);
+  return event;
+}
+
+void EventOrderer::finish() {
+  if (!suspects_.empty()) settle(std::nullopt);
+  finished_ = true;
+}
+
+void EventOrderer::save(BinaryWriter& writer) const {
+  writer.put(report_);
+  for (const Clock& clock : clocks_)
+    writer.put(clock);
+  writer.put(static_cast<std::uint64_t>(pending_.size()));
+  for (const Pending& pending : pending_) {
+    writer.put(pending.order);
+    writer.put(pending.stream);
+    put_event(writer, pending.event);
+  }
+  writer.put(static_cast<std::uint64_t>(suspects_.size()));
+  for (const Event& event : suspects_)
+    put_event(writer, event);
+  writer.put(suspect_stream_);
+  writer.put(newest_);
+  writer.put(any_seen_);
+  writer.put(released_);
+  writer.put(any_released_);
+  writer.put(finished_);
+  writer.put(pushes_);
+}
+
+void EventOrderer::load(BinaryReader& reader) {
+  report_ = reader.get<Report>();
+  for (Clock& clock : clocks_)
+    clock = reader.get<Clock>();
+  pending_.clear();
+  for (auto n = reader.get<std::uint64_t>(); n > 0; --n) {
+    Pending pending;
+    pending.order = reader.get<std::uint64_t>();
+    pending.stream = reader.get<Stream>();
+    pending.event = get_event(reader);
+    pending.rank = pending.stream == kLidar ? 1 : 0;
+    pending.time = event_time(pending.event);
+    pending.stamp = stamp_of(pending.event);
+    pending_.push_back(std::move(pending));
+  }
+  suspects_.clear();
+  for (auto n = reader.get<std::uint64_t>(); n > 0; --n)
+    suspects_.push_back(get_event(reader));
+  suspect_stream_ = reader.get<Stream>();
+  newest_ = reader.get<TimeNs>();
+  any_seen_ = reader.get<bool>();
+  released_ = reader.get<TimeNs>();
+  any_released_ = reader.get<bool>();
+  finished_ = reader.get<bool>();
+  pushes_ = reader.get<std::uint64_t>();
+}
+
+}  // namespace understory

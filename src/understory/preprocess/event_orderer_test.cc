@@ -1,0 +1,301 @@
+#include "understory/preprocess/event_orderer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <map>
+
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+constexpr TimeNs kMs = 1'000'000;
+constexpr TimeNs kEpoch = 1'700'000'000'000 * kMs;
+
+ImuSample imu(TimeNs stamp) {
+  ImuSample sample;
+  sample.stamp = stamp;
+  sample.angular_rate.x() = static_cast<double>(stamp % 1000);
+  return sample;
+}
+
+ScanPtr scan(TimeNs stamp) {
+  auto made = std::make_shared<Scan>();
+  made->stamp = stamp;
+  made->points.resize(3);
+  made->points[2].t_ns = 99 * kMs;
+  return made;
+}
+
+GnssFix fix(TimeNs stamp) {
+  GnssFix made;
+  made.stamp = stamp;
+  return made;
+}
+
+// Scans at 10 Hz, IMU at 100 Hz, GNSS at 1 Hz, each as it would be written when complete.
+std::vector<Event> recording(double seconds) {
+  std::vector<Event> events;
+  const auto end = static_cast<TimeNs>(seconds * 1e9);
+  for (TimeNs t = 0; t < end; t += 10 * kMs) {
+    events.emplace_back(imu(kEpoch + t + 3 * kMs));
+    if (t % (100 * kMs) == 0 && t > 0) events.emplace_back(scan(kEpoch + t - 100 * kMs));
+    if (t % (1000 * kMs) == 0) events.emplace_back(fix(kEpoch + t));
+  }
+  return events;
+}
+
+TimeNs stamp_of(const Event& event) {
+  if (const auto* p = std::get_if<ScanPtr>(&event)) return (*p)->stamp;
+  if (const auto* p = std::get_if<ImuSample>(&event)) return p->stamp;
+  if (const auto* p = std::get_if<GnssFix>(&event)) return p->stamp;
+  return std::get<MagSample>(event).stamp;
+}
+
+struct Outcome {
+  std::vector<Event> events;
+  EventOrderer::Report report;
+  std::vector<Log::Warning> warnings;
+};
+
+Outcome run(const std::vector<Event>& events, const EventOrderer::Config& config = {}) {
+  Log log;
+  EventOrderer orderer(config, log);
+  Outcome outcome;
+  const auto drain = [&] {
+    while (auto event = orderer.pop())
+      outcome.events.push_back(std::move(*event));
+  };
+  for (const Event& event : events) {
+    orderer.push(event);
+    drain();
+  }
+  orderer.finish();
+  drain();
+  outcome.report = orderer.report();
+  outcome.warnings = log.warnings();
+  return outcome;
+}
+
+std::vector<std::pair<std::size_t, TimeNs>> stamps(const std::vector<Event>& events) {
+  std::vector<std::pair<std::size_t, TimeNs>> all;
+  for (const Event& event : events)
+    all.emplace_back(event.index(), stamp_of(event));
+  return all;
+}
+
+// Every scan comes after an IMU sample at or past its end, and IMU and scans each in order.
+void expect_sound(const Outcome& outcome) {
+  TimeNs last_imu = 0;
+  TimeNs last_scan = 0;
+  for (const Event& event : outcome.events) {
+    if (event.index() == EventOrderer::kImu) {
+      EXPECT_GT(stamp_of(event), last_imu);
+      last_imu = stamp_of(event);
+    }
+    if (event.index() == EventOrderer::kLidar) {
+      EXPECT_GT(stamp_of(event), last_scan);
+      last_scan = stamp_of(event);
+      EXPECT_GE(last_imu, event_time(event));
+    }
+  }
+}
+
+TEST(EventOrderer, PassesAnOrderlyRecordingOnUnchanged) {
+  const std::vector<Event> events = recording(5.0);
+  const Outcome outcome = run(events);
+  EXPECT_EQ(outcome.events.size(), events.size());
+  EXPECT_TRUE(outcome.warnings.empty());
+  expect_sound(outcome);
+  EXPECT_EQ(outcome.report.scans_without_imu, 0U);
+}
+
+TEST(EventOrderer, NothingLagsBehindWithoutWindow) {
+  EventOrderer::Config config;
+  config.window_s = 0.0;
+  Log log;
+  EventOrderer orderer(config, log);
+  orderer.push(imu(kEpoch));
+  EXPECT_TRUE(orderer.pop().has_value());
+  orderer.push(scan(kEpoch - 50 * kMs));  // ends 49 ms past the last IMU sample
+  EXPECT_FALSE(orderer.pop().has_value());
+  orderer.push(imu(kEpoch + 40 * kMs));
+  EXPECT_EQ(orderer.pop()->index(), EventOrderer::kImu);
+  EXPECT_FALSE(orderer.pop().has_value());
+  orderer.push(imu(kEpoch + 50 * kMs));
+  EXPECT_EQ(orderer.pop()->index(), EventOrderer::kImu);
+  EXPECT_EQ(orderer.pop()->index(), EventOrderer::kLidar);
+}
+
+TEST(EventOrderer, PutsShuffledMessagesInOrderAndDropsDuplicates) {
+  const std::vector<Event> clean = recording(6.0);
+  std::vector<Event> events = clean;
+  Random random(5);
+  for (std::size_t i = 0; i + 8 < events.size(); i += 4)
+    std::swap(events[i], events[i + 1 + random.below(7)]);
+  for (int i = 0; i < 20; ++i) {
+    const auto at = static_cast<std::ptrdiff_t>(random.below(events.size() - 5));
+    events.insert(events.begin() + at + 3, events[static_cast<std::size_t>(at)]);
+  }
+  const Outcome outcome = run(events);
+  EXPECT_EQ(stamps(outcome.events), stamps(run(clean).events));
+  std::uint64_t duplicates = 0;
+  std::uint64_t reordered = 0;
+  for (const auto& stream : outcome.report.streams) {
+    duplicates += stream.duplicates;
+    reordered += stream.reordered;
+  }
+  EXPECT_EQ(duplicates, 20U);
+  EXPECT_GT(reordered, 10U);
+}
+
+TEST(EventOrderer, ShiftsAnImuWhoseClockJumpsAndComesBack) {
+  std::vector<Event> events = recording(10.0);
+  const std::vector<Event> clean = events;
+  for (Event& event : events) {
+    auto* sample = std::get_if<ImuSample>(&event);
+    if (sample != nullptr && sample->stamp > kEpoch + 3000 * kMs &&
+        sample->stamp < kEpoch + 7000 * kMs)
+      sample->stamp += 1'000'000 * kMs;
+  }
+  const Outcome outcome = run(events);
+  EXPECT_EQ(outcome.report.streams[EventOrderer::kImu].clock_jumps, 2U);
+  ASSERT_EQ(outcome.events.size(), clean.size());
+  const auto expected = stamps(run(clean).events);
+  const auto got = stamps(outcome.events);
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    EXPECT_EQ(got[i].first, expected[i].first);
+    EXPECT_LE(std::llabs(got[i].second - expected[i].second), kMs);
+  }
+  EXPECT_EQ(outcome.report.scans_without_imu, 0U);
+}
+
+TEST(EventOrderer, ShiftsEverythingWhenAllClocksGoBack) {
+  std::vector<Event> events = recording(10.0);
+  for (Event& event : events) {
+    if (event_time(event) < kEpoch + 5000 * kMs) continue;
+    if (auto* sample = std::get_if<ImuSample>(&event)) sample->stamp -= 100'000 * kMs;
+    if (auto* made = std::get_if<ScanPtr>(&event)) *made = scan((*made)->stamp - 100'000 * kMs);
+    if (auto* made = std::get_if<GnssFix>(&event)) made->stamp -= 100'000 * kMs;
+  }
+  const Outcome outcome = run(events);
+  expect_sound(outcome);
+  EXPECT_GE(outcome.events.size() + 4, events.size());  // those at the very moment may be lost
+  for (const Event& event : outcome.events) {
+    EXPECT_GT(event_time(event), kEpoch - 200 * kMs);
+    EXPECT_LT(event_time(event), kEpoch + 10'200 * kMs);
+  }
+}
+
+TEST(EventOrderer, ALidarAloneThatGoesBackGoesOn) {
+  std::vector<Event> events;
+  for (int i = 0; i < 40; ++i)
+    events.emplace_back(scan(kEpoch + (i < 20 ? i : i - 600) * 100 * kMs));
+  const Outcome outcome = run(events);
+  ASSERT_EQ(outcome.events.size(), 40U);
+  for (int i = 0; i < 40; ++i)
+    EXPECT_EQ(stamp_of(outcome.events[static_cast<std::size_t>(i)]), kEpoch + i * 100 * kMs);
+}
+
+TEST(EventOrderer, AGapOfTheRecordingIsNoJump) {
+  std::vector<Event> events;
+  for (const Event& event : recording(20.0)) {
+    const TimeNs since = event_time(event) - kEpoch;
+    if (since < 5000 * kMs || since > 15'000 * kMs) events.push_back(event);
+  }
+  const Outcome outcome = run(events);
+  EXPECT_EQ(outcome.events.size(), events.size());
+  for (const auto& stream : outcome.report.streams) {
+    EXPECT_EQ(stream.clock_jumps, 0U);
+    EXPECT_EQ(stream.glitches, 0U);
+  }
+  EXPECT_EQ(outcome.report.streams[EventOrderer::kLidar].gaps, 1U);
+  EXPECT_EQ(outcome.report.streams[EventOrderer::kImu].gaps, 1U);
+}
+
+TEST(EventOrderer, AnOutageOfTheLidarIsNoJump) {
+  std::vector<Event> events;
+  for (const Event& event : recording(20.0)) {
+    const TimeNs since = event_time(event) - kEpoch;
+    if (event.index() != EventOrderer::kLidar || since < 5000 * kMs || since > 15'000 * kMs)
+      events.push_back(event);
+  }
+  const Outcome outcome = run(events);
+  EXPECT_EQ(outcome.events.size(), events.size());
+  EXPECT_EQ(outcome.report.streams[EventOrderer::kLidar].clock_jumps, 0U);
+  EXPECT_EQ(outcome.report.streams[EventOrderer::kLidar].gaps, 1U);
+  expect_sound(outcome);
+}
+
+TEST(EventOrderer, ASingleWildStampIsDropped) {
+  std::vector<Event> events = recording(4.0);
+  events.insert(events.begin() + 150, imu(kEpoch + 50'000'000 * kMs));
+  const Outcome outcome = run(events);
+  EXPECT_EQ(outcome.report.streams[EventOrderer::kImu].glitches, 1U);
+  EXPECT_EQ(outcome.events.size(), events.size() - 1);
+  expect_sound(outcome);
+}
+
+TEST(EventOrderer, ReleasesScansWhenTheImuFallsSilent) {
+  std::vector<Event> events;
+  for (const Event& event : recording(6.0)) {
+    if (event.index() != EventOrderer::kImu || event_time(event) < kEpoch + 3000 * kMs)
+      events.push_back(event);
+  }
+  const Outcome outcome = run(events);
+  EXPECT_EQ(outcome.events.size(), events.size());
+  EXPECT_GT(outcome.report.scans_without_imu, 25U);
+  EXPECT_LT(outcome.report.scans_without_imu, 32U);
+}
+
+TEST(EventOrderer, ClocksThatNeverAgreedAreBroughtTogether) {
+  std::vector<Event> events = recording(5.0);
+  for (Event& event : events) {
+    if (auto* sample = std::get_if<ImuSample>(&event)) sample->stamp -= kEpoch;
+  }
+  const Outcome outcome = run(events);
+  EXPECT_GE(outcome.events.size() + 2, events.size());
+  EXPECT_LE(outcome.report.scans_without_imu, 2U);
+}
+
+TEST(EventOrderer, GoesOnFromASavedStateAsIfNothingHadHappened) {
+  std::vector<Event> events = recording(8.0);
+  Random random(9);
+  for (std::size_t i = 0; i + 8 < events.size(); i += 4)
+    std::swap(events[i], events[i + 1 + random.below(7)]);
+  for (Event& event : events) {
+    auto* sample = std::get_if<ImuSample>(&event);
+    if (sample != nullptr && sample->stamp > kEpoch + 3000 * kMs) sample->stamp += 1'000'000 * kMs;
+  }
+  const auto expected = stamps(run(events).events);
+  for (const std::size_t cut : {std::size_t{5}, events.size() / 3, events.size() / 2}) {
+    Log log;
+    EventOrderer first({}, log);
+    std::vector<Event> got;
+    for (std::size_t i = 0; i < cut; ++i) {
+      first.push(events[i]);
+      while (auto event = first.pop())
+        got.push_back(std::move(*event));
+    }
+    BinaryWriter writer;
+    first.save(writer);
+    EventOrderer second({}, log);
+    BinaryReader reader(writer.bytes(), "test");
+    second.load(reader);
+    EXPECT_TRUE(reader.at_end());
+    for (std::size_t i = cut; i <= events.size(); ++i) {
+      if (i < events.size())
+        second.push(events[i]);
+      else
+        second.finish();
+      while (auto event = second.pop())
+        got.push_back(std::move(*event));
+    }
+    EXPECT_EQ(stamps(got), expected);
+  }
+}
+
+}  // namespace
+}  // namespace understory
