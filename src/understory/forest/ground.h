@@ -12,13 +12,12 @@ namespace understory {
 // cloth simulation filter, W. Zhang et al., Remote Sensing 8(6):501, 2016) and then laying a smooth
 // surface through the points that the cloth touched.
 struct GroundConfig {
-  double cell_m = 0.5;        // of the terrain model
-  double cloth_cell_m = 0.5;  // between the nodes of the cloth
-  int stiffness = 2;          // times the inner forces act in a step: 1 steep, 2 rolling, 3 flat
-  int steps = 500;            // at most
-  double touch_m = 0.5;       // points this near to the cloth are ground for the terrain model
-  double class_m = 0.20;      // points this near to the terrain model are of class ground
-  double max_gap_m = 8.0;     // how far terrain is filled in from the nearest ground point
+  double cell_m = 0.5;     // of the terrain model and between the nodes of the cloth
+  int stiffness = 2;       // times the inner forces act in a step: 1 steep, 2 rolling, 3 flat
+  int steps = 500;         // at most
+  double touch_m = 0.5;    // points this near to the cloth are ground for the terrain model
+  double class_m = 0.20;   // points this near to the terrain model are of class ground
+  double max_gap_m = 8.0;  // how far terrain is filled in from the nearest ground point
 };
 void describe(ConfigTable& table, GroundConfig& config);
 

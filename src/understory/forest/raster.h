@@ -40,7 +40,7 @@ struct Raster {
     return z0 + static_cast<double>(values[index(column, row)]);
   }
   // Bilinear between the centres of cells; held constant beyond the outer centres; NaN further than
-  // one cell outside or where a needed cell is unknown.
+  // one cell outside, or where less than a quarter (by weight) of the four cells is known.
   [[nodiscard]] double interpolate(double x, double y) const;
 };
 

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace understory {
+
+// A grid of small records over an area whose bounds are not known beforehand: blocks of cells that
+// come to be where something falls into them. Cells hold what does not depend on the order of work
+// inside the cloud. Not thread-safe.
+template <typename Cell>
+class CellGrid {
+ public:
+  static constexpr int kBlock = 32;
+  struct Bounds {
+    int column0 = 0, row0 = 0, columns = 0, rows = 0;
+  };
+
+  explicit CellGrid(double cell_m) : cell_m_(cell_m) {}
+  [[nodiscard]] double cell_m() const { return cell_m_; }
+
+  Cell& at(double x, double y) {
+    const auto column = static_cast<int>(std::floor(x / cell_m_));
+    const auto row = static_cast<int>(std::floor(y / cell_m_));
+    const std::pair<int, int> key{floor_div(row), floor_div(column)};
+    if (last_ == nullptr || key != last_key_) {
+      auto& block = blocks_[key];
+      if (block == nullptr) block = std::make_unique<Block>();
+      last_ = block.get();
+      last_key_ = key;
+    }
+    ++last_->points;
+    return last_->cells[static_cast<std::size_t>((row - key.first * kBlock) * kBlock + column -
+                                                 key.second * kBlock)];
+  }
+
+  // The blocks' bounds in cells. A few stray points far away must not make the area huge: where it
+  // has more than `most` cells, blocks with fewer than `few` points are left out.
+  [[nodiscard]] Bounds bounds(std::uint64_t most, std::uint64_t few) const {
+    Bounds all = bounds_of(0);
+    const auto area =
+        static_cast<std::uint64_t>(all.columns) * static_cast<std::uint64_t>(all.rows);
+    return area > most ? bounds_of(few) : all;
+  }
+
+  template <typename Visit>
+  void for_each(const Visit& visit) const {
+    for (const auto& [key, block] : blocks_) {
+      for (int j = 0; j < kBlock; ++j) {
+        for (int i = 0; i < kBlock; ++i) {
+          visit(key.second * kBlock + i, key.first * kBlock + j,
+                block->cells[static_cast<std::size_t>(j * kBlock + i)]);
+        }
+      }
+    }
+  }
+
+ private:
+  struct Block {
+    std::array<Cell, kBlock * kBlock> cells{};
+    std::uint64_t points = 0;
+  };
+  static int floor_div(int value) {
+    return value >= 0 ? value / kBlock : -((kBlock - 1 - value) / kBlock);
+  }
+  [[nodiscard]] Bounds bounds_of(std::uint64_t few) const {
+    bool first = true;
+    std::pair<int, int> low{0, 0};
+    std::pair<int, int> high{0, 0};
+    for (const auto& [key, block] : blocks_) {
+      if (block->points < few) continue;
+      low =
+          first ? key : std::pair{std::min(low.first, key.first), std::min(low.second, key.second)};
+      high = first ? key
+                   : std::pair{std::max(high.first, key.first), std::max(high.second, key.second)};
+      first = false;
+    }
+    if (first) return {};
+    return {low.second * kBlock, low.first * kBlock, (high.second - low.second + 1) * kBlock,
+            (high.first - low.first + 1) * kBlock};
+  }
+
+  double cell_m_;
+  std::map<std::pair<int, int>, std::unique_ptr<Block>> blocks_;
+  Block* last_ = nullptr;
+  std::pair<int, int> last_key_{};
+};
+
+}  // namespace understory

@@ -1,0 +1,34 @@
+#include "understory/forest/raster.h"
+
+#include <algorithm>
+
+namespace understory {
+
+double Raster::interpolate(double x, double y) const {
+  const double u = (x - x0) / cell_m - 0.5;
+  const double v = (y - y0) / cell_m - 0.5;
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  if (!(u >= -1.5 && v >= -1.5 && u <= columns + 0.5 && v <= rows + 0.5)) return kUnknown;
+  const double uc = std::clamp(u, 0.0, columns - 1.0);
+  const double vc = std::clamp(v, 0.0, rows - 1.0);
+  const int column = std::min(static_cast<int>(uc), std::max(columns - 2, 0));
+  const int row = std::min(static_cast<int>(vc), std::max(rows - 2, 0));
+  const double fu = uc - column;
+  const double fv = vc - row;
+  double sum = 0.0;
+  double weights = 0.0;
+  for (int j = 0; j < 2; ++j) {
+    for (int i = 0; i < 2; ++i) {
+      const double weight = (i == 0 ? 1.0 - fu : fu) * (j == 0 ? 1.0 - fv : fv);
+      if (weight <= 0.0 || !contains(column + i, row + j)) continue;
+      const auto value = static_cast<double>(values[index(column + i, row + j)]);
+      if (!std::isfinite(value)) continue;
+      sum += weight * value;
+      weights += weight;
+    }
+  }
+  // At the border of the known a part of the four cells is enough, as long as one is near.
+  return weights >= 0.25 ? z0 + sum / weights : kUnknown;
+}
+
+}  // namespace understory

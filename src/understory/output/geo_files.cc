@@ -1,0 +1,165 @@
+#include "understory/output/geo_files.h"
+
+#include <cpl_conv.h>
+#include <cpl_error.h>
+#include <gdal_priv.h>
+#include <ogrsf_frmts.h>
+
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <system_error>
+#include <utility>
+
+#include "understory/output/atomic_file.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr float kNoData = -9999.0F;
+
+// Keeps GDAL's messages off the terminal; the last one goes into the exception.
+class QuietGdal {
+ public:
+  QuietGdal() {
+    static std::once_flag registered;
+    std::call_once(registered, [] { GDALAllRegister(); });
+    CPLPushErrorHandler(CPLQuietErrorHandler);
+    CPLErrorReset();
+    errno = 0;
+  }
+  ~QuietGdal() { CPLPopErrorHandler(); }
+  QuietGdal(const QuietGdal&) = delete;
+  QuietGdal& operator=(const QuietGdal&) = delete;
+};
+
+[[noreturn]] void fail(const std::filesystem::path& path) {
+  const int code = errno;
+  const std::string told = CPLGetLastErrorMsg();
+  std::error_code ignored;
+  std::filesystem::remove(part_path(path), ignored);
+  std::string reason = "cannot be written";
+  if (code == ENOSPC || code == EACCES || code == ENOENT || code == EROFS) {
+    reason += std::string(": ") + std::strerror(code);
+  } else if (!told.empty()) {
+    reason += ": " + told;
+  }
+  throw OutputError(path.string(), reason);
+}
+
+GDALDriver* driver(const char* name) {
+  GDALDriver* found = GetGDALDriverManager()->GetDriverByName(name);
+  if (found == nullptr) throw InternalError(std::string("this GDAL has no driver ") + name);
+  return found;
+}
+
+// Closing writes the rest, so its errors count.
+void close(GDALDatasetUniquePtr dataset, const std::filesystem::path& path) {
+  CPLErrorReset();
+  GDALClose(GDALDataset::ToHandle(dataset.release()));
+  if (CPLGetLastErrorType() >= CE_Failure) fail(path);
+  sync_and_rename(part_path(path), path);
+}
+
+void set_system(OGRSpatialReference& system, const std::string& wkt) {
+  system.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
+  if (wkt.empty()) {
+    system.SetLocalCS("local metric frame, z up");
+    system.SetLinearUnits(SRS_UL_METER, 1.0);
+  } else if (system.importFromWkt(wkt.c_str()) != OGRERR_NONE) {
+    throw InternalError("the coordinate system is no valid WKT");
+  }
+}
+
+}  // namespace
+
+void write_geotiff(const std::filesystem::path& path, const Raster& raster,
+                   const std::string& crs_wkt) {
+  UNDERSTORY_CHECK(!raster.empty());
+  const QuietGdal quiet;
+  char** options = CSLSetNameValue(nullptr, "COMPRESS", "DEFLATE");
+  options = CSLSetNameValue(options, "PREDICTOR", "3");
+  GDALDatasetUniquePtr dataset(driver("GTiff")->Create(part_path(path).c_str(), raster.columns,
+                                                       raster.rows, 1, GDT_Float32, options));
+  CSLDestroy(options);
+  if (dataset == nullptr) fail(path);
+  const double top = raster.y0 + raster.rows * raster.cell_m;
+  std::array<double, 6> transform = {raster.x0, raster.cell_m, 0.0, top, 0.0, -raster.cell_m};
+  dataset->SetGeoTransform(transform.data());
+  if (!crs_wkt.empty()) {
+    OGRSpatialReference system;
+    set_system(system, crs_wkt);
+    dataset->SetSpatialRef(&system);
+  }
+  GDALRasterBand* band = dataset->GetRasterBand(1);
+  band->SetNoDataValue(kNoData);
+  band->SetUnitType("metre");
+  std::vector<float> line(static_cast<std::size_t>(raster.columns));
+  for (int row = 0; row < raster.rows; ++row) {
+    const int from = raster.rows - 1 - row;  // a TIFF starts in the north
+    for (int column = 0; column < raster.columns; ++column) {
+      const float value = raster.values[raster.index(column, from)];
+      line[static_cast<std::size_t>(column)] =
+          std::isfinite(value) ? static_cast<float>(raster.z0 + static_cast<double>(value))
+                               : kNoData;
+    }
+    if (band->RasterIO(GF_Write, 0, row, raster.columns, 1, line.data(), raster.columns, 1,
+                       GDT_Float32, 0, 0, nullptr) != CE_None) {
+      fail(path);
+    }
+  }
+  close(std::move(dataset), path);
+}
+
+void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
+                      const std::string& crs_wkt) {
+  const QuietGdal quiet;
+  // The same rows give the same bytes: without this the file holds the time of writing.
+  CPLSetThreadLocalConfigOption("OGR_CURRENT_DATE", "2000-01-01T00:00:00.000Z");
+  std::error_code ignored;
+  std::filesystem::remove(part_path(path), ignored);
+  GDALDatasetUniquePtr dataset(
+      driver("GPKG")->Create(part_path(path).c_str(), 0, 0, 0, GDT_Unknown, nullptr));
+  if (dataset == nullptr) fail(path);
+  OGRSpatialReference system;
+  set_system(system, crs_wkt);
+  OGRLayer* layer =
+      dataset->CreateLayer("trees", crs_wkt.empty() ? nullptr : &system, wkbPoint25D, nullptr);
+  if (layer == nullptr) fail(path);
+  using Column = std::pair<const char*, double Tree::*>;
+  constexpr std::array<Column, 6> kColumns = {{{"dbh_m", &Tree::dbh_m},
+                                               {"dbh_sd_m", &Tree::dbh_sd_m},
+                                               {"height_m", &Tree::height_m},
+                                               {"lean_deg", &Tree::lean_deg},
+                                               {"x_sd_m", &Tree::x_sd_m},
+                                               {"y_sd_m", &Tree::y_sd_m}}};
+  OGRFieldDefn id("id", OFTInteger);
+  OGRFieldDefn observations("observations", OFTInteger);
+  if (layer->CreateField(&id) != OGRERR_NONE) fail(path);
+  for (const Column& column : kColumns) {
+    OGRFieldDefn field(column.first, OFTReal);
+    if (layer->CreateField(&field) != OGRERR_NONE) fail(path);
+  }
+  if (layer->CreateField(&observations) != OGRERR_NONE) fail(path);
+  dataset->StartTransaction();
+  for (const Tree& tree : trees) {
+    const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer->GetLayerDefn()));
+    feature->SetField("id", tree.id);
+    feature->SetField("observations", tree.observations);
+    for (const auto& [name, member] : kColumns) {
+      if (std::isfinite(tree.*member)) feature->SetField(name, tree.*member);
+    }
+    OGRPoint point(tree.x, tree.y, tree.z);
+    feature->SetGeometry(&point);
+    if (layer->CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
+  }
+  if (dataset->CommitTransaction() != OGRERR_NONE) fail(path);
+  close(std::move(dataset), path);
+}
+
+}  // namespace understory

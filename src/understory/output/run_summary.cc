@@ -1,0 +1,140 @@
+#include "understory/output/run_summary.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "understory/output/atomic_file.h"
+
+namespace understory {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Rounded to microseconds or the like: the tail of a double tells nothing and makes files differ.
+Json number(double value) {
+  if (!std::isfinite(value)) return nullptr;
+  return std::round(value * 1e6) / 1e6;
+}
+
+Json to_json(const Distribution& values) {
+  return {{"mean", number(values.mean)},
+          {"p50", number(values.p50)},
+          {"p99", number(values.p99)},
+          {"max", number(values.max)}};
+}
+
+Json to_json(const std::map<std::string, Figure>& figures) {
+  Json result = Json::object();
+  for (const auto& [name, figure] : figures) {
+    if (const double* value = std::get_if<double>(&figure)) {
+      result[name] = std::isfinite(*value) ? Json(*value) : Json(nullptr);
+    } else {
+      std::visit([&, key = name](const auto& other) { result[key] = other; }, figure);
+    }
+  }
+  return result;
+}
+
+Json scalar_to_json(const YAML::Node& node) {
+  if (node.Tag() == "!") return node.as<std::string>();  // quoted
+  std::int64_t integer = 0;
+  if (YAML::convert<std::int64_t>::decode(node, integer)) return integer;
+  double real = 0.0;
+  if (YAML::convert<double>::decode(node, real)) {
+    return std::isfinite(real) ? Json(real) : Json(node.Scalar());
+  }
+  bool truth = false;
+  if (YAML::convert<bool>::decode(node, truth)) return truth;
+  return node.Scalar();
+}
+
+Json to_json(const YAML::Node& node) {
+  if (node.IsMap()) {
+    Json result = Json::object();
+    for (const auto& entry : node)
+      result[entry.first.as<std::string>()] = to_json(entry.second);
+    return result;
+  }
+  if (node.IsSequence()) {
+    Json result = Json::array();
+    for (const auto& entry : node)
+      result.push_back(to_json(entry));
+    return result;
+  }
+  return node.IsScalar() ? scalar_to_json(node) : Json(nullptr);
+}
+
+}  // namespace
+
+std::string to_string(RunStatus status) {
+  switch (status) {
+    case RunStatus::kComplete:
+      return "complete";
+    case RunStatus::kPartial:
+      return "partial";
+    case RunStatus::kUntrusted:
+      break;
+  }
+  return "untrusted";
+}
+
+std::map<std::string, StageSummary> summarise(const StageTimes& times) {
+  std::map<std::string, StageSummary> result;
+  for (const std::string& stage : times.stages()) {
+    std::vector<double> wall;
+    std::vector<double> cpu;
+    for (const StageTimes::Sample& sample : times.samples(stage)) {
+      wall.push_back(static_cast<double>(sample.wall_ms));
+      cpu.push_back(static_cast<double>(sample.cpu_ms));
+    }
+    result[stage] = {distribution_of(std::move(wall)), distribution_of(std::move(cpu)),
+                     times.total_wall_ms(stage) * 1e-3};
+  }
+  return result;
+}
+
+std::string run_json(const RunSummary& summary) {
+  Json json;
+  json["status"] = to_string(summary.status);
+  json["reasons"] = summary.reasons;
+  json["warnings"] = Json::array();
+  for (const Log::Warning& warning : summary.warnings) {
+    json["warnings"].push_back(
+        {{"key", warning.key}, {"message", warning.first_message}, {"count", warning.count}});
+  }
+  json["command"] = summary.command;
+  json["version"] = summary.version;
+  json["scans"] = summary.scans;
+  json["poses"] = summary.poses;
+  json["recording_s"] = number(summary.recording_s);
+  json["wall_s"] = number(summary.wall_s);
+  json["cpu_s"] = number(summary.cpu_s);
+  json["peak_memory_mb"] = number(summary.peak_memory_mb);
+  json["stages"] = Json::object();
+  for (const auto& [name, stage] : summary.stages) {
+    json["stages"][name] = {{"wall_ms", to_json(stage.wall_ms)},
+                            {"cpu_ms", to_json(stage.cpu_ms)},
+                            {"runs", stage.wall_ms.count},
+                            {"total_wall_s", number(stage.total_wall_s)}};
+  }
+  json["counts"] = to_json(summary.counts);
+  json["quality"] = to_json(summary.quality);
+  json["coordinate_system"] = summary.crs_wkt.empty() ? Json(nullptr) : Json(summary.crs_wkt);
+  json["inputs"] = Json::array();
+  for (const InputHash& input : summary.inputs) {
+    json["inputs"].push_back(
+        {{"file", input.file}, {"bytes", input.bytes}, {"sha256", input.sha256}});
+  }
+  json["config"] = to_json(YAML::Load(summary.config_yaml));
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void write_run_json(const std::filesystem::path& path, const RunSummary& summary) {
+  AtomicFile file(path);
+  file.write(run_json(summary));
+  file.commit();
+}
+
+}  // namespace understory

@@ -1,0 +1,152 @@
+#include "understory/output/run_tables.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+
+namespace understory {
+namespace {
+
+// A number with `decimals` decimals, nothing where it is not known; never "-0.000".
+std::string cell(double value, int decimals) {
+  if (!std::isfinite(value)) return "";
+  std::string text = fmt::format("{:.{}f}", value, decimals);
+  if (text.front() == '-' && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
+  return text;
+}
+
+std::string seven_numbers(const Pose& pose) {
+  Eigen::Quaterniond q = pose.rotation();
+  if (q.w() < 0.0) q.coeffs() *= -1.0;
+  const Eigen::Vector3d& t = pose.translation();
+  return fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}", t.x(), t.y(), t.z(), q.x(),
+                     q.y(), q.z(), q.w());
+}
+
+template <typename Matrix>
+void append_upper_triangle(std::string& line, const Matrix& matrix, const char* separator) {
+  for (int i = 0; i < matrix.rows(); ++i) {
+    for (int j = i; j < matrix.cols(); ++j)
+      fmt::format_to(std::back_inserter(line), "{}{:.9e}", separator, matrix(i, j));
+  }
+}
+
+// A text cell of a CSV file, quoted where it has to be.
+std::string quoted(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"') result += '"';
+    result += c == '\n' || c == '\r' ? ' ' : c;
+  }
+  return result + '"';
+}
+
+}  // namespace
+
+TumWriter::TumWriter(const std::filesystem::path& path) : file_(path) {}
+
+void TumWriter::add(const StampedPose& pose) {
+  file_.write(format_seconds(pose.stamp) + " " + seven_numbers(pose.world_from_body) + "\n");
+}
+
+StatesWriter::StatesWriter(const std::filesystem::path& path) : file_(path) {
+  std::string header = "timestamp,vx,vy,vz,gx,gy,gz,ax,ay,az";
+  for (int i = 0; i < 6; ++i) {
+    for (int j = i; j < 6; ++j)
+      header += fmt::format(",c{}{}", i, j);
+  }
+  file_.write(header + "\n");
+}
+
+void StatesWriter::add(const StateRow& row) {
+  std::string line = format_seconds(row.stamp);
+  for (const Eigen::Vector3d* v : {&row.velocity_in_world, &row.gyro_bias, &row.accel_bias}) {
+    for (int i = 0; i < 3; ++i)
+      fmt::format_to(std::back_inserter(line), ",{:.9f}", (*v)[i]);
+  }
+  append_upper_triangle(line, row.pose_covariance, ",");
+  file_.write(line + "\n");
+}
+
+GnssWriter::GnssWriter(const std::filesystem::path& path) : file_(path) {
+  file_.write(
+      "timestamp,x,y,z,latitude_deg,longitude_deg,height_m,c00,c01,c02,c11,c12,c22,hdop,vdop,"
+      "satellites,quality,residual_x,residual_y,residual_z,used,reason\n");
+}
+
+void GnssWriter::add(const GnssRow& row) {
+  std::string line = format_seconds(row.fix.stamp);
+  const auto put = [&](double value, int decimals) { line += "," + cell(value, decimals); };
+  for (int i = 0; i < 3; ++i)
+    put(row.position_in_world[i], 4);
+  put(row.fix.latitude_deg, 9);
+  put(row.fix.longitude_deg, 9);
+  put(row.fix.height_m, 4);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j)
+      put(row.fix.covariance(i, j), 6);
+  }
+  put(row.fix.hdop, 2);
+  put(row.fix.vdop, 2);
+  line += row.fix.satellites < 0 ? "," : fmt::format(",{}", row.fix.satellites);
+  line += fmt::format(",{}", row.fix.quality);
+  for (int i = 0; i < 3; ++i)
+    put(row.residual[i], 4);
+  line += fmt::format(",{},{}\n", row.used ? 1 : 0, quoted(row.reason));
+  file_.write(line);
+}
+
+Matrix6d g2o_information(const Matrix6d& information) {
+  // error = (translation, quaternion vector) = (v, omega / 2), so omega = 2 q and v = t.
+  Matrix6d ours_from_g2o = Matrix6d::Zero();
+  ours_from_g2o.topRightCorner<3, 3>() = 2.0 * Eigen::Matrix3d::Identity();
+  ours_from_g2o.bottomLeftCorner<3, 3>() = Eigen::Matrix3d::Identity();
+  return ours_from_g2o.transpose() * information * ours_from_g2o;
+}
+
+void write_g2o(const std::filesystem::path& path, const std::vector<GraphVertex>& vertices,
+               const std::vector<GraphEdge>& edges) {
+  AtomicTextFile file(path);
+  for (const GraphVertex& vertex : vertices) {
+    file.write(
+        fmt::format("VERTEX_SE3:QUAT {} {}\n", vertex.id, seven_numbers(vertex.world_from_body)));
+    if (vertex.fixed) file.write(fmt::format("FIX {}\n", vertex.id));
+  }
+  for (const GraphEdge& edge : edges) {
+    std::string line =
+        fmt::format("EDGE_SE3:QUAT {} {} {}", edge.from, edge.to, seven_numbers(edge.from_from_to));
+    append_upper_triangle(line, g2o_information(edge.information), " ");
+    file.write(line + "\n");
+  }
+  file.commit();
+}
+
+void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>& trees) {
+  AtomicTextFile file(path);
+  file.write("id,x,y,z,dbh_m,dbh_sd_m,height_m,lean_deg,observations,x_sd_m,y_sd_m\n");
+  for (const Tree& tree : trees) {
+    file.write(fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", tree.id, cell(tree.x, 3),
+                           cell(tree.y, 3), cell(tree.z, 3), cell(tree.dbh_m, 4),
+                           cell(tree.dbh_sd_m, 4), cell(tree.height_m, 2), cell(tree.lean_deg, 2),
+                           tree.observations, cell(tree.x_sd_m, 4), cell(tree.y_sd_m, 4)));
+  }
+  file.commit();
+}
+
+StemsWriter::StemsWriter(const std::filesystem::path& path) : file_(path) {
+  file_.write("frame,timestamp,x,y,z,axis_x,axis_y,axis_z,length_m,dbh_m,score\n");
+}
+
+void StemsWriter::add(const StemRow& row) {
+  std::string line = fmt::format("{},{}", row.frame, format_seconds(row.stamp));
+  for (int i = 0; i < 3; ++i)
+    line += "," + cell(row.point[i], 4);
+  for (int i = 0; i < 3; ++i)
+    line += "," + cell(row.axis[i], 6);
+  line += "," + cell(row.length_m, 3) + "," + cell(row.dbh_m, 4) + "," + cell(row.score, 4) + "\n";
+  file_.write(line);
+}
+
+}  // namespace understory
