@@ -13,8 +13,9 @@ namespace understory {
 enum class OusterProfile {
   kLegacy,
   kRng19,  // RNG19_RFL8_SIG16_NIR16: single return
-  kRng15,  // RNG15_RFL8_NIR8: low data rate
   kDual,   // RNG19_RFL8_SIG16_NIR16_DUAL
+  kRng15,  // RNG15_RFL8_NIR8: low data rate
+  kRng15Dual,
 };
 
 // What an Ouster sensor says of itself, in any layout of its metadata JSON: the flat legacy one
@@ -35,13 +36,13 @@ struct OusterMetadata {
   int last_column = 0;
   std::vector<double> beam_altitude_deg;  // per pixel, from the top beam down
   std::vector<double> beam_azimuth_deg;
-  // x offset of the beams' origin, and the whole transform where the metadata has one.
+  // Where the beams leave: an offset along x, or the whole transform where the metadata has one.
   Eigen::Matrix4d lidar_from_beam = Eigen::Matrix4d::Identity();
-  double beam_origin_m = 0.0;
   Pose sensor_from_lidar;
   Pose sensor_from_imu;
   int lidar_port = 0;  // 0 if not given
   int imu_port = 0;
+  bool legacy_imu = true;  // false: IMU packets of a layout that is not read
 
   // Size of a lidar packet's payload; the IMU's is 48.
   [[nodiscard]] std::size_t lidar_packet_size() const;

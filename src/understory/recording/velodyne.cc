@@ -42,6 +42,21 @@ double positive_cdeg(double azimuth) {
   return wrapped < kTurnCdeg ? wrapped : 0.0;
 }
 
+// The sentence of a position packet if it has place, day and time.
+std::optional<NmeaSentence> position_sentence(const std::uint8_t* data, std::size_t size) {
+  if (size != VelodyneDecoder::kPositionPacketSize) return std::nullopt;
+  const std::string_view text(reinterpret_cast<const char*>(data) + kPositionSentence,
+                              kPositionSentenceSize);
+  auto sentence = parse_nmea(text.substr(0, text.find('\n')));
+  if (!sentence || !sentence->latitude_deg || !sentence->time_of_day || !sentence->day)
+    return std::nullopt;
+  return sentence;
+}
+
+TimeNs utc_of(const NmeaSentence& sentence) {
+  return *sentence.day * 86'400 * kNsPerSecond + *sentence.time_of_day;
+}
+
 }  // namespace
 
 VelodyneDecoder::VelodyneDecoder(const VelodyneConfig& config, std::string source, Log& log)
@@ -248,15 +263,17 @@ void VelodyneDecoder::close_scan() {
     finished_.push_back(std::move(scan));
 }
 
+bool VelodyneDecoder::set_clock(const std::uint8_t* data, std::size_t size) {
+  const auto sentence = position_sentence(data, size);
+  return sentence &&
+         clock_.set_utc(read<std::uint32_t>(data + kPositionCounter), utc_of(*sentence));
+}
+
 std::optional<GnssFix> VelodyneDecoder::add_position_packet(const std::uint8_t* data,
                                                             std::size_t size) {
-  if (size != kPositionPacketSize) return std::nullopt;
-  const std::string_view text(reinterpret_cast<const char*>(data) + kPositionSentence,
-                              kPositionSentenceSize);
-  const auto sentence = parse_nmea(text.substr(0, text.find('\n')));
-  if (!sentence || !sentence->latitude_deg || !sentence->time_of_day || !sentence->day)
-    return std::nullopt;
-  const TimeNs utc = *sentence->day * 86'400 * kNsPerSecond + *sentence->time_of_day;
+  const auto sentence = position_sentence(data, size);
+  if (!sentence) return std::nullopt;
+  const TimeNs utc = utc_of(*sentence);
   clock_.set_utc(read<std::uint32_t>(data + kPositionCounter), utc);
   if (utc == last_fix_) return std::nullopt;
   last_fix_ = utc;

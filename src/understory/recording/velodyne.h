@@ -50,9 +50,12 @@ class VelodyneDecoder {
 
   // `stamp` is when the packet was received. Any bytes of any size are survived.
   void add_packet(const std::uint8_t* data, std::size_t size, TimeNs stamp);
-  // A position packet: joins its time of day with the data packets' clock if the sensor is locked
-  // to it, and gives the fix in its NMEA sentence, if that is a new and valid one.
+  // A position packet: the clock is set by it, and the fix in its NMEA sentence is given if it is a
+  // new and valid one.
   std::optional<GnssFix> add_position_packet(const std::uint8_t* data, std::size_t size);
+  // Joins a position packet's time of day with the data packets' clock; false if the packet has no
+  // valid fix or the sensor is not locked to it.
+  bool set_clock(const std::uint8_t* data, std::size_t size);
 
   // The next finished scan, or null. Call until null after each packet.
   [[nodiscard]] ScanPtr take_scan();

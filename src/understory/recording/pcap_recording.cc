@@ -1,0 +1,341 @@
+#include "understory/recording/pcap_recording.h"
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <map>
+#include <optional>
+
+#include "understory/recording/byte_source.h"
+#include "understory/recording/ouster.h"
+#include "understory/recording/pcap_file.h"
+#include "understory/recording/pcap_survey.h"
+#include "understory/recording/stream_report.h"
+#include "understory/recording/udp.h"
+#include "understory/recording/velodyne.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr int kFramesForPosition = 20'000;
+
+// What both kinds of sensor share: the walk through the file and the reports.
+class PcapRecording : public Recording {
+ public:
+  PcapRecording(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar, Log& log)
+      : log_(log), file_(std::move(file)), survey_(std::move(survey)), lidar_(lidar) {
+    lidar_report_.name = lidar.name();
+    lidar_report_.role = "lidar";
+  }
+
+  std::optional<Event> next() override {
+    while (ready_.empty()) {
+      CapturedFrame frame;
+      if (!file_->next(frame)) {
+        if (finished_) return std::nullopt;
+        finished_ = true;
+        finish();
+        continue;
+      }
+      if (frame.truncated) {
+        log_.warn("recording.snapped", place(frame) + ": the capture cut a frame short");
+      }
+      const auto datagram = udp_.add(frame.link_type, frame.bytes, frame.stamp);
+      if (!datagram) continue;
+      if (survey_.trust_checksums() && datagram->has_checksum && !datagram->checksum_ok) {
+        log_.warn("recording.damaged", place(frame) + ": a packet with a wrong checksum, left out");
+        continue;
+      }
+      take(*datagram);
+    }
+    Event event = std::move(ready_.front());
+    ready_.pop_front();
+    return event;
+  }
+
+  const Rig& rig() const override { return rig_; }
+  std::string format() const override {
+    return std::string(file_->is_pcapng() ? "PCAPNG" : "PCAP") + " (" + sensor() + ")";
+  }
+  double progress() const override { return file_->progress(); }
+  std::vector<TopicReport> topics() const override {
+    std::vector<TopicReport> reports{lidar_report_};
+    if (second_report_.messages > 0) reports.push_back(second_report_);
+    for (const auto& [key, report] : ignored_)
+      reports.push_back(report);
+    return reports;
+  }
+
+ protected:
+  virtual void take(const Datagram& datagram) = 0;
+  virtual void finish() = 0;
+  [[nodiscard]] virtual std::string sensor() const = 0;
+
+  [[nodiscard]] bool from_lidar(const Datagram& datagram) const {
+    return datagram.source == lidar_.source && datagram.port == lidar_.port;
+  }
+  void emit_scan(ScanPtr scan) {
+    count_message(lidar_report_, scan->stamp, scan->points.size());
+    ready_.emplace_back(std::move(scan));
+  }
+  void ignore(const Datagram& datagram) {
+    const UdpStream key{datagram.source, datagram.port};
+    if (survey_.streams.count(key) == 0) return;  // which bounds the number of reports
+    TopicReport& report = ignored_[key];
+    report.name = key.name();
+    report.type = "UDP datagrams";
+    report.role = "ignored";
+    count_message(report, datagram.stamp);
+  }
+
+  Log& log_;
+  std::unique_ptr<PcapFile> file_;
+  PcapSurvey survey_;
+  UdpStream lidar_;
+  Rig rig_;
+  TopicReport lidar_report_;
+  TopicReport second_report_;  // IMU or GNSS
+  std::deque<Event> ready_;
+
+ private:
+  [[nodiscard]] std::string place(const CapturedFrame& frame) const {
+    return file_->name() + ": at byte " + std::to_string(frame.position);
+  }
+
+  UdpAssembler udp_;
+  std::map<UdpStream, TopicReport> ignored_;
+  bool finished_ = false;
+};
+
+class VelodynePcap : public PcapRecording {
+ public:
+  VelodynePcap(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar, Log& log)
+      : PcapRecording(std::move(file), std::move(survey), lidar, log),
+        decoder_(VelodyneConfig{}, file_->name(), log) {
+    lidar_report_.type = "Velodyne packets";
+    second_report_.role = "gnss";
+    second_report_.type = "Velodyne position packets";
+    look_ahead();
+  }
+
+  std::vector<TopicReport> topics() const override {
+    std::vector<TopicReport> reports = PcapRecording::topics();
+    reports.front().conventions = decoder_.conventions();
+    return reports;
+  }
+
+ private:
+  // The model, and the hour out of the first position packet, are wanted before the first scan.
+  void look_ahead() {
+    UdpAssembler udp;
+    CapturedFrame frame;
+    Log unheard;  // what is damaged is told when it is read
+    file_->rewind(unheard);
+    VelodyneDecoder first({}, file_->name(), unheard);
+    bool has_time = false;
+    for (int i = 0; i < kFramesForPosition && file_->next(frame); ++i) {
+      const auto datagram = udp.add(frame.link_type, frame.bytes, frame.stamp);
+      if (!datagram || datagram->source != lidar_.source) continue;
+      if (from_lidar(*datagram) && first.model_name().empty())
+        first.add_packet(datagram->payload.data(), datagram->payload.size(), datagram->stamp);
+      if (!has_time && is_velodyne_position(datagram->payload) && !wrong(*datagram)) {
+        has_time = decoder_.set_clock(datagram->payload.data(), datagram->payload.size());
+      }
+      if (has_time && !first.model_name().empty()) break;
+    }
+    rig_.lidar_model = first.model_name();
+    file_->rewind(log_);
+  }
+
+  [[nodiscard]] bool wrong(const Datagram& datagram) const {
+    return survey_.trust_checksums() && datagram.has_checksum && !datagram.checksum_ok;
+  }
+
+  void take(const Datagram& datagram) override {
+    if (from_lidar(datagram) && datagram.payload.size() == VelodyneDecoder::kDataPacketSize) {
+      decoder_.add_packet(datagram.payload.data(), datagram.payload.size(), datagram.stamp);
+      take_scans();
+    } else if (datagram.source == lidar_.source && is_velodyne_position(datagram.payload)) {
+      const auto fix =
+          decoder_.add_position_packet(datagram.payload.data(), datagram.payload.size());
+      if (!fix) return;
+      second_report_.name = UdpStream{datagram.source, datagram.port}.name();
+      second_report_.conventions = "NMEA in position packets; UTC; no height unless GGA";
+      count_message(second_report_, fix->stamp);
+      ready_.emplace_back(*fix);
+    } else {
+      ignore(datagram);
+    }
+  }
+
+  void finish() override {
+    decoder_.finish();
+    take_scans();
+  }
+
+  void take_scans() {
+    while (ScanPtr scan = decoder_.take_scan())
+      emit_scan(std::move(scan));
+  }
+
+  std::string sensor() const override { return "Velodyne " + rig_.lidar_model; }
+
+  VelodyneDecoder decoder_;
+};
+
+class OusterPcap : public PcapRecording {
+ public:
+  OusterPcap(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar,
+             const OusterMetadata& metadata, Log& log)
+      : PcapRecording(std::move(file), std::move(survey), lidar, log),
+        metadata_(metadata),
+        decoder_(metadata, file_->name(), log) {
+    lidar_report_.type = "Ouster packets";
+    lidar_report_.conventions = decoder_.conventions();
+    second_report_.role = "imu";
+    second_report_.type = "Ouster IMU packets";
+    second_report_.conventions =
+        "g and deg/s converted to m/s² and rad/s; the gyroscope's time stamp; with gravity";
+    find_imu();
+    if (imu_) {
+      rig_ = metadata_.rig();
+    } else {
+      rig_.lidar_model = metadata_.product;
+      rig_.lidar_extrinsic_source = "is the body, there being no IMU";
+    }
+  }
+
+ private:
+  // The stream of 48-byte packets from the same sensor; the one at the stated port if there is it.
+  void find_imu() {
+    for (const auto& [key, stream] : survey_.streams) {
+      const auto count = stream.by_size.find(kOusterImuPacketSize);
+      if (key.source != lidar_.source || count == stream.by_size.end()) continue;
+      if (!imu_ || key.port == metadata_.imu_port) imu_ = key;
+    }
+    if (imu_) second_report_.name = imu_->name();
+    if (imu_ || metadata_.legacy_imu) return;
+    log_.warn("imu.unsupported", file_->name() +
+                                     ": the sensor's IMU packets are of a profile that is not "
+                                     "read; only the lidar is used");
+  }
+
+  void take(const Datagram& datagram) override {
+    const std::uint8_t* data = datagram.payload.data();
+    const std::size_t size = datagram.payload.size();
+    if (from_lidar(datagram) &&
+        (size != kOusterImuPacketSize || !imu_ || imu_->port != lidar_.port)) {
+      decoder_.add_lidar_packet(data, size);
+      take_scans();
+    } else if (imu_ && datagram.source == imu_->source && datagram.port == imu_->port) {
+      const auto sample = decoder_.add_imu_packet(data, size);
+      if (!sample) return;
+      count_message(second_report_, sample->stamp);
+      ready_.emplace_back(*sample);
+    } else {
+      ignore(datagram);
+    }
+  }
+
+  void finish() override {
+    decoder_.finish();
+    take_scans();
+  }
+
+  void take_scans() {
+    while (ScanPtr scan = decoder_.take_scan())
+      emit_scan(std::move(scan));
+  }
+
+  std::string sensor() const override { return "Ouster " + metadata_.product; }
+
+  OusterMetadata metadata_;
+  OusterDecoder decoder_;
+  std::optional<UdpStream> imu_;
+};
+
+// The stream with most packets that `count` counts, or the one that the option names.
+template <typename Count>
+std::optional<UdpStream> choose(const PcapSurvey& survey, const OpenOptions& options,
+                                const std::string& file, Log& log, Count&& count) {
+  std::optional<UdpStream> best;
+  std::uint64_t most = 0;
+  int streams = 0;
+  for (const auto& [key, stream] : survey.streams) {
+    const std::uint64_t packets = count(stream);
+    const bool named = options.lidar_topic.empty() || options.lidar_topic == key.name();
+    streams += packets > 0 ? 1 : 0;
+    if (named && packets > most) {
+      most = packets;
+      best = key;
+    }
+  }
+  if (best && streams > 1 && options.lidar_topic.empty()) {
+    log.warn("recording.lidars", file + ": packets of " + std::to_string(streams) +
+                                     " lidars; only those of " + best->name() +
+                                     " are used (choose with --lidar-topic)");
+  }
+  return best;
+}
+
+std::uint64_t velodyne_packets(const PcapSurvey::Stream& stream) {
+  return stream.velodyne;
+}
+
+std::unique_ptr<Recording> open(std::unique_ptr<ByteSource> source, const OpenOptions& options,
+                                Log& log) {
+  Log unheard;
+  auto file = std::make_unique<PcapFile>(std::move(source), unheard);
+  PcapSurvey survey = survey_pcap(*file);
+  file->rewind(log);
+  const std::string name = file->name();
+  if (options.metadata_file.empty()) {
+    if (const auto lidar = choose(survey, options, name, log, velodyne_packets))
+      return std::make_unique<VelodynePcap>(std::move(file), std::move(survey), *lidar, log);
+  }
+  const std::string metadata_file =
+      options.metadata_file.empty() ? find_ouster_metadata(name) : options.metadata_file;
+  if (metadata_file.empty()) {
+    throw InputError(name, "",
+                     "expected Velodyne packets, or Ouster packets with their metadata (--metadata "
+                     "FILE, or a .json beside it whose name its name begins with); found " +
+                         survey.list());
+  }
+  const OusterMetadata metadata = read_ouster_metadata(metadata_file);
+  const auto lidar = choose(survey, options, name, log, [&](const PcapSurvey::Stream& stream) {
+    const auto count = stream.by_size.find(metadata.lidar_packet_size());
+    return count == stream.by_size.end() ? 0 : count->second;
+  });
+  if (!lidar) {
+    throw InputError(name, "",
+                     "expected Ouster packets of " + std::to_string(metadata.lidar_packet_size()) +
+                         " bytes as " + metadata_file + " has them; found " + survey.list());
+  }
+  return std::make_unique<OusterPcap>(std::move(file), std::move(survey), *lidar, metadata, log);
+}
+
+}  // namespace
+
+bool is_pcap(const std::string& path) {
+  try {
+    const auto source = open_file(path);
+    std::array<std::uint8_t, 4> start{};
+    return source->read(0, start.data(), start.size()) == start.size() &&
+           PcapFile::recognise(start);
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+std::unique_ptr<Recording> open_pcap(const std::string& path, const OpenOptions& options,
+                                     Log& log) {
+  return open(open_file(path), options, log);
+}
+
+std::unique_ptr<Recording> open_pcap(std::unique_ptr<ByteSource> source, const OpenOptions& options,
+                                     Log& log) {
+  return open(std::move(source), options, log);
+}
+
+}  // namespace understory

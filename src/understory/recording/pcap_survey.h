@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "understory/recording/pcap_file.h"
+#include "understory/recording/udp.h"
+
+namespace understory {
+
+// Where datagrams come from and go to.
+struct UdpStream {
+  std::uint32_t source = 0;
+  std::uint16_t port = 0;
+  auto operator<=>(const UdpStream&) const = default;
+  [[nodiscard]] std::string name() const { return "udp " + std::to_string(port); }
+};
+
+// What the first datagrams of a capture are.
+struct PcapSurvey {
+  struct Stream {
+    std::uint64_t datagrams = 0;
+    std::uint64_t velodyne = 0;                    // Velodyne data packets
+    std::uint64_t position = 0;                    // Velodyne position packets
+    std::map<std::size_t, std::uint64_t> by_size;  // at most 16 sizes
+  };
+  std::map<UdpStream, Stream> streams;  // at most 256
+  std::uint64_t good_checksums = 0;
+  std::uint64_t bad_checksums = 0;
+  // Checksums tell of damage only where most are right: a capture made on the sending machine has
+  // none of them filled in.
+  [[nodiscard]] bool trust_checksums() const { return good_checksums > 10 * bad_checksums; }
+  [[nodiscard]] std::string list() const;  // for messages: "udp 7502: 192 x 8448 bytes, ..."
+};
+
+[[nodiscard]] bool is_velodyne_data(ByteSpan payload);
+[[nodiscard]] bool is_velodyne_position(ByteSpan payload);
+
+// Reads the first datagrams (at most 20 000 frames) from where the file stands.
+[[nodiscard]] PcapSurvey survey_pcap(PcapFile& file);
+
+// The path of the only .json file beside a capture whose name the capture's name begins with; empty
+// if there is none. Throws InputError if there are several.
+[[nodiscard]] std::string find_ouster_metadata(const std::string& capture);
+
+}  // namespace understory
