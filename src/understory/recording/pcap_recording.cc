@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "understory/recording/byte_source.h"
+#include "understory/recording/extrinsics.h"
 #include "understory/recording/ouster.h"
 #include "understory/recording/pcap_file.h"
 #include "understory/recording/pcap_survey.h"
@@ -28,6 +29,8 @@ class PcapRecording : public Recording {
     lidar_report_.name = lidar.name();
     lidar_report_.role = "lidar";
   }
+
+  void apply_extrinsics(const std::string& path) { apply_extrinsics_file(path, rig_); }
 
   std::optional<Event> next() override {
     while (ready_.empty()) {
@@ -283,8 +286,8 @@ std::uint64_t velodyne_packets(const PcapSurvey::Stream& stream) {
   return stream.velodyne;
 }
 
-std::unique_ptr<Recording> open(std::unique_ptr<ByteSource> source, const OpenOptions& options,
-                                Log& log) {
+std::unique_ptr<PcapRecording> open(std::unique_ptr<ByteSource> source, const OpenOptions& options,
+                                    Log& log) {
   Log unheard;
   auto file = std::make_unique<PcapFile>(std::move(source), unheard);
   PcapSurvey survey = survey_pcap(*file);
@@ -330,12 +333,14 @@ bool is_pcap(const std::string& path) {
 
 std::unique_ptr<Recording> open_pcap(const std::string& path, const OpenOptions& options,
                                      Log& log) {
-  return open(open_file(path), options, log);
+  return open_pcap(open_file(path), options, log);
 }
 
 std::unique_ptr<Recording> open_pcap(std::unique_ptr<ByteSource> source, const OpenOptions& options,
                                      Log& log) {
-  return open(std::move(source), options, log);
+  auto recording = open(std::move(source), options, log);
+  if (!options.extrinsics_file.empty()) recording->apply_extrinsics(options.extrinsics_file);
+  return recording;
 }
 
 }  // namespace understory
