@@ -185,8 +185,9 @@ void EventOrderer::note_step(Stream stream, TimeNs stamp) {
     log_->warn(std::string("time.gap_") + kNames[stream], std::string(kNames[stream]) +
                                                               ": nothing for " + seconds(step) +
                                                               " before " + seconds(stamp));
-  } else if (step < ns(config_.clock_jump_s)) {
-    clock.period = clock.period == 0 ? step : clock.period + (step - clock.period) / 16;
+  } else if (step <= kStartFactor * ns(config_.clock_jump_s)) {
+    const bool restart = clock.period == 0 || step < clock.period / 2;
+    clock.period = restart ? step : clock.period + (step - clock.period) / 16;
   }
 }
 
