@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# check.sh [BASE]: what a change has to pass beside the tests: layers, format, and clang-tidy on the
+# .cc files that differ from BASE (default: where this branch left main; on main the last commit).
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+cd "$top"
+tools/setup.sh check
+failed=()
+
+default_base() {
+  local base
+  base=$(git merge-base HEAD origin/main 2>/dev/null || git merge-base HEAD main 2>/dev/null || true)
+  if [[ -z $base || $base == $(git rev-parse HEAD) ]]; then
+    base=$(git rev-parse -q --verify HEAD~1 || git hash-object -t tree /dev/null)
+  fi
+  echo "$base"
+}
+
+say "layers"
+python3 tools/check_layers.py || failed+=(layers)
+python3 tools/check_layers_test.py || failed+=("the layers script's own test")
+say "format"
+tools/format.sh --check || failed+=(format)
+say "clang-tidy on changed files"
+tools/tidy.sh "${1:-$(default_base)}" || failed+=(clang-tidy)
+
+if ((${#failed[@]})); then
+  printf -v list '%s, ' "${failed[@]}"
+  fail "not in order: ${list%, }"
+fi
+say "checks passed"

@@ -1,0 +1,66 @@
+#!/usr/bin/env python3
+"""Fails on any #include in src/understory that does not lead to a layer above its own.
+
+The order of the layers is the list in the top CMakeLists.txt. A file may include its own layer and
+those before it; nothing else inside the project, and nothing by a relative path.
+
+    check_layers.py [SOURCE_TREE]     exit 0: in order; 1: prints each wrong arrow; 2: no such tree
+"""
+
+import pathlib
+import re
+import sys
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
+LAYERS = re.compile(r"foreach\(layer IN ITEMS\s+([a-z_\s]+)\)")
+
+
+def layer_order(tree):
+    found = LAYERS.search((tree / "CMakeLists.txt").read_text(encoding="utf-8"))
+    if not found:
+        raise ValueError(f"{tree / 'CMakeLists.txt'}: no list 'foreach(layer IN ITEMS ...)'")
+    return found.group(1).split()
+
+
+def wrong_arrow(layer, included, order):
+    """Why a file of `layer` may not include `included`, or None."""
+    parts = included.split("/")
+    if parts[0] != "understory" or len(parts) < 3:
+        return 'own headers are included as "understory/<layer>/<file>.h"'
+    if parts[1] not in order:
+        return f"{parts[1]} is not a layer"
+    if order.index(parts[1]) > order.index(layer):
+        return f"{layer} stands above {parts[1]} and may not use it"
+    return None
+
+
+def check(tree):
+    """Yields one line for each wrong include of a source tree."""
+    order = layer_order(tree)
+    root = tree / "src" / "understory"
+    for path in sorted(p for p in root.rglob("*") if p.suffix in (".cc", ".h")):
+        layer = path.relative_to(root).parts[0]
+        name = path.relative_to(tree)
+        if layer not in order:
+            yield f"{name}:1: {layer} is not a layer of the top CMakeLists.txt"
+            continue
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            found = INCLUDE.match(line)
+            reason = wrong_arrow(layer, found.group(1), order) if found else None
+            if reason:
+                yield f'{name}:{number}: includes "{found.group(1)}": {reason}'
+
+
+def main():
+    here = pathlib.Path(__file__).resolve().parent.parent
+    tree = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else here
+    if not (tree / "CMakeLists.txt").is_file():
+        print(f"check_layers.py: {tree} has no CMakeLists.txt", file=sys.stderr)
+        return 2
+    wrong = list(check(tree))
+    print("\n".join(wrong) if wrong else "layers: every include leads upwards")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

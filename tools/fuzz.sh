@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# fuzz.sh [SECONDS] [TARGET...]: builds the fuzz targets and runs each for SECONDS (default 600). The
+# corpus that grows stays in the cache; a find is kept in build-fuzz/finds and makes this fail.
+# An input may take 10 s and 2 GB at most.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+cd "$top"
+seconds=${1:-600}
+if (($#)); then shift; fi
+[[ $seconds =~ ^[0-9]+$ ]] || fail "fuzz.sh: SECONDS is a number, not '$seconds'"
+if [[ ! -e fuzz/CMakeLists.txt ]]; then
+  say "no fuzz targets"
+  exit
+fi
+tools/setup.sh check
+build_preset fuzz
+failed=()
+mkdir -p build-fuzz/finds
+for program in build-fuzz/fuzz/fuzz_*; do
+  [[ -x $program && ! -d $program ]] || continue
+  name=${program##*/}
+  if (($#)) && [[ " $* " != *" ${name#fuzz_} "* && " $* " != *" $name "* ]]; then continue; fi
+  corpus=$cache/fuzz/$name
+  mkdir -p "$corpus"
+  seeds=(); if [[ -d fuzz/corpus/${name#fuzz_} ]]; then seeds=("fuzz/corpus/${name#fuzz_}"); fi
+  say "$name for $seconds s"
+  if "$program" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
+    -artifact_prefix="build-fuzz/finds/$name-" "$corpus" "${seeds[@]}" >"build-fuzz/$name.log" 2>&1; then
+    grep -E 'stat::number_of_executed_units|stat::peak_rss_mb' "build-fuzz/$name.log"
+  else
+    tail -n 30 "build-fuzz/$name.log"
+    failed+=("$name")
+  fi
+done
+if ((${#failed[@]})); then fail "found something: ${failed[*]} (inputs in build-fuzz/finds)"; fi

@@ -1,0 +1,39 @@
+# What ./run and the scripts in tools/ share. Sourced, not run.
+top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cache=${UNDERSTORY_CACHE:-${HOME:-/root}/.cache/understory}
+
+say() { printf '== %s\n' "$*"; }
+
+fail() {
+  printf 'run: %s\n' "$*" >&2
+  exit 1
+}
+
+# As many jobs as cores, but no more than memory bears (about 1.5 GB for the largest file).
+jobs_that_fit() {
+  local cores memory_kb by_memory
+  cores=$(nproc)
+  memory_kb=$(awk '/^MemAvailable/ {print $2}' /proc/meminfo)
+  by_memory=$((memory_kb / 1500000))
+  ((by_memory < 1)) && by_memory=1
+  echo $((cores < by_memory ? cores : by_memory))
+}
+
+# build_preset PRESET [TARGET...]
+build_preset() {
+  local preset=$1 folder target_arguments=() log
+  shift
+  folder=$(preset_folder "$preset")
+  mkdir -p "$folder"
+  log=$folder/configure.log
+  if ! cmake --preset "$preset" -S "$top" ${UNDERSTORY_CMAKE_ARGUMENTS:-} >"$log" 2>&1; then
+    tail -n 40 "$log" >&2
+    fail "configuring preset $preset failed; the whole log is $log"
+  fi
+  if (($#)); then target_arguments=(--target "$@"); fi
+  cmake --build "$folder" --parallel "$(jobs_that_fit)" "${target_arguments[@]}"
+}
+
+preset_folder() {
+  if [[ $1 == release ]]; then echo "$top/build"; else echo "$top/build-$1"; fi
+}
