@@ -56,6 +56,27 @@ function(understory_test target)
                        PROPERTIES TIMEOUT ${arg_TIMEOUT})
 endfunction()
 
+# understory_python_test(<name> SCRIPT <file> [NEEDS <module>...] [ARGUMENTS ...] [TIMEOUT <seconds>])
+# A Python script, run in the environment of tools/python-env.sh; exit status 0 is a pass. It skips
+# when a module of NEEDS cannot be imported. The script finds the program in UNDERSTORY_PROGRAM and
+# the example data in UNDERSTORY_DATA, and may itself skip with exit status 77.
+function(understory_python_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "SCRIPT;TIMEOUT" "NEEDS;ARGUMENTS")
+  if(NOT UNDERSTORY_TESTS)
+    return()
+  endif()
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 300)
+  endif()
+  list(JOIN arg_NEEDS "," needs)
+  add_test(NAME python.${name}
+           COMMAND "${PROJECT_SOURCE_DIR}/tools/python-test.sh" "${needs}"
+                   "${CMAKE_CURRENT_SOURCE_DIR}/${arg_SCRIPT}" ${arg_ARGUMENTS})
+  set_tests_properties(python.${name} PROPERTIES
+    SKIP_RETURN_CODE 77 TIMEOUT ${arg_TIMEOUT}
+    ENVIRONMENT "UNDERSTORY_PROGRAM=${PROJECT_BINARY_DIR}/understory;UNDERSTORY_BUILD=${PROJECT_BINARY_DIR}")
+endfunction()
+
 # understory_program(<target> SOURCES ... [LAYERS ...] [LIBRARIES ...])
 # The command-line tool: lies at the root of the build folder and is installed.
 function(understory_program target)

@@ -1,24 +1,44 @@
 #!/usr/bin/env bash
-# tidy.sh BASE: clang-tidy on the .cc files that differ from the commit BASE; "all" takes every file.
+# tidy.sh BASE|all: clang-tidy on the .cc files that differ from the commit BASE, or on every one.
+# A file that passed before is passed over: the cache holds the hash of each that did, taken over
+# its preprocessed text and the configuration.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$top"
-base=$1
-if [[ $base == all ]]; then
+
+tidy_file() { # one .cc file
+  local file=$1 command hash
+  command=$(python3 - "$file" <<'EOF'
+import json, os, shlex, sys
+for entry in json.load(open("build-tidy/compile_commands.json")):
+    if os.path.relpath(entry["file"]) == sys.argv[1]:
+        words = shlex.split(entry["command"])
+        words = words[1:] if os.path.basename(words[0]) == "ccache" else words
+        keep = [w for i, w in enumerate(words) if w not in ("-c", "-o") and words[i - 1] != "-o"]
+        print("cd " + shlex.quote(entry["directory"]) + " && " + shlex.join(keep + ["-E", "-P"]))
+        break
+EOF
+  )
+  if [[ -z $command ]]; then return; fi # not part of this build
+  hash=$( (cat .clang-tidy; bash -c "$command") | sha256sum | cut -c1-32)
+  if [[ -e $cache/tidy/$hash ]]; then return; fi
+  clang-tidy -p build-tidy --quiet --warnings-as-errors='*' "$file" 2>/dev/null || return 1
+  touch "$cache/tidy/$hash"
+}
+
+if [[ ${1:-} == --file ]]; then
+  tidy_file "$2"
+  exit
+fi
+if [[ ${1:-} == all ]]; then
   mapfile -t files < <(git ls-files -- 'src/*.cc')
 else
-  mapfile -t files < <(git diff --name-only --diff-filter=d "$base" -- 'src/*.cc')
+  mapfile -t files < <(git diff --name-only --diff-filter=d "${1:?which commit to compare with}" -- 'src/*.cc')
 fi
 if ((${#files[@]} == 0)); then
   say "no changed files"
   exit
 fi
-# Only files that the build knows have compile commands.
-mkdir -p build-tidy
+mkdir -p build-tidy "$cache/tidy"
 cmake --preset tidy >build-tidy/configure.log 2>&1 || { tail -n 20 build-tidy/configure.log >&2; exit 1; }
-mapfile -t known < <(python3 -c 'import json, os, sys
-for entry in json.load(open("build-tidy/compile_commands.json")):
-    print(os.path.relpath(entry["file"]))')
-mapfile -t files < <(comm -12 <(printf '%s\n' "${files[@]}" | sort -u) <(printf '%s\n' "${known[@]}" | sort -u))
-printf '%s\0' "${files[@]}" |
-  xargs -0 -r -n 2 -P "$(nproc)" clang-tidy -p build-tidy --quiet --warnings-as-errors='*' 2>/dev/null
+printf '%s\0' "${files[@]}" | xargs -0 -r -n 1 -P "$(nproc)" "$0" --file

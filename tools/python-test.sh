@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# python-test.sh MODULE,MODULE... SCRIPT ARGUMENTS...: runs a test script in the environment of
+# tools/python-env.sh, or exits 77 (ctest's "skipped") when a module that it needs is missing there.
+# UNDERSTORY_PYTHON names another interpreter.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+modules=$1
+shift
+python=${UNDERSTORY_PYTHON:-$("$top/tools/python-env.sh" --where)}
+if [[ ! -x $python ]]; then python=$(command -v python3) || { echo "no python3"; exit 77; }; fi
+for module in ${modules//,/ }; do
+  if ! "$python" -c "import $module" 2>/dev/null; then
+    echo "skipped: the Python package $module is not installed (tools/python-env.sh)"
+    exit 77
+  fi
+done
+export UNDERSTORY_DATA=${UNDERSTORY_DATA:-$top/../shared/data} PYTHONDONTWRITEBYTECODE=1
+exec "$python" "$@"
