@@ -1,3 +1,7 @@
+if(UNDERSTORY_TESTS)
+  add_custom_target(layer_tests COMMENT "the test programs of the layers")
+endif()
+
 # understory_layer(<name> SOURCES ... [TESTS ...] [DEPENDS ...] [LIBRARIES ...] [PRIVATE_LIBRARIES ...])
 # One folder under src/understory is one static library understory_<name> (alias understory::<name>).
 #   SOURCES            explicit .cc files; without any the layer is headers only
@@ -28,16 +32,17 @@ function(understory_layer name)
 
   if(arg_TESTS AND UNDERSTORY_TESTS)
     understory_test(test_${name} SOURCES ${arg_TESTS} LAYERS ${name}
-                    LIBRARIES ${arg_TEST_LIBRARIES} ${arg_PRIVATE_LIBRARIES})
+                    LIBRARIES ${arg_TEST_LIBRARIES} ${arg_PRIVATE_LIBRARIES} LABELS layer)
+    add_dependencies(layer_tests test_${name})
   endif()
 endfunction()
 
-# understory_test(<target> SOURCES ... [LAYERS ...] [LIBRARIES ...] [TIMEOUT <seconds>])
+# understory_test(<target> SOURCES ... [LAYERS ...] [LIBRARIES ...] [LABELS ...] [TIMEOUT <seconds>])
 # A GoogleTest program whose cases ctest finds one by one. Tests that need the example data look in
 # the environment variable UNDERSTORY_DATA, else in ../shared/data beside the source tree, and skip
 # when it is absent.
 function(understory_test target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LAYERS;LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LAYERS;LIBRARIES;LABELS")
   if(NOT UNDERSTORY_TESTS)
     return()
   endif()
@@ -53,7 +58,7 @@ function(understory_test target)
                              UNDERSTORY_PROGRAM="${PROJECT_BINARY_DIR}/understory")
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
   gtest_discover_tests(${target} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
-                       PROPERTIES TIMEOUT ${arg_TIMEOUT})
+                       PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
 endfunction()
 
 # understory_python_test(<name> SCRIPT <file> [NEEDS <module>...] [ARGUMENTS ...] [TIMEOUT <seconds>])
