@@ -23,6 +23,19 @@ class CounterNoise {
     const float v = uniform();
     return std::sqrt(-2.0F * std::log(u)) * std::cos(2.0F * std::numbers::pi_v<float> * v);
   }
+  // Two independent normal numbers for the price of one.
+  struct Pair {
+    float first;
+    float second;
+  };
+  Pair normal_pair() {
+    const std::uint64_t bits = next();
+    const float u = 1.0F - static_cast<float>(bits >> 40) * 0x1.0p-24F;
+    const float v = static_cast<float>(bits & 0xffffffU) * 0x1.0p-24F;
+    const float radius = std::sqrt(-2.0F * std::log(u));
+    const float angle = 2.0F * std::numbers::pi_v<float> * v;
+    return {radius * std::cos(angle), radius * std::sin(angle)};
+  }
 
  private:
   std::uint64_t next() {

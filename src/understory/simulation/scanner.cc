@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
+#include <tuple>
 
 #include "understory/util/parallel.h"
 
@@ -11,6 +13,16 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::int64_t kBlockFirings = 16;
+
+// A rotation about the sensor's axis.
+struct Turn {
+  explicit Turn(double angle) : cosine(std::cos(angle)), sine(std::sin(angle)) {}
+  Eigen::Vector3d operator*(const Eigen::Vector3d& v) const {
+    return {cosine * v.x() - sine * v.y(), sine * v.x() + cosine * v.y(), v.z()};
+  }
+  double cosine;
+  double sine;
+};
 
 }  // namespace
 
@@ -50,7 +62,22 @@ Scanner::Scanner(const SiteConfig& config, const ForestScene& scene, const Carri
       start_(start),
       seed_(hash_numbers(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kLidar))),
       model_(make_lidar_model(config.lidar)),
-      body_from_lidar_(mount_pose(config.lidar.mount_m, config.lidar.mount_rpy_deg)) {}
+      body_from_lidar_(mount_pose(config.lidar.mount_m, config.lidar.mount_rpy_deg)),
+      neighbours_(model_.beams.size()) {
+  for (const Beam& beam : model_.beams) {
+    const Turn turn(beam.azimuth_offset_rad);
+    beam_directions_.emplace_back(
+        turn * Eigen::Vector3d(std::cos(beam.elevation_rad), 0.0, std::sin(beam.elevation_rad)));
+    beam_sides_.emplace_back(turn * Eigen::Vector3d::UnitY());
+  }
+  std::iota(neighbours_.begin(), neighbours_.end(), std::size_t{0});
+  std::sort(neighbours_.begin(), neighbours_.end(), [&](std::size_t a, std::size_t b) {
+    const Beam& beam_a = model_.beams[a];
+    const Beam& beam_b = model_.beams[b];
+    return std::tie(beam_a.azimuth_offset_rad, beam_a.elevation_rad) <
+           std::tie(beam_b.azimuth_offset_rad, beam_b.elevation_rad);
+  });
+}
 
 TimeNs Scanner::stamp(std::int64_t scan) const {
   return start_ + model_.firing_time(model_.firings(scan).first);
@@ -106,15 +133,44 @@ SimulatedScan Scanner::cast(std::int64_t number) const {
 void Scanner::cast_block(std::int64_t scan, std::int64_t first, std::int64_t end,
                          Block& block) const {
   make_rays(scan, first, end, block);
-  block.hits.resize(block.rays.size());
-  scene_.cast(block.rays.data(), block.rays.size(), static_cast<float>(config_.min_range_m),
-              static_cast<float>(config_.max_range_m), block.hits.data());
+  trace(static_cast<std::size_t>(end - first), block);
   if (!machine_.empty()) meet_machine(first, block);
   const std::size_t beams = model_.beams.size();
   for (std::size_t i = 0; i < block.t_ns.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;
     read_beam(CounterNoise(seed_, firing, i % beams), i, block);
   }
+}
+
+// Traces the rays in tiles of neighbours, which the scene casts together: beams of nearly the same
+// azimuth and elevation, of a few firings after each other.
+void Scanner::trace(std::size_t firings, Block& block) const {
+  const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
+  const std::size_t beams = model_.beams.size();
+  const std::size_t tile_firings = rays_per_beam == 1 ? 4 : (rays_per_beam < 8 ? 2 : 1);
+  const std::size_t tile_beams = rays_per_beam < 4 ? 4 : (rays_per_beam < 16 ? 2 : 1);
+  std::vector<std::size_t> order;
+  order.reserve(block.rays.size());
+  for (std::size_t f = 0; f < firings; f += tile_firings) {
+    for (std::size_t b = 0; b < beams; b += tile_beams) {
+      for (std::size_t i = f; i < std::min(f + tile_firings, firings); ++i) {
+        for (std::size_t j = b; j < std::min(b + tile_beams, beams); ++j) {
+          const std::size_t beam = i * beams + neighbours_[j];
+          for (std::size_t k = 0; k < rays_per_beam; ++k)
+            order.push_back(beam * rays_per_beam + k);
+        }
+      }
+    }
+  }
+  std::vector<Ray> rays(order.size());
+  std::vector<Hit> hits(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+    rays[i] = block.rays[order[i]];
+  scene_.cast(rays.data(), rays.size(), static_cast<float>(config_.min_range_m),
+              static_cast<float>(config_.max_range_m), hits.data());
+  block.hits.resize(block.rays.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+    block.hits[order[i]] = hits[i];
 }
 
 void Scanner::make_rays(std::int64_t scan, std::int64_t first, std::int64_t end,
@@ -132,36 +188,34 @@ void Scanner::make_rays(std::int64_t scan, std::int64_t first, std::int64_t end,
     const TimeNs firing_time = model_.firing_time(firing);
     CounterNoise jitter(seed_ + 1, static_cast<std::uint64_t>(firing), 0);
     const double shake = config_.azimuth_jitter_deg * kDegree * jitter.normal();
-    Pose world_from_lidar;
+    const Turn turn_by_jitter(shake);
+    Eigen::Matrix3d rotation;
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
     Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+    Turn head(0.0);
     for (std::size_t b = 0; b < beams; ++b) {
-      const Beam& beam = model_.beams[b];
-      const TimeNs time = firing_time + static_cast<TimeNs>(beam.delay_ns);
-      const double head = model_.azimuth(static_cast<double>(time));
+      const TimeNs time = firing_time + static_cast<TimeNs>(model_.beams[b].delay_ns);
       if (b == 0 || !model_.beams_at_once) {
-        world_from_lidar = path_.pose(to_seconds(time)) * body_from_lidar_;
-        origin = model_.beam_origin_m * Eigen::Vector3d(std::cos(head), std::sin(head), 0.0);
+        const Pose world_from_lidar = path_.pose(to_seconds(time)) * body_from_lidar_;
+        rotation = world_from_lidar.rotation_matrix();
+        place = world_from_lidar.translation();
+        head = Turn(model_.azimuth(static_cast<double>(time)));
+        origin = model_.beam_origin_m * Eigen::Vector3d(head.cosine, head.sine, 0.0);
       }
       if (b == 0) block.origin_in_lidar.push_back(origin.cast<float>());
-      const double reported = head + beam.azimuth_offset_rad;
-      const double flat = std::cos(beam.elevation_rad);
-      const double up = std::sin(beam.elevation_rad);
-      const auto towards = [&](double azimuth) {
-        return Eigen::Vector3d(flat * std::cos(azimuth), flat * std::sin(azimuth), up);
-      };
-      block.direction_in_lidar.push_back(towards(reported).cast<float>());
+      const Eigen::Vector3d reported = head * beam_directions_[b];
+      block.direction_in_lidar.push_back(reported.cast<float>());
       block.t_ns.push_back(static_cast<std::uint32_t>(time - scan_time));
-      const Eigen::Vector3d centre = towards(reported + shake);
-      const Eigen::Vector3d side(-std::sin(reported), std::cos(reported), 0.0);
+      const Eigen::Vector3d centre = turn_by_jitter * reported;
+      const Eigen::Vector3d side = head * beam_sides_[b];
       const Eigen::Vector3d rise = centre.cross(side);
       CounterNoise footprint(seed_ + 2, static_cast<std::uint64_t>(firing), b);
       for (std::size_t k = 0; k < rays_per_beam; ++k) {
-        const double u = footprint.normal();
-        const double v = footprint.normal();
-        const Eigen::Vector3d offset = u * side + v * rise;
+        const CounterNoise::Pair uv = footprint.normal_pair();
+        const Eigen::Vector3d offset = uv.first * side + uv.second * rise;
         const Eigen::Vector3d direction = (centre + spread * offset).normalized();
-        block.rays.push_back({(world_from_lidar * (origin + exit * offset)).cast<float>(),
-                              (world_from_lidar.rotation() * direction).cast<float>()});
+        block.rays.push_back({(place + rotation * (origin + exit * offset)).cast<float>(),
+                              (rotation * direction).cast<float>()});
       }
     }
   }
@@ -253,7 +307,8 @@ void Scanner::read_beam(CounterNoise noise, std::size_t beam_number, Block& bloc
   if (echo.surface == Surface::kStem || echo.surface == Surface::kDeadWood) {
     sd = std::hypot(sd, static_cast<float>(config_.bark_sd_m));
   }
-  float range = echo.range_m + sd * noise.normal();
+  const CounterNoise::Pair shiver = noise.normal_pair();
+  float range = echo.range_m + sd * shiver.first;
   if (config_.range_step_m > 0.0) {
     const auto step = static_cast<float>(config_.range_step_m);
     range = std::round(range / step) * step;
@@ -264,7 +319,7 @@ void Scanner::read_beam(CounterNoise noise, std::size_t beam_number, Block& bloc
   const Beam& beam = model_.beams[beam_number % beams];
   const Eigen::Vector3f point =
       block.origin_in_lidar[beam_number / beams] + range * block.direction_in_lidar[beam_number];
-  const float brightness = 255.0F * echo.energy * (1.0F + 0.06F * noise.normal());
+  const float brightness = 255.0F * echo.energy * (1.0F + 0.06F * shiver.second);
   block.points.push_back({point.x(), point.y(), point.z(), std::clamp(brightness, 0.0F, 255.0F),
                           block.t_ns[beam_number], beam.ring, 0, 0});
   if (echo.tree > 0) {

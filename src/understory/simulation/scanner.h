@@ -47,6 +47,7 @@ class Scanner {
   struct Echo;
   void cast_block(std::int64_t scan, std::int64_t first, std::int64_t end, Block& block) const;
   void make_rays(std::int64_t scan, std::int64_t first, std::int64_t end, Block& block) const;
+  void trace(std::size_t firings, Block& block) const;
   void meet_machine(std::int64_t first, Block& block) const;
   void read_beam(CounterNoise noise, std::size_t beam, Block& block) const;
   [[nodiscard]] Echo strongest(const Hit* hits) const;
@@ -59,6 +60,10 @@ class Scanner {
   std::uint64_t seed_;
   LidarModel model_;
   Pose body_from_lidar_;
+  std::vector<Eigen::Vector3d> beam_directions_;  // at azimuth 0 of the head
+  std::vector<Eigen::Vector3d> beam_sides_;       // level, to the left of each beam
+  std::vector<std::size_t>
+      neighbours_;  // beams, those that look in nearly the same direction together
 };
 
 // The pose of a sensor from its place and its roll, pitch, yaw in degrees.

@@ -98,7 +98,8 @@ unsigned attach(RTCScene scene, RTCGeometry geometry) {
 struct CrownShape {
   Species species;
   CrownSize size;
-  RTCScene scene;
+  RTCScene living;
+  RTCScene dead;  // branches below the crown: a slim thing, looked into far less often
 };
 
 CrownSize size_class(Species species, double height_m) {
@@ -135,7 +136,7 @@ class ForestScene::Impl {
     grow_shapes(config, seed);
     add_crowns(stand);
     add_plants(stand);
-    rtcSetSceneFlags(top_, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneFlags(top_, RTC_SCENE_FLAG_NONE);
     rtcCommitScene(top_);
     UNDERSTORY_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
   }
@@ -171,6 +172,8 @@ class ForestScene::Impl {
       packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
       packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
+    // First what stands in the way most surely: leaves behind it need not be looked for.
+    embree_intersect16(valid, static_, &packet);
     embree_intersect16(valid, top_, &packet);
     for (std::size_t i = 0; i < count; ++i)
       hits[i] = read_hit(packet, i, rays[i]);
@@ -188,6 +191,7 @@ class ForestScene::Impl {
     ray.tfar = 60.0F;
     ray.mask = 0xffffffffU;
     embree_occluded1(top_, &ray);
+    if (ray.tfar >= 0.0F) embree_occluded1(static_, &ray);
     return ray.tfar < 0.0F;
   }
 
@@ -203,7 +207,10 @@ class ForestScene::Impl {
   [[nodiscard]] Hit read_hit(const RTCRayHit16& packet, std::size_t i, const Ray& ray) const {
     Hit hit;
     if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return hit;
-    const Instance& instance = instances_[packet.hit.instID[0][i]];
+    const unsigned number = packet.hit.instID[0][i];
+    const bool is_static = number == RTC_INVALID_GEOMETRY_ID;
+    const Instance instance =
+        is_static ? Instance{Surface::kGround, 1.0F, 0.0F, 0.3F} : instances_[number];
     const Eigen::Vector3f normal(packet.hit.Ng_x[i], packet.hit.Ng_y[i], packet.hit.Ng_z[i]);
     const Eigen::Vector3f turned(instance.cos_yaw * normal.x() - instance.sin_yaw * normal.y(),
                                  instance.sin_yaw * normal.x() + instance.cos_yaw * normal.y(),
@@ -214,7 +221,7 @@ class ForestScene::Impl {
         length > 0.0F ? std::min(1.0F, std::abs(turned.dot(ray.direction)) / length) : 0.5F;
     hit.surface = instance.surface;
     hit.reflectivity = instance.reflectivity;
-    if (instance.surface == Surface::kGround) read_static(packet, i, hit);
+    if (is_static) read_static(packet, i, hit);
     return hit;
   }
 
@@ -235,8 +242,8 @@ class ForestScene::Impl {
   }
 
   void add_static(const Terrain& terrain, const Stand& stand) {
-    RTCScene scene = new_scene();
-    UNDERSTORY_CHECK(attach(scene, terrain_geometry(device_, terrain)) == kGroundGeometry);
+    static_ = new_scene();
+    UNDERSTORY_CHECK(attach(static_, terrain_geometry(device_, terrain)) == kGroundGeometry);
     Cones stems;
     bark_.assign(stand.trees.size() + 1, 0.3F);
     for (const Tree& tree : stand.trees)
@@ -246,7 +253,7 @@ class ForestScene::Impl {
     stems.join();
     cone_tree_.push_back(0);
     stems.add({0.0, 0.0, -1000.5}, 0.01);
-    UNDERSTORY_CHECK(attach(scene, cone_geometry(device_, stems)) == kStemGeometry);
+    UNDERSTORY_CHECK(attach(static_, cone_geometry(device_, stems)) == kStemGeometry);
     Cones wood;
     for (const Wood& piece : stand.dead_wood) {
       wood.add(piece.from, piece.radius_from_m);
@@ -254,11 +261,9 @@ class ForestScene::Impl {
       wood.add(piece.to, piece.radius_to_m);
     }
     if (!wood.first.empty()) {
-      UNDERSTORY_CHECK(attach(scene, cone_geometry(device_, wood)) == kWoodGeometry);
+      UNDERSTORY_CHECK(attach(static_, cone_geometry(device_, wood)) == kWoodGeometry);
     }
-    rtcCommitScene(scene);
-    add_instance(scene, Eigen::Matrix<float, 3, 4>(Eigen::Matrix<float, 3, 4>::Identity()),
-                 {Surface::kGround, 1.0F, 0.0F, 0.3F});
+    rtcCommitScene(static_);
   }
 
   void add_stem(const Tree& tree, Cones& stems) {
@@ -290,7 +295,9 @@ class ForestScene::Impl {
           CrownSize size = size_class(species, height);
           size.foliage = config.foliage;
           size.dead_branches = config.dead_branches;
-          crowns_.push_back({species, size, shape_scene(grow_crown(species, size, random))});
+          const RTCScene living = shape_scene(grow_crown(species, size, random));
+          const RTCScene dead = shape_scene(grow_dead_branches(species, size, random));
+          crowns_.push_back({species, size, living, dead});
         }
       }
     }
@@ -334,7 +341,8 @@ class ForestScene::Impl {
         high * static_cast<float>(tree.lean.y()), high;
     world_from_shape.col(3) = tree.foot.cast<float>();
     const float leaf = tree.species == Species::kBirch ? 0.5F : 0.42F;
-    add_instance(crown.scene, world_from_shape, {Surface::kFoliage, cos_yaw, sin_yaw, leaf});
+    add_instance(crown.living, world_from_shape, {Surface::kFoliage, cos_yaw, sin_yaw, leaf});
+    add_instance(crown.dead, world_from_shape, {Surface::kFoliage, cos_yaw, sin_yaw, 0.3F});
   }
 
   void add_plants(const Stand& stand) {
@@ -356,7 +364,7 @@ class ForestScene::Impl {
 
   RTCScene new_scene() {
     RTCScene scene = rtcNewScene(device_);
-    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_NONE);
     scenes_.push_back(scene);
     return scene;
   }
@@ -379,7 +387,8 @@ class ForestScene::Impl {
   }
 
   RTCDevice device_ = nullptr;
-  RTCScene top_ = nullptr;
+  RTCScene static_ = nullptr;  // ground, stems, dead wood
+  RTCScene top_ = nullptr;     // instances of crowns and plants
   std::vector<RTCScene> scenes_;
   std::vector<CrownShape> crowns_;
   std::vector<RTCScene> plants_;  // three of each kind

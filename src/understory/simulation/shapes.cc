@@ -107,7 +107,32 @@ void add_living_branch(Shape& shape, const Habit& habit, const Vector& root, dou
   }
 }
 
-void add_dead_branches(Shape& shape, Species species, const CrownSize& size, Random& random) {
+}  // namespace
+
+Shape grow_crown(Species species, const CrownSize& size, Random& random) {
+  const Habit habit = habit_of(species);
+  Shape shape;
+  const double length = size.height_m - size.crown_base_m;
+  for (double z = 0.0; z < length; z += habit.whorl_m * random.uniform(0.75, 1.25)) {
+    const double u = z / length;
+    const double turn = random.uniform(0.0, kTau);
+    for (int k = 0; k < habit.branches; ++k) {
+      if (random.chance(0.12)) continue;
+      const double azimuth = turn + kTau * k / habit.branches + 0.25 * random.normal();
+      const double slope =
+          habit.angle_base + (habit.angle_top - habit.angle_base) * u + 0.12 * random.normal();
+      const double radius =
+          size.crown_radius_m * crown_profile(species, u) * random.uniform(0.65, 1.1);
+      const double reach = std::max(0.12, radius / std::max(0.5, std::cos(slope)));
+      add_living_branch(shape, habit, Vector(0.0, 0.0, size.crown_base_m + z), azimuth, slope,
+                        std::min(reach, 0.8 * (length - z) + 0.3), size.foliage, random);
+    }
+  }
+  return shape;
+}
+
+Shape grow_dead_branches(Species species, const CrownSize& size, Random& random) {
+  Shape shape;
   const double lowest = species == Species::kSpruce ? 0.4 : 1.6;
   const double per_m = (species == Species::kBirch ? 1.0 : 4.5) * size.dead_branches;
   const double span = std::max(0.0, size.crown_base_m - lowest);
@@ -130,30 +155,6 @@ void add_dead_branches(Shape& shape, Species species, const CrownSize& size, Ran
                  0.003);
     }
   }
-}
-
-}  // namespace
-
-Shape grow_crown(Species species, const CrownSize& size, Random& random) {
-  const Habit habit = habit_of(species);
-  Shape shape;
-  const double length = size.height_m - size.crown_base_m;
-  for (double z = 0.0; z < length; z += habit.whorl_m * random.uniform(0.75, 1.25)) {
-    const double u = z / length;
-    const double turn = random.uniform(0.0, kTau);
-    for (int k = 0; k < habit.branches; ++k) {
-      if (random.chance(0.12)) continue;
-      const double azimuth = turn + kTau * k / habit.branches + 0.25 * random.normal();
-      const double slope =
-          habit.angle_base + (habit.angle_top - habit.angle_base) * u + 0.12 * random.normal();
-      const double radius =
-          size.crown_radius_m * crown_profile(species, u) * random.uniform(0.65, 1.1);
-      const double reach = std::max(0.12, radius / std::max(0.5, std::cos(slope)));
-      add_living_branch(shape, habit, Vector(0.0, 0.0, size.crown_base_m + z), azimuth, slope,
-                        std::min(reach, 0.8 * (length - z) + 0.3), size.foliage, random);
-    }
-  }
-  add_dead_branches(shape, species, size, random);
   return shape;
 }
 
