@@ -9,6 +9,8 @@
 
 namespace understory {
 
+class ByteSource;
+
 // A whole point cloud as a file holds it. Coordinates of point i in the file's frame (a coordinate
 // system, or the sensor's) are origin + points[i]: the origin in double takes up the large part, so
 // that floats keep tenths of a millimetre. All other columns are either empty or one per point.
@@ -26,5 +28,6 @@ struct PointCloudFile {
 // or infinite are left out. A file that breaks off gives the points up to there and a warning
 // ("recording.damaged"); throws InputError if no point can be had from it.
 [[nodiscard]] PointCloudFile read_cloud(const std::string& path, Log& log);
+[[nodiscard]] PointCloudFile read_cloud(ByteSource& file, Log& log);
 
 }  // namespace understory

@@ -1,0 +1,278 @@
+#include "understory/recording/las.h"
+
+#include <laszip/laszip_api.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <istream>
+#include <memory>
+#include <streambuf>
+#include <vector>
+
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kSmallestHeader = 227;
+constexpr std::uint32_t kMostVlrs = 4096;
+constexpr std::size_t kVlrHeader = 54;
+constexpr std::size_t kLargestPoint = 4096;
+constexpr std::array<std::uint32_t, 11> kRecordLengths{20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+
+template <typename T>
+T get(const std::vector<std::uint8_t>& bytes, std::size_t at) {
+  T value{};
+  if (at + sizeof(T) <= bytes.size()) std::memcpy(&value, bytes.data() + at, sizeof(T));
+  return value;
+}
+
+[[noreturn]] void fail(const ByteSource& file, std::uint64_t at, const std::string& expected) {
+  throw InputError(file.name(), "byte " + std::to_string(at), expected);
+}
+
+std::string text_of(const std::vector<std::uint8_t>& bytes, std::size_t at, std::size_t size) {
+  std::string text;
+  for (std::size_t i = at; i < std::min(at + size, bytes.size()) && bytes[i] != 0; ++i)
+    text.push_back(static_cast<char>(bytes[i]));
+  return text;
+}
+
+// The EPSG number of a GeoTIFF key directory: projected, else geographic; 0 if it has neither.
+int epsg_of_keys(const std::vector<std::uint8_t>& keys) {
+  constexpr std::uint16_t kProjected = 3072;
+  constexpr std::uint16_t kGeographic = 2048;
+  constexpr std::uint16_t kUserDefined = 32767;
+  int projected = 0;
+  int geographic = 0;
+  for (std::size_t at = 8; at + 8 <= keys.size(); at += 8) {
+    const auto key = get<std::uint16_t>(keys, at);
+    const auto location = get<std::uint16_t>(keys, at + 2);
+    const auto value = get<std::uint16_t>(keys, at + 6);
+    if (location != 0 || value == 0 || value >= kUserDefined) continue;
+    if (key == kProjected) projected = value;
+    if (key == kGeographic) geographic = value;
+  }
+  return projected != 0 ? projected : geographic;
+}
+
+std::string coordinate_system(ByteSource& file, std::uint64_t at, std::uint32_t vlrs) {
+  constexpr std::size_t kLongestWkt = 65'535;
+  std::string wkt;
+  int epsg = 0;
+  std::vector<std::uint8_t> vlr;
+  for (std::uint32_t i = 0; i < std::min(vlrs, kMostVlrs); ++i) {
+    file.read(at, kVlrHeader, vlr);
+    if (vlr.size() < kVlrHeader) break;
+    const auto id = get<std::uint16_t>(vlr, 18);
+    const auto size = get<std::uint16_t>(vlr, 20);
+    const bool projection = text_of(vlr, 2, 16) == "LASF_Projection";
+    if (projection && (id == 2112 || id == 34735)) {
+      file.read(at + kVlrHeader, size, vlr);
+      if (id == 2112) wkt = text_of(vlr, 0, kLongestWkt);
+      if (id == 34735) epsg = epsg_of_keys(vlr);
+    }
+    at += kVlrHeader + size;
+  }
+  if (!wkt.empty()) return wkt;
+  return epsg == 0 ? "" : "EPSG:" + std::to_string(epsg);
+}
+
+bool has_time(int format) {
+  return format == 1 || format >= 3;
+}
+
+void report_break(const ByteSource& file, const LasHeader& header, std::uint64_t read, Log& log) {
+  if (read == header.points) return;
+  const std::string text =
+      std::to_string(read) + " of " + std::to_string(header.points) + " points can be read";
+  if (read == 0) throw InputError(file.name(), "", "expected points: " + text);
+  log.warn("recording.damaged", file.name() + ": " + text);
+}
+
+class PointDecoder {
+ public:
+  explicit PointDecoder(const LasHeader& header) : header_(header) {}
+
+  // Of an uncompressed record.
+  [[nodiscard]] LasPoint from_record(const std::uint8_t* raw) const {
+    std::array<std::int32_t, 3> xyz;
+    std::memcpy(xyz.data(), raw, sizeof(xyz));
+    LasPoint point;
+    point.position = position(xyz[0], xyz[1], xyz[2]);
+    std::uint16_t intensity = 0;
+    std::memcpy(&intensity, raw + 12, 2);
+    point.intensity = intensity;
+    const bool modern = header_.point_format >= 6;
+    point.classification = modern ? raw[16] : static_cast<std::uint8_t>(raw[15] & 0x1F);
+    if (header_.has_gps_time) std::memcpy(&point.gps_time, raw + (modern ? 22 : 20), 8);
+    return point;
+  }
+  [[nodiscard]] LasPoint from_laszip(const laszip_point& raw) const {
+    LasPoint point;
+    point.position = position(raw.X, raw.Y, raw.Z);
+    point.intensity = raw.intensity;
+    point.classification =
+        header_.point_format >= 6 ? raw.extended_classification : raw.classification;
+    point.gps_time = header_.has_gps_time ? raw.gps_time : 0.0;
+    return point;
+  }
+
+ private:
+  [[nodiscard]] Eigen::Vector3d position(double x, double y, double z) const {
+    return header_.offset + header_.scale.cwiseProduct(Eigen::Vector3d(x, y, z));
+  }
+  const LasHeader& header_;
+};
+
+void read_uncompressed(ByteSource& file, const LasHeader& header, Log& log,
+                       const std::function<void(const LasPoint&)>& visit) {
+  constexpr std::uint64_t kAtOnce = 4096;
+  const PointDecoder decoder(header);
+  std::vector<std::uint8_t> part;
+  std::uint64_t read = 0;
+  while (read < header.points) {
+    const std::uint64_t want = std::min(kAtOnce, header.points - read);
+    file.read(header.point_position + read * header.record_length, want * header.record_length,
+              part);
+    const std::uint64_t got = part.size() / header.record_length;
+    for (std::uint64_t i = 0; i < got; ++i)
+      visit(decoder.from_record(part.data() + i * header.record_length));
+    read += got;
+    if (got < want) break;
+  }
+  report_break(file, header, read, log);
+}
+
+// A stream over a ByteSource, for LASzip.
+class SourceBuffer : public std::streambuf {
+ public:
+  explicit SourceBuffer(ByteSource& file) : file_(file) {}
+
+ protected:
+  int_type underflow() override {
+    const std::uint64_t next = begin_ + static_cast<std::uint64_t>(egptr() - eback());
+    const std::size_t got =
+        file_.read(next, reinterpret_cast<std::uint8_t*>(window_.data()), window_.size());
+    begin_ = next;
+    setg(window_.data(), window_.data(), window_.data() + got);
+    return got == 0 ? traits_type::eof() : traits_type::to_int_type(window_[0]);
+  }
+  pos_type seekoff(off_type offset, std::ios_base::seekdir way, std::ios_base::openmode) override {
+    const auto here = static_cast<off_type>(begin_ + static_cast<std::uint64_t>(gptr() - eback()));
+    const off_type from = way == std::ios_base::beg   ? 0
+                          : way == std::ios_base::cur ? here
+                                                      : static_cast<off_type>(file_.size());
+    return seekpos(from + offset, std::ios_base::in);
+  }
+  pos_type seekpos(pos_type position, std::ios_base::openmode) override {
+    const off_type at = position;
+    if (at < 0) return pos_type(off_type(-1));
+    const auto loaded = static_cast<off_type>(egptr() - eback());
+    const off_type relative = at - static_cast<off_type>(begin_);
+    if (relative >= 0 && relative < loaded) {
+      setg(eback(), eback() + relative, egptr());
+    } else {
+      begin_ = static_cast<std::uint64_t>(at);
+      setg(window_.data(), window_.data(), window_.data());
+    }
+    return position;
+  }
+
+ private:
+  ByteSource& file_;
+  std::uint64_t begin_ = 0;  // of what is loaded
+  std::array<char, 1U << 16> window_{};
+};
+
+struct LaszipCloser {
+  void operator()(void* reader) const {
+    laszip_close_reader(reader);
+    laszip_destroy(reader);
+  }
+};
+
+void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
+                     const std::function<void(const LasPoint&)>& visit) {
+  SourceBuffer buffer(file);
+  std::istream stream(&buffer);
+  laszip_POINTER raw = nullptr;
+  if (laszip_create(&raw) != 0) throw InternalError("LASzip cannot be started");
+  const std::unique_ptr<void, LaszipCloser> reader(raw);
+  laszip_BOOL compressed = 0;
+  laszip_point* point = nullptr;
+  if (laszip_open_reader_stream(raw, stream, &compressed) != 0 ||
+      laszip_get_point_pointer(raw, &point) != 0) {
+    laszip_CHAR* error = nullptr;
+    laszip_get_error(raw, &error);
+    throw InputError(file.name(), "",
+                     std::string("LASzip: ") + (error == nullptr ? "cannot be read" : error));
+  }
+  const PointDecoder decoder(header);
+  std::uint64_t read = 0;
+  while (read < header.points && laszip_read_point(raw) == 0) {
+    visit(decoder.from_laszip(*point));
+    ++read;
+  }
+  report_break(file, header, read, log);
+}
+
+void read_fields(const std::vector<std::uint8_t>& raw, LasHeader& header) {
+  header.version_minor = raw[25];
+  const std::uint8_t format = get<std::uint8_t>(raw, 104);
+  header.compressed = (format & 0xC0) != 0;
+  header.point_format = format & 0x3F;
+  header.has_gps_time = has_time(header.point_format);
+  header.record_length = get<std::uint16_t>(raw, 105);
+  header.point_position = get<std::uint32_t>(raw, 96);
+  header.points = get<std::uint32_t>(raw, 107);
+  if (header.version_minor >= 4 && raw.size() >= 255) {
+    const auto points = get<std::uint64_t>(raw, 247);
+    if (points > 0) header.points = points;
+  }
+  for (int i = 0; i < 3; ++i) {
+    const auto step = static_cast<std::size_t>(i);
+    header.scale[i] = get<double>(raw, 131 + 8 * step);
+    header.offset[i] = get<double>(raw, 155 + 8 * step);
+    header.high[i] = get<double>(raw, 179 + 16 * step);
+    header.low[i] = get<double>(raw, 187 + 16 * step);
+  }
+}
+
+}  // namespace
+
+LasHeader read_las_header(ByteSource& file) {
+  std::vector<std::uint8_t> raw;
+  file.read(0, 375, raw);
+  if (raw.size() < kSmallestHeader || std::memcmp(raw.data(), "LASF", 4) != 0)
+    fail(file, 0, "expected a LAS header");
+  LasHeader header;
+  read_fields(raw, header);
+  const auto header_size = get<std::uint16_t>(raw, 94);
+  if (header.point_format >= static_cast<int>(kRecordLengths.size()))
+    fail(file, 104, "expected a point format from 0 to 10");
+  if (header.record_length < kRecordLengths[static_cast<std::size_t>(header.point_format)] ||
+      header.record_length > kLargestPoint)
+    fail(file, 105, "expected a record length that goes with the point format");
+  if (!header.scale.allFinite() || !header.offset.allFinite() || header.scale.minCoeff() <= 0.0 ||
+      header.scale.maxCoeff() > 1e6 || header.offset.cwiseAbs().maxCoeff() > 1e12)
+    fail(file, 131, "expected finite scales and offsets");
+  if (header_size < kSmallestHeader || header.point_position < header_size ||
+      header.point_position > file.size())
+    fail(file, 94, "expected the points behind the header");
+  header.coordinate_system = coordinate_system(file, header_size, get<std::uint32_t>(raw, 100));
+  return header;
+}
+
+void read_las_points(ByteSource& file, const LasHeader& header, Log& log,
+                     const std::function<void(const LasPoint&)>& visit) {
+  if (header.compressed) {
+    read_compressed(file, header, log, visit);
+  } else {
+    read_uncompressed(file, header, log, visit);
+  }
+}
+
+}  // namespace understory
