@@ -51,6 +51,7 @@ int run(int argc, char** argv) {
   Command chosen;
   // In the order of the help page; each lives in a file of its own.
   add_simulate_command(app, chosen);
+  add_evaluate_command(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

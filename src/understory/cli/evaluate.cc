@@ -1,0 +1,198 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "understory/cli/command.h"
+#include "understory/cli/evaluate_trees.h"
+#include "understory/evaluation/trajectory_errors.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct EvaluateOptions {
+  std::string estimate;
+  std::string truth;
+  std::string alignment = "none";
+  double tolerance_s = 0.01;
+  std::vector<double> deltas_m = {10.0};
+  bool json = false;
+};
+
+// A trajectory file, or the one inside a run or truth folder.
+fs::path trajectory_file(const std::string& given) {
+  const fs::path path(given);
+  if (!fs::is_directory(path)) return path;
+  const fs::path inside = path / "trajectory.tum";
+  if (!fs::exists(inside)) {
+    throw InputError(given, "", "expected a folder that holds trajectory.tum");
+  }
+  return inside;
+}
+
+// The velocities beside a trajectory, empty if there are none.
+std::vector<StampedVelocity> velocities_beside(const std::string& given, Log& log) {
+  const fs::path path(given);
+  if (!fs::is_directory(path)) return {};
+  for (const char* name : {"states.csv.gz", "velocity.csv"}) {
+    if (!fs::exists(path / name)) continue;
+    try {
+      return read_velocities(path / name);
+    } catch (const InputError& error) {
+      log.warn("evaluate.velocity", std::string("velocities are left out: ") + error.what());
+    }
+  }
+  return {};
+}
+
+Json to_json(const TrajectoryErrors& errors, const std::optional<Eigen::Vector3d>& velocity) {
+  Json json;
+  json["pairs"] = errors.pairs;
+  json["alignment"] = to_string(errors.alignment);
+  json["length_m"] = errors.length_m;
+  json["ape_rmse_m"] = errors.ape_rmse_m;
+  json["ape_plane_rmse_m"] = errors.ape_plane_rmse_m;
+  json["ape_mean_m"] = errors.ape_mean_m;
+  json["ape_median_m"] = errors.ape_median_m;
+  json["ape_max_m"] = errors.ape_max_m;
+  json["ape_rotation_rmse_deg"] = errors.ape_rotation_rmse_deg;
+  json["drift_end_m"] = errors.drift_end_m;
+  json["drift_plane_m"] = errors.drift_plane_m;
+  json["drift_percent"] = errors.drift_percent;
+  json["rpe"] = Json::array();
+  for (const RelativeError& rpe : errors.rpe) {
+    json["rpe"].push_back({{"delta_m", rpe.delta_m},
+                           {"translation_rmse_m", rpe.translation_rmse_m},
+                           {"translation_percent", rpe.translation_percent},
+                           {"rotation_rmse_deg", rpe.rotation_rmse_deg}});
+  }
+  json["segments"] = Json::array();
+  for (const SegmentError& segment : errors.segments) {
+    json["segments"].push_back({{"length_m", segment.length_m},
+                                {"translation_percent", segment.translation_percent},
+                                {"translation_plane_percent", segment.translation_plane_percent},
+                                {"rotation_deg_per_m", segment.rotation_deg_per_m}});
+  }
+  json["velocity_rmse_m_s"] = nullptr;
+  if (velocity) json["velocity_rmse_m_s"] = {velocity->x(), velocity->y(), velocity->z()};
+  return json;
+}
+
+std::string to_text(const TrajectoryErrors& e, const std::optional<Eigen::Vector3d>& velocity,
+                    double tolerance_s) {
+  std::string text = fmt::format(
+      "alignment           {}{}\npairs               {} within {} s, {:.1f} % of the truth's time\n"
+      "length of truth     {:.3f} m\n"
+      "APE                 rmse {:.4f} m, in the plane {:.4f} m, mean {:.4f} m, median {:.4f} m, "
+      "max "
+      "{:.4f} m, rotation rmse {:.4f} deg\n"
+      "drift at the end    {:.4f} m = {:.4f} % (first pose aligned; x {:+.4f}, y {:+.4f}, z "
+      "{:+.4f} "
+      "m; in the plane {:.4f} m)\n",
+      to_string(e.alignment), e.alignment == Alignment::kNone ? " (positions as they are)" : "",
+      e.pairs, tolerance_s, 100.0 * e.covered, e.length_m, e.ape_rmse_m, e.ape_plane_rmse_m,
+      e.ape_mean_m, e.ape_median_m, e.ape_max_m, e.ape_rotation_rmse_deg, e.drift_end_m,
+      e.drift_percent, e.drift_end.x(), e.drift_end.y(), e.drift_end.z(), e.drift_plane_m);
+  for (const RelativeError& rpe : e.rpe) {
+    text += rpe.pairs == 0
+                ? fmt::format("RPE over {:g} m       no pair: the estimate's path is shorter\n",
+                              rpe.delta_m)
+                : fmt::format(
+                      "RPE over {:g} m       rmse {:.4f} m = {:.4f} %, rotation rmse {:.4f} "
+                      "deg ({} pairs)\n",
+                      rpe.delta_m, rpe.translation_rmse_m, rpe.translation_percent,
+                      rpe.rotation_rmse_deg, rpe.pairs);
+  }
+  for (const SegmentError& s : e.segments) {
+    text += fmt::format(
+        "segments of {:>3g} m   {:.4f} %, in the plane {:.4f} %, rotation {:.6f} deg/m ({} "
+        "segments)\n",
+        s.length_m, s.translation_percent, s.translation_plane_percent, s.rotation_deg_per_m,
+        s.segments);
+  }
+  text += velocity ? fmt::format("velocity            rmse x {:.4f}, y {:.4f}, z {:.4f} m/s\n",
+                                 velocity->x(), velocity->y(), velocity->z())
+                   : "velocity            not compared: both folders need velocities\n";
+  return text;
+}
+
+void warn_of_doubts(const TrajectoryErrors& errors, Log& log) {
+  if (errors.covered < 0.95) {
+    log.warn("evaluate.coverage",
+             fmt::format("only {:.1f} % of the truth's time is covered by the estimate",
+                         100.0 * errors.covered));
+  }
+  if (!errors.alignment_determined) {
+    log.warn("evaluate.alignment", "the positions do not fix the " + to_string(errors.alignment) +
+                                       " alignment (they lie in one place or on a line); rotation "
+                                       "errors mean nothing");
+  }
+}
+
+int evaluate(const EvaluateOptions& options, CommandContext& context) {
+  if (options.estimate.empty() || options.truth.empty()) {
+    throw ConfigError({"understory evaluate needs ESTIMATE and TRUTH (files or folders)"});
+  }
+  EvaluationOptions settings;
+  settings.alignment = alignment_from_name(options.alignment);
+  settings.tolerance_s = options.tolerance_s;
+  settings.rpe_deltas_m = options.deltas_m;
+  const fs::path estimate_file = trajectory_file(options.estimate);
+  const Trajectory estimate = read_trajectory(estimate_file);
+  const Trajectory truth = read_trajectory(trajectory_file(options.truth));
+  const auto errors = evaluate_trajectory(estimate, truth, settings);
+  if (!errors) {
+    throw InputError(
+        estimate_file.string(), "",
+        fmt::format("expected poses within {} s of those of the truth; the estimate "
+                    "runs from {} to {} s, the truth from {} to {} s",
+                    options.tolerance_s, format_seconds(estimate.front().stamp),
+                    format_seconds(estimate.back().stamp), format_seconds(truth.front().stamp),
+                    format_seconds(truth.back().stamp)));
+  }
+  const auto velocity = velocity_rmse(velocities_beside(options.estimate, context.log),
+                                      velocities_beside(options.truth, context.log),
+                                      errors->truth_from_estimate.rotation(), options.tolerance_s);
+  warn_of_doubts(*errors, context.log);
+  const std::string text = options.json ? to_json(*errors, velocity).dump(2) + "\n"
+                                        : to_text(*errors, velocity, options.tolerance_s);
+  std::fputs(text.c_str(), stdout);
+  return errors->alignment_determined ? kExitDone : kExitUntrusted;
+}
+
+}  // namespace
+
+void add_evaluate_command(CLI::App& app, Command& chosen) {
+  CLI::App* command = app.add_subcommand(
+      "evaluate", "Errors of a trajectory, or of a tree list, against the truth");
+  const auto options = std::make_shared<EvaluateOptions>();
+  command->add_option("ESTIMATE", options->estimate, "Run folder or TUM file");
+  command->add_option("TRUTH", options->truth, "Truth folder or TUM file");
+  command
+      ->add_option("--align", options->alignment,
+                   "Move the estimate onto the truth first (unaligned by default)")
+      ->check(CLI::IsMember({"none", "first", "yaw", "se3"}));
+  command->add_option("--tolerance-s", options->tolerance_s, "Largest difference of paired times")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
+  command->add_option("--delta-m", options->deltas_m, "Path lengths for RPE (10 by default)")
+      ->check(CLI::Range(1e-6, 1e7));
+  command->add_flag("--json", options->json, "One JSON object on stdout");
+  command->footer(
+      "Example:\n  understory evaluate run walk.truth --align se3\n"
+      "  understory evaluate trees run walk.truth --align yaw");
+  command->callback([&chosen, options, command] {
+    if (!command->get_subcommands().empty()) return;
+    chosen = [options](CommandContext& context) { return evaluate(*options, context); };
+  });
+  add_evaluate_trees_command(*command, chosen);
+}
+
+}  // namespace understory

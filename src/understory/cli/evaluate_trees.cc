@@ -1,0 +1,160 @@
+#include "understory/cli/evaluate_trees.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "understory/evaluation/tree_errors.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct TreeOptions {
+  std::string a;
+  std::string b;
+  std::string alignment = "none";
+  double radius_m = 0.5;
+  std::string returns;
+  long min_returns = 30;
+  std::string path;
+  double within_m = 15.0;
+  bool json = false;
+};
+
+fs::path inside_folder(const std::string& given, const std::string& name) {
+  const fs::path path(given);
+  if (!fs::is_directory(path)) return path;
+  if (!fs::exists(path / name)) {
+    throw InputError(given, "", "expected a folder that holds " + name);
+  }
+  return path / name;
+}
+
+struct Comparison {
+  TreeErrors all;
+  std::optional<VisibleTreeErrors> visible;
+};
+
+nlohmann::ordered_json to_json(const Comparison& result, const TreeOptions& options) {
+  nlohmann::ordered_json json;
+  json["trees_a"] = result.all.trees_a;
+  json["trees_b"] = result.all.trees_b;
+  json["matched"] = result.all.matched;
+  json["recall"] = result.all.recall;
+  json["precision"] = result.all.precision;
+  json["position_rmse_m"] = result.all.position_rmse_m;
+  json["dbh_rmse_m"] = result.all.dbh_rmse_m;
+  json["dbh_bias_m"] = result.all.dbh_bias_m;
+  json["height_rmse_m"] = result.all.height_rmse_m;
+  if (result.visible) {
+    json["visible"] = {
+        {"min_returns", options.min_returns},   {"within_m", options.within_m},
+        {"expected", result.visible->expected}, {"found", result.visible->found},
+        {"recall", result.visible->recall},     {"reported", result.visible->reported},
+        {"false", result.visible->false_trees}, {"false_share", result.visible->false_share}};
+  }
+  return json;
+}
+
+std::string to_text(const Comparison& result, const TreeOptions& options) {
+  const TreeErrors& e = result.all;
+  std::string text = fmt::format(
+      "alignment           {}\ntrees               {} in A, {} in B, {} matched one to one within "
+      "{:g} m (nearest first)\nrecall              {:.4f}\nprecision           {:.4f}\nposition    "
+      "  "
+      "      rmse {:.4f} m (horizontal)\ndiameter            rmse {:.4f} m, bias {:+.4f} m (A "
+      "minus "
+      "B)\nheight              rmse {:.4f} m\n",
+      options.alignment, e.trees_a, e.trees_b, e.matched, options.radius_m, e.recall, e.precision,
+      e.position_rmse_m, e.dbh_rmse_m, e.dbh_bias_m, e.height_rmse_m);
+  if (result.visible) {
+    const VisibleTreeErrors& v = *result.visible;
+    text += fmt::format(
+        "visible             {} of {} found ({:.2f} %), {} of {} false ({:.2f} %); within {:g} m "
+        "of "
+        "the path, at least {} returns\n",
+        v.found, v.expected, 100.0 * v.recall, v.false_trees, v.reported, 100.0 * v.false_share,
+        options.within_m, options.min_returns);
+  }
+  return text;
+}
+
+std::optional<VisibleTreeErrors> compare_visible(const TreeOptions& options,
+                                                 const std::vector<Tree>& a,
+                                                 const std::vector<Tree>& b) {
+  if (options.returns.empty() && options.path.empty()) return std::nullopt;
+  if (options.returns.empty() || options.path.empty()) {
+    throw ConfigError({"--truth-returns and --path belong together"});
+  }
+  Visibility visibility;
+  visibility.returns_by_tree = read_returns(inside_folder(options.returns, "returns.csv.gz"));
+  visibility.path = read_trajectory(inside_folder(options.path, "trajectory.tum"));
+  visibility.min_returns = options.min_returns;
+  visibility.within_m = options.within_m;
+  return compare_visible_trees(a, b, options.radius_m, visibility);
+}
+
+int evaluate_trees(const TreeOptions& options, CommandContext& context) {
+  std::vector<Tree> a = read_trees(inside_folder(options.a, "trees.csv"));
+  const std::vector<Tree> b = read_trees(inside_folder(options.b, "trees.csv"));
+  const Alignment alignment = alignment_from_name(options.alignment);
+  bool aligned = true;
+  if (alignment != Alignment::kNone) {
+    const std::optional<Pose> b_from_a = align_trees(a, b, alignment, options.radius_m);
+    aligned = b_from_a.has_value();
+    if (aligned) a = moved(a, *b_from_a);
+  }
+  if (!aligned) {
+    context.log.warn("evaluate.trees",
+                     "no motion lays three trees of A on trees of B; compared "
+                     "where they are");
+  }
+  Comparison result;
+  result.all = compare_trees(a, b, options.radius_m);
+  result.visible = compare_visible(options, a, b);
+  const std::string text =
+      options.json ? to_json(result, options).dump(2) + "\n" : to_text(result, options);
+  std::fputs(text.c_str(), stdout);
+  return aligned ? kExitDone : kExitUntrusted;
+}
+
+}  // namespace
+
+void add_evaluate_trees_command(CLI::App& evaluate, Command& chosen) {
+  CLI::App* command =
+      evaluate.add_subcommand("trees", "Compare a tree list A with another one B (the truth)");
+  const auto options = std::make_shared<TreeOptions>();
+  command->add_option("A", options->a, "Run folder or trees.csv")->required();
+  command->add_option("B", options->b, "Truth folder or trees.csv")->required();
+  command->add_option("--radius-m", options->radius_m, "Largest distance of a matched pair")
+      ->check(CLI::Range(1e-3, 100.0))
+      ->capture_default_str();
+  command
+      ->add_option("--align", options->alignment,
+                   "Move A onto B first, found from the trees alone (unaligned by default)")
+      ->check(CLI::IsMember({"none", "yaw", "se3"}));
+  command->add_option("--truth-returns", options->returns,
+                      "returns.csv.gz of the truth: expect only trees that gave returns");
+  command->add_option("--min-returns", options->min_returns, "Returns that make a tree visible")
+      ->capture_default_str();
+  command->add_option("--path", options->path, "The scanner's trajectory in B's frame");
+  command->add_option("--within-m", options->within_m, "Trees further from the path do not count")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "One JSON object on stdout");
+  command->footer(
+      "Example:\n  understory evaluate trees run walk.truth --align yaw\n"
+      "  understory evaluate trees run walk.truth --align yaw --truth-returns walk.truth --path "
+      "walk.truth");
+  command->callback([&chosen, options] {
+    chosen = [options](CommandContext& context) { return evaluate_trees(*options, context); };
+  });
+}
+
+}  // namespace understory

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+
+namespace understory {
+
+// How an estimate is moved onto the truth before errors are taken. Nothing is moved unless asked.
+enum class Alignment {
+  kNone,
+  kFirst,  // the first pair's poses coincide
+  kYaw,    // heading and translation, least squares over the positions: keeps gravity
+  kSe3     // rotation and translation, least squares over the positions; never a scale
+};
+
+[[nodiscard]] std::string to_string(Alignment alignment);  // "none", "first", "yaw", "se3"
+// Throws ConfigError on any other name.
+[[nodiscard]] Alignment alignment_from_name(const std::string& name);
+
+struct AlignmentResult {
+  Pose target_from_source;
+  // False where the points do not fix the motion (all in one place, or for SE(3) on a line): the
+  // rest of it is then chosen smallest, and rotation errors after it mean little.
+  bool determined = false;
+};
+
+// Least-squares rigid motion that moves `source` onto `target`, pairwise, without scale, closed
+// form: Umeyama 1991 eq. 34-43. Same frame and unit as the points. Needs at least one pair.
+[[nodiscard]] AlignmentResult align_points_se3(const std::vector<Eigen::Vector3d>& source,
+                                               const std::vector<Eigen::Vector3d>& target);
+
+// The same with a rotation about the z axis only, closed form.
+[[nodiscard]] AlignmentResult align_points_yaw(const std::vector<Eigen::Vector3d>& source,
+                                               const std::vector<Eigen::Vector3d>& target);
+
+}  // namespace understory

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <vector>
+
+#include "understory/geometry/stamped_pose.h"
+
+namespace understory {
+
+// Poses in ascending order of time.
+using Trajectory = std::vector<StampedPose>;
+
+// Reads a TUM trajectory, `timestamp_s x y z qx qy qz qw`: separated by blanks, tabs or commas,
+// comments (#, %) and empty lines passed over, plain or gzip. Times keep every nanosecond that is
+// written. Poses out of order are sorted by time. Throws InputError with the line where one is not
+// eight finite numbers or the quaternion is zero, and if there is no pose at all.
+[[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& path);
+
+struct StampedVelocity {
+  TimeNs stamp = 0;
+  Eigen::Vector3d velocity_in_world = Eigen::Vector3d::Zero();  // m/s
+};
+
+// Reads the columns `timestamp,vx,vy,vz` of a CSV table (states.csv.gz, velocity.csv), plain or
+// gzip, sorted by time. Rows with an empty or non-finite velocity are passed over. Throws
+// InputError where a column is missing or a cell is no number.
+[[nodiscard]] std::vector<StampedVelocity> read_velocities(const std::filesystem::path& path);
+
+// Length of the path in metres through poses[first..last].
+[[nodiscard]] double path_length(const Trajectory& poses, std::size_t first, std::size_t last);
+
+}  // namespace understory

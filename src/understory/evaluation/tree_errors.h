@@ -1,0 +1,75 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "understory/evaluation/alignment.h"
+#include "understory/evaluation/trajectory.h"
+#include "understory/forest/tree.h"
+
+namespace understory {
+
+// Reads trees.csv (docs/outputs.md); of its columns only x and y are needed. Throws InputError with
+// the line where a position is missing or a cell is no number.
+[[nodiscard]] std::vector<Tree> read_trees(const std::filesystem::path& path);
+
+// An index into A and one into B.
+using TreePair = std::pair<std::size_t, std::size_t>;
+
+// One-to-one pairs within the radius in the plane, the nearest pair first (greedy by distance, ties
+// by index). In ascending order of the index into A.
+[[nodiscard]] std::vector<TreePair> match_trees(const std::vector<Tree>& a,
+                                                const std::vector<Tree>& b, double radius_m);
+
+// Finds the motion that lays A on B without a start value: hypotheses from pairs of trees of A and
+// equally distant pairs of B, the one with most matches, then least squares over the matches until
+// they stay the same. `yaw` turns about the vertical and shifts; `se3` uses heights and turns
+// fully. Empty if no hypothesis matches three trees.
+[[nodiscard]] std::optional<Pose> align_trees(const std::vector<Tree>& a,
+                                              const std::vector<Tree>& b, Alignment alignment,
+                                              double radius_m);
+
+[[nodiscard]] std::vector<Tree> moved(const std::vector<Tree>& trees,
+                                      const Pose& target_from_source);
+
+// Errors of the trees A against the trees B (the truth). NaN where nothing can be compared.
+struct TreeErrors {
+  std::size_t trees_a = 0;
+  std::size_t trees_b = 0;
+  std::size_t matched = 0;
+  double recall = 0.0;           // matched of B
+  double precision = 0.0;        // matched of A
+  double position_rmse_m = 0.0;  // horizontal
+  double dbh_rmse_m = 0.0;       // of pairs in which both have a diameter
+  double dbh_bias_m = 0.0;       // mean of A minus B
+  double height_rmse_m = 0.0;
+};
+[[nodiscard]] TreeErrors compare_trees(const std::vector<Tree>& a, const std::vector<Tree>& b,
+                                       double radius_m);
+
+// The same for what the scanner could have seen.
+struct VisibleTreeErrors {
+  std::size_t expected = 0;     // of B: near the path and with enough returns
+  std::size_t found = 0;        // of these, matched
+  double recall = 0.0;          // found / expected
+  std::size_t reported = 0;     // of A: near the path
+  std::size_t false_trees = 0;  // of these, without any tree of B within the radius left for them
+  double false_share = 0.0;     // false_trees / reported
+};
+struct Visibility {
+  std::map<int, long> returns_by_tree;  // tree id -> lidar returns over the whole run
+  long min_returns = 30;
+  Trajectory path;  // world frame of B
+  double within_m = 15.0;
+};
+[[nodiscard]] VisibleTreeErrors compare_visible_trees(const std::vector<Tree>& a,
+                                                      const std::vector<Tree>& b, double radius_m,
+                                                      const Visibility& visibility);
+
+// Sums the column `returns` per `tree_id` of a truth folder's returns.csv.gz. Throws InputError.
+[[nodiscard]] std::map<int, long> read_returns(const std::filesystem::path& path);
+
+}  // namespace understory
