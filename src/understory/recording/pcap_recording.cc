@@ -11,7 +11,7 @@
 #include "understory/recording/ouster.h"
 #include "understory/recording/pcap_file.h"
 #include "understory/recording/pcap_survey.h"
-#include "understory/recording/stream_report.h"
+#include "understory/recording/topic_statistics.h"
 #include "understory/recording/udp.h"
 #include "understory/recording/velodyne.h"
 #include "understory/util/error.h"
@@ -26,8 +26,8 @@ class PcapRecording : public Recording {
  public:
   PcapRecording(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar, Log& log)
       : log_(log), file_(std::move(file)), survey_(std::move(survey)), lidar_(lidar) {
-    lidar_report_.name = lidar.name();
-    lidar_report_.role = "lidar";
+    lidar_statistics_.report().name = lidar.name();
+    lidar_statistics_.report().role = "lidar";
   }
 
   void apply_extrinsics(const std::string& path) { apply_extrinsics_file(path, rig_); }
@@ -63,10 +63,10 @@ class PcapRecording : public Recording {
   }
   double progress() const override { return file_->progress(); }
   std::vector<TopicReport> topics() const override {
-    std::vector<TopicReport> reports{lidar_report_};
-    if (second_report_.messages > 0) reports.push_back(second_report_);
-    for (const auto& [key, report] : ignored_)
-      reports.push_back(report);
+    std::vector<TopicReport> reports{lidar_statistics_.report()};
+    if (second_statistics_.report().messages > 0) reports.push_back(second_statistics_.report());
+    for (const auto& [key, statistics] : ignored_)
+      reports.push_back(statistics.report());
     return reports;
   }
 
@@ -79,17 +79,18 @@ class PcapRecording : public Recording {
     return datagram.source == lidar_.source && datagram.port == lidar_.port;
   }
   void emit_scan(ScanPtr scan) {
-    count_message(lidar_report_, scan->stamp, scan->points.size());
+    lidar_statistics_.add_stamp(scan->stamp);
+    lidar_statistics_.report().points += scan->points.size();
     ready_.emplace_back(std::move(scan));
   }
   void ignore(const Datagram& datagram) {
     const UdpStream key{datagram.source, datagram.port};
     if (survey_.streams.count(key) == 0) return;  // which bounds the number of reports
-    TopicReport& report = ignored_[key];
+    TopicReport& report = ignored_[key].report();
     report.name = key.name();
     report.type = "UDP datagrams";
     report.role = "ignored";
-    count_message(report, datagram.stamp);
+    ignored_[key].add_stamp(datagram.stamp);
   }
 
   Log& log_;
@@ -97,8 +98,8 @@ class PcapRecording : public Recording {
   PcapSurvey survey_;
   UdpStream lidar_;
   Rig rig_;
-  TopicReport lidar_report_;
-  TopicReport second_report_;  // IMU or GNSS
+  TopicStatistics lidar_statistics_;
+  TopicStatistics second_statistics_;  // IMU or GNSS
   std::deque<Event> ready_;
 
  private:
@@ -107,7 +108,7 @@ class PcapRecording : public Recording {
   }
 
   UdpAssembler udp_;
-  std::map<UdpStream, TopicReport> ignored_;
+  std::map<UdpStream, TopicStatistics> ignored_;
   bool finished_ = false;
 };
 
@@ -116,9 +117,9 @@ class VelodynePcap : public PcapRecording {
   VelodynePcap(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar, Log& log)
       : PcapRecording(std::move(file), std::move(survey), lidar, log),
         decoder_(VelodyneConfig{}, file_->name(), log) {
-    lidar_report_.type = "Velodyne packets";
-    second_report_.role = "gnss";
-    second_report_.type = "Velodyne position packets";
+    lidar_statistics_.report().type = "Velodyne packets";
+    second_statistics_.report().role = "gnss";
+    second_statistics_.report().type = "Velodyne position packets";
     look_ahead();
   }
 
@@ -163,9 +164,10 @@ class VelodynePcap : public PcapRecording {
       const auto fix =
           decoder_.add_position_packet(datagram.payload.data(), datagram.payload.size());
       if (!fix) return;
-      second_report_.name = UdpStream{datagram.source, datagram.port}.name();
-      second_report_.conventions = "NMEA in position packets; UTC; no height unless GGA";
-      count_message(second_report_, fix->stamp);
+      second_statistics_.report().name = UdpStream{datagram.source, datagram.port}.name();
+      second_statistics_.report().conventions =
+          "NMEA in position packets; UTC; no height unless GGA";
+      second_statistics_.add_stamp(fix->stamp);
       ready_.emplace_back(*fix);
     } else {
       ignore(datagram);
@@ -194,11 +196,11 @@ class OusterPcap : public PcapRecording {
       : PcapRecording(std::move(file), std::move(survey), lidar, log),
         metadata_(metadata),
         decoder_(metadata, file_->name(), log) {
-    lidar_report_.type = "Ouster packets";
-    lidar_report_.conventions = decoder_.conventions();
-    second_report_.role = "imu";
-    second_report_.type = "Ouster IMU packets";
-    second_report_.conventions =
+    lidar_statistics_.report().type = "Ouster packets";
+    lidar_statistics_.report().conventions = decoder_.conventions();
+    second_statistics_.report().role = "imu";
+    second_statistics_.report().type = "Ouster IMU packets";
+    second_statistics_.report().conventions =
         "g and deg/s converted to m/s² and rad/s; the gyroscope's time stamp; with gravity";
     find_imu();
     if (imu_) {
@@ -217,7 +219,7 @@ class OusterPcap : public PcapRecording {
       if (key.source != lidar_.source || count == stream.by_size.end()) continue;
       if (!imu_ || key.port == metadata_.imu_port) imu_ = key;
     }
-    if (imu_) second_report_.name = imu_->name();
+    if (imu_) second_statistics_.report().name = imu_->name();
     if (imu_ || metadata_.legacy_imu) return;
     log_.warn("imu.unsupported", file_->name() +
                                      ": the sensor's IMU packets are of a profile that is not "
@@ -234,7 +236,7 @@ class OusterPcap : public PcapRecording {
     } else if (imu_ && datagram.source == imu_->source && datagram.port == imu_->port) {
       const auto sample = decoder_.add_imu_packet(data, size);
       if (!sample) return;
-      count_message(second_report_, sample->stamp);
+      second_statistics_.add_stamp(sample->stamp);
       ready_.emplace_back(*sample);
     } else {
       ignore(datagram);
