@@ -213,7 +213,8 @@ CloudFileTimes cloud_file_times(const std::string& folder, const std::vector<std
            folder +
                ": neither --rate-hz nor times.txt nor times in the names: 10 clouds a second "
                "are assumed");
-  return {regular_times(names.size(), kAssumedRate), "assumed 10 Hz", false};
+  return {regular_times(names.size(), kAssumedRate), names.size() > 1 ? "assumed 10 Hz" : "none",
+          false};
 }
 
 }  // namespace understory

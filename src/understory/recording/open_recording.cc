@@ -1,9 +1,11 @@
 #include <filesystem>
 
 #include "understory/recording/byte_source.h"
+#include "understory/recording/cloud_folder.h"
 #include "understory/recording/mcap_format.h"
 #include "understory/recording/mcap_reader.h"
 #include "understory/recording/message_recording.h"
+#include "understory/recording/pcap_recording.h"
 #include "understory/recording/recording.h"
 #include "understory/util/error.h"
 
@@ -31,6 +33,8 @@ std::unique_ptr<Recording> open_file_recording(const std::string& path, const Op
   if (starts_with(head, mcap_magic))
     return open_messages(
         path, [path](Log& sink) { return read_mcap(open_file(path), sink); }, options, log);
+  if (is_pcap(path)) return open_pcap(path, options, log);
+  if (is_cloud_file(path)) return open_cloud_folder(path, options, log);
   throw InputError(path, "at byte 0", kKnownKinds);
 }
 
@@ -41,7 +45,10 @@ std::unique_ptr<Recording> open_recording(const std::string& path, const OpenOpt
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) throw InputError(path, "", "no such file or folder");
-  if (fs::is_directory(status)) throw InputError(path, "", kKnownKinds);
+  if (fs::is_directory(status)) {
+    if (is_cloud_folder(path)) return open_cloud_folder(path, options, log);
+    throw InputError(path, "", kKnownKinds);
+  }
   return open_file_recording(path, options, log);
 }
 
