@@ -50,6 +50,7 @@ int run(int argc, char** argv) {
   app.add_flag("--verbose", verbose, "Debug messages on stderr");
   Command chosen;
   // In the order of the help page; each lives in a file of its own.
+  add_info_command(app, chosen);
   add_simulate_command(app, chosen);
   add_evaluate_command(app, chosen);
   try {

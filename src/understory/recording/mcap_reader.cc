@@ -7,6 +7,7 @@
 
 #include "understory/recording/compression.h"
 #include "understory/recording/mcap_walker.h"
+#include "understory/recording/message_merger.h"
 #include "understory/recording/output_file.h"
 #include "understory/util/error.h"
 
@@ -18,20 +19,10 @@ using mcap::Block;
 constexpr std::size_t kMostLoadedBlocks = 64;
 constexpr std::uint64_t kMostLoadedBytes = 256ULL << 20;
 
-// A block in memory with the places of its messages, by log time.
-struct LoadedBlock {
-  struct Entry {
-    std::uint64_t log_time = 0;
-    std::shared_ptr<const MessageChannel> channel;
-    std::size_t offset = 0;
-    std::size_t length = 0;
-  };
-  std::vector<std::uint8_t> bytes;
-  std::vector<Entry> entries;
-  std::size_t next = 0;
-
-  [[nodiscard]] std::uint64_t time() const { return entries[next].log_time; }
-};
+// Log times beyond the range of TimeNs are damaged or far from now.
+TimeNs to_time(std::uint64_t log_time) {
+  return static_cast<TimeNs>(std::min<std::uint64_t>(log_time, std::numeric_limits<TimeNs>::max()));
+}
 
 class McapSource : public MessageSource {
  public:
@@ -41,18 +32,17 @@ class McapSource : public MessageSource {
   }
 
   bool next(RawMessage& message) override {
-    if (current_ != nullptr && current_->next >= current_->entries.size()) drop_current();
-    current_ = nullptr;
-    load_what_is_due();
-    LoadedBlock* block = earliest();
-    if (block == nullptr) return false;
-    const LoadedBlock::Entry& entry = block->entries[block->next++];
-    message.channel = entry.channel;
-    message.log_time = static_cast<TimeNs>(std::min<std::uint64_t>(
-        entry.log_time, static_cast<std::uint64_t>(std::numeric_limits<TimeNs>::max())));
-    message.data = ByteSpan(block->bytes).subspan(entry.offset, entry.length);
-    current_ = block;
-    return true;
+    merger_.tidy();
+    // Load blocks until no block still to come can hold an earlier message.
+    while (pending_) {
+      const bool full =
+          merger_.blocks() >= kMostLoadedBlocks || merger_.bytes() >= kMostLoadedBytes;
+      if (!merger_.empty() && (full || to_time(pending_->start) > merger_.earliest())) break;
+      const Block block = *pending_;
+      load(block);
+      pending_ = walker_.next();
+    }
+    return merger_.next(message);
   }
 
   [[nodiscard]] std::string format() const override {
@@ -67,47 +57,17 @@ class McapSource : public MessageSource {
   }
 
  private:
-  // Loads blocks until no block still to come can hold an earlier message.
-  void load_what_is_due() {
-    while (pending_) {
-      const LoadedBlock* first = earliest();
-      const bool full = loaded_.size() >= kMostLoadedBlocks || loaded_bytes_ >= kMostLoadedBytes;
-      if (first != nullptr && (full || pending_->start > first->time())) return;
-      const Block block = *pending_;
-      load(block);
-      pending_ = walker_.next();
-    }
-  }
-
-  LoadedBlock* earliest() {
-    LoadedBlock* best = nullptr;
-    for (const auto& block : loaded_) {
-      if (best == nullptr || block->time() < best->time()) best = block.get();
-    }
-    return best;
-  }
-
-  void drop_current() {
-    const auto at = std::find_if(loaded_.begin(), loaded_.end(),
-                                 [&](const auto& block) { return block.get() == current_; });
-    loaded_bytes_ -= current_->bytes.size();
-    loaded_.erase(at);
-  }
-
   void load(const Block& block) {
-    auto loaded = std::make_unique<LoadedBlock>();
+    MessageBlock loaded;
     if (block.is_chunk) {
-      if (!unpack(block, loaded->bytes)) return;
-      list_messages(block, *loaded);
+      if (!unpack(block, loaded.bytes)) return;
+      list_messages(block, loaded);
     } else {
-      file_->read(block.offset + mcap::kRecordHead, block.length, loaded->bytes);
-      add_message(loaded->bytes, 0, *loaded);
+      if (block.length > kLongestBlock) return (void)damaged(block, "the message is too long");
+      file_->read(block.offset + mcap::kRecordHead, block.length, loaded.bytes);
+      add_message(loaded.bytes, 0, loaded);
     }
-    if (loaded->entries.empty()) return;
-    std::stable_sort(loaded->entries.begin(), loaded->entries.end(),
-                     [](const auto& a, const auto& b) { return a.log_time < b.log_time; });
-    loaded_bytes_ += loaded->bytes.size();
-    loaded_.push_back(std::move(loaded));
+    merger_.add(std::move(loaded));
   }
 
   // The records of a chunk, unpacked and checked.
@@ -133,7 +93,7 @@ class McapSource : public MessageSource {
     return true;
   }
 
-  void list_messages(const Block& block, LoadedBlock& loaded) {
+  void list_messages(const Block& block, MessageBlock& loaded) {
     ByteReader reader(loaded.bytes);
     while (reader.remaining() >= mcap::kRecordHead) {
       const auto opcode = reader.get<std::uint8_t>();
@@ -150,12 +110,12 @@ class McapSource : public MessageSource {
     }
   }
 
-  void add_message(ByteSpan content, std::size_t begin, LoadedBlock& loaded) {
+  void add_message(ByteSpan content, std::size_t begin, MessageBlock& loaded) {
     ByteReader reader(content);
     const auto id = reader.get<std::uint16_t>();
     (void)reader.get<std::uint32_t>();  // sequence
-    LoadedBlock::Entry entry;
-    entry.log_time = reader.get<std::uint64_t>();
+    MessageBlock::Entry entry;
+    entry.log_time = to_time(reader.get<std::uint64_t>());
     (void)reader.get<std::uint64_t>();  // publish time
     entry.channel = registry_.find(id);
     if (!reader.ok() || entry.channel == nullptr) {
@@ -180,9 +140,7 @@ class McapSource : public MessageSource {
   mcap::Registry registry_;
   mcap::Walker walker_;
   std::optional<Block> pending_;
-  std::vector<std::unique_ptr<LoadedBlock>> loaded_;
-  std::uint64_t loaded_bytes_ = 0;
-  LoadedBlock* current_ = nullptr;
+  MessageMerger merger_;
   std::vector<std::uint8_t> packed_;
   std::string compression_;
 };

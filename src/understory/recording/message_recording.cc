@@ -102,8 +102,9 @@ class MessageRecording : public Recording {
 
   std::optional<Event> next() override {
     RawMessage message;
-    while (events_.empty()) {
+    while (events_.empty() && !ended_) {
       if (!source_->next(message)) {
+        ended_ = true;
         fixes_.flush(events_);
         if (packets_) packets_->finish(events_);
         break;
@@ -352,6 +353,7 @@ class MessageRecording : public Recording {
   std::deque<Event> events_;
   FixJoiner fixes_;
   std::unique_ptr<PacketTopic> packets_;
+  bool ended_ = false;
 };
 
 }  // namespace

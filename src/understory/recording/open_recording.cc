@@ -7,6 +7,8 @@
 #include "understory/recording/message_recording.h"
 #include "understory/recording/pcap_recording.h"
 #include "understory/recording/recording.h"
+#include "understory/recording/ros2_bag.h"
+#include "understory/recording/rosbag_reader.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -17,6 +19,8 @@ namespace fs = std::filesystem;
 constexpr const char* kKnownKinds =
     "expected an MCAP file, a ROS 1 bag, a ROS 2 bag (.db3 or its folder), a PCAP capture, a cloud "
     "(.pcd, .ply, .las, .laz, .bin) or a folder of clouds";
+
+constexpr std::string_view kSqliteMagic = "SQLite format 3";
 
 bool starts_with(ByteSpan head, std::string_view magic) {
   return head.size() >= magic.size() && std::memcmp(head.data(), magic.data(), magic.size()) == 0;
@@ -33,9 +37,24 @@ std::unique_ptr<Recording> open_file_recording(const std::string& path, const Op
   if (starts_with(head, mcap_magic))
     return open_messages(
         path, [path](Log& sink) { return read_mcap(open_file(path), sink); }, options, log);
+  if (starts_with(head, kRosbagMagic))
+    return open_messages(
+        path, [path](Log& sink) { return read_rosbag(open_file(path), sink); }, options, log);
+  if (starts_with(head, kSqliteMagic))
+    return open_messages(
+        path, [path](Log& sink) { return read_db3(path, sink); }, options, log);
   if (is_pcap(path)) return open_pcap(path, options, log);
   if (is_cloud_file(path)) return open_cloud_folder(path, options, log);
   throw InputError(path, "at byte 0", kKnownKinds);
+}
+
+std::unique_ptr<Recording> open_folder_recording(const std::string& path,
+                                                 const OpenOptions& options, Log& log) {
+  if (is_ros2_bag_folder(path))
+    return open_messages(
+        path, [path](Log& sink) { return read_ros2_bag_folder(path, sink); }, options, log);
+  if (is_cloud_folder(path)) return open_cloud_folder(path, options, log);
+  throw InputError(path, "", kKnownKinds);
 }
 
 }  // namespace
@@ -45,10 +64,7 @@ std::unique_ptr<Recording> open_recording(const std::string& path, const OpenOpt
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) throw InputError(path, "", "no such file or folder");
-  if (fs::is_directory(status)) {
-    if (is_cloud_folder(path)) return open_cloud_folder(path, options, log);
-    throw InputError(path, "", kKnownKinds);
-  }
+  if (fs::is_directory(status)) return open_folder_recording(path, options, log);
   return open_file_recording(path, options, log);
 }
 

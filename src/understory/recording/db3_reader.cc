@@ -1,0 +1,225 @@
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "understory/recording/byte_source.h"
+#include "understory/recording/compression.h"
+#include "understory/recording/ros2_bag.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr std::uint8_t kZstdMagic[4] = {0x28, 0xB5, 0x2F, 0xFD};
+constexpr int kMostMissingRows = 100'000;
+
+struct CloseDatabase {
+  void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
+};
+struct FinishStatement {
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using Database = std::unique_ptr<sqlite3, CloseDatabase>;
+using Statement = std::unique_ptr<sqlite3_stmt, FinishStatement>;
+
+class Db3Source : public MessageSource {
+ public:
+  // `bytes` is the database if it is in memory; it must live as long as `database`.
+  Db3Source(std::string name, Database database, std::vector<std::uint8_t> bytes, Log& log)
+      : name_(std::move(name)),
+        bytes_(std::move(bytes)),
+        database_(std::move(database)),
+        log_(log) {
+    sqlite3_limit(database_.get(), SQLITE_LIMIT_LENGTH, static_cast<int>(kLongestBlock));
+    read_topics();
+    read_extent();
+    const bool indexed = scalar(
+                             "SELECT count(*) FROM sqlite_master WHERE type = 'index' AND "
+                             "tbl_name = 'messages' AND sql LIKE '%timestamp%'") > 0;
+    // Without an index an order by time would need memory for all messages.
+    rows_ = prepare(std::string("SELECT id, topic_id, timestamp, data FROM messages ORDER BY ") +
+                    (indexed ? "timestamp, id" : "id"));
+    if (rows_ == nullptr) fail("expected a table of messages: ");
+  }
+  ~Db3Source() override {
+    rows_.reset();  // statements before their database
+  }
+
+  bool next(RawMessage& message) override {
+    while (!ended_) {
+      const int state = step();
+      if (state == SQLITE_DONE) break;
+      const auto topic = topics_.find(sqlite3_column_int64(rows_.get(), 1));
+      const TimeNs time = sqlite3_column_int64(rows_.get(), 2);
+      if (by_row_ && time < last_time_) continue;  // was read before the damage
+      last_time_ = time;
+      if (topic == topics_.end()) {
+        log_.warn("recording.unknown_channel",
+                  name_ + ": a message of an unknown topic is passed over");
+        continue;
+      }
+      message.channel = topic->second;
+      message.log_time = time;
+      message.data = blob();
+      ++read_;
+      return true;
+    }
+    ended_ = true;  // a further step would begin anew
+    return false;
+  }
+
+  [[nodiscard]] std::string format() const override { return "ROS 2 bag (SQLite)"; }
+  [[nodiscard]] double progress() const override {
+    return last_ > first_ ? std::clamp(static_cast<double>(last_time_ - first_) /
+                                           static_cast<double>(last_ - first_),
+                                       0.0, 1.0)
+                          : 0.0;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& expected) const {
+    throw InputError(name_, "", expected + sqlite3_errmsg(database_.get()));
+  }
+
+  Statement prepare(const std::string& query) {
+    sqlite3_stmt* raw = nullptr;
+    sqlite3_prepare_v2(database_.get(), query.c_str(), -1, &raw, nullptr);
+    return Statement(raw);
+  }
+
+  // The number that a query gives; 0 if it fails.
+  std::int64_t scalar(const std::string& query) {
+    const Statement statement = prepare(query);
+    if (statement == nullptr || sqlite3_step(statement.get()) != SQLITE_ROW) return 0;
+    return sqlite3_column_int64(statement.get(), 0);
+  }
+
+  static std::string text(sqlite3_stmt* statement, int column) {
+    const unsigned char* raw = sqlite3_column_text(statement, column);
+    if (raw == nullptr) return "";
+    return {reinterpret_cast<const char*>(raw),
+            static_cast<std::size_t>(sqlite3_column_bytes(statement, column))};
+  }
+
+  void read_topics() {
+    const Statement rows = prepare("SELECT id, name, type, serialization_format FROM topics");
+    if (rows == nullptr) fail("expected the tables of a ROS 2 bag: ");
+    int state = SQLITE_ROW;
+    while ((state = sqlite3_step(rows.get())) == SQLITE_ROW) {
+      auto channel = std::make_shared<MessageChannel>();
+      channel->topic = text(rows.get(), 1);
+      channel->type = text(rows.get(), 2);
+      channel->readable = text(rows.get(), 3) == "cdr";
+      topics_[sqlite3_column_int64(rows.get(), 0)] = std::move(channel);
+    }
+    if (state != SQLITE_DONE) warn_damage("the table of topics is damaged");
+  }
+
+  void read_extent() {
+    first_ = scalar("SELECT min(timestamp) FROM messages");
+    last_ = scalar("SELECT max(timestamp) FROM messages");
+  }
+
+  void warn_damage(const std::string& what) {
+    log_.warn("recording.damaged",
+              name_ + ": " + what + " (" + sqlite3_errmsg(database_.get()) + ")");
+  }
+
+  // The next row, SQLITE_ROW or SQLITE_DONE. At the first damage it goes over to reading row by
+  // row, which finds whatever the intact pages hold.
+  int step() {
+    if (!by_row_) {
+      const int state = sqlite3_step(rows_.get());
+      if (state == SQLITE_ROW || state == SQLITE_DONE) return state;
+      warn_damage("the database is damaged after " + std::to_string(read_) +
+                  " messages; reading row by row from there");
+      by_row_ = true;
+      rows_ = prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id = ?");
+      if (rows_ == nullptr) return SQLITE_DONE;
+    }
+    for (int missing = 0; missing < kMostMissingRows; ++missing) {
+      sqlite3_reset(rows_.get());
+      sqlite3_bind_int64(rows_.get(), 1, ++row_);
+      if (sqlite3_step(rows_.get()) == SQLITE_ROW) return SQLITE_ROW;
+    }
+    return SQLITE_DONE;
+  }
+
+  ByteSpan blob() {
+    const auto* raw = static_cast<const std::uint8_t*>(sqlite3_column_blob(rows_.get(), 3));
+    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows_.get(), 3));
+    const ByteSpan stored(raw, raw == nullptr ? 0 : size);
+    if (stored.size() < 4 || !std::equal(stored.begin(), stored.begin() + 4, kZstdMagic))
+      return stored;
+    const std::string problem = decompress(stored, "zstd", kLongestBlock, unpacked_);
+    if (!problem.empty())
+      log_.warn("recording.damaged", name_ + ": a compressed message is damaged: " + problem);
+    return unpacked_;
+  }
+
+  std::string name_;
+  std::vector<std::uint8_t> bytes_;
+  Database database_;
+  Log& log_;
+  Statement rows_;
+  std::map<std::int64_t, std::shared_ptr<const MessageChannel>> topics_;
+  TimeNs first_ = 0;
+  TimeNs last_ = 0;
+  TimeNs last_time_ = 0;
+  std::uint64_t read_ = 0;
+  bool by_row_ = false;
+  bool ended_ = false;
+  std::int64_t row_ = 0;
+  std::vector<std::uint8_t> unpacked_;
+};
+
+// A path as an SQLite URI.
+std::string uri_of(const std::string& path) {
+  constexpr const char* kDigits = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : path) {
+    if (c == '%' || c == '?' || c == '#') {
+      const auto byte = static_cast<unsigned char>(c);
+      uri += {'%', kDigits[byte >> 4U], kDigits[byte & 15U]};
+    } else {
+      uri += c;
+    }
+  }
+  return uri + "?mode=ro";
+}
+
+}  // namespace
+
+std::unique_ptr<MessageSource> read_db3(const std::string& path, Log& log) {
+  if (open_file(path)->size() == 0) throw InputError(path, "", "the file is empty");
+  // A bag that was being written may have its newest part in a journal, which can be read only
+  // where the folder is writable; "immutable" reads the file alone.
+  for (const char* mode : {"", "&immutable=1"}) {
+    sqlite3* raw = nullptr;
+    const int state = sqlite3_open_v2((uri_of(path) + mode).c_str(), &raw,
+                                      SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
+    Database database(raw);
+    if (state != SQLITE_OK) continue;
+    if (sqlite3_exec(raw, "SELECT count(*) FROM sqlite_master", nullptr, nullptr, nullptr) ==
+        SQLITE_CANTOPEN)
+      continue;
+    return std::make_unique<Db3Source>(path, std::move(database), std::vector<std::uint8_t>(), log);
+  }
+  throw InputError(path, "", "the SQLite database cannot be opened");
+}
+
+std::unique_ptr<MessageSource> read_db3(std::vector<std::uint8_t> bytes, const std::string& name,
+                                        Log& log) {
+  sqlite3* raw = nullptr;
+  const int state = sqlite3_open_v2(":memory:", &raw, SQLITE_OPEN_READWRITE, nullptr);
+  Database database(raw);
+  const auto size = static_cast<sqlite3_int64>(bytes.size());
+  if (state != SQLITE_OK || sqlite3_deserialize(raw, "main", bytes.data(), size, size,
+                                                SQLITE_DESERIALIZE_READONLY) != SQLITE_OK)
+    throw InputError(name, "", "the SQLite database cannot be opened");
+  return std::make_unique<Db3Source>(name, std::move(database), std::move(bytes), log);
+}
+
+}  // namespace understory

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "understory/recording/message_source.h"
+
+namespace understory {
+
+// A part of a container file in memory (a chunk, unpacked) with the places of its messages.
+struct MessageBlock {
+  struct Entry {
+    TimeNs log_time = 0;
+    std::shared_ptr<const MessageChannel> channel;
+    std::size_t offset = 0;
+    std::size_t length = 0;
+  };
+  std::vector<std::uint8_t> bytes;
+  std::vector<Entry> entries;
+};
+
+// Hands out the messages of several blocks by log time; equal times in the order in which they were
+// added. Not thread-safe.
+class MessageMerger {
+ public:
+  void add(MessageBlock block) {
+    if (block.entries.empty()) return;
+    std::stable_sort(block.entries.begin(), block.entries.end(),
+                     [](const auto& a, const auto& b) { return a.log_time < b.log_time; });
+    bytes_ += block.bytes.size();
+    blocks_.push_back({std::move(block), 0});
+  }
+  // Drops blocks that are used up, the last message's block with them.
+  void tidy() {
+    std::erase_if(blocks_, [&](const Reading& reading) {
+      const bool done = reading.next >= reading.block.entries.size();
+      if (done) bytes_ -= reading.block.bytes.size();
+      return done;
+    });
+  }
+  // Valid after `tidy` and before the next `add`.
+  [[nodiscard]] bool empty() const { return blocks_.empty(); }
+  [[nodiscard]] TimeNs earliest() const { return first()->time(); }
+  [[nodiscard]] std::size_t blocks() const { return blocks_.size(); }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+  // The earliest message; its data stay valid until `tidy`.
+  [[nodiscard]] bool next(RawMessage& message) {
+    if (blocks_.empty()) return false;
+    Reading& reading = blocks_[static_cast<std::size_t>(first() - blocks_.begin())];
+    const MessageBlock::Entry& entry = reading.block.entries[reading.next++];
+    message.channel = entry.channel;
+    message.log_time = entry.log_time;
+    message.data = ByteSpan(reading.block.bytes).subspan(entry.offset, entry.length);
+    return true;
+  }
+
+ private:
+  struct Reading {
+    MessageBlock block;
+    std::size_t next = 0;
+    [[nodiscard]] TimeNs time() const { return block.entries[next].log_time; }
+  };
+  [[nodiscard]] std::vector<Reading>::const_iterator first() const {
+    return std::min_element(blocks_.begin(), blocks_.end(),
+                            [](const auto& a, const auto& b) { return a.time() < b.time(); });
+  }
+
+  std::vector<Reading> blocks_;
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace understory

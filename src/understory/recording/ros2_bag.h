@@ -1,0 +1,26 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "understory/recording/message_source.h"
+
+namespace understory {
+
+// Reads the messages of one ROS 2 bag file in SQLite (.db3), by time. Messages compressed with zstd
+// one by one are unpacked. A damaged file is read row by row as far as its pages allow. Throws
+// InputError if the file is no SQLite database with the tables of a bag.
+[[nodiscard]] std::unique_ptr<MessageSource> read_db3(const std::string& path, Log& log);
+// The same from memory.
+[[nodiscard]] std::unique_ptr<MessageSource> read_db3(std::vector<std::uint8_t> bytes,
+                                                      const std::string& name, Log& log);
+
+// Whether the folder holds the files of a ROS 2 bag (.db3, .mcap, both also with .zstd).
+[[nodiscard]] bool is_ros2_bag_folder(const std::string& path);
+// The files of the bag folder one after the other, .db3 or .mcap, also with .zstd behind it (those
+// are unpacked into the folder for temporary files while they are read).
+[[nodiscard]] std::unique_ptr<MessageSource> read_ros2_bag_folder(const std::string& path,
+                                                                  Log& log);
+
+}  // namespace understory
