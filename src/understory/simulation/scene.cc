@@ -268,16 +268,10 @@ class ForestScene::Impl {
 
   void add_stem(const Tree& tree, Cones& stems) {
     bark_[static_cast<std::size_t>(tree.id)] = static_cast<float>(tree.bark_reflectivity);
-    std::vector<double> heights = {-0.3, 0.0, 0.12, 0.3, 0.6, 1.0};
-    const double step = std::max(0.5, (tree.height_m - 1.0) / 24.0);
-    for (double h = 1.0 + step; h < tree.height_m; h += step)
-      heights.push_back(h);
-    heights.push_back(tree.height_m);
+    const std::vector<double> heights = tree.joints();
     for (std::size_t i = 0; i < heights.size(); ++i) {
-      const double above = std::max(0.0, heights[i]);
-      Eigen::Vector3d centre = tree.centre(above);
-      centre.z() = tree.foot.z() + heights[i];
-      stems.add(centre, std::max(0.004, 0.5 * tree.diameter(above)));
+      const Tree::Joint joint = tree.joint(heights[i]);
+      stems.add(joint.centre, joint.radius_m);
       if (i + 1 < heights.size()) {
         stems.join();
         cone_tree_.push_back(tree.id);

@@ -112,6 +112,7 @@ void add_living_branch(Shape& shape, const Habit& habit, const Vector& root, dou
 Shape grow_crown(Species species, const CrownSize& size, Random& random) {
   const Habit habit = habit_of(species);
   Shape shape;
+  if (size.foliage <= 0.0) return shape;  // a winter without twigs: for tests
   const double length = size.height_m - size.crown_base_m;
   for (double z = 0.0; z < length; z += habit.whorl_m * random.uniform(0.75, 1.25)) {
     const double u = z / length;

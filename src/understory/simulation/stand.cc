@@ -215,6 +215,22 @@ Eigen::Vector3d Tree::centre(double height_above_foot) const {
   return foot + Eigen::Vector3d(side.x(), side.y(), height_above_foot);
 }
 
+std::vector<double> Tree::joints() const {
+  std::vector<double> heights = {-0.3, 0.0, 0.12, 0.3, 0.6, 1.0, kBreastHeight};
+  const double step = std::max(0.5, (height_m - kBreastHeight) / 26.0);
+  for (double h = kBreastHeight + step; h < height_m - 0.2 * step; h += step)
+    heights.push_back(h);
+  heights.push_back(height_m);
+  return heights;
+}
+
+Tree::Joint Tree::joint(double height_above_foot) const {
+  const double above = std::max(0.0, height_above_foot);
+  Joint joint{centre(above), std::max(0.004, 0.5 * diameter(above))};
+  joint.centre.z() = foot.z() + height_above_foot;
+  return joint;
+}
+
 double Tree::lean_deg() const {
   const Eigen::Vector3d axis = centre(3.0) - centre(0.0);
   return std::atan2(axis.head<2>().norm(), axis.z()) / kDegree;

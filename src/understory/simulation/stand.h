@@ -32,6 +32,15 @@ struct Tree {
   [[nodiscard]] double diameter(double height_m_above_foot) const;
   // Centre of the stem at that height, world frame.
   [[nodiscard]] Eigen::Vector3d centre(double height_m_above_foot) const;
+  // Heights above the foot at which the stem is measured off into cones; the first lies below the
+  // ground, the last is the top.
+  [[nodiscard]] std::vector<double> joints() const;
+  // Centre and radius of the stem at a joint.
+  struct Joint {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    double radius_m = 0.0;
+  };
+  [[nodiscard]] Joint joint(double height_m_above_foot) const;
   // Tilt of the stem's lowest 3 m against the vertical.
   [[nodiscard]] double lean_deg() const;
 };

@@ -1,0 +1,296 @@
+#include "understory/simulation/scanner.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <numbers>
+
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+// A scanner with all that it needs, without noise.
+struct World {
+  explicit World(const SiteConfig& site)
+      : config(site),
+        seed(static_cast<std::uint64_t>(site.seed)),
+        route(site.carrier, seed),
+        terrain(site.terrain, 0.5 * site.stand.size_x_m + 5.0, 0.5 * site.stand.size_y_m + 5.0,
+                seed),
+        stand(grow_stand(site.stand, site.carrier, terrain, route, seed)),
+        plan(plan_carrier(site, route, terrain)),
+        scene(site.stand, terrain, stand, seed),
+        machine(site.carrier, plan.boom),
+        scanner(site, scene, plan.path, machine, 0) {}
+
+  [[nodiscard]] Eigen::Vector3d in_world(const Scan& scan, const ScanPoint& point) const {
+    const Pose world_from_lidar =
+        plan.path.pose(to_seconds(scan.stamp + point.t_ns)) * scanner.body_from_lidar();
+    return world_from_lidar * Eigen::Vector3d(point.x, point.y, point.z);
+  }
+
+  SiteConfig config;
+  std::uint64_t seed;
+  Route route;
+  Terrain terrain;
+  Stand stand;
+  CarrierPlan plan;
+  ForestScene scene;
+  Machine machine;
+  Scanner scanner;
+};
+
+SiteConfig quiet_site() {
+  SiteConfig site;
+  site.duration_s = 30.0;
+  site.carrier.length_m = 60.0;
+  site.stand.size_x_m = site.stand.size_y_m = 50.0;
+  site.stand.trees_per_ha = 600.0;
+  site.stand.foliage = site.stand.dead_branches = 0.0;
+  site.stand.seedlings_per_ha = site.stand.shrubs_per_ha = 0.0;
+  site.stand.ground_plants_per_ha = 0.0;
+  site.stand.stumps_per_ha = site.stand.logs_per_ha = 0.0;
+  site.lidar.columns = 512;
+  site.lidar.divergence_mrad = site.lidar.azimuth_jitter_deg = 0.0;
+  site.lidar.range_sd_m = site.lidar.range_sd_per_m = site.lidar.bark_sd_m = 0.0;
+  site.lidar.range_step_m = site.lidar.dropout = 0.0;
+  site.lidar.range_10_percent_m = 1000.0;
+  return site;
+}
+
+// Distance of a point from a stem, with sign: from the spheres that roll along each of its cones.
+double off_bark(const Tree& tree, const Eigen::Vector3d& point) {
+  const std::vector<double> heights = tree.joints();
+  double nearest = 1e9;
+  for (std::size_t i = 0; i + 1 < heights.size(); ++i) {
+    const Tree::Joint low = tree.joint(heights[i]);
+    const Tree::Joint high = tree.joint(heights[i + 1]);
+    if (point.z() < low.centre.z() - 1.0 || point.z() > high.centre.z() + 1.0) continue;
+    const auto distance = [&](double u) {
+      return (point - low.centre - u * (high.centre - low.centre)).norm() - low.radius_m -
+             u * (high.radius_m - low.radius_m);
+    };
+    double from = 0.0;
+    double to = 1.0;
+    for (int step = 0; step < 60; ++step) {  // the distance is convex along the cone
+      const double a = from + (to - from) / 3.0;
+      const double b = to - (to - from) / 3.0;
+      (distance(a) < distance(b) ? to : from) = distance(a) < distance(b) ? b : a;
+    }
+    nearest = std::min(nearest, distance(from));
+  }
+  return nearest;
+}
+
+const Tree* nearest_tree(const Stand& stand, const Eigen::Vector3d& point) {
+  const Tree* best = nullptr;
+  double nearest = 1e9;
+  for (const Tree& tree : stand.trees) {
+    if ((tree.centre(point.z() - tree.foot.z()) - point).head<2>().norm() > 0.4) continue;
+    const double distance = std::abs(off_bark(tree, point));
+    if (distance < nearest) {
+      nearest = distance;
+      best = &tree;
+    }
+  }
+  return best;
+}
+
+TEST(Scanner, VlpOnFlatGroundSeesRingsAtTheirAnglesAndRanges) {
+  SiteConfig site = quiet_site();
+  site.terrain.relief_m = site.terrain.slope_deg = 0.0;
+  site.terrain.hummock_m = site.terrain.roughness_m = 0.0;
+  site.stand.trees_per_ha = 0.0;
+  site.carrier.height_m = 0.0;
+  site.carrier.still_s = 20.0;
+  site.lidar.model = "VLP-16";
+  site.lidar.mount_m = {0.0, 0.0, 1.5};
+  site.lidar.fov_deg = 360.0;
+  site.lidar.max_range_m = 20.0;
+  const World world(site);
+  const SimulatedScan simulated = world.scanner.cast(20);
+  const Scan& scan = *simulated.scan;
+  // Five rings look down steeply enough to end within 20 m: -15 to -5 degrees is six, of which the
+  // last meets the ground at 17.2 m.
+  EXPECT_GT(scan.points.size(), 6U * 1800U);
+  std::uint32_t last = 0;
+  for (const ScanPoint& point : scan.points) {
+    const double flat = std::hypot(point.x, point.y);
+    const double elevation = std::atan2(point.z, flat) / kDegree;
+    EXPECT_NEAR(elevation, -15.0 + 2.0 * point.ring, 1e-4);
+    EXPECT_LE(point.ring, 5);
+    EXPECT_NEAR(std::hypot(flat, point.z), 1.5 / std::sin(-elevation * kDegree), 2e-3);
+    EXPECT_GE(point.t_ns, last);
+    last = point.t_ns;
+    // 2.304 us between lasers, 55.296 us between sequences.
+    const double in_sequence = std::fmod(point.t_ns + 0.5, 55296.0);
+    EXPECT_LT(std::fmod(in_sequence, 2304.0), 2.0);
+    EXPECT_LT(in_sequence, 16 * 2304.0);
+  }
+  EXPECT_GT(last, 99'000'000U);
+  EXPECT_LT(last, 100'000'000U);
+}
+
+TEST(Scanner, NarrowViewKeepsToItsSector) {
+  SiteConfig site = quiet_site();
+  site.lidar.model = "VLP-16";
+  site.lidar.mount_m = {0.0, 0.0, -1.7};
+  site.lidar.fov_deg = 210.0;
+  const World world(site);
+  const ScanPtr kept = world.scanner.cast(10).scan;
+  const Scan& scan = *kept;
+  double widest = 0.0;
+  for (const ScanPoint& point : scan.points)
+    widest = std::max(widest, std::abs(std::atan2(point.y, point.x)) / kDegree);
+  EXPECT_LT(widest, 105.1);
+  EXPECT_GT(widest, 104.0);
+}
+
+TEST(Scanner, PointsAtTheirOwnTimesLieOnTheSurfaces) {
+  const World world(quiet_site());
+  std::size_t ground = 0;
+  std::size_t bark = 0;
+  for (const std::int64_t number : {5, 100, 230}) {
+    const SimulatedScan simulated = world.scanner.cast(number);
+    ASSERT_GT(simulated.scan->points.size(), 20000U);
+    for (const ScanPoint& point : simulated.scan->points) {
+      const Eigen::Vector3d place = world.in_world(*simulated.scan, point);
+      const double above = place.z() - world.terrain.height(place.x(), place.y());
+      if (std::abs(above) < 1e-3) {
+        ++ground;
+        continue;
+      }
+      const Tree* tree = nearest_tree(world.stand, place);
+      ASSERT_NE(tree, nullptr);
+      EXPECT_NEAR(off_bark(*tree, place), 0.0, 1e-3);
+      ++bark;
+    }
+  }
+  EXPECT_GT(ground, 30000U);
+  EXPECT_GT(bark, 3000U);
+}
+
+TEST(Tree, StemHasItsDiameterAtBreastHeight) {
+  const World world(quiet_site());
+  for (const Tree& tree : world.stand.trees) {
+    EXPECT_NEAR(2.0 * tree.joint(1.3).radius_m, tree.dbh_m, 1e-12);
+    EXPECT_NEAR(tree.centre(0.0).z(), world.terrain.height(tree.foot.x(), tree.foot.y()), 1e-12);
+    EXPECT_LT(tree.diameter(tree.height_m * 0.8), tree.dbh_m);
+  }
+}
+
+TEST(Scanner, CountsOfStemReturnsAgreeWithABruteCount) {
+  const World world(quiet_site());
+  const SimulatedScan simulated = world.scanner.cast(150);
+  std::map<int, std::map<int, int>> counted;
+  for (const ScanPoint& point : simulated.scan->points) {
+    const Eigen::Vector3d place = world.in_world(*simulated.scan, point);
+    if (std::abs(place.z() - world.terrain.height(place.x(), place.y())) < 1e-3) continue;
+    ++counted[nearest_tree(world.stand, place)->id][point.ring];
+  }
+  ASSERT_GT(simulated.stems.size(), 20U);
+  EXPECT_NEAR(static_cast<double>(counted.size()), static_cast<double>(simulated.stems.size()), 1);
+  for (const StemReturns& stem : simulated.stems) {
+    int returns = 0;
+    int with_3 = 0;
+    for (const auto& [ring, count] : counted[stem.tree]) {
+      returns += count;
+      with_3 += count >= 3 ? 1 : 0;
+    }
+    // A return just at the foot may be taken for ground.
+    EXPECT_NEAR(stem.returns, returns, 2) << "tree " << stem.tree;
+    EXPECT_NEAR(stem.rings, static_cast<int>(counted[stem.tree].size()), 2);
+    EXPECT_NEAR(stem.rings_with_3, with_3, 2);
+  }
+}
+
+TEST(Scanner, SameBytesForAnyNumberOfThreadsAndAnyOrder) {
+  SiteConfig site = quiet_site();
+  site.stand.foliage = 1.0;
+  site.lidar.range_sd_m = 0.02;
+  site.lidar.divergence_mrad = 6.0;
+  site.lidar.rays_per_beam = 3;
+  site.lidar.range_10_percent_m = 17.0;
+  const World one(site);
+  const World two(site);
+  std::vector<SimulatedScan> alone(3);
+  with_threads(1, [&] {
+    for (std::int64_t i = 0; i < 3; ++i)
+      alone[static_cast<std::size_t>(i)] = one.scanner.cast(i);
+  });
+  with_threads(2, [&] {
+    for (std::int64_t i = 2; i >= 0; --i) {
+      const SimulatedScan both = two.scanner.cast(i);
+      const SimulatedScan& first = alone[static_cast<std::size_t>(i)];
+      ASSERT_EQ(both.scan->points.size(), first.scan->points.size());
+      EXPECT_EQ(std::memcmp(both.scan->points.data(), first.scan->points.data(),
+                            first.scan->points.size() * sizeof(ScanPoint)),
+                0);
+      ASSERT_EQ(both.stems.size(), first.stems.size());
+    }
+  });
+}
+
+TEST(Scanner, RangeNoiseGrowsWithRangeAndIncidence) {
+  SiteConfig site = quiet_site();
+  site.terrain.relief_m = site.terrain.slope_deg = 0.0;
+  site.terrain.hummock_m = site.terrain.roughness_m = 0.0;
+  site.stand.trees_per_ha = 0.0;
+  site.stand.size_x_m = site.stand.size_y_m = 100.0;
+  site.carrier.height_m = 3.2;
+  site.carrier.still_s = 20.0;
+  site.lidar.mount_m = {0.0, 0.0, 0.0};
+  site.lidar.range_sd_m = 0.012;
+  site.lidar.range_sd_per_m = 0.0004;
+  const World world(site);
+  const ScanPtr kept = world.scanner.cast(20).scan;
+  const Scan& scan = *kept;
+  std::map<int, std::pair<double, int>> squares;
+  for (const ScanPoint& point : scan.points) {
+    const double range = std::sqrt(point.x * point.x + point.y * point.y + point.z * point.z);
+    const double truth = range * 3.2 / -point.z;
+    squares[point.ring].first += std::pow(range - truth, 2.0);
+    squares[point.ring].second += 1;
+  }
+  const auto sd = [&](int ring) { return std::sqrt(squares[ring].first / squares[ring].second); };
+  EXPECT_NEAR(sd(0), 0.012 * (1.0 + 0.35), 0.002);  // 45 degrees down
+  EXPECT_GT(sd(50), 1.3 * sd(0));                   // 9.6 degrees down, 19 m away
+}
+
+// The edges of stems mix: with a wide beam the points around a stem spread farther than it is wide.
+TEST(Scanner, WideBeamsMakeStemsWider) {
+  SiteConfig site = quiet_site();
+  site.stand.trees_per_ha = 300.0;
+  const auto width = [](const SiteConfig& config) {
+    const World world(config);
+    const SimulatedScan simulated = world.scanner.cast(10);
+    int returns = 0;
+    for (const StemReturns& stem : simulated.stems)
+      returns += stem.returns;
+    return returns;
+  };
+  const int narrow = width(site);
+  site.lidar.divergence_mrad = 6.1;
+  site.lidar.rays_per_beam = 16;
+  const int wide = width(site);
+  EXPECT_GT(wide, 1.02 * narrow);
+}
+
+TEST(ForestScene, OpenSkyIsOpenAndAStandHidesIt) {
+  SiteConfig site = quiet_site();
+  site.stand.foliage = 1.0;
+  site.stand.trees_per_ha = 1200.0;
+  const World dense(site);
+  site.stand.trees_per_ha = 0.0;
+  const World open(site);
+  EXPECT_EQ(open.scene.canopy_cover({0.0, 0.0, 5.0}), 0.0);
+  EXPECT_GT(dense.scene.canopy_cover({0.0, 0.0, 5.0}), 0.3);
+}
+
+}  // namespace
+}  // namespace understory

@@ -1,0 +1,213 @@
+#include "understory/simulation/simulator.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "understory/simulation/satellite.h"
+#include "understory/util/error.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+SiteConfig small_site() {
+  SiteConfig site = load_site("demo", {"duration_s=3", "lidar.columns=256"});
+  return site;
+}
+
+bool same(const Event& a, const Event& b) {
+  if (a.index() != b.index() || event_time(a) != event_time(b)) return false;
+  if (const auto* imu = std::get_if<ImuSample>(&a)) {
+    const auto& other = std::get<ImuSample>(b);
+    return imu->angular_rate == other.angular_rate && imu->specific_force == other.specific_force;
+  }
+  if (const auto* fix = std::get_if<GnssFix>(&a)) {
+    const auto& other = std::get<GnssFix>(b);
+    return fix->latitude_deg == other.latitude_deg && fix->height_m == other.height_m &&
+           fix->hdop == other.hdop;
+  }
+  const auto& points = std::get<ScanPtr>(a)->points;
+  const auto& others = std::get<ScanPtr>(b)->points;
+  return points.size() == others.size() &&
+         std::memcmp(points.data(), others.data(), points.size() * sizeof(ScanPoint)) == 0;
+}
+
+std::vector<Event> read_all(Recording& recording) {
+  std::vector<Event> events;
+  while (std::optional<Event> event = recording.next())
+    events.push_back(*event);
+  return events;
+}
+
+std::size_t lines_of(const std::string& path) {
+  std::ifstream file(path);
+  EXPECT_TRUE(file.is_open()) << path;
+  std::size_t count = 0;
+  for (std::string line; std::getline(file, line);)
+    ++count;
+  return count;
+}
+
+TEST(Simulator, SameSeedSameEventsWithOneAndTwoThreads) {
+  std::vector<Event> one;
+  std::vector<Event> two;
+  with_threads(1, [&] {
+    Simulator simulator(small_site());
+    one = read_all(simulator);
+  });
+  with_threads(2, [&] {
+    Simulator simulator(small_site());
+    two = read_all(simulator);
+  });
+  ASSERT_EQ(one.size(), two.size());
+  for (std::size_t i = 0; i < one.size(); ++i)
+    ASSERT_TRUE(same(one[i], two[i])) << "event " << i;
+  SiteConfig other = small_site();
+  other.seed = 2;
+  Simulator simulator(other);
+  const std::vector<Event> different = read_all(simulator);
+  EXPECT_FALSE(same(one[0], different[0]));
+}
+
+TEST(Simulator, EventsComeInOrderAtTheirRates) {
+  Simulator simulator(small_site());
+  std::size_t counts[3] = {0, 0, 0};
+  TimeNs last = 0;
+  while (std::optional<Event> event = simulator.next()) {
+    ++counts[event->index()];
+    // A scan whose last firings brought nothing ends a little before its place in the stream.
+    EXPECT_GE(event_time(*event), last - 2'000'000);
+    last = event_time(*event);
+  }
+  EXPECT_NEAR(static_cast<double>(counts[0]), 30.0, 1.0);
+  EXPECT_NEAR(static_cast<double>(counts[1]), 600.0, 1.0);
+  EXPECT_NEAR(static_cast<double>(counts[2]), 15.0, 1.0);
+  EXPECT_EQ(simulator.rig().body_frame, "imu");
+  EXPECT_EQ(simulator.topics()[0].messages, counts[0]);
+}
+
+TEST(Simulator, SkippingLeavesTheRestAsItWas) {
+  Simulator whole(small_site());
+  const std::vector<Event> events = read_all(whole);
+  Simulator skipping(small_site());
+  skipping.skip(400);
+  for (std::size_t i = 400; i < events.size(); ++i) {
+    const std::optional<Event> event = skipping.next();
+    ASSERT_TRUE(event.has_value());
+    ASSERT_TRUE(same(*event, events[i])) << "event " << i;
+  }
+  EXPECT_FALSE(skipping.next().has_value());
+}
+
+TEST(Simulator, WritesItsTruth) {
+  Simulator simulator(small_site());
+  const std::vector<Event> events = read_all(simulator);
+  std::size_t scans = 0;
+  for (const Event& event : events)
+    scans += std::holds_alternative<ScanPtr>(event) ? 1 : 0;
+  const std::string folder = testing::TempDir() + "simulator_truth";
+  std::filesystem::remove_all(folder);
+  simulator.write_truth(folder);
+  EXPECT_EQ(lines_of(folder + "/trajectory.tum"), scans);
+  EXPECT_EQ(lines_of(folder + "/velocity.csv"), scans + 1);
+  EXPECT_EQ(lines_of(folder + "/imu_bias.csv"), scans + 1);
+  EXPECT_GT(lines_of(folder + "/trees.csv"), 100U);
+  EXPECT_TRUE(std::filesystem::exists(folder + "/returns.csv.gz"));
+  EXPECT_TRUE(std::filesystem::exists(folder + "/dtm.tif"));
+  // The site that was written is the site that was run.
+  const SiteConfig again = load_site(folder + "/site.yaml", {});
+  Simulator second(again);
+  EXPECT_TRUE(same(*second.next(), events[0]));
+  std::filesystem::remove_all(folder);
+  EXPECT_THROW(simulator.write_truth("/proc/nowhere"), OutputError);
+}
+
+TEST(SatelliteReceiver, ErrorsGrowUnderTheCanopyAndAreWorseInHeight) {
+  const auto run = [](double trees_per_ha, Eigen::Vector3d& squares, double& reported) {
+    int count = 0;
+    squares.setZero();
+    reported = 0.0;
+    for (int seed = 1; seed <= 6; ++seed) {
+      SiteConfig site = load_site("demo", {"gnss.rate_hz=1", "gnss.correlation_s=4"});
+      site.seed = seed;
+      site.stand.trees_per_ha = trees_per_ha;
+      const auto key = static_cast<std::uint64_t>(seed);
+      const Route route(site.carrier, key);
+      const Terrain terrain(site.terrain, 40.0, 40.0, key);
+      const Stand stand = grow_stand(site.stand, site.carrier, terrain, route, key);
+      const CarrierPlan plan = plan_carrier(site, route, terrain);
+      const ForestScene scene(site.stand, terrain, stand, key);
+      SatelliteReceiver receiver(site, plan.path, scene, 0);
+      while (to_seconds(receiver.next_stamp()) < plan.path.duration_s()) {
+        const std::optional<GnssFix> fix = receiver.next();
+        if (!fix) continue;
+        squares += receiver.last_error_enu().cwiseAbs2();
+        reported += std::sqrt(fix->covariance(0, 0));
+        ++count;
+      }
+    }
+    squares /= count;
+    reported /= count;
+  };
+  Eigen::Vector3d open;
+  Eigen::Vector3d dense;
+  double open_reported = 0.0;
+  double dense_reported = 0.0;
+  run(0.0, open, open_reported);
+  run(1200.0, dense, dense_reported);
+  EXPECT_GT(dense.x() + dense.y(), 2.0 * (open.x() + open.y()));
+  EXPECT_GT(dense.z(), 1.2 * (dense.x() + dense.y()));
+  EXPECT_LT(dense_reported, 0.8 * std::sqrt(0.5 * (dense.x() + dense.y())));  // overconfident
+}
+
+TEST(Geodetic, SmallOffsetsFollowTheRadiiOfCurvature) {
+  OriginConfig origin;
+  const double lat = origin.latitude_deg * std::numbers::pi / 180.0;
+  const double e2 = 0.00669437999014;
+  const double w = std::sqrt(1.0 - e2 * std::pow(std::sin(lat), 2.0));
+  const double prime = 6378137.0 / w;
+  const double meridian = 6378137.0 * (1.0 - e2) / (w * w * w);
+  const Eigen::Vector3d zero = geodetic_from_enu(origin, Eigen::Vector3d::Zero());
+  EXPECT_NEAR(zero.x(), origin.latitude_deg, 1e-12);
+  EXPECT_NEAR(zero.y(), origin.longitude_deg, 1e-12);
+  EXPECT_NEAR(zero.z(), origin.height_m, 1e-8);
+  const Eigen::Vector3d moved = geodetic_from_enu(origin, {10.0, 20.0, 5.0});
+  const double degree = std::numbers::pi / 180.0;
+  EXPECT_NEAR((moved.x() - origin.latitude_deg) * degree * (meridian + 150.0), 20.0, 1e-3);
+  EXPECT_NEAR((moved.y() - origin.longitude_deg) * degree * (prime + 150.0) * std::cos(lat), 10.0,
+              1e-3);
+  EXPECT_NEAR(moved.z() - origin.height_m, 5.0, 1e-3);
+}
+
+TEST(Sites, AreFoundByNameAndChangedBySettings) {
+  ASSERT_GE(shipped_sites().size(), 3U);
+  for (const ShippedSite& site : shipped_sites()) {
+    EXPECT_FALSE(site.summary.empty());
+    EXPECT_NO_THROW((void)load_site(site.name, {}));
+  }
+  EXPECT_EQ(load_site("handheld", {"seed=9", "lidar.rays_per_beam=4"}).lidar.rays_per_beam, 4);
+  EXPECT_THROW((void)load_site("nowhere", {}), InputError);
+  try {
+    (void)load_site("handheld", {"lidar.raysperbeam=4", "seed=-3"});
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(error.problems().size(), 2U);
+  }
+}
+
+TEST(Sites, UrisAreTakenApart) {
+  const SimulationUri uri = parse_simulation_uri("sim:handheld?seed=3&lidar.rays_per_beam=1");
+  EXPECT_EQ(uri.site, "handheld");
+  EXPECT_EQ(uri.settings, (std::vector<std::string>{"seed=3", "lidar.rays_per_beam=1"}));
+  EXPECT_TRUE(parse_simulation_uri("sim:demo").settings.empty());
+  EXPECT_FALSE(is_simulation_uri("handheld.mcap"));
+  EXPECT_THROW((void)parse_simulation_uri("sim:"), ConfigError);
+}
+
+}  // namespace
+}  // namespace understory
