@@ -1,0 +1,316 @@
+#include "understory/forest/circle_search.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "understory/forest/arc_bins.h"
+#include "understory/util/parallel.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+constexpr int kTriesPerDraw = 6;
+using PointList = std::vector<Eigen::Vector2f>;
+
+// Points sorted into square cells, so that those near a place are found without looking at all.
+class CellIndex {
+ public:
+  CellIndex(const PointList& points, float cell_m) : cell_m_(cell_m) {
+    low_ = points.front();
+    Eigen::Vector2f high = low_;
+    for (const Eigen::Vector2f& point : points) {
+      low_ = low_.cwiseMin(point);
+      high = high.cwiseMax(point);
+    }
+    columns_ = static_cast<int>((high.x() - low_.x()) / cell_m) + 1;
+    rows_ = static_cast<int>((high.y() - low_.y()) / cell_m) + 1;
+    begin_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) + 1, 0);
+    for (const Eigen::Vector2f& point : points)
+      ++begin_[cell_of(point) + 1];
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+    order_.resize(points.size());
+    std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      order_[next[cell_of(points[i])]++] = static_cast<std::uint32_t>(i);
+  }
+
+  // Calls visit(i) for the points of all cells that touch the square around `centre`.
+  template <typename Visit>
+  void near(const Eigen::Vector2f& centre, float reach, const Visit& visit) const {
+    const int c0 = std::max(0, column(centre.x() - reach));
+    const int c1 = std::min(columns_ - 1, column(centre.x() + reach));
+    const int r0 = std::max(0, row(centre.y() - reach));
+    const int r1 = std::min(rows_ - 1, row(centre.y() + reach));
+    for (int r = r0; r <= r1; ++r) {
+      const std::size_t base = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_);
+      for (int c = c0; c <= c1; ++c) {
+        const std::size_t cell = base + static_cast<std::size_t>(c);
+        for (std::uint32_t k = begin_[cell]; k < begin_[cell + 1]; ++k)
+          visit(order_[k]);
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] int column(float x) const {
+    return static_cast<int>(std::floor((x - low_.x()) / cell_m_));
+  }
+  [[nodiscard]] int row(float y) const {
+    return static_cast<int>(std::floor((y - low_.y()) / cell_m_));
+  }
+  [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& point) const {
+    const int c = std::clamp(column(point.x()), 0, columns_ - 1);
+    const int r = std::clamp(row(point.y()), 0, rows_ - 1);
+    return static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(c);
+  }
+
+  float cell_m_;
+  Eigen::Vector2f low_;
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<std::uint32_t> begin_;
+  std::vector<std::uint32_t> order_;
+};
+
+// Groups of points that hang together: cells of `reach` that touch, also by a corner.
+std::vector<PointList> groups_of(const PointList& points, double reach, int min_points) {
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> cells(points.size());
+  const auto key = [&](std::int64_t column, std::int64_t row) {
+    return static_cast<std::uint64_t>(row + (1LL << 31)) << 32 |
+           static_cast<std::uint64_t>(column + (1LL << 31));
+  };
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    cells[i] = {key(static_cast<std::int64_t>(std::floor(points[i].x() / reach)),
+                    static_cast<std::int64_t>(std::floor(points[i].y() / reach))),
+                static_cast<std::uint32_t>(i)};
+  }
+  std::sort(cells.begin(), cells.end());
+  std::vector<std::uint64_t> keys;
+  for (const auto& cell : cells) {
+    if (keys.empty() || keys.back() != cell.first) keys.push_back(cell.first);
+  }
+  std::vector<std::uint32_t> parent(keys.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  const auto root = [&](std::uint32_t i) {
+    while (parent[i] != i)
+      i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const auto row = static_cast<std::int64_t>(keys[i] >> 32) - (1LL << 31);
+    const auto column = static_cast<std::int64_t>(keys[i] & 0xffffffffU) - (1LL << 31);
+    constexpr std::array<std::pair<int, int>, 4> kBefore = {{{-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
+    for (const auto& [dx, dy] : kBefore) {
+      const std::uint64_t other = key(column + dx, row + dy);
+      const auto found = std::lower_bound(keys.begin(), keys.end(), other);
+      if (found == keys.end() || *found != other) continue;
+      const std::uint32_t a = root(static_cast<std::uint32_t>(found - keys.begin()));
+      const std::uint32_t b = root(static_cast<std::uint32_t>(i));
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  std::vector<PointList> groups(keys.size());
+  std::size_t cell = 0;
+  for (const auto& [k, i] : cells) {
+    while (keys[cell] != k)
+      ++cell;
+    groups[root(static_cast<std::uint32_t>(cell))].push_back(points[i]);
+  }
+  std::erase_if(
+      groups, [&](const PointList& group) { return static_cast<int>(group.size()) < min_points; });
+  return groups;
+}
+
+// The circle through three points; false where they lie on a line.
+bool circle_through(const Eigen::Vector2f& a, const Eigen::Vector2f& b, const Eigen::Vector2f& c,
+                    Circle& circle) {
+  const Eigen::Vector2d u = (b - a).cast<double>();
+  const Eigen::Vector2d v = (c - a).cast<double>();
+  const double d = 2.0 * (u.x() * v.y() - u.y() * v.x());
+  if (std::abs(d) < 1e-6) return false;
+  const Eigen::Vector2d w((v.y() * u.squaredNorm() - u.y() * v.squaredNorm()) / d,
+                          (u.x() * v.squaredNorm() - v.x() * u.squaredNorm()) / d);
+  circle.centre = a.cast<double>() + w;
+  circle.radius_m = w.norm();
+  return true;
+}
+
+// A search for circles in one group.
+class GroupSearch {
+ public:
+  GroupSearch(PointList points, const CircleSearchConfig& config, std::uint64_t seed)
+      : config_(config), points_(std::move(points)), random_(seed) {}
+
+  std::vector<Circle> run() {
+    std::vector<Circle> found;
+    int failures = 0;
+    const Eigen::Vector2f extent = extent_of(points_);
+    const int most_failures = 2 + static_cast<int>(1.5F * extent.x() * extent.y());
+    while (static_cast<int>(points_.size()) >= config_.min_points && failures < most_failures) {
+      const CellIndex index(points_, 0.1F);
+      const Circle sampled = sample(index);
+      if (sampled.on < config_.min_points) break;
+      const Circle circle = refine_circle(points_, sampled, config_.band_m);
+      const bool good = acceptable(circle);
+      if (good) {
+        found.push_back(circle);
+      } else {
+        ++failures;
+      }
+      remove(good ? circle : sampled, good);
+    }
+    return found;
+  }
+
+ private:
+  static Eigen::Vector2f extent_of(const PointList& points) {
+    Eigen::Vector2f low = points.front();
+    Eigen::Vector2f high = low;
+    for (const Eigen::Vector2f& point : points) {
+      low = low.cwiseMin(point);
+      high = high.cwiseMax(point);
+    }
+    return high - low;
+  }
+
+  [[nodiscard]] bool acceptable(const Circle& circle) const {
+    return circle.on >= config_.min_points && circle.radius_m >= config_.min_radius_m &&
+           circle.radius_m <= config_.max_radius_m && circle.arc_deg >= config_.min_arc_deg &&
+           2 * circle.inside <= circle.on &&
+           circle.rms_m <= std::max(0.6 * config_.band_m, 0.12 * circle.radius_m);
+  }
+
+  // The best of many circles through three points near each other.
+  Circle sample(const CellIndex& index) {
+    constexpr std::array<float, 4> kScales = {0.08F, 0.2F, 0.45F, 0.9F};
+    const std::size_t n = points_.size();
+    const std::size_t draws = std::min<std::size_t>(24 + n / 8, 300);
+    Circle best;
+    double best_score = 0.0;
+    for (std::size_t draw = 0; draw < draws; ++draw) {
+      const Eigen::Vector2f& first = points_[random_.below(n)];
+      const float scale = kScales[draw % kScales.size()];
+      if (scale > 2.0 * config_.max_radius_m) continue;
+      candidates_.clear();
+      index.near(first, scale, [&](std::uint32_t i) {
+        if ((points_[i] - first).squaredNorm() <= scale * scale) candidates_.push_back(i);
+      });
+      if (candidates_.size() < 3) continue;
+      for (int i = 0; i < kTriesPerDraw; ++i) {
+        Circle circle;
+        if (!circle_through(first, points_[candidates_[random_.below(candidates_.size())]],
+                            points_[candidates_[random_.below(candidates_.size())]], circle) ||
+            circle.radius_m < config_.min_radius_m || circle.radius_m > config_.max_radius_m) {
+          continue;
+        }
+        const double value = score(index, circle);
+        if (value <= best_score) continue;
+        best_score = value;
+        best = circle;
+      }
+    }
+    return best;
+  }
+
+  // Points on the circle less those inside it, which a stem cannot have.
+  double score(const CellIndex& index, Circle& circle) const {
+    const Eigen::Vector2f centre = circle.centre.cast<float>();
+    const auto radius = static_cast<float>(circle.radius_m);
+    const auto band = static_cast<float>(config_.band_m);
+    int on = 0;
+    int inside = 0;
+    index.near(centre, radius + band, [&](std::uint32_t i) {
+      const float d = (points_[i] - centre).norm() - radius;
+      if (std::abs(d) <= band) ++on;
+      if (d < -2.0F * band) ++inside;
+    });
+    circle.on = on;
+    circle.inside = inside;
+    // A wider arc of the same points would be a larger circle through a blob: prefer small ones.
+    return (on - 1.5 * inside) / std::sqrt(0.3 + circle.radius_m);
+  }
+
+  // Takes away what the circle explains: its points and, of a stem, all within it.
+  void remove(const Circle& circle, bool stem) {
+    const double margin = 1.5 * config_.band_m;
+    const std::size_t before = points_.size();
+    std::erase_if(points_, [&](const Eigen::Vector2f& point) {
+      const double d = (point.cast<double>() - circle.centre).norm() - circle.radius_m;
+      return d <= margin && (stem || d >= -margin);
+    });
+    if (points_.size() == before) points_.clear();  // cannot happen twice without progress
+  }
+
+  const CircleSearchConfig& config_;
+  PointList points_;
+  Random random_;
+  std::vector<std::uint32_t> candidates_;
+};
+
+}  // namespace
+
+Circle refine_circle(const std::vector<Eigen::Vector2f>& points, const Circle& start,
+                     double band_m) {
+  Circle circle = start;
+  for (int iteration = 0; iteration < 12; ++iteration) {
+    const double reach = 2.0 * band_m;
+    Eigen::Matrix3d normal = 1e-9 * Eigen::Matrix3d::Identity();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    int used = 0;
+    for (const Eigen::Vector2f& point : points) {
+      const Eigen::Vector2d q = point.cast<double>() - circle.centre;
+      const double distance = q.norm();
+      const double e = distance - circle.radius_m;
+      if (std::abs(e) >= reach || distance < 1e-6) continue;
+      const double u = e / reach;
+      const double weight = (1.0 - u * u) * (1.0 - u * u);
+      const Eigen::Vector3d jacobian(-q.x() / distance, -q.y() / distance, -1.0);
+      normal += weight * jacobian * jacobian.transpose();
+      gradient += weight * e * jacobian;
+      ++used;
+    }
+    if (used < 4) break;
+    const Eigen::Vector3d step = -normal.ldlt().solve(gradient);
+    if (!step.allFinite() || step.norm() > 0.5) break;
+    circle.centre += step.head<2>();
+    circle.radius_m += step.z();
+    if (step.norm() < 1e-5) break;
+  }
+  ArcBins bins;
+  double squares = 0.0;
+  circle.on = 0;
+  circle.inside = 0;
+  for (const Eigen::Vector2f& point : points) {
+    const Eigen::Vector2d q = point.cast<double>() - circle.centre;
+    const double e = q.norm() - circle.radius_m;
+    if (e < -2.0 * band_m) ++circle.inside;
+    if (std::abs(e) > band_m) continue;
+    ++circle.on;
+    squares += e * e;
+    bins.add(q.x(), q.y());
+  }
+  circle.arc_deg = bins.covered_deg();
+  circle.rms_m = circle.on > 0 ? std::sqrt(squares / circle.on) : 0.0;
+  return circle;
+}
+
+std::vector<Circle> find_circles(const std::vector<Eigen::Vector2f>& points,
+                                 const CircleSearchConfig& config, std::uint64_t seed) {
+  if (static_cast<int>(points.size()) < config.min_points) return {};
+  const std::vector<PointList> groups = groups_of(points, config.reach_m, config.min_points);
+  std::vector<std::vector<Circle>> found(groups.size());
+  parallel_for(groups.size(), 1, [&](std::size_t i) {
+    found[i] = GroupSearch(groups[i], config, hash_numbers(seed, i)).run();
+  });
+  std::vector<Circle> all;
+  for (const std::vector<Circle>& part : found)
+    all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+}  // namespace understory

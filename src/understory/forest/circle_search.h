@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace understory {
+
+// A circle among the points of one horizontal slice.
+struct Circle {
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  double radius_m = 0.0;
+  double rms_m = 0.0;    // of the points on it
+  double arc_deg = 0.0;  // covered by them, in steps of 10 degrees
+  int on = 0;            // points on it
+  int inside = 0;        // points well within: a stem has none, foliage has many
+};
+
+struct CircleSearchConfig {
+  double min_radius_m = 0.025;
+  double max_radius_m = 0.6;
+  double band_m = 0.02;   // points this near to the circle are on it
+  double reach_m = 0.08;  // points nearer to each other than about this hang together
+  int min_points = 5;
+  double min_arc_deg = 50.0;
+};
+
+// All circles, by repeated sampling (RANSAC) in each group of points that hang together and robust
+// least squares (Gauss-Newton on the geometric distance). `seed` and the points decide the result;
+// threads do not.
+[[nodiscard]] std::vector<Circle> find_circles(const std::vector<Eigen::Vector2f>& points,
+                                               const CircleSearchConfig& config,
+                                               std::uint64_t seed);
+
+// Least-squares circle through the points near `start`, with Tukey weights over `band_m`; its
+// figures are counted anew. on = 0 if it fails.
+[[nodiscard]] Circle refine_circle(const std::vector<Eigen::Vector2f>& points, const Circle& start,
+                                   double band_m);
+
+}  // namespace understory

@@ -1,0 +1,175 @@
+#include "understory/forest/inventory.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "understory/forest/cell_grid.h"
+#include "understory/forest/slice_thinner.h"
+#include "understory/forest/stem_fit.h"
+#include "understory/forest/tree_heights.h"
+
+namespace understory {
+namespace {
+
+constexpr std::uint64_t kMostCells = 24'000'000;
+constexpr std::uint64_t kStray = 20;
+constexpr double kAreaCell = 2.0;
+
+// What the third run through the cloud gathers.
+struct Gathered {
+  SliceThinner slices;
+  CellGrid<ColumnCell> columns;
+  std::uint64_t points = 0;
+  std::uint64_t without_ground = 0;
+};
+
+void gather(const PointBlocks& cloud, const InventoryConfig& config, const InventoryResult& result,
+            Gathered& gathered) {
+  cloud([&](std::span<const Eigen::Vector3d> points) {
+    for (const Eigen::Vector3d& point : points) {
+      ++gathered.points;
+      const double height = result.ground.height_above(point);
+      if (std::isnan(height)) {
+        ++gathered.without_ground;
+        continue;
+      }
+      if (height < -1.0 || height > 120.0) continue;
+      const Eigen::Vector3d local = point - result.origin;
+      gathered.columns.at(local.x(), local.y()).add(height);
+      if (height >= config.stems.lowest_m && height < config.stems.highest_m) {
+        gathered.slices.add(local.x(), local.y(), height);
+      }
+    }
+  });
+}
+
+Raster canopy_of(const CellGrid<ColumnCell>& columns, const Eigen::Vector3d& origin) {
+  Raster canopy;
+  const auto bounds = columns.bounds(kMostCells, kStray);
+  canopy.cell_m = columns.cell_m();
+  canopy.x0 = origin.x() + bounds.column0 * canopy.cell_m;
+  canopy.y0 = origin.y() + bounds.row0 * canopy.cell_m;
+  canopy.columns = bounds.columns;
+  canopy.rows = bounds.rows;
+  canopy.values.assign(
+      static_cast<std::size_t>(canopy.columns) * static_cast<std::size_t>(canopy.rows),
+      std::numeric_limits<float>::quiet_NaN());
+  columns.for_each([&](int column, int row, const ColumnCell& cell) {
+    const int c = column - bounds.column0;
+    const int r = row - bounds.row0;
+    if (cell.occupied != 0 && canopy.contains(c, r)) {
+      canopy.values[canopy.index(c, r)] = cell.highest_m;
+    }
+  });
+  return canopy;
+}
+
+// Area in which stems could be seen: squares of 2 m with points near breast height or on the
+// ground, that is all in which the cloud holds anything.
+double area_of(const Raster& canopy) {
+  CellGrid<char> seen(kAreaCell);
+  for (int row = 0; row < canopy.rows; ++row) {
+    for (int column = 0; column < canopy.columns; ++column) {
+      if (!std::isfinite(canopy.values[canopy.index(column, row)])) continue;
+      seen.at((column + 0.5) * canopy.cell_m, (row + 0.5) * canopy.cell_m) = 1;
+    }
+  }
+  std::size_t count = 0;
+  seen.for_each([&](int, int, char cell) { count += cell != 0 ? 1 : 0; });
+  return static_cast<double>(count) * kAreaCell * kAreaCell;
+}
+
+std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<double>& heights) {
+  std::vector<Tree> trees;
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    const StemFit& stem = result.stems[i];
+    Tree tree;
+    tree.id = static_cast<int>(i) + 1;
+    // Down the centre line from breast height to the ground.
+    const Eigen::Vector2d foot = stem.centre - kBreastHeight * stem.slope;
+    tree.x = result.origin.x() + foot.x();
+    tree.y = result.origin.y() + foot.y();
+    tree.z = result.ground.terrain.interpolate(tree.x, tree.y);
+    tree.dbh_m = 2.0 * stem.radius_m;
+    tree.dbh_sd_m = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
+    tree.height_m = heights[i];
+    tree.lean_deg = std::atan(stem.slope.norm()) * 180.0 / M_PI;
+    tree.observations = stem.returns;
+    tree.x_sd_m = std::sqrt(std::max(0.0, stem.covariance(0, 0)));
+    tree.y_sd_m = std::sqrt(std::max(0.0, stem.covariance(1, 1)));
+    trees.push_back(tree);
+  }
+  return trees;
+}
+
+void remark(const Gathered& gathered, const InventoryConfig& config, InventoryResult& result) {
+  const double per_m2 = static_cast<double>(gathered.points) / std::max(1.0, result.area_m2);
+  std::uint64_t returns = 0;
+  for (const SlicePoint& point : result.slices)
+    returns += point.returns;
+  const double near_breast = static_cast<double>(returns) / std::max(1.0, result.area_m2);
+  if (near_breast < 20.0) {
+    result.remarks.push_back(fmt::format(
+        "Only {:.1f} returns per square metre lie between {} and {} m above the ground ({:.0f} of "
+        "all heights): too few to see stems reliably. Trees are missing from the list; the terrain "
+        "and canopy models are not affected.",
+        near_breast, config.stems.lowest_m, config.stems.highest_m, per_m2));
+  }
+  if (gathered.without_ground * 50 > gathered.points) {
+    result.remarks.push_back(fmt::format(
+        "{:.0f} % of the points lie where no ground was seen within {} m; they were left out.",
+        100.0 * static_cast<double>(gathered.without_ground) / static_cast<double>(gathered.points),
+        config.ground.max_gap_m));
+  }
+  std::size_t no_top = 0;
+  for (const Tree& tree : result.trees)
+    no_top += std::isnan(tree.height_m) ? 1 : 0;
+  if (no_top > 0) {
+    result.remarks.push_back(
+        fmt::format("{} of {} trees have no height: nothing was seen above their stems.", no_top,
+                    result.trees.size()));
+  }
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, InventoryConfig& config) {
+  table.section("ground", [&] { describe(table, config.ground); });
+  table.section("stems", [&] { describe(table, config.stems); });
+  table.add("canopy_cell_m", config.canopy_cell_m, {0.1, 10.0}, "m", "cell of the canopy model");
+}
+
+InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& config,
+                               const ProgressSink& progress) {
+  const auto tell = [&](const char* stage, double done) {
+    if (progress) progress({stage, done, 4.0, "passes", ""});
+  };
+  InventoryResult result;
+  tell("ground", 0.0);
+  result.ground = estimate_ground(cloud, config.ground);
+  if (result.ground.terrain.empty()) {
+    result.remarks.emplace_back("The cloud holds no points.");
+    return result;
+  }
+  const Raster& terrain = result.ground.terrain;
+  result.origin = {std::round(terrain.x0), std::round(terrain.y0), terrain.z0};
+  tell("heights", 2.0);
+  Gathered gathered{SliceThinner(config.stems.thin_m), CellGrid<ColumnCell>(config.canopy_cell_m)};
+  gather(cloud, config, result, gathered);
+  result.points = gathered.points;
+  result.slices = gathered.slices.take();
+  result.canopy = canopy_of(gathered.columns, result.origin);
+  result.area_m2 = area_of(result.canopy);
+  tell("stems", 3.0);
+  result.stems = detect_stems(result.slices, config.stems);
+  result.trees =
+      trees_of(result, tree_heights(gathered.columns, result.stems, config.stems.highest_m));
+  remark(gathered, config, result);
+  tell("stems", 4.0);
+  return result;
+}
+
+}  // namespace understory
