@@ -43,9 +43,10 @@ keyring=/usr/share/keyrings/debian-archive-keyring.gpg
   if [[ -e $keyring ]]; then printf 'Signed-By: %s\n' "$keyring"; fi
 } >"$private/parts/newer.sources"
 only_newer=("${in_private[@]}" -o "Dir::Etc::SourceList=/dev/null" -o "Dir::Etc::SourceParts=$private/parts")
-apt-get -q "${only_newer[@]}" update
+quietly() { "$@" >"$private/log" 2>&1 || { cat "$private/log" >&2; exit 1; }; }
+quietly apt-get -q "${only_newer[@]}" update
 cd "$folder"
-apt-get -q "${only_newer[@]}" source --tar-only "$@"
+quietly apt-get -q "${only_newer[@]}" source --tar-only "$@"
 if ! have_all "$@"; then
   echo "fetch.sh: $suite on this machine's mirror has no tarball of: $*" >&2
   exit 1
