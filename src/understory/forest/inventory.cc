@@ -111,7 +111,13 @@ void remark(const Gathered& gathered, const InventoryConfig& config, InventoryRe
   for (const SlicePoint& point : result.slices)
     returns += point.returns;
   const double near_breast = static_cast<double>(returns) / std::max(1.0, result.area_m2);
-  if (near_breast < 20.0) {
+  result.too_sparse = near_breast < 20.0;
+  if (returns == 0) {
+    result.remarks.push_back(fmt::format(
+        "No point lies between {} and {} m above the lowest points: the ground below the trees is "
+        "missing from the cloud, or it was cut to another layer.",
+        config.stems.lowest_m, config.stems.highest_m));
+  } else if (result.too_sparse) {
     result.remarks.push_back(fmt::format(
         "Only {:.1f} returns per square metre lie between {} and {} m above the ground ({:.0f} of "
         "all heights): too few to see stems reliably. Trees are missing from the list; the terrain "
@@ -140,12 +146,13 @@ void describe(ConfigTable& table, InventoryConfig& config) {
   table.section("ground", [&] { describe(table, config.ground); });
   table.section("stems", [&] { describe(table, config.stems); });
   table.add("canopy_cell_m", config.canopy_cell_m, {0.1, 10.0}, "m", "cell of the canopy model");
+  table.add("segments", config.segments, {0, 50}, "", "trees shown one by one in the report");
 }
 
 InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& config,
                                const ProgressSink& progress) {
   const auto tell = [&](const char* stage, double done) {
-    if (progress) progress({stage, done, 4.0, "passes", ""});
+    if (progress) progress({stage, done, 5.0, "passes", ""});
   };
   InventoryResult result;
   tell("ground", 0.0);
@@ -168,7 +175,10 @@ InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& 
   result.trees =
       trees_of(result, tree_heights(gathered.columns, result.stems, config.stems.highest_m));
   remark(gathered, config, result);
-  tell("stems", 4.0);
+  tell("segments", 4.0);
+  constexpr double kReach = 1.5;
+  result.segments = collect_segments(cloud, result.ground, result.trees, config.segments, kReach);
+  tell("segments", 5.0);
   return result;
 }
 

@@ -7,6 +7,7 @@
 #include "understory/forest/ground.h"
 #include "understory/forest/stem_detector.h"
 #include "understory/forest/tree.h"
+#include "understory/forest/tree_segments.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
 
@@ -16,6 +17,7 @@ struct InventoryConfig {
   GroundConfig ground;
   StemDetectorConfig stems;
   double canopy_cell_m = 0.5;
+  int segments = 6;  // trees whose points are kept for a look at them
 };
 void describe(ConfigTable& table, InventoryConfig& config);
 
@@ -28,12 +30,14 @@ struct InventoryResult {
   std::vector<Tree> trees;                           // by id; ids from 1 in order of position
   std::vector<StemFit> stems;                        // of the same index as trees
   std::vector<SlicePoint> slices;  // the thinned points between 0.5 m and 3.5 m that were searched
+  std::vector<TreeSegment> segments;  // of a few trees, for the report
   std::uint64_t points = 0;
-  double area_m2 = 0.0;  // cells in which the slices hold points, holes filled
+  double area_m2 = 0.0;     // cells in which the slices hold points, holes filled
+  bool too_sparse = false;  // for stems: some are missing from the list
   std::vector<std::string> remarks;
 };
 
-// Ground, canopy, trees of a whole cloud: three runs through it. Deterministic for any number of
+// Ground, canopy, trees of a whole cloud: four runs through it. Deterministic for any number of
 // threads.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,

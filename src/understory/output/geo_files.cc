@@ -71,8 +71,8 @@ void set_system(OGRSpatialReference& system, const std::string& wkt) {
   if (wkt.empty()) {
     system.SetLocalCS("local metric frame, z up");
     system.SetLinearUnits(SRS_UL_METER, 1.0);
-  } else if (system.importFromWkt(wkt.c_str()) != OGRERR_NONE) {
-    throw InternalError("the coordinate system is no valid WKT");
+  } else if (system.SetFromUserInput(wkt.c_str()) != OGRERR_NONE) {
+    throw InternalError("not a coordinate system: " + wkt);
   }
 }
 

@@ -9,7 +9,8 @@
 
 namespace understory {
 
-// GeoTIFF, float32, deflate, NaN as no-data. `crs_wkt` empty: local coordinates, no system.
+// GeoTIFF, float32, deflate, NaN as no-data. `crs_wkt` is WKT or
+// "EPSG:25832"; empty: local coordinates, no system.
 void write_geotiff(const std::filesystem::path& path, const Raster& raster,
                    const std::string& crs_wkt);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -23,6 +24,8 @@ class MapPicture {
   [[nodiscard]] double y0() const;
   [[nodiscard]] double width_m() const;
   [[nodiscard]] double height_m() const;
+  // West, south, east, north of the cells that hold something, metres.
+  [[nodiscard]] std::array<double, 4> content_box() const;
   // Transparent where nothing was seen.
   [[nodiscard]] std::string png() const;
 
@@ -35,13 +38,13 @@ class MapPicture {
   };
   void grow(int column, int row);
   void coarsen();
+  [[nodiscard]] std::string encode() const;
 
   double cell_m_;
   int largest_side_;
   int column0_ = 0, row0_ = 0, columns_ = 0, rows_ = 0;
   std::vector<Cell> cells_;
   std::uint64_t count_ = 0;
-  double z_sum_origin_ = 0.0;
 };
 
 }  // namespace understory

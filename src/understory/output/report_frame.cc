@@ -1,0 +1,210 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "understory/output/report_parts.h"
+#include "understory/output/svg_plot.h"
+
+namespace understory {
+namespace {
+
+struct Verdict {
+  const char* word;
+  const char* css;
+  const char* text;
+};
+
+Verdict verdict_of(RunStatus status) {
+  switch (status) {
+    case RunStatus::kComplete:
+      return {"Complete", "good", "Everything was processed; the result can be used."};
+    case RunStatus::kPartial:
+      return {"Partial", "fair", "What is here can be used, but some of it is missing."};
+    case RunStatus::kUntrusted:
+      break;
+  }
+  return {"Untrusted", "bad", "Do not rely on this result without checking it."};
+}
+
+// What a kind of warning means for the result, by the beginning of its key.
+std::string consequence_of(const std::string& key) {
+  constexpr std::array<std::pair<const char*, const char*>, 12> kMeanings = {
+      {{"recording.damaged", "That part of the recording is missing from the map."},
+       {"imu.gap", "In such gaps the path rests on the lidar alone; look there for bent stems."},
+       {"imu.stop", "From there on the path rests on the lidar alone; height may drift."},
+       {"imu", "Tilt and fast turns are less certain."},
+       {"lidar.gap", "The path over such a gap is predicted, not measured."},
+       {"lidar.point_times",
+        "Motion within a scan could not be taken out: stems may look thick or doubled."},
+       {"time", "Stamps were mended; if they were wrong by more, the map is smeared."},
+       {"gnss", "Positions of the satellites were not used there."},
+       {"loop", "Places seen twice may not lie exactly on each other."},
+       {"match", "Positions there are less certain; see where the path is marked as weak."},
+       {"inventory", "Trees may be missing from the list."},
+       {"folder", "Times were assumed; speeds and deskewing depend on them."}}};
+  for (const auto& [beginning, meaning] : kMeanings) {
+    if (key.rfind(beginning, 0) == 0) return meaning;
+  }
+  return "";
+}
+
+std::string tile(const std::string& value, const std::string& label) {
+  return "<div class=\"tile\"><b>" + value + "</b><span>" + escape_html(label) + "</span></div>";
+}
+
+std::string stand_tiles(const InventoryResult& inventory) {
+  std::string html = tile(count_text(inventory.trees.size()), "trees with a measured stem");
+  const double hectares = inventory.area_m2 / 1e4;
+  double dbh = 0.0;
+  double basal = 0.0;
+  for (const Tree& tree : inventory.trees) {
+    dbh += tree.dbh_m;
+    basal += 0.25 * M_PI * tree.dbh_m * tree.dbh_m;
+  }
+  const auto n = static_cast<double>(inventory.trees.size());
+  if (hectares > 0.0) {
+    html += tile(fmt::format("{:.2f} ha", hectares), "area with points (not a plot's border)");
+    if (n > 0) html += tile(fmt::format("≈ {:.0f}", n / hectares), "stems per hectare seen");
+  }
+  if (n > 0) {
+    html += tile(fmt::format("{:.1f} cm", 100.0 * dbh / n), "mean diameter at 1.3 m");
+    if (hectares > 0.0) html += tile(fmt::format("≈ {:.1f} m²/ha", basal / hectares), "basal area");
+  }
+  return html;
+}
+
+}  // namespace
+
+double path_length_m(const std::vector<ReportScan>& scans) {
+  constexpr float kStep = 0.1F;  // a sensor at rest jitters by millimetres ten times a second
+  double length = 0.0;
+  if (scans.empty()) return length;
+  Eigen::Vector3f last = scans.front().position;
+  for (const ReportScan& scan : scans) {
+    const float step = (scan.position - last).norm();
+    if (step < kStep) continue;
+    length += static_cast<double>(step);
+    last = scan.position;
+  }
+  return length;
+}
+
+std::string duration_text(double seconds) {
+  if (seconds < 60.0) return fmt::format("{:.1f} s", seconds);
+  const auto whole = static_cast<long>(std::lround(seconds));
+  if (whole < 3600) return fmt::format("{} min {:02d} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02d} min", whole / 3600, whole % 3600 / 60);
+}
+
+std::string count_text(std::uint64_t value) {
+  std::string text = std::to_string(value);
+  for (auto i = static_cast<int>(text.size()) - 3; i > 0; i -= 3)
+    text.insert(static_cast<std::size_t>(i), ",");
+  return text;
+}
+
+std::string verdict_section(const ReportInput& input) {
+  const Verdict verdict = verdict_of(input.summary.status);
+  std::string html = fmt::format("<section class=\"verdict {}\"><h2>{}</h2><p>{}</p>", verdict.css,
+                                 verdict.word, verdict.text);
+  if (!input.summary.reasons.empty()) {
+    html += "<ul>";
+    for (const std::string& reason : input.summary.reasons)
+      html += "<li>" + escape_html(reason) + "</li>";
+    html += "</ul>";
+  }
+  return html + "</section>\n";
+}
+
+std::string figures_section(const ReportInput& input) {
+  std::string html = "<section class=\"tiles\">";
+  if (!input.scans.empty()) {
+    html += tile(fmt::format("{:.0f} m", path_length_m(input.scans)), "length of the path");
+    html += tile(duration_text(to_seconds(input.scans.back().stamp - input.scans.front().stamp)),
+                 "of recording");
+    html += tile(count_text(input.summary.scans), "scans");
+  }
+  if (input.inventory != nullptr) html += stand_tiles(*input.inventory);
+  const auto scan = input.summary.stages.find("scan");
+  if (scan != input.summary.stages.end()) {
+    html +=
+        tile(fmt::format("{:.0f} ms", scan->second.wall_ms.mean),
+             input.sensor_period_ms > 0.0
+                 ? fmt::format("per scan; a new one comes every {:.0f} ms", input.sensor_period_ms)
+                 : "per scan");
+  }
+  if (!input.loops.empty()) {
+    const auto closed = std::count_if(input.loops.begin(), input.loops.end(),
+                                      [](const ReportLoop& loop) { return loop.accepted; });
+    html += tile(std::to_string(closed), "loops closed");
+  }
+  return html + "</section>\n";
+}
+
+std::string distrust_section(const ReportInput& input) {
+  std::string items;
+  const auto add = [&](const std::string& what, const std::string& meaning) {
+    items += "<li>" + escape_html(what);
+    if (!meaning.empty()) items += " <span class=\"so\">" + escape_html(meaning) + "</span>";
+    items += "</li>";
+  };
+  for (const Log::Warning& warning : input.summary.warnings) {
+    const std::string times =
+        warning.count > 1 ? fmt::format(" ({} times; the first is shown)", warning.count) : "";
+    add(warning.first_message + times, consequence_of(warning.key));
+  }
+  if (input.inventory != nullptr) {
+    for (const std::string& remark : input.inventory->remarks)
+      add(remark, "");
+  }
+  if (!input.scans.empty() && !input.loop_closure_enabled) {
+    add("Loop closure was switched off.", "Places seen twice need not lie on each other.");
+  }
+  if (!input.scans.empty() && input.summary.crs_wkt.empty() && !input.north_is_up) {
+    add("The map is in a local frame: without satellite positions its heading and place on the "
+        "earth are arbitrary.",
+        "Distances and heights within it hold.");
+  }
+  if (items.empty()) {
+    items = "<li>Nothing stood out: no warning was given during processing.</li>";
+  }
+  return "<section><h2>What to distrust</h2><ul class=\"warn\">" + items + "</ul></section>\n";
+}
+
+std::string made_section(const ReportInput& input) {
+  const RunSummary& s = input.summary;
+  std::string html = "<section><details><summary>How this was made</summary>";
+  html += fmt::format(
+      "<p>understory {} · <code>{}</code> · {} of computing ({} of CPU time) · peak "
+      "memory {:.0f} MB</p>",
+      escape_html(s.version), escape_html(s.command), duration_text(s.wall_s),
+      duration_text(s.cpu_s), s.peak_memory_mb);
+  if (!s.inputs.empty()) {
+    html +=
+        "<h3>Inputs</h3><table><tr><th>file</th><th class=\"n\">bytes</th><th>SHA-256</th></tr>";
+    for (const InputHash& file : s.inputs) {
+      html += fmt::format("<tr><td>{}</td><td class=\"n\">{}</td><td><code>{}</code></td></tr>",
+                          escape_html(file.file), count_text(file.bytes), file.sha256);
+    }
+    html += "</table>";
+  }
+  const auto listed = [&](const char* title, const std::map<std::string, Figure>& figures) {
+    if (figures.empty()) return;
+    html += fmt::format("<h3>{}</h3><table>", title);
+    for (const auto& [name, value] : figures) {
+      const std::string text =
+          std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
+      html += "<tr><td>" + escape_html(name) + "</td><td>" + escape_html(text) + "</td></tr>";
+    }
+    html += "</table>";
+  };
+  listed("Counts", s.counts);
+  listed("Quality figures", s.quality);
+  html += "<h3>Configuration</h3><pre>" + escape_html(s.config_yaml) + "</pre>";
+  return html + "</details></section>\n";
+}
+
+}  // namespace understory
