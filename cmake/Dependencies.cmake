@@ -1,9 +1,7 @@
 # Every third-party library as an imported target, so that its headers count as system headers.
-#   Eigen3::Eigen TBB::tbb spdlog::spdlog fmt::fmt understory::nanoflann understory::cgal
-#   understory::gdal understory::proj understory::embree understory::fastcdr understory::lz4
-#   understory::zstd understory::bz2 ZLIB::ZLIB understory::pcap SQLite::SQLite3
-#   yaml-cpp CLI11::CLI11 nlohmann_json::nlohmann_json GTest::gtest_main
-#   understory::gtsam understory::laszip
+#   Eigen3::Eigen TBB::tbb fmt::fmt understory::nanoflann understory::gdal understory::embree
+#   understory::lz4 understory::zstd understory::bz2 ZLIB::ZLIB SQLite::SQLite3 yaml-cpp
+#   CLI11::CLI11 nlohmann_json::nlohmann_json GTest::gtest_main understory::gtsam understory::laszip
 include(Gtsam)
 include(Laszip)
 
@@ -36,16 +34,13 @@ endfunction()
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(TBB REQUIRED)
 find_package(fmt REQUIRED)
-find_package(spdlog REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(BZip2 REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(yaml-cpp REQUIRED)
-find_package(fastcdr REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 understory_dependency(bz2 BZip2::BZip2)
-understory_dependency(fastcdr fastcdr)
 # yaml-cpp 0.8 renamed its target.
 if(NOT TARGET yaml-cpp)
   add_library(yaml-cpp INTERFACE IMPORTED GLOBAL)
@@ -54,15 +49,7 @@ endif()
 understory_find(nanoflann HEADER nanoflann.hpp)
 understory_find(lz4 HEADER lz4frame.h LIBRARY lz4)
 understory_find(zstd HEADER zstd.h LIBRARY zstd)
-understory_find(pcap HEADER pcap/pcap.h LIBRARY pcap)
-understory_find(proj HEADER proj.h LIBRARY proj)
 understory_find(gdal HEADER gdal_priv.h LIBRARY gdal SUFFIXES gdal)
-
-# CGAL header-only with the number types it needs; its own CMake file would set global flags.
-understory_find(cgal HEADER CGAL/Delaunay_triangulation_3.h LIBRARY gmp)
-find_library(MPFR_LIBRARY mpfr REQUIRED)
-mark_as_advanced(MPFR_LIBRARY)
-target_link_libraries(understory_dep_cgal INTERFACE "${MPFR_LIBRARY}")
 
 # Embree 4 (Debian 13) and 3 (Debian 12) differ in the header's folder and a few calls.
 find_path(EMBREE_HEADERS NAMES embree4/rtcore.h embree3/rtcore.h REQUIRED)

@@ -10,6 +10,7 @@ listed() { # names in the lists that a purpose needs
     test) lists+=(test) ;;
     check) lists+=(test check) ;;
   esac
+  if available libgtsam-dev; then lists+=(with-libgtsam); fi
   local list
   for list in "${lists[@]}"; do grep -vE '^(#|$)' "$top/tools/packages/$list.txt"; done
 }
@@ -48,6 +49,7 @@ install_packages() {
   log=$(mktemp)
   say "set-up: reading the package lists (apt-get update)"
   as_root apt-get -q update >"$log" 2>&1 || { tail -n 20 "$log" >&2; fail "apt-get update failed"; }
+  mapfile -t all < <(listed "$purpose")
   mapfile -t wanted < <(missing "${all[@]}")
   say "set-up: installing ${#wanted[@]} packages: ${wanted[*]}"
   as_root env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o Dpkg::Use-Pty=0 \

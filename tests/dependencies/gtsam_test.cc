@@ -12,7 +12,6 @@
 #include <gtsam/nonlinear/Marginals.h>
 #include <gtsam/nonlinear/PriorFactor.h>
 #include <gtsam/slam/BetweenFactor.h>
-#include <gtsam_unstable/nonlinear/IncrementalFixedLagSmoother.h>
 
 #include <memory>
 #include <vector>
@@ -73,11 +72,8 @@ TEST(Gtsam, SolvesAPoseGraphWithEitherOrdering) {
   }
 }
 
-TEST(Gtsam, IncrementalSolversAgreeWithTheBatch) {
-  gtsam::ISAM2Params params(gtsam::ISAM2GaussNewtonParams(0.0), 1e-7, 1);
-  gtsam::ISAM2 isam(params);
-  params.findUnusedFactorSlots = true;
-  gtsam::IncrementalFixedLagSmoother smoother(1000.0, params);
+TEST(Gtsam, IncrementalSolverAgreesWithTheBatch) {
+  gtsam::ISAM2 isam(gtsam::ISAM2Params(gtsam::ISAM2GaussNewtonParams(0.0), 1e-7, 1));
   const gtsam::Values guess = disturbed_guess();
   const gtsam::NonlinearFactorGraph graph = chain();
   for (int i = 0; i < kPoses; ++i) {
@@ -86,15 +82,11 @@ TEST(Gtsam, IncrementalSolversAgreeWithTheBatch) {
     gtsam::Values values;
     values.insert(X(i), guess.at<gtsam::Pose3>(X(i)));
     isam.update(factors, values);
-    smoother.update(factors, values, {{X(i), static_cast<double>(i)}});
   }
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < 3; ++i)
     isam.update();
-    smoother.update();
-  }
   const gtsam::Pose3 expected = expected_pose(kPoses - 1);
   EXPECT_TRUE(isam.calculateEstimate<gtsam::Pose3>(X(kPoses - 1)).equals(expected, 1e-5));
-  EXPECT_TRUE(smoother.calculateEstimate<gtsam::Pose3>(X(kPoses - 1)).equals(expected, 1e-5));
 }
 
 TEST(Gtsam, PreintegratesAConstantAcceleration) {
