@@ -53,7 +53,7 @@ Pose mount_pose(const std::vector<double>& place_m, const std::vector<double>& r
   return {rotation, Eigen::Vector3d(place_m[0], place_m[1], place_m[2])};
 }
 
-Scanner::Scanner(const SiteConfig& config, const ForestScene& scene, const CarrierPath& path,
+Scanner::Scanner(const SiteConfig& config, ForestScene& scene, const CarrierPath& path,
                  const Machine& machine, TimeNs start)
     : config_(config.lidar),
       scene_(scene),
@@ -88,7 +88,8 @@ TimeNs Scanner::end(std::int64_t scan) const {
          static_cast<TimeNs>(model_.beams.back().delay_ns);
 }
 
-SimulatedScan Scanner::cast(std::int64_t number) const {
+SimulatedScan Scanner::cast(std::int64_t number) {
+  scene_.sway(0.5 * (to_seconds(stamp(number) - start_) + to_seconds(end(number) - start_)));
   const LidarModel::Firings firings = model_.firings(number);
   const auto blocks_count =
       static_cast<std::size_t>((firings.end - firings.first + kBlockFirings - 1) / kBlockFirings);

@@ -26,18 +26,19 @@ struct SimulatedScan {
 };
 
 // A spinning lidar carried through the forest. Every firing is cast from the true pose at its own
-// time. A scan is a function of its number alone: any order, any number of threads, same bytes.
+// time. A scan is a function of its number alone: any order, any number of threads, same bytes. One
+// scan after another, as the wind moves the scene; within a scan crowns stand still.
 class Scanner {
  public:
   // All references must outlive the scanner. `start` is the time of the path's zero.
-  Scanner(const SiteConfig& config, const ForestScene& scene, const CarrierPath& path,
+  Scanner(const SiteConfig& config, ForestScene& scene, const CarrierPath& path,
           const Machine& machine, TimeNs start);
 
   // Nominal times of a scan: its first firing and its last beam in the field of view.
   [[nodiscard]] TimeNs stamp(std::int64_t scan) const;
   [[nodiscard]] TimeNs end(std::int64_t scan) const;
 
-  [[nodiscard]] SimulatedScan cast(std::int64_t scan) const;
+  [[nodiscard]] SimulatedScan cast(std::int64_t scan);
 
   [[nodiscard]] const Pose& body_from_lidar() const { return body_from_lidar_; }
   [[nodiscard]] const LidarModel& model() const { return model_; }
@@ -53,7 +54,7 @@ class Scanner {
   [[nodiscard]] Echo strongest(const Hit* hits) const;
 
   const LidarConfig config_;
-  const ForestScene& scene_;
+  ForestScene& scene_;
   const CarrierPath& path_;
   const Machine& machine_;
   TimeNs start_;

@@ -112,7 +112,7 @@ TEST(Scanner, VlpOnFlatGroundSeesRingsAtTheirAnglesAndRanges) {
   site.lidar.mount_m = {0.0, 0.0, 1.5};
   site.lidar.fov_deg = 360.0;
   site.lidar.max_range_m = 20.0;
-  const World world(site);
+  World world(site);
   const SimulatedScan simulated = world.scanner.cast(20);
   const Scan& scan = *simulated.scan;
   // Five rings look down steeply enough to end within 20 m: -15 to -5 degrees is six, of which the
@@ -141,7 +141,7 @@ TEST(Scanner, NarrowViewKeepsToItsSector) {
   site.lidar.model = "VLP-16";
   site.lidar.mount_m = {0.0, 0.0, -1.7};
   site.lidar.fov_deg = 210.0;
-  const World world(site);
+  World world(site);
   const ScanPtr kept = world.scanner.cast(10).scan;
   const Scan& scan = *kept;
   double widest = 0.0;
@@ -152,7 +152,7 @@ TEST(Scanner, NarrowViewKeepsToItsSector) {
 }
 
 TEST(Scanner, PointsAtTheirOwnTimesLieOnTheSurfaces) {
-  const World world(quiet_site());
+  World world(quiet_site());
   std::size_t ground = 0;
   std::size_t bark = 0;
   for (const std::int64_t number : {5, 100, 230}) {
@@ -176,7 +176,7 @@ TEST(Scanner, PointsAtTheirOwnTimesLieOnTheSurfaces) {
 }
 
 TEST(Tree, StemHasItsDiameterAtBreastHeight) {
-  const World world(quiet_site());
+  World world(quiet_site());
   for (const Tree& tree : world.stand.trees) {
     EXPECT_NEAR(2.0 * tree.joint(1.3).radius_m, tree.dbh_m, 1e-12);
     EXPECT_NEAR(tree.centre(0.0).z(), world.terrain.height(tree.foot.x(), tree.foot.y()), 1e-12);
@@ -185,7 +185,7 @@ TEST(Tree, StemHasItsDiameterAtBreastHeight) {
 }
 
 TEST(Scanner, CountsOfStemReturnsAgreeWithABruteCount) {
-  const World world(quiet_site());
+  World world(quiet_site());
   const SimulatedScan simulated = world.scanner.cast(150);
   std::map<int, std::map<int, int>> counted;
   for (const ScanPoint& point : simulated.scan->points) {
@@ -216,8 +216,8 @@ TEST(Scanner, SameBytesForAnyNumberOfThreadsAndAnyOrder) {
   site.lidar.divergence_mrad = 6.0;
   site.lidar.rays_per_beam = 3;
   site.lidar.range_10_percent_m = 17.0;
-  const World one(site);
-  const World two(site);
+  World one(site);
+  World two(site);
   std::vector<SimulatedScan> alone(3);
   with_threads(1, [&] {
     for (std::int64_t i = 0; i < 3; ++i)
@@ -247,7 +247,7 @@ TEST(Scanner, RangeNoiseGrowsWithRangeAndIncidence) {
   site.lidar.mount_m = {0.0, 0.0, 0.0};
   site.lidar.range_sd_m = 0.012;
   site.lidar.range_sd_per_m = 0.0004;
-  const World world(site);
+  World world(site);
   const ScanPtr kept = world.scanner.cast(20).scan;
   const Scan& scan = *kept;
   std::map<int, std::pair<double, int>> squares;
@@ -262,12 +262,43 @@ TEST(Scanner, RangeNoiseGrowsWithRangeAndIncidence) {
   EXPECT_GT(sd(50), 1.3 * sd(0));                   // 9.6 degrees down, 19 m away
 }
 
+TEST(ForestScene, WindMovesCrownsAndNotStems) {
+  SiteConfig site = quiet_site();
+  site.stand.wind_sway_m = 0.0;
+  World calm(site);
+  site.stand.wind_sway_m = 0.3;
+  World windy(site);
+  // Without foliage nothing sways; with it foliage moves while the same stems are seen.
+  EXPECT_EQ(calm.scanner.cast(3).scan->points.size(), windy.scanner.cast(3).scan->points.size());
+  site.stand.foliage = 1.0;
+  World leafy(site);
+  const Ray up{{0.0F, 0.0F, 2.0F}, {0.0F, 0.6F, 0.8F}};
+  std::vector<Ray> fan;
+  for (int i = 0; i < 400; ++i) {
+    const float angle = 0.0157F * static_cast<float>(i);
+    fan.push_back({up.origin, {0.6F * std::cos(angle), 0.6F * std::sin(angle), 0.8F}});
+  }
+  const auto ranges = [&](double time) {
+    std::vector<Hit> hits(fan.size());
+    leafy.scene.sway(time);
+    leafy.scene.cast(fan.data(), fan.size(), 0.1F, 40.0F, hits.data());
+    std::vector<float> values;
+    for (const Hit& hit : hits)
+      values.push_back(hit.range_m);
+    return values;
+  };
+  const std::vector<float> first = ranges(1.0);
+  const std::vector<float> later = ranges(2.0);
+  EXPECT_NE(first, later);
+  EXPECT_EQ(first, ranges(1.0));
+}
+
 // The edges of stems mix: with a wide beam the points around a stem spread farther than it is wide.
 TEST(Scanner, WideBeamsMakeStemsWider) {
   SiteConfig site = quiet_site();
   site.stand.trees_per_ha = 300.0;
   const auto width = [](const SiteConfig& config) {
-    const World world(config);
+    World world(config);
     const SimulatedScan simulated = world.scanner.cast(10);
     int returns = 0;
     for (const StemReturns& stem : simulated.stems)
@@ -285,9 +316,9 @@ TEST(ForestScene, OpenSkyIsOpenAndAStandHidesIt) {
   SiteConfig site = quiet_site();
   site.stand.foliage = 1.0;
   site.stand.trees_per_ha = 1200.0;
-  const World dense(site);
+  World dense(site);
   site.stand.trees_per_ha = 0.0;
-  const World open(site);
+  World open(site);
   EXPECT_EQ(open.scene.canopy_cover({0.0, 0.0, 5.0}), 0.0);
   EXPECT_GT(dense.scene.canopy_cover({0.0, 0.0, 5.0}), 0.3);
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "understory/simulation/counter_noise.h"
 #include "understory/simulation/embree.h"
@@ -134,14 +135,16 @@ class ForestScene::Impl {
     top_ = rtcNewScene(device_);
     add_static(terrain, stand);
     grow_shapes(config, seed);
+    wind_sway_m_ = config.wind_sway_m;
     add_crowns(stand);
     add_plants(stand);
-    rtcSetSceneFlags(top_, RTC_SCENE_FLAG_NONE);
     rtcCommitScene(top_);
+    if (wind_sway_m_ > 0.0) still_ = copy_of_instances();
     UNDERSTORY_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
   }
 
   ~Impl() {
+    if (still_ != nullptr) rtcReleaseScene(still_);
     rtcReleaseScene(top_);
     for (const RTCScene scene : scenes_)
       rtcReleaseScene(scene);
@@ -179,6 +182,20 @@ class ForestScene::Impl {
       hits[i] = read_hit(packet, i, rays[i]);
   }
 
+  void sway(double time_s) {
+    if (wind_sway_m_ <= 0.0) return;
+    for (const Swaying& crown : swaying_) {
+      const Eigen::Vector2d top = wind_sway_m_ * sway_of(crown.tree, crown.height_m, time_s);
+      Eigen::Matrix<float, 3, 4> world_from_shape = crown.world_from_shape;
+      world_from_shape.col(2).head<2>() += (top / crown.shape_height_m).cast<float>();
+      RTCGeometry geometry = rtcGetGeometry(top_, crown.instance);
+      rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR,
+                              world_from_shape.data());
+      rtcCommitGeometry(geometry);
+    }
+    rtcCommitScene(top_);
+  }
+
   [[nodiscard]] bool occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& to) const {
     RTCRay ray{};
     ray.org_x = origin.x();
@@ -190,12 +207,35 @@ class ForestScene::Impl {
     ray.tnear = 0.05F;
     ray.tfar = 60.0F;
     ray.mask = 0xffffffffU;
-    embree_occluded1(top_, &ray);
+    embree_occluded1(still_ != nullptr ? still_ : top_, &ray);
     if (ray.tfar >= 0.0F) embree_occluded1(static_, &ray);
     return ray.tfar < 0.0F;
   }
 
  private:
+  // A part of a crown that leans with the wind.
+  struct Swaying {
+    unsigned instance;
+    Eigen::Matrix<float, 3, 4> world_from_shape;
+    std::uint64_t tree;
+    double height_m;
+    double shape_height_m;
+  };
+
+  // Where the wind has the top of a tree, for a sway of standard deviation 1 in each direction:
+  // trees swing at their own pace, the taller the slower, in gusts that all of them feel.
+  static Eigen::Vector2d sway_of(std::uint64_t tree, double height_m, double time_s) {
+    CounterNoise noise(tree, stream_of(NoiseStream::kShapes), 77);
+    const double pace = 2.0 * std::numbers::pi * 3.6 / (height_m + 4.0);
+    const auto wave = [&](double share) {
+      return std::sin(share * pace * time_s + 2.0 * std::numbers::pi * noise.uniform());
+    };
+    const double gust = 1.0 + 0.6 * std::sin(0.31 * time_s) + 0.3 * std::sin(0.83 * time_s + 1.0);
+    const double east = 0.85 * wave(1.0) + 0.5 * wave(0.37);
+    const double north = 0.85 * wave(1.13) + 0.5 * wave(0.41);
+    return gust * Eigen::Vector2d(east, north);
+  }
+
   // What an instance is: its surface, how it is turned, and how bright.
   struct Instance {
     Surface surface;
@@ -335,8 +375,12 @@ class ForestScene::Impl {
         high * static_cast<float>(tree.lean.y()), high;
     world_from_shape.col(3) = tree.foot.cast<float>();
     const float leaf = tree.species == Species::kBirch ? 0.5F : 0.42F;
-    add_instance(crown.living, world_from_shape, {Surface::kFoliage, cos_yaw, sin_yaw, leaf});
-    add_instance(crown.dead, world_from_shape, {Surface::kFoliage, cos_yaw, sin_yaw, 0.3F});
+    for (const auto& [scene, reflectivity] : {std::pair(crown.living, leaf), {crown.dead, 0.3F}}) {
+      const unsigned number = add_instance(scene, world_from_shape,
+                                           {Surface::kFoliage, cos_yaw, sin_yaw, reflectivity});
+      swaying_.push_back({number, world_from_shape, static_cast<std::uint64_t>(tree.id),
+                          tree.height_m, crown.size.height_m});
+    }
   }
 
   void add_plants(const Stand& stand) {
@@ -363,21 +407,41 @@ class ForestScene::Impl {
     return scene;
   }
 
-  RTCScene shape_scene(const Shape& shape) {
+  RTCScene shape_scene(Shape shape) {
+    if (shape.triangles.empty()) {  // a bare crown: a triangle without area, which no ray meets
+      shape.vertices.assign(3, Eigen::Vector3f::Zero());
+      shape.triangles.emplace_back(0, 1, 2);
+    }
     RTCScene scene = new_scene();
     attach(scene, shape_geometry(device_, shape));
     rtcCommitScene(scene);
     return scene;
   }
 
-  void add_instance(RTCScene scene, const Eigen::Matrix<float, 3, 4>& world_from_shape,
-                    const Instance& instance) {
+  unsigned add_instance(RTCScene scene, const Eigen::Matrix<float, 3, 4>& world_from_shape,
+                        const Instance& instance) {
     RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
     rtcSetGeometryInstancedScene(geometry, scene);
     rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, world_from_shape.data());
     const unsigned id = attach(top_, geometry);
     UNDERSTORY_CHECK(id == instances_.size());
     instances_.push_back(instance);
+    shapes_.push_back({scene, world_from_shape});
+    return id;
+  }
+
+  // The same crowns and plants once more, to stay where they are.
+  RTCScene copy_of_instances() {
+    RTCScene copy = rtcNewScene(device_);
+    for (const auto& [scene, world_from_shape] : shapes_) {
+      RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+      rtcSetGeometryInstancedScene(geometry, scene);
+      rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR,
+                              world_from_shape.data());
+      attach(copy, geometry);
+    }
+    rtcCommitScene(copy);
+    return copy;
   }
 
   RTCDevice device_ = nullptr;
@@ -386,7 +450,11 @@ class ForestScene::Impl {
   std::vector<RTCScene> scenes_;
   std::vector<CrownShape> crowns_;
   std::vector<RTCScene> plants_;  // three of each kind
+  RTCScene still_ = nullptr;      // the instances at rest, if there is wind
   std::vector<Instance> instances_;
+  std::vector<std::pair<RTCScene, Eigen::Matrix<float, 3, 4>>> shapes_;  // of the instances
+  std::vector<Swaying> swaying_;
+  double wind_sway_m_ = 0.0;
   std::vector<int> cone_tree_;  // id of the tree of each cone
   std::vector<float> bark_;     // reflectivity by id
 };
@@ -395,6 +463,10 @@ ForestScene::ForestScene(const StandConfig& config, const Terrain& terrain, cons
                          std::uint64_t seed)
     : impl_(std::make_unique<Impl>(config, terrain, stand, seed)) {}
 ForestScene::~ForestScene() = default;
+
+void ForestScene::sway(double time_s) {
+  impl_->sway(time_s);
+}
 
 void ForestScene::cast(const Ray* rays, std::size_t count, float near_m, float far_m,
                        Hit* hits) const {

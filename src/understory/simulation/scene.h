@@ -28,7 +28,7 @@ struct Hit {
 
 // Terrain and stand as Embree geometry: stems are round cones one by one; crowns and plants are
 // instances of a few grown shapes, so that memory hardly grows with the number of trees. Casting is
-// thread-safe; results depend on the rays alone.
+// thread-safe; results depend on the rays and on the moment of the wind alone.
 class ForestScene {
  public:
   ForestScene(const StandConfig& config, const Terrain& terrain, const Stand& stand,
@@ -37,11 +37,15 @@ class ForestScene {
   ForestScene(const ForestScene&) = delete;
   ForestScene& operator=(const ForestScene&) = delete;
 
+  // Puts the crowns where the wind has them at a time; before that they hang at rest. What a later
+  // moment looks like does not depend on earlier ones. Not while others cast.
+  void sway(double time_s);
+
   // The first thing each ray meets within [near_m, far_m]. Neighbouring rays should lie beside each
   // other: sixteen at a time go through the scene together.
   void cast(const Ray* rays, std::size_t count, float near_m, float far_m, Hit* hits) const;
 
-  // Share of the upper sky (above 15 degrees) that is hidden from a place, 0..1.
+  // Share of the upper sky (above 15 degrees) that is hidden from a place, 0..1, in still air.
   [[nodiscard]] double canopy_cover(const Eigen::Vector3d& place) const;
 
  private:

@@ -85,9 +85,9 @@ class Simulator::Impl {
   const Terrain terrain;
   const Stand stand;
   const CarrierPlan plan;
-  const ForestScene scene;
+  ForestScene scene;
   const Machine machine;
-  const Scanner scanner;
+  Scanner scanner;
   InertialSensor imu;
   SatelliteReceiver gnss;
   std::optional<GnssFix> next_fix;
