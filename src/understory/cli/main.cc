@@ -52,6 +52,7 @@ int run(int argc, char** argv) {
   // In the order of the help page; each lives in a file of its own.
   add_info_command(app, chosen);
   add_simulate_command(app, chosen);
+  add_register_command(app, chosen);
   add_inventory_command(app, chosen);
   add_evaluate_command(app, chosen);
   try {

@@ -14,10 +14,12 @@ struct IcpConfig {
   Metric metric = Metric::kPointToPlane;
   double max_distance_m = 1.0;  // farther neighbours are no match
   double kernel_m = 0.1;        // scale of the Geman-McClure kernel
-  int normal_neighbours = 10;
-  double max_planarity = 0.1;  // smallest / middle eigenvalue; above it a point has no normal and
-                               // is matched point to point
+  int normal_neighbours = 16;
+  double max_planarity = 0.1;       // smallest / middle eigenvalue; above it a point says nothing
+  double sigma_m = 0.03;            // noise of a point, for the cost against the prior
+  double independent_share = 0.05;  // share of the points that counts as independent
   int max_iterations = 50;
+  double max_step_m = 0.5;
   double step_translation_m = 2e-4;
   double step_rotation_rad = 2e-5;
   double degenerate_ratio = 0.01;
@@ -25,7 +27,8 @@ struct IcpConfig {
 };
 void describe(ConfigTable& table, IcpConfig& config);
 
-// Target of ICP: points with a search tree and normals. Immutable, shared between threads.
+// Target of ICP: points with a search tree and normals. Thin the points by a voxel filter first:
+// the nearest few of a dense cloud span less than its noise. Immutable, shared between threads.
 class IcpTarget {
  public:
   IcpTarget(const Points& points, const IcpConfig& config);

@@ -32,6 +32,10 @@ void describe(ConfigTable& table, NdtConfig& config) {
             "converged when a step is shorter");
   table.add("step_rotation_rad", config.step_rotation_rad, {1e-8, 0.1}, "rad",
             "converged when a step turns less");
+  table.add("widening", config.widening, {1.0, 20.0}, "",
+            "the first steps see normals this much wider; 1 = no such steps");
+  table.add("wide_until_m", config.wide_until_m, {1e-4, 1.0}, "m",
+            "the first steps end when one is shorter");
   table.add("max_step_m", config.max_step_m, {0.01, 10.0}, "m", "longest step");
   table.add("degenerate_ratio", config.degenerate_ratio, {0.0, 0.5}, "",
             "a direction with less of the strongest direction's information is undetermined");
@@ -209,7 +213,8 @@ void add_exact_terms(const Match& match, const NdtCell& cell, const Eigen::Vecto
 
 class Accumulator {
  public:
-  Accumulator(const NdtMap& target, const Points& source, const Pose& pose, const NdtConfig& config)
+  Accumulator(const NdtMap& target, const Points& source, const Pose& pose, const NdtConfig& config,
+              double widening)
       : target_(target),
         source_(source),
         local_(localise(pose, target.cell_size())),
@@ -217,8 +222,8 @@ class Accumulator {
         trilinear_(config.search == NdtConfig::Search::k8) {
     const MixtureConstants mixture =
         internal::mixture_constants(config.outlier_ratio, target.cell_size());
-    d1_ = static_cast<float>(mixture.d1);
-    d2_ = static_cast<float>(mixture.d2);
+    d2_ = static_cast<float>(mixture.d2 / (widening * widening));
+    pull_ = static_cast<float>(-mixture.d1 * mixture.d2);
     if (!trilinear_) fixed_count_ = fixed_neighbours(config.search, fixed_);
   }
 
@@ -272,10 +277,10 @@ class Accumulator {
                  float share, BlockSums& sums) const {
     if (matched.q * d2_ > 60.0F) return;
     const float likelihood = std::exp(-0.5F * d2_ * matched.q);
-    const float weight = -d1_ * d2_ * likelihood * share;
+    const float weight = pull_ * likelihood * share;
     add_gauss_newton(matched, weight, sums);
     if (exact_) add_exact_terms(matched, cell, lever, weight, d2_, sums);
-    sums.cost += static_cast<double>(d1_ * likelihood * share);
+    sums.cost -= static_cast<double>(weight / d2_);
     sums.weight += static_cast<double>(weight);
     sums.weighted_residual += static_cast<double>(weight * matched.q);
     sums.weighted_rows += static_cast<double>(weight) * matched.rows;
@@ -290,8 +295,8 @@ class Accumulator {
   bool trilinear_;
   Neighbours fixed_{};
   int fixed_count_ = 0;
-  float d1_ = -1.0F;
-  float d2_ = 1.0F;
+  float d2_ = 1.0F;    // of the (widened) kernel
+  float pull_ = 1.0F;  // weight of a perfect match
 };
 
 void add_block(const BlockSums& block, NdtCost& to) {
@@ -312,8 +317,8 @@ void add_block(const BlockSums& block, NdtCost& to) {
 }  // namespace
 
 NdtCost ndt_cost(const NdtMap& target, const Points& source, const Pose& target_from_source,
-                 const NdtConfig& config) {
-  const Accumulator accumulator(target, source, target_from_source, config);
+                 const NdtConfig& config, double widening) {
+  const Accumulator accumulator(target, source, target_from_source, config, widening);
   const std::size_t blocks = (source.size() + kBlock - 1) / kBlock;
   std::vector<BlockSums> sums(blocks);
   parallel_for(blocks, 2, [&](std::size_t b) {
@@ -370,16 +375,29 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
                    "only " + std::to_string(source.size()) + " source points", guess);
   }
   const double range = internal::mean_range(source);
+  double widening = config.widening;
   const auto evaluate = [&](const Pose& pose) {
-    const NdtCost at = ndt_cost(target, source, pose, config);
+    const NdtCost at = ndt_cost(target, source, pose, config, widening);
     const double share = config.independent_share;
     internal::Quadratic sum{share * at.cost, share * at.gradient, share * at.hessian};
     if (prior) internal::add_prior(*prior, pose, sum);
     return sum;
   };
-  const internal::StepLimits limits{config.max_iterations, config.step_translation_m,
-                                    config.step_rotation_rad, config.max_step_m, range};
-  const internal::Minimum minimum = internal::minimise(evaluate, guess, limits);
+  internal::StepLimits limits{config.max_iterations, config.step_translation_m,
+                              config.step_rotation_rad, config.max_step_m, range};
+  internal::Minimum minimum{guess, {}, 0, false};
+  // From far away a narrow normal has no pull: wide ones first, until the steps become short.
+  if (widening > 1.0) {
+    limits.step_translation_m = config.wide_until_m;
+    limits.step_rotation_rad = config.wide_until_m / range;
+    minimum = internal::minimise(evaluate, guess, limits);
+  }
+  const int wide_iterations = minimum.iterations;
+  widening = 1.0;
+  limits.step_translation_m = config.step_translation_m;
+  limits.step_rotation_rad = config.step_rotation_rad;
+  minimum = internal::minimise(evaluate, minimum.pose, limits);
+  minimum.iterations += wide_iterations;
 
   NdtConfig plain = config;  // information has to be positive
   plain.hessian = NdtConfig::Hessian::kGaussNewton;

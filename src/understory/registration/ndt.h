@@ -19,20 +19,24 @@ struct NdtConfig {
       // the point; with all neighbours
   enum class Hessian { kGaussNewton, kNewton };
 
-  Search search = Search::k8;
+  Search search = Search::k1;
   Hessian hessian = Hessian::kGaussNewton;
   // Share of points expected to match nothing, P4 after (41) [Magnusson 2009, (6.8)].
   double outlier_ratio = 0.3;
+  // The first steps see normals this much wider, which pull from farther away; they end when a step
+  // is shorter than `wide_until_m` (turns count at the mean range of the points).
+  double widening = 3.0;
+  double wide_until_m = 0.02;
   int max_iterations = 30;
-  double step_translation_m = 5e-4;  // converged when a step is smaller than both
-  double step_rotation_rad = 5e-5;
+  double step_translation_m = 1e-3;  // converged when a step is smaller than both
+  double step_rotation_rad = 1e-4;
   double max_step_m = 0.5;         // longest step; rotations scaled by the mean range
   double degenerate_ratio = 0.01;  // a direction with less than this share of the strongest
                                    // direction's information counts as undetermined
   int min_matches = 50;
   // Neighbouring points see the same cell and share its error: this share of them counts as
   // independent. Scales the matching cost against the prior, and the information.
-  double independent_share = 0.1;
+  double independent_share = 0.05;
 };
 void describe(ConfigTable& table, NdtConfig& config);
 
@@ -65,6 +69,7 @@ struct NdtCost {
   double surface_squared = 0.0;    // sum of weight * squared distance from the surface, m^2
 };
 [[nodiscard]] NdtCost ndt_cost(const NdtMap& target, const Points& source,
-                               const Pose& target_from_source, const NdtConfig& config);
+                               const Pose& target_from_source, const NdtConfig& config,
+                               double widening = 1.0);
 
 }  // namespace understory

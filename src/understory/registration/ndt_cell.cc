@@ -81,6 +81,7 @@ Eigen::Matrix3d CellMoments::covariance() const {
 NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
                   const MomentsAround& around) {
   NdtCell cell;
+  cell.row.fill(Eigen::Vector3f::Zero());
   cell.count = static_cast<std::uint32_t>(moments.n);
   cell.mean = moments.mean().cast<float>();
   const Eigen::Matrix3d covariance = moments.covariance();

@@ -1,0 +1,241 @@
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "understory/cli/command.h"
+#include "understory/preprocess/voxel_filter.h"
+#include "understory/recording/cloud_file.h"
+#include "understory/registration/icp.h"
+#include "understory/registration/ndt.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+struct RegisterConfig {
+  double target_voxel_m = 0.1;
+  double source_voxel_m = 0.25;
+  std::vector<double> cell_sizes_m = {3.0, 1.0, 0.5};
+  NdtMapConfig map;
+  NdtConfig ndt;
+  IcpConfig icp;
+};
+
+void describe(ConfigTable& table, RegisterConfig& config) {
+  table.add("target_voxel_m", config.target_voxel_m, {0.01, 5.0}, "m",
+            "voxels that thin the target");
+  table.add("source_voxel_m", config.source_voxel_m, {0.01, 5.0}, "m",
+            "voxels that thin the source (ICP: both)");
+  table.section("ndt", [&] {
+    table.add("cell_sizes_m", config.cell_sizes_m, "m", "cells from coarse to fine");
+    table.add("min_points", config.map.min_points, {3, 1000}, "",
+              "cells with fewer points are not matched");
+    table.add("sigma_floor_m", config.map.sigma_floor_m, {0.001, 1.0}, "m",
+              "no surface is taken to be thinner");
+    describe(table, config.ndt);
+  });
+  table.section("icp", [&] { describe(table, config.icp); });
+}
+
+struct RegisterOptions {
+  std::string target;
+  std::string source;
+  std::string method = "ndt";
+  std::vector<double> guess;
+  std::string config_file;
+  std::vector<std::string> settings;
+  bool json = false;
+  bool print_config = false;
+};
+
+const char* name_of(RegistrationStatus status) {
+  switch (status) {
+    case RegistrationStatus::kConverged:
+      return "converged";
+    case RegistrationStatus::kIterationLimit:
+      return "iteration_limit";
+    case RegistrationStatus::kDegenerate:
+      return "degenerate";
+    case RegistrationStatus::kTooFewPoints:
+      return "too_few_points";
+    case RegistrationStatus::kTooFewMatches:
+      return "too_few_matches";
+  }
+  return "?";
+}
+
+// The guess as given: nothing, x y z, x y z qx qy qz qw, or 16 numbers row by row.
+Pose parse_guess(const std::vector<double>& numbers) {
+  switch (numbers.size()) {
+    case 0:
+      return {};
+    case 3:
+      return {Eigen::Quaterniond::Identity(), Eigen::Vector3d(numbers.data())};
+    case 7: {
+      const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
+      if (!(rotation.norm() > 0.5)) break;
+      return {rotation, Eigen::Vector3d(numbers.data())};
+    }
+    case 16: {
+      const Eigen::Matrix4d matrix =
+          Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data());
+      const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+      const Eigen::RowVector4d last = matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1);
+      const double off = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
+      if (off > 1e-3 || rotation.determinant() < 0.0 || last.norm() > 1e-9) break;
+      return Pose::from_matrix(matrix);
+    }
+    default:
+      break;
+  }
+  throw ConfigError(
+      {"--guess: expected x,y,z or x,y,z,qx,qy,qz,qw or a rigid motion as 16 numbers row by row"});
+}
+
+// A cloud in a frame of its own: `shift` takes its points back to the frame of the file.
+struct Loaded {
+  Points points;
+  Eigen::Vector3d shift;
+};
+
+Loaded load(const std::string& path, const Eigen::Vector3d* frame, Log& log) {
+  PointCloudFile file = read_cloud(path, log);
+  Loaded loaded{std::move(file.points), frame != nullptr ? *frame : file.origin};
+  const Eigen::Vector3f offset = (file.origin - loaded.shift).cast<float>();
+  for (Eigen::Vector3f& point : loaded.points)
+    point += offset;
+  return loaded;
+}
+
+RegistrationResult match(const RegisterOptions& options, const RegisterConfig& config,
+                         const Points& target, const Points& source, const Pose& guess) {
+  VoxelFilter filter;
+  const Points thinned = filter.filter(source, config.source_voxel_m);
+  if (options.method == "icp") {
+    const IcpTarget tree(filter.filter(target, config.source_voxel_m), config.icp);
+    return register_icp(tree, thinned, guess, std::nullopt, config.icp);
+  }
+  const Points dense = filter.filter(target, config.target_voxel_m);
+  std::vector<NdtMapPtr> maps;
+  for (const double size : config.cell_sizes_m) {
+    NdtMapConfig map = config.map;
+    map.cell_size_m = size;
+    const PlacedCloud cloud{&dense, Pose()};
+    maps.push_back(build_ndt_map({&cloud, 1}, map));
+  }
+  return register_ndt(maps, thinned, guess, std::nullopt, config.ndt);
+}
+
+nlohmann::json numbers_of(const Eigen::MatrixXd& matrix) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+    for (Eigen::Index c = 0; c < matrix.cols(); ++c)
+      rows.push_back(matrix(r, c));
+  }
+  return rows;
+}
+
+void print_json(const RegistrationResult& result, const Pose& a_from_b) {
+  nlohmann::json out;
+  out["a_from_b"] = numbers_of(a_from_b.matrix());
+  out["status"] = name_of(result.status);
+  out["reason"] = result.reason;
+  out["fitness_m2"] = result.fitness_m2;
+  out["surface_residual_m2"] = result.surface_residual_m2;
+  out["inlier_ratio"] = result.inlier_ratio;
+  out["iterations"] = result.iterations;
+  out["information"] = numbers_of(result.information);
+  out["degenerate_directions"] = nlohmann::json::array();
+  for (Eigen::Index i = 0; i < result.degenerate_directions.cols(); ++i)
+    out["degenerate_directions"].push_back(numbers_of(result.degenerate_directions.col(i)));
+  std::printf("%s\n", out.dump(2).c_str());
+}
+
+void print_text(const RegistrationResult& result, const Pose& a_from_b) {
+  const Eigen::Matrix4d matrix = a_from_b.matrix();
+  std::printf("a_from_b\n");
+  for (int r = 0; r < 4; ++r)
+    std::printf("%.9f %.9f %.9f %.9f\n", matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3));
+  std::printf("status %s%s%s\n", name_of(result.status), result.reason.empty() ? "" : ": ",
+              result.reason.c_str());
+  std::printf("fitness_m2 %.6f\nsurface_residual_m2 %.6f\ninlier_ratio %.4f\niterations %d\n",
+              result.fitness_m2, result.surface_residual_m2, result.inlier_ratio,
+              result.iterations);
+  std::printf("information (rotation x y z, translation x y z)\n");
+  for (int r = 0; r < 6; ++r) {
+    for (int c = 0; c < 6; ++c)
+      std::printf("%.6g%c", result.information(r, c), c == 5 ? '\n' : ' ');
+  }
+  std::printf("degenerate_directions %td\n", result.degenerate_directions.cols());
+  for (Eigen::Index i = 0; i < result.degenerate_directions.cols(); ++i) {
+    for (int r = 0; r < 6; ++r)
+      std::printf("%.4f%c", result.degenerate_directions(r, i), r == 5 ? '\n' : ' ');
+  }
+}
+
+int run_register(const RegisterOptions& options, CommandContext& context) {
+  RegisterConfig config;
+  ConfigTable table;
+  describe(table, config);
+  if (!options.config_file.empty()) table.read_file(options.config_file);
+  table.set(options.settings);
+  if (options.print_config) {
+    std::fputs(table.to_yaml(true).c_str(), stdout);
+    return kExitDone;
+  }
+  if (options.target.empty() || options.source.empty())
+    throw ConfigError({"register: expected two clouds, A and B"});
+  if (config.cell_sizes_m.empty()) throw ConfigError({"ndt.cell_sizes_m: expected at least one"});
+  for (const double size : config.cell_sizes_m) {
+    if (!(size > 0.0)) throw ConfigError({"ndt.cell_sizes_m: expected numbers above 0"});
+  }
+  // Both clouds relative to A's origin, so that single precision is enough in any coordinate
+  // system.
+  const Loaded target = load(options.target, nullptr, context.log);
+  const Loaded source = load(options.source, &target.shift, context.log);
+  const Pose shift(Eigen::Quaterniond::Identity(), target.shift);
+  const Pose guess = shift.inverse() * parse_guess(options.guess) * shift;
+  const RegistrationResult result = match(options, config, target.points, source.points, guess);
+  const Pose a_from_b = shift * result.target_from_source * shift.inverse();
+  if (options.json)
+    print_json(result, a_from_b);
+  else
+    print_text(result, a_from_b);
+  const bool trusted =
+      result.status == RegistrationStatus::kConverged && result.degenerate_directions.cols() == 0;
+  if (!trusted)
+    context.log.warn("register.untrusted",
+                     result.reason.empty() ? "some directions are undetermined" : result.reason);
+  return trusted ? kExitDone : kExitUntrusted;
+}
+
+}  // namespace
+
+void add_register_command(CLI::App& app, Command& chosen) {
+  auto options = std::make_shared<RegisterOptions>();
+  CLI::App* command = app.add_subcommand("register", "Match one point cloud to another");
+  command->add_option("A", options->target, "Target cloud (.pcd, .ply, .las, .laz, .bin)");
+  command->add_option("B", options->source, "Source cloud");
+  command->add_option("--method", options->method, "ndt or icp")
+      ->check(CLI::IsMember({"ndt", "icp"}));
+  command
+      ->add_option("--guess", options->guess,
+                   "a_from_b to start from: x,y,z or x,y,z,qx,qy,qz,qw or 16 numbers row by row")
+      ->delimiter(',');
+  command->add_option("--config", options->config_file, "YAML file with settings");
+  command->add_option("--set", options->settings, "Change a setting: key=value");
+  command->add_flag("--json", options->json, "Print one JSON object");
+  command->add_flag("--print-config", options->print_config, "Print every key with its meaning");
+  command->footer(
+      "Example: understory register a.pcd b.pcd --method ndt --guess 1.2,0,0 --json\n"
+      "prints a_from_b, the motion that takes points of B to A, row by row. Exit code 4: the "
+      "match\n"
+      "did not converge or leaves directions undetermined.");
+  command->callback([options, &chosen] {
+    chosen = [options](CommandContext& context) { return run_register(*options, context); };
+  });
+}
+
+}  // namespace understory

@@ -1,0 +1,194 @@
+#include "understory/registration/ndt_map.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "understory/registration/test_stand.h"
+#include "understory/util/parallel.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+Pose somewhere() {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 2, 3).normalized())),
+          Eigen::Vector3d(7, -3, 2)};
+}
+
+Points random_points(std::size_t n, std::uint64_t seed) {
+  Random random(seed);
+  Points points;
+  for (std::size_t i = 0; i < n; ++i) {
+    points.push_back(
+        Eigen::Vector3d(random.uniform(-5, 5), random.uniform(-5, 5), random.uniform(-2, 2))
+            .cast<float>());
+  }
+  return points;
+}
+
+// Means and counts of the cells, P4 (40), against a plain computation.
+TEST(NdtMap, CellsHoldTheMeanOfTheirPoints) {
+  const Points points = random_points(20'000, 1);
+  NdtMapConfig config;
+  config.cell_size_m = 0.7;
+  const PlacedCloud cloud{&points, somewhere()};
+  const NdtMapPtr map = build_ndt_map({&cloud, 1}, config);
+  std::map<std::array<int, 3>, std::pair<int, Eigen::Vector3d>> expected;
+  for (const Eigen::Vector3f& p : points) {
+    const Eigen::Vector3d placed = somewhere() * p.cast<double>();
+    std::array<int, 3> key;
+    for (int k = 0; k < 3; ++k)
+      key[static_cast<std::size_t>(k)] = static_cast<int>(std::floor(placed[k] / 0.7));
+    auto& cell = expected.try_emplace(key, 0, Eigen::Vector3d::Zero()).first->second;
+    ++cell.first;
+    cell.second += placed;
+  }
+  std::size_t compared = 0;
+  for (std::size_t i = 0; i < map->size(); ++i) {
+    const auto& cell = expected.at(map->coordinates()[i]);
+    // A point on a border may fall to either side in single precision.
+    if (map->cells()[i].count != static_cast<std::uint32_t>(cell.first)) continue;
+    EXPECT_LT((map->mean(i) - cell.second / cell.first).norm(), 1e-4);
+    ++compared;
+  }
+  EXPECT_GT(compared, map->size() * 98 / 100);
+  const std::array<int, 3>& at = map->coordinates()[5];
+  EXPECT_EQ(map->find(at[0], at[1], at[2]), &map->cells()[5]);
+  EXPECT_EQ(map->find(1000, 0, 0), nullptr);
+}
+
+TEST(NdtMap, PlanesConstrainAcrossThemOnly) {
+  Random random(2);
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.2, -0.3, 1.0).normalized();
+  Points points;
+  for (int i = 0; i < 20'000; ++i) {
+    Eigen::Vector3d p(random.uniform(-4, 4), random.uniform(-4, 4), 0.0);
+    p.z() = -(normal.x() * p.x() + normal.y() * p.y()) / normal.z();
+    points.push_back((p + 0.02 * random.normal() * normal).cast<float>());
+  }
+  const PlacedCloud cloud{&points, Pose()};
+  const NdtMapPtr map = build_ndt_map({&cloud, 1}, {});
+  int surfaces = 0;
+  for (const NdtCell& cell : map->cells()) {
+    if (cell.count < 100) continue;
+    ASSERT_EQ(cell.rows, 1);
+    const Eigen::Vector3d row = cell.row[0].cast<double>();
+    EXPECT_GT(std::abs(row.normalized().dot(normal)), 0.99);
+    // 1 / (0.02^2 + floor^2) less what a full cell would say.
+    EXPECT_NEAR(row.squaredNorm(), 1.0 / (0.0004 + 0.0009), 150.0);
+    ++surfaces;
+  }
+  EXPECT_GT(surfaces, 40);
+}
+
+TEST(NdtMap, AnEvenlyFilledCellSaysNothing) {
+  const Points points = random_points(200'000, 3);
+  const PlacedCloud cloud{&points, Pose()};
+  const NdtMapPtr map = build_ndt_map({&cloud, 1}, {});
+  double strongest = 0.0;
+  for (const NdtCell& cell : map->cells()) {
+    if (cell.count < 300) continue;
+    for (int r = 0; r < cell.rows; ++r)
+      strongest =
+          std::max(strongest, static_cast<double>(cell.row[static_cast<std::size_t>(r)].norm()));
+  }
+  EXPECT_LT(strongest, 2.5);  // a sigma of 0.4 m at least, in cells of 1 m
+}
+
+// A single ring on the ground is a line; only together with its neighbours does it show the ground.
+TEST(NdtMap, RingsOnTheGroundDoNotConstrainAlongIt) {
+  const testing::Stand flat;
+  const Pose pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 2.0));
+  const Points points = testing::scan_stand(flat, pose, testing::vlp16(), 1);
+  const PlacedCloud cloud{&points, pose};
+  const NdtMapPtr map = build_ndt_map({&cloud, 1}, {});
+  int constrained = 0;
+  for (const NdtCell& cell : map->cells()) {
+    for (int r = 0; r < cell.rows; ++r) {
+      const Eigen::Vector3f row = cell.row[static_cast<std::size_t>(r)];
+      EXPECT_LT(row.head<2>().norm(), 0.35F * row.norm());
+      ++constrained;
+    }
+  }
+  EXPECT_GT(constrained, 50);
+}
+
+// The arc that a ring leaves on a stem still says how far the stem is.
+TEST(NdtMap, ArcsOnAStemKeepTheirDistance) {
+  testing::Stand stand;
+  testing::Stem stem;
+  stem.foot = {8.0, 0.0, 0.0};
+  stand.stems.push_back(stem);
+  const Pose pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 2.0));
+  const Points points = testing::scan_stand(stand, pose, testing::vlp16(), 1);
+  const PlacedCloud cloud{&points, pose};
+  NdtMapConfig config;
+  config.cell_size_m = 0.5;
+  const NdtMapPtr map = build_ndt_map({&cloud, 1}, config);
+  int on_stem = 0;
+  for (std::size_t i = 0; i < map->size(); ++i) {
+    const Eigen::Vector3d mean = map->mean(i);
+    if (mean.z() < 0.6 || (mean - Eigen::Vector3d(8, 0, mean.z())).norm() > 0.4) continue;
+    const NdtCell& cell = map->cells()[i];
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    for (int r = 0; r < cell.rows; ++r) {
+      const Eigen::Vector3d row = cell.row[static_cast<std::size_t>(r)].cast<double>();
+      information += row * row.transpose();
+    }
+    if (information(0, 0) > 100.0) ++on_stem;
+    EXPECT_LT(information(2, 2), 100.0);  // nothing holds along the stem
+  }
+  EXPECT_GE(on_stem, 3);
+}
+
+TEST(NdtMap, GrowingIsTheSameAsBuildingAtOnce) {
+  const testing::Stand stand = testing::make_stand({.half_width_m = 15.0}, 1);
+  std::vector<Points> clouds;
+  std::vector<Pose> poses;
+  for (int i = 0; i < 3; ++i) {
+    poses.emplace_back(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.5 * i, 0, 1.6));
+    clouds.push_back(testing::scan_stand(stand, poses.back(), testing::vlp16(), 10));
+  }
+  NdtMapBuilder growing({});
+  std::vector<PlacedCloud> placed;
+  NdtMapPtr last;
+  for (std::size_t i = 0; i < 3; ++i) {
+    growing.insert(clouds[i], poses[i]);
+    last = growing.snapshot();
+    placed.push_back({&clouds[i], poses[i]});
+  }
+  NdtMapPtr at_once;
+  with_threads(2, [&] { at_once = build_ndt_map(placed, {}); });
+  ASSERT_EQ(last->size(), at_once->size());
+  for (std::size_t i = 0; i < last->size(); ++i) {
+    EXPECT_EQ(last->coordinates()[i], at_once->coordinates()[i]);
+    EXPECT_EQ(last->cells()[i].mean, at_once->cells()[i].mean);
+    EXPECT_EQ(last->cells()[i].rows, at_once->cells()[i].rows);
+    EXPECT_EQ(last->cells()[i].row[0], at_once->cells()[i].row[0]);
+  }
+}
+
+TEST(NdtMap, ForgetsWhatIsFarAway) {
+  const Points points = random_points(20'000, 5);
+  NdtMapBuilder builder({});
+  builder.insert(points, Pose());
+  const NdtMapPtr all = builder.snapshot();
+  builder.remove_beyond(Eigen::Vector3d(2, 0, 0), 3.0);
+  const NdtMapPtr some = builder.snapshot();
+  EXPECT_LT(some->size(), all->size());
+  EXPECT_GT(some->size(), 20U);
+  for (std::size_t i = 0; i < some->size(); ++i) {
+    EXPECT_LT((some->mean(i) - Eigen::Vector3d(2, 0, 0)).norm(), 3.9);
+    const std::array<int, 3>& at = some->coordinates()[i];
+    EXPECT_EQ(some->find(at[0], at[1], at[2]), &some->cells()[i]);
+  }
+  builder.clear();
+  EXPECT_TRUE(builder.snapshot()->empty());
+}
+
+}  // namespace
+}  // namespace understory
