@@ -1,0 +1,105 @@
+"""Runs the program for the benchmarks and reads what it wrote. Python standard library only."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+TOP = Path(__file__).resolve().parent.parent
+PROGRAM = Path(os.environ.get("UNDERSTORY_PROGRAM", TOP / "build" / "understory"))
+
+# Exit codes: done; done, but partial or not to be trusted.
+DONE, UNTRUSTED = 0, 4
+
+
+class Failed(Exception):
+    pass
+
+
+@dataclass
+class Finished:
+    code: int
+    wall_s: float
+    cpu_s: float
+    peak_memory_mb: float
+    stdout: str
+    stderr: str = field(repr=False, default="")
+
+
+def run(*arguments, cpus=None):
+    """Runs a command; its CPU time and memory are the kernel's figures for that process."""
+    command = [str(a) for a in arguments]
+    begin = time.perf_counter()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          preexec_fn=(lambda: os.sched_setaffinity(0, cpus)) if cpus else None,
+                          ) as process:
+        # Standard error is short (--quiet), so reading one after the other cannot block.
+        out, err = process.stdout.read(), process.stderr.read()
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    return Finished(process.returncode, time.perf_counter() - begin,
+                    usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024 / 1e6, out, err)
+
+
+def understory(*arguments, accept=(DONE,), cpus=None):
+    done = run(PROGRAM, "--quiet", *arguments, cpus=cpus)
+    if done.code not in accept:
+        raise Failed(f"understory {' '.join(map(str, arguments))}\n"
+                     f"ended with exit code {done.code}: {done.stderr.strip()[-800:]}")
+    return done
+
+
+def understory_json(*arguments):
+    return json.loads(understory(*arguments, "--json", accept=(DONE, UNTRUSTED)).stdout)
+
+
+def simulated(site, **keys):
+    """The name of a simulated recording: sim:SITE?key=value&..."""
+    return f"sim:{site}?" + "&".join(f"{k}={v}" for k, v in keys.items())
+
+
+def map_recording(recording, folder, threads=2, settings=(), cpus=None):
+    """Maps a recording; returns its run.json with the kernel's figures under 'process'."""
+    arguments = ["map", recording, "-o", folder, "--threads", threads, "--overwrite"]
+    for setting in settings:
+        arguments += ["--set", setting]
+    done = understory(*arguments, accept=(DONE, UNTRUSTED), cpus=cpus)
+    result = json.loads((Path(folder) / "run.json").read_text())
+    result["process"] = {"cpu_s": done.cpu_s, "wall_s": done.wall_s,
+                         "peak_memory_mb": done.peak_memory_mb}
+    return result
+
+
+def truth_of(folder):
+    return f"{folder}.truth"
+
+
+def version():
+    return run(PROGRAM, "--version").stdout.strip()
+
+
+def machine():
+    """The processor and how much of it there is, for the head of a table of times."""
+    name = "unknown processor"
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                name = line.split(":", 1)[1].strip()
+                break
+    except OSError:
+        pass
+    return f"{name}, {os.cpu_count()} threads, load {os.getloadavg()[0]:.1f}"
+
+
+def say(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+def own_cpus(count=2):
+    """The first `count` processors that this process may use."""
+    return set(sorted(os.sched_getaffinity(0))[:count])
+
+
