@@ -2,13 +2,20 @@
 # python-env.sh: a folder with the Python packages that tests compare with (tests/requirements.txt),
 # made once in the cache. Prints its interpreter. A package that cannot be installed is named and
 # left out; the tests that need it then skip.
-#   python-env.sh --where   prints the interpreter's path without making anything
+#   python-env.sh --where            prints the interpreter's path without making anything
+#   python-env.sh [--where] FILE     the same for another list of packages: a package of one list may
+#                                    hold another back (ouster-sdk keeps kiss-icp at an old version)
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
-requirements=$top/tests/requirements.txt
+where=0
+if [[ ${1:-} == --where ]]; then
+  where=1
+  shift
+fi
+requirements=$top/${1:-tests/requirements.txt}
 folder=$cache/python/$( (python3 --version; cat "$requirements") | sha256sum | cut -c1-16)
 
-if [[ ${1:-} == --where || -e $folder/complete ]]; then
+if ((where)) || [[ -e $folder/complete ]]; then
   echo "$folder/bin/python"
   exit
 fi
