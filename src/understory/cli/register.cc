@@ -17,7 +17,7 @@ namespace {
 struct RegisterConfig {
   double target_voxel_m = 0.1;
   double source_voxel_m = 0.25;
-  std::vector<double> cell_sizes_m = {3.0, 1.0, 0.5};
+  std::vector<double> cell_sizes_m = {3.0, 1.0};
   NdtMapConfig map;
   NdtConfig ndt;
   IcpConfig icp;
