@@ -51,6 +51,7 @@ int run(int argc, char** argv) {
   Command chosen;
   // In the order of the help page; each lives in a file of its own.
   add_info_command(app, chosen);
+  add_convert_command(app, chosen);
   add_simulate_command(app, chosen);
   add_register_command(app, chosen);
   add_inventory_command(app, chosen);

@@ -44,6 +44,11 @@ void OutputFile::close() {
   if (error_ != 0) fail();
   // Some places (pipes, /dev/full) cannot be synced; what matters there was told by write.
   if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) fail();
+  close_unsynced();
+}
+
+void OutputFile::close_unsynced() {
+  if (error_ != 0) fail();
   const int descriptor = std::exchange(descriptor_, -1);
   if (::close(descriptor) != 0) fail();
 }

@@ -1,0 +1,149 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "understory/cli/command.h"
+#include "understory/cli/open_options.h"
+#include "understory/output/las_writer.h"
+#include "understory/recording/cloud_folder_writer.h"
+#include "understory/recording/mcap_writer.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+struct ConvertOptions {
+  std::string input;
+  std::string output;
+  OpenOptions open;
+  std::string format;
+  std::string compression = "zstd";
+};
+
+// What a recording is written to.
+class Target {
+ public:
+  virtual ~Target() = default;
+  virtual void set_rig(const Rig& rig) = 0;
+  virtual void write(const Event& event) = 0;
+  virtual void finish() = 0;
+};
+
+template <typename Writer>
+class TargetOf : public Target {
+ public:
+  template <typename... Arguments>
+  explicit TargetOf(Arguments&&... arguments) : writer_(std::forward<Arguments>(arguments)...) {}
+  void set_rig(const Rig& rig) override { writer_.set_rig(rig); }
+  void write(const Event& event) override { writer_.write(event); }
+  void finish() override { writer_.finish(); }
+
+ private:
+  Writer writer_;
+};
+
+// Each return's own time goes into the GPS time.
+void write_las_cloud(const std::string& path, const Scan& scan) {
+  LasWriter writer(path, {});
+  for (const ScanPoint& point : scan.points) {
+    LasPoint out;
+    out.x = point.x;
+    out.y = point.y;
+    out.z = point.z;
+    out.stamp = scan.stamp + static_cast<TimeNs>(point.t_ns);
+    out.intensity =
+        static_cast<std::uint16_t>(std::lround(std::clamp(point.intensity, 0.0F, 65535.0F)));
+    writer.add(out);
+  }
+  writer.commit();
+}
+
+std::unique_ptr<Target> make_target(const ConvertOptions& options) {
+  if (std::filesystem::path(options.output).extension() == ".mcap") {
+    McapWriterOptions mcap;
+    mcap.compression = options.compression == "zstd"  ? McapCompression::kZstd
+                       : options.compression == "lz4" ? McapCompression::kLz4
+                                                      : McapCompression::kNone;
+    return std::make_unique<TargetOf<McapWriter>>(options.output, mcap);
+  }
+  const std::string ending = "." + (options.format.empty() ? "pcd" : options.format);
+  CloudWriter writer = cloud_writer(ending);
+  if (!writer) writer = write_las_cloud;
+  return std::make_unique<TargetOf<CloudFolderWriter>>(options.output, ending, std::move(writer));
+}
+
+// An input must not be overwritten while it is read.
+void refuse_same_place(const ConvertOptions& options) {
+  std::error_code error;
+  if (std::filesystem::equivalent(options.input, options.output, error) && !error)
+    throw OutputError(options.output, "is the input itself");
+}
+
+int run_convert(const ConvertOptions& options, CommandContext& context) {
+  refuse_same_place(options);
+  const std::unique_ptr<Recording> recording =
+      open_recording(options.input, options.open, context.log);
+  const std::unique_ptr<Target> target = make_target(options);
+  std::uint64_t scans = 0;
+  std::uint64_t events = 0;
+  bool stopped = false;
+  bool has_rig = false;
+  // The rig is known once the first scan has come, so what comes before it waits.
+  std::vector<Event> waiting;
+  const auto begin = [&] {
+    target->set_rig(recording->rig());
+    has_rig = true;
+    for (const Event& event : waiting)
+      target->write(event);
+    waiting.clear();
+  };
+  constexpr std::size_t kMostWaiting = 100'000;
+  while (!stopped) {
+    const auto event = recording->next();
+    if (!event) break;
+    const bool is_scan = std::holds_alternative<ScanPtr>(*event);
+    if (is_scan) ++scans;
+    if (!has_rig && (is_scan || waiting.size() >= kMostWaiting)) begin();
+    if (has_rig) {
+      target->write(*event);
+    } else {
+      waiting.push_back(*event);
+    }
+    if (++events % 64 != 0) continue;
+    context.progress({"converting", 100.0 * recording->progress(), 100.0, "%",
+                      std::to_string(scans) + " scans"});
+    stopped = context.stop_requested();
+  }
+  if (!has_rig) begin();
+  target->finish();
+  if (stopped) context.log.warn("convert.stopped", "stopped before the end: the output is partial");
+  if (events == 0)
+    throw InputError(options.input, "", "expected scans, IMU samples or fixes; found none");
+  return stopped ? kExitUntrusted : kExitDone;
+}
+
+}  // namespace
+
+void add_convert_command(CLI::App& app, Command& chosen) {
+  auto options = std::make_shared<ConvertOptions>();
+  CLI::App* command = app.add_subcommand(
+      "convert", "Write a recording as MCAP (OUT ends in .mcap) or as a folder of clouds");
+  command->add_option("IN", options->input, "Recording: file or folder")->required();
+  command->add_option("OUT", options->output, "File .mcap, or a folder")->required();
+  command->add_option("--format", options->format, "Clouds of a folder (default pcd)")
+      ->check(CLI::IsMember({"pcd", "ply", "las", "laz", "bin"}));
+  command->add_option("--compression", options->compression, "Chunks of an MCAP file")
+      ->check(CLI::IsMember({"none", "lz4", "zstd"}))
+      ->capture_default_str();
+  add_open_options(*command, options->open);
+  command->footer(
+      "Examples:\n  understory convert walk.bag walk.mcap\n"
+      "  understory convert walk.mcap walk_clouds --format ply");
+  command->callback([options, &chosen] {
+    chosen = [options](CommandContext& context) { return run_convert(*options, context); };
+  });
+}
+
+}  // namespace understory
