@@ -56,7 +56,7 @@ std::optional<TimeNs> time_of_day(std::string_view text) {
 
 std::optional<std::int64_t> day_number(std::optional<int> year, std::optional<int> month,
                                        std::optional<int> day) {
-  if (!year || !month || !day) return std::nullopt;
+  if (!year || !month || !day || *year < 1980 || *year > 2200) return std::nullopt;
   const std::chrono::year_month_day date{std::chrono::year(*year),
                                          std::chrono::month(static_cast<unsigned>(*month)),
                                          std::chrono::day(static_cast<unsigned>(*day))};

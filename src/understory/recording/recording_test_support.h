@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -38,6 +39,13 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
+
+// Where the example data may lie (absent in most places: then tests skip).
+inline std::filesystem::path data_folder() {
+  const char* named = std::getenv("UNDERSTORY_DATA");
+  if (named != nullptr) return named;
+  return std::filesystem::path(UNDERSTORY_SOURCE_DIR) / ".." / "shared" / "data";
+}
 
 inline std::vector<std::uint8_t> read_bytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);

@@ -20,6 +20,7 @@ constexpr std::uint8_t kDualMode = 0x39;
 constexpr std::uint8_t kDualConfidenceMode = 0x3A;
 // The fastest head turns 20 times a second.
 constexpr double kFastestCdegPerUs = 25.0 * kTurnCdeg * 1e-6;
+constexpr double kRateSlack = 0.05;  // centidegrees/us: noise of the azimuth's last digits
 constexpr TimeNs kLongestScan = kNsPerSecond / 2;
 constexpr std::size_t kPositionCounter = 198;
 constexpr std::size_t kPositionSentence = 206;
@@ -141,8 +142,8 @@ VelodyneDecoder::Blocks VelodyneDecoder::read_blocks(const std::uint8_t* data) {
   return blocks;
 }
 
-// The rate of turn behind each block is the difference to the next block; blocks whose azimuth does
-// not go with the packet's median rate are damaged.
+// The rate of turn behind each block is the difference to the next block; blocks whose azimuth goes
+// neither with the block before nor with the one behind, by the packet's median rate, are damaged.
 void VelodyneDecoder::set_rates(Blocks& blocks) {
   const std::size_t step = dual_ ? 2 : 1;
   std::vector<double> rates;
@@ -160,20 +161,20 @@ void VelodyneDecoder::set_rates(Blocks& blocks) {
     std::nth_element(rates.begin(), middle, rates.end());
     if (*middle >= 0.0 && *middle < kFastestCdegPerUs) rate_cdeg_per_us_ = *middle;
   }
-  const auto plausible = [&](double rate) {
-    return std::abs(rate - rate_cdeg_per_us_) < 0.5 * rate_cdeg_per_us_ + 0.05;
-  };
+  std::array<bool, kBlocks> plausible{};
+  for (std::size_t b = 0; b < kBlocks; b += step) {
+    plausible[b] =
+        std::abs(blocks[b].cdeg_per_us - rate_cdeg_per_us_) < 0.5 * rate_cdeg_per_us_ + kRateSlack;
+  }
   double before = rate_cdeg_per_us_;
   for (std::size_t b = 0; b < kBlocks; b += step) {
     Block& block = blocks[b];
-    // An azimuth that fits neither to the block before nor to the one behind is damaged.
-    const bool fits = plausible(block.cdeg_per_us) ||
-                      (b >= step && plausible(blocks[b - step].cdeg_per_us)) || rates.size() < 3;
+    const bool fits = plausible[b] || (b >= step && plausible[b - step]) || rates.size() < 3;
     if (block.returns != nullptr && !fits) {
       damaged("the azimuth of block " + std::to_string(b) + " does not go with its neighbours");
       block.returns = nullptr;
     }
-    if (!plausible(block.cdeg_per_us)) block.cdeg_per_us = before;
+    if (!plausible[b]) block.cdeg_per_us = before;
     before = block.cdeg_per_us;
   }
 }
