@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# tidy.sh BASE|all: clang-tidy on the .cc files that differ from the commit BASE, or on every one.
+# tidy.sh BASE|all: clang-tidy on the .cc files (tests apart) that differ from the commit BASE, or on
+# every one.
 # A file that passed before is passed over: the cache holds the hash of each that did, taken over
 # its preprocessed text and the configuration.
 set -euo pipefail
@@ -31,9 +32,9 @@ if [[ ${1:-} == --file ]]; then
   exit
 fi
 if [[ ${1:-} == all ]]; then
-  mapfile -t files < <(git ls-files -- 'src/*.cc')
+  mapfile -t files < <(git ls-files -- 'src/*.cc' ':!*_test.cc')
 else
-  mapfile -t files < <(git diff --name-only --diff-filter=d "${1:?which commit to compare with}" -- 'src/*.cc')
+  mapfile -t files < <(git diff --name-only --diff-filter=d "${1:?which commit to compare with}" -- 'src/*.cc' ':!*_test.cc')
 fi
 if ((${#files[@]} == 0)); then
   say "no changed files"
