@@ -24,6 +24,25 @@ struct Turn {
   double sine;
 };
 
+// Returns of stems, given one by one as tree << 16 | ring.
+std::vector<StemReturns> count_stems(std::vector<std::uint64_t> returns) {
+  std::sort(returns.begin(), returns.end());
+  std::vector<StemReturns> stems;
+  for (std::size_t i = 0; i < returns.size();) {
+    std::size_t same = i;
+    while (same < returns.size() && returns[same] == returns[i])
+      ++same;
+    const int tree = static_cast<int>(returns[i] >> 16);
+    const int count = static_cast<int>(same - i);
+    if (stems.empty() || stems.back().tree != tree) stems.push_back({tree, 0, 0, 0});
+    stems.back().rings += 1;
+    stems.back().rings_with_3 += count >= 3 ? 1 : 0;
+    stems.back().returns += count;
+    i = same;
+  }
+  return stems;
+}
+
 }  // namespace
 
 // The rays of a few firings, in the order in which they are traced, and what came back.
@@ -32,9 +51,8 @@ struct Scanner::Block {
   std::vector<Hit> hits;
   std::vector<Eigen::Vector3f> direction_in_lidar;  // reported, by beam
   std::vector<Eigen::Vector3f> origin_in_lidar;     // by firing
-  std::vector<std::uint32_t> t_ns;                  // by beam
-  std::vector<ScanPoint> points;
-  std::vector<std::uint64_t> stems;  // tree << 16 | ring of each return from a stem
+  std::vector<ScanReadings::Reading> readings;      // by beam
+  std::vector<std::uint64_t> stems;                 // tree << 16 | ring of each return from a stem
 };
 
 struct Scanner::Echo {
@@ -89,6 +107,12 @@ TimeNs Scanner::end(std::int64_t scan) const {
 }
 
 SimulatedScan Scanner::cast(std::int64_t number) {
+  ScanReadings readings = measure(number);
+  ScanPtr scan = assemble(number, readings);
+  return {std::move(scan), std::move(readings.stems)};
+}
+
+ScanReadings Scanner::measure(std::int64_t number) {
   scene_.sway(0.5 * (to_seconds(stamp(number) - start_) + to_seconds(end(number) - start_)));
   const LidarModel::Firings firings = model_.firings(number);
   const auto blocks_count =
@@ -96,50 +120,67 @@ SimulatedScan Scanner::cast(std::int64_t number) {
   std::vector<Block> blocks(blocks_count);
   parallel_for(blocks_count, 1, [&](std::size_t b) {
     const std::int64_t first = firings.first + static_cast<std::int64_t>(b) * kBlockFirings;
-    cast_block(number, first, std::min(firings.end, first + kBlockFirings), blocks[b]);
+    cast_block(first, std::min(firings.end, first + kBlockFirings), blocks[b]);
   });
-
-  auto scan = std::make_shared<Scan>();
-  scan->stamp = stamp(number);
-  scan->ring_count = static_cast<int>(model_.beams.size());
+  ScanReadings readings;
   std::vector<std::uint64_t> stems;
-  std::size_t total = 0;
-  for (const Block& block : blocks)
-    total += block.points.size();
-  scan->points.reserve(total);
   for (const Block& block : blocks) {
-    scan->points.insert(scan->points.end(), block.points.begin(), block.points.end());
+    readings.beams.insert(readings.beams.end(), block.readings.begin(), block.readings.end());
     stems.insert(stems.end(), block.stems.begin(), block.stems.end());
   }
-  std::sort(stems.begin(), stems.end());
-  SimulatedScan result{std::move(scan), {}};
-  for (std::size_t i = 0; i < stems.size();) {
-    std::size_t same = i;
-    while (same < stems.size() && stems[same] == stems[i])
-      ++same;
-    const int tree = static_cast<int>(stems[i] >> 16);
-    const int returns = static_cast<int>(same - i);
-    if (result.stems.empty() || result.stems.back().tree != tree) {
-      result.stems.push_back({tree, 0, 0, 0});
-    }
-    StemReturns& stem = result.stems.back();
-    stem.rings += 1;
-    stem.rings_with_3 += returns >= 3 ? 1 : 0;
-    stem.returns += returns;
-    i = same;
-  }
-  return result;
+  readings.stems = count_stems(std::move(stems));
+  return readings;
 }
 
-void Scanner::cast_block(std::int64_t scan, std::int64_t first, std::int64_t end,
-                         Block& block) const {
-  make_rays(scan, first, end, block);
+ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) const {
+  const LidarModel::Firings firings = model_.firings(number);
+  const std::size_t beams = model_.beams.size();
+  auto scan = std::make_shared<Scan>();
+  scan->stamp = stamp(number);
+  scan->ring_count = static_cast<int>(beams);
+  const auto present = [](const ScanReadings::Reading& reading) { return reading.range_m > 0.0F; };
+  scan->points.reserve(static_cast<std::size_t>(
+      std::count_if(readings.beams.begin(), readings.beams.end(), present)));
+  std::size_t i = 0;
+  for (std::int64_t firing = firings.first; firing < firings.end; ++firing) {
+    const TimeNs firing_time = model_.firing_time(firing);
+    Turn head(0.0);
+    Eigen::Vector3f origin = Eigen::Vector3f::Zero();
+    for (std::size_t b = 0; b < beams; ++b, ++i) {
+      const TimeNs time = firing_time + static_cast<TimeNs>(model_.beams[b].delay_ns);
+      if (b == 0 || !model_.beams_at_once) {
+        head = Turn(model_.azimuth(static_cast<double>(time)));
+        origin =
+            (model_.beam_origin_m * Eigen::Vector3d(head.cosine, head.sine, 0.0)).cast<float>();
+      }
+      const ScanReadings::Reading& reading = readings.beams[i];
+      if (!present(reading)) continue;
+      const Eigen::Vector3f point =
+          origin + reading.range_m * (head * beam_directions_[b]).cast<float>();
+      scan->points.push_back({point.x(), point.y(), point.z(), reading.intensity,
+                              static_cast<std::uint32_t>(start_ + time - scan->stamp),
+                              model_.beams[b].ring, 0, 0});
+    }
+  }
+  return scan;
+}
+
+void Scanner::cast_block(std::int64_t first, std::int64_t end, Block& block) const {
+  make_rays(first, end, block);
   trace(static_cast<std::size_t>(end - first), block);
   if (!machine_.empty()) meet_machine(first, block);
   const std::size_t beams = model_.beams.size();
-  for (std::size_t i = 0; i < block.t_ns.size(); ++i) {
+  const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
+  block.readings.resize(block.direction_in_lidar.size());
+  for (std::size_t i = 0; i < block.readings.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;
-    read_beam(CounterNoise(seed_, firing, i % beams), i, block);
+    const Echo echo = strongest(&block.hits[i * rays_per_beam]);
+    if (echo.surface == Surface::kNone) continue;
+    block.readings[i] = read_beam(CounterNoise(seed_, firing, i % beams), echo);
+    if (echo.tree > 0 && block.readings[i].range_m > 0.0F) {
+      block.stems.push_back(static_cast<std::uint64_t>(echo.tree) << 16 |
+                            model_.beams[i % beams].ring);
+    }
   }
 }
 
@@ -174,14 +215,12 @@ void Scanner::trace(std::size_t firings, Block& block) const {
     block.hits[order[i]] = hits[i];
 }
 
-void Scanner::make_rays(std::int64_t scan, std::int64_t first, std::int64_t end,
-                        Block& block) const {
+void Scanner::make_rays(std::int64_t first, std::int64_t end, Block& block) const {
   const std::size_t beams = model_.beams.size();
   const auto firings = static_cast<std::size_t>(end - first);
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
   block.rays.reserve(firings * beams * rays_per_beam);
   block.direction_in_lidar.reserve(firings * beams);
-  const TimeNs scan_time = stamp(scan) - start_;
   const double spread = 0.25e-3 * config_.divergence_mrad;  // one standard deviation
   const double exit = 0.25 * config_.beam_exit_m;
   for (std::size_t f = 0; f < firings; ++f) {
@@ -206,7 +245,6 @@ void Scanner::make_rays(std::int64_t scan, std::int64_t first, std::int64_t end,
       if (b == 0) block.origin_in_lidar.push_back(origin.cast<float>());
       const Eigen::Vector3d reported = head * beam_directions_[b];
       block.direction_in_lidar.push_back(reported.cast<float>());
-      block.t_ns.push_back(static_cast<std::uint32_t>(time - scan_time));
       const Eigen::Vector3d centre = turn_by_jitter * reported;
       const Eigen::Vector3d side = head * beam_sides_[b];
       const Eigen::Vector3d rise = centre.cross(side);
@@ -289,16 +327,13 @@ Scanner::Echo Scanner::strongest(const Hit* hits) const {
   return best;
 }
 
-void Scanner::read_beam(CounterNoise noise, std::size_t beam_number, Block& block) const {
-  const Echo echo =
-      strongest(&block.hits[beam_number * static_cast<std::size_t>(config_.rays_per_beam)]);
-  if (echo.surface == Surface::kNone) return;
+ScanReadings::Reading Scanner::read_beam(CounterNoise noise, const Echo& echo) const {
   // Whether the echo rises above the noise: half of them do at the threshold.
   const float threshold = static_cast<float>(config_.range_10_percent_m);
   const float signal = 10.0F * echo.energy * threshold * threshold / (echo.range_m * echo.range_m);
   const float steep = signal * signal * signal;
-  if (noise.uniform() * (1.0F + steep) > steep) return;
-  if (noise.uniform() < static_cast<float>(config_.dropout)) return;
+  if (noise.uniform() * (1.0F + steep) > steep) return {};
+  if (noise.uniform() < static_cast<float>(config_.dropout)) return {};
 
   const float cosine = std::max(0.1F, echo.cosine);
   const float tangent = std::sqrt(1.0F - cosine * cosine) / cosine;
@@ -314,18 +349,9 @@ void Scanner::read_beam(CounterNoise noise, std::size_t beam_number, Block& bloc
     const auto step = static_cast<float>(config_.range_step_m);
     range = std::round(range / step) * step;
   }
-  if (range < config_.min_range_m || range > config_.max_range_m) return;
-
-  const std::size_t beams = model_.beams.size();
-  const Beam& beam = model_.beams[beam_number % beams];
-  const Eigen::Vector3f point =
-      block.origin_in_lidar[beam_number / beams] + range * block.direction_in_lidar[beam_number];
+  if (range < config_.min_range_m || range > config_.max_range_m) return {};
   const float brightness = 255.0F * echo.energy * (1.0F + 0.06F * shiver.second);
-  block.points.push_back({point.x(), point.y(), point.z(), std::clamp(brightness, 0.0F, 255.0F),
-                          block.t_ns[beam_number], beam.ring, 0, 0});
-  if (echo.tree > 0) {
-    block.stems.push_back(static_cast<std::uint64_t>(echo.tree) << 16 | beam.ring);
-  }
+  return {range, std::round(std::clamp(brightness, 0.0F, 255.0F))};
 }
 
 }  // namespace understory

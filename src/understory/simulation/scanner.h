@@ -20,6 +20,16 @@ struct StemReturns {
   int returns = 0;
 };
 
+// What the beams of one scan measured, firing by firing and beam by beam in the order of the model.
+struct ScanReadings {
+  struct Reading {
+    float range_m = 0.0F;    // 0: no return; a multiple of the range step
+    float intensity = 0.0F;  // whole number, 0 to 255
+  };
+  std::vector<Reading> beams;
+  std::vector<StemReturns> stems;  // by increasing id
+};
+
 struct SimulatedScan {
   ScanPtr scan;
   std::vector<StemReturns> stems;  // by increasing id
@@ -39,6 +49,9 @@ class Scanner {
   [[nodiscard]] TimeNs end(std::int64_t scan) const;
 
   [[nodiscard]] SimulatedScan cast(std::int64_t scan);
+  // The two halves of `cast`: what the beams measure, and the points that follow from it.
+  [[nodiscard]] ScanReadings measure(std::int64_t scan);
+  [[nodiscard]] ScanPtr assemble(std::int64_t scan, const ScanReadings& readings) const;
 
   [[nodiscard]] const Pose& body_from_lidar() const { return body_from_lidar_; }
   [[nodiscard]] const LidarModel& model() const { return model_; }
@@ -46,11 +59,11 @@ class Scanner {
  private:
   struct Block;
   struct Echo;
-  void cast_block(std::int64_t scan, std::int64_t first, std::int64_t end, Block& block) const;
-  void make_rays(std::int64_t scan, std::int64_t first, std::int64_t end, Block& block) const;
+  void cast_block(std::int64_t first, std::int64_t end, Block& block) const;
+  void make_rays(std::int64_t first, std::int64_t end, Block& block) const;
   void trace(std::size_t firings, Block& block) const;
   void meet_machine(std::int64_t first, Block& block) const;
-  void read_beam(CounterNoise noise, std::size_t beam, Block& block) const;
+  [[nodiscard]] ScanReadings::Reading read_beam(CounterNoise noise, const Echo& echo) const;
   [[nodiscard]] Echo strongest(const Hit* hits) const;
 
   const LidarConfig config_;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 #include <limits>
 
 #include "understory/simulation/carrier.h"
@@ -9,6 +11,7 @@
 #include "understory/simulation/machine.h"
 #include "understory/simulation/route.h"
 #include "understory/simulation/satellite.h"
+#include "understory/simulation/scan_cache.h"
 #include "understory/simulation/scanner.h"
 #include "understory/simulation/scene.h"
 #include "understory/simulation/stand.h"
@@ -22,6 +25,23 @@ constexpr double kTerrainMargin = 12.0;  // of ground around the stand, metres
 
 std::uint64_t seed_of(const SiteConfig& site) {
   return static_cast<std::uint64_t>(site.seed);
+}
+
+// Names a site with all its settings.
+std::uint64_t key_of(const SiteConfig& site) {
+  SiteConfig copy = site;
+  ConfigTable table;
+  describe(table, copy);
+  std::uint64_t key = 0;
+  for (const char c : table.to_yaml(false))
+    key = hash_numbers(key, static_cast<std::uint64_t>(c));
+  return key;
+}
+
+bool same_readings(const ScanReadings& a, const ScanReadings& b) {
+  if (a.beams.size() != b.beams.size() || a.stems.size() != b.stems.size()) return false;
+  return std::memcmp(a.beams.data(), b.beams.data(), a.beams.size() * sizeof(a.beams[0])) == 0 &&
+         std::memcmp(a.stems.data(), b.stems.data(), a.stems.size() * sizeof(a.stems[0])) == 0;
 }
 
 void note(TopicReport& report, TimeNs stamp) {
@@ -77,6 +97,23 @@ class Simulator::Impl {
     return true;
   }
 
+  void use_cache(const std::string& folder, Log& log) {
+    if (!ScanCache::fits(site.lidar)) {
+      log.warn("simulation.cache", "ranges are too fine or too long to be kept");
+      return;
+    }
+    cache = std::make_unique<ScanCache>(folder, key_of(site), site.lidar.range_step_m);
+    const auto span = cache->span();
+    if (!span) return;
+    for (const std::int64_t scan : {span->first, span->second}) {
+      const std::optional<ScanReadings> kept = cache->find(scan);
+      if (kept && same_readings(*kept, scanner.measure(scan))) continue;
+      log.warn("simulation.cache", cache->path() + ": made by another version, begun anew");
+      cache->clear();
+      return;
+    }
+  }
+
   const SiteConfig site;
   const TimeNs start;
   double duration_s = 0.0;
@@ -96,6 +133,7 @@ class Simulator::Impl {
   Rig rig;
   std::vector<TopicReport> reports;
   std::vector<ScanTruth> truths;
+  std::unique_ptr<ScanCache> cache;
   // Biases at the stamps of scans that are not finished yet.
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> biases;
 
@@ -128,13 +166,22 @@ class Simulator::Impl {
     truth.accel_bias = biases[at].second;
     note(reports[0], truth.stamp);
     if (wanted) {
-      SimulatedScan simulated = scanner.cast(scan_number);
-      reports[0].points += simulated.scan->points.size();
-      truth.stems = std::move(simulated.stems);
-      event = std::move(simulated.scan);
+      ScanReadings readings = measure(scan_number);
+      ScanPtr scan = scanner.assemble(scan_number, readings);
+      reports[0].points += scan->points.size();
+      truth.stems = std::move(readings.stems);
+      event = std::move(scan);
     }
     truths.push_back(std::move(truth));
     ++scan_number;
+  }
+
+  ScanReadings measure(std::int64_t scan) {
+    if (!cache) return scanner.measure(scan);
+    if (std::optional<ScanReadings> kept = cache->find(scan)) return std::move(*kept);
+    ScanReadings readings = scanner.measure(scan);
+    cache->store(scan, readings);
+    return readings;
   }
 
   std::optional<GnssFix> find_fix() {
@@ -178,6 +225,10 @@ class Simulator::Impl {
 };
 
 Simulator::Simulator(const SiteConfig& config) : impl_(std::make_unique<Impl>(config)) {}
+Simulator::Simulator(const SiteConfig& config, const std::string& cache_folder, Log& log)
+    : Simulator(config) {
+  impl_->use_cache(cache_folder, log);
+}
 Simulator::~Simulator() = default;
 
 std::optional<Event> Simulator::next() {
@@ -227,9 +278,20 @@ void Simulator::write_truth(const std::string& folder) const {
 
 std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {
   const SimulationUri parts = parse_simulation_uri(uri);
-  auto simulator = std::make_unique<Simulator>(load_site(parts.site, parts.settings));
-  log.debug("simulating " + parts.site + ", " + std::to_string(simulator->duration_s()) + " s");
-  return simulator;
+  std::string folder;
+  if (const char* named = std::getenv("UNDERSTORY_SIMULATION_CACHE")) folder = named;
+  std::vector<std::string> settings;
+  for (const std::string& setting : parts.settings) {
+    if (setting.rfind("cache=", 0) == 0) {
+      folder = setting.substr(6);
+    } else {
+      settings.push_back(setting);
+    }
+  }
+  const SiteConfig site = load_site(parts.site, settings);
+  log.debug("simulating " + parts.site);
+  if (folder.empty()) return std::make_unique<Simulator>(site);
+  return std::make_unique<Simulator>(site, folder, log);
 }
 
 }  // namespace understory

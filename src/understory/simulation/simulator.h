@@ -17,6 +17,10 @@ namespace understory {
 class Simulator : public Recording {
  public:
   explicit Simulator(const SiteConfig& config);
+  // Reads scans from a folder of casts where they are kept there, and keeps those that it casts
+  // (ScanCache); the events are the same as without. What is kept is held against what the program
+  // casts today, and forgotten with a warning ("simulation.cache") where it differs.
+  Simulator(const SiteConfig& config, const std::string& cache_folder, Log& log);
   ~Simulator() override;
 
   [[nodiscard]] std::optional<Event> next() override;
@@ -41,8 +45,9 @@ class Simulator : public Recording {
   std::unique_ptr<Impl> impl_;
 };
 
-// Opens "sim:SITE?key=value&..." (SITE: a shipped site or a YAML file). Throws InputError for an
-// unknown site, ConfigError for wrong keys.
+// Opens "sim:SITE?key=value&..." (SITE: a shipped site or a YAML file). The key `cache` names a
+// folder for a ScanCache; without it the environment variable UNDERSTORY_SIMULATION_CACHE does,
+// without both nothing is kept. Throws InputError for an unknown site, ConfigError for wrong keys.
 [[nodiscard]] std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log);
 
 }  // namespace understory

@@ -104,6 +104,40 @@ TEST(Simulator, SkippingLeavesTheRestAsItWas) {
   EXPECT_FALSE(skipping.next().has_value());
 }
 
+TEST(Simulator, CacheGivesTheSameEventsAndSurvivesDamage) {
+  const std::string folder = testing::TempDir() + "simulator_cache";
+  std::filesystem::remove_all(folder);
+  Log log;
+  SiteConfig site = small_site();
+  site.duration_s = 1.5;
+  Simulator plain(site);
+  const std::vector<Event> events = read_all(plain);
+  const auto expect_same = [&](const char* what) {
+    Simulator cached(site, folder, log);
+    const std::vector<Event> others = read_all(cached);
+    ASSERT_EQ(others.size(), events.size()) << what;
+    for (std::size_t i = 0; i < events.size(); ++i)
+      ASSERT_TRUE(same(events[i], others[i])) << what << ", event " << i;
+  };
+  expect_same("casting");
+  const auto file = std::filesystem::directory_iterator(folder)->path();
+  const auto size = std::filesystem::file_size(file);
+  EXPECT_LT(size / 15, 500'000U);
+  expect_same("kept");
+  std::filesystem::resize_file(file, size - 1000);  // killed while writing
+  expect_same("torn");
+  EXPECT_EQ(std::filesystem::file_size(file), size);
+  EXPECT_TRUE(log.warnings().empty());
+  {
+    std::fstream broken(file, std::ios::in | std::ios::out | std::ios::binary);
+    broken.seekp(5000);
+    broken.put('\x55').put('\xaa').put('\x55');
+  }
+  expect_same("damaged");
+  EXPECT_EQ(log.warnings().size(), 1U);
+  std::filesystem::remove_all(folder);
+}
+
 TEST(Simulator, WritesItsTruth) {
   Simulator simulator(small_site());
   const std::vector<Event> events = read_all(simulator);
