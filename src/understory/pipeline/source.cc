@@ -9,7 +9,9 @@ constexpr const char* kScheme = "sim:";
 
 }  // namespace
 
-bool is_simulation(const std::string& name) { return name.rfind(kScheme, 0) == 0; }
+bool is_simulation(const std::string& name) {
+  return name.rfind(kScheme, 0) == 0;
+}
 
 std::unique_ptr<Recording> open_source(const std::string& name, const OpenOptions& options,
                                        Log& log) {

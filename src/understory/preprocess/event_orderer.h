@@ -19,10 +19,12 @@ namespace understory {
 //
 // - An event leaves once the newest time seen is `window_s` ahead of it. With a window of 0 every
 //   stream is taken to be in order by itself, for least delay.
-// - A scan's time is its end, and it leaves right after the first IMU sample at or past that end, so
+// - A scan's time is its end, and it leaves right after the first IMU sample at or past that end,
+// so
 //   that deskewing never lacks samples; unless the IMU has been silent for `imu_silence_s`.
 // - Same stream and same stamp: the second is dropped. Earlier than what already left: dropped.
-// - A stream whose stamps step away by more than `clock_jump_s` from its own past and from the other
+// - A stream whose stamps step away by more than `clock_jump_s` from its own past and from the
+// other
 //   sensors has a clock jump: its stamps are shifted so that it goes on at its usual rate, until it
 //   jumps back. If lidar and IMU step forward together, it is a gap in the recording and the stamps
 //   stand; backward together, all are shifted. A single stamp far off is dropped.

@@ -8,7 +8,6 @@
 #include "understory/sensor/rig.h"
 #include "understory/sensor/scan.h"
 
-
 namespace understory {
 
 // A box around a part of the machine that carries the lidar, with at most one degree of freedom

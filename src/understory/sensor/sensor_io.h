@@ -40,8 +40,8 @@ inline void put_fix(BinaryWriter& writer, const GnssFix& fix) {
 [[nodiscard]] inline GnssFix get_fix(BinaryReader& reader) {
   GnssFix fix;
   fix.stamp = reader.get<TimeNs>();
-  for (double* number : {&fix.latitude_deg, &fix.longitude_deg, &fix.height_m, &fix.hdop,
-                         &fix.vdop, &fix.track_deg, &fix.speed_m_s}) {
+  for (double* number : {&fix.latitude_deg, &fix.longitude_deg, &fix.height_m, &fix.hdop, &fix.vdop,
+                         &fix.track_deg, &fix.speed_m_s}) {
     *number = reader.get<double>();
   }
   reader.get_doubles(fix.covariance.data(), 9);
