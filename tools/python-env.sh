@@ -23,13 +23,13 @@ mkdir -p "$cache/python"
 exec 9>"$cache/python/.lock"
 flock 9
 if [[ ! -e $folder/complete ]]; then
-  say "set-up: Python packages that the tests compare with" >&2
+  say "set-up: Python packages of ${requirements#"$top/"}" >&2
   python3 -m venv --clear "$folder"
   pip=("$folder/bin/python" -m pip install -q --disable-pip-version-check --prefer-binary)
   if ! "${pip[@]}" -r "$requirements" >"$folder/pip.log" 2>&1; then
     grep -vE '^(#|$)' "$requirements" | while read -r package; do
       "${pip[@]}" "$package" >>"$folder/pip.log" 2>&1 ||
-        say "set-up: $package cannot be installed here; tests that need it will skip" >&2
+        say "set-up: $package cannot be installed here; what needs it will skip" >&2
     done
   fi
   touch "$folder/complete"
