@@ -14,9 +14,9 @@
 namespace understory {
 namespace {
 
+// 0x04, index data, is not needed for reading from front to back.
 constexpr std::uint8_t kMessage = 0x02;
 constexpr std::uint8_t kBagHeader = 0x03;
-constexpr std::uint8_t kIndexData = 0x04;
 constexpr std::uint8_t kChunk = 0x05;
 constexpr std::uint8_t kChunkInfo = 0x06;
 constexpr std::uint8_t kConnection = 0x07;

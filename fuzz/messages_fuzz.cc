@@ -1,0 +1,26 @@
+#include "understory/recording/message_decode.h"
+#include "understory/recording/point_cloud.h"
+
+// The first byte chooses the serialisation, the rest is decoded as every type of message.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace understory;
+  if (size == 0) return 0;
+  const MessageReader reader(ByteSpan(data + 1, size - 1),
+                             data[0] % 2 == 0 ? Serialization::kCdr : Serialization::kRos1);
+  (void)decode_imu(reader);
+  (void)decode_magnetic_field(reader);
+  (void)decode_nav_sat_fix(reader);
+  (void)decode_gps_fix(reader);
+  (void)decode_transforms(reader);
+  (void)decode_velodyne_scan(reader);
+  (void)decode_nebula_packets(reader);
+  const auto cloud = decode_point_cloud2(reader);
+  if (!cloud) return 0;
+  const auto layout = CloudLayout::find(*cloud);
+  if (!layout) return 0;
+  const CloudTimes times = measure_times(*cloud, *layout, 0);
+  const TimeConvention convention =
+      detect_point_times(layout->time_field(), layout->time_type(), {times}, {});
+  (void)convert_cloud(*cloud, *layout, convention);
+  return 0;
+}
