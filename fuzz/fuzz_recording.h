@@ -18,8 +18,8 @@ void read_as_recording(const std::uint8_t* data, std::size_t size, const OpenByt
   const std::vector<std::uint8_t> bytes(data, data + size);
   Log log;
   try {
-    const auto recording =
-        open_messages("fuzz", [&](Log& sink) { return open(bytes, sink); }, {}, log);
+    const auto recording = open_messages(
+        "fuzz", [&](Log& sink) { return open(bytes, sink); }, {}, log);
     RecordingSurvey survey;
     while (const auto event = recording->next())
       survey.add(*event);
