@@ -284,8 +284,13 @@ class MessageRecording : public Recording {
 
   bool take_packets(TopicStatistics& topic, const std::optional<PacketsMessage>& message) {
     if (!message) return false;
-    if (!packets_)
-      packets_ = std::make_unique<PacketTopic>(file_ + " " + topic.report().name, log_);
+    if (!packets_) {
+      // The clouds that go with packets: the ROS 1 driver's calibration has the beams' vertical
+      // offsets, that of nebula for ROS 2 has not.
+      VelodyneConfig config;
+      config.vertical_offsets = source_->format().rfind("ROS 1", 0) == 0;
+      packets_ = std::make_unique<PacketTopic>(config, file_ + " " + topic.report().name, log_);
+    }
     topic.add_stamp(message->header.stamp);
     topic.report().frame = message->header.frame;
     topic.report().points += packets_->add(*message, events_);

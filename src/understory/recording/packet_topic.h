@@ -13,7 +13,8 @@ namespace understory {
 class PacketTopic {
  public:
   // `source` names the stream in warnings.
-  PacketTopic(const std::string& source, Log& log) : decoder_({}, source, log) {}
+  PacketTopic(const VelodyneConfig& config, const std::string& source, Log& log)
+      : decoder_(config, source, log) {}
 
   // Returns the number of points of the scans that were finished.
   std::uint64_t add(const PacketsMessage& message, std::deque<Event>& events) {
