@@ -1,6 +1,8 @@
 # What ./run and the scripts in tools/ share. Sourced, not run.
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cache=${UNDERSTORY_CACHE:-${HOME:-/root}/.cache/understory}
+# ccache then knows a file again in another clone of the project.
+export CCACHE_BASEDIR=$top CCACHE_NOHASHDIR=1
 
 say() { printf '== %s\n' "$*"; }
 
