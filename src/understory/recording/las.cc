@@ -146,6 +146,62 @@ void read_uncompressed(ByteSource& file, const LasHeader& header, Log& log,
   report_break(file, header, read, log);
 }
 
+// Shows LASzip a file whose header holds its own record alone, because LASzip frees what it has not
+// yet allocated when a record of a damaged header ends its reading. Points keep their places.
+class CleanedFile : public ByteSource {
+ public:
+  explicit CleanedFile(ByteSource& file) : file_(file) {
+    std::vector<std::uint8_t> header;
+    file.read(0, 375, header);
+    const auto header_size = get<std::uint16_t>(header, 94);
+    const auto points = get<std::uint32_t>(header, 96);
+    const bool long_enough = header_size >= (header[25] >= 4 ? 375 : header[25] == 3 ? 235 : 227);
+    const std::vector<std::uint8_t> record =
+        find_record(header_size, points, get<std::uint32_t>(header, 100));
+    if (!long_enough || header[24] != 1 || header[25] > 4 || record.empty() ||
+        header_size + record.size() > points)
+      fail(file, header_size, "expected LASzip's record in the header");
+    file.read(0, header_size, start_);
+    const std::uint32_t records = 1;
+    std::memcpy(start_.data() + 100, &records, 4);
+    // Waveforms and records behind the points are not read.
+    if (header[25] >= 3) std::memset(start_.data() + 227, 0, 8);
+    if (header[25] >= 4) std::memset(start_.data() + 235, 0, 12);
+    start_.insert(start_.end(), record.begin(), record.end());
+  }
+
+  std::size_t read(std::uint64_t offset, std::uint8_t* into, std::size_t count) override {
+    const std::size_t got = file_.read(offset, into, count);
+    for (std::size_t i = 0; i < got && offset + i < start_.size(); ++i)
+      into[i] = start_[static_cast<std::size_t>(offset) + i];
+    return got;
+  }
+  [[nodiscard]] std::uint64_t size() const override { return file_.size(); }
+  [[nodiscard]] const std::string& name() const override { return file_.name(); }
+
+ private:
+  [[nodiscard]] std::vector<std::uint8_t> find_record(std::uint64_t at, std::uint64_t end,
+                                                      std::uint32_t records) {
+    std::vector<std::uint8_t> head;
+    for (std::uint32_t i = 0; i < std::min(records, kMostVlrs) && at + kVlrHeader <= end; ++i) {
+      file_.read(at, kVlrHeader, head);
+      if (head.size() < kVlrHeader) break;
+      const std::uint64_t size = kVlrHeader + get<std::uint16_t>(head, 20);
+      if (text_of(head, 2, 16) == "laszip encoded" && get<std::uint16_t>(head, 18) == 22204 &&
+          at + size <= end) {
+        std::vector<std::uint8_t> record;
+        file_.read(at, size, record);
+        return record;
+      }
+      at += size;
+    }
+    return {};
+  }
+
+  ByteSource& file_;
+  std::vector<std::uint8_t> start_;
+};
+
 // A stream over a ByteSource, for LASzip.
 class SourceBuffer : public std::streambuf {
  public:
@@ -196,7 +252,8 @@ struct LaszipCloser {
 
 void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
                      const std::function<void(const LasPoint&)>& visit) {
-  SourceBuffer buffer(file);
+  CleanedFile cleaned(file);
+  SourceBuffer buffer(cleaned);
   std::istream stream(&buffer);
   laszip_POINTER raw = nullptr;
   if (laszip_create(&raw) != 0) throw InternalError("LASzip cannot be started");
