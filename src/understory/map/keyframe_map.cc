@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "understory/geometry/pose_io.h"
 #include "understory/util/error.h"
 
@@ -24,47 +26,10 @@ double keyframe_distance(const Pose& world_from_last, const Pose& world_from_cur
   return difference.norm();
 }
 
-KeyframePoints::KeyframePoints(const std::filesystem::path& file, std::size_t keep,
-                               std::size_t cached)
-    : clouds_(file, keep), cached_(cached) {}
-
-void KeyframePoints::append(TimeNs stamp, const Points& points) {
-  KeyframeCloud cloud{static_cast<std::int32_t>(clouds_.size()), stamp, {}};
-  cloud.points.reserve(points.size());
-  for (const Eigen::Vector3f& p : points)
-    cloud.points.push_back({p.x(), p.y(), p.z(), 0, 0});
-  remember(clouds_.size(), std::make_shared<const Points>(points));
-  clouds_.append(cloud);
-}
-
-std::shared_ptr<const Points> KeyframePoints::get(std::size_t keyframe) {
-  const auto found = cache_.find(keyframe);
-  if (found != cache_.end()) {
-    found->second.used = ++uses_;
-    return found->second.points;
-  }
-  const KeyframeCloud cloud = clouds_.read(keyframe);
-  Points points;
-  points.reserve(cloud.points.size());
-  for (const KeyframePoint& p : cloud.points)
-    points.emplace_back(p.x, p.y, p.z);
-  auto shared = std::make_shared<const Points>(std::move(points));
-  remember(keyframe, shared);
-  return shared;
-}
-
-void KeyframePoints::remember(std::size_t keyframe, std::shared_ptr<const Points> points) {
-  cache_[keyframe] = {std::move(points), ++uses_};
-  if (cache_.size() <= cached_) return;
-  const auto oldest =
-      std::min_element(cache_.begin(), cache_.end(),
-                       [](const auto& a, const auto& b) { return a.second.used < b.second.used; });
-  cache_.erase(oldest);
-}
-
 void KeyframeMap::describe(ConfigTable& table, Config& config) {
   table.section("keyframe", [&] { understory::describe(table, config.keyframe); });
   table.section("local_map", [&] { understory::describe(table, config.local_map); });
+  table.section("loop_closure", [&] { understory::describe(table, config.loop_closure); });
   table.section("odometry_edge", [&] {
     table.add("rotation_deg_per_sqrt_m", config.edge_rotation_deg_per_sqrt_m, {1e-6, 10.0},
               "deg/sqrt(m)", "noise of the odometry between keyframes");
@@ -75,7 +40,12 @@ void KeyframeMap::describe(ConfigTable& table, Config& config) {
 
 KeyframeMap::KeyframeMap(const Config& config, const std::filesystem::path& folder,
                          StageTimes& times, Log& log)
-    : config_(config), folder_(folder), times_(times), log_(log), local_map_(config.local_map) {}
+    : config_(config),
+      folder_(folder),
+      times_(times),
+      log_(log),
+      local_map_(config.local_map),
+      loops_(config.loop_closure, config.local_map) {}
 
 namespace {
 constexpr std::size_t kCachedKeyframes = 300;
@@ -95,27 +65,83 @@ bool KeyframeMap::wants(const Pose& world_from_body) const {
 std::optional<Pose> KeyframeMap::add(TimeNs stamp, const Pose& world_from_body,
                                      const Points& points_in_body) {
   const ScopedTimer timer(times_, "keyframe");
+  std::optional<Pose> moved;
+  if (auto outcome = loops_.take(keyframes_.size(), false, at_once_)) {
+    moved = take_over(std::move(*outcome));
+  }
   Keyframe keyframe;
   keyframe.stamp = stamp;
-  keyframe.world_from_body = world_from_body;
-  double length = 0.0;
+  keyframe.world_from_body = moved ? *moved * world_from_body : world_from_body;
   if (!keyframes_.empty()) {
-    keyframe.previous_from_this = keyframes_.back().world_from_body.inverse() * world_from_body;
-    length = keyframe.previous_from_this.translation().norm();
+    keyframe.previous_from_this =
+        keyframes_.back().world_from_body.inverse() * keyframe.world_from_body;
   }
+  keyframe.covariance = edge_covariance(keyframe.previous_from_this);
+  keyframes_.push_back(keyframe);
+  points_->append(stamp, points_in_body);
+  update_local_map(keyframes_.size() - 1);
+  loops_.consider(keyframes_, segment_start_, *points_);
+  return moved;
+}
+
+Matrix6d KeyframeMap::edge_covariance(const Pose& previous_from_this) const {
   // A new segment hangs on a prediction over an outage: its edge says almost nothing.
   const bool joined = keyframes_.size() != segment_start_;
-  const double grown = std::sqrt(std::max(length, 0.1)) * (joined ? 1.0 : 1e3);
+  const double length = std::max(previous_from_this.translation().norm(), 0.1);
+  const double grown = std::sqrt(length) * (joined ? 1.0 : 1e3);
   const double rotation = grown * config_.edge_rotation_deg_per_sqrt_m * std::numbers::pi / 180.0;
   const double translation = grown * config_.edge_translation_m_per_sqrt_m;
   Vector6d variances;
   variances << Eigen::Vector3d::Constant(rotation * rotation),
       Eigen::Vector3d::Constant(translation * translation);
-  keyframe.covariance = variances.asDiagonal();
-  keyframes_.push_back(keyframe);
-  points_->append(stamp, points_in_body);
-  update_local_map(keyframes_.size() - 1);
-  return std::nullopt;
+  return variances.asDiagonal();
+}
+
+// Applies new poses of the keyframes that the search knew; those added since move along rigidly,
+// and so does the present (P0 (20)).
+std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
+  for (const LoopAttempt& attempt : outcome.attempts) {
+    log_.debug(fmt::format("loop {} - {}: {}", attempt.from, attempt.to,
+                           attempt.verified
+                               ? fmt::format("fits, {:.3f} m off", attempt.correction_m)
+                               : attempt.reason));
+  }
+  if (outcome.world_from_keyframe.empty()) return std::nullopt;
+  const std::size_t known = outcome.keyframes;
+  const Pose moved =
+      outcome.world_from_keyframe[known - 1] * keyframes_[known - 1].world_from_body.inverse();
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    keyframes_[i].world_from_body =
+        i < known ? outcome.world_from_keyframe[i] : moved * keyframes_[i].world_from_body;
+  }
+  if (!outcome.local_map) {
+    rebuild_local_map();
+    return moved;
+  }
+  local_map_ = std::move(*outcome.local_map);
+  inserted_ = std::move(outcome.inserted);
+  for (std::size_t i = std::max(known, segment_start_); i < keyframes_.size(); ++i) {
+    inserted_.push_back({i, 1});
+    local_map_.insert({points_->get(i).get(), keyframes_[i].world_from_body}, true);
+  }
+  snapshot_ = local_map_.snapshot();
+  return moved;
+}
+
+void KeyframeMap::finish() {
+  if (keyframes_.empty()) return;
+  if (auto outcome = loops_.take(keyframes_.size(), true, true)) {
+    static_cast<void>(take_over(std::move(*outcome)));
+  }
+  const PoseGraphResult result = loops_.optimise(keyframes_);
+  loops_used_.assign(loops_.attempts().size(), 0);
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < loops_used_.size(); ++i) {
+    if (loops_.attempts()[i].verified) loops_used_[i] = result.loop_used[k++];
+  }
+  for (std::size_t i = 0; i < result.world_from_keyframe.size(); ++i) {
+    keyframes_[i].world_from_body = result.world_from_keyframe[i];
+  }
 }
 
 void KeyframeMap::update_local_map(std::size_t keyframe) {
@@ -140,18 +166,14 @@ void KeyframeMap::rebuild_local_map() {
       inserted_.push_back({segment_start_ + i, 0});
     }
   } else {
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-      const double distance = (positions[i] - positions.back()).norm();
-      if (distance < config_.local_map.radius_m) inserted_.push_back({segment_start_ + i, 0});
-    }
-    inserted_.back().forget = 1;
+    inserted_ = keyframes_within_reach(positions, segment_start_, config_.local_map);
   }
   insert_all();
 }
 
 void KeyframeMap::insert_all() {
   local_map_.clear();
-  for (const Insertion& insertion : inserted_) {
+  for (const LocalMapInsertion& insertion : inserted_) {
     const auto points = points_->get(insertion.keyframe);
     local_map_.insert({points.get(), keyframes_[insertion.keyframe].world_from_body},
                       insertion.forget != 0);
@@ -166,6 +188,9 @@ void KeyframeMap::start_segment() {
 }
 
 void KeyframeMap::move_world(const Pose& new_world_from_old_world) {
+  // What a running search finds refers to the world as it was. Its loops are kept for the next
+  // optimisation, its poses are not.
+  static_cast<void>(loops_.take(keyframes_.size(), true, true));
   for (Keyframe& keyframe : keyframes_) {
     keyframe.world_from_body = new_world_from_old_world * keyframe.world_from_body;
   }
@@ -186,6 +211,7 @@ void KeyframeMap::save(BinaryWriter& writer) const {
   }
   writer.put(static_cast<std::uint64_t>(segment_start_));
   writer.put(inserted_);
+  loops_.save(writer);
 }
 
 void KeyframeMap::load(BinaryReader& reader) {
@@ -197,7 +223,7 @@ void KeyframeMap::load(BinaryReader& reader) {
     reader.get_doubles(keyframe.covariance.data(), 36);
   }
   segment_start_ = reader.get<std::uint64_t>();
-  inserted_ = reader.get_vector<Insertion>();
+  inserted_ = reader.get_vector<LocalMapInsertion>();
   points_ =
       std::make_unique<KeyframePoints>(folder_ / kPointsFile, keyframes_.size(), kCachedKeyframes);
   insert_all();

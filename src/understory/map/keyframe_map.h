@@ -4,13 +4,14 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <unordered_map>
 #include <vector>
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
-#include "understory/map/keyframe_clouds.h"
+#include "understory/map/keyframe.h"
+#include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
+#include "understory/map/loop_closer.h"
 #include "understory/util/binary_io.h"
 #include "understory/util/config.h"
 #include "understory/util/log.h"
@@ -31,34 +32,6 @@ void describe(ConfigTable& table, KeyframeConfig& config);
 [[nodiscard]] double keyframe_distance(const Pose& world_from_last, const Pose& world_from_current,
                                        const KeyframeConfig& config);
 
-struct Keyframe {
-  TimeNs stamp = 0;
-  Pose world_from_body;                    // best estimate so far
-  Pose previous_from_this;                 // as the odometry measured it; identity for the first
-  Matrix6d covariance = Matrix6d::Zero();  // of previous_from_this, right perturbation
-};
-
-// The thinned clouds of all keyframes: on disk, the last used ones in memory. Not thread-safe.
-class KeyframePoints {
- public:
-  KeyframePoints(const std::filesystem::path& file, std::size_t keep, std::size_t cached);
-  void append(TimeNs stamp, const Points& points);
-  void flush() { clouds_.flush(); }
-  [[nodiscard]] std::shared_ptr<const Points> get(std::size_t keyframe);
-
- private:
-  struct Entry {
-    std::shared_ptr<const Points> points;
-    std::uint64_t used = 0;
-  };
-  void remember(std::size_t keyframe, std::shared_ptr<const Points> points);
-
-  KeyframeClouds clouds_;
-  std::size_t cached_;
-  std::uint64_t uses_ = 0;
-  std::unordered_map<std::size_t, Entry> cache_;
-};
-
 // The second graph of P4 F2: keyframes, and the local map made of them. Scans are positioned in the
 // world frame of these keyframes; when a loop closure moves them, `add` says by how much the
 // present part of the world moved. Not thread-safe.
@@ -67,6 +40,7 @@ class KeyframeMap {
   struct Config {
     KeyframeConfig keyframe;
     LocalMapConfig local_map;
+    LoopCloserConfig loop_closure;
     // Noise of the odometry between keyframes: grows with the square root of the distance.
     double edge_rotation_deg_per_sqrt_m = 0.02;
     double edge_translation_m_per_sqrt_m = 0.01;
@@ -87,24 +61,28 @@ class KeyframeMap {
   // Begins anew after the scans could not be matched any more: the next keyframe is joined to the
   // last one by a prediction only, and the local map starts empty.
   void start_segment();
+  // The recording is over: waits for what is running, looks for a last loop, optimises.
+  void finish();
   // Moves everything, e.g. to level the world.
   void move_world(const Pose& new_world_from_old_world);
 
   [[nodiscard]] const std::vector<NdtMapPtr>& local_map() const { return snapshot_; }
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
+  [[nodiscard]] const std::vector<LoopAttempt>& loops() const { return loops_.attempts(); }
+  // Which of the verified loops the graph believes in; of the size of loops().
+  [[nodiscard]] const std::vector<char>& loops_used() const { return loops_used_; }
+  // --realtime: outcomes are taken over as soon as they are there.
+  void take_outcomes_at_once() { at_once_ = true; }
   // Makes what has been added so far safe on disk.
   void flush();
   void save(BinaryWriter& writer) const;
   void load(BinaryReader& reader);
 
  private:
-  // One keyframe that went into the local map; `forget` as in LocalMap::insert.
-  struct Insertion {
-    std::uint64_t keyframe = 0;
-    std::uint64_t forget = 0;
-  };
   void update_local_map(std::size_t keyframe);
   void rebuild_local_map();
+  [[nodiscard]] Matrix6d edge_covariance(const Pose& previous_from_this) const;
+  [[nodiscard]] std::optional<Pose> take_over(LoopOutcome outcome);
   void insert_all();
 
   Config config_;
@@ -115,8 +93,12 @@ class KeyframeMap {
   std::vector<Keyframe> keyframes_;
   std::size_t segment_start_ = 0;  // first keyframe of the present segment
   LocalMap local_map_;
-  std::vector<Insertion> inserted_;  // since the local map was empty, in order: builds it again
+  std::vector<LocalMapInsertion>
+      inserted_;  // since the local map was empty, in order: builds it again
   std::vector<NdtMapPtr> snapshot_;
+  bool at_once_ = false;
+  std::vector<char> loops_used_;
+  LoopCloser loops_;
 };
 
 }  // namespace understory

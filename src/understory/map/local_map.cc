@@ -88,4 +88,17 @@ std::vector<std::size_t> recent_keyframes(const std::vector<Eigen::Vector3d>& po
   return chosen;
 }
 
+std::vector<LocalMapInsertion> keyframes_within_reach(const std::vector<Eigen::Vector3d>& positions,
+                                                      std::size_t first,
+                                                      const LocalMapConfig& config) {
+  std::vector<LocalMapInsertion> chosen;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if ((positions[i] - positions.back()).norm() < config.radius_m) {
+      chosen.push_back({first + i, 0});
+    }
+  }
+  if (!chosen.empty()) chosen.back().forget = 1;
+  return chosen;
+}
+
 }  // namespace understory

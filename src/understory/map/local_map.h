@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "understory/geometry/points.h"
@@ -29,6 +30,13 @@ struct PlacedPoints {
   Pose world_from_body;
 };
 
+// One keyframe that went into a local map; `forget` as in LocalMap::insert. (64-bit, so that
+// there is no padding in a checkpoint.)
+struct LocalMapInsertion {
+  std::uint64_t keyframe = 0;
+  std::uint64_t forget = 0;
+};
+
 // The map around the carrier that scans are matched to, made of keyframes. Hands out immutable
 // snapshots that stay valid while it goes on. Not thread-safe itself.
 class LocalMap {
@@ -49,5 +57,10 @@ class LocalMap {
 // recent `recent_keyframes` the one nearest to the mean of each cube of `recent_spacing_m`.
 [[nodiscard]] std::vector<std::size_t> recent_keyframes(
     const std::vector<Eigen::Vector3d>& positions, const LocalMapConfig& config);
+
+// All keyframes, of those at these positions, that lie within the radius of the last one, as
+// insertions into an empty map; `first` is the index of the first position.
+[[nodiscard]] std::vector<LocalMapInsertion> keyframes_within_reach(
+    const std::vector<Eigen::Vector3d>& positions, std::size_t first, const LocalMapConfig& config);
 
 }  // namespace understory

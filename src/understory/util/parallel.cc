@@ -20,4 +20,9 @@ void with_threads(int threads, const std::function<void()>& work) {
   arena.execute(work);
 }
 
+void in_arena(int threads, const std::function<void()>& work) {
+  oneapi::tbb::task_arena arena(threads);
+  arena.execute(work);
+}
+
 }  // namespace understory

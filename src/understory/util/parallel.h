@@ -48,6 +48,10 @@ template <typename Sum, typename Accumulate>
 // that every parallel call inside uses no more than that.
 void with_threads(int threads, const std::function<void()>& work);
 
+// Runs `work` in an arena of its own of `threads` threads, within the limit of the process: for
+// work beside the main loop.
+void in_arena(int threads, const std::function<void()>& work);
+
 // Number of threads that the machine offers.
 [[nodiscard]] int hardware_threads();
 

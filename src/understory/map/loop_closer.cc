@@ -1,0 +1,242 @@
+#include "understory/map/loop_closer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "understory/geometry/pose_io.h"
+#include "understory/preprocess/voxel_filter.h"
+#include "understory/util/error.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+// Everything that a search needs, of its own, so that it can run beside the scan loop.
+struct Search {
+  LoopCloserConfig config;
+  LocalMapConfig local_map;
+  PoseGraphProblem problem;
+  std::size_t segment_start = 0;
+  KeyframePoints* points = nullptr;
+};
+
+// The clouds of the keyframes around one, along the path, in its frame.
+Points points_around(const Search& search, std::size_t keyframe, int reach) {
+  const auto& poses = search.problem.world_from_keyframe;
+  const auto r = static_cast<std::size_t>(reach);
+  const std::size_t first = std::max(search.segment_start, keyframe > r ? keyframe - r : 0);
+  const std::size_t last = std::min(poses.size() - 1, keyframe + r);
+  Points all;
+  for (std::size_t i = first; i <= last; ++i) {
+    const Pose here_from_there = poses[keyframe].inverse() * poses[i];
+    const Eigen::Matrix3f rotation = here_from_there.rotation_matrix().cast<float>();
+    const Eigen::Vector3f translation = here_from_there.translation().cast<float>();
+    for (const Eigen::Vector3f& p : *search.points->get(i)) {
+      all.push_back(rotation * p + translation);
+    }
+  }
+  return VoxelFilter().filter(all, search.config.voxel_size_m);
+}
+
+LoopAttempt try_loop(const Search& search, std::size_t query, const LoopCandidate& candidate) {
+  const auto& poses = search.problem.world_from_keyframe;
+  const auto from = static_cast<std::size_t>(candidate.keyframe);
+  LoopInput input;
+  input.target_points = points_around(search, from, search.config.submap_keyframes);
+  input.source_points = points_around(search, query, search.config.source_keyframes);
+  input.target_from_source = poses[from].inverse() * poses[query];
+  input.sigma_translation_m = candidate.sigma_translation_m;
+  input.sigma_rotation_rad = candidate.sigma_rotation_rad;
+  input.up_in_target = poses[from].rotation().conjugate() * Eigen::Vector3d::UnitZ();
+  input.up_in_source = poses[query].rotation().conjugate() * Eigen::Vector3d::UnitZ();
+  const LoopVerification answer = verify_loop(input, search.config.verification);
+  LoopAttempt attempt;
+  attempt.from = candidate.keyframe;
+  attempt.to = static_cast<int>(query);
+  attempt.verified = answer.accepted;
+  attempt.reason = answer.reason;
+  attempt.correction_m =
+      (input.target_from_source.inverse() * answer.target_from_source).translation().norm();
+  attempt.edge = {attempt.from, attempt.to, answer.target_from_source, answer.covariance};
+  return attempt;
+}
+
+bool worth_applying(const Search& search, const std::vector<Pose>& answer) {
+  const auto& poses = search.problem.world_from_keyframe;
+  for (std::size_t i = 0; i < answer.size(); ++i) {
+    const Pose change = poses[i].inverse() * answer[i];
+    if (change.translation().norm() > search.config.least_correction_m ||
+        change.angle() > search.config.least_correction_deg * std::numbers::pi / 180.0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void make_local_map(const Search& search, LoopOutcome& outcome) {
+  if (search.local_map.method != LocalMapConfig::Method::kAccumulate) return;
+  std::vector<Eigen::Vector3d> positions;
+  for (std::size_t i = search.segment_start; i < outcome.world_from_keyframe.size(); ++i) {
+    positions.push_back(outcome.world_from_keyframe[i].translation());
+  }
+  outcome.local_map.emplace(search.local_map);
+  outcome.inserted = keyframes_within_reach(positions, search.segment_start, search.local_map);
+  for (const LocalMapInsertion& insertion : outcome.inserted) {
+    const auto points = search.points->get(insertion.keyframe);
+    outcome.local_map->insert({points.get(), outcome.world_from_keyframe[insertion.keyframe]},
+                              insertion.forget != 0);
+  }
+}
+
+LoopOutcome run_search(Search search) {
+  const double cpu_start = thread_cpu_seconds();
+  LoopOutcome outcome;
+  outcome.keyframes = search.problem.world_from_keyframe.size();
+  const std::size_t query = outcome.keyframes - 1;
+  for (const LoopCandidate& candidate :
+       find_loop_candidates(search.problem, query, search.config.search)) {
+    if (static_cast<std::size_t>(candidate.keyframe) < search.segment_start) continue;
+    outcome.attempts.push_back(try_loop(search, query, candidate));
+    if (outcome.attempts.back().verified)
+      search.problem.loops.push_back(outcome.attempts.back().edge);
+  }
+  const bool found = std::any_of(outcome.attempts.begin(), outcome.attempts.end(),
+                                 [](const LoopAttempt& attempt) { return attempt.verified; });
+  if (found) {
+    PoseGraphResult result = optimise_pose_graph(search.problem, search.config.graph);
+    if (result.converged && worth_applying(search, result.world_from_keyframe)) {
+      outcome.world_from_keyframe = std::move(result.world_from_keyframe);
+      make_local_map(search, outcome);
+    }
+  }
+  outcome.cpu_ms = 1e3 * (thread_cpu_seconds() - cpu_start);
+  return outcome;
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, LoopCloserConfig& config) {
+  table.add("enabled", config.enabled, "look for loops and close them");
+  table.section("search", [&] { describe(table, config.search); });
+  table.section("verification", [&] { describe(table, config.verification); });
+  table.section("graph", [&] { describe(table, config.graph); });
+  table.add("submap_keyframes", config.submap_keyframes, {0, 1000}, "",
+            "keyframes on each side of a candidate that are matched to");
+  table.add("source_keyframes", config.source_keyframes, {0, 100}, "",
+            "keyframes on each side of the query that are matched");
+  table.add("voxel_size_m", config.voxel_size_m, {0.05, 5.0}, "m", "thins what is matched");
+  table.add("handover_keyframes", config.handover_keyframes, {1, 1000}, "",
+            "keyframes after which the result of a search is taken over");
+  table.add("least_correction_m", config.least_correction_m, {0.0, 10.0}, "m",
+            "smaller corrections wait for the next");
+  table.add("least_correction_deg", config.least_correction_deg, {0.0, 180.0}, "deg",
+            "smaller corrections wait for the next");
+}
+
+LoopCloser::LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map)
+    : config_(config), local_map_config_(local_map) {}
+
+LoopCloser::~LoopCloser() {
+  if (running_) running_->outcome.wait();  // it uses the caller's points
+}
+
+PoseGraphProblem LoopCloser::problem_of(const std::vector<Keyframe>& keyframes) const {
+  PoseGraphProblem problem;
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    problem.world_from_keyframe.push_back(keyframes[i].world_from_body);
+    if (i == 0) continue;
+    problem.odometry.push_back({static_cast<int>(i) - 1, static_cast<int>(i),
+                                keyframes[i].previous_from_this, keyframes[i].covariance});
+  }
+  for (const LoopAttempt& attempt : attempts_) {
+    if (attempt.verified) problem.loops.push_back(attempt.edge);
+  }
+  return problem;
+}
+
+void LoopCloser::consider(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
+                          KeyframePoints& points) {
+  if (!config_.enabled || running_) return;
+  if (!loop_search_due(last_search_, keyframes.back().stamp, config_.search)) return;
+  last_search_ = keyframes.back().stamp;
+  begin(keyframes, segment_start, points);
+}
+
+void LoopCloser::begin(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
+                       KeyframePoints& points) {
+  Search search{config_, local_map_config_, problem_of(keyframes), segment_start, &points};
+  running_.emplace();
+  running_->keyframes = keyframes.size();
+  running_->segment_start = segment_start;
+  running_->outcome = std::async(std::launch::async, [search = std::move(search)]() mutable {
+    LoopOutcome outcome;
+    // One thread: the others belong to the scan loop.
+    in_arena(1, [&] { outcome = run_search(std::move(search)); });
+    return outcome;
+  });
+}
+
+std::optional<LoopOutcome> LoopCloser::take(std::size_t keyframes, bool wait, bool at_once) {
+  if (!running_) return std::nullopt;
+  const bool ready =
+      running_->outcome.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  const auto due = running_->keyframes + static_cast<std::size_t>(config_.handover_keyframes);
+  if (!wait && !(at_once ? ready : keyframes >= due)) return std::nullopt;
+  LoopOutcome outcome = running_->outcome.get();
+  running_.reset();
+  attempts_.insert(attempts_.end(), outcome.attempts.begin(), outcome.attempts.end());
+  return outcome;
+}
+
+PoseGraphResult LoopCloser::optimise(const std::vector<Keyframe>& keyframes) const {
+  const PoseGraphProblem problem = problem_of(keyframes);
+  if (problem.loops.empty()) return {};
+  return optimise_pose_graph(problem, config_.graph);
+}
+
+void LoopCloser::save(BinaryWriter& writer) const {
+  writer.put(last_search_);
+  writer.put(static_cast<std::uint64_t>(attempts_.size()));
+  for (const LoopAttempt& attempt : attempts_) {
+    writer.put(attempt.from);
+    writer.put(attempt.to);
+    writer.put(attempt.verified);
+    writer.put(attempt.correction_m);
+    put_pose(writer, attempt.edge.from_from_to);
+    writer.put_doubles(attempt.edge.covariance.data(), 36);
+    writer.put(attempt.reason);
+  }
+  writer.put(running_.has_value());
+  if (!running_) return;
+  writer.put(running_->keyframes);
+  writer.put(running_->segment_start);
+}
+
+void LoopCloser::load(BinaryReader& reader, const std::vector<Keyframe>& keyframes,
+                      KeyframePoints& points) {
+  last_search_ = reader.get<TimeNs>();
+  attempts_.resize(reader.get<std::uint64_t>());
+  for (LoopAttempt& attempt : attempts_) {
+    attempt.from = reader.get<int>();
+    attempt.to = reader.get<int>();
+    attempt.verified = reader.get<bool>();
+    attempt.correction_m = reader.get<double>();
+    attempt.edge.from = attempt.from;
+    attempt.edge.to = attempt.to;
+    attempt.edge.from_from_to = get_pose(reader);
+    reader.get_doubles(attempt.edge.covariance.data(), 36);
+    attempt.reason = reader.get_string();
+  }
+  if (!reader.get<bool>()) return;
+  const auto known = reader.get<std::uint64_t>();
+  const auto segment_start = reader.get<std::uint64_t>();
+  UNDERSTORY_CHECK(known <= keyframes.size());
+  // Keyframes do not move while a search runs (a levelling of the world waits for it), so the first
+  // ones are what it began with.
+  begin({keyframes.begin(), keyframes.begin() + static_cast<std::ptrdiff_t>(known)}, segment_start,
+        points);
+}
+
+}  // namespace understory

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/graph/loop_closure.h"
+#include "understory/graph/loop_search.h"
+#include "understory/graph/pose_graph.h"
+#include "understory/map/keyframe.h"
+#include "understory/map/keyframe_points.h"
+#include "understory/map/local_map.h"
+#include "understory/util/binary_io.h"
+#include "understory/util/config.h"
+#include "understory/util/log.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+
+struct LoopCloserConfig {
+  bool enabled = true;
+  LoopSearchConfig search;
+  LoopClosureConfig verification;
+  PoseGraphConfig graph;
+  int submap_keyframes = 12;   // on each side of a candidate, that make the map it is matched to
+  int source_keyframes = 2;    // on each side of the query, that are matched
+  double voxel_size_m = 0.4;   // thins both
+  int handover_keyframes = 6;  // results are taken over that many keyframes after the search began
+  double least_correction_m = 0.005;  // smaller ones wait for the next
+  double least_correction_deg = 0.02;
+};
+void describe(ConfigTable& table, LoopCloserConfig& config);
+
+// A loop that was tried, for graph, report and run.json.
+struct LoopAttempt {
+  int from = 0;  // the older keyframe
+  int to = 0;
+  bool verified = false;      // the scans fit; whether the graph believes it is another question
+  double correction_m = 0.0;  // by how much it disagreed with the poses at the time
+  PoseEdge edge;              // if verified
+  std::string reason;         // if not
+};
+
+// What a finished search hands back.
+struct LoopOutcome {
+  std::size_t keyframes = 0;  // that were known when it began
+  std::vector<LoopAttempt> attempts;
+  std::vector<Pose> world_from_keyframe;  // of all those, if a loop was verified; else empty
+  std::optional<LocalMap> local_map;      // made of them around the last one, if it accumulates
+  std::vector<LocalMapInsertion> inserted;
+  double cpu_ms = 0.0;
+};
+
+// Looks for loops beside the scan loop: one search at a time in the background, begun at most every
+// `search.interval_s` of recording, its result taken over at a keyframe that is fixed in advance,
+// so that results do not depend on how fast the machine is. P4 section 3.1.1, P2-7.
+class LoopCloser {
+ public:
+  LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map);
+  ~LoopCloser();
+  LoopCloser(const LoopCloser&) = delete;
+  LoopCloser& operator=(const LoopCloser&) = delete;
+
+  // Begins a search for the newest keyframe if one is due and none is running. `points` must stay
+  // alive until its outcome has been taken.
+  void consider(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
+                KeyframePoints& points);
+  // The outcome of the running search, nothing if none is running or due. It is due at a fixed
+  // number of keyframes, and then waited for; `wait`: due now; `at_once`: due when it is there.
+  [[nodiscard]] std::optional<LoopOutcome> take(std::size_t keyframes, bool wait, bool at_once);
+
+  [[nodiscard]] const std::vector<LoopAttempt>& attempts() const { return attempts_; }
+  // The graph optimised with all verified loops; without any, no poses.
+  [[nodiscard]] PoseGraphResult optimise(const std::vector<Keyframe>& keyframes) const;
+
+  void save(BinaryWriter& writer) const;
+  // Begins the search again that was running when the state was saved.
+  void load(BinaryReader& reader, const std::vector<Keyframe>& keyframes, KeyframePoints& points);
+
+ private:
+  struct Running {
+    std::uint64_t keyframes = 0;  // known to it
+    std::uint64_t segment_start = 0;
+    std::future<LoopOutcome> outcome;
+  };
+  void begin(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
+             KeyframePoints& points);
+  [[nodiscard]] PoseGraphProblem problem_of(const std::vector<Keyframe>& keyframes) const;
+
+  LoopCloserConfig config_;
+  LocalMapConfig local_map_config_;
+  std::vector<LoopAttempt> attempts_;
+  TimeNs last_search_ = kNoSearchYet;
+  std::optional<Running> running_;
+};
+
+}  // namespace understory
