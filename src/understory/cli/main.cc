@@ -50,6 +50,8 @@ int run(int argc, char** argv) {
   app.add_flag("--verbose", verbose, "Debug messages on stderr");
   Command chosen;
   // In the order of the help page; each lives in a file of its own.
+  add_demo_command(app, chosen);
+  add_map_command(app, chosen);
   add_info_command(app, chosen);
   add_convert_command(app, chosen);
   add_simulate_command(app, chosen);

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "understory/cli/command.h"
+#include "understory/cli/open_options.h"
 #include "understory/cli/outcome.h"
 #include "understory/pipeline/mapping.h"
 #include "understory/util/error.h"

@@ -63,6 +63,7 @@ class MappingRun {
       auto player = std::make_unique<RealtimePlayer>(
           std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans));
       player_ = player.get();
+      session_.map().take_outcomes_at_once();
       source_ = std::move(player);
     }
   }
@@ -96,6 +97,7 @@ class MappingRun {
       state_.remove();
       throw InputError(request_.recording, "", no_scan_reason());
     }
+    session_.map().finish();
     session_.flush();
     RunFacts facts;
     facts.stopped = stopped;
@@ -105,7 +107,9 @@ class MappingRun {
     facts.latencies_ms = latencies_ms_;
     facts.realtime = player_ != nullptr;
     facts.dropped_scans = player_ != nullptr ? player_->dropped_scans() : 0;
-    MappingOutcome outcome = write_run(request_, session_, facts, *source_, log_, progress_);
+    MappingOutcome outcome =
+        write_run(request_, session_, facts, player_ != nullptr ? player_->played() : *source_,
+                  log_, progress_);
     state_.remove();
     return outcome;
   }

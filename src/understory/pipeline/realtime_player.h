@@ -32,6 +32,8 @@ class RealtimePlayer : public Recording {
   // Milliseconds from the moment a sensor would have delivered what happened at `time` until now.
   [[nodiscard]] double latency_ms(TimeNs time) const;
   [[nodiscard]] std::uint64_t dropped_scans() const;
+  // The recording that is played; not to be touched before `next` has returned nothing.
+  [[nodiscard]] const Recording& played() const { return *source_; }
 
  private:
   using Clock = std::chrono::steady_clock;

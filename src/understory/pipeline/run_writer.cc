@@ -14,6 +14,7 @@
 #include "understory/pipeline/finished_map.h"
 #include "understory/pipeline/finished_trajectory.h"
 #include "understory/pipeline/run_judgement.h"
+#include "understory/pipeline/run_truth.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/version.h"
 
@@ -107,8 +108,34 @@ void write_graph(const std::filesystem::path& folder, const KeyframeMap& map) {
       edges.push_back({id - 1, id, keyframe.previous_from_this, keyframe.covariance.inverse()});
     }
   }
+  for (std::size_t i = 0; i < map.loops().size(); ++i) {
+    if (!map.loops_used()[i]) continue;
+    const PoseEdge& edge = map.loops()[i].edge;
+    edges.push_back({edge.from, edge.to, edge.from_from_to, edge.covariance.inverse()});
+  }
   poses.commit();
   write_g2o(folder / "graph.g2o", vertices, edges);
+}
+
+std::vector<ReportLoop> report_loops(const KeyframeMap& map) {
+  std::vector<ReportLoop> rows;
+  for (std::size_t i = 0; i < map.loops().size(); ++i) {
+    const LoopAttempt& attempt = map.loops()[i];
+    const Keyframe& from = map.keyframes()[static_cast<std::size_t>(attempt.from)];
+    const Keyframe& to = map.keyframes()[static_cast<std::size_t>(attempt.to)];
+    ReportLoop row;
+    row.from = from.world_from_body.translation();
+    row.to = to.world_from_body.translation();
+    row.from_stamp = from.stamp;
+    row.to_stamp = to.stamp;
+    row.accepted = map.loops_used()[i] != 0;
+    row.correction_m = attempt.correction_m;
+    row.reason = row.accepted       ? ""
+                 : attempt.verified ? "contradicts the odometry or the other loops"
+                                    : attempt.reason;
+    rows.push_back(std::move(row));
+  }
+  return rows;
 }
 
 void write_fixes(const std::filesystem::path& folder, const std::vector<GnssFix>& fixes) {
@@ -184,6 +211,9 @@ void fill_counts(RunSummary& summary, const MappingSession& session, const RunFa
   count("scans_velocity_gated", counts.gated);
   count("scans_with_few_points", counts.empty_scans);
   count("segments", counts.segments);
+  const auto& used = session.map().loops_used();
+  count("loops_tried", used.size());
+  count("loops_closed", static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 1)));
   count("imu_samples", counts.imu_samples);
   count("gnss_fixes", session.fixes().size());
   count("lidar_points", counts.points);
@@ -252,7 +282,7 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
 }  // namespace
 
 MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
-                         const RunFacts& facts, Recording& source, Log& log,
+                         const RunFacts& facts, const Recording& source, Log& log,
                          const ProgressSink& progress) {
   const std::filesystem::path& folder = request.run_folder;
   StageTimes& times = session.times();
@@ -262,6 +292,11 @@ MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
   InventoryResult inventory;
   MapPicture picture;
   RunSummary summary = summarise_run(request, session, facts, trajectory, log);
+  const std::optional<ReportTruth> truth = compare_with_truth(folder, source);
+  if (truth) {
+    summary.quality["ape_rmse_m"] = truth->ape_rmse_m;
+    summary.quality["drift_percent"] = truth->drift_percent;
+  }
   if (request.config.map_enabled) {
     std::unique_ptr<MapTiles> tiles;
     {
@@ -300,6 +335,9 @@ MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
   if (request.config.map_enabled) report.inventory = &inventory;
   report.scans = trajectory.scans;
   report.sensor_period_ms = trajectory.period_ms;
+  report.loops = report_loops(session.map());
+  report.loop_closure_enabled = request.config.keyframe_map.loop_closure.enabled;
+  report.truth = truth;
   write_report(folder / "report.html", report);
   return {summary.status, summary.reasons, folder / "report.html",
           terminal_summary(summary, trajectory, inventory, folder)};

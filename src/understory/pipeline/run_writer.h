@@ -24,7 +24,7 @@ struct RunFacts {
 // Writes the run folder (design: formats): trajectory, states, keyframes, graph, fixes, map, trees,
 // terrain, run.json, report. Every file appears whole or not at all.
 [[nodiscard]] MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
-                                       const RunFacts& facts, Recording& source, Log& log,
+                                       const RunFacts& facts, const Recording& source, Log& log,
                                        const ProgressSink& progress);
 
 }  // namespace understory

@@ -17,6 +17,8 @@ void describe(ConfigTable& table, NdtMapConfig& config) {
             "cells with fewer points are not matched");
   table.add("sigma_floor_m", config.sigma_floor_m, {0.001, 1.0}, "m",
             "no surface is taken to be thinner; noise of the lidar and of the map's poses");
+  table.add("second_axis_weight", config.second_axis_weight, {0.0, 1.0}, "",
+            "weight of a cell's second thinnest direction");
 }
 
 Eigen::Vector3d NdtMap::mean(std::size_t index) const {

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "understory/output/report.h"
+#include "understory/recording/recording.h"
+
+namespace understory {
+
+// The simulator knows where it was: its truth is written to RUN.truth beside the run folder, and
+// the finished trajectory is held against it, for the report alone. Nothing for other recordings.
+[[nodiscard]] std::optional<ReportTruth> compare_with_truth(const std::filesystem::path& run_folder,
+                                                            const Recording& source);
+
+}  // namespace understory
