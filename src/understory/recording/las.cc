@@ -158,7 +158,9 @@ class CleanedFile : public ByteSource {
     const bool long_enough = header_size >= (header[25] >= 4 ? 375 : header[25] == 3 ? 235 : 227);
     const std::vector<std::uint8_t> record =
         find_record(header_size, points, get<std::uint32_t>(header, 100));
-    if (!long_enough || header[24] != 1 || header[25] > 4 || record.empty() ||
+    constexpr std::size_t kItems = kVlrHeader + 32;  // their number, then 6 bytes each
+    if (!long_enough || header[24] != 1 || header[25] > 4 ||
+        record.size() != kItems + 2 + 6 * std::size_t{get<std::uint16_t>(record, kItems)} ||
         header_size + record.size() > points)
       fail(file, header_size, "expected LASzip's record in the header");
     file.read(0, header_size, start_);
