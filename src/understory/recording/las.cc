@@ -1,14 +1,19 @@
 #include "understory/recording/las.h"
 
 #include <laszip/laszip_api.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstring>
 #include <istream>
 #include <memory>
 #include <streambuf>
+#include <type_traits>
 #include <vector>
 
 #include "understory/util/error.h"
@@ -252,28 +257,105 @@ struct LaszipCloser {
   }
 };
 
-void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
-                     const std::function<void(const LasPoint&)>& visit) {
+// Decodes with LASzip until it gives up and hands parts of the points to `pass`.
+void decode_compressed(ByteSource& file, const LasHeader& header,
+                       const std::function<void(const std::vector<LasPoint>&)>& pass) {
+  constexpr std::size_t kAtOnce = 1024;
   CleanedFile cleaned(file);
   SourceBuffer buffer(cleaned);
   std::istream stream(&buffer);
   laszip_POINTER raw = nullptr;
-  if (laszip_create(&raw) != 0) throw InternalError("LASzip cannot be started");
+  if (laszip_create(&raw) != 0) return;
   const std::unique_ptr<void, LaszipCloser> reader(raw);
   laszip_BOOL compressed = 0;
   laszip_point* point = nullptr;
   if (laszip_open_reader_stream(raw, stream, &compressed) != 0 ||
-      laszip_get_point_pointer(raw, &point) != 0) {
-    laszip_CHAR* error = nullptr;
-    laszip_get_error(raw, &error);
-    throw InputError(file.name(), "",
-                     std::string("LASzip: ") + (error == nullptr ? "cannot be read" : error));
-  }
+      laszip_get_point_pointer(raw, &point) != 0)
+    return;
   const PointDecoder decoder(header);
+  std::vector<LasPoint> part;
+  for (std::uint64_t read = 0; read < header.points && laszip_read_point(raw) == 0; ++read) {
+    part.push_back(decoder.from_laszip(*point));
+    if (part.size() < kAtOnce) continue;
+    pass(part);
+    part.clear();
+  }
+  pass(part);
+}
+
+bool write_all(int pipe, const void* data, std::size_t size) {
+  const auto* at = static_cast<const char*>(data);
+  while (size > 0) {
+    const ssize_t written = ::write(pipe, at, size);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    at += written;
+    size -= static_cast<std::size_t>(written);
+  }
+  return true;
+}
+
+// In the process that decodes: never returns.
+[[noreturn]] void serve_points(ByteSource& file, const LasHeader& header, int pipe) {
+  for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGPIPE})
+    std::signal(signal, SIG_DFL);
+  try {
+    decode_compressed(file, header, [&](const std::vector<LasPoint>& points) {
+      if (!write_all(pipe, points.data(), points.size() * sizeof(LasPoint))) ::_exit(1);
+    });
+  } catch (...) {
+    ::_exit(1);
+  }
+  ::_exit(0);
+}
+
+// The end of a pipe and the process at its other end.
+struct Decoding {
+  int pipe = -1;
+  pid_t process = -1;
+  ~Decoding() {
+    if (pipe >= 0) ::close(pipe);
+    if (process > 0) {
+      while (::waitpid(process, nullptr, 0) < 0 && errno == EINTR) {
+      }
+    }
+  }
+};
+
+// LASzip reads and writes out of bounds on damaged data, so it decodes in a process of its own:
+// if that one ends early, what came before is kept.
+void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
+                     const std::function<void(const LasPoint&)>& visit) {
+  static_assert(std::is_trivially_destructible_v<LasPoint>);
+  const CleanedFile checked(file);
+  std::array<int, 2> ends{};
+  if (::pipe(ends.data()) != 0) throw InternalError("no pipe for LASzip's process");
+  Decoding decoding;
+  decoding.pipe = ends[0];
+  decoding.process = ::fork();
+  if (decoding.process == 0) {
+    ::close(ends[0]);
+    serve_points(file, header, ends[1]);
+  }
+  ::close(ends[1]);
+  if (decoding.process < 0) throw InternalError("no process for LASzip");
+  std::vector<char> part(1024 * sizeof(LasPoint));
+  std::size_t have = 0;
   std::uint64_t read = 0;
-  while (read < header.points && laszip_read_point(raw) == 0) {
-    visit(decoder.from_laszip(*point));
-    ++read;
+  while (true) {
+    const ssize_t got = ::read(decoding.pipe, part.data() + have, part.size() - have);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) break;
+    have += static_cast<std::size_t>(got);
+    const std::size_t whole = have / sizeof(LasPoint);
+    for (std::size_t i = 0; i < whole; ++i) {
+      LasPoint point;
+      std::memcpy(static_cast<void*>(&point), part.data() + i * sizeof(LasPoint), sizeof(point));
+      visit(point);
+    }
+    read += whole;
+    have -= whole * sizeof(LasPoint);
+    std::memmove(part.data(), part.data() + whole * sizeof(LasPoint), have);
   }
   report_break(file, header, read, log);
 }
