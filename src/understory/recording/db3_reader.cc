@@ -13,7 +13,7 @@ namespace understory {
 namespace {
 
 constexpr std::uint8_t kZstdMagic[4] = {0x28, 0xB5, 0x2F, 0xFD};
-constexpr int kMostMissingRows = 100'000;
+constexpr int kMostMissingRows = 20'000;
 
 struct CloseDatabase {
   void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
@@ -52,7 +52,7 @@ class Db3Source : public MessageSource {
       const int state = step();
       if (state == SQLITE_DONE) break;
       const auto topic = topics_.find(sqlite3_column_int64(rows_.get(), 1));
-      const TimeNs time = sqlite3_column_int64(rows_.get(), 2);
+      const TimeNs time = plausible_time(sqlite3_column_int64(rows_.get(), 2));
       if (by_row_ && time < last_time_) continue;  // was read before the damage
       last_time_ = time;
       if (topic == topics_.end()) {
@@ -118,8 +118,9 @@ class Db3Source : public MessageSource {
   }
 
   void read_extent() {
-    first_ = scalar("SELECT min(timestamp) FROM messages");
-    last_ = scalar("SELECT max(timestamp) FROM messages");
+    first_ = plausible_time(scalar("SELECT min(timestamp) FROM messages"));
+    last_ = plausible_time(scalar("SELECT max(timestamp) FROM messages"));
+    last_row_ = scalar("SELECT max(id) FROM messages");
   }
 
   void warn_damage(const std::string& what) {
@@ -140,6 +141,7 @@ class Db3Source : public MessageSource {
       if (rows_ == nullptr) return SQLITE_DONE;
     }
     for (int missing = 0; missing < kMostMissingRows; ++missing) {
+      if (last_row_ > 0 && row_ >= last_row_) return SQLITE_DONE;
       sqlite3_reset(rows_.get());
       sqlite3_bind_int64(rows_.get(), 1, ++row_);
       if (sqlite3_step(rows_.get()) == SQLITE_ROW) return SQLITE_ROW;
@@ -172,6 +174,7 @@ class Db3Source : public MessageSource {
   bool by_row_ = false;
   bool ended_ = false;
   std::int64_t row_ = 0;
+  std::int64_t last_row_ = 0;  // 0 if the damage hides it
   std::vector<std::uint8_t> unpacked_;
 };
 

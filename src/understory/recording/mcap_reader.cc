@@ -19,9 +19,8 @@ using mcap::Block;
 constexpr std::size_t kMostLoadedBlocks = 64;
 constexpr std::uint64_t kMostLoadedBytes = 256ULL << 20;
 
-// Log times beyond the range of TimeNs are damaged or far from now.
 TimeNs to_time(std::uint64_t log_time) {
-  return static_cast<TimeNs>(std::min<std::uint64_t>(log_time, std::numeric_limits<TimeNs>::max()));
+  return static_cast<TimeNs>(std::min<std::uint64_t>(log_time, kLatestTime));
 }
 
 class McapSource : public MessageSource {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -19,6 +20,13 @@ struct MessageChannel {
   Serialization serialization = Serialization::kCdr;
   bool readable = true;  // false: an encoding other than CDR or ROS 1
 };
+
+// Log times are held within half of the range of TimeNs, so that differences of damaged ones are
+// numbers too; it reaches beyond the year 2110.
+inline constexpr TimeNs kLatestTime = 4'600'000'000'000'000'000;
+[[nodiscard]] inline TimeNs plausible_time(TimeNs time) {
+  return std::clamp(time, -kLatestTime, kLatestTime);
+}
 
 struct RawMessage {
   std::shared_ptr<const MessageChannel> channel;

@@ -74,7 +74,7 @@ Grid grid_of(const PointCloud2Message& cloud) {
   grid.row_step = std::max<std::size_t>(cloud.row_step, dense_row);
   if (cloud.height <= 1) grid.row_step = dense_row;
   grid.columns = std::min<std::size_t>(cloud.width, cloud.data.size() / cloud.point_step);
-  grid.rows = cloud.height;
+  grid.rows = grid.columns > 0 ? cloud.height : 0;
   if (grid.row_step > 0) grid.rows = std::min(grid.rows, cloud.data.size() / grid.row_step + 1);
   return grid;
 }

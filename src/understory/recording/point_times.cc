@@ -186,7 +186,7 @@ TimeConvention with_absolute_times(const std::string& name, double unit,
 }  // namespace
 
 TimeNs raw_time_to_ns(double raw, double unit_s) {
-  constexpr double kLargest = 9.2e18;
+  constexpr double kLargest = 4.6e18;  // as kLatestTime
   const double units_per_second = std::round(1.0 / unit_s);
   const double ns_per_unit = std::round(1e9 / units_per_second);
   if (!(std::abs(raw) * ns_per_unit < kLargest)) return 0;

@@ -77,7 +77,7 @@ class RecordingSurvey::Impl {
     lidar.ring_count = std::max(lidar.ring_count, scan->ring_count);
     if (scan->points.empty()) ++lidar.empty_scans;
     if (!scan->has_point_times) ++lidar.scans_without_point_times;
-    if (lidar.scans > 1 && step > 0 && scan->stamp - before > step * 5 / 2) ++lidar.outages;
+    if (lidar.scans > 1 && step > 0 && (scan->stamp - before) / 5 > step / 2) ++lidar.outages;
     const TimeNs end = scan->end();
     lidar.last = lidar.scans == 1 ? end : std::max(lidar.last, end);
     lidar.scan_duration_s = std::max(lidar.scan_duration_s, to_seconds(end - scan->stamp));
