@@ -53,6 +53,10 @@ constexpr const char* kPointsFile = "keyframe_points.bin";
 }  // namespace
 
 void KeyframeMap::start() {
+  keyframes_.clear();
+  segment_start_ = 0;
+  inserted_.clear();
+  insert_all();
   points_ = std::make_unique<KeyframePoints>(folder_ / kPointsFile, 0, kCachedKeyframes);
 }
 

@@ -50,6 +50,7 @@ class KeyframeMap {
   // Files go to `folder`; a resumed run calls `load` next, which keeps them, any other `start`.
   KeyframeMap(const Config& config, const std::filesystem::path& folder, StageTimes& times,
               Log& log);
+  // Begins with an empty map.
   void start();
 
   // Whether a scan at this pose is to become a keyframe (37); true for the first.

@@ -91,6 +91,11 @@ void DenseOdometry::match(const LocalMapSnapshot& local_map, const NavState& pre
       estimate.match.usable() && estimate.match.inlier_ratio >= config_.min_inlier_ratio;
 }
 
+void DenseOdometry::set_initial_motion(const Eigen::Vector3d& velocity_m_s,
+                                       const Eigen::Vector3d& angular_rate_rad_s) {
+  motion_->set_initial_motion(velocity_m_s, angular_rate_rad_s);
+}
+
 void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
   motion_->move_world(new_world_from_old_world);
 }

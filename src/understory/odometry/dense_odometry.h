@@ -62,6 +62,9 @@ class DenseOdometry {
 
   void add_imu(const ImuSample& sample);
   [[nodiscard]] DenseEstimate process(const Scan& scan, const LocalMapSnapshot& local_map);
+  // See MotionModel; before the first scan.
+  void set_initial_motion(const Eigen::Vector3d& velocity_m_s,
+                          const Eigen::Vector3d& angular_rate_rad_s);
   // The local map was moved by this (loop closure): the estimate moves along.
   void move_world(const Pose& new_world_from_old_world);
 

@@ -165,6 +165,10 @@ std::vector<StampedPose> ImuSmoother::predict_path(TimeNs from, TimeNs to) const
         at.state.gyro_bias += s.angular_rate() / static_cast<double>(samples.size());
     }
   }
+  const Eigen::Vector3d start_velocity = at.state.world_from_imu.rotation() *
+                                         body_from_imu_.rotation().conjugate() *
+                                         initial_velocity_.value_or(Eigen::Vector3d::Zero());
+  if (!window_.started()) at.state.velocity = start_velocity;
   at.state.stamp = from;
   path.push_back({from, at.state.world_from_imu * imu_from_body});
   std::vector<InertialSample> samples;
@@ -173,9 +177,10 @@ std::vector<StampedPose> ImuSmoother::predict_path(TimeNs from, TimeNs to) const
     if (samples[i].stamp <= samples[i - 1].stamp) continue;
     ImuState next = step_state(at.state, samples[i - 1], samples[i], gravity());
     if (!window_.started()) {
-      next.velocity.setZero();
-      next.world_from_imu =
-          Pose(next.world_from_imu.rotation(), at.state.world_from_imu.translation());
+      next.velocity = start_velocity;
+      next.world_from_imu = Pose(next.world_from_imu.rotation(),
+                                 at.state.world_from_imu.translation() +
+                                     start_velocity * to_seconds(next.stamp - at.state.stamp));
     }
     at.state = next;
     at.angular_rate = samples[i].angular_rate() - at.state.gyro_bias;
@@ -190,9 +195,20 @@ std::vector<StampedPose> ImuSmoother::predict_path(TimeNs from, TimeNs to) const
   return path;
 }
 
+void ImuSmoother::set_initial_motion(const Eigen::Vector3d& velocity_m_s,
+                                     const Eigen::Vector3d& angular_rate_rad_s) {
+  initial_velocity_ = velocity_m_s;
+  if (!use_imu()) angular_rate_ = angular_rate_rad_s;
+}
+
 MotionUpdate ImuSmoother::begin(TimeNs stamp) {
   const auto samples = buffer_.samples(stamp - kHistory, stamp + kHistory);
-  const InitialState initial = find_initial_state(samples, stamp, body_from_imu_, config_.imu);
+  InitialState initial = find_initial_state(samples, stamp, body_from_imu_, config_.imu);
+  if (initial_velocity_) {
+    const Pose world_from_body = initial.state.world_from_imu * body_from_imu_.inverse();
+    initial.state.velocity = world_from_body.rotation() * *initial_velocity_;
+    initial.sigma.velocity_m_s = 0.5;
+  }
   window_.start(initial.state, initial.up_in_world, initial.sigma);
   how_ = initial.how;
   if (how_ != Initialisation::kNoImu) vertical_since_ = stamp;

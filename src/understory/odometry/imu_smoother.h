@@ -16,6 +16,8 @@ class ImuSmoother : public MotionModel {
   ImuSmoother(const MotionConfig& config, const Pose& body_from_imu, Log* log);
 
   void add_imu(const ImuSample& sample) override;
+  void set_initial_motion(const Eigen::Vector3d& velocity_m_s,
+                          const Eigen::Vector3d& angular_rate_rad_s) override;
   [[nodiscard]] Initialisation initialisation() const override { return how_; }
   [[nodiscard]] NavState predict(TimeNs t) const override;
   [[nodiscard]] std::vector<StampedPose> predict_path(TimeNs from, TimeNs to) const override;
@@ -76,6 +78,7 @@ class ImuSmoother : public MotionModel {
   bool levelled_ = false;
   int dropped_in_a_row_ = 0;
   std::optional<LastMatch> last_match_;
+  std::optional<Eigen::Vector3d> initial_velocity_;  // body frame; only until the first scan
 };
 
 }  // namespace understory

@@ -78,6 +78,11 @@ class MotionModel {
   [[nodiscard]] virtual Initialisation initialisation() const = 0;
   [[nodiscard]] bool initialised() const { return initialisation() != Initialisation::kNone; }
 
+  // What is known of the motion at the first scan, body frame; to be called before it. Without it a
+  // carrier is taken to start at rest, and the first scan is not deskewed for its speed.
+  virtual void set_initial_motion(const Eigen::Vector3d& velocity_m_s,
+                                  const Eigen::Vector3d& angular_rate_rad_s) = 0;
+
   // The state at `t`, at or after the last scan's stamp (before it: the last state). Uses the IMU
   // as far as it reaches and constant velocity beyond.
   [[nodiscard]] virtual NavState predict(TimeNs t) const = 0;

@@ -79,7 +79,7 @@ class MappingRun {
   void checkpoint_if_due() {
     const TimeNs due =
         state_.last_checkpoint() + from_seconds(request_.config.checkpoint_interval_s);
-    if (session_.last_scan_end() >= due) {
+    if (session_.settled() && session_.last_scan_end() >= due) {
       state_.save(request_, session_, orderer_, log_, events_);
     }
   }

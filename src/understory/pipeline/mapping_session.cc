@@ -13,6 +13,11 @@ namespace {
 
 constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kFewPoints = 100;
+// Opening: scans further apart tell nothing of the speed at the first; a smear of the first scan
+// that is smaller does no harm, that of a turn counted at this range.
+constexpr double kLongestOpeningS = 0.5;
+constexpr double kLeastSmearM = 0.005;
+constexpr double kSmearRangeM = 10.0;
 
 std::uint16_t clamp_to_u16(double value) {
   return static_cast<std::uint16_t>(std::clamp(value, 0.0, 65'535.0));
@@ -27,6 +32,7 @@ MappingSession::MappingSession(const MappingConfig& config, std::filesystem::pat
       map_(config.keyframe_map, folder_, times_, log) {}
 
 void MappingSession::handle(const Event& event, const Rig& rig) {
+  if (opening_ && started()) opening_->events.push_back(event);
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
     ++counts_.imu_samples;
     if (started()) {
@@ -39,27 +45,72 @@ void MappingSession::handle(const Event& event, const Rig& rig) {
     fixes_.push_back(*fix);
   } else if (const auto* scan = std::get_if<ScanPtr>(&event)) {
     if (!started()) {
-      journal_ = std::make_unique<Journal>(folder_ / "journal.bin", 0);
-      clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", 0);
-      map_.start();
-      start(rig);
-      for (const ImuSample& waiting : waiting_imu_)
-        odometry_->add_imu(waiting);
-      waiting_imu_.clear();
+      opening_->events.push_back(event);
+      opening_->counts_before = counts_;
+      rig_ = rig;
+      start_anew();
     }
     on_scan(**scan);
   }
 }
 
-void MappingSession::start(const Rig& rig) {
+void MappingSession::make_odometry(const Rig& rig) {
   rig_ = rig;
   odometry_ = std::make_unique<DenseOdometry>(config_.odometry, rig_, times_, log_);
+}
+
+// An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
+void MappingSession::start_anew() {
+  journal_ = std::make_unique<Journal>(folder_ / "journal.bin", 0);
+  clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", 0);
+  map_.start();
+  make_odometry(rig_);
+  if (opening_->rounds > 0) {
+    odometry_->set_initial_motion(opening_->velocity, opening_->angular_rate);
+  }
+  for (const ImuSample& waiting : waiting_imu_)
+    odometry_->add_imu(waiting);
+  counts_ = opening_->counts_before;
+}
+
+void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
+  if (counts_.scans < 2) return;
+  const Scan& first = *std::get<ScanPtr>(opening_->events.front());
+  const double between = to_seconds(scan.stamp - first.stamp);
+  const double lasting = to_seconds(first.end() - first.stamp);
+  constexpr int kMostRounds = 6;
+  if (estimate.matched && between > 0.0 && between < kLongestOpeningS &&
+      opening_->rounds < kMostRounds) {
+    const Vector6d turned = right_difference(estimate.match.target_from_source,
+                                             map_.keyframes().front().world_from_body) /
+                            between;
+    // Right differences are along the screw: to first order the velocity at the first scan.
+    const Eigen::Vector3d rate = odometry_->uses_imu() ? Eigen::Vector3d(opening_->angular_rate)
+                                                       : Eigen::Vector3d(turned.head<3>());
+    const double smear = (turned.tail<3>() - opening_->velocity).norm() * lasting +
+                         (rate - opening_->angular_rate).norm() * lasting * kSmearRangeM;
+    if (smear > kLeastSmearM) {
+      opening_->velocity = turned.tail<3>();
+      opening_->angular_rate = rate;
+      ++opening_->rounds;
+      start_anew();
+      const std::vector<Event> events = std::exchange(opening_->events, {});
+      const Rig rig = rig_;
+      opening_->events.push_back(events.front());
+      on_scan(first);
+      for (std::size_t i = 1; i < events.size(); ++i)
+        handle(events[i], rig);
+      return;
+    }
+  }
+  opening_.reset();
+  waiting_imu_.clear();
 }
 
 void MappingSession::on_scan(const Scan& scan) {
   const ScopedTimer timer(times_, "scan");
   const double cpu_start = process_cpu_seconds();
-  DenseEstimate estimate = odometry_->process(scan, map_.local_map());
+  const DenseEstimate estimate = odometry_->process(scan, map_.local_map());
   if (estimate.update.status == MotionStatus::kIgnored) return;
   ScanRecord record;
   record.stamp = scan.stamp;
@@ -71,6 +122,7 @@ void MappingSession::on_scan(const Scan& scan) {
   record.cpu_ms = static_cast<float>(1e3 * (process_cpu_seconds() - cpu_start));
   journal_->append(record);
   last_scan_end_ = scan.end();
+  if (opening_) consider_opening(scan, estimate);
 }
 
 void MappingSession::note_outcome(const DenseEstimate& estimate, ScanRecord& record) {
@@ -177,6 +229,7 @@ void MappingSession::flush() {
 }
 
 void MappingSession::save(BinaryWriter& writer) const {
+  UNDERSTORY_CHECK(settled() || !started());
   writer.put(static_cast<std::uint64_t>(fixes_.size()));
   for (const GnssFix& fix : fixes_)
     put_fix(writer, fix);
@@ -206,8 +259,9 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   if (!was_started) return;
   journal_ = std::make_unique<Journal>(folder_ / "journal.bin", reader.get<std::uint64_t>());
   clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", reader.get<std::uint64_t>());
+  opening_.reset();
   map_.load(reader);
-  start(rig);
+  make_odometry(rig);
   odometry_->load(reader);
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "understory/map/keyframe_clouds.h"
@@ -49,6 +50,8 @@ class MappingSession {
   void load(BinaryReader& reader, const Rig& rig);
 
   [[nodiscard]] bool started() const { return odometry_ != nullptr; }
+  // False during the first scans, which may be done again; no state can be saved then.
+  [[nodiscard]] bool settled() const { return !opening_.has_value(); }
   [[nodiscard]] const Rig& rig() const { return rig_; }
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }
   [[nodiscard]] const KeyframeMap& map() const { return map_; }
@@ -62,7 +65,19 @@ class MappingSession {
   [[nodiscard]] TimeNs last_scan_end() const { return last_scan_end_; }
 
  private:
-  void start(const Rig& rig);
+  // The first two scans. A carrier that is on its way when the recording begins smears its first
+  // scan; the second one tells the speed, and both are done again with it.
+  struct Opening {
+    std::vector<Event> events;
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // assumed, body frame of the first scan
+    Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();
+    int rounds = 0;
+    MappingCounts counts_before;
+  };
+
+  void make_odometry(const Rig& rig);
+  void start_anew();
+  void consider_opening(const Scan& scan, const DenseEstimate& estimate);
   void on_scan(const Scan& scan);
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
   void store_cloud(const DenseEstimate& estimate);
@@ -82,6 +97,7 @@ class MappingSession {
   std::vector<GnssFix> fixes_;
   MappingCounts counts_;
   TimeNs last_scan_end_ = 0;
+  std::optional<Opening> opening_{std::in_place};
 };
 
 }  // namespace understory
