@@ -185,14 +185,21 @@ TimeConvention with_absolute_times(const std::string& name, double unit,
 
 }  // namespace
 
+TimeNs ns_per_unit(double unit_s) {
+  if (unit_s == 1.0) return kNsPerSecond;
+  if (unit_s == 1e-3) return 1'000'000;
+  return unit_s == 1e-6 ? 1'000 : 1;
+}
+
 TimeNs raw_time_to_ns(double raw, double unit_s) {
   constexpr double kLargest = 4.6e18;  // as kLatestTime
-  const double units_per_second = std::round(1.0 / unit_s);
-  const double ns_per_unit = std::round(1e9 / units_per_second);
-  if (!(std::abs(raw) * ns_per_unit < kLargest)) return 0;
-  const double whole = std::floor(raw);
-  return static_cast<TimeNs>(whole) * static_cast<TimeNs>(ns_per_unit) +
-         static_cast<TimeNs>(std::llround((raw - whole) * ns_per_unit));
+  const TimeNs unit_ns = ns_per_unit(unit_s);
+  const auto factor = static_cast<double>(unit_ns);
+  if (!(std::abs(raw) * factor < kLargest)) return 0;
+  // The whole part as an integer: an absolute time in nanoseconds does not fit a double.
+  const auto whole = static_cast<TimeNs>(raw);
+  const double rest = (raw - static_cast<double>(whole)) * factor;
+  return whole * unit_ns + static_cast<TimeNs>(rest + (rest < 0.0 ? -0.5 : 0.5));
 }
 
 TimeConvention detect_point_times(const std::string& field, const std::string& type,
