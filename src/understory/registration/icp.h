@@ -22,7 +22,7 @@ struct IcpConfig {
   double max_step_m = 0.5;
   double step_translation_m = 2e-4;
   double step_rotation_rad = 2e-5;
-  double degenerate_ratio = 0.01;
+  double degenerate_ratio = 0.003;
   int min_matches = 50;
 };
 void describe(ConfigTable& table, IcpConfig& config);

@@ -88,12 +88,13 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
                               config.step_rotation_rad, config.max_step_m, range};
   internal::Minimum minimum{guess, {}, 0, false};
   // From far away a narrow normal has no pull: wide ones first, until the steps become short.
-  if (widening > 1.0) {
-    limits.step_translation_m = config.wide_until_m;
-    limits.step_rotation_rad = config.wide_until_m / range;
-    minimum = internal::minimise(evaluate, guess, limits);
+  int wide_iterations = 0;
+  limits.step_translation_m = config.wide_until_m;
+  limits.step_rotation_rad = config.wide_until_m / range;
+  for (; widening > 1.0; widening *= 0.5) {
+    minimum = internal::minimise(evaluate, minimum.pose, limits);
+    wide_iterations += minimum.iterations;
   }
-  const int wide_iterations = minimum.iterations;
   widening = 1.0;
   limits.step_translation_m = config.step_translation_m;
   limits.step_rotation_rad = config.step_rotation_rad;

@@ -31,7 +31,7 @@ struct NdtConfig {
   double step_translation_m = 1e-3;  // converged when a step is smaller than both
   double step_rotation_rad = 1e-4;
   double max_step_m = 0.5;         // longest step; rotations scaled by the mean range
-  double degenerate_ratio = 0.01;  // a direction with less than this share of the strongest
+  double degenerate_ratio = 0.003;  // a direction with less than this share of the strongest
                                    // direction's information counts as undetermined
   int min_matches = 50;
   // Neighbouring points see the same cell and share its error: this share of them counts as
@@ -42,7 +42,7 @@ void describe(ConfigTable& table, NdtConfig& config);
 
 // Matches a source cloud to the target, P4 (41): minimises the sum over points of
 // -log(mixture of the cell's normal and a uniform distribution), plus the prior's Mahalanobis
-// distance, by damped Newton steps that never raise the cost. Source points should be thinned by a
+// distance, by Newton steps to where the gradient vanishes. Source points should be thinned by a
 // voxel filter first. Parallel; same bits for any number of threads. Thread-safe.
 [[nodiscard]] RegistrationResult register_ndt(const NdtMap& target, const Points& source,
                                               const Pose& guess,

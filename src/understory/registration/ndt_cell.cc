@@ -7,11 +7,14 @@
 namespace understory::internal {
 namespace {
 
-// Ratios of variances. A trace of one ring is far thinner than long; two rings through one cell of
-// a rough ground still are; a patch of surface with a handful of points is not.
+// Ratios of variances, beyond what noise makes of them: a short piece of a ring is as wide as the
+// noise and would pass for a patch that is known in all directions.
 constexpr double kLineRatio = 0.05;   // middle / largest below it: a line
 constexpr double kPlaneRatio = 0.15;  // smallest / middle below it: a surface
 constexpr double kPoleCosine = 0.7;   // lines steeper than 45 degrees are stems, not rings
+// In units of the squared floor of sigma.
+constexpr double kLineNoise = 1.0;
+constexpr double kPlaneNoise = 0.25;
 
 struct Shape {
   Eigen::Vector3d variance;  // ascending
@@ -24,12 +27,12 @@ Shape shape_of(const Eigen::Matrix3d& covariance) {
   return {solver.eigenvalues().cwiseMax(0.0), solver.eigenvectors()};
 }
 
-bool is_line(const Shape& shape) {
-  return shape.variance[1] < kLineRatio * shape.variance[2];
+bool is_line(const Shape& shape, double floor) {
+  return shape.variance[1] < kLineRatio * shape.variance[2] + kLineNoise * floor;
 }
 
-bool is_plane(const Shape& shape) {
-  return shape.variance[0] < kPlaneRatio * shape.variance[1];
+bool is_plane(const Shape& shape, double floor) {
+  return shape.variance[0] < kPlaneRatio * shape.variance[1] + kPlaneNoise * floor;
 }
 
 void add_row(NdtCell& cell, const Eigen::Vector3d& direction, double information) {
@@ -44,8 +47,8 @@ void add_row_of_surroundings(NdtCell& cell, const Eigen::Matrix3d& covariance, d
   for (const int reach : {1, 2}) {
     const CellMoments moments = around(reach);
     const Shape shape = shape_of(moments.covariance());
-    if (is_line(shape)) continue;
-    if (!is_plane(shape)) return;
+    if (is_line(shape, floor)) continue;
+    if (!is_plane(shape, floor)) return;
     const Eigen::Vector3d normal = shape.axes.col(0);
     const double own = normal.dot(covariance * normal);
     add_row(cell, normal, 1.0 / (std::max(own, shape.variance[0]) + floor));
@@ -90,12 +93,12 @@ NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
   // A cell evenly filled has this variance and says nothing.
   const double box = config.cell_size_m * config.cell_size_m / 12.0 + floor;
 
-  if (is_line(shape)) {
+  if (is_line(shape, floor)) {
     if (std::abs(shape.axes.col(2).z()) < kPoleCosine) {
       add_row_of_surroundings(cell, covariance, floor, around);
       return cell;
     }
-  } else if (is_plane(shape)) {
+  } else if (is_plane(shape, floor)) {
     add_row(cell, shape.axes.col(0), 1.0 / (shape.variance[0] + floor) - 1.0 / box);
     return cell;
   }
@@ -105,8 +108,7 @@ NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
   // estimate back (0.16 % of the way on a stand of stems, 0.12 % without).
   for (int i = 0; i < 2; ++i) {
     const double weight = i == 0 ? 1.0 : config.second_axis_weight;
-    add_row(cell, shape.axes.col(i),
-            weight * (1.0 / (shape.variance[i] + floor) - 1.0 / longest));
+    add_row(cell, shape.axes.col(i), weight * (1.0 / (shape.variance[i] + floor) - 1.0 / longest));
   }
   return cell;
 }

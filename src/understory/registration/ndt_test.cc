@@ -215,8 +215,10 @@ TEST(Ndt, StandsAThirdOfOutliers) {
   EXPECT_LT(error_of(result.target_from_source, a).translation_m, 0.02);
 }
 
-// The rings of one scan must not be matched to the rings of the scan before (field notes): the map
-// is one VLP-16 scan over smooth ground with a few stems, and the sensor has moved by 0.3 m.
+// Steps used to be accepted by the cost, which is lowest where rings lie on rings: it held the
+// answer back by centimetres. The rings of one scan must not be matched to the rings of the scan
+// before (field notes): the map is one VLP-16 scan over smooth ground with a few stems, and the
+// sensor has moved by 0.3 m.
 TEST(Ndt, FollowsTheStemsAndNotTheRingsOnTheGround) {
   Stand stand;
   const double places[][2] = {{5, 2}, {-4, 6}, {3, -7},  {-8, -3},
@@ -233,7 +235,7 @@ TEST(Ndt, FollowsTheStemsAndNotTheRingsOnTheGround) {
     const NdtMapPtr map = map_of(scan_stand(stand, a, testing::vlp16(), 1), a);
     const Points source = scan_stand(stand, b, testing::vlp16(), 2);
     const RegistrationResult result = register_ndt(*map, source, a, std::nullopt, {});
-    EXPECT_LT(error_of(result.target_from_source, b).translation_m, 0.05) << direction;
+    EXPECT_LT(error_of(result.target_from_source, b).translation_m, 0.015) << direction;
   }
 }
 

@@ -17,9 +17,9 @@ Vector6d scale_of(double range_m) {
   return scale;
 }
 
-// Solves (H + damping) step = -g in the basis of H's eigenvectors, so that indefinite and singular
-// Hessians need no special case: negative curvature is turned round, none at all gives no step.
-Vector6d damped_step(const Quadratic& at, const Vector6d& scale, double damping) {
+// Solves H step = -g in the basis of H's eigenvectors, so that indefinite and singular Hessians
+// need no special case: negative curvature is turned round, none at all gives no step.
+Vector6d newton_step(const Quadratic& at, const Vector6d& scale) {
   const Matrix6d hessian = scale.asDiagonal() * at.hessian * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(hessian);
   const Vector6d curvature = solver.eigenvalues().cwiseAbs();
@@ -27,8 +27,7 @@ Vector6d damped_step(const Quadratic& at, const Vector6d& scale, double damping)
   if (!(strongest > 0.0)) return Vector6d::Zero();
   Vector6d along = solver.eigenvectors().transpose() * scale.cwiseProduct(at.gradient);
   for (int i = 0; i < 6; ++i) {
-    along[i] =
-        curvature[i] < 1e-9 * strongest ? 0.0 : -along[i] / (curvature[i] + damping * strongest);
+    along[i] = curvature[i] < 1e-9 * strongest ? 0.0 : -along[i] / curvature[i];
   }
   return scale.cwiseProduct(solver.eigenvectors() * along);
 }
@@ -37,6 +36,10 @@ void shorten(Vector6d& step, const StepLimits& limits) {
   const double length = std::max(step.tail<3>().norm(), limits.range_m * step.head<3>().norm());
   if (length > limits.max_step_m) step *= limits.max_step_m / length;
 }
+
+// A step is taken back and halved if it ends on a rise steeper than this share of the fall at its
+// start.
+constexpr double kMostOvershoot = 0.9;
 
 bool small(const Vector6d& step, const StepLimits& limits) {
   return step.tail<3>().norm() < limits.step_translation_m &&
@@ -47,22 +50,25 @@ bool small(const Vector6d& step, const StepLimits& limits) {
 
 Minimum minimise(const Evaluate& evaluate, const Pose& guess, const StepLimits& limits) {
   Minimum best{guess, evaluate(guess), 0, false};
-  double damping = 0.0;
+  const Vector6d scale = scale_of(limits.range_m);
+  double fraction = 1.0;
   while (best.iterations < limits.max_iterations) {
-    const Vector6d scale = scale_of(limits.range_m);
-    Vector6d step = damped_step(best.at, scale, damping);
+    Vector6d step = newton_step(best.at, scale);
     shorten(step, limits);
+    step *= fraction;
     const Pose pose = best.pose * Pose::exp(step);
     const Quadratic at = evaluate(pose);
     ++best.iterations;
-    if (at.cost <= best.at.cost) {
+    const double slope_before = best.at.gradient.dot(step);
+    const double slope_after = at.gradient.dot(step);
+    if (slope_after <= kMostOvershoot * std::abs(slope_before)) {
       best.pose = pose;
       best.at = at;
-      damping = damping < 1e-6 ? 0.0 : damping * 0.1;
+      fraction = std::min(1.0, 2.0 * fraction);
     } else {
-      damping = std::max(1e-3, damping * 10.0);
+      fraction *= 0.5;
     }
-    // A step this small is the end whether it gained or not: the cost is not smooth below it.
+    // A step this small is the end whether it was taken or not: below it nothing is smooth.
     if (small(step, limits)) {
       best.converged = true;
       break;

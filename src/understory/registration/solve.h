@@ -7,8 +7,8 @@
 
 namespace understory::internal {
 
-// Cost of a pose with its gradient and a positive semidefinite (or exact) Hessian with respect to a
-// right perturbation.
+// Cost of a pose (for information) with its gradient and a positive semidefinite (or exact) Hessian
+// with respect to a right perturbation.
 struct Quadratic {
   double cost = 0.0;
   Vector6d gradient = Vector6d::Zero();
@@ -31,9 +31,11 @@ struct Minimum {
   bool converged = false;
 };
 
-// Damped Newton (Levenberg-Marquardt): steps that would raise the cost are shortened until they do
-// not, so it always ends at a pose no worse than the guess. Directions without any information are
-// not moved along.
+// Newton steps to where the gradient vanishes; a step that runs far past that point is halved. The
+// slope decides and not the cost, because the cost also counts how many points meet any cell at
+// all: over smooth ground that is most where the rings of one scan lie on the rings of the other,
+// and steps away from there would be refused. Directions without any information are not moved
+// along.
 [[nodiscard]] Minimum minimise(const Evaluate& evaluate, const Pose& guess,
                                const StepLimits& limits);
 
