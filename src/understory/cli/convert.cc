@@ -7,6 +7,7 @@
 #include "understory/cli/command.h"
 #include "understory/cli/open_options.h"
 #include "understory/output/las_writer.h"
+#include "understory/pipeline/source.h"
 #include "understory/recording/cloud_folder_writer.h"
 #include "understory/recording/mcap_writer.h"
 #include "understory/util/error.h"
@@ -84,7 +85,7 @@ void refuse_same_place(const ConvertOptions& options) {
 int run_convert(const ConvertOptions& options, CommandContext& context) {
   refuse_same_place(options);
   const std::unique_ptr<Recording> recording =
-      open_recording(options.input, options.open, context.log);
+      open_source(options.input, options.open, context.log);
   const std::unique_ptr<Target> target = make_target(options);
   std::uint64_t scans = 0;
   std::uint64_t events = 0;
@@ -130,7 +131,8 @@ void add_convert_command(CLI::App& app, Command& chosen) {
   auto options = std::make_shared<ConvertOptions>();
   CLI::App* command = app.add_subcommand(
       "convert", "Write a recording as MCAP (OUT ends in .mcap) or as a folder of clouds");
-  command->add_option("IN", options->input, "Recording: file or folder")->required();
+  command->add_option("IN", options->input, "Recording: file or folder, or sim:SITE?key=value")
+      ->required();
   command->add_option("OUT", options->output, "File .mcap, or a folder")->required();
   command->add_option("--format", options->format, "Clouds of a folder (default pcd)")
       ->check(CLI::IsMember({"pcd", "ply", "las", "laz", "bin"}));

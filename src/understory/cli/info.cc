@@ -5,6 +5,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/open_options.h"
+#include "understory/pipeline/source.h"
 #include "understory/recording/recording_info.h"
 
 namespace understory {
@@ -198,7 +199,7 @@ void print_text(const RecordingInfo& info) {
 
 int run_info(const InfoOptions& options, CommandContext& context) {
   Log log;  // its warnings are part of the result
-  const std::unique_ptr<Recording> recording = open_recording(options.recording, options.open, log);
+  const std::unique_ptr<Recording> recording = open_source(options.recording, options.open, log);
   RecordingSurvey survey;
   bool stopped = false;
   std::uint64_t events = 0;
@@ -221,7 +222,8 @@ void add_info_command(CLI::App& app, Command& chosen) {
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command =
       app.add_subcommand("info", "What is in a recording, and which conventions were detected");
-  command->add_option("RECORDING", options->recording, "File or folder")->required();
+  command->add_option("RECORDING", options->recording, "File or folder, or sim:SITE?key=value")
+      ->required();
   command->add_flag("--json", options->json, "Print one JSON object");
   add_open_options(*command, options->open);
   command->footer("Example:\n  understory info walk.mcap");

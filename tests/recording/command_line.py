@@ -1,0 +1,91 @@
+"""What `understory info` and `understory convert` answer to good and bad recordings: exit codes,
+messages that name the file, and what is kept of damaged ones."""
+
+import json
+import os
+import pathlib
+import subprocess
+import tempfile
+
+PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
+SAMPLES = pathlib.Path(__file__).resolve().parents[2] / "fuzz" / "corpus"
+
+
+def run(*arguments):
+    done = subprocess.run([PROGRAM, "--quiet", *map(str, arguments)], capture_output=True,
+                          text=True)
+    return done.returncode, done.stdout, done.stderr
+
+
+def info(path):
+    code, out, errors = run("info", "--json", path)
+    assert code == 0, (path, code, errors)
+    return json.loads(out)
+
+
+def check_samples(folder):
+    for sample in ("rosbag/small_none.bag", "rosbag/small_bz2.bag", "rosbag/small_lz4.bag",
+                   "db3/small.db3", "mcap/small_plain.mcap"):
+        first = info(SAMPLES / sample)
+        assert first["lidar"]["scans"] == 3 and first["imu"]["samples"] == 15, sample
+        assert first["gnss"]["fixes"] == 1 and first["warnings"] == [], sample
+        conventions = {t["role"]: t["conventions"] for t in first["topics"]}
+        assert "offset in s from the header stamp" in conventions["lidar"], conventions
+        # Through every output and back, the counts stay.
+        for out, options in (("x.mcap", ()), ("lz4.mcap", ("--compression", "lz4")), ("pcd", ()),
+                             ("ply", ("--format", "ply"))):
+            target = folder / f"{sample.replace('/', '_')}_{out}"
+            code, _, errors = run("convert", SAMPLES / sample, target, *options)
+            assert code == 0, errors
+            again = info(target)
+            for kind, count in (("lidar", "scans"), ("lidar", "points"), ("imu", "samples"),
+                                ("gnss", "fixes")):
+                assert again[kind][count] == first[kind][count], (target, kind, count)
+            assert abs(again["duration_s"] - first["duration_s"]) < 1e-6, target
+
+
+def check_refusals(folder):
+    empty = folder / "empty.mcap"
+    empty.touch()
+    text = folder / "text.bag"
+    text.write_text("no recording\n" * 100)
+    for path in (folder / "missing.mcap", empty, text, folder / "none"):
+        code, _, errors = run("info", path)
+        assert code == 3 and str(path) in errors, (path, code, errors)
+    sample = SAMPLES / "rosbag" / "small_none.bag"
+    code, _, errors = run("convert", sample, folder / "no" / "such" / "x.mcap")
+    assert code == 3 and "x.mcap" in errors, errors
+    if os.path.exists("/dev/full"):
+        full = folder / "full.mcap"
+        full.symlink_to("/dev/full")
+        code, _, errors = run("convert", sample, full)
+        assert code == 3 and "full.mcap" in errors and "space" in errors.lower(), errors
+    copy = folder / "same.mcap"
+    assert run("convert", sample, copy)[0] == 0
+    before = copy.read_bytes()
+    assert run("convert", copy, copy)[0] == 3
+    assert copy.read_bytes() == before
+    code, _, errors = run("info", sample, "--lidar-topic", "/nothing")
+    assert code == 3 and "/points" in errors, errors
+    assert run("convert", sample)[0] == 2
+    assert run("info", sample, "--turn")[0] == 2
+
+
+def check_damage(folder):
+    for name in ("rosbag/small_bz2.bag", "mcap/small_zstd.mcap"):
+        whole = (SAMPLES / name).read_bytes()
+        cut = folder / f"cut_{pathlib.Path(name).name}"
+        cut.write_bytes(whole[: len(whole) // 2])
+        said = info(cut)
+        assert any(str(cut) in warning for warning in said["warnings"]), said["warnings"]
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        check_samples(folder)
+        check_refusals(folder)
+        check_damage(folder)
+
+
+main()
