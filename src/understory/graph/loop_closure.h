@@ -37,7 +37,7 @@ struct LoopClosureConfig {
   int max_starts = 600;    // beyond, the steps grow
   int refined_starts = 6;  // of those, the best few are carried through
   // Acceptance.
-  double max_fitness_m2 = 0.1;   // of ICP
+  double max_fitness_m2 = 0.3;   // of ICP; grows with the spacing of the points, so it is wide
   double structure_low_m = 0.7;  // heights above ground of what is compared
   double structure_high_m = 6.0;
   double structure_cell_m = 0.25;
