@@ -124,6 +124,12 @@ void remark(const Gathered& gathered, const InventoryConfig& config, InventoryRe
         "and canopy models are not affected.",
         near_breast, config.stems.lowest_m, config.stems.highest_m, per_m2));
   }
+  if (result.ground.measured_share < 0.2) {
+    result.remarks.push_back(fmt::format(
+        "Ground was seen in only {:.0f} % of the terrain model's cells; between them it is "
+        "interpolated, and with it the height at which diameters are taken.",
+        100.0 * result.ground.measured_share));
+  }
   if (gathered.without_ground * 50 > gathered.points) {
     result.remarks.push_back(fmt::format(
         "{:.0f} % of the points lie where no ground was seen within {} m; they were left out.",

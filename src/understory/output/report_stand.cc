@@ -85,9 +85,9 @@ std::string cross_section(const InventoryResult& inventory, const Panel& panel) 
     if (p.height_m < kCrossLow || p.height_m > kCrossHigh) continue;
     const double x = (static_cast<double>(p.x) - panel.x0) * scale;
     const double y = (panel.y0 + panel.height - static_cast<double>(p.y)) * scale;
-    if (x >= 0 && y >= 0 && x < width && y < height) {
-      picture.at(static_cast<int>(x), static_cast<int>(y)) = 1;
-    }
+    if (x < 0 || y < 0 || x + 1 >= width || y + 1 >= height) continue;
+    for (int k = 0; k < 4; ++k)
+      picture.at(static_cast<int>(x) + k % 2, static_cast<int>(y) + k / 2) = 1;
   }
   std::string svg = fmt::format(
       "<svg class=\"paper\" viewBox=\"0 0 {0} {1}\" role=\"img\" aria-label=\"cross "
@@ -162,19 +162,19 @@ std::string front_view(const TreeSegment& segment, double top_m) {
       picture.at(x + k % 2, y + k / 2) = p.z() < 0.2F ? 1 : 2;
   }
   std::string svg = fmt::format(
-      "<svg class=\"paper\" viewBox=\"0 0 {0} {1}\" preserveAspectRatio=\"xMidYMax meet\" "
+      "<svg class=\"paper\" viewBox=\"-90 0 {3} {1}\" preserveAspectRatio=\"xMidYMax meet\" "
       "style=\"height:420px\" role=\"img\" aria-label=\"front view\"><image width=\"{0}\" "
       "height=\"{1}\" href=\"data:image/png;base64,{2}\"/>",
-      width, height, base64(encode_png(picture)));
+      width, height, base64(encode_png(picture)), width + 90);
   const double step = top_m > 12.0 ? 5.0 : 1.0;
   const double size = 0.032 * height;
   for (double h = 0.0; h <= top_m; h += step) {
     const double y = (top_m + 0.3 - h) * kPerMetre;
     svg += fmt::format(
-        "<line x1=\"0\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#555\" "
-        "stroke-width=\"{:.1f}\"/><text x=\"{:.1f}\" y=\"{:.1f}\" "
-        "font-size=\"{:.1f}\">{:.0f}</text>",
-        0.4 * size, y, y, 0.08 * size, 0.5 * size, y - 0.15 * size, size, h);
+        "<line x1=\"-30\" x2=\"-5\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" stroke=\"#555\" "
+        "stroke-width=\"{1:.1f}\"/><text x=\"-36\" y=\"{2:.1f}\" text-anchor=\"end\" "
+        "font-size=\"{3:.1f}\">{4:.0f}</text>",
+        y, 0.08 * size, y + 0.35 * size, size, h);
   }
   return svg + "</svg>";
 }
@@ -193,7 +193,9 @@ std::string section_of(const TreeSegment& segment, const Tree& tree, const StemF
     const double dy = static_cast<double>(p.y()) - rise * stem.slope.y();
     const auto x = static_cast<int>((dx + kReach) * kScale);
     const auto y = static_cast<int>((kReach - dy) * kScale);
-    if (x >= 0 && y >= 0 && x < kSide && y < kSide) picture.at(x, y) = 1;
+    if (x < 0 || y < 0 || x + 1 >= kSide || y + 1 >= kSide) continue;
+    for (int k = 0; k < 4; ++k)
+      picture.at(x + k % 2, y + k / 2) = 1;
   }
   return fmt::format(
       "<svg class=\"paper\" viewBox=\"0 0 {0} {0}\" role=\"img\" aria-label=\"cross "

@@ -31,7 +31,7 @@ svg.plot{max-width:1100px}svg.plot text{fill:var(--soft);font-size:12px}
 .line{fill:none;stroke-width:1.4}.level{stroke:var(--bad);stroke-width:1.2;stroke-dasharray:6 4}
 .bar{fill:var(--good)}
 .two{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:16px;align-items:start}
-.panels{display:grid;grid-template-columns:repeat(auto-fit,minmax(430px,1fr));gap:14px}
+.two figure{max-width:620px}.panels{display:grid;grid-template-columns:repeat(auto-fit,minmax(430px,1fr));gap:14px}
 .panels.one{grid-template-columns:minmax(0,900px)}
 .trees{display:flex;flex-wrap:wrap;gap:14px}.trees figure{width:165px}
 figure{margin:0}figcaption{font-size:.85rem;color:var(--soft);margin-top:4px}
