@@ -36,6 +36,9 @@ class CellIndex {
     std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
     for (std::size_t i = 0; i < points.size(); ++i)
       order_[next[cell_of(points[i])]++] = static_cast<std::uint32_t>(i);
+    sorted_.reserve(points.size());
+    for (const std::uint32_t i : order_)
+      sorted_.push_back(points[i]);
   }
 
   // Calls visit(i) for the points of all cells that touch the square around `centre`.
@@ -54,6 +57,37 @@ class CellIndex {
       }
     }
   }
+
+  // What each cell near a circle means for it: wholly within `inner` of the centre, touched by the
+  // band between `inner` and `outer`, or neither. on_cell(begin, end) gets ranges of `sorted`.
+  template <typename OnCell>
+  void ring_cells(const Eigen::Vector2f& centre, float inner, float outer,
+                  const OnCell& on_cell) const {
+    const int c0 = std::max(0, column(centre.x() - outer));
+    const int c1 = std::min(columns_ - 1, column(centre.x() + outer));
+    const int r0 = std::max(0, row(centre.y() - outer));
+    const int r1 = std::min(rows_ - 1, row(centre.y() + outer));
+    const float half = 0.5F * cell_m_;
+    for (int r = r0; r <= r1; ++r) {
+      const std::size_t base = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_);
+      const float dy = std::abs(low_.y() + (static_cast<float>(r) + 0.5F) * cell_m_ - centre.y());
+      for (int c = c0; c <= c1; ++c) {
+        const std::size_t cell = base + static_cast<std::size_t>(c);
+        if (begin_[cell] == begin_[cell + 1]) continue;
+        const float dx = std::abs(low_.x() + (static_cast<float>(c) + 0.5F) * cell_m_ - centre.x());
+        const float far = (dx + half) * (dx + half) + (dy + half) * (dy + half);
+        if (far < inner * inner) {
+          on_cell(begin_[cell], begin_[cell + 1], true);
+          continue;
+        }
+        const float nx = std::max(0.0F, dx - half);
+        const float ny = std::max(0.0F, dy - half);
+        if (nx * nx + ny * ny <= outer * outer) on_cell(begin_[cell], begin_[cell + 1], false);
+      }
+    }
+  }
+  // The points in order of their cells.
+  [[nodiscard]] const PointList& sorted() const { return sorted_; }
 
  private:
   [[nodiscard]] int column(float x) const {
@@ -75,6 +109,7 @@ class CellIndex {
   int rows_ = 0;
   std::vector<std::uint32_t> begin_;
   std::vector<std::uint32_t> order_;
+  PointList sorted_;
 };
 
 // Groups of points that hang together: cells of `reach` that touch, also by a corner.
@@ -152,7 +187,7 @@ class GroupSearch {
     const Eigen::Vector2f extent = extent_of(points_);
     const int most_failures = 2 + static_cast<int>(1.5F * extent.x() * extent.y());
     while (static_cast<int>(points_.size()) >= config_.min_points && failures < most_failures) {
-      const CellIndex index(points_, 0.1F);
+      const CellIndex index(points_, 0.05F);
       const Circle sampled = sample(index);
       if (sampled.on < config_.min_points) break;
       const Circle circle = refine_circle(points_, sampled, config_.band_m);
@@ -181,7 +216,7 @@ class GroupSearch {
   [[nodiscard]] bool acceptable(const Circle& circle) const {
     return circle.on >= config_.min_points && circle.radius_m >= config_.min_radius_m &&
            circle.radius_m <= config_.max_radius_m && circle.arc_deg >= config_.min_arc_deg &&
-           2 * circle.inside <= circle.on &&
+           circle.even_deg >= 0.3 * circle.arc_deg && 2 * circle.inside <= circle.on &&
            circle.rms_m <= std::max(0.6 * config_.band_m, 0.12 * circle.radius_m);
   }
 
@@ -208,7 +243,7 @@ class GroupSearch {
             circle.radius_m < config_.min_radius_m || circle.radius_m > config_.max_radius_m) {
           continue;
         }
-        const double value = score(index, circle);
+        const double value = score(index, circle, best_score);
         if (value <= best_score) continue;
         best_score = value;
         best = circle;
@@ -217,22 +252,38 @@ class GroupSearch {
     return best;
   }
 
-  // Points on the circle less those inside it, which a stem cannot have.
-  double score(const CellIndex& index, Circle& circle) const {
+  // Points on the circle less those inside it, which a stem cannot have, about per
+  // length of the circumference: a large circle through a thicket and a stem in it collects more
+  // points than the stem, but hardly more per length. Gives up as soon as it cannot beat `best`.
+  double score(const CellIndex& index, Circle& circle, double best) {
     const Eigen::Vector2f centre = circle.centre.cast<float>();
     const auto radius = static_cast<float>(circle.radius_m);
     const auto band = static_cast<float>(config_.band_m);
-    int on = 0;
+    const double length = std::pow(0.15 + circle.radius_m, 0.7);
     int inside = 0;
-    index.near(centre, radius + band, [&](std::uint32_t i) {
-      const float d = (points_[i] - centre).norm() - radius;
-      if (std::abs(d) <= band) ++on;
-      if (d < -2.0F * band) ++inside;
-    });
+    int possible = 0;
+    ring_.clear();
+    index.ring_cells(centre, std::max(0.0F, radius - 2.0F * band), radius + band,
+                     [&](std::uint32_t begin, std::uint32_t end, bool within) {
+                       if (within) {
+                         inside += static_cast<int>(end - begin);
+                       } else {
+                         possible += static_cast<int>(end - begin);
+                         ring_.emplace_back(begin, end);
+                       }
+                     });
+    if ((possible - 1.5 * inside) / length <= best) return 0.0;
+    int on = 0;
+    for (const auto& [begin, end] : ring_) {
+      for (std::uint32_t i = begin; i < end; ++i) {
+        const float d = (index.sorted()[i] - centre).norm() - radius;
+        on += std::abs(d) <= band ? 1 : 0;
+        inside += d < -2.0F * band ? 1 : 0;
+      }
+    }
     circle.on = on;
     circle.inside = inside;
-    // A wider arc of the same points would be a larger circle through a blob: prefer small ones.
-    return (on - 1.5 * inside) / std::sqrt(0.3 + circle.radius_m);
+    return (on - 1.5 * inside) / length;
   }
 
   // Takes away what the circle explains: its points and, of a stem, all within it.
@@ -250,6 +301,7 @@ class GroupSearch {
   PointList points_;
   Random random_;
   std::vector<std::uint32_t> candidates_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> ring_;
 };
 
 }  // namespace
@@ -295,6 +347,7 @@ Circle refine_circle(const std::vector<Eigen::Vector2f>& points, const Circle& s
     bins.add(q.x(), q.y());
   }
   circle.arc_deg = bins.covered_deg();
+  circle.even_deg = bins.even_deg();
   circle.rms_m = circle.on > 0 ? std::sqrt(squares / circle.on) : 0.0;
   return circle;
 }

@@ -10,10 +10,11 @@ namespace understory {
 struct Circle {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   double radius_m = 0.0;
-  double rms_m = 0.0;    // of the points on it
-  double arc_deg = 0.0;  // covered by them, in steps of 10 degrees
-  int on = 0;            // points on it
-  int inside = 0;        // points well within: a stem has none, foliage has many
+  double rms_m = 0.0;     // of the points on it
+  double arc_deg = 0.0;   // covered by them, in steps of 10 degrees
+  double even_deg = 0.0;  // the arc if they lay evenly: small where most are in one place
+  int on = 0;             // points on it
+  int inside = 0;         // points well within: a stem has none, foliage has many
 };
 
 struct CircleSearchConfig {

@@ -53,7 +53,7 @@ struct Ring {
   Circle circle;
   double height_m = 0.0;
   int slice = 0;
-  [[nodiscard]] double quality() const { return circle.on * circle.arc_deg; }
+  [[nodiscard]] double quality() const { return circle.on * circle.even_deg; }
 };
 
 // One way of cutting the points: thin slices for dense clouds, thick ones for what is left of
@@ -210,12 +210,32 @@ std::vector<StemFit> link_rings(const std::vector<Ring>& rings, const Cut& cut,
   return stems;
 }
 
+// How much may lie beside the surface, as the sum of both ratios of StemEvidence, for it still to
+// be a stem. In a thicket it takes many slices that agree to believe in one; a steep lean is what a
+// line through scattered points has.
+double most_clutter(const StemFitResult& fit, double lean_deg) {
+  const auto rings = static_cast<double>(fit.stem.slices.size());
+  if (lean_deg > 8.0) return 0.25;
+  const double limit = std::min(0.65, 0.34 + 0.085 * std::max(0.0, rings - 2.0));
+  return fit.evidence.scatter_m > 0.029 && rings < 6.0 ? std::min(limit, 0.4) : limit;
+}
+
+// A slim column of points that stands alone: with a thin stem and noisy ranges its inside fills up,
+// but nothing else looks like that.
+bool stands_alone(const StemFitResult& fit, double slices_between, double lean_deg) {
+  const StemEvidence& e = fit.evidence;
+  return fit.stem.radius_m <= 0.1 && e.outside_ratio <= 0.12 && lean_deg <= 10.0 &&
+         fit.stem.highest_m - fit.stem.lowest_m >= 1.5 && e.slices >= 0.85 * slices_between &&
+         e.even_arc_deg >= 90.0 && e.scatter_m <= 0.4 * fit.stem.radius_m + 0.006;
+}
+
 // Is it a stem, or a bush that a cone happens to fit?
 bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig& config) {
   if (!fit.converged) return false;
   const StemFit& stem = fit.stem;
   const StemEvidence& e = fit.evidence;
   const double dbh = 2.0 * stem.radius_m;
+  const double dbh_sd = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
   const double lean_deg = std::atan(stem.slope.norm()) * 180.0 / M_PI;
   const double extent = stem.highest_m - stem.lowest_m;
   // Steep leans are rare, and a line through scattered points leans as it likes: they have to be
@@ -223,20 +243,24 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
   const double wanted_returns = config.min_returns * (1.0 + std::pow(lean_deg / 8.0, 2));
   const double slices_between = std::floor(stem.highest_m / config.slice_m) -
                                 std::floor(stem.lowest_m / config.slice_m) + 1.0;
-  const double dbh_sd = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
-  // Where points are many, a stem shows in thin slices; what only thick ones show has to be clean.
-  const bool dense = e.on > 12 * e.slices;
-  if (cut.min_slices < config.min_slices && dense &&
-      (e.inside_ratio > 0.15 || e.outside_ratio > 0.25 || e.scatter_m > 0.025 || lean_deg > 10.0)) {
+  if (dbh < config.min_dbh_m || dbh > config.max_dbh_m || lean_deg > config.max_lean_deg ||
+      e.returns < wanted_returns || e.slices < config.min_slices ||
+      e.slices < 0.6 * slices_between || extent < std::max(0.7, 2.0 * cut.thickness_m) ||
+      stem.lowest_m > kBreastHeight + 0.3 ||  // a branch or a crown, not a stem
+      stem.arc_deg < config.min_arc_deg ||
+      e.even_arc_deg < std::max(0.8 * config.min_arc_deg, 0.35 * stem.arc_deg) ||
+      dbh_sd > 0.01 + 0.08 * dbh) {
     return false;
   }
-  return dbh_sd <= 0.01 + 0.08 * dbh && e.inside_ratio + e.outside_ratio <= 0.65 &&
-         dbh >= config.min_dbh_m && dbh <= config.max_dbh_m && lean_deg <= config.max_lean_deg &&
-         e.returns >= wanted_returns && e.slices >= config.min_slices &&
-         e.slices >= 0.6 * slices_between && stem.arc_deg >= config.min_arc_deg &&
-         extent >= std::max(0.7, 2.0 * cut.thickness_m) && 4 * e.inside <= e.on &&
-         e.inside_ratio <= 0.35 && e.outside_ratio <= 0.6 &&
-         e.scatter_m <= std::max(0.012, 0.2 * stem.radius_m) + 0.005;
+  if (stands_alone(fit, slices_between, lean_deg)) return true;
+  // Where points are many, a stem shows in thin slices; what only thick ones show has to be clean.
+  const double clutter = e.inside_ratio + e.outside_ratio;
+  const bool dense = e.on > 12 * e.slices;
+  if (cut.min_slices < config.min_slices && dense && (clutter > 0.25 || e.scatter_m > 0.025)) {
+    return false;
+  }
+  return 4 * e.inside <= e.on && e.inside_ratio <= 0.35 && clutter <= most_clutter(fit, lean_deg) &&
+         e.scatter_m <= std::max(0.012, 0.2 * stem.radius_m) + 0.008;
 }
 
 bool same_stem(const StemFit& a, const StemFit& b) {
@@ -310,13 +334,14 @@ std::vector<StemFit> detect_stems(const std::vector<SlicePoint>& points,
     parallel_for(starts.size(), 1, [&](std::size_t i) {
       const StemFit& start = starts[i];
       const double reach =
-          start.radius_m + 0.25 + start.slope.norm() * (config.highest_m - kBreastHeight);
+          start.radius_m + 0.4 + start.slope.norm() * (config.highest_m - kBreastHeight);
       std::vector<SlicePoint> near;
       for (const std::uint32_t k : index.near(start.centre, reach)) {
-        if (explained[k] == 0) near.push_back(sorted[k]);
+        if (explained[k] == 0 && place_on(start, sorted[k]).distance_m < start.radius_m + 0.35) {
+          near.push_back(sorted[k]);
+        }
       }
       fits[i] = fit_stem(near, start, config);
-      fits[i].stem.slices = start.slices;
     });
     for (const StemFitResult& fit : fits) {
       if (!is_stem(fit, cut, config)) continue;

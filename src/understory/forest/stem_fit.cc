@@ -28,6 +28,7 @@ struct System {
   Matrix6 normal = Matrix6::Zero();
   Vector6 gradient = Vector6::Zero();
   int used = 0;
+  double weight = 0.0;
 };
 
 System build_system(const std::vector<SlicePoint>& points, const StemFit& stem,
@@ -40,12 +41,15 @@ System build_system(const std::vector<SlicePoint>& points, const StemFit& stem,
     const double e = surface_error(stem, place);
     if (std::abs(e) >= reach || place.distance_m < 1e-4) continue;
     const double u = e / reach;
-    const double weight = (1.0 - u * u) * (1.0 - u * u);
+    // A point stands for its returns: the thinned cloud alone would fill the noise around a
+    // surface evenly, which lies more outside than inside of it.
+    const double weight = static_cast<double>(point.returns) * (1.0 - u * u) * (1.0 - u * u);
     Vector6 jacobian;
     const Eigen::Vector2d out = place.outward.head<2>();
     jacobian << -out, -place.along_m * upright * out, -1.0, -place.along_m;
     system.normal += weight * jacobian * jacobian.transpose();
     system.gradient += weight * e * jacobian;
+    system.weight += weight;
     ++system.used;
   }
   // Priors, scaled as if they were points of this scatter.
@@ -60,16 +64,35 @@ System build_system(const std::vector<SlicePoint>& points, const StemFit& stem,
   return system;
 }
 
+// Enough points to fit by: every n-th. A stem needs no more than a few thousand.
+std::vector<SlicePoint> sample_of(const std::vector<SlicePoint>& points) {
+  constexpr std::size_t kEnough = 3'000;
+  const std::size_t stride = points.size() / kEnough + 1;
+  std::vector<SlicePoint> some;
+  for (std::size_t i = 0; i < points.size(); i += stride)
+    some.push_back(points[i]);
+  return some;
+}
+
 double scatter_of(const std::vector<SlicePoint>& points, const StemFit& stem, double reach) {
-  std::vector<double> errors;
+  std::vector<std::pair<double, std::uint32_t>> errors;
+  std::uint64_t returns = 0;
   for (const SlicePoint& point : points) {
     const double e = std::abs(surface_error(stem, place_on(stem, point)));
-    if (e < reach) errors.push_back(e);
+    if (e >= reach) continue;
+    errors.emplace_back(e, point.returns);
+    returns += point.returns;
   }
   if (errors.empty()) return kMostScatter;
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return std::clamp(1.4826 * *middle, kLeastScatter, kMostScatter);
+  std::sort(errors.begin(), errors.end());
+  std::uint64_t passed = 0;
+  double middle = 0.0;
+  for (const auto& [e, count] : errors) {
+    middle = e;
+    passed += count;
+    if (2 * passed >= returns) break;
+  }
+  return std::clamp(1.4826 * middle, kLeastScatter, kMostScatter);
 }
 
 void judge(const std::vector<SlicePoint>& points, const StemDetectorConfig& config,
@@ -113,6 +136,7 @@ void judge(const std::vector<SlicePoint>& points, const StemDetectorConfig& conf
     evidence.outside_ratio = outer_density / on_density;
   }
   stem.arc_deg = arc.covered_deg();
+  evidence.even_arc_deg = arc.even_deg();
   stem.returns = evidence.returns;
   stem.rms_m = evidence.on > 0 ? std::sqrt(squares / evidence.on) : 0.0;
 }
@@ -152,12 +176,12 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
   StemFitResult result;
   StemFit& stem = result.stem;
   stem = start;
-  stem.slices.clear();
   stem.taper = kUsualTaper;
-  double scatter = std::max(0.015, scatter_of(points, stem, 0.05));
+  const std::vector<SlicePoint> some = sample_of(points);
+  double scatter = std::max(0.015, scatter_of(some, stem, 0.05));
   System system;
   for (int iteration = 0; iteration < 25; ++iteration) {
-    system = build_system(points, stem, start, scatter);
+    system = build_system(some, stem, start, scatter);
     if (system.used < 6) return result;
     const Vector6 step = -system.normal.ldlt().solve(system.gradient);
     if (!step.allFinite() || step.head<2>().norm() > 0.3) return result;
@@ -166,14 +190,14 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
     stem.radius_m += step[4];
     stem.taper += step[5];
     if (stem.radius_m < 0.3 * config.min_dbh_m || stem.radius_m > config.max_dbh_m) return result;
-    if (iteration >= 3) scatter = scatter_of(points, stem, 0.05);
-    if (iteration > 5 && step.norm() < 1e-5) break;
+    if (iteration >= 3) scatter = scatter_of(some, stem, 0.05);
+    if (iteration > 4 && step.norm() < 1e-4) break;
   }
   result.converged = true;
   result.evidence.scatter_m = scatter;
   judge(points, config, result);
   const int patches = std::max(1, independent_patches(points, stem, 3.0 * scatter, config.slice_m));
-  const double thinning = std::max(1.0, static_cast<double>(system.used) / patches);
+  const double thinning = std::max(1.0, system.weight / patches);
   const Matrix6 covariance = scatter * scatter * thinning * system.normal.inverse();
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j)

@@ -18,13 +18,14 @@ struct StemEvidence {
   // inside is empty, in foliage all three are alike.
   double inside_ratio = 0.0;
   double outside_ratio = 0.0;
-  int slices = 0;  // slices in which the surface shows
+  double even_arc_deg = 0.0;  // see ArcBins::even_deg
+  int slices = 0;             // slices in which the surface shows
   double scatter_m = 0.0;
 };
 
 // Leaning, tapering cone through the points near `start`, by least squares with Tukey weights
 // (perpendicular distances to the surface). The taper is held near -1 cm of radius per metre by a
-// weak prior, the slope near the start's. Fills every field of StemFit but `slices`.
+// weak prior, the slope near the start's. Keeps the slices of `start`.
 struct StemFitResult {
   bool converged = false;
   StemFit stem;
