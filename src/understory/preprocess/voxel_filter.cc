@@ -1,6 +1,7 @@
 #include "understory/preprocess/voxel_filter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -9,6 +10,11 @@
 #include "understory/util/random.h"
 
 namespace understory {
+namespace {
+
+constexpr std::size_t kBlock = 64;
+
+}  // namespace
 
 void describe(ConfigTable& table, VoxelFilterConfig& config) {
   table.add("voxel_size_m", config.voxel_size_m, {0.01, 10.0}, "m",
@@ -73,26 +79,32 @@ void VoxelFilter::sort_into_voxels(const Points& points, double voxel_size_m,
   UNDERSTORY_CHECK(voxel_size_m > 0.0);
   start(points.size());
   const auto scale = static_cast<float>(1.0 / voxel_size_m);
-  std::uint64_t last_key = 0;
-  std::uint32_t last_voxel = kNone;
-  for (std::uint32_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3f& p = points[i];
-    if (!in_range(i)) continue;
-    const std::uint64_t key = voxel_key(voxel_floor(p.x() * scale), voxel_floor(p.y() * scale),
-                                        voxel_floor(p.z() * scale));
-    // Neighbours in a scan often share a voxel.
-    if (last_voxel == kNone || key != last_key) {
-      last_voxel = find_or_add(key, i);
-      last_key = key;
+  // Keys a block ahead, so that the memory of the slots is asked for before it is needed.
+  std::array<std::uint64_t, kBlock> keys;
+  for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+    const std::size_t end = std::min(points.size(), begin + kBlock);
+    for (std::size_t i = begin; i < end; ++i) {
+      const Eigen::Vector3f& p = points[i];
+      keys[i - begin] = voxel_key(voxel_floor(p.x() * scale), voxel_floor(p.y() * scale),
+                                  voxel_floor(p.z() * scale));
+      __builtin_prefetch(slots_.data() + (voxel_hash(keys[i - begin]) & mask_));
     }
-    voxel_of_point_[i] = last_voxel;
-    Voxel& voxel = voxels_[last_voxel];
-    const Eigen::Vector3f& first = points[voxel.first];
-    voxel.sum[0] += p.x() - first.x();
-    voxel.sum[1] += p.y() - first.y();
-    voxel.sum[2] += p.z() - first.z();
-    ++voxel.count;
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto index = static_cast<std::uint32_t>(i);
+      if (in_range(index)) add_point(points, keys[i - begin], index);
+    }
   }
+}
+
+void VoxelFilter::add_point(const Points& points, std::uint64_t key, std::uint32_t index) {
+  const std::uint32_t found = find_or_add(key, index);
+  voxel_of_point_[index] = found;
+  Voxel& voxel = voxels_[found];
+  const Eigen::Vector3f from_first = points[index] - points[voxel.first];
+  voxel.sum[0] += from_first.x();
+  voxel.sum[1] += from_first.y();
+  voxel.sum[2] += from_first.z();
+  ++voxel.count;
 }
 
 void VoxelFilter::choose_nearest_to_mean(const Points& points) {

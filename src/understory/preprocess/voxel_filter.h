@@ -58,6 +58,7 @@ class VoxelFilter {
   void grow();
   template <typename InRange>
   void sort_into_voxels(const Points& points, double voxel_size_m, const InRange& in_range);
+  void add_point(const Points& points, std::uint64_t key, std::uint32_t index);
   void choose_nearest_to_mean(const Points& points);
 
   std::vector<Slot> slots_;
