@@ -58,6 +58,7 @@ class McapSource : public MessageSource {
  private:
   void load(const Block& block) {
     MessageBlock loaded;
+    loaded.bytes = merger_.take_spare();
     if (block.is_chunk) {
       if (!unpack(block, loaded.bytes)) return;
       list_messages(block, loaded);

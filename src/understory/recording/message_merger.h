@@ -36,10 +36,15 @@ class MessageMerger {
   void tidy() {
     std::erase_if(blocks_, [&](const Reading& reading) {
       const bool done = reading.next >= reading.block.entries.size();
-      if (done) bytes_ -= reading.block.bytes.size();
+      if (done) {
+        bytes_ -= reading.block.bytes.size();
+        spare_ = std::move(reading.block.bytes);
+      }
       return done;
     });
   }
+  // The memory of a block that was dropped, for the next one.
+  [[nodiscard]] std::vector<std::uint8_t> take_spare() { return std::move(spare_); }
   // Valid after `tidy` and before the next `add`.
   [[nodiscard]] bool empty() const { return blocks_.empty(); }
   [[nodiscard]] TimeNs earliest() const { return first()->time(); }
@@ -69,6 +74,7 @@ class MessageMerger {
   }
 
   std::vector<Reading> blocks_;
+  std::vector<std::uint8_t> spare_;
   std::uint64_t bytes_ = 0;
 };
 

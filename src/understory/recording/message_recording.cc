@@ -316,6 +316,20 @@ class MessageRecording : public Recording {
     return true;
   }
 
+  // The rig was made of what the first seconds held; what comes later cannot be used any more.
+  bool take_transforms(TopicStatistics& topic, const MessageReader& reader, TimeNs log_time) {
+    const auto transforms = decode_transforms(reader);
+    if (!transforms) return false;
+    topic.add_stamp(log_time);
+    for (const TransformMessage& each : *transforms) {
+      if (survey_.transforms.has_frame(each.child)) continue;
+      log_.warn("recording.late_extrinsics",
+                file_ + ": the place of " + each.child + " on " + each.parent +
+                    " comes too late in the recording to be used: give --extrinsics FILE");
+    }
+    return true;
+  }
+
   bool take_mag(TopicStatistics& topic, const MessageReader& reader) {
     const auto mag = decode_magnetic_field(reader);
     if (!mag) return false;
