@@ -1,0 +1,240 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "understory/forest/inventory.h"
+#include "understory/util/parallel.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+using Cloud = std::vector<Eigen::Vector3d>;
+
+PointBlocks blocks_of(const Cloud& cloud) {
+  return [&cloud](const PointVisitor& visit) { visit(cloud); };
+}
+
+// A plot with a known terrain and known stems.
+class Plot {
+ public:
+  explicit Plot(std::uint64_t seed) : random_(seed) {}
+
+  double slope_x = 0.0;
+  double bump_m = 0.0;
+
+  [[nodiscard]] double ground(double x, double y) const {
+    return 100.0 + slope_x * x + bump_m * std::sin(0.4 * x) * std::cos(0.3 * y);
+  }
+  void add_ground(double side, int per_m2) {
+    const int count = static_cast<int>(side * side) * per_m2;
+    for (int i = 0; i < count; ++i) {
+      const double x = random_.uniform(0.0, side);
+      const double y = random_.uniform(0.0, side);
+      cloud.emplace_back(x, y, ground(x, y) + random_.normal(0.0, 0.02));
+    }
+  }
+  struct Stem {
+    double x, y, dbh;
+    double lean_x = 0.0;     // metres per metre
+    double arc_deg = 360.0;  // of the circumference that is seen
+    int points = 900;        // between the ground and 4 m
+    double noise_m = 0.008;
+  };
+  void add_stem(const Stem& stem) {
+    for (int i = 0; i < stem.points; ++i) {
+      const double h = random_.uniform(0.1, 4.0);
+      const double turn = random_.uniform(0.0, stem.arc_deg * M_PI / 180.0);
+      const double r = 0.5 * stem.dbh - 0.008 * (h - 1.3) + random_.normal(0.0, stem.noise_m);
+      cloud.emplace_back(stem.x + stem.lean_x * h + r * std::cos(turn), stem.y + r * std::sin(turn),
+                         ground(stem.x, stem.y) + h);
+    }
+    for (int i = 0; i < 300; ++i) {  // a crown to take a height from
+      cloud.emplace_back(stem.x + random_.normal(0.0, 0.6), stem.y + random_.normal(0.0, 0.6),
+                         ground(stem.x, stem.y) + random_.uniform(4.0, 15.0));
+    }
+  }
+  // A bush: points all through a ball.
+  void add_bush(double x, double y, double radius, int points) {
+    for (int i = 0; i < points;) {
+      const Eigen::Vector3d p(random_.uniform(-1, 1), random_.uniform(-1, 1),
+                              random_.uniform(-1, 1));
+      if (p.norm() > 1.0) continue;
+      cloud.emplace_back(x + radius * p.x(), y + radius * p.y(),
+                         ground(x, y) + radius + 1.2 * radius * p.z());
+      ++i;
+    }
+  }
+  Cloud cloud;
+
+ private:
+  Random random_;
+};
+
+const Tree* nearest(const std::vector<Tree>& trees, double x, double y) {
+  const Tree* best = nullptr;
+  double least = 0.3;
+  for (const Tree& tree : trees) {
+    const double distance = std::hypot(tree.x - x, tree.y - y);
+    if (distance < least) best = &tree;
+    least = std::min(least, distance);
+  }
+  return best;
+}
+
+TEST(Ground, LiesUnderStemsAndBushesOnASlope) {
+  Plot plot(1);
+  plot.slope_x = 0.4;
+  plot.bump_m = 0.6;
+  plot.add_ground(20.0, 40);
+  for (int i = 0; i < 8; ++i)
+    plot.add_bush(2.0 + 2.2 * i, 3.0 + 1.8 * i, 0.9, 2000);
+  plot.add_stem({10.0, 4.0, 0.4});
+  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
+  double squares = 0.0;
+  double worst = 0.0;
+  int count = 0;
+  for (double x = 1.0; x < 19.0; x += 0.7) {
+    for (double y = 1.0; y < 19.0; y += 0.7) {
+      const double error = model.terrain.interpolate(x, y) - plot.ground(x, y);
+      ASSERT_TRUE(std::isfinite(error));
+      squares += error * error;
+      worst = std::max(worst, std::abs(error));
+      ++count;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / count), 0.04);
+  EXPECT_LT(worst, 0.25);
+}
+
+TEST(Ground, AStrayPointDeepBelowDoesNotPullItDown) {
+  Plot plot(2);
+  plot.add_ground(10.0, 40);
+  plot.cloud.emplace_back(5.0, 5.0, 90.0);
+  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
+  EXPECT_NEAR(model.terrain.interpolate(5.0, 5.0), 100.0, 0.05);
+  EXPECT_EQ(model.las_class(model.height_above({5.0, 5.0, 90.0})), 7);
+  EXPECT_EQ(model.las_class(model.height_above({5.0, 5.0, 100.01})), 2);
+  EXPECT_EQ(model.las_class(model.height_above({5.0, 5.0, 101.5})), 4);
+}
+
+TEST(Ground, NothingIsInventedFarFromTheGround) {
+  Plot plot(3);
+  plot.add_ground(10.0, 40);
+  plot.cloud.emplace_back(60.0, 5.0, 130.0);
+  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
+  EXPECT_TRUE(std::isnan(model.terrain.interpolate(35.0, 5.0)));
+  EXPECT_TRUE(std::isnan(estimate_ground(blocks_of({}), {}).height_above({0.0, 0.0, 0.0})));
+}
+
+TEST(Inventory, DiametersPositionsAndHeightsOfAStand) {
+  Plot plot(4);
+  plot.slope_x = 0.25;
+  plot.add_ground(24.0, 40);
+  std::vector<Plot::Stem> stems;
+  for (int i = 0; i < 16; ++i) {
+    Plot::Stem stem{3.0 + 6.0 * (i % 4), 3.0 + 6.0 * (i / 4), 0.08 + 0.03 * i};
+    stem.lean_x = 0.01 * (i % 5);
+    stem.noise_m = 0.01;
+    stems.push_back(stem);
+    plot.add_stem(stem);
+  }
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  EXPECT_EQ(result.trees.size(), stems.size());
+  for (const Plot::Stem& stem : stems) {
+    const Tree* tree = nearest(result.trees, stem.x, stem.y);
+    ASSERT_NE(tree, nullptr) << stem.x << " " << stem.y;
+    EXPECT_NEAR(tree->dbh_m, stem.dbh, 0.012);
+    EXPECT_LT(std::abs(tree->dbh_m - stem.dbh), 5.0 * tree->dbh_sd_m + 0.004);
+    EXPECT_NEAR(tree->x, stem.x, 0.02);
+    EXPECT_NEAR(tree->z, plot.ground(stem.x, stem.y), 0.06);
+    EXPECT_NEAR(tree->lean_deg, std::atan(stem.lean_x) * 180.0 / M_PI, 0.8);
+    EXPECT_NEAR(tree->height_m, 15.0, 0.7);
+  }
+}
+
+TEST(Inventory, StemsSeenFromOneSideKeepTheirDiameter) {
+  Plot plot(5);
+  plot.add_ground(20.0, 40);
+  for (int i = 0; i < 9; ++i) {
+    Plot::Stem stem{3.0 + 6.0 * (i % 3), 3.0 + 6.0 * (i / 3), 0.2 + 0.03 * i};
+    stem.arc_deg = 150.0;
+    plot.add_stem(stem);
+  }
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  EXPECT_EQ(result.trees.size(), 9U);
+  for (int i = 0; i < 9; ++i) {
+    const Tree* tree = nearest(result.trees, 3.0 + 6.0 * (i % 3), 3.0 + 6.0 * (i / 3));
+    ASSERT_NE(tree, nullptr) << i;
+    EXPECT_NEAR(tree->dbh_m, 0.2 + 0.03 * i, 0.03);
+  }
+}
+
+TEST(Inventory, BushesAreNoTrees) {
+  Plot plot(6);
+  plot.add_ground(20.0, 40);
+  for (int i = 0; i < 16; ++i)
+    plot.add_bush(2.0 + 5.0 * (i % 4), 2.0 + 5.0 * (i / 4), 0.6 + 0.1 * (i % 5), 3000);
+  EXPECT_TRUE(take_inventory(blocks_of(plot.cloud), {}).trees.empty());
+}
+
+TEST(Inventory, AStemInABushIsFound) {
+  Plot plot(7);
+  plot.add_ground(12.0, 40);
+  plot.add_stem({6.0, 6.0, 0.3});
+  plot.add_bush(6.5, 6.0, 0.7, 800);
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  ASSERT_EQ(result.trees.size(), 1U);
+  EXPECT_NEAR(result.trees[0].dbh_m, 0.3, 0.03);
+}
+
+TEST(Inventory, FewReturnsAreEnoughForAFreeStem) {
+  Plot plot(8);
+  plot.add_ground(16.0, 40);
+  for (int i = 0; i < 4; ++i) {
+    Plot::Stem stem{4.0 + 8.0 * (i % 2), 4.0 + 8.0 * (i / 2), 0.3};
+    stem.points = 80;  // about 60 of them in the searched layer
+    plot.add_stem(stem);
+  }
+  EXPECT_EQ(take_inventory(blocks_of(plot.cloud), {}).trees.size(), 4U);
+}
+
+TEST(Inventory, AnAirborneCloudSaysThatStemsAreNotSeen) {
+  Plot plot(9);
+  plot.add_ground(20.0, 4);
+  Random random(9);
+  for (int i = 0; i < 4000; ++i)
+    plot.cloud.emplace_back(random.uniform(0, 20), random.uniform(0, 20), random.uniform(108, 120));
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  EXPECT_TRUE(result.trees.empty());
+  EXPECT_TRUE(result.too_sparse);
+  EXPECT_FALSE(result.remarks.empty());
+}
+
+TEST(Inventory, ThreadsDoNotChangeAnything) {
+  Plot plot(10);
+  plot.add_ground(16.0, 40);
+  for (int i = 0; i < 9; ++i)
+    plot.add_stem({3.0 + 5.0 * (i % 3), 3.0 + 5.0 * (i / 3), 0.15 + 0.04 * i});
+  plot.add_bush(5.5, 5.5, 1.2, 4000);
+  std::vector<InventoryResult> results(2);
+  for (int threads = 1; threads <= 2; ++threads) {
+    with_threads(threads, [&] {
+      results[static_cast<std::size_t>(threads - 1)] = take_inventory(blocks_of(plot.cloud), {});
+    });
+  }
+  ASSERT_EQ(results[0].trees.size(), results[1].trees.size());
+  for (std::size_t i = 0; i < results[0].trees.size(); ++i) {
+    EXPECT_EQ(results[0].trees[i].x, results[1].trees[i].x);
+    EXPECT_EQ(results[0].trees[i].dbh_m, results[1].trees[i].dbh_m);
+  }
+  const std::vector<float>& a = results[0].ground.terrain.values;
+  const std::vector<float>& b = results[1].ground.terrain.values;
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i)
+    EXPECT_TRUE(a[i] == b[i] || (std::isnan(a[i]) && std::isnan(b[i])));
+}
+
+}  // namespace
+}  // namespace understory
