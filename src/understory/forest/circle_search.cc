@@ -187,8 +187,9 @@ class GroupSearch {
     const Eigen::Vector2f extent = extent_of(points_);
     const int most_failures = 2 + static_cast<int>(1.5F * extent.x() * extent.y());
     while (static_cast<int>(points_.size()) >= config_.min_points && failures < most_failures) {
-      const CellIndex index(points_, 0.05F);
-      const Circle sampled = sample(index);
+      const CellIndex fine(points_, 0.08F);
+      const CellIndex coarse(points_, 0.3F);
+      const Circle sampled = sample(fine, coarse);
       if (sampled.on < config_.min_points) break;
       const Circle circle = refine_circle(points_, sampled, config_.band_m);
       const bool good = acceptable(circle);
@@ -221,7 +222,7 @@ class GroupSearch {
   }
 
   // The best of many circles through three points near each other.
-  Circle sample(const CellIndex& index) {
+  Circle sample(const CellIndex& fine, const CellIndex& coarse) {
     constexpr std::array<float, 4> kScales = {0.08F, 0.2F, 0.45F, 0.9F};
     const std::size_t n = points_.size();
     const std::size_t draws = std::min<std::size_t>(24 + n / 8, 300);
@@ -232,7 +233,7 @@ class GroupSearch {
       const float scale = kScales[draw % kScales.size()];
       if (scale > 2.0 * config_.max_radius_m) continue;
       candidates_.clear();
-      index.near(first, scale, [&](std::uint32_t i) {
+      coarse.near(first, scale, [&](std::uint32_t i) {
         if ((points_[i] - first).squaredNorm() <= scale * scale) candidates_.push_back(i);
       });
       if (candidates_.size() < 3) continue;
@@ -243,7 +244,7 @@ class GroupSearch {
             circle.radius_m < config_.min_radius_m || circle.radius_m > config_.max_radius_m) {
           continue;
         }
-        const double value = score(index, circle, best_score);
+        const double value = score(fine, circle, best_score);
         if (value <= best_score) continue;
         best_score = value;
         best = circle;

@@ -64,13 +64,18 @@ System build_system(const std::vector<SlicePoint>& points, const StemFit& stem,
   return system;
 }
 
-// Enough points to fit by: every n-th. A stem needs no more than a few thousand.
-std::vector<SlicePoint> sample_of(const std::vector<SlicePoint>& points) {
-  constexpr std::size_t kEnough = 3'000;
-  const std::size_t stride = points.size() / kEnough + 1;
+// Enough points to fit by: those near the surface of the start, every n-th where they are many.
+std::vector<SlicePoint> sample_of(const std::vector<SlicePoint>& points, const StemFit& start) {
+  constexpr double kReach = 0.15;
+  constexpr std::size_t kEnough = 2'000;
+  std::vector<SlicePoint> near;
+  for (const SlicePoint& point : points) {
+    if (std::abs(surface_error(start, place_on(start, point))) < kReach) near.push_back(point);
+  }
+  const std::size_t stride = near.size() / kEnough + 1;
   std::vector<SlicePoint> some;
-  for (std::size_t i = 0; i < points.size(); i += stride)
-    some.push_back(points[i]);
+  for (std::size_t i = 0; i < near.size(); i += stride)
+    some.push_back(near[i]);
   return some;
 }
 
@@ -177,7 +182,7 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
   StemFit& stem = result.stem;
   stem = start;
   stem.taper = kUsualTaper;
-  const std::vector<SlicePoint> some = sample_of(points);
+  const std::vector<SlicePoint> some = sample_of(points, stem);
   double scatter = std::max(0.015, scatter_of(some, stem, 0.05));
   System system;
   for (int iteration = 0; iteration < 25; ++iteration) {
