@@ -23,7 +23,7 @@ namespace understory {
 struct KeyframeConfig {
   // P4 (37): a scan becomes a keyframe when |theta * (X_L^-1 X_k)| reaches `distance_m`, where
   // theta weighs a rotation of `rotation_as_metre_deg` like one metre. In the paper 0.2 m and 20.
-  double distance_m = 1.0;
+  double distance_m = 0.3;
   double rotation_as_metre_deg = 30.0;
 };
 void describe(ConfigTable& table, KeyframeConfig& config);

@@ -25,10 +25,10 @@ struct LoopCloserConfig {
   LoopSearchConfig search;
   LoopClosureConfig verification;
   PoseGraphConfig graph;
-  int submap_keyframes = 12;   // on each side of a candidate, that make the map it is matched to
-  int source_keyframes = 2;    // on each side of the query, that are matched
-  double voxel_size_m = 0.4;   // thins both
-  int handover_keyframes = 6;  // results are taken over that many keyframes after the search began
+  int submap_keyframes = 35;    // on each side of a candidate, that make the map it is matched to
+  int source_keyframes = 6;     // on each side of the query, that are matched
+  double voxel_size_m = 0.4;    // thins both
+  int handover_keyframes = 15;  // results are taken over that many keyframes after the search began
   double least_correction_m = 0.005;  // smaller ones wait for the next
   double least_correction_deg = 0.02;
 };

@@ -30,7 +30,7 @@ struct DenseOdometryConfig {
   bool imu_enabled = true;         // false: the IMU of the recording is passed over
   std::string machine_boxes_file;  // YAML, P4-8; empty: none
   // A match counts only with this share of the scan's points near the map.
-  double min_inlier_ratio = 0.3;
+  double min_inlier_ratio = 0.1;
   // The coarse maps are asked first where the prediction may be off by more than this share of the
   // finest cell (one sigma), or the last scan found no match.
   double coarse_above_sigma = 0.25;

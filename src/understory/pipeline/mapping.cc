@@ -63,7 +63,7 @@ class MappingRun {
       auto player = std::make_unique<RealtimePlayer>(
           std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans));
       player_ = player.get();
-      session_.map().take_outcomes_at_once();
+      session_.take_outcomes_at_once();
       source_ = std::move(player);
     }
   }

@@ -18,6 +18,8 @@ ConfigTable mapping_table(MappingConfig& config) {
               "farther returns do not enter the finished map");
     table.add("keyframe_thin_m", config.keyframe_thin_m, {0.0, 1.0}, "m",
               "one point per cube of this edge of each keyframe; 0: all");
+    table.add("cloud_distance_m", config.cloud_distance_m, {0.0, 100.0}, "m",
+              "weighted distance between keyframes whose clouds make the finished map");
     table.add("thin_m", config.map.thin_m, {0.0, 1.0}, "m",
               "one point per cube of this edge of the finished map; 0: all");
     table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
@@ -26,6 +28,8 @@ ConfigTable mapping_table(MappingConfig& config) {
   table.section("run", [&] {
     table.add("checkpoint_interval_s", config.checkpoint_interval_s, {0.1, 5.0}, "s",
               "of recording between checkpoints");
+    table.add("sparse_scan_points", config.sparse_scan_points, {0, 100000000}, "points",
+              "a first scan with fewer is not thinned like a dense one; 0: never");
     table.add("lost_after_scans", config.lost_after_scans, {1, 100000}, "scans",
               "unmatched scans in a row after which a new piece of map begins");
     table.add("realtime_queue_scans", config.realtime_queue_scans, {1, 1000}, "scans",

@@ -24,7 +24,11 @@ struct MappingConfig {
   bool map_enabled = true;        // write map.laz and what is made from it
   InventoryConfig inventory;
   double checkpoint_interval_s = 4.0;  // of recording; at most 5 s are processed again
-  int lost_after_scans = 30;           // unmatched scans in a row after which a new segment begins
+  double cloud_distance_m = 1.0;  // weighted distance (37) between keyframes whose clouds are kept
+  // Scans with fewer points than this (16 beams) are matched and mapped as they are: thinned like a
+  // dense scan, too few points would be left in a cell.
+  int sparse_scan_points = 60000;
+  int lost_after_scans = 30;  // unmatched scans in a row after which a new segment begins
   int realtime_queue_scans = 3;
 };
 

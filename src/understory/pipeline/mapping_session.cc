@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
+#include "understory/geometry/pose_io.h"
 #include "understory/sensor/sensor_io.h"
 #include "understory/util/error.h"
 
@@ -12,7 +14,9 @@ namespace understory {
 namespace {
 
 constexpr std::size_t kMostWaitingImu = 20'000;
+constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
 constexpr std::size_t kFewPoints = 100;
+constexpr double kMostSpeedMS = 100.0;
 // Opening: scans further apart tell nothing of the speed at the first; a smear of the first scan
 // that is smaller does no harm, that of a turn counted at this range.
 constexpr double kLongestOpeningS = 0.5;
@@ -29,25 +33,26 @@ MappingSession::MappingSession(const MappingConfig& config, std::filesystem::pat
     : config_(config),
       folder_(std::move(folder)),
       log_(log),
-      map_(config.keyframe_map, folder_, times_, log) {}
+      map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)) {}
 
 void MappingSession::handle(const Event& event, const Rig& rig) {
   if (opening_ && started()) opening_->events.push_back(event);
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
     ++counts_.imu_samples;
-    if (started()) {
-      odometry_->add_imu(*sample);
-    } else {
-      waiting_imu_.push_back(*sample);
-      if (waiting_imu_.size() > kMostWaitingImu) waiting_imu_.pop_front();
-    }
+    recent_imu_.push_back(*sample);
+    const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
+    while (recent_imu_.size() > most)
+      recent_imu_.pop_front();
+    if (started()) odometry_->add_imu(*sample);
   } else if (const auto* fix = std::get_if<GnssFix>(&event)) {
     fixes_.push_back(*fix);
   } else if (const auto* scan = std::get_if<ScanPtr>(&event)) {
     if (!started()) {
       opening_->events.push_back(event);
       opening_->counts_before = counts_;
+      opening_->imu_before = recent_imu_;
       rig_ = rig;
+      adapt_to((*scan)->points.size());
       start_anew();
     }
     on_scan(**scan);
@@ -63,12 +68,12 @@ void MappingSession::make_odometry(const Rig& rig) {
 void MappingSession::start_anew() {
   journal_ = std::make_unique<Journal>(folder_ / "journal.bin", 0);
   clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", 0);
-  map_.start();
+  map_->start();
   make_odometry(rig_);
   if (opening_->rounds > 0) {
     odometry_->set_initial_motion(opening_->velocity, opening_->angular_rate);
   }
-  for (const ImuSample& waiting : waiting_imu_)
+  for (const ImuSample& waiting : recent_imu_)
     odometry_->add_imu(waiting);
   counts_ = opening_->counts_before;
 }
@@ -82,7 +87,7 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
   if (estimate.matched && between > 0.0 && between < kLongestOpeningS &&
       opening_->rounds < kMostRounds) {
     const Vector6d turned = right_difference(estimate.match.target_from_source,
-                                             map_.keyframes().front().world_from_body) /
+                                             map_->keyframes().front().world_from_body) /
                             between;
     // Right differences are along the screw: to first order the velocity at the first scan.
     const Eigen::Vector3d rate = odometry_->uses_imu() ? Eigen::Vector3d(opening_->angular_rate)
@@ -104,14 +109,59 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
     }
   }
   opening_.reset();
-  waiting_imu_.clear();
+}
+
+// A sparse scan is not thinned away, and its keyframes lie closer.
+void MappingSession::adapt_to(std::size_t scan_points) {
+  sparse_ = scan_points < static_cast<std::size_t>(config_.sparse_scan_points) ? 1 : 0;
+  if (sparse_ == 0) return;
+  VoxelFilterConfig& voxel = config_.odometry.voxel;
+  voxel.voxel_size_m = std::min(voxel.voxel_size_m, 0.1);
+  LocalMapConfig& local = config_.keyframe_map.local_map;
+  local.cells.min_points = std::min(local.cells.min_points, 4);
+  map_ = std::make_unique<KeyframeMap>(config_.keyframe_map, folder_, times_, log_);
+  if (at_once_) map_->take_outcomes_at_once();
+}
+
+// Lost: unmatched for so long that the prediction is worth nothing, or not even finite any more.
+bool MappingSession::lost(const DenseEstimate& estimate) const {
+  const bool finite = estimate.state.world_from_body.matrix().allFinite() &&
+                      estimate.state.velocity_in_world.allFinite() &&
+                      estimate.state.velocity_in_world.norm() < kMostSpeedMS;
+  const bool matched = estimate.matched && estimate.update.status == MotionStatus::kAccepted;
+  return !finite || (!matched && counts_.lost_in_a_row + 1 >=
+                                     static_cast<std::uint64_t>(config_.lost_after_scans));
+}
+
+// A new odometry from this scan on, put where the last good one was, and an empty local map.
+DenseEstimate MappingSession::begin_segment(const Scan& scan) {
+  log_.warn("map.segment", fmt::format("lost at {}: a new piece of map begins there, joined to the "
+                                       "old one by nothing but the last known position",
+                                       format_seconds(scan.stamp)));
+  make_odometry(rig_);
+  for (const ImuSample& sample : recent_imu_)
+    odometry_->add_imu(sample);
+  map_->start_segment();
+  ++counts_.segments;
+  counts_.lost_in_a_row = 0;
+  DenseEstimate estimate = odometry_->process(scan, map_->local_map());
+  const Eigen::Vector3d forward = last_good_.rotation() * Eigen::Vector3d::UnitX();
+  const Pose placed(so3_exp({0.0, 0.0, std::atan2(forward.y(), forward.x())}),
+                    last_good_.translation());
+  odometry_->move_world(placed);
+  estimate.state.world_from_body = placed * estimate.state.world_from_body;
+  estimate.state.velocity_in_world = placed.rotation() * estimate.state.velocity_in_world;
+  return estimate;
 }
 
 void MappingSession::on_scan(const Scan& scan) {
   const ScopedTimer timer(times_, "scan");
   const double cpu_start = process_cpu_seconds();
-  const DenseEstimate estimate = odometry_->process(scan, map_.local_map());
+  DenseEstimate estimate = odometry_->process(scan, map_->local_map());
   if (estimate.update.status == MotionStatus::kIgnored) return;
+  if (!map_->keyframes().empty() && estimate.thinned.size() >= kFewPoints && lost(estimate)) {
+    estimate = begin_segment(scan);
+  }
   ScanRecord record;
   record.stamp = scan.stamp;
   record.points = static_cast<std::uint32_t>(scan.points.size());
@@ -147,7 +197,7 @@ void MappingSession::note_outcome(const DenseEstimate& estimate, ScanRecord& rec
     log_.warn("match.velocity_gate",
               fmt::format("match of the scan at {} dropped: {}", format_seconds(record.stamp),
                           estimate.update.reason));
-  } else if (!estimate.matched && !map_.local_map().empty()) {
+  } else if (!estimate.matched && !map_->local_map().empty()) {
     record.outcome = ScanOutcome::kUnmatched;
     ++counts_.unmatched;
     log_.warn("match.none",
@@ -161,27 +211,18 @@ void MappingSession::note_outcome(const DenseEstimate& estimate, ScanRecord& rec
 void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& record) {
   NavState state = estimate.state;
   if (estimate.update.new_world_from_old_world) {
-    map_.move_world(*estimate.update.new_world_from_old_world);
+    map_->move_world(*estimate.update.new_world_from_old_world);
   }
   const bool good =
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
   counts_.lost_in_a_row = good ? 0 : counts_.lost_in_a_row + 1;
-  bool wanted = good && map_.wants(state.world_from_body);
-  if (counts_.lost_in_a_row >= static_cast<std::uint64_t>(config_.lost_after_scans) &&
-      estimate.thinned.size() >= kFewPoints) {
-    log_.warn("map.segment", fmt::format("lost at {}: a new piece of map begins there, joined to "
-                                         "the old one by a prediction only",
-                                         format_seconds(record.stamp)));
-    map_.start_segment();
-    ++counts_.segments;
-    counts_.lost_in_a_row = 0;
-    wanted = true;
-  }
+  if (good) last_good_ = state.world_from_body;
+  const bool wanted = good && map_->wants(state.world_from_body);
   // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop
   // closure, levelling) moves the scans with them.
-  const bool first = map_.keyframes().empty();
-  const Pose reference = first ? state.world_from_body : map_.keyframes().back().world_from_body;
-  record.keyframe = first ? 0 : static_cast<std::int32_t>(map_.keyframes().size()) - 1;
+  const bool first = map_->keyframes().empty();
+  const Pose reference = first ? state.world_from_body : map_->keyframes().back().world_from_body;
+  record.keyframe = first ? 0 : static_cast<std::int32_t>(map_->keyframes().size()) - 1;
   record.set_pose(reference.inverse() * state.world_from_body);
   const Eigen::Quaterniond keyframe_from_world = reference.rotation().conjugate();
   Eigen::Map<Eigen::Vector3d>(record.velocity.data()) =
@@ -191,15 +232,21 @@ void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& recor
   if (!wanted) return;
   record.becomes_keyframe = 1;
   store_cloud(estimate);
-  const auto moved = map_.add(record.stamp, state.world_from_body, estimate.thinned);
+  const auto moved = map_->add(record.stamp, state.world_from_body, estimate.thinned);
   if (moved) odometry_->move_world(*moved);
 }
 
 void MappingSession::store_cloud(const DenseEstimate& estimate) {
   const ScopedTimer timer(times_, "store");
   const BodyCloud& cloud = estimate.cloud;
-  KeyframeCloud stored{static_cast<std::int32_t>(map_.keyframes().size()), cloud.stamp, {}};
-  if (config_.map_enabled) {
+  KeyframeCloud stored{static_cast<std::int32_t>(map_->keyframes().size()), cloud.stamp, {}};
+  const auto& keyframes = map_->keyframes();
+  const bool due =
+      keyframes.empty() ||
+      keyframe_distance(keyframes[last_cloud_].world_from_body, estimate.state.world_from_body,
+                        config_.keyframe_map.keyframe) >= config_.cloud_distance_m;
+  if (config_.map_enabled && due) {
+    last_cloud_ = keyframes.size();
     std::vector<std::uint32_t> kept;
     if (config_.keyframe_thin_m > 0.0) {
       kept = cloud_filter_.keep(cloud.points, config_.keyframe_thin_m);
@@ -225,7 +272,7 @@ void MappingSession::flush() {
   if (!started()) return;
   journal_->flush();
   clouds_->flush();
-  map_.flush();
+  map_->flush();
 }
 
 void MappingSession::save(BinaryWriter& writer) const {
@@ -235,14 +282,17 @@ void MappingSession::save(BinaryWriter& writer) const {
     put_fix(writer, fix);
   writer.put(counts_);
   writer.put(last_scan_end_);
+  writer.put(sparse_);
+  writer.put(last_cloud_);
+  put_pose(writer, last_good_);
   writer.put(started());
-  writer.put(static_cast<std::uint64_t>(waiting_imu_.size()));
-  for (const ImuSample& sample : waiting_imu_)
+  writer.put(static_cast<std::uint64_t>(recent_imu_.size()));
+  for (const ImuSample& sample : recent_imu_)
     put_imu(writer, sample);
   if (!started()) return;
   writer.put(journal_->size());
   writer.put(static_cast<std::uint64_t>(clouds_->size()));
-  map_.save(writer);
+  map_->save(writer);
   odometry_->save(writer);
 }
 
@@ -252,15 +302,19 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
     fixes_.push_back(get_fix(reader));
   counts_ = reader.get<MappingCounts>();
   last_scan_end_ = reader.get<TimeNs>();
+  const bool sparse = reader.get<std::uint8_t>() != 0;
+  last_cloud_ = reader.get<std::uint64_t>();
+  last_good_ = get_pose(reader);
   const bool was_started = reader.get<bool>();
   const auto waiting = reader.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < waiting; ++i)
-    waiting_imu_.push_back(get_imu(reader));
+    recent_imu_.push_back(get_imu(reader));
   if (!was_started) return;
   journal_ = std::make_unique<Journal>(folder_ / "journal.bin", reader.get<std::uint64_t>());
   clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", reader.get<std::uint64_t>());
   opening_.reset();
-  map_.load(reader);
+  if (sparse) adapt_to(0);
+  map_->load(reader);
   make_odometry(rig);
   odometry_->load(reader);
 }

@@ -54,12 +54,17 @@ class MappingSession {
   [[nodiscard]] bool settled() const { return !opening_.has_value(); }
   [[nodiscard]] const Rig& rig() const { return rig_; }
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }
-  [[nodiscard]] const KeyframeMap& map() const { return map_; }
-  [[nodiscard]] KeyframeMap& map() { return map_; }
+  [[nodiscard]] const KeyframeMap& map() const { return *map_; }
+  [[nodiscard]] KeyframeMap& map() { return *map_; }
   [[nodiscard]] const Journal& journal() const { return *journal_; }
   [[nodiscard]] const KeyframeClouds& clouds() const { return *clouds_; }
   [[nodiscard]] const std::vector<GnssFix>& fixes() const { return fixes_; }
   [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
+  // --realtime: loops are taken over as soon as they are found.
+  void take_outcomes_at_once() {
+    at_once_ = true;
+    map_->take_outcomes_at_once();
+  }
   [[nodiscard]] StageTimes& times() { return times_; }
   // Set after each scan, for progress and latency.
   [[nodiscard]] TimeNs last_scan_end() const { return last_scan_end_; }
@@ -73,13 +78,17 @@ class MappingSession {
     Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();
     int rounds = 0;
     MappingCounts counts_before;
+    std::deque<ImuSample> imu_before;
   };
 
   void make_odometry(const Rig& rig);
   void start_anew();
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
+  void adapt_to(std::size_t scan_points);
   void on_scan(const Scan& scan);
+  [[nodiscard]] DenseEstimate begin_segment(const Scan& scan);
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
+  [[nodiscard]] bool lost(const DenseEstimate& estimate) const;
   void store_cloud(const DenseEstimate& estimate);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
 
@@ -88,15 +97,19 @@ class MappingSession {
   Log& log_;
   StageTimes times_;
   Rig rig_;
-  std::deque<ImuSample> waiting_imu_;  // before the first scan
+  std::deque<ImuSample> recent_imu_;  // all before the first scan, then the last ones
   std::unique_ptr<DenseOdometry> odometry_;
-  KeyframeMap map_;
+  std::unique_ptr<KeyframeMap> map_;
   std::unique_ptr<Journal> journal_;
   std::unique_ptr<KeyframeClouds> clouds_;
   VoxelFilter cloud_filter_;
   std::vector<GnssFix> fixes_;
   MappingCounts counts_;
   TimeNs last_scan_end_ = 0;
+  std::uint8_t sparse_ = 0;       // the first scan was
+  std::uint64_t last_cloud_ = 0;  // keyframe whose cloud was kept last
+  Pose last_good_;                // of the last scan that was matched
+  bool at_once_ = false;
   std::optional<Opening> opening_{std::in_place};
 };
 
