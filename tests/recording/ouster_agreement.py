@@ -1,7 +1,12 @@
 """The OS-1-128 capture, point by point within 1 mm of ouster-sdk."""
 
 import numpy as np
-from ouster.sdk import core, open_source
+from ouster.sdk import open_source
+
+try:
+    from ouster.sdk import core
+except ImportError:  # before 1.0, which other packages may hold back
+    from ouster.sdk import client as core
 
 from scans import DATA, check, read_scans, skip_without, xyz
 
@@ -9,11 +14,12 @@ capture = skip_without(DATA / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap")
 metadata = DATA / "OS-1-128_v2.3.0_1024x10.json"
 ours = read_scans(capture)
 source = open_source(str(capture), meta=[str(metadata)])
-table = core.XYZLut(source.sensor_info[0])
+info = source.sensor_info[0] if hasattr(source, "sensor_info") else source.metadata
+table = core.XYZLut(info)
 theirs = list(source)
 check(len(ours) == len(theirs), f"{len(ours)} scans, ouster-sdk has {len(theirs)}")
 for (stamp, points), scans in zip(ours, theirs):
-    scan = scans[0]
+    scan = scans if isinstance(scans, core.LidarScan) else scans[0]
     ranges = scan.field("RANGE")
     rows, columns = np.nonzero(ranges)
     order = np.lexsort((rows, columns))  # column after column, from the top beam down

@@ -13,7 +13,9 @@ namespace understory {
 struct LocalMapConfig {
   // Edges of the cells of the maps that scans are matched to, coarse to fine.
   std::vector<double> cell_sizes_m = {2.0, 1.0};
-  NdtMapConfig cells;  // cell_size_m is taken from the list above
+  // cell_size_m is taken from the list above. Many keyframes lie in a cell: what they agree on is
+  // sharper than one scan.
+  NdtMapConfig cells = {.sigma_floor_m = 0.01};
   // Accumulate: every keyframe within the radius stays, however old; recent: only the last
   // keyframes, thinned by a voxel grid of their positions (P4 section 3.1.1, Local Map).
   enum class Method { kAccumulate, kRecent };

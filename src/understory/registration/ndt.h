@@ -30,9 +30,9 @@ struct NdtConfig {
   int max_iterations = 30;
   double step_translation_m = 1e-3;  // converged when a step is smaller than both
   double step_rotation_rad = 1e-4;
-  double max_step_m = 0.5;         // longest step; rotations scaled by the mean range
+  double max_step_m = 0.5;          // longest step; rotations scaled by the mean range
   double degenerate_ratio = 0.003;  // a direction with less than this share of the strongest
-                                   // direction's information counts as undetermined
+                                    // direction's information counts as undetermined
   int min_matches = 50;
   // Neighbouring points see the same cell and share its error: this share of them counts as
   // independent. Scales the matching cost against the prior, and the information.

@@ -16,7 +16,7 @@ namespace understory {
 struct NdtMapConfig {
   double cell_size_m = 1.0;     // edge of a cell
   int min_points = 5;           // cells with fewer have no distribution
-  double sigma_floor_m = 0.01;  // a surface is never taken to be thinner: sensor and pose noise
+  double sigma_floor_m = 0.03;  // a surface is never taken to be thinner: sensor and pose noise
   double second_axis_weight = 0.25;  // of a cell's second thinnest direction, 0..1
 };
 void describe(ConfigTable& table, NdtMapConfig& config);
