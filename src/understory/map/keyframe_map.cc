@@ -231,6 +231,7 @@ void KeyframeMap::load(BinaryReader& reader) {
   points_ =
       std::make_unique<KeyframePoints>(folder_ / kPointsFile, keyframes_.size(), kCachedKeyframes);
   insert_all();
+  loops_.load(reader, keyframes_, *points_);
 }
 
 }  // namespace understory
