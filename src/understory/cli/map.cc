@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
 
 #include "understory/cli/command.h"
@@ -25,6 +26,23 @@ struct MapOptions {
   OpenOptions open;
 };
 
+// What a run that could not be written can do about it.
+int with_advice(const std::string& run_folder, const std::function<int()>& work) {
+  try {
+    return work();
+  } catch (const OutputError& error) {
+    const auto checkpoint = std::filesystem::path(run_folder) / "work" / "checkpoint.bin";
+    std::error_code ignored;
+    const std::string said = error.what();
+    if (!std::filesystem::exists(checkpoint, ignored) || said.find("--resume") != said.npos) throw;
+    const std::string file = error.file() + ": ";
+    throw OutputError(error.file(), said.substr(said.rfind(file, 0) == 0 ? file.size() : 0) +
+                                        "; what was mapped so far is kept: make room and go on "
+                                        "with `understory map --resume " +
+                                        run_folder + "`");
+  }
+}
+
 MappingConfig resolved(const MapOptions& options) {
   return read_mapping_config(options.profile, options.config_file, options.settings);
 }
@@ -36,8 +54,10 @@ int run_map(const MapOptions& options, CommandContext& context) {
     return kExitDone;
   }
   if (!options.resume.empty()) {
-    return report_outcome(
-        resume_mapping(options.resume, context.log, context.progress, context.stop_requested));
+    return with_advice(options.resume, [&] {
+      return report_outcome(
+          resume_mapping(options.resume, context.log, context.progress, context.stop_requested));
+    });
   }
   if (options.recording.empty() || options.run_folder.empty()) {
     throw ConfigError({"understory map needs a RECORDING and -o RUN (or --resume RUN)"});
@@ -50,8 +70,10 @@ int run_map(const MapOptions& options, CommandContext& context) {
   request.open = options.open;
   request.realtime = options.realtime;
   request.overwrite = options.overwrite;
-  return report_outcome(
-      run_mapping(request, context.log, context.progress, context.stop_requested));
+  return with_advice(options.run_folder, [&] {
+    return report_outcome(
+        run_mapping(request, context.log, context.progress, context.stop_requested));
+  });
 }
 
 }  // namespace

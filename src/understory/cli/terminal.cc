@@ -98,6 +98,8 @@ ProgressSink terminal_progress(bool quiet) {
 StopRequested install_stop_handler() {
   std::signal(SIGINT, on_stop_signal);
   std::signal(SIGTERM, on_stop_signal);
+  std::signal(SIGXFSZ,
+              SIG_IGN);  // a file that may grow no more is an error of writing, like a full disk
   return [] { return stop_signal != 0; };
 }
 

@@ -47,10 +47,6 @@ bool ImuBuffer::acceptable(const ImuSample& sample) {
 
 void ImuBuffer::add(const ImuSample& sample) {
   if (!acceptable(sample)) return;
-  if (last_stamp_ && sample.stamp - *last_stamp_ > max_gap() && log_ != nullptr) {
-    log_->warn("imu.gap", "no IMU for " + std::to_string(to_seconds(sample.stamp - *last_stamp_)) +
-                              " s before " + format_seconds(sample.stamp) + " s");
-  }
   InertialSample kept;
   kept.stamp = sample.stamp;
   for (int i = 0; i < 3; ++i) {

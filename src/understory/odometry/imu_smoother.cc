@@ -237,10 +237,16 @@ void ImuSmoother::learn_vertical(const MotionInterval& interval) {
   how_ = Initialisation::kInMotion;
 }
 
-void ImuSmoother::note_silence(const MotionInterval& interval, TimeNs stamp) {
-  if (log_ == nullptr || !interval.samples.empty() || !buffer_.ever_filled() || !use_imu()) return;
-  log_->warn("imu.silent",
-             "no IMU for the scan at " + format_seconds(stamp) + " s: constant velocity stands in");
+// Once for each stretch without IMU.
+void ImuSmoother::note_silence(const MotionInterval& interval, TimeNs from, TimeNs stamp) {
+  const bool silent = interval.samples.empty() && buffer_.ever_filled() && use_imu();
+  if (silent && !silent_ && log_ != nullptr) {
+    log_->warn("imu.silent", "no IMU between the scans at " + format_seconds(from) + " s and " +
+                                 format_seconds(stamp) +
+                                 " s: until it comes back the motion between scans is taken to be "
+                                 "even");
+  }
+  silent_ = silent;
 }
 
 void ImuSmoother::add_state(TimeNs stamp, const MotionInterval& interval,
@@ -286,19 +292,36 @@ void ImuSmoother::watch(TimeNs stamp, const MotionInterval& interval,
                         const std::optional<PoseFactor>& lidar) {
   if (!lidar) return;
   const bool was_trusted = monitor_.trust().trusted;
-  if (last_match_ && last_match_->stamp == latest().stamp && !interval.samples.empty()) {
+  const bool was_on_probation = monitor_.on_probation();
+  monitor_.pass_time(stamp);
+  // An IMU on probation is not in the interval, but it is looked at.
+  std::vector<InertialSample> apart;
+  if (monitor_.on_probation()) apart = buffer_.slice(latest().stamp, stamp);
+  const std::vector<InertialSample>& samples = apart.empty() ? interval.samples : apart;
+  if (last_match_ && last_match_->stamp == latest().stamp && !samples.empty()) {
     const Eigen::Quaterniond turned =
         last_match_->world_from_imu.rotation().conjugate() * lidar->world_from_imu.rotation();
-    monitor_.add_turn(so3_log(turned), raw_turn(interval.samples), interval.motion.duration);
+    monitor_.add_turn(so3_log(turned), raw_turn(samples), interval.motion.duration);
     monitor_.add_force(
         last_match_->world_from_imu.rotation().slerp(0.5, lidar->world_from_imu.rotation()),
-        mean_force(interval.samples), interval.motion.duration);
+        mean_force(samples), interval.motion.duration);
   }
   last_match_ = LastMatch{stamp, lidar->world_from_imu};
-  if (was_trusted && !monitor_.trust().trusted && log_ != nullptr) {
+  note_standing(stamp, was_on_probation, was_trusted);
+}
+
+void ImuSmoother::note_standing(TimeNs stamp, bool was_on_probation, bool was_trusted) {
+  if (log_ == nullptr) return;
+  if (was_trusted && !monitor_.trust().trusted) {
     log_->warn("imu.untrusted",
                monitor_.trust().reason +
                    (!monitor_.usable() ? "; the rest of the run does without the IMU" : ""));
+  } else if (!was_on_probation && monitor_.on_probation()) {
+    log_->warn("imu.probation",
+               "IMU and lidar contradict each other at " + format_seconds(stamp) +
+                   " s: the IMU is left out until it is clear whether it is right");
+  } else if (was_on_probation && !monitor_.on_probation()) {
+    log_->info("the IMU is used again from " + format_seconds(stamp) + " s on");
   }
 }
 
@@ -341,6 +364,7 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
   }
   if (dropped_in_a_row_ >= config_.velocity_gate_patience) {
     dropped_in_a_row_ = 0;
+    monitor_.suspect(stamp);
     restart_at(stamp, lidar, match_velocity);
     update.reason.clear();
     if (log_ != nullptr)
@@ -348,6 +372,7 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
                  "the matches insist against the prediction; the estimate of "
                  "the motion starts anew at " +
                      format_seconds(stamp) + " s");
+    note_standing(stamp, false, monitor_.trust().trusted);
     return update;
   }
   update.status = MotionStatus::kVelocityGate;
@@ -384,10 +409,10 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
   MotionInterval interval = make_interval(before.stamp, stamp);
   const bool was_usable = use_imu();
   watch(stamp, interval, lidar);
-  note_silence(interval, stamp);
+  note_silence(interval, before.stamp, stamp);
 
   MotionUpdate update;
-  if (was_usable && !use_imu()) {
+  if (was_usable != use_imu()) {
     restart_at(stamp, *lidar, match_velocity);
     update.status = MotionStatus::kAccepted;
   } else {
@@ -460,6 +485,7 @@ void ImuSmoother::save(BinaryWriter& writer) const {
   writer.put(vertical_since_.value_or(0));
   writer.put(levelled_);
   writer.put(dropped_in_a_row_);
+  writer.put(silent_);
   writer.put(last_match_.has_value());
   writer.put(last_match_ ? last_match_->stamp : TimeNs{0});
   put_pose(writer, last_match_ ? last_match_->world_from_imu : Pose());
@@ -481,6 +507,7 @@ void ImuSmoother::load(BinaryReader& reader) {
   vertical_since_ = vertical ? std::optional<TimeNs>(since) : std::nullopt;
   levelled_ = reader.get<bool>();
   dropped_in_a_row_ = reader.get<int>();
+  silent_ = reader.get<bool>();
   const bool matched = reader.get<bool>();
   const auto stamp = reader.get<TimeNs>();
   const Pose pose = get_pose(reader);

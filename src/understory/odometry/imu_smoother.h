@@ -61,7 +61,8 @@ class ImuSmoother : public MotionModel {
                                  const PoseFactor& lidar, double& jump) const;
   void watch(TimeNs stamp, const MotionInterval& interval, const std::optional<PoseFactor>& lidar);
   void restart_at(TimeNs stamp, const PoseFactor& lidar, const Eigen::Vector3d& velocity);
-  void note_silence(const MotionInterval& interval, TimeNs stamp);
+  void note_silence(const MotionInterval& interval, TimeNs from, TimeNs stamp);
+  void note_standing(TimeNs stamp, bool was_on_probation, bool was_trusted);
   void level(MotionUpdate& update);
   void hand_over_to_isam();
 
@@ -77,6 +78,7 @@ class ImuSmoother : public MotionModel {
   std::optional<TimeNs> vertical_since_;                    // when the IMU first told of gravity
   bool levelled_ = false;
   int dropped_in_a_row_ = 0;
+  bool silent_ = false;  // no IMU over the last interval
   std::optional<LastMatch> last_match_;
   std::optional<Eigen::Vector3d> initial_velocity_;  // body frame; only until the first scan
 };

@@ -57,6 +57,7 @@ enum class Initialisation { kNone, kStill, kInMotion, kNoImu };
 // Agreement between the IMU and the lidar, judged over the run.
 struct ImuTrust {
   bool trusted = true;
+  bool usable = true;  // false: sure to do harm; the model goes on without it
   std::string reason;  // one sentence for run.json if not trusted
 };
 

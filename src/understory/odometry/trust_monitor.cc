@@ -17,13 +17,19 @@ constexpr double kSmallestTurn = 0.3 * kDegree;
 constexpr double kEnoughTurning = 30.0 * kDegree;
 constexpr int kEnoughTurns = 10;
 constexpr double kEnoughUnexplained = 120.0 * kDegree;  // before a verdict without a cause
-constexpr double kLargestBias = 0.06;                   // rad/s
+constexpr double kLongestProbation_s = 20.0;
+constexpr double kProbationTurn_s = 0.5;
+constexpr double kLargestBias = 0.06;  // rad/s
 // Share of the turning that is unexplained: below kGood all is well; above kBad something is wrong.
 constexpr double kBad = 0.4;
 constexpr double kGood = 0.25;
+constexpr double kGoodOnProbation = 0.3;  // a lidar alone is less sure of its turns
+constexpr double kSurelyTurned = 20.0 * kDegree;
+constexpr double kMuchBetter = 0.25;  // of the squares
 // Gravity over whole seconds: walking and driving swing it by a few degrees.
 constexpr int kEnoughSeconds = 10;
 constexpr int kEnoughForLength = 3;
+constexpr int kEnoughForProbation = 4;
 constexpr double kForceSpread = 15.0 * kDegree;
 constexpr double kLengthTolerance = 0.15;
 
@@ -91,14 +97,60 @@ std::string degrees(double radians) {
 
 }  // namespace
 
-void TrustMonitor::distrust(const std::string& reason) {
+void TrustMonitor::distrust(const std::string& reason, bool usable) {
   if (!trust_.trusted) return;
-  trust_.trusted = false;
-  trust_.reason = reason;
+  trust_ = {false, usable, reason};
+}
+
+void TrustMonitor::join_anew() {
+  joined_lidar_.setIdentity();
+  joined_gyro_.setIdentity();
+  joined_time_ = 0.0;
+}
+
+void TrustMonitor::begin_anew() {
+  join_anew();
+  product_.setZero();
+  lidar_sum_.setZero();
+  gyro_sum_.setZero();
+  force_world_.setZero();
+  force_imu_.setZero();
+  directions_world_.setZero();
+  lidar_square_ = gyro_square_ = turn_time_ = total_angle_ = force_time_ = length_sum_ = 0.0;
+  turns_ = seconds_ = 0;
+}
+
+void TrustMonitor::suspect(TimeNs now) {
+  if (standing_ != Standing::kUnproven || !trust_.trusted) return;
+  standing_ = Standing::kOnProbation;
+  now_ = probation_since_ = now;
+  begin_anew();
+}
+
+void TrustMonitor::pass_time(TimeNs now) {
+  now_ = now;
+  if (on_probation() && to_seconds(now - probation_since_) > kLongestProbation_s) {
+    standing_ = Standing::kUnproven;
+    begin_anew();
+  }
 }
 
 void TrustMonitor::add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
                             double duration_s) {
+  if (!on_probation()) return take_turn(by_lidar, by_gyro, duration_s);
+  joined_lidar_ = (joined_lidar_ * so3_exp(by_lidar)).normalized();
+  joined_gyro_ = (joined_gyro_ * so3_exp(by_gyro)).normalized();
+  joined_time_ += duration_s;
+  if (joined_time_ < kProbationTurn_s) return;
+  const Eigen::Vector3d lidar = so3_log(joined_lidar_);
+  const Eigen::Vector3d gyro = so3_log(joined_gyro_);
+  const double time = joined_time_;
+  join_anew();
+  take_turn(lidar, gyro, time);
+}
+
+void TrustMonitor::take_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
+                             double duration_s) {
   const double angle = std::max(by_lidar.norm(), by_gyro.norm());
   if (angle < kSmallestTurn) return;
   product_ += by_gyro * by_lidar.transpose();
@@ -122,28 +174,42 @@ void TrustMonitor::judge_turns() {
                       kLargestBias * turn_time_ / turns_};
   const double all = std::max(lidar_square_, gyro_square_);
   const double left = unexplained(sums, Eigen::Matrix3d::Identity());
-  if (left < kBad * kBad * all) return;
+  const double good = on_probation() ? kGoodOnProbation : kGood;
+  const double limit = good * good * all;
   Eigen::Matrix3d rotation = best_rotation(sums, false);
   const Eigen::Matrix3d centred = best_rotation(sums, true);
   if (unexplained(sums, centred) < unexplained(sums, rotation)) rotation = centred;
+  // Where most turns are about the vertical, an IMU turned about it explains most of them. Once it
+  // is suspected, a turn that explains them much better is enough.
+  const bool turned = on_probation() && Eigen::AngleAxisd(rotation).angle() > kSurelyTurned &&
+                      unexplained(sums, rotation) < kMuchBetter * left;
+  if (left < kBad * kBad * all && !turned) {
+    // On probation the accelerometer has to prove itself, too.
+    if (left < limit && (!on_probation() || seconds_ >= kEnoughForProbation))
+      standing_ = Standing::kProven;
+    return;
+  }
   const AxesGuess axes = best_axes(sums);
-  const double limit = kGood * kGood * all;
   std::string cause;
+  bool explained = true;
   if (axes.left < limit) {
-    usable_ = false;
     cause = "; its axes look swapped: to agree with the lidar they would be " + axes.text;
   } else if (unexplained(sums, rotation) < limit) {
-    usable_ = false;
     cause = "; the IMU looks mounted about " + degrees(Eigen::AngleAxisd(rotation).angle()) +
             " degrees from where its extrinsics say";
+  } else if (standing_ == Standing::kUnproven) {
+    return suspect(now_);
   } else if (total_angle_ < kEnoughUnexplained) {
     return;
   } else {
+    // A lidar that positions itself alone and is contradicted all the same: the IMU is of no use.
+    explained = on_probation();
     cause = "; none of the ways to turn its axes explains it";
   }
   distrust("gyroscope and lidar disagree on how the sensor turned (" +
-           std::to_string(static_cast<int>(std::lround(100.0 * std::sqrt(left / all)))) +
-           " % unexplained over " + degrees(total_angle_) + " degrees of turning)" + cause);
+               std::to_string(static_cast<int>(std::lround(100.0 * std::sqrt(left / all)))) +
+               " % unexplained over " + degrees(total_angle_) + " degrees of turning)" + cause,
+           !explained);
 }
 
 void TrustMonitor::add_force(const Eigen::Quaterniond& world_from_imu,
@@ -165,23 +231,30 @@ void TrustMonitor::add_force(const Eigen::Quaterniond& world_from_imu,
 void TrustMonitor::judge_forces() {
   const double length = length_sum_ / seconds_;
   if (std::abs(length - gravity_) > kLengthTolerance * gravity_) {
-    usable_ = false;
     distrust("mean specific force is " + std::to_string(length) + " m/s^2 instead of " +
-             std::to_string(gravity_) + ": wrong unit, gravity taken out, or scale");
+                 std::to_string(gravity_) + ": wrong unit, gravity taken out, or scale",
+             false);
     return;
   }
-  if (seconds_ < kEnoughSeconds) return;
+  if (seconds_ < (on_probation() ? kEnoughForProbation : kEnoughSeconds)) return;
   // Root mean square angle from the mean direction, from the length of the mean unit vector.
   const double spread = std::sqrt(std::max(0.0, 2.0 - 2.0 * directions_world_.norm() / seconds_));
   if (spread > kForceSpread)
     distrust("gravity as the accelerometer sees it swings by " + degrees(spread) +
-             " degrees in the world: its axes do not fit the lidar's attitude");
+                 " degrees in the world: its axes do not fit the lidar's attitude",
+             !on_probation());
 }
 
 void TrustMonitor::save(BinaryWriter& writer) const {
   writer.put(trust_.trusted);
   writer.put(trust_.reason);
-  writer.put(usable_);
+  writer.put(trust_.usable);
+  writer.put(standing_);
+  writer.put_doubles(joined_lidar_.coeffs().data(), 4);
+  writer.put_doubles(joined_gyro_.coeffs().data(), 4);
+  writer.put(joined_time_);
+  writer.put(now_);
+  writer.put(probation_since_);
   writer.put_doubles(product_.data(), 9);
   for (const double value : {lidar_square_, gyro_square_, turn_time_, total_angle_})
     writer.put(value);
@@ -196,7 +269,13 @@ void TrustMonitor::save(BinaryWriter& writer) const {
 void TrustMonitor::load(BinaryReader& reader) {
   trust_.trusted = reader.get<bool>();
   trust_.reason = reader.get_string();
-  usable_ = reader.get<bool>();
+  trust_.usable = reader.get<bool>();
+  standing_ = reader.get<Standing>();
+  reader.get_doubles(joined_lidar_.coeffs().data(), 4);
+  reader.get_doubles(joined_gyro_.coeffs().data(), 4);
+  joined_time_ = reader.get<double>();
+  now_ = reader.get<TimeNs>();
+  probation_since_ = reader.get<TimeNs>();
   reader.get_doubles(product_.data(), 9);
   for (double* value : {&lidar_square_, &gyro_square_, &turn_time_, &total_angle_})
     *value = reader.get<double>();

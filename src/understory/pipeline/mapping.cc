@@ -4,6 +4,7 @@
 
 #include <chrono>
 
+#include "understory/pipeline/input_remarks.h"
 #include "understory/pipeline/mapping_session.h"
 #include "understory/pipeline/realtime_player.h"
 #include "understory/pipeline/run_state.h"
@@ -23,10 +24,8 @@ class MappingRun {
         log_(log),
         progress_(progress),
         stop_requested_(stop_requested),
-        state_(std::move(state)),
-        orderer_(request.config.time_repair, log),
-        session_(request.config, state_.work(), log) {
-    open();
+        state_(std::move(state)) {
+    begin();
   }
 
   // Events in the order of the recording -> events in order of time -> poses, keyframes, map.
@@ -36,88 +35,124 @@ class MappingRun {
       std::optional<Event> event = source_->next();
       if (!event) break;
       ++events_;
-      orderer_.push(std::move(*event));
-      while (auto ready = orderer_.pop())
-        handle(*ready);
+      orderer_->push(std::move(*event));
+      handle_ready();
       checkpoint_if_due();
+      if (session_->imu_is_wrong() && player_ == nullptr) start_over_without_imu();
     }
-    if (!stopped) {
-      orderer_.finish();
-      while (auto ready = orderer_.pop())
-        handle(*ready);
+    if (stopped) {
+      if (session_->settled()) state_.save(request_, *session_, *orderer_, log_, events_);
+    } else {
+      orderer_->finish();
+      handle_ready();
     }
     return finish(stopped);
   }
 
  private:
-  void open() {
+  void begin() {
+    orderer_.emplace(request_.config.time_repair, log_);
+    session_.emplace(request_.config, state_.work(), log_);
     source_ = open_source(request_.recording, request_.open, log_);
     if (state_.events() > 0) {
       source_->skip(state_.events());
-      state_.restore(session_, orderer_, log_, source_->rig());
+      state_.restore(*session_, *orderer_, log_, source_->rig());
       events_ = state_.events();
     } else {
-      state_.save(request_, session_, orderer_, log_, 0);  // makes the run resumable from the start
+      // Makes the run resumable from the start.
+      state_.save(request_, *session_, *orderer_, log_, 0);
     }
     if (request_.realtime) {
       auto player = std::make_unique<RealtimePlayer>(
           std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans));
       player_ = player.get();
-      session_.take_outcomes_at_once();
+      session_->take_outcomes_at_once();
       source_ = std::move(player);
     }
   }
 
+  // An IMU that contradicts the lidar bends what is positioned with it, the map included.
+  void start_over_without_imu() {
+    const std::string reason = session_->odometry().motion().imu_trust().reason;
+    log_.forget_all_but("imu.untrusted");
+    log_.info("the recording is mapped again from its beginning, without the IMU");
+    session_.reset();  // lets go of its files
+    session_.emplace(request_.config, state_.work(), log_);
+    session_->refuse_imu(reason);
+    orderer_.emplace(request_.config.time_repair, log_);
+    source_ = open_source(request_.recording, request_.open, log_);
+    events_ = 0;
+    state_.save(request_, *session_, *orderer_, log_, 0);
+  }
+
+  void handle_ready() {
+    while (auto ready = orderer_->pop())
+      handle(*ready);
+  }
+
   void handle(const Event& event) {
-    const TimeNs before = session_.last_scan_end();
-    session_.handle(event, source_->rig());
-    if (session_.last_scan_end() == before) return;
-    if (player_ != nullptr) latencies_ms_.push_back(player_->latency_ms(session_.last_scan_end()));
+    const TimeNs before = session_->last_scan_end();
+    session_->handle(event, source_->rig());
+    if (session_->last_scan_end() == before) return;
+    if (player_ != nullptr) latencies_ms_.push_back(player_->latency_ms(session_->last_scan_end()));
     report_progress();
   }
 
   void checkpoint_if_due() {
     const TimeNs due =
         state_.last_checkpoint() + from_seconds(request_.config.checkpoint_interval_s);
-    if (session_.settled() && session_.last_scan_end() >= due) {
-      state_.save(request_, session_, orderer_, log_, events_);
+    if (session_->settled() && session_->last_scan_end() >= due) {
+      state_.save(request_, *session_, *orderer_, log_, events_);
     }
   }
 
   void report_progress() const {
     if (!progress_) return;
     const double share = source_->progress();
-    const auto done = static_cast<double>(session_.counts().scans);
+    const auto done = static_cast<double>(session_->counts().scans);
     progress_({"mapping", done, share > 0.0 ? done / share : 0.0, "scans",
-               fmt::format("{} keyframes", session_.map().keyframes().size())});
+               fmt::format("{} keyframes", session_->map().keyframes().size())});
   }
 
   MappingOutcome finish(bool stopped) {
-    if (session_.counts().scans == 0) {
-      state_.remove();
-      throw InputError(request_.recording, "", no_scan_reason());
-    }
-    session_.map().finish();
-    session_.flush();
+    if (session_->map().keyframes().empty()) return nothing_to_map(stopped);
+    session_->map().finish();
+    session_->flush();
     RunFacts facts;
     facts.stopped = stopped;
     facts.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     facts.format = source_->format();
-    facts.time_repair = orderer_.report();
+    facts.time_repair = orderer_->report();
     facts.latencies_ms = latencies_ms_;
     facts.realtime = player_ != nullptr;
     facts.dropped_scans = player_ != nullptr ? player_->dropped_scans() : 0;
-    MappingOutcome outcome =
-        write_run(request_, session_, facts, player_ != nullptr ? player_->played() : *source_,
-                  log_, progress_);
-    state_.remove();
+    if (player_ != nullptr) player_->stop();
+    const Recording& source = player_ != nullptr ? player_->played() : *source_;
+    if (!stopped) remark_on_input(*session_, source, request_.recording, log_);
+    MappingOutcome outcome = write_run(request_, *session_, facts, source, log_, progress_);
+    if (!stopped) state_.remove();
     return outcome;
   }
 
-  [[nodiscard]] std::string no_scan_reason() const {
+  MappingOutcome nothing_to_map(bool stopped) {
+    state_.remove();
+    if (!stopped) throw InputError(request_.recording, "", nothing_to_map_reason());
+    const std::string reason = "stopped by the user before the first scan; nothing was written";
+    return {RunStatus::kPartial, {reason}, "", reason};
+  }
+
+  [[nodiscard]] std::string nothing_to_map_reason() const {
     std::string topics;
+    std::uint64_t empty = 0;
     for (const TopicReport& topic : source_->topics()) {
       topics += (topics.empty() ? "" : ", ") + topic.name + " (" + topic.type + ")";
+      empty += topic.empty_points;
+    }
+    if (session_->counts().scans > 0) {
+      return fmt::format(
+          "none of its {} scans has points to map: {} points are not a number or at zero range, "
+          "the others too near, too far or on the machine",
+          session_->counts().scans, empty);
     }
     return "no lidar scan could be read from it" +
            (topics.empty() ? std::string() : "; it holds " + topics);
@@ -129,8 +164,8 @@ class MappingRun {
   const StopRequested& stop_requested_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   RunState state_;
-  EventOrderer orderer_;
-  MappingSession session_;
+  std::optional<EventOrderer> orderer_;
+  std::optional<MappingSession> session_;
   std::unique_ptr<Recording> source_;
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
   std::uint64_t events_ = 0;

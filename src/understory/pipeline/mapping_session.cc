@@ -35,6 +35,21 @@ MappingSession::MappingSession(const MappingConfig& config, std::filesystem::pat
       log_(log),
       map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)) {}
 
+void MappingSession::refuse_imu(const std::string& reason) {
+  UNDERSTORY_CHECK(!started());
+  imu_refused_ = reason;
+  config_.odometry.imu_enabled = false;
+}
+
+bool MappingSession::imu_is_wrong() const {
+  return started() && odometry_->uses_imu() && !odometry_->motion().imu_trust().usable;
+}
+
+std::optional<TimeNs> MappingSession::last_imu() const {
+  if (recent_imu_.empty()) return std::nullopt;
+  return recent_imu_.back().stamp;
+}
+
 void MappingSession::handle(const Event& event, const Rig& rig) {
   if (opening_ && started()) opening_->events.push_back(event);
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
@@ -51,6 +66,7 @@ void MappingSession::handle(const Event& event, const Rig& rig) {
       opening_->events.push_back(event);
       opening_->counts_before = counts_;
       opening_->imu_before = recent_imu_;
+      opening_->fixes_before = fixes_.size();
       rig_ = rig;
       adapt_to((*scan)->points.size());
       start_anew();
@@ -73,9 +89,12 @@ void MappingSession::start_anew() {
   if (opening_->rounds > 0) {
     odometry_->set_initial_motion(opening_->velocity, opening_->angular_rate);
   }
+  // What came after the first scan comes again.
+  recent_imu_ = opening_->imu_before;
+  fixes_.resize(opening_->fixes_before);
+  counts_ = opening_->counts_before;
   for (const ImuSample& waiting : recent_imu_)
     odometry_->add_imu(waiting);
-  counts_ = opening_->counts_before;
 }
 
 void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
@@ -142,7 +161,7 @@ DenseEstimate MappingSession::begin_segment(const Scan& scan) {
   for (const ImuSample& sample : recent_imu_)
     odometry_->add_imu(sample);
   map_->start_segment();
-  ++counts_.segments;
+  if (counts_.segments++ == 1) counts_.first_lost = scan.stamp;
   counts_.lost_in_a_row = 0;
   DenseEstimate estimate = odometry_->process(scan, map_->local_map());
   const Eigen::Vector3d forward = last_good_.rotation() * Eigen::Vector3d::UnitX();
@@ -277,6 +296,7 @@ void MappingSession::flush() {
 
 void MappingSession::save(BinaryWriter& writer) const {
   UNDERSTORY_CHECK(settled() || !started());
+  writer.put(imu_refused_);
   writer.put(static_cast<std::uint64_t>(fixes_.size()));
   for (const GnssFix& fix : fixes_)
     put_fix(writer, fix);
@@ -297,6 +317,8 @@ void MappingSession::save(BinaryWriter& writer) const {
 }
 
 void MappingSession::load(BinaryReader& reader, const Rig& rig) {
+  const std::string refused = reader.get_string();
+  if (!refused.empty()) refuse_imu(refused);
   const auto fixes = reader.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < fixes; ++i)
     fixes_.push_back(get_fix(reader));

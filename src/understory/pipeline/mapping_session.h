@@ -29,6 +29,7 @@ struct MappingCounts {
   std::uint64_t empty_scans = 0;  // hardly any point left after preprocessing
   std::uint64_t segments = 1;     // pieces of map that hang together by predictions only
   std::uint64_t lost_in_a_row = 0;
+  TimeNs first_lost = 0;  // when the second piece began
   std::uint64_t imu_samples = 0;
   std::uint64_t points = 0;
 };
@@ -39,6 +40,12 @@ struct MappingCounts {
 class MappingSession {
  public:
   MappingSession(const MappingConfig& config, std::filesystem::path folder, Log& log);
+
+  // Before the first event: this run does without the IMU, for this reason.
+  void refuse_imu(const std::string& reason);
+  [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
+  // The IMU has turned out to be wrong: what was positioned with it is better done again without.
+  [[nodiscard]] bool imu_is_wrong() const;
 
   // `rig` is looked at when the first scan comes.
   void handle(const Event& event, const Rig& rig);
@@ -68,6 +75,8 @@ class MappingSession {
   [[nodiscard]] StageTimes& times() { return times_; }
   // Set after each scan, for progress and latency.
   [[nodiscard]] TimeNs last_scan_end() const { return last_scan_end_; }
+  // Of the IMU; nothing if there has been no sample.
+  [[nodiscard]] std::optional<TimeNs> last_imu() const;
 
  private:
   // The first two scans. A carrier that is on its way when the recording begins smears its first
@@ -79,6 +88,7 @@ class MappingSession {
     int rounds = 0;
     MappingCounts counts_before;
     std::deque<ImuSample> imu_before;
+    std::size_t fixes_before = 0;
   };
 
   void make_odometry(const Rig& rig);
@@ -106,6 +116,7 @@ class MappingSession {
   std::vector<GnssFix> fixes_;
   MappingCounts counts_;
   TimeNs last_scan_end_ = 0;
+  std::string imu_refused_;
   std::uint8_t sparse_ = 0;       // the first scan was
   std::uint64_t last_cloud_ = 0;  // keyframe whose cloud was kept last
   Pose last_good_;                // of the last scan that was matched

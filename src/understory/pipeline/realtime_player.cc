@@ -8,12 +8,16 @@ RealtimePlayer::RealtimePlayer(std::unique_ptr<Recording> source, std::size_t ma
     : source_(std::move(source)), max_scans_(max_scans), thread_([this] { play(); }) {}
 
 RealtimePlayer::~RealtimePlayer() {
+  stop();
+}
+
+void RealtimePlayer::stop() {
   {
     const std::lock_guard lock(mutex_);
     stopped_ = true;
   }
   changed_.notify_all();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 void RealtimePlayer::play() {

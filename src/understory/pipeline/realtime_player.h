@@ -32,7 +32,9 @@ class RealtimePlayer : public Recording {
   // Milliseconds from the moment a sensor would have delivered what happened at `time` until now.
   [[nodiscard]] double latency_ms(TimeNs time) const;
   [[nodiscard]] std::uint64_t dropped_scans() const;
-  // The recording that is played; not to be touched before `next` has returned nothing.
+  // Ends the playing; `next` is not to be called any more.
+  void stop();
+  // The recording that is played; not to be touched before `next` has returned nothing or `stop`.
   [[nodiscard]] const Recording& played() const { return *source_; }
 
  private:

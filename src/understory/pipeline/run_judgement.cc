@@ -9,56 +9,88 @@ namespace {
 constexpr double kMostUnmatchedShare = 0.02;
 constexpr double kMostEmptyShare = 0.10;
 constexpr double kLongestLidarGapS = 1.0;
+constexpr double kMostSmearM = 0.05;
 
 double share(std::uint64_t part, std::uint64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
-}  // namespace
-
-RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, const Log& log) {
-  RunJudgement judgement;
-  const MappingCounts& counts = session.counts();
-  const auto distrust = [&](const std::string& reason) { judgement.reasons.push_back(reason); };
+void judge_scans(const MappingCounts& counts, std::vector<std::string>& reasons) {
   const std::uint64_t failed = counts.unmatched + counts.gated;
   if (share(failed, counts.scans) > kMostUnmatchedShare) {
-    distrust(
+    reasons.push_back(
         fmt::format("{} of {} scans ({:.1f} %) could not be matched to the map; their poses "
                     "are predictions",
                     failed, counts.scans, 100.0 * share(failed, counts.scans)));
   }
-  if (counts.segments > 1) {
-    distrust(
-        fmt::format("the position was lost {} time(s); the map consists of {} pieces that do "
-                    "not fit together",
-                    counts.segments - 1, counts.segments));
-  }
   if (share(counts.empty_scans, counts.scans) > kMostEmptyShare) {
-    distrust(fmt::format("{} of {} scans had hardly any usable point", counts.empty_scans,
-                         counts.scans));
+    reasons.push_back(fmt::format("{} of {} scans had hardly any usable point", counts.empty_scans,
+                                  counts.scans));
   }
-  const double gap = to_seconds(facts.time_repair.streams[EventOrderer::kLidar].longest_gap);
-  if (gap > kLongestLidarGapS) {
-    distrust(fmt::format("the lidar was silent for {:.1f} s; the motion in between is a prediction",
-                         gap));
+}
+
+void judge_outages(const MappingSession& session, const RunFacts& facts,
+                   std::vector<std::string>& reasons) {
+  const MappingCounts& counts = session.counts();
+  if (counts.segments > 1) {
+    reasons.push_back(
+        fmt::format("the position was lost {} time(s), first at {} s; the map consists of {} "
+                    "pieces that do not fit together",
+                    counts.segments - 1, format_seconds(counts.first_lost), counts.segments));
   }
+  const EventOrderer::StreamReport& lidar = facts.time_repair.streams[EventOrderer::kLidar];
+  if (to_seconds(lidar.longest_gap) > kLongestLidarGapS) {
+    reasons.push_back(fmt::format(
+        "the lidar was silent for {:.1f} s before {} s; {}", to_seconds(lidar.longest_gap),
+        format_seconds(lidar.after_longest_gap),
+        session.odometry().uses_imu()
+            ? "the IMU alone carried the position across, so the map before and after may be offset"
+            : "the motion in between was guessed, so the map before and after may be offset"));
+  }
+}
+
+}  // namespace
+
+RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, double smear_m,
+                       const Log& log) {
+  RunJudgement judgement;
+  judge_scans(session.counts(), judgement.reasons);
+  judge_outages(session, facts, judgement.reasons);
   const ImuTrust trust = session.odometry().motion().imu_trust();
-  if (!trust.trusted) distrust(trust.reason);
+  if (!session.imu_refused().empty()) {
+    judgement.reasons.push_back(session.imu_refused() +
+                                "; the recording was mapped without the IMU: check how it "
+                                "is mounted (--extrinsics FILE), its axes and units");
+  } else if (!trust.trusted) {
+    judgement.reasons.push_back(trust.reason);
+  }
+  bool cut = false;
+  std::vector<std::string> missing;
   for (const Log::Warning& warning : log.warnings()) {
     // Kinds of damage that take data away or make it unreliable, not what was merely mended.
     if (warning.key == "recording.damaged") {
-      distrust(fmt::format("the recording is damaged ({} place(s), the first: {})", warning.count,
-                           warning.first_message));
-    } else if (warning.key == "imu.stopped") {
-      distrust(warning.first_message);
+      judgement.reasons.push_back(
+          fmt::format("the recording is damaged ({} place(s), the first: {})", warning.count,
+                      warning.first_message));
+    } else if (warning.key == "recording.truncated") {
+      cut = true;
+      missing.push_back("the recording is cut off; what came after is missing: " +
+                        warning.first_message);
+    } else if (warning.key == "recording.no_point_times" && smear_m > kMostSmearM) {
+      judgement.reasons.push_back(
+          fmt::format("{}; the sensor moved so much that points 10 m away are smeared by {:.2f} m",
+                      warning.first_message, smear_m));
     }
   }
   if (!judgement.reasons.empty()) judgement.status = RunStatus::kUntrusted;
+  if (cut && judgement.status == RunStatus::kComplete) judgement.status = RunStatus::kPartial;
   if (facts.stopped) {
     judgement.status = RunStatus::kPartial;
-    judgement.reasons.insert(judgement.reasons.begin(),
-                             "stopped by the user before the end of the recording");
+    missing.insert(missing.begin(),
+                   "stopped by the user before the end of the recording; go on with "
+                   "`understory map --resume`");
   }
+  judgement.reasons.insert(judgement.reasons.begin(), missing.begin(), missing.end());
   return judgement;
 }
 

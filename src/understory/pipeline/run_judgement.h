@@ -15,9 +15,10 @@ struct RunJudgement {
 };
 
 // Whether the result of a run is to be trusted, and if not why, in words for the user. Partial: the
-// run was stopped. Untrusted: something hurt the result (lost scans, an IMU that contradicts the
-// lidar, an outage bridged by prediction).
+// run was stopped, or the recording is cut off. Untrusted: something hurt the result (lost scans,
+// an IMU that contradicts the lidar, an outage bridged by prediction, scans blurred by motion).
+// `smear_m`: how far a point 10 m away moves against the sensor during a scan, on average.
 [[nodiscard]] RunJudgement judge_run(const MappingSession& session, const RunFacts& facts,
-                                     const Log& log);
+                                     double smear_m, const Log& log);
 
 }  // namespace understory

@@ -21,12 +21,15 @@
 namespace understory {
 namespace {
 
+constexpr double kSmearRangeM = 10.0;
+
 // What walking through the finished trajectory yields for report and run.json.
 struct TrajectoryFacts {
   std::vector<ReportScan> scans;
   double length_m = 0.0;
   double duration_s = 0.0;
   double period_ms = 0.0;  // median time between scans
+  double smear_m = 0.0;    // mean motion of a point 10 m away during a scan
   double inlier_ratio_mean = 0.0;
   double fitness_rms_m = 0.0;
   std::uint64_t weak = 0;
@@ -66,7 +69,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
   double inliers = 0.0;
   double squares = 0.0;
   std::uint64_t matched = 0;
-  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  Pose last;
   for_each_finished_scan(
       session.journal(), session.map().keyframes(), [&](const FinishedScan& scan) {
         const ScanRecord& record = *scan.record;
@@ -75,9 +78,12 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
                     Eigen::Vector3d::Map(record.gyro_bias.data()),
                     Eigen::Vector3d::Map(record.accel_bias.data()), record.pose_covariance()});
         facts.scans.push_back(report_scan(scan));
-        const Eigen::Vector3d position = scan.world_from_body.translation();
-        if (facts.scans.size() > 1) facts.length_m += (position - last).norm();
-        last = position;
+        const Pose step = last.inverse() * scan.world_from_body;
+        if (facts.scans.size() > 1) {
+          facts.length_m += step.translation().norm();
+          facts.smear_m += step.translation().norm() + kSmearRangeM * step.angle();
+        }
+        last = scan.world_from_body;
         if (record.iterations > 0) {
           ++matched;
           inliers += static_cast<double>(record.inlier_ratio);
@@ -91,6 +97,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
     facts.inlier_ratio_mean = inliers / static_cast<double>(matched);
     facts.fitness_rms_m = std::sqrt(squares / static_cast<double>(matched));
   }
+  if (facts.scans.size() > 1) facts.smear_m /= static_cast<double>(facts.scans.size() - 1);
   facts.period_ms = median_period_ms(facts.scans);
   facts.duration_s = to_seconds(facts.scans.back().stamp - facts.scans.front().stamp);
   return facts;
@@ -227,6 +234,7 @@ void fill_counts(RunSummary& summary, const MappingSession& session, const RunFa
     count((name + "_clock_jumps").c_str(), stream.clock_jumps);
     count((name + "_gaps").c_str(), stream.gaps);
   }
+  count("scans_without_imu", facts.time_repair.scans_without_imu);
   if (facts.realtime) count("scans_dropped", facts.dropped_scans);
 }
 
@@ -254,7 +262,7 @@ RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
   summary.scans = session.counts().scans;
   summary.poses = session.journal().size();
   summary.recording_s = trajectory.duration_s;
-  const RunJudgement judgement = judge_run(session, facts, log);
+  const RunJudgement judgement = judge_run(session, facts, trajectory.smear_m, log);
   summary.status = judgement.status;
   summary.reasons = judgement.reasons;
   fill_counts(summary, session, facts);
@@ -274,7 +282,7 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
   }
   text += fmt::format("\n{} trees\n", inventory.trees.size());
   for (const std::string& reason : summary.reasons) {
-    text += "not to be trusted: " + reason + "\n";
+    text += to_string(summary.status) + ": " + reason + "\n";
   }
   return text + "report: " + (folder / "report.html").string();
 }

@@ -181,7 +181,10 @@ void EventOrderer::note_step(Stream stream, TimeNs stamp) {
                      : static_cast<TimeNs>(config_.gap_scans * static_cast<double>(clock.period));
   if ((stream == kLidar || stream == kImu) && clock.period > 0 && step > limit) {
     ++report.gaps;
-    report.longest_gap = std::max(report.longest_gap, step);
+    if (step > report.longest_gap) {
+      report.longest_gap = step;
+      report.after_longest_gap = stamp;
+    }
     log_->warn(std::string("time.gap_") + kNames[stream], std::string(kNames[stream]) +
                                                               ": nothing for " + seconds(step) +
                                                               " before " + seconds(stamp));
@@ -247,11 +250,7 @@ bool EventOrderer::covered(const Pending& scan) {
   const Clock& imu = clocks_[kImu];
   if (imu.any_released && imu.released >= scan.time) return true;
   if (finished_ || newest_ - scan.time > ns(config_.imu_silence_s)) {
-    if (imu.seen) {
-      ++report_.scans_without_imu;
-      log_->warn("time.imu_silent",
-                 "no IMU sample past the end of the scan at " + seconds(scan.stamp));
-    }
+    if (imu.seen) ++report_.scans_without_imu;
     return true;
   }
   return false;

@@ -52,6 +52,7 @@ class EventOrderer {
     std::uint64_t glitches = 0;  // single stamps far off, dropped
     std::uint64_t gaps = 0;
     TimeNs longest_gap = 0;
+    TimeNs after_longest_gap = 0;  // stamp of the message that ended it
   };
   struct Report {
     std::array<StreamReport, kStreams> streams;

@@ -311,6 +311,7 @@ class CloudFolder : public Recording {
     const auto layout = CloudLayout::find(message);
     if (!layout) throw InputError(path(i), "header", "expected the fields x, y and z");
     ConvertedCloud converted = convert_cloud(message, *layout, convention_);
+    lidar_.report().empty_points += converted.without_return;
     if (converted.bad_times > 0) {
       log_.warn("recording.damaged", path(i) + ": " + std::to_string(converted.bad_times) +
                                          " points with times outside of the scan, left out");

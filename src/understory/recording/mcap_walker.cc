@@ -100,7 +100,7 @@ void Walker::read_summary() {
   std::vector<std::uint8_t> summary;
   file_.read(start, footer_at + kFooterRecord - 4 - start, summary);
   if (crc != 0 && crc32_of(summary) != crc) {
-    warn("recording.damaged", start, "the index is damaged; reading without it");
+    warn("recording.mended", start, "the index is damaged; reading without it, nothing is lost");
     return;
   }
   data_end_ = start;
@@ -232,8 +232,8 @@ std::optional<Block> Walker::next() {
   while (!ended_) {
     const auto head = head_at(position_);
     if (!head) {
-      warn("recording.truncated", position_,
-           "the file ends without the end of its data; read as far as it goes");
+      warn("recording.unfinished", position_,
+           "the recording was not closed (it has no index); read to its end");
       ended_ = true;
       break;
     }
@@ -252,7 +252,7 @@ std::optional<Block> Walker::next() {
     }
     if (head->opcode == kDataEnd || head->opcode == kFooter) {
       if (!has_end_)
-        warn("recording.truncated", file_.size(),
+        warn("recording.unfinished", file_.size(),
              "the file ends before the end of its index; no message is lost");
       ended_ = true;
       break;

@@ -159,8 +159,8 @@ class RosbagSource : public MessageSource {
   void advance() {
     if (position_ >= file_->size() || (is_indexed_ && position_ >= data_end_)) {
       if (!is_indexed_)
-        warn("recording.truncated", position_,
-             "the bag was not closed (it has no index); read as far as it goes");
+        warn("recording.unfinished", position_,
+             "the bag was not closed (it has no index); read to its end");
       ended_ = true;
       return;
     }

@@ -32,6 +32,12 @@ void Log::restore(const std::vector<Warning>& warnings) {
     warnings_[warning.key] = warning;
 }
 
+void Log::forget_all_but(const std::string& key) {
+  const std::lock_guard lock(mutex_);
+  for (auto it = warnings_.begin(); it != warnings_.end();)
+    it = it->first == key ? std::next(it) : warnings_.erase(it);
+}
+
 void Log::pass(LogLevel level, const std::string& message) {
   if (!sink_) return;
   const std::lock_guard lock(mutex_);

@@ -39,6 +39,8 @@ class Log {
   [[nodiscard]] std::vector<Warning> warnings() const;
   // Puts back warnings of an earlier part of the run (a resumed run reports them all).
   void restore(const std::vector<Warning>& warnings);
+  // Forgets all warnings but those of this kind (work is begun anew).
+  void forget_all_but(const std::string& key);
 
  private:
   void pass(LogLevel level, const std::string& message);

@@ -1,0 +1,44 @@
+#include "understory/pipeline/input_remarks.h"
+
+#include <fmt/format.h>
+
+namespace understory {
+namespace {
+
+constexpr double kImuStoppedS = 1.0;  // before the end of the last scan
+
+void remark_on_imu(const MappingSession& session, const std::string& name, Log& log) {
+  const std::optional<TimeNs> last = session.last_imu();
+  if (!last) {
+    log.warn("imu.none",
+             name +
+                 ": no IMU: positions come from the scans alone, and the vertical is that of the "
+                 "scanner at the first scan");
+    return;
+  }
+  const double missing = to_seconds(session.last_scan_end() - *last);
+  if (missing < kImuStoppedS) return;
+  log.warn("imu.stopped",
+           fmt::format("{}: the IMU stopped at {} s; the last {:.1f} s are positioned by the scans "
+                       "alone",
+                       name, format_seconds(*last), missing));
+}
+
+}  // namespace
+
+void remark_on_input(const MappingSession& session, const Recording& source,
+                     const std::string& name, Log& log) {
+  remark_on_imu(session, name, log);
+  for (const TopicReport& topic : source.topics()) {
+    if (topic.empty_points == 0) continue;
+    const std::uint64_t all = topic.points + topic.empty_points;
+    log.warn(
+        "points.no_return",
+        fmt::format("{}: {}: {} of {} points ({:.1f} %) are not a number or at zero range; "
+                    "left out",
+                    name, topic.name, topic.empty_points, all,
+                    100.0 * static_cast<double>(topic.empty_points) / static_cast<double>(all)));
+  }
+}
+
+}  // namespace understory

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+#include "understory/pipeline/mapping_session.h"
+#include "understory/recording/recording.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// At the end of a recording: warns of what only its whole can show, no IMU at all, an IMU that
+// stopped, points without a return. `name` is that of the recording.
+void remark_on_input(const MappingSession& session, const Recording& source,
+                     const std::string& name, Log& log);
+
+}  // namespace understory

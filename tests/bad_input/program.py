@@ -1,0 +1,95 @@
+"""Runs the program on spoilt input and keeps what it said. What is promised is in
+docs/troubleshooting.md: 0 mended or harmless, 3 nothing usable, 4 not to be trusted or partial."""
+
+import concurrent.futures
+import json
+import os
+import pathlib
+import subprocess
+import tempfile
+
+from recordings import read_mcap
+
+PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
+SECONDS = 12
+SITE = (f"duration_s={SECONDS}", "seed=5", "lidar.model=VLP-16", "carrier.still_s=1",
+        "carrier.turn_interval_s=4", "gnss.enabled=false")
+
+
+class Outcome:
+    def __init__(self, code, out, said, folder):
+        self.code, self.out, self.said, self.folder = code, out, said, folder
+        path = folder / "run.json" if folder else None
+        self.run = json.loads(path.read_text()) if path and path.exists() else None
+
+    @property
+    def warnings(self):
+        return {w["key"]: w for w in self.run["warnings"]}
+
+    @property
+    def poses(self):
+        return (self.folder / "trajectory.tum").read_text().splitlines()
+
+
+def program(*arguments, **options):
+    return subprocess.run([PROGRAM, "--quiet", *map(str, arguments)], capture_output=True, text=True,
+                          **options)
+
+
+def map_recording(recording, folder, *options, **more):
+    """`understory map`, without the finished map unless asked for."""
+    done = program("map", recording, "-o", folder, "--threads", 1, "--set", "map.enabled=false",
+                   *options, **more)
+    assert done.returncode in (0, 3, 4), f"exit code {done.returncode}: {done.stderr}"
+    return Outcome(done.returncode, done.stdout, done.stderr, folder)
+
+
+def good_recording(folder):
+    """Twelve seconds on foot with a VLP-16 and an IMU: (file, its messages, truth)."""
+    first, path = folder / "first.mcap", folder / "good.mcap"
+    settings = [word for setting in SITE for word in ("--set", setting)]
+    for words in (("simulate", "demo", "-o", first, *settings),
+                  ("convert", first, path, "--compression", "none")):
+        done = program(*words)
+        assert done.returncode == 0, done.stderr
+    return path, read_mcap(path), folder / "first.truth"
+
+
+def error_m(outcome, truth):
+    """Root mean square error of the positions, first poses aligned, and how many were compared."""
+    done = program("evaluate", outcome.folder, truth, "--align", "first", "--json")
+    assert done.returncode == 0, done.stderr
+    errors = json.loads(done.stdout)
+    return errors["ape_rmse_m"], errors["pairs"]
+
+
+class Cases:
+    """Named checks, two at a time; all are run, failures are listed at the end."""
+
+    def __init__(self):
+        self.scratch = tempfile.TemporaryDirectory()
+        self.folder = pathlib.Path(self.scratch.name)
+        self.cases = []
+
+    def case(self, name):
+        def add(function):
+            self.cases.append((name, function))
+            return function
+        return add
+
+    def run(self):
+        def attempt(case):
+            name, function = case
+            folder = self.folder / name.replace(" ", "_").replace("/", "_")
+            folder.mkdir()
+            try:
+                return name, None, function(folder)
+            except Exception as error:  # every case is to be seen, whatever the first one does
+                return name, f"{type(error).__name__}: {error}", None
+        failed = 0
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            for name, failure, remark in pool.map(attempt, self.cases):
+                failed += failure is not None
+                print(f"{'FAILED' if failure else 'ok':6} {name}: {failure or remark or ''}")
+        self.scratch.cleanup()
+        raise SystemExit(1 if failed else 0)
