@@ -26,6 +26,7 @@ constexpr double kGood = 0.25;
 constexpr double kGoodOnProbation = 0.3;  // a lidar alone is less sure of its turns
 constexpr double kSurelyTurned = 20.0 * kDegree;
 constexpr double kMuchBetter = 0.25;  // of the squares
+constexpr double kAsGood = 1.5;       // of the squares
 // Gravity over whole seconds: walking and driving swing it by a few degrees.
 constexpr int kEnoughSeconds = 10;
 constexpr int kEnoughForLength = 3;
@@ -192,7 +193,7 @@ void TrustMonitor::judge_turns() {
   const AxesGuess axes = best_axes(sums);
   std::string cause;
   bool explained = true;
-  if (axes.left < limit) {
+  if (axes.left < limit && axes.left < kAsGood * unexplained(sums, rotation)) {
     cause = "; its axes look swapped: to agree with the lidar they would be " + axes.text;
   } else if (unexplained(sums, rotation) < limit) {
     cause = "; the IMU looks mounted about " + degrees(Eigen::AngleAxisd(rotation).angle()) +
