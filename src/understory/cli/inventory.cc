@@ -61,11 +61,15 @@ PointBlocks blocks_of(const PointCloudFile& cloud) {
 }
 
 // What the user has to know before using the numbers.
-void judge(const InventoryResult& inventory, RunSummary& summary) {
+void judge(const InventoryResult& inventory, const Log& log, RunSummary& summary) {
   const auto lower = [&](RunStatus status, const std::string& reason) {
     summary.status = status;
     summary.reasons.push_back(reason);
   };
+  for (const Log::Warning& warning : log.warnings()) {
+    if (warning.key == "recording.damaged")
+      lower(RunStatus::kPartial, "the cloud is not whole: " + warning.first_message);
+  }
   if (!inventory.too_sparse) return;
   if (inventory.trees.empty()) {
     lower(RunStatus::kUntrusted,
@@ -78,7 +82,7 @@ void judge(const InventoryResult& inventory, RunSummary& summary) {
 }
 
 RunSummary summary_of(const InventoryResult& inventory, const std::string& config,
-                      const std::string& crs) {
+                      const std::string& crs, const Log& log) {
   RunSummary summary;
   summary.command = "inventory";
   summary.version = kVersion;
@@ -88,7 +92,7 @@ RunSummary summary_of(const InventoryResult& inventory, const std::string& confi
   summary.counts["trees"] = static_cast<std::int64_t>(inventory.trees.size());
   summary.quality["area_m2"] = inventory.area_m2;
   summary.quality["ground_measured_share"] = inventory.ground.measured_share;
-  judge(inventory, summary);
+  judge(inventory, log, summary);
   return summary;
 }
 
@@ -129,7 +133,8 @@ int run_inventory(const InventoryOptions& options, CommandContext& context) {
     });
     write_inventory_files(folder, inventory, cloud.coordinate_system);
   }
-  RunSummary summary = summary_of(inventory, table.to_yaml(false), cloud.coordinate_system);
+  RunSummary summary =
+      summary_of(inventory, table.to_yaml(false), cloud.coordinate_system, context.log);
   summary.inputs.push_back(hash_input(path));
   for (const std::string& remark : inventory.remarks)
     context.log.info(remark);

@@ -44,7 +44,10 @@ int with_advice(const std::string& run_folder, const std::function<int()>& work)
 }
 
 MappingConfig resolved(const MapOptions& options) {
-  return read_mapping_config(options.profile, options.config_file, options.settings);
+  std::vector<std::string> settings = options.settings;
+  // Live, each sensor is in order, and nothing is gained by waiting for the others.
+  if (options.realtime) settings.insert(settings.begin(), "time_repair.window_s=0");
+  return read_mapping_config(options.profile, options.config_file, settings);
 }
 
 int run_map(const MapOptions& options, CommandContext& context) {
@@ -94,7 +97,8 @@ void add_map_command(CLI::App& app, Command& chosen) {
   command->add_option("--front-end", options->front_end, "How scans are positioned")
       ->check(CLI::IsMember({"dense"}));
   command->add_flag("--realtime", options->realtime,
-                    "Play the recording at sensor speed; late scans are dropped");
+                    "Play the recording at sensor speed; late scans are dropped "
+                    "(sets time_repair.window_s=0)");
   command->add_flag("--overwrite", options->overwrite,
                     "Start anew although the run folder holds an unfinished run");
   command->add_flag("--print-config", options->print_config,

@@ -32,6 +32,7 @@ constexpr int kEnoughSeconds = 10;
 constexpr int kEnoughForLength = 3;
 constexpr int kEnoughForProbation = 4;
 constexpr double kForceSpread = 15.0 * kDegree;
+constexpr double kSuspectSpread = 5.0 * kDegree;  // of an accelerometer that was suspected before
 constexpr double kLengthTolerance = 0.15;
 
 // What is left of the turns' squares if the gyroscope's axes are turned by `lidar_from_gyro`. A
@@ -96,6 +97,11 @@ std::string degrees(double radians) {
   return std::to_string(static_cast<int>(std::lround(radians / kDegree)));
 }
 
+std::string two_decimals(double value) {
+  const std::string text = std::to_string(value);
+  return text.substr(0, text.find('.') + 3);
+}
+
 }  // namespace
 
 void TrustMonitor::distrust(const std::string& reason, bool usable) {
@@ -122,6 +128,12 @@ void TrustMonitor::begin_anew() {
 }
 
 void TrustMonitor::suspect(TimeNs now) {
+  if (was_on_probation_) {
+    return distrust(
+        "the gyroscope agrees with the lidar, but the motion that the accelerometer tells of does "
+        "not: its axes look swapped or its scale wrong",
+        force_spread() < kSuspectSpread);
+  }
   if (standing_ != Standing::kUnproven || !trust_.trusted) return;
   standing_ = Standing::kOnProbation;
   now_ = probation_since_ = now;
@@ -186,8 +198,10 @@ void TrustMonitor::judge_turns() {
                       unexplained(sums, rotation) < kMuchBetter * left;
   if (left < kBad * kBad * all && !turned) {
     // On probation the accelerometer has to prove itself, too.
-    if (left < limit && (!on_probation() || seconds_ >= kEnoughForProbation))
+    if (left < limit && (!on_probation() || seconds_ >= kEnoughForProbation)) {
+      was_on_probation_ = on_probation();
       standing_ = Standing::kProven;
+    }
     return;
   }
   const AxesGuess axes = best_axes(sums);
@@ -229,17 +243,22 @@ void TrustMonitor::add_force(const Eigen::Quaterniond& world_from_imu,
   if (trust_.trusted && seconds_ >= kEnoughForLength) judge_forces();
 }
 
+// Root mean square angle from the mean direction, from the length of the mean unit vector.
+double TrustMonitor::force_spread() const {
+  if (seconds_ == 0) return 0.0;
+  return std::sqrt(std::max(0.0, 2.0 - 2.0 * directions_world_.norm() / seconds_));
+}
+
 void TrustMonitor::judge_forces() {
   const double length = length_sum_ / seconds_;
   if (std::abs(length - gravity_) > kLengthTolerance * gravity_) {
-    distrust("mean specific force is " + std::to_string(length) + " m/s^2 instead of " +
-                 std::to_string(gravity_) + ": wrong unit, gravity taken out, or scale",
+    distrust("mean specific force is " + two_decimals(length) + " m/s^2 instead of " +
+                 two_decimals(gravity_) + ": wrong unit, gravity taken out, or scale",
              false);
     return;
   }
   if (seconds_ < (on_probation() ? kEnoughForProbation : kEnoughSeconds)) return;
-  // Root mean square angle from the mean direction, from the length of the mean unit vector.
-  const double spread = std::sqrt(std::max(0.0, 2.0 - 2.0 * directions_world_.norm() / seconds_));
+  const double spread = force_spread();
   if (spread > kForceSpread)
     distrust("gravity as the accelerometer sees it swings by " + degrees(spread) +
                  " degrees in the world: its axes do not fit the lidar's attitude",
@@ -251,6 +270,7 @@ void TrustMonitor::save(BinaryWriter& writer) const {
   writer.put(trust_.reason);
   writer.put(trust_.usable);
   writer.put(standing_);
+  writer.put(was_on_probation_);
   writer.put_doubles(joined_lidar_.coeffs().data(), 4);
   writer.put_doubles(joined_gyro_.coeffs().data(), 4);
   writer.put(joined_time_);
@@ -272,6 +292,7 @@ void TrustMonitor::load(BinaryReader& reader) {
   trust_.reason = reader.get_string();
   trust_.usable = reader.get<bool>();
   standing_ = reader.get<Standing>();
+  was_on_probation_ = reader.get<bool>();
   reader.get_doubles(joined_lidar_.coeffs().data(), 4);
   reader.get_doubles(joined_gyro_.coeffs().data(), 4);
   joined_time_ = reader.get<double>();

@@ -51,12 +51,14 @@ class TrustMonitor {
   void distrust(const std::string& reason, bool usable);
   void begin_anew();
   void join_anew();
+  [[nodiscard]] double force_spread() const;
   void take_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
                  double duration_s);
 
   double gravity_;
   ImuTrust trust_;
   Standing standing_ = Standing::kUnproven;
+  bool was_on_probation_ = false;  // and passed
   TimeNs now_ = 0;
   TimeNs probation_since_ = 0;
   // Sums over turns: outer product of gyro and lidar, squares, vectors, and the total angle,

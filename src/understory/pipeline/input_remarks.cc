@@ -5,9 +5,17 @@
 namespace understory {
 namespace {
 
-constexpr double kImuStoppedS = 1.0;  // before the end of the last scan
+constexpr double kImuMissingS = 1.0;  // at the beginning or the end
 
-void remark_on_imu(const MappingSession& session, const std::string& name, Log& log) {
+TimeNs first_of(const Recording& source, const std::string& role, TimeNs otherwise) {
+  for (const TopicReport& topic : source.topics()) {
+    if (topic.role == role && topic.messages > 0) return topic.first_stamp;
+  }
+  return otherwise;
+}
+
+void remark_on_imu(const MappingSession& session, const Recording& source, const std::string& name,
+                   Log& log) {
   const std::optional<TimeNs> last = session.last_imu();
   if (!last) {
     log.warn("imu.none",
@@ -16,8 +24,16 @@ void remark_on_imu(const MappingSession& session, const std::string& name, Log& 
                  "scanner at the first scan");
     return;
   }
+  const TimeNs begin = first_of(source, "lidar", 0);
+  const double late = to_seconds(first_of(source, "imu", begin) - begin);
+  if (late > kImuMissingS) {
+    log.warn("imu.late",
+             fmt::format("{}: the IMU begins {:.1f} s after the lidar; until then positions come "
+                         "from the scans alone",
+                         name, late));
+  }
   const double missing = to_seconds(session.last_scan_end() - *last);
-  if (missing < kImuStoppedS) return;
+  if (missing < kImuMissingS) return;
   log.warn("imu.stopped",
            fmt::format("{}: the IMU stopped at {} s; the last {:.1f} s are positioned by the scans "
                        "alone",
@@ -28,7 +44,7 @@ void remark_on_imu(const MappingSession& session, const std::string& name, Log& 
 
 void remark_on_input(const MappingSession& session, const Recording& source,
                      const std::string& name, Log& log) {
-  remark_on_imu(session, name, log);
+  remark_on_imu(session, source, name, log);
   for (const TopicReport& topic : source.topics()) {
     if (topic.empty_points == 0) continue;
     const std::uint64_t all = topic.points + topic.empty_points;

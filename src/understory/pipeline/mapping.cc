@@ -128,6 +128,11 @@ class MappingRun {
     facts.dropped_scans = player_ != nullptr ? player_->dropped_scans() : 0;
     if (player_ != nullptr) player_->stop();
     const Recording& source = player_ != nullptr ? player_->played() : *source_;
+    if (facts.dropped_scans > 0) {
+      log_.warn("realtime.dropped",
+                fmt::format("{} of {} scans were dropped, because the machine could not keep up",
+                            facts.dropped_scans, facts.dropped_scans + session_->counts().scans));
+    }
     if (!stopped) remark_on_input(*session_, source, request_.recording, log_);
     MappingOutcome outcome = write_run(request_, *session_, facts, source, log_, progress_);
     if (!stopped) state_.remove();

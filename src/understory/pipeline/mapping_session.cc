@@ -219,6 +219,7 @@ void MappingSession::note_outcome(const DenseEstimate& estimate, ScanRecord& rec
   } else if (!estimate.matched && !map_->local_map().empty()) {
     record.outcome = ScanOutcome::kUnmatched;
     ++counts_.unmatched;
+    if (estimate.thinned.size() < kFewPoints) return;
     log_.warn("match.none",
               fmt::format("scan at {} could not be matched ({:.0f} % of its points "
                           "near the map){}",

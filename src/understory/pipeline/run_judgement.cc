@@ -60,7 +60,8 @@ RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, dou
   if (!session.imu_refused().empty()) {
     judgement.reasons.push_back(session.imu_refused() +
                                 "; the recording was mapped without the IMU: check how it "
-                                "is mounted (--extrinsics FILE), its axes and units");
+                                "is mounted (--extrinsics FILE), its axes, units and "
+                                "clock");
   } else if (!trust.trusted) {
     judgement.reasons.push_back(trust.reason);
   }

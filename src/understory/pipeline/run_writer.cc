@@ -287,6 +287,16 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
   return text + "report: " + (folder / "report.html").string();
 }
 
+// What an earlier run may have left in the folder and this one may not write.
+void remove_old_results(const std::filesystem::path& folder) {
+  for (const char* name :
+       {"gnss.csv", "map.laz", "trees.csv", "trees.gpkg", "dtm.tif", "chm.tif"}) {
+    std::error_code
+        ignored;  // what cannot be removed cannot be replaced either, and then it is said
+    std::filesystem::remove(folder / name, ignored);
+  }
+}
+
 }  // namespace
 
 MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
@@ -294,6 +304,7 @@ MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
                          const ProgressSink& progress) {
   const std::filesystem::path& folder = request.run_folder;
   StageTimes& times = session.times();
+  remove_old_results(folder);
   const TrajectoryFacts trajectory = write_trajectory(folder, session);
   write_graph(folder, session.map());
   write_fixes(folder, session.fixes());

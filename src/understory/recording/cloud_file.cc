@@ -94,6 +94,7 @@ PointCloudFile read_cloud(ByteSource& file, Log& log) {
 
 PointCloudFile read_cloud(const std::string& path, Log& log) {
   const auto file = open_file(path);
+  if (file->size() == 0) throw InputError(path, "", "the file is empty");
   return read_cloud(*file, log);
 }
 

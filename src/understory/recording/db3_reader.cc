@@ -32,6 +32,8 @@ class Db3Source : public MessageSource {
         bytes_(std::move(bytes)),
         database_(std::move(database)),
         log_(log) {
+    // A file that is shorter than its header says would otherwise not be read at all.
+    sqlite3_exec(database_.get(), "PRAGMA writable_schema = ON", nullptr, nullptr, nullptr);
     sqlite3_limit(database_.get(), SQLITE_LIMIT_LENGTH, static_cast<int>(kLongestBlock));
     read_topics();
     read_extent();

@@ -91,8 +91,8 @@ bool has_time(int format) {
 
 void report_break(const ByteSource& file, const LasHeader& header, std::uint64_t read, Log& log) {
   if (read == header.points) return;
-  const std::string text =
-      std::to_string(read) + " of " + std::to_string(header.points) + " points can be read";
+  const std::string text = std::to_string(read) + " of " + std::to_string(header.points) +
+                           " points can be read; the rest is damaged or cut off";
   if (read == 0) throw InputError(file.name(), "", "expected points: " + text);
   log.warn("recording.damaged", file.name() + ": " + text);
 }
@@ -175,12 +175,22 @@ class CleanedFile : public ByteSource {
     if (header[25] >= 3) std::memset(start_.data() + 227, 0, 8);
     if (header[25] >= 4) std::memset(start_.data() + 235, 0, 12);
     start_.insert(start_.end(), record.begin(), record.end());
+    // A table of chunks that a cut has taken away: LASzip does without if it is told that it was
+    // never written, which is a place of it before the first chunk.
+    table_at_ = points;
+    file.read(points, sizeof(std::uint64_t), table_);
+    if (table_.size() == sizeof(std::uint64_t) && get<std::uint64_t>(table_, 0) >= file.size())
+      std::memcpy(table_.data(), &table_at_, sizeof(table_at_));
   }
 
   std::size_t read(std::uint64_t offset, std::uint8_t* into, std::size_t count) override {
     const std::size_t got = file_.read(offset, into, count);
     for (std::size_t i = 0; i < got && offset + i < start_.size(); ++i)
       into[i] = start_[static_cast<std::size_t>(offset) + i];
+    for (std::size_t i = 0; i < table_.size(); ++i) {
+      if (table_at_ + i >= offset && table_at_ + i < offset + got)
+        into[static_cast<std::size_t>(table_at_ + i - offset)] = table_[i];
+    }
     return got;
   }
   [[nodiscard]] std::uint64_t size() const override { return file_.size(); }
@@ -207,6 +217,8 @@ class CleanedFile : public ByteSource {
 
   ByteSource& file_;
   std::vector<std::uint8_t> start_;
+  std::vector<std::uint8_t> table_;  // where the table of chunks lies, and where that is written
+  std::uint64_t table_at_ = 0;
 };
 
 // A stream over a ByteSource, for LASzip.

@@ -145,7 +145,7 @@ class MessageRecording : public Recording {
       log_.warn("recording.no_imu_extrinsics",
                 file_ + ": nothing tells where the IMU (" + frame_of(choice_.imu) +
                     ") sits relative to the lidar (" + frame_of(choice_.lidar) +
-                    "): give --extrinsics FILE");
+                    "): it is not used; give --extrinsics FILE");
   }
 
   void judge_lidar() {
