@@ -17,6 +17,11 @@ constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
 constexpr std::size_t kFewPoints = 100;
 constexpr double kMostSpeedMS = 100.0;
+// Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
+// and the sigma of a prediction that is no better than staying where one was.
+constexpr double kOutageS = 1.0;
+constexpr double kFoundAgainShare = 0.5;
+constexpr double kWorthlessSigmaM = 10.0;
 // Opening: scans further apart tell nothing of the speed at the first; a smear of the first scan
 // that is smaller does no harm, that of a turn counted at this range.
 constexpr double kLongestOpeningS = 0.5;
@@ -93,6 +98,7 @@ void MappingSession::start_anew() {
   recent_imu_ = opening_->imu_before;
   fixes_.resize(opening_->fixes_before);
   counts_ = opening_->counts_before;
+  last_good_inliers_ = 0.0;
   for (const ImuSample& waiting : recent_imu_)
     odometry_->add_imu(waiting);
 }
@@ -152,11 +158,20 @@ bool MappingSession::lost(const DenseEstimate& estimate) const {
                                      static_cast<std::uint64_t>(config_.lost_after_scans));
 }
 
-// A new odometry from this scan on, put where the last good one was, and an empty local map.
-DenseEstimate MappingSession::begin_segment(const Scan& scan) {
-  log_.warn("map.segment", fmt::format("lost at {}: a new piece of map begins there, joined to the "
-                                       "old one by nothing but the last known position",
-                                       format_seconds(scan.stamp)));
+// After an outage the prediction may be so far off that a match is one by chance: it finds few of
+// the points again that scans found before. (Right matches after 10 s found 0.87 of that share,
+// wrong ones 0.13.)
+bool MappingSession::lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const {
+  if (to_seconds(scan.stamp - last_scan_) < kOutageS || last_good_inliers_ <= 0.0) return false;
+  return !estimate.matched || estimate.match.inlier_ratio < kFoundAgainShare * last_good_inliers_;
+}
+
+// A new odometry from this scan on, put `about_there`, and an empty local map.
+DenseEstimate MappingSession::begin_segment(const Scan& scan, const Pose& about_there) {
+  log_.warn("map.segment",
+            fmt::format("lost at {} s: a new piece of map begins there, joined to the "
+                        "old one by no more than a guess of the way in between",
+                        format_seconds(scan.stamp)));
   make_odometry(rig_);
   for (const ImuSample& sample : recent_imu_)
     odometry_->add_imu(sample);
@@ -164,9 +179,9 @@ DenseEstimate MappingSession::begin_segment(const Scan& scan) {
   if (counts_.segments++ == 1) counts_.first_lost = scan.stamp;
   counts_.lost_in_a_row = 0;
   DenseEstimate estimate = odometry_->process(scan, map_->local_map());
-  const Eigen::Vector3d forward = last_good_.rotation() * Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d forward = about_there.rotation() * Eigen::Vector3d::UnitX();
   const Pose placed(so3_exp({0.0, 0.0, std::atan2(forward.y(), forward.x())}),
-                    last_good_.translation());
+                    about_there.translation());
   odometry_->move_world(placed);
   estimate.state.world_from_body = placed * estimate.state.world_from_body;
   estimate.state.velocity_in_world = placed.rotation() * estimate.state.velocity_in_world;
@@ -176,11 +191,20 @@ DenseEstimate MappingSession::begin_segment(const Scan& scan) {
 void MappingSession::on_scan(const Scan& scan) {
   const ScopedTimer timer(times_, "scan");
   const double cpu_start = process_cpu_seconds();
+  const bool outage = to_seconds(scan.stamp - last_scan_) > kOutageS;
+  const NavState predicted = outage ? odometry_->motion().predict(scan.stamp) : NavState();
   DenseEstimate estimate = odometry_->process(scan, map_->local_map());
   if (estimate.update.status == MotionStatus::kIgnored) return;
-  if (!map_->keyframes().empty() && estimate.thinned.size() >= kFewPoints && lost(estimate)) {
-    estimate = begin_segment(scan);
+  if (!map_->keyframes().empty() && estimate.thinned.size() >= kFewPoints) {
+    if (lost_over_outage(scan, estimate)) {
+      const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
+      estimate =
+          begin_segment(scan, sigma < kWorthlessSigmaM ? predicted.world_from_body : last_good_);
+    } else if (lost(estimate)) {
+      estimate = begin_segment(scan, last_good_);
+    }
   }
+  last_scan_ = scan.stamp;
   ScanRecord record;
   record.stamp = scan.stamp;
   record.points = static_cast<std::uint32_t>(scan.points.size());
@@ -236,7 +260,10 @@ void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& recor
   const bool good =
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
   counts_.lost_in_a_row = good ? 0 : counts_.lost_in_a_row + 1;
-  if (good) last_good_ = state.world_from_body;
+  if (good) {
+    last_good_ = state.world_from_body;
+    if (estimate.matched) last_good_inliers_ = estimate.match.inlier_ratio;
+  }
   const bool wanted = good && map_->wants(state.world_from_body);
   // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop
   // closure, levelling) moves the scans with them.
@@ -306,6 +333,8 @@ void MappingSession::save(BinaryWriter& writer) const {
   writer.put(sparse_);
   writer.put(last_cloud_);
   put_pose(writer, last_good_);
+  writer.put(last_good_inliers_);
+  writer.put(last_scan_);
   writer.put(started());
   writer.put(static_cast<std::uint64_t>(recent_imu_.size()));
   for (const ImuSample& sample : recent_imu_)
@@ -328,6 +357,8 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   const bool sparse = reader.get<std::uint8_t>() != 0;
   last_cloud_ = reader.get<std::uint64_t>();
   last_good_ = get_pose(reader);
+  last_good_inliers_ = reader.get<double>();
+  last_scan_ = reader.get<TimeNs>();
   const bool was_started = reader.get<bool>();
   const auto waiting = reader.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < waiting; ++i)

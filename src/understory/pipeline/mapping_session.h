@@ -96,7 +96,8 @@ class MappingSession {
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
   void adapt_to(std::size_t scan_points);
   void on_scan(const Scan& scan);
-  [[nodiscard]] DenseEstimate begin_segment(const Scan& scan);
+  [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);
+  [[nodiscard]] bool lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const;
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
   [[nodiscard]] bool lost(const DenseEstimate& estimate) const;
   void store_cloud(const DenseEstimate& estimate);
@@ -116,6 +117,8 @@ class MappingSession {
   std::vector<GnssFix> fixes_;
   MappingCounts counts_;
   TimeNs last_scan_end_ = 0;
+  double last_good_inliers_ = 0.0;  // share of that scan's points near the map
+  TimeNs last_scan_ = 0;            // stamp
   std::string imu_refused_;
   std::uint8_t sparse_ = 0;       // the first scan was
   std::uint64_t last_cloud_ = 0;  // keyframe whose cloud was kept last

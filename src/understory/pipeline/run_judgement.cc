@@ -39,14 +39,15 @@ void judge_outages(const MappingSession& session, const RunFacts& facts,
                     counts.segments - 1, format_seconds(counts.first_lost), counts.segments));
   }
   const EventOrderer::StreamReport& lidar = facts.time_repair.streams[EventOrderer::kLidar];
-  if (to_seconds(lidar.longest_gap) > kLongestLidarGapS) {
-    reasons.push_back(fmt::format(
-        "the lidar was silent for {:.1f} s before {} s; {}", to_seconds(lidar.longest_gap),
-        format_seconds(lidar.after_longest_gap),
-        session.odometry().uses_imu()
-            ? "the IMU alone carried the position across, so the map before and after may be offset"
-            : "the motion in between was guessed, so the map before and after may be offset"));
-  }
+  if (to_seconds(lidar.longest_gap) <= kLongestLidarGapS) return;
+  const TimeNs imu_gap = facts.time_repair.streams[EventOrderer::kImu].longest_gap;
+  const bool carried = session.odometry().uses_imu() && to_seconds(imu_gap) <= kLongestLidarGapS &&
+                       counts.segments == 1;
+  reasons.push_back(fmt::format(
+      "the lidar was silent for {:.1f} s before {} s; the way in between was {}, so the map before "
+      "and after may be offset",
+      to_seconds(lidar.longest_gap), format_seconds(lidar.after_longest_gap),
+      carried ? "told by the IMU alone" : "guessed"));
 }
 
 }  // namespace
