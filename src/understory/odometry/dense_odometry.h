@@ -68,6 +68,9 @@ class DenseOdometry {
   // The local map was moved by this (loop closure): the estimate moves along.
   void move_world(const Pose& new_world_from_old_world);
 
+  // The position was lost; see MotionModel.
+  void suspect_imu(TimeNs now) { motion_->suspect_imu(now); }
+
   [[nodiscard]] const MotionModel& motion() const { return *motion_; }
   [[nodiscard]] bool uses_imu() const { return uses_imu_; }
   void save(BinaryWriter& writer) const;

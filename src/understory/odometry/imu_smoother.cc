@@ -43,6 +43,16 @@ Eigen::Vector3d raw_turn(const std::vector<InertialSample>& samples) {
   return so3_log(rotation.normalized());
 }
 
+// All the turning that the gyroscope tells of, to and fro, radians.
+double turning(const std::vector<InertialSample>& samples) {
+  double angle = 0.0;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    angle += 0.5 * (samples[i].angular_rate() + samples[i - 1].angular_rate()).norm() *
+             to_seconds(samples[i].stamp - samples[i - 1].stamp);
+  }
+  return angle;
+}
+
 // One sampling interval without covariances, for paths.
 ImuState step_state(const ImuState& from, const InertialSample& a, const InertialSample& b,
                     const Eigen::Vector3d& gravity) {
@@ -201,6 +211,11 @@ void ImuSmoother::set_initial_motion(const Eigen::Vector3d& velocity_m_s,
   if (!use_imu()) angular_rate_ = angular_rate_rad_s;
 }
 
+void ImuSmoother::suspect_imu(TimeNs now) {
+  monitor_.suspect(now);
+  note_standing(now, false, monitor_.trust().trusted);
+}
+
 MotionUpdate ImuSmoother::begin(TimeNs stamp) {
   const auto samples = buffer_.samples(stamp - kHistory, stamp + kHistory);
   InitialState initial = find_initial_state(samples, stamp, body_from_imu_, config_.imu);
@@ -301,7 +316,8 @@ void ImuSmoother::watch(TimeNs stamp, const MotionInterval& interval,
   if (last_match_ && last_match_->stamp == latest().stamp && !samples.empty()) {
     const Eigen::Quaterniond turned =
         last_match_->world_from_imu.rotation().conjugate() * lidar->world_from_imu.rotation();
-    monitor_.add_turn(so3_log(turned), raw_turn(samples), interval.motion.duration);
+    monitor_.add_turn(so3_log(turned), raw_turn(samples), turning(samples),
+                      interval.motion.duration);
     monitor_.add_force(
         last_match_->world_from_imu.rotation().slerp(0.5, lidar->world_from_imu.rotation()),
         mean_force(samples), interval.motion.duration);

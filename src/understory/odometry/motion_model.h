@@ -57,8 +57,9 @@ enum class Initialisation { kNone, kStill, kInMotion, kNoImu };
 // Agreement between the IMU and the lidar, judged over the run.
 struct ImuTrust {
   bool trusted = true;
-  bool usable = true;  // false: sure to do harm; the model goes on without it
-  std::string reason;  // one sentence for run.json if not trusted
+  bool usable = true;   // false: sure to do harm; the model goes on without it
+  bool proven = false;  // agreed with the lidar over enough turning
+  std::string reason;   // one sentence for run.json if not trusted
 };
 
 // The first graph of P4 F2: a state for every scan, prediction in between. One per run, not
@@ -103,6 +104,9 @@ class MotionModel {
   // True (warned of in the log, too) unless the IMU contradicts the lidar: swapped axes, wrong
   // extrinsics, wrong units.
   [[nodiscard]] virtual ImuTrust imu_trust() const = 0;
+  // The position was lost with it: unless it has agreed with the lidar before, the IMU is left out
+  // until it is clear whether it is right.
+  virtual void suspect_imu(TimeNs now) = 0;
 
   // The estimated tilt of the world frame: the rotation about a horizontal axis that would bring
   // the world's z axis onto the true vertical. Identity without an IMU.

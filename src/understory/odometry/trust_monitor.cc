@@ -23,7 +23,8 @@ constexpr double kLargestBias = 0.06;  // rad/s
 // Share of the turning that is unexplained: below kGood all is well; above kBad something is wrong.
 constexpr double kBad = 0.4;
 constexpr double kGood = 0.25;
-constexpr double kGoodOnProbation = 0.3;  // a lidar alone is less sure of its turns
+constexpr double kLooksLikeDegrees = 20.0;  // times the lidar's turning, which has noise of its own
+constexpr double kGoodOnProbation = 0.3;    // a lidar alone is less sure of its turns
 constexpr double kSurelyTurned = 20.0 * kDegree;
 constexpr double kMuchBetter = 0.25;  // of the squares
 constexpr double kAsGood = 1.5;       // of the squares
@@ -106,7 +107,7 @@ std::string two_decimals(double value) {
 
 void TrustMonitor::distrust(const std::string& reason, bool usable) {
   if (!trust_.trusted) return;
-  trust_ = {false, usable, reason};
+  trust_ = {false, usable, trust_.proven, reason};
 }
 
 void TrustMonitor::join_anew() {
@@ -123,6 +124,7 @@ void TrustMonitor::begin_anew() {
   force_world_.setZero();
   force_imu_.setZero();
   directions_world_.setZero();
+  lidar_turning_ = gyro_turning_ = 0.0;
   lidar_square_ = gyro_square_ = turn_time_ = total_angle_ = force_time_ = length_sum_ = 0.0;
   turns_ = seconds_ = 0;
 }
@@ -149,8 +151,10 @@ void TrustMonitor::pass_time(TimeNs now) {
 }
 
 void TrustMonitor::add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
-                            double duration_s) {
+                            double gyro_turning, double duration_s) {
   if (!on_probation()) return take_turn(by_lidar, by_gyro, duration_s);
+  lidar_turning_ += by_lidar.norm();
+  gyro_turning_ += gyro_turning;
   joined_lidar_ = (joined_lidar_ * so3_exp(by_lidar)).normalized();
   joined_gyro_ = (joined_gyro_ * so3_exp(by_gyro)).normalized();
   joined_time_ += duration_s;
@@ -201,13 +205,16 @@ void TrustMonitor::judge_turns() {
     if (left < limit && (!on_probation() || seconds_ >= kEnoughForProbation)) {
       was_on_probation_ = on_probation();
       standing_ = Standing::kProven;
+      trust_.proven = true;
     }
     return;
   }
   const AxesGuess axes = best_axes(sums);
   std::string cause;
   bool explained = true;
-  if (axes.left < limit && axes.left < kAsGood * unexplained(sums, rotation)) {
+  if (lidar_turning_ > kEnoughTurning && gyro_turning_ > kLooksLikeDegrees * lidar_turning_) {
+    cause = "; its rates look like degrees per second";
+  } else if (axes.left < limit && axes.left < kAsGood * unexplained(sums, rotation)) {
     cause = "; its axes look swapped: to agree with the lidar they would be " + axes.text;
   } else if (unexplained(sums, rotation) < limit) {
     cause = "; the IMU looks mounted about " + degrees(Eigen::AngleAxisd(rotation).angle()) +
@@ -269,6 +276,7 @@ void TrustMonitor::save(BinaryWriter& writer) const {
   writer.put(trust_.trusted);
   writer.put(trust_.reason);
   writer.put(trust_.usable);
+  writer.put(trust_.proven);
   writer.put(standing_);
   writer.put(was_on_probation_);
   writer.put_doubles(joined_lidar_.coeffs().data(), 4);
@@ -277,7 +285,8 @@ void TrustMonitor::save(BinaryWriter& writer) const {
   writer.put(now_);
   writer.put(probation_since_);
   writer.put_doubles(product_.data(), 9);
-  for (const double value : {lidar_square_, gyro_square_, turn_time_, total_angle_})
+  for (const double value :
+       {lidar_square_, gyro_square_, turn_time_, total_angle_, lidar_turning_, gyro_turning_})
     writer.put(value);
   writer.put(turns_);
   for (const auto* v : {&force_world_, &force_imu_, &directions_world_, &lidar_sum_, &gyro_sum_})
@@ -291,6 +300,7 @@ void TrustMonitor::load(BinaryReader& reader) {
   trust_.trusted = reader.get<bool>();
   trust_.reason = reader.get_string();
   trust_.usable = reader.get<bool>();
+  trust_.proven = reader.get<bool>();
   standing_ = reader.get<Standing>();
   was_on_probation_ = reader.get<bool>();
   reader.get_doubles(joined_lidar_.coeffs().data(), 4);
@@ -299,7 +309,8 @@ void TrustMonitor::load(BinaryReader& reader) {
   now_ = reader.get<TimeNs>();
   probation_since_ = reader.get<TimeNs>();
   reader.get_doubles(product_.data(), 9);
-  for (double* value : {&lidar_square_, &gyro_square_, &turn_time_, &total_angle_})
+  for (double* value :
+       {&lidar_square_, &gyro_square_, &turn_time_, &total_angle_, &lidar_turning_, &gyro_turning_})
     *value = reader.get<double>();
   turns_ = reader.get<int>();
   for (auto* v : {&force_world_, &force_imu_, &directions_world_, &lidar_sum_, &gyro_sum_})

@@ -22,8 +22,9 @@ class TrustMonitor {
 
   // Turn of the IMU from scan to scan, as rotation vectors in its frame at the first scan: from
   // matching and from the gyroscope without any estimate of its bias (an estimate that follows the
-  // lidar would hide what is looked for).
-  void add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro, double duration_s);
+  // lidar would hide what is looked for). `gyro_turning`: all that it turned, to and fro, radians.
+  void add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
+                double gyro_turning, double duration_s);
   // Mean specific force between two scans with the attitude by matching in its middle.
   void add_force(const Eigen::Quaterniond& world_from_imu, const Eigen::Vector3d& force_in_imu,
                  double duration_s);
@@ -57,6 +58,8 @@ class TrustMonitor {
 
   double gravity_;
   ImuTrust trust_;
+  double lidar_turning_ = 0.0;  // in all, on probation
+  double gyro_turning_ = 0.0;
   Standing standing_ = Standing::kUnproven;
   bool was_on_probation_ = false;  // and passed
   TimeNs now_ = 0;

@@ -31,21 +31,24 @@ class MappingRun {
   // Events in the order of the recording -> events in order of time -> poses, keyframes, map.
   MappingOutcome run() {
     bool stopped = false;
-    while (!(stopped = stop_requested_ && stop_requested_())) {
+    bool ended = false;
+    while (!ended && !(stopped = stop_requested_ && stop_requested_())) {
       std::optional<Event> event = source_->next();
-      if (!event) break;
-      ++events_;
-      orderer_->push(std::move(*event));
+      ended = !event;
+      if (event) {
+        ++events_;
+        orderer_->push(std::move(*event));
+      } else {
+        orderer_->finish();
+      }
       handle_ready();
-      checkpoint_if_due();
-      if (session_->imu_is_wrong() && player_ == nullptr) start_over_without_imu();
+      if (!ended) checkpoint_if_due();
+      if (session_->imu_is_wrong() && player_ == nullptr) {
+        start_over_without_imu();
+        ended = false;
+      }
     }
-    if (stopped) {
-      if (session_->settled()) state_.save(request_, *session_, *orderer_, log_, events_);
-    } else {
-      orderer_->finish();
-      handle_ready();
-    }
+    if (stopped && session_->settled()) state_.save(request_, *session_, *orderer_, log_, events_);
     return finish(stopped);
   }
 

@@ -172,9 +172,11 @@ DenseEstimate MappingSession::begin_segment(const Scan& scan, const Pose& about_
             fmt::format("lost at {} s: a new piece of map begins there, joined to the "
                         "old one by no more than a guess of the way in between",
                         format_seconds(scan.stamp)));
+  const bool proven = odometry_->motion().imu_trust().proven;
   make_odometry(rig_);
   for (const ImuSample& sample : recent_imu_)
     odometry_->add_imu(sample);
+  if (odometry_->uses_imu() && !proven) odometry_->suspect_imu(scan.stamp);
   map_->start_segment();
   if (counts_.segments++ == 1) counts_.first_lost = scan.stamp;
   counts_.lost_in_a_row = 0;
