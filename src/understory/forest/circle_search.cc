@@ -185,7 +185,7 @@ class GroupSearch {
     std::vector<Circle> found;
     int failures = 0;
     const Eigen::Vector2f extent = extent_of(points_);
-    const int most_failures = 2 + static_cast<int>(1.5F * extent.x() * extent.y());
+    const int most_failures = 2 + static_cast<int>(0.5F * extent.x() * extent.y());
     while (static_cast<int>(points_.size()) >= config_.min_points && failures < most_failures) {
       const CellIndex fine(points_, 0.08F);
       const CellIndex coarse(points_, 0.3F);
@@ -225,7 +225,7 @@ class GroupSearch {
   Circle sample(const CellIndex& fine, const CellIndex& coarse) {
     constexpr std::array<float, 4> kScales = {0.08F, 0.2F, 0.45F, 0.9F};
     const std::size_t n = points_.size();
-    const std::size_t draws = std::min<std::size_t>(24 + n / 8, 300);
+    const std::size_t draws = std::min<std::size_t>(24 + n / 8, 150);
     Circle best;
     double best_score = 0.0;
     for (std::size_t draw = 0; draw < draws; ++draw) {
@@ -249,6 +249,8 @@ class GroupSearch {
         best_score = value;
         best = circle;
       }
+      // Most of the group lies on one clean circle: more draws would only find it again.
+      if (draw >= 8 && best.inside == 0 && 10 * best.on >= 6 * static_cast<int>(n)) break;
     }
     return best;
   }
@@ -353,17 +355,32 @@ Circle refine_circle(const std::vector<Eigen::Vector2f>& points, const Circle& s
   return circle;
 }
 
-std::vector<Circle> find_circles(const std::vector<Eigen::Vector2f>& points,
-                                 const CircleSearchConfig& config, std::uint64_t seed) {
-  if (static_cast<int>(points.size()) < config.min_points) return {};
-  const std::vector<PointList> groups = groups_of(points, config.reach_m, config.min_points);
-  std::vector<std::vector<Circle>> found(groups.size());
-  parallel_for(groups.size(), 1, [&](std::size_t i) {
-    found[i] = GroupSearch(groups[i], config, hash_numbers(seed, i)).run();
+std::vector<std::vector<Circle>> find_circles(const std::vector<PointList>& slices,
+                                              const CircleSearchConfig& config,
+                                              std::uint64_t seed) {
+  std::vector<std::vector<PointList>> groups(slices.size());
+  parallel_for(slices.size(), 1, [&](std::size_t s) {
+    if (static_cast<int>(slices[s].size()) < config.min_points) return;
+    groups[s] = groups_of(slices[s], config.reach_m, config.min_points);
   });
-  std::vector<Circle> all;
-  for (const std::vector<Circle>& part : found)
-    all.insert(all.end(), part.begin(), part.end());
+  // Large groups take much longer than small ones: all slices' groups together keep all threads
+  // busy to the end.
+  std::vector<std::pair<std::size_t, std::size_t>> jobs;
+  std::vector<std::vector<std::vector<Circle>>> found(slices.size());
+  for (std::size_t s = 0; s < slices.size(); ++s) {
+    found[s].resize(groups[s].size());
+    for (std::size_t g = 0; g < groups[s].size(); ++g)
+      jobs.emplace_back(s, g);
+  }
+  parallel_for(jobs.size(), 1, [&](std::size_t i) {
+    const auto [s, g] = jobs[i];
+    found[s][g] = GroupSearch(std::move(groups[s][g]), config, hash_numbers(seed, s, g)).run();
+  });
+  std::vector<std::vector<Circle>> all(slices.size());
+  for (std::size_t s = 0; s < slices.size(); ++s) {
+    for (const std::vector<Circle>& part : found[s])
+      all[s].insert(all[s].end(), part.begin(), part.end());
+  }
   return all;
 }
 

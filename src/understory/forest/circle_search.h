@@ -26,12 +26,12 @@ struct CircleSearchConfig {
   double min_arc_deg = 50.0;
 };
 
-// All circles, by repeated sampling (RANSAC) in each group of points that hang together and robust
-// least squares (Gauss-Newton on the geometric distance). `seed` and the points decide the result;
-// threads do not.
-[[nodiscard]] std::vector<Circle> find_circles(const std::vector<Eigen::Vector2f>& points,
-                                               const CircleSearchConfig& config,
-                                               std::uint64_t seed);
+// All circles of each slice, by repeated sampling (RANSAC) in each group of points that hang
+// together and robust least squares (Gauss-Newton on the geometric distance). `seed` and the points
+// decide the result; threads do not.
+[[nodiscard]] std::vector<std::vector<Circle>> find_circles(
+    const std::vector<std::vector<Eigen::Vector2f>>& slices, const CircleSearchConfig& config,
+    std::uint64_t seed);
 
 // Least-squares circle through the points near `start`, with Tukey weights over `band_m`; its
 // figures are counted anew. on = 0 if it fails.

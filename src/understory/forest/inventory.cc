@@ -98,8 +98,8 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
     tree.height_m = heights[i];
     tree.lean_deg = std::atan(stem.slope.norm()) * 180.0 / M_PI;
     tree.observations = stem.returns;
-    tree.x_sd_m = std::sqrt(std::max(0.0, stem.covariance(0, 0)));
-    tree.y_sd_m = std::sqrt(std::max(0.0, stem.covariance(1, 1)));
+    tree.x_sd_m = std::sqrt(std::max(0.0, stem.foot_covariance(0, 0)));
+    tree.y_sd_m = std::sqrt(std::max(0.0, stem.foot_covariance(1, 1)));
     trees.push_back(tree);
   }
   return trees;

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <numeric>
-#include <optional>
 
 #include "understory/forest/circle_search.h"
+#include "understory/forest/ring_linker.h"
 #include "understory/forest/stem_fit.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
@@ -48,14 +46,6 @@ class PointIndex {
   std::vector<Entry> cells_;
 };
 
-// A circle with the height of its slice.
-struct Ring {
-  Circle circle;
-  double height_m = 0.0;
-  int slice = 0;
-  [[nodiscard]] double quality() const { return circle.on * circle.even_deg; }
-};
-
 // One way of cutting the points: thin slices for dense clouds, thick ones for what is left of
 // sparse clouds.
 struct Cut {
@@ -85,129 +75,15 @@ std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
   search.reach_m = cut.reach_m;
   search.band_m = cut.band_m;
   std::vector<Ring> rings;
+  const std::vector<std::vector<Circle>> circles =
+      find_circles(slices, search, hash_numbers(count, 0));
   for (std::size_t s = 0; s < count; ++s) {
     const double middle =
         config.lowest_m + (static_cast<double>(s) + 0.5) * span / static_cast<double>(count);
-    for (const Circle& circle : find_circles(slices[s], search, hash_numbers(s, count)))
+    for (const Circle& circle : circles[s])
       rings.push_back({circle, middle, static_cast<int>(s)});
   }
   return rings;
-}
-
-// A straight line through two rings, or a vertical one through one.
-struct Axis {
-  Eigen::Vector2d at_breast = Eigen::Vector2d::Zero();
-  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
-};
-
-bool rings_agree(const Ring& a, const Ring& b) {
-  const double larger = std::max(a.circle.radius_m, b.circle.radius_m);
-  return std::abs(a.circle.radius_m - b.circle.radius_m) <= 0.03 + 0.3 * larger;
-}
-
-// For each slice the ring that lies best on the axis, of those that agree with `seed`.
-std::vector<const Ring*> supporters(const std::vector<const Ring*>& near, const Axis& axis,
-                                    const Ring& seed) {
-  std::map<int, std::pair<double, const Ring*>> best;
-  for (const Ring* ring : near) {
-    if (!rings_agree(*ring, seed)) continue;
-    const Eigen::Vector2d place = axis.at_breast + (ring->height_m - kBreastHeight) * axis.slope;
-    const double off = (ring->circle.centre - place).norm();
-    if (off > 0.04 + 0.2 * seed.circle.radius_m) continue;
-    const auto [it, fresh] = best.try_emplace(ring->slice, off, ring);
-    if (!fresh && off < it->second.first) it->second = {off, ring};
-  }
-  std::vector<const Ring*> result;
-  for (const auto& [slice, entry] : best)
-    result.push_back(entry.second);
-  return result;
-}
-
-// The line through the supporters by least squares; the radius is their median.
-StemFit line_through(const std::vector<const Ring*>& rings) {
-  double sh = 0.0;
-  double shh = 0.0;
-  Eigen::Vector2d sc = Eigen::Vector2d::Zero();
-  Eigen::Vector2d shc = Eigen::Vector2d::Zero();
-  std::vector<double> radii;
-  for (const Ring* ring : rings) {
-    const double h = ring->height_m - kBreastHeight;
-    sh += h;
-    shh += h * h;
-    sc += ring->circle.centre;
-    shc += h * ring->circle.centre;
-    radii.push_back(ring->circle.radius_m);
-  }
-  const auto n = static_cast<double>(rings.size());
-  StemFit stem;
-  // A weak pull towards the vertical (0.3 m of lever) keeps two neighbouring slices from leaning.
-  const double spread = shh - sh * sh / n + 0.1;
-  stem.slope = (shc - sh * sc / n) / spread;
-  stem.centre = (sc - sh * stem.slope) / n;
-  std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2),
-                   radii.end());
-  stem.radius_m = radii[radii.size() / 2];
-  return stem;
-}
-
-// Links rings of different slices to stems, best rings first.
-std::vector<StemFit> link_rings(const std::vector<Ring>& rings, const Cut& cut,
-                                const StemDetectorConfig& config) {
-  std::vector<std::size_t> order(rings.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    const double qa = rings[a].quality();
-    const double qb = rings[b].quality();
-    return qa != qb ? qa > qb : a < b;
-  });
-  const double lean = std::tan(config.max_lean_deg * M_PI / 180.0);
-  std::multimap<int, std::size_t> by_column;
-  for (std::size_t i = 0; i < rings.size(); ++i)
-    by_column.emplace(static_cast<int>(std::floor(rings[i].circle.centre.x())), i);
-  std::vector<char> used(rings.size(), 0);
-  std::vector<StemFit> stems;
-  for (const std::size_t s : order) {
-    if (used[s] != 0) continue;
-    const Ring& seed = rings[s];
-    std::vector<const Ring*> near;
-    const int column = static_cast<int>(std::floor(seed.circle.centre.x()));
-    const auto end = by_column.upper_bound(column + 2);
-    for (auto it = by_column.lower_bound(column - 2); it != end; ++it) {
-      const Ring& ring = rings[it->second];
-      const double rise = std::abs(ring.height_m - seed.height_m);
-      if (used[it->second] == 0 &&
-          (ring.circle.centre - seed.circle.centre).norm() <= 0.05 + lean * rise) {
-        near.push_back(&ring);
-      }
-    }
-    const auto axis_to = [&](const Ring* other) {
-      Axis axis;
-      if (other != nullptr)
-        axis.slope =
-            (other->circle.centre - seed.circle.centre) / (other->height_m - seed.height_m);
-      axis.at_breast = seed.circle.centre + (kBreastHeight - seed.height_m) * axis.slope;
-      return axis;
-    };
-    std::vector<const Ring*> best = supporters(near, axis_to(nullptr), seed);
-    for (const Ring* other : near) {
-      if (other->slice == seed.slice) continue;
-      const std::vector<const Ring*> support = supporters(near, axis_to(other), seed);
-      if (support.size() > best.size()) best = support;
-    }
-    used[s] = 1;
-    if (static_cast<int>(best.size()) < cut.min_slices) continue;
-    for (const Ring* ring : best)
-      used[static_cast<std::size_t>(ring - rings.data())] = 1;
-    StemFit stem = line_through(best);
-    for (const Ring* ring : best) {
-      const Circle& c = ring->circle;
-      stem.slices.push_back({static_cast<float>(ring->height_m), static_cast<float>(c.centre.x()),
-                             static_cast<float>(c.centre.y()), static_cast<float>(c.radius_m),
-                             static_cast<float>(c.rms_m), static_cast<float>(c.arc_deg)});
-    }
-    stems.push_back(stem);
-  }
-  return stems;
 }
 
 // How much may lie beside the surface, as the sum of both ratios of StemEvidence, for it still to
@@ -263,6 +139,15 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
          e.scatter_m <= std::max(0.012, 0.2 * stem.radius_m) + 0.008;
 }
 
+// After the refined fit, which may have found a much thinner stem in the circle's edge.
+bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
+  const StemFit& stem = fit.stem;
+  return fit.converged && 2.0 * stem.radius_m >= config.min_dbh_m &&
+         2.0 * stem.radius_m <= config.max_dbh_m && fit.evidence.returns >= config.min_returns &&
+         std::atan(stem.slope.norm()) * 180.0 / M_PI <= config.max_lean_deg &&
+         stem.arc_deg >= config.min_arc_deg;
+}
+
 bool same_stem(const StemFit& a, const StemFit& b) {
   const double larger = std::max(a.radius_m, b.radius_m);
   const double smaller = std::min(a.radius_m, b.radius_m);
@@ -270,30 +155,37 @@ bool same_stem(const StemFit& a, const StemFit& b) {
   return (a.centre - b.centre).norm() < std::max(0.85 * (larger + smaller), larger + 0.3 * smaller);
 }
 
-// Keeps the best supported of stems that stand in each other.
-void merge_duplicates(std::vector<StemFit>& stems) {
-  std::stable_sort(stems.begin(), stems.end(), [](const StemFit& a, const StemFit& b) {
-    const double qa = a.returns * a.arc_deg;
-    const double qb = b.returns * b.arc_deg;
+// Best supported first: many returns, evenly on the parts that were seen.
+void sort_by_support(std::vector<StemFitResult>& fits) {
+  std::stable_sort(fits.begin(), fits.end(), [](const StemFitResult& a, const StemFitResult& b) {
+    const double qa = a.evidence.patches * a.evidence.fill;
+    const double qb = b.evidence.patches * b.evidence.fill;
     if (qa != qb) return qa > qb;
-    return a.centre.x() != b.centre.x() ? a.centre.x() < b.centre.x() : a.centre.y() < b.centre.y();
+    const Eigen::Vector2d& ca = a.stem.centre;
+    const Eigen::Vector2d& cb = b.stem.centre;
+    return ca.x() != cb.x() ? ca.x() < cb.x() : ca.y() < cb.y();
   });
-  std::vector<StemFit> kept;
-  for (const StemFit& stem : stems) {
-    if (std::none_of(kept.begin(), kept.end(),
-                     [&](const StemFit& other) { return same_stem(stem, other); })) {
-      kept.push_back(stem);
-    }
+}
+
+// Returns on the stem's surface that no better stem has taken.
+int unclaimed_returns(const StemFitResult& fit, const PointIndex& index,
+                      const std::vector<SlicePoint>& points, const std::vector<char>& explained) {
+  const StemAxis axis(fit.stem);
+  const double band = std::max(2.5 * fit.evidence.scatter_m, 0.015);
+  std::uint64_t returns = 0;
+  for (const std::uint32_t i : index.near(fit.stem.centre, fit.stem.radius_m + 1.2)) {
+    if (explained[i] == 0 && std::abs(axis.surface_error(points[i])) <= band)
+      returns += points[i].returns;
   }
-  stems = kept;
+  return static_cast<int>(returns);
 }
 
 // Marks what belongs to a stem: surface, inside, and a margin.
 void mark_explained(const StemFit& stem, const PointIndex& index,
                     const std::vector<SlicePoint>& points, std::vector<char>& explained) {
+  const StemAxis axis(stem);
   for (const std::uint32_t i : index.near(stem.centre, stem.radius_m + 1.2)) {
-    const AxisPlace place = place_on(stem, points[i]);
-    if (place.distance_m <= stem.radius_m + 0.06) explained[i] = 1;
+    if (axis.place(points[i]).distance_m <= stem.radius_m + 0.06) explained[i] = 1;
   }
 }
 
@@ -329,27 +221,44 @@ std::vector<StemFit> detect_stems(const std::vector<SlicePoint>& points,
                                  {3.0 * config.slice_m, 2, 0.12, 0.025}};
   for (const Cut& cut : cuts) {
     const std::vector<Ring> rings = find_rings(sorted, explained, cut, config);
-    const std::vector<StemFit> starts = link_rings(rings, cut, config);
+    const std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
     std::vector<StemFitResult> fits(starts.size());
+    std::vector<char> accepted(starts.size(), 0);
     parallel_for(starts.size(), 1, [&](std::size_t i) {
       const StemFit& start = starts[i];
       const double reach =
           start.radius_m + 0.4 + start.slope.norm() * (config.highest_m - kBreastHeight);
       std::vector<SlicePoint> near;
+      const StemAxis axis(start);
       for (const std::uint32_t k : index.near(start.centre, reach)) {
-        if (explained[k] == 0 && place_on(start, sorted[k]).distance_m < start.radius_m + 0.35) {
+        if (explained[k] == 0 && axis.place(sorted[k]).distance_m < start.radius_m + 0.35) {
           near.push_back(sorted[k]);
         }
       }
       fits[i] = fit_stem(near, start, config);
+      accepted[i] = is_stem(fits[i], cut, config) ? 1 : 0;
+      if (accepted[i] != 0) {
+        fits[i] = refine_stem(near, fits[i], config);
+        accepted[i] = is_stem_still(fits[i], config) ? 1 : 0;
+      }
     });
-    for (const StemFitResult& fit : fits) {
-      if (!is_stem(fit, cut, config)) continue;
-      stems.push_back(fit.stem);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < fits.size(); ++i) {
+      if (accepted[i] != 0) fits[kept++] = fits[i];
     }
-    merge_duplicates(stems);
-    for (const StemFit& stem : stems)
-      mark_explained(stem, index, sorted, explained);
+    fits.resize(kept);
+    sort_by_support(fits);
+    for (const StemFitResult& fit : fits) {
+      const auto overlaps = [&](const StemFit& other) { return same_stem(fit.stem, other); };
+      if (std::any_of(stems.begin(), stems.end(), overlaps)) continue;
+      // A stem beside another must not live on the other's points.
+      if (unclaimed_returns(fit, index, sorted, explained) <
+          std::max(config.min_returns, fit.evidence.returns * 2 / 3)) {
+        continue;
+      }
+      stems.push_back(fit.stem);
+      mark_explained(fit.stem, index, sorted, explained);
+    }
   }
   std::sort(stems.begin(), stems.end(), [](const StemFit& a, const StemFit& b) {
     return a.centre.x() != b.centre.x() ? a.centre.x() < b.centre.x() : a.centre.y() < b.centre.y();

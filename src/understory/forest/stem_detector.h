@@ -49,10 +49,11 @@ struct StemFit {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
   double radius_m = 0.0;  // at breast height
   double taper = 0.0;     // of the radius per metre of height (negative: thinner upwards)
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of centre x, y and radius
-  double rms_m = 0.0;                                    // of the points on the surface
-  double arc_deg = 0.0;                                  // covered by points
-  int returns = 0;                                       // of the cloud
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();       // of centre x, y and radius
+  Eigen::Matrix2d foot_covariance = Eigen::Matrix2d::Zero();  // of the centre line at the ground
+  double rms_m = 0.0;                                         // of the points on the surface
+  double arc_deg = 0.0;                                       // covered by points
+  int returns = 0;                                            // of the cloud
   double lowest_m = 0.0;  // first and last height with points on the surface
   double highest_m = 0.0;
   std::vector<StemSlice> slices;

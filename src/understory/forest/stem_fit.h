@@ -3,11 +3,10 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "understory/forest/stem_axis.h"
 #include "understory/forest/stem_detector.h"
 
 namespace understory {
-
-inline constexpr double kBreastHeight = 1.3;
 
 // Figures of a fit that decide whether it is a stem.
 struct StemEvidence {
@@ -20,6 +19,10 @@ struct StemEvidence {
   double outside_ratio = 0.0;
   double even_arc_deg = 0.0;  // see ArcBins::even_deg
   int slices = 0;             // slices in which the surface shows
+  int patches = 0;            // pieces of the surface, 30 degrees by one slice, that hold points
+  // Pieces of 10 degrees that hold points over those that as many evenly laid ones would hit: small
+  // where each slice shows another side.
+  double fill = 0.0;
   double scatter_m = 0.0;
 };
 
@@ -31,15 +34,14 @@ struct StemFitResult {
   StemFit stem;
   StemEvidence evidence;
 };
+// For a first decision: fast, but too thick where the points scatter much.
 [[nodiscard]] StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& start,
                                      const StemDetectorConfig& config);
 
-// Distance of a point from the centre line, and its height along it over breast height.
-struct AxisPlace {
-  double distance_m = 0.0;
-  double along_m = 0.0;
-  Eigen::Vector3d outward = Eigen::Vector3d::Zero();  // unit, from the axis to the point
-};
-[[nodiscard]] AxisPlace place_on(const StemFit& stem, const SlicePoint& point);
+// The same stem by fit_noisy_cylinder, from its fit and, where the points would also suit a thinner
+// stem in the circle's edge, from that one; the likelier of both. `points` should hold all within
+// 0.35 m of the surface. The figures are taken anew.
+[[nodiscard]] StemFitResult refine_stem(const std::vector<SlicePoint>& points,
+                                        const StemFitResult& fit, const StemDetectorConfig& config);
 
 }  // namespace understory
