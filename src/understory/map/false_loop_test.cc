@@ -1,0 +1,150 @@
+// Loops through the whole of the keyframe map: search, verification, graph. A walk around a ring
+// whose odometry slips once, half way; what is seen is cast from where the walker truly is.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "understory/map/keyframe_map.h"
+#include "understory/registration/test_stand.h"
+
+namespace understory {
+namespace {
+
+using testing::Stand;
+
+constexpr int kSteps = 60;
+constexpr double kRadiusM = 9.0;
+constexpr double kSpacingM = 3.0;
+
+// Equal stems in rows on even ground: every place looks like that one spacing further on.
+Stand plantation() {
+  Stand stand;
+  stand.roughness_m = 0.02;
+  for (double x = -60.0; x <= 60.0; x += kSpacingM) {
+    for (double y = -45.0; y <= 45.0; y += kSpacingM) {
+      testing::Stem stem;
+      stem.foot = {x + 1.5, y + 1.5, -1.0};
+      stem.radius_m = 0.12;
+      stand.stems.push_back(stem);
+    }
+  }
+  return stand;
+}
+
+Stand grown_stand() {
+  testing::StandOptions options;
+  options.half_width_m = 60.0;
+  options.stems_per_hectare = 700.0;
+  options.crowns = false;
+  Stand stand = testing::make_stand(options, 3);
+  stand.bump_m = 0.3;
+  return stand;
+}
+
+Points scan_at(const Stand& stand, const Pose& world_from_body, std::uint64_t seed) {
+  testing::Pattern pattern = testing::os0_128();
+  pattern.rings = 32;
+  pattern.columns = 240;
+  pattern.range_m = 25.0;
+  Stand near = stand;
+  near.stems.clear();
+  for (const testing::Stem& stem : stand.stems) {
+    if ((stem.foot - world_from_body.translation()).norm() < 27.0) near.stems.push_back(stem);
+  }
+  return testing::scan_stand(near, world_from_body, pattern, seed);
+}
+
+// Where the walker believes to be.
+Pose believed(int step) {
+  const double angle = 2.0 * std::numbers::pi * step / kSteps * 1.05;
+  return {so3_exp({0.0, 0.0, angle}),
+          Eigen::Vector3d(kRadiusM * std::sin(angle), kRadiusM * (1.0 - std::cos(angle)), 1.7)};
+}
+
+struct Walk {
+  std::vector<LoopAttempt> loops;  // tried from places wholly after the slip
+  int used = 0;                    // of those, believed by the graph
+  std::vector<Keyframe> keyframes;
+};
+
+// `slip`: from half way on the walker truly is that far from where it believes to be.
+Walk walk(const Stand& stand, const Eigen::Vector3d& slip, const std::string& name) {
+  KeyframeMap::Config config;
+  config.keyframe.distance_m = 0.5;
+  // The odometry is known to slip, so that the search looks far enough and the graph alone would
+  // let a wrong loop pass.
+  config.edge_translation_m_per_sqrt_m = 0.2;
+  config.loop_closure.submap_keyframes = 6;
+  config.loop_closure.source_keyframes = 3;
+  config.loop_closure.handover_keyframes = 1;
+  config.loop_closure.search.interval_s = 7.0;
+  const auto folder = std::filesystem::path(::testing::TempDir()) / ("understory_loops_" + name);
+  std::filesystem::create_directories(folder);
+  StageTimes times;
+  Log log;
+  KeyframeMap map(config, folder, times, log);
+  map.start();
+  Pose moved;
+  for (int step = 0; step <= kSteps; ++step) {
+    const Pose truth =
+        Pose(Eigen::Quaterniond::Identity(), step > kSteps / 2 ? slip : Eigen::Vector3d::Zero()) *
+        believed(step);
+    const auto now = map.add(TimeNs{step} * kNsPerSecond, moved * believed(step),
+                             scan_at(stand, truth, static_cast<std::uint64_t>(step)));
+    if (now) moved = *now * moved;
+  }
+  map.finish();
+  Walk result;
+  for (std::size_t i = 0; i < map.loops().size(); ++i) {
+    if (map.loops()[i].to <= kSteps / 2 + 3) continue;
+    result.loops.push_back(map.loops()[i]);
+    result.used += map.loops_used()[i];
+  }
+  result.keyframes = map.keyframes();
+  return result;
+}
+
+void print(const Walk& result) {
+  if (std::getenv("UNDERSTORY_PRINT") == nullptr) return;
+  for (const LoopAttempt& loop : result.loops) {
+    std::printf("%d - %d: %s, %.2f m; %s\n", loop.from, loop.to, loop.verified ? "fits" : "no",
+                loop.correction_m, loop.reason.c_str());
+  }
+}
+
+// Shows that the walks below could have been closed: the place is the same, the belief 1 m off.
+TEST(FalseLoops, ATrueReturnIsClosed) {
+  const Eigen::Vector3d slip(0.8, -0.6, 0.0);
+  const Walk result = walk(grown_stand(), slip, "true");
+  print(result);
+  EXPECT_GT(result.used, 0);
+  const Pose truth = Pose(Eigen::Quaterniond::Identity(), slip) * believed(kSteps);
+  const Pose first = result.keyframes.front().world_from_body;
+  const Pose found = believed(0) * first.inverse() * result.keyframes.back().world_from_body;
+  EXPECT_LT((found.translation() - truth.translation()).norm(), 0.25);
+}
+
+void expect_no_loop(const Walk& result) {
+  print(result);
+  EXPECT_GT(result.loops.size(), 3U) << "nothing was tried";
+  EXPECT_EQ(result.used, 0);
+  for (const LoopAttempt& loop : result.loops)
+    EXPECT_FALSE(loop.reason.empty()) << loop.from << " - " << loop.to;
+  const Pose first = result.keyframes.front().world_from_body;
+  const Pose found = believed(0) * first.inverse() * result.keyframes.back().world_from_body;
+  EXPECT_LT((found.translation() - believed(kSteps).translation()).norm(), 0.15);
+}
+
+TEST(FalseLoops, AnotherPlaceOfAStandIsNone) {
+  expect_no_loop(walk(grown_stand(), {31.0, 12.0, 0.0}, "other"));
+}
+
+// Rows fit rows at every multiple of their spacing, so the fit by itself says nothing.
+TEST(FalseLoops, RowsOfAPlantationAreNone) {
+  expect_no_loop(walk(plantation(), {8.0 * kSpacingM + 1.2, 1.0, 0.0}, "rows"));
+}
+
+}  // namespace
+}  // namespace understory
