@@ -139,13 +139,26 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
          e.scatter_m <= std::max(0.012, 0.2 * stem.radius_m) + 0.008;
 }
 
-// After the refined fit, which may have found a much thinner stem in the circle's edge.
+// After the refined fit, which may have found a much thinner stem in the circle's edge. What shows
+// another side in each slice is a piece of a machine or a heap of branches (a stem's pieces were
+// filled to 0.67 and more on the tuning maps); what shows in few slices has to stand clear, and
+// must not be cut off where it was seen well.
 bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
+  constexpr double kLeastFill = 0.65;
+  constexpr double kWellSeen = 50.0;  // returns a slice
   const StemFit& stem = fit.stem;
-  return fit.converged && 2.0 * stem.radius_m >= config.min_dbh_m &&
-         2.0 * stem.radius_m <= config.max_dbh_m && fit.evidence.returns >= config.min_returns &&
-         std::atan(stem.slope.norm()) * 180.0 / M_PI <= config.max_lean_deg &&
-         stem.arc_deg >= config.min_arc_deg;
+  const StemEvidence& e = fit.evidence;
+  if (!fit.converged || 2.0 * stem.radius_m < config.min_dbh_m ||
+      2.0 * stem.radius_m > config.max_dbh_m || e.returns < config.min_returns ||
+      std::atan(stem.slope.norm()) * 180.0 / M_PI > config.max_lean_deg ||
+      stem.arc_deg < config.min_arc_deg || e.fill < kLeastFill) {
+    return false;
+  }
+  const double all = (config.highest_m - config.lowest_m) / config.slice_m;
+  if (e.slices >= 0.8 * all) return true;
+  const double sd = std::sqrt(std::max(0.0, stem.covariance(2, 2)));
+  return e.inside_ratio + e.outside_ratio <= 0.25 && sd <= 0.35 * stem.radius_m &&
+         (e.slices >= 0.4 * all || e.returns < kWellSeen * e.slices);
 }
 
 bool same_stem(const StemFit& a, const StemFit& b) {
