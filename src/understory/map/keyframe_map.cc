@@ -17,6 +17,8 @@ void describe(ConfigTable& table, KeyframeConfig& config) {
             "weighted distance (37) after which a scan becomes a keyframe");
   table.add("rotation_as_metre_deg", config.rotation_as_metre_deg, {0.1, 360.0}, "deg",
             "rotation that counts as one metre in (37)");
+  table.add("voxel_size_m", config.voxel_size_m, {0.02, 5.0}, "m",
+            "edge of the voxels that thin a keyframe's points");
 }
 
 double keyframe_distance(const Pose& world_from_last, const Pose& world_from_current,

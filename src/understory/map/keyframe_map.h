@@ -23,8 +23,11 @@ namespace understory {
 struct KeyframeConfig {
   // P4 (37): a scan becomes a keyframe when |theta * (X_L^-1 X_k)| reaches `distance_m`, where
   // theta weighs a rotation of `rotation_as_metre_deg` like one metre. In the paper 0.2 m and 20.
-  double distance_m = 0.3;
+  double distance_m = 0.5;
   double rotation_as_metre_deg = 30.0;
+  // Edge of the voxels that thin a keyframe's points. Finer than a scan is thinned to be matched:
+  // the local map's cells have to tell a stem's near side from its flanks.
+  double voxel_size_m = 0.1;
 };
 void describe(ConfigTable& table, KeyframeConfig& config);
 

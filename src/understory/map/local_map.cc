@@ -21,6 +21,8 @@ void describe(ConfigTable& table, LocalMapConfig& config) {
             "no surface is taken to be thinner");
   table.add("second_axis_weight", config.cells.second_axis_weight, {0.0, 1.0}, "",
             "weight of a cell's second thinnest direction");
+  table.add("volume_weight", config.cells.volume_weight, {0.0, 1.0}, "",
+            "weight of cells that are neither surface nor line");
   table.add("radius_m", config.radius_m, {10.0, 1000.0}, "m", "accumulate: reach of the map");
   table.add("recent_keyframes", config.recent_keyframes, {1, 10000}, "", "recent: how many");
   table.add("recent_spacing_m", config.recent_spacing_m, {0.0, 100.0}, "m",

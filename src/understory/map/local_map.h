@@ -12,7 +12,7 @@ namespace understory {
 
 struct LocalMapConfig {
   // Edges of the cells of the maps that scans are matched to, coarse to fine.
-  std::vector<double> cell_sizes_m = {2.0, 1.0};
+  std::vector<double> cell_sizes_m = {2.0, 0.5};
   // cell_size_m is taken from the list above. Many keyframes lie in a cell: what they agree on is
   // sharper than one scan.
   NdtMapConfig cells = {.sigma_floor_m = 0.01};

@@ -25,12 +25,12 @@ struct LoopCloserConfig {
   LoopSearchConfig search;
   LoopClosureConfig verification;
   PoseGraphConfig graph;
-  int submap_keyframes = 35;    // on each side of a candidate, that make the map it is matched to
-  int source_keyframes = 6;     // on each side of the query, that are matched
+  int submap_keyframes = 22;    // on each side of a candidate, that make the map it is matched to
+  int source_keyframes = 4;     // on each side of the query, that are matched
   double voxel_size_m = 0.4;    // thins both
-  int handover_keyframes = 15;  // results are taken over that many keyframes after the search began
-  double least_correction_m = 0.005;  // smaller ones wait for the next
-  double least_correction_deg = 0.02;
+  int handover_keyframes = 10;  // results are taken over that many keyframes after the search began
+  double least_correction_m = 0.03;  // smaller ones wait for the next
+  double least_correction_deg = 0.1;
 };
 void describe(ConfigTable& table, LoopCloserConfig& config);
 

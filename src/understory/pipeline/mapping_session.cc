@@ -281,8 +281,16 @@ void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& recor
   if (!wanted) return;
   record.becomes_keyframe = 1;
   store_cloud(estimate);
-  const auto moved = map_->add(record.stamp, state.world_from_body, estimate.thinned);
+  const auto moved = map_->add(record.stamp, state.world_from_body, map_points(estimate));
   if (moved) odometry_->move_world(*moved);
+}
+
+// What the map takes from a scan: more than what is matched.
+Points MappingSession::map_points(const DenseEstimate& estimate) {
+  VoxelFilterConfig voxel = config_.odometry.voxel;
+  voxel.voxel_size_m = std::min(voxel.voxel_size_m, config_.keyframe_map.keyframe.voxel_size_m);
+  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m) return estimate.thinned;
+  return cloud_filter_.filter(estimate.cloud, voxel).points;
 }
 
 void MappingSession::store_cloud(const DenseEstimate& estimate) {

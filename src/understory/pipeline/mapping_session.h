@@ -100,6 +100,7 @@ class MappingSession {
   [[nodiscard]] bool lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const;
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
   [[nodiscard]] bool lost(const DenseEstimate& estimate) const;
+  [[nodiscard]] Points map_points(const DenseEstimate& estimate);
   void store_cloud(const DenseEstimate& estimate);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
 

@@ -93,7 +93,8 @@ NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
   // A cell evenly filled has this variance and says nothing.
   const double box = config.cell_size_m * config.cell_size_m / 12.0 + floor;
 
-  if (is_line(shape, floor)) {
+  const bool line = is_line(shape, floor);
+  if (line) {
     if (std::abs(shape.axes.col(2).z()) < kPoleCosine) {
       add_row_of_surroundings(cell, covariance, floor, around);
       return cell;
@@ -103,11 +104,12 @@ NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
     return cell;
   }
   const double longest = std::min(shape.variance[2] + floor, box);
-  // Only the thinnest direction is a surface. Along the second one the cell ends where the lidar
-  // could no longer see it, and those ends move with the lidar: full weight there holds the
-  // estimate back (0.16 % of the way on a stand of stems, 0.12 % without).
+  // What is neither surface nor line is seen from one side only, and that side goes with the lidar:
+  // such cells hold the estimate back (docs/registration.md). The same goes for the second
+  // direction, along which a cell ends where the lidar could no longer see it.
+  const double share = line ? 1.0 : config.volume_weight;
   for (int i = 0; i < 2; ++i) {
-    const double weight = i == 0 ? 1.0 : config.second_axis_weight;
+    const double weight = share * (i == 0 ? 1.0 : config.second_axis_weight);
     add_row(cell, shape.axes.col(i), weight * (1.0 / (shape.variance[i] + floor) - 1.0 / longest));
   }
   return cell;

@@ -19,6 +19,8 @@ void describe(ConfigTable& table, NdtMapConfig& config) {
             "no surface is taken to be thinner; noise of the lidar and of the map's poses");
   table.add("second_axis_weight", config.second_axis_weight, {0.0, 1.0}, "",
             "weight of a cell's second thinnest direction");
+  table.add("volume_weight", config.volume_weight, {0.0, 1.0}, "",
+            "weight of cells that are neither surface nor line");
 }
 
 Eigen::Vector3d NdtMap::mean(std::size_t index) const {

@@ -18,6 +18,7 @@ struct NdtMapConfig {
   int min_points = 5;           // cells with fewer have no distribution
   double sigma_floor_m = 0.03;  // a surface is never taken to be thinner: sensor and pose noise
   double second_axis_weight = 0.25;  // of a cell's second thinnest direction, 0..1
+  double volume_weight = 0.03;       // of cells that are neither surface nor line, 0..1
 };
 void describe(ConfigTable& table, NdtMapConfig& config);
 
