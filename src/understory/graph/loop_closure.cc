@@ -171,6 +171,7 @@ std::optional<Match> match_sides(const Side& target, const Side& source,
     if (!same_place(other.result.target_from_source, best.result.target_from_source))
       report.runner_up = std::max(report.runner_up, other.overlap);
   }
+  if (config.refine == LoopClosureConfig::Refine::kNdt) return best;
   const IcpTarget icp_target(target.points, config.icp);
   best.result = register_icp(icp_target, source.points, best.result.target_from_source,
                              std::nullopt, config.icp);
@@ -186,16 +187,17 @@ void measure_asymmetry(const Side& target, const Side& source, const Pose& targe
   const NdtMapPtr& fine = source.maps.back();
   const RegistrationResult ndt =
       register_ndt(*fine, target.points, target_from_source.inverse(), std::nullopt, config.ndt);
-  const IcpTarget icp_target(source.points, config.icp);
-  const RegistrationResult icp =
-      register_icp(icp_target, target.points,
-                   ndt.usable() ? ndt.target_from_source : target_from_source.inverse(),
-                   std::nullopt, config.icp);
-  if (!icp.usable()) {
+  RegistrationResult back = ndt;
+  if (config.refine == LoopClosureConfig::Refine::kIcp) {
+    const Pose start = ndt.usable() ? ndt.target_from_source : target_from_source.inverse();
+    back = register_icp(IcpTarget(source.points, config.icp), target.points, start, std::nullopt,
+                        config.icp);
+  }
+  if (!back.usable()) {
     report.asymmetry_m = std::numeric_limits<double>::infinity();
     return;
   }
-  const Pose circle = target_from_source * icp.target_from_source;
+  const Pose circle = target_from_source * back.target_from_source;
   // At the middle of the source's points, where the lever of a small turn is not counted twice.
   const Eigen::Vector3d middle = target_from_source.translation();
   report.asymmetry_m = (circle * middle - middle).norm();
@@ -226,8 +228,10 @@ Matrix6d loop_covariance(const RegistrationResult& result, const LoopClosureConf
   Matrix6d covariance = 0.5 * (inverse + inverse.transpose());
   const double rotation = config.sigma_rotation_deg * kDegree;
   covariance.diagonal().head<3>().array() += rotation * rotation;
-  covariance.diagonal().tail<3>().array() +=
-      config.sigma_translation_m * config.sigma_translation_m;
+  const double translation =
+      std::hypot(config.sigma_translation_m,
+                 config.sigma_translation_per_m * result.target_from_source.translation().norm());
+  covariance.diagonal().tail<3>().array() += translation * translation;
   return covariance;
 }
 
@@ -275,6 +279,10 @@ LoopVerification verify_loop(const LoopInput& input, const LoopClosureConfig& co
 void describe(ConfigTable& table, LoopClosureConfig& config) {
   table.add("cell_sizes_m", config.cell_sizes_m, "m", "cells of NDT, coarse to fine");
   table.section("ndt", [&] { describe(table, config.ndt); });
+  table.add_enum(
+      "refine", config.refine,
+      {{"icp", LoopClosureConfig::Refine::kIcp}, {"ndt", LoopClosureConfig::Refine::kNdt}},
+      "what has the last word on the relative pose");
   table.section("icp", [&] { describe(table, config.icp); });
   table.add("search_sigmas", config.search_sigmas, {0.0, 10.0}, "",
             "standard deviations of the belief over which NDT starts; 0: from the belief alone");
@@ -312,6 +320,8 @@ void describe(ConfigTable& table, LoopClosureConfig& config) {
             "least standard deviation of a loop");
   table.add("sigma_translation_m", config.sigma_translation_m, {1e-5, 10.0}, "m",
             "least standard deviation of a loop");
+  table.add("sigma_translation_per_m", config.sigma_translation_per_m, {0.0, 1.0}, "",
+            "what it grows by with the distance between the two places");
 }
 
 }  // namespace understory

@@ -25,9 +25,12 @@ struct LoopInput {
 };
 
 struct LoopClosureConfig {
-  std::vector<double> cell_sizes_m = {2.0, 1.0};  // of NDT, coarse to fine
-  NdtMapConfig cells;
+  std::vector<double> cell_sizes_m = {2.0, 0.5};  // of NDT, coarse to fine
+  NdtMapConfig cells = {.sigma_floor_m = 0.01};
   NdtConfig ndt;
+  // What gives the last word: ICP as in P2-7, or the finest NDT.
+  enum class Refine { kIcp, kNdt };
+  Refine refine = Refine::kNdt;
   IcpConfig icp;
   // Where the belief is uncertain, NDT starts from many places: a grid over so many standard
   // deviations, with steps that the coarsest cells can bridge.
@@ -52,6 +55,8 @@ struct LoopClosureConfig {
   // The least that is believed of the result's standard deviations.
   double sigma_rotation_deg = 0.1;
   double sigma_translation_m = 0.02;
+  double sigma_translation_per_m = 0.002;  // of the distance between the two: surfaces seen from
+                                           // different sides fit a little too near
 };
 void describe(ConfigTable& table, LoopClosureConfig& config);
 

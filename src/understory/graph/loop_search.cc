@@ -138,6 +138,7 @@ std::vector<LoopCandidate> uncertain_candidates(const PoseGraphProblem& problem,
     // What the overlap may be if the drift was as unkind as it plausibly can.
     const double nearest =
         std::max(0.0, candidate.distance_m - config.sigmas * candidate.sigma_translation_m);
+    if (nearest > config.max_chord_ratio * (way[query] - way[k])) continue;
     if (disc_overlap(nearest, config.view_radius_m) >= config.min_overlap) all.push_back(candidate);
   }
   return spread(std::move(all), way, config);
@@ -168,6 +169,8 @@ void describe(ConfigTable& table, LoopSearchConfig& config) {
   table.add("interval_s", config.interval_s, {0.0, 1e4}, "s", "at most one search in this time");
   table.add("exclude_path_m", config.exclude_path_m, {0.0, 1e5}, "m",
             "keyframes are recent as long as the way since is shorter");
+  table.add("max_chord_ratio", config.max_chord_ratio, {0.0, 1.0}, "",
+            "keyframes are recent as long as they are farther than this share of the way since");
   table.add("view_radius_m", config.view_radius_m, {1.0, 1000.0}, "m",
             "how far from the sensor scans overlap usefully");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",

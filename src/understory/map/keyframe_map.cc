@@ -51,6 +51,8 @@ KeyframeMap::KeyframeMap(const Config& config, const std::filesystem::path& fold
 
 namespace {
 constexpr std::size_t kCachedKeyframes = 300;
+// What is too far away is looked for only now and then: it means going over the whole local map.
+constexpr std::size_t kForgetEvery = 8;
 constexpr const char* kPointsFile = "keyframe_points.bin";
 }  // namespace
 
@@ -127,8 +129,7 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
   local_map_ = std::move(*outcome.local_map);
   inserted_ = std::move(outcome.inserted);
   for (std::size_t i = std::max(known, segment_start_); i < keyframes_.size(); ++i) {
-    inserted_.push_back({i, 1});
-    local_map_.insert({points_->get(i).get(), keyframes_[i].world_from_body}, true);
+    insert(i);
   }
   snapshot_ = local_map_.snapshot();
   return moved;
@@ -155,9 +156,14 @@ void KeyframeMap::update_local_map(std::size_t keyframe) {
     rebuild_local_map();
     return;
   }
-  inserted_.push_back({keyframe, 1});
-  local_map_.insert({points_->get(keyframe).get(), keyframes_[keyframe].world_from_body}, true);
+  insert(keyframe);
   snapshot_ = local_map_.snapshot();
+}
+
+void KeyframeMap::insert(std::size_t keyframe) {
+  const bool forget = keyframe % kForgetEvery == 0;
+  inserted_.push_back({keyframe, forget ? 1U : 0U});
+  local_map_.insert({points_->get(keyframe).get(), keyframes_[keyframe].world_from_body}, forget);
 }
 
 // Chooses the keyframes of the local map anew, e.g. after a loop closure has moved them.

@@ -84,6 +84,7 @@ class KeyframeMap {
 
  private:
   void update_local_map(std::size_t keyframe);
+  void insert(std::size_t keyframe);
   void rebuild_local_map();
   [[nodiscard]] Matrix6d edge_covariance(const Pose& previous_from_this) const;
   [[nodiscard]] std::optional<Pose> take_over(LoopOutcome outcome);

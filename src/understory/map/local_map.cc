@@ -6,6 +6,7 @@
 #include <map>
 
 #include "understory/util/error.h"
+#include "understory/util/parallel.h"
 
 namespace understory {
 
@@ -42,10 +43,11 @@ LocalMap::LocalMap(const LocalMapConfig& config) : config_(config) {
 }
 
 void LocalMap::insert(const PlacedPoints& keyframe, bool forget) {
-  for (NdtMapBuilder& builder : builders_) {
+  parallel_for(builders_.size(), 1, [&](std::size_t i) {
+    NdtMapBuilder& builder = builders_[i];
     builder.insert(*keyframe.points_in_body, keyframe.world_from_body);
     if (forget) builder.remove_beyond(keyframe.world_from_body.translation(), config_.radius_m);
-  }
+  });
 }
 
 void LocalMap::clear() {
@@ -54,10 +56,8 @@ void LocalMap::clear() {
 }
 
 std::vector<NdtMapPtr> LocalMap::snapshot() {
-  std::vector<NdtMapPtr> maps;
-  maps.reserve(builders_.size());
-  for (NdtMapBuilder& builder : builders_)
-    maps.push_back(builder.snapshot());
+  std::vector<NdtMapPtr> maps(builders_.size());
+  parallel_for(builders_.size(), 1, [&](std::size_t i) { maps[i] = builders_[i].snapshot(); });
   return maps;
 }
 

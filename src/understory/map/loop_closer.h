@@ -27,8 +27,8 @@ struct LoopCloserConfig {
   PoseGraphConfig graph;
   int submap_keyframes = 22;    // on each side of a candidate, that make the map it is matched to
   int source_keyframes = 4;     // on each side of the query, that are matched
-  double voxel_size_m = 0.4;    // thins both
-  int handover_keyframes = 10;  // results are taken over that many keyframes after the search began
+  double voxel_size_m = 0.2;    // thins both
+  int handover_keyframes = 30;  // results are taken over that many keyframes after the search began
   double least_correction_m = 0.03;  // smaller ones wait for the next
   double least_correction_deg = 0.1;
 };
