@@ -119,4 +119,8 @@ function(understory_fuzz name)
   target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
   set_target_properties(fuzz_${name} PROPERTIES
                         RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/fuzz")
+  if(NOT TARGET fuzz_targets)
+    add_custom_target(fuzz_targets COMMENT "the fuzz targets")
+  endif()
+  add_dependencies(fuzz_targets fuzz_${name})
 endfunction()

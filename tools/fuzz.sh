@@ -13,7 +13,7 @@ if [[ ! -e fuzz/CMakeLists.txt ]]; then
   exit
 fi
 tools/setup.sh check
-build_preset fuzz
+build_preset fuzz fuzz_targets
 failed=()
 mkdir -p build-fuzz/finds
 for program in build-fuzz/fuzz/fuzz_*; do

@@ -82,8 +82,8 @@ class LoopCloser {
 
  private:
   struct Running {
-    std::uint64_t keyframes = 0;  // known to it
-    std::uint64_t segment_start = 0;
+    std::uint64_t keyframes;  // known to it
+    std::uint64_t segment_start;
     std::future<LoopOutcome> outcome;
   };
   void begin(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
