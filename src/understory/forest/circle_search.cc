@@ -13,7 +13,7 @@
 namespace understory {
 namespace {
 
-constexpr int kTriesPerDraw = 6;
+constexpr int kTriesPerDraw = 9;
 using PointList = std::vector<Eigen::Vector2f>;
 
 // Points sorted into square cells, so that those near a place are found without looking at all.
@@ -32,59 +32,61 @@ class CellIndex {
     for (const Eigen::Vector2f& point : points)
       ++begin_[cell_of(point) + 1];
     std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
-    order_.resize(points.size());
     std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
-    for (std::size_t i = 0; i < points.size(); ++i)
-      order_[next[cell_of(points[i])]++] = static_cast<std::uint32_t>(i);
-    sorted_.reserve(points.size());
-    for (const std::uint32_t i : order_)
-      sorted_.push_back(points[i]);
+    sorted_.resize(points.size());
+    for (const Eigen::Vector2f& point : points)
+      sorted_[next[cell_of(point)]++] = point;
   }
 
-  // Calls visit(i) for the points of all cells that touch the square around `centre`.
-  template <typename Visit>
-  void near(const Eigen::Vector2f& centre, float reach, const Visit& visit) const {
+  using Range = std::pair<std::uint32_t, std::uint32_t>;  // of `sorted`, without its end
+
+  // The points of all cells that touch the square around `centre`: one range a row.
+  std::uint32_t square(const Eigen::Vector2f& centre, float reach,
+                       std::vector<Range>& ranges) const {
+    ranges.clear();
     const int c0 = std::max(0, column(centre.x() - reach));
     const int c1 = std::min(columns_ - 1, column(centre.x() + reach));
     const int r0 = std::max(0, row(centre.y() - reach));
     const int r1 = std::min(rows_ - 1, row(centre.y() + reach));
-    for (int r = r0; r <= r1; ++r) {
-      const std::size_t base = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_);
-      for (int c = c0; c <= c1; ++c) {
-        const std::size_t cell = base + static_cast<std::size_t>(c);
-        for (std::uint32_t k = begin_[cell]; k < begin_[cell + 1]; ++k)
-          visit(order_[k]);
-      }
+    std::uint32_t count = 0;
+    for (int r = r0; r <= r1 && c0 <= c1; ++r) {
+      ranges.push_back(cells_between(r, c0, c1));
+      count += ranges.back().second - ranges.back().first;
     }
+    return count;
   }
 
-  // What each cell near a circle means for it: wholly within `inner` of the centre, touched by the
-  // band between `inner` and `outer`, or neither. on_cell(begin, end) gets ranges of `sorted`.
-  template <typename OnCell>
-  void ring_cells(const Eigen::Vector2f& centre, float inner, float outer,
-                  const OnCell& on_cell) const {
-    const int c0 = std::max(0, column(centre.x() - outer));
-    const int c1 = std::min(columns_ - 1, column(centre.x() + outer));
+  // The points in cells that touch the ring between `inner` and `outer`, as ranges; returns how
+  // many lie in cells wholly within `inner`. Cells of a row follow each other, so a row takes two
+  // steps.
+  std::uint32_t ring(const Eigen::Vector2f& centre, float inner, float outer,
+                     std::vector<Range>& ranges) const {
+    ranges.clear();
+    std::uint32_t within = 0;
     const int r0 = std::max(0, row(centre.y() - outer));
     const int r1 = std::min(rows_ - 1, row(centre.y() + outer));
-    const float half = 0.5F * cell_m_;
     for (int r = r0; r <= r1; ++r) {
-      const std::size_t base = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_);
-      const float dy = std::abs(low_.y() + (static_cast<float>(r) + 0.5F) * cell_m_ - centre.y());
-      for (int c = c0; c <= c1; ++c) {
-        const std::size_t cell = base + static_cast<std::size_t>(c);
-        if (begin_[cell] == begin_[cell + 1]) continue;
-        const float dx = std::abs(low_.x() + (static_cast<float>(c) + 0.5F) * cell_m_ - centre.x());
-        const float far = (dx + half) * (dx + half) + (dy + half) * (dy + half);
-        if (far < inner * inner) {
-          on_cell(begin_[cell], begin_[cell + 1], true);
-          continue;
-        }
-        const float nx = std::max(0.0F, dx - half);
-        const float ny = std::max(0.0F, dy - half);
-        if (nx * nx + ny * ny <= outer * outer) on_cell(begin_[cell], begin_[cell + 1], false);
+      const float low = low_.y() + static_cast<float>(r) * cell_m_ - centre.y();
+      const float high = low + cell_m_;
+      const float nearest = std::max({0.0F, low, -high});
+      const float farthest = std::max(-low, high);
+      const float wide = std::sqrt(std::max(0.0F, outer * outer - nearest * nearest));
+      const int c0 = std::max(0, column(centre.x() - wide));
+      const int c1 = std::min(columns_ - 1, column(centre.x() + wide));
+      if (c0 > c1) continue;
+      const float slim = inner > farthest ? std::sqrt(inner * inner - farthest * farthest) : -1.0F;
+      const int i0 = std::max(c0, column(centre.x() - slim) + 1);
+      const int i1 = std::min(c1, column(centre.x() + slim) - 1);
+      if (slim <= 0.0F || i0 > i1) {
+        add_range(cells_between(r, c0, c1), ranges);
+        continue;
       }
+      add_range(cells_between(r, c0, i0 - 1), ranges);
+      add_range(cells_between(r, i1 + 1, c1), ranges);
+      const Range inside = cells_between(r, i0, i1);
+      within += inside.second - inside.first;
     }
+    return within;
   }
   // The points in order of their cells.
   [[nodiscard]] const PointList& sorted() const { return sorted_; }
@@ -95,6 +97,14 @@ class CellIndex {
   }
   [[nodiscard]] int row(float y) const {
     return static_cast<int>(std::floor((y - low_.y()) / cell_m_));
+  }
+  static void add_range(const Range& range, std::vector<Range>& ranges) {
+    if (range.first < range.second) ranges.push_back(range);
+  }
+  [[nodiscard]] Range cells_between(int r, int c0, int c1) const {
+    const std::size_t base = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_);
+    return {begin_[base + static_cast<std::size_t>(c0)],
+            begin_[base + static_cast<std::size_t>(c1) + 1]};
   }
   [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& point) const {
     const int c = std::clamp(column(point.x()), 0, columns_ - 1);
@@ -108,7 +118,6 @@ class CellIndex {
   int columns_ = 0;
   int rows_ = 0;
   std::vector<std::uint32_t> begin_;
-  std::vector<std::uint32_t> order_;
   PointList sorted_;
 };
 
@@ -232,15 +241,15 @@ class GroupSearch {
       const Eigen::Vector2f& first = points_[random_.below(n)];
       const float scale = kScales[draw % kScales.size()];
       if (scale > 2.0 * config_.max_radius_m) continue;
-      candidates_.clear();
-      coarse.near(first, scale, [&](std::uint32_t i) {
-        if ((points_[i] - first).squaredNorm() <= scale * scale) candidates_.push_back(i);
-      });
-      if (candidates_.size() < 3) continue;
+      const std::uint32_t near = coarse.square(first, scale, candidates_);
+      if (near < 3) continue;
       for (int i = 0; i < kTriesPerDraw; ++i) {
         Circle circle;
-        if (!circle_through(first, points_[candidates_[random_.below(candidates_.size())]],
-                            points_[candidates_[random_.below(candidates_.size())]], circle) ||
+        const Eigen::Vector2f& second = pick(coarse, near);
+        const Eigen::Vector2f& third = pick(coarse, near);
+        if ((second - first).squaredNorm() > scale * scale ||
+            (third - first).squaredNorm() > scale * scale ||
+            !circle_through(first, second, third, circle) ||
             circle.radius_m < config_.min_radius_m || circle.radius_m > config_.max_radius_m) {
           continue;
         }
@@ -255,6 +264,23 @@ class GroupSearch {
     return best;
   }
 
+  // One of the candidates, each as likely as any other.
+  const Eigen::Vector2f& pick(const CellIndex& index, std::uint32_t count) {
+    auto at = static_cast<std::uint32_t>(random_.below(count));
+    for (const auto& [begin, end] : candidates_) {
+      if (at < end - begin) return index.sorted()[begin + at];
+      at -= end - begin;
+    }
+    return index.sorted()[candidates_.front().first];
+  }
+
+  // (0.15 m + radius)^0.7, nearly: products of roots are cheaper than powers.
+  static double length_of(double radius_m) {
+    const double root = std::sqrt(0.15 + radius_m);
+    const double eighth = std::sqrt(std::sqrt(root));
+    return root * eighth * std::sqrt(eighth);
+  }
+
   // Points on the circle less those inside it, which a stem cannot have, about per
   // length of the circumference: a large circle through a thicket and a stem in it collects more
   // points than the stem, but hardly more per length. Gives up as soon as it cannot beat `best`.
@@ -262,19 +288,12 @@ class GroupSearch {
     const Eigen::Vector2f centre = circle.centre.cast<float>();
     const auto radius = static_cast<float>(circle.radius_m);
     const auto band = static_cast<float>(config_.band_m);
-    const double length = std::pow(0.15 + circle.radius_m, 0.7);
-    int inside = 0;
+    const double length = length_of(circle.radius_m);
+    auto inside = static_cast<int>(
+        index.ring(centre, std::max(0.0F, radius - 2.0F * band), radius + band, ring_));
     int possible = 0;
-    ring_.clear();
-    index.ring_cells(centre, std::max(0.0F, radius - 2.0F * band), radius + band,
-                     [&](std::uint32_t begin, std::uint32_t end, bool within) {
-                       if (within) {
-                         inside += static_cast<int>(end - begin);
-                       } else {
-                         possible += static_cast<int>(end - begin);
-                         ring_.emplace_back(begin, end);
-                       }
-                     });
+    for (const auto& [begin, end] : ring_)
+      possible += static_cast<int>(end - begin);
     if ((possible - 1.5 * inside) / length <= best) return 0.0;
     int on = 0;
     for (const auto& [begin, end] : ring_) {
@@ -303,8 +322,8 @@ class GroupSearch {
   const CircleSearchConfig& config_;
   PointList points_;
   Random random_;
-  std::vector<std::uint32_t> candidates_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> ring_;
+  std::vector<CellIndex::Range> candidates_;
+  std::vector<CellIndex::Range> ring_;
 };
 
 }  // namespace

@@ -265,7 +265,7 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
   const std::vector<SlicePoint> some = sample_of(points, stem);
   double scatter = std::max(0.015, scatter_of(some, stem, 0.05));
   System system;
-  for (int iteration = 0; iteration < 25; ++iteration) {
+  for (int iteration = 0; iteration < 12; ++iteration) {
     system = build_system(some, stem, start, scatter);
     if (system.used < 6) return result;
     const Vector6 step = -system.normal.ldlt().solve(system.gradient);
