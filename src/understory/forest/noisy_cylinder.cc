@@ -78,7 +78,7 @@ class Estimator {
       const Vector6 start = parameters();
       if (!step(result)) return result;
       const Vector6 first = parameters() - start;
-      if (first.norm() < 1e-5) break;
+      if (first.norm() < 4e-5) break;
       const Vector6 once = parameters();
       if (!step(result)) return result;
       extrapolate(start, first, parameters() - once);
@@ -157,7 +157,7 @@ class Estimator {
     const double distance = q.norm();
     // Only places near the point's own angle can have given it.
     const auto count = static_cast<int>(visible_.size());
-    const double width = 4.0 * scatter_ / std::sqrt(std::max(1e-8, r * distance));
+    const double width = 3.5 * scatter_ / std::sqrt(std::max(1e-8, r * distance));
     const int reach =
         width >= M_PI ? count / 2 : static_cast<int>(width / (2.0 * M_PI) * count) + 1;
     const int middle =
