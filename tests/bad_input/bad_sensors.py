@@ -180,7 +180,7 @@ def outage(folder):
                   pairs=len(scans) - 100)
 
 
-def error_of_part(outcome, folder, first, last):
+def error_of_part(outcome, folder, first, last, truth=truth):
     """Of a piece of the trajectory by itself, in metres."""
     part = folder / f"part_{first}.tum"
     part.write_text("".join(line + "\n" for line in outcome.poses
@@ -198,6 +198,20 @@ def outage_of_both(folder):
     assert outcome.code == 4 and outcome.run["counts"]["segments"] == 2, outcome.said
     assert "lost at 17000000" in outcome.said and "2 pieces" in outcome.said, outcome.said
     errors = [error_of_part(outcome, folder, 0, 8), error_of_part(outcome, folder, 18, 30)]
+    assert max(errors) < 0.1, errors
+    return f"exit 4, two pieces of {100 * errors[0]:.1f} and {100 * errors[1]:.1f} cm"
+
+
+@cases.case("sensors that are suddenly elsewhere")
+def elsewhere(folder):
+    """From one scan to the next in another stand, as when two recordings were joined."""
+    _, other, _ = good_recording(folder, seconds=12, seed=9)
+    _, outcome = mapped(folder, [m for m in short if m.time < start + 6e9] + [
+        m for m in other if m.time >= start + 6e9 and m.topic != "/tf_static"])
+    assert outcome.code == 4 and outcome.run["counts"]["segments"] == 2, outcome.said
+    assert "suddenly much less than before" in outcome.said and "lost at 17000000" in outcome.said
+    errors = [error_of_part(outcome, folder, 0, 6),
+              error_of_part(outcome, folder, 9, 12, folder / "first.truth")]
     assert max(errors) < 0.1, errors
     return f"exit 4, two pieces of {100 * errors[0]:.1f} and {100 * errors[1]:.1f} cm"
 

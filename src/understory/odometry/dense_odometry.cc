@@ -14,6 +14,9 @@ void describe(ConfigTable& table, DenseOdometryConfig& config) {
     describe(table, config.ndt);
     table.add("min_inlier_ratio", config.min_inlier_ratio, {0.0, 1.0}, "",
               "least share of a scan's points near the map for a match to count");
+    table.add("min_inlier_share", config.min_inlier_share, {0.0, 1.0}, "",
+              "a match that finds less of its points than this share of what matches before it "
+              "found does not count");
     table.add("coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "cells",
               "prediction error (1 sigma) above which the coarse map is asked first");
     table.add("prior_weight", config.prior_weight, {0.0, 1.0}, "",
@@ -87,8 +90,17 @@ void DenseOdometry::match(const LocalMapSnapshot& local_map, const NavState& pre
   const std::span<const NdtMapPtr> maps(local_map);
   estimate.match = register_ndt(coarse ? maps : maps.last(1), estimate.thinned,
                                 predicted.world_from_body, prior, config_.ndt);
-  estimate.matched =
-      estimate.match.usable() && estimate.match.inlier_ratio >= config_.min_inlier_ratio;
+  const double found = estimate.match.inlier_ratio;
+  estimate.matched = estimate.match.usable() && found >= config_.min_inlier_ratio;
+  if (!estimate.matched) return;
+  if (found < config_.min_inlier_share * usual_inliers_) {
+    estimate.matched = false;
+    estimate.match.reason = "suddenly much less than before";
+    return;
+  }
+  constexpr double kFollow = 0.1;
+  usual_inliers_ =
+      usual_inliers_ > 0.0 ? (1.0 - kFollow) * usual_inliers_ + kFollow * found : found;
 }
 
 void DenseOdometry::set_initial_motion(const Eigen::Vector3d& velocity_m_s,
@@ -102,11 +114,13 @@ void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
 
 void DenseOdometry::save(BinaryWriter& writer) const {
   writer.put(last_matched_);
+  writer.put(usual_inliers_);
   motion_->save(writer);
 }
 
 void DenseOdometry::load(BinaryReader& reader) {
   last_matched_ = reader.get<bool>();
+  usual_inliers_ = reader.get<double>();
   motion_->load(reader);
 }
 

@@ -31,6 +31,10 @@ struct DenseOdometryConfig {
   std::string machine_boxes_file;  // YAML, P4-8; empty: none
   // A match counts only with this share of the scan's points near the map.
   double min_inlier_ratio = 0.1;
+  // Nor does one that suddenly finds less than this share of what matches found before it: a jump
+  // of the position, or something before the lidar. (In good runs no scan finds less than 0.8 of
+  // it.)
+  double min_inlier_share = 0.5;
   // The coarse maps are asked first where the prediction may be off by more than this share of the
   // finest cell (one sigma), or the last scan found no match.
   double coarse_above_sigma = 0.25;
@@ -88,6 +92,7 @@ class DenseOdometry {
   std::vector<MachineBox> boxes_;
   VoxelFilter filter_;
   bool last_matched_ = false;
+  double usual_inliers_ = 0.0;  // running mean of the inlier ratio of matches; 0: none yet
 };
 
 }  // namespace understory
