@@ -31,20 +31,32 @@ Verdict verdict_of(RunStatus status) {
 
 // What a kind of warning means for the result, by the beginning of its key.
 std::string consequence_of(const std::string& key) {
-  constexpr std::array<std::pair<const char*, const char*>, 12> kMeanings = {
+  constexpr std::array<std::pair<const char*, const char*>, 22> kMeanings = {
       {{"recording.damaged", "That part of the recording is missing from the map."},
-       {"imu.gap", "In such gaps the path rests on the lidar alone; look there for bent stems."},
-       {"imu.stop", "From there on the path rests on the lidar alone; height may drift."},
-       {"imu", "Tilt and fast turns are less certain."},
-       {"lidar.gap", "The path over such a gap is predicted, not measured."},
-       {"lidar.point_times",
+       {"recording.truncated", "What was scanned later is missing from the map."},
+       {"recording.unfinished", "Nothing is known to be missing."},
+       {"recording.mended", "Nothing is missing."},
+       {"recording.no_point_times",
         "Motion within a scan could not be taken out: stems may look thick or doubled."},
+       {"recording.point_times",
+        "If the times of points were understood wrongly, stems look thick."},
+       {"recording.no_imu_extrinsics",
+        "The IMU was not used: tilt and fast turns are less certain."},
+       {"imu.silent", "In such gaps the path rests on the lidar alone; look there for bent stems."},
+       {"imu.stopped", "From there on the path rests on the lidar alone; height may drift."},
+       {"imu.none", "The map may be tilted as a whole; fast turns are less certain."},
+       {"imu.in_g", "Nothing is wrong with the result."},
+       {"imu.untrusted", "The recording was mapped without the IMU, or should have been."},
+       {"imu", "Tilt and fast turns are less certain."},
+       {"map.segment", "The pieces of the map lie beside each other by a guess only."},
+       {"points.no_return", "Nothing is wrong with the result."},
+       {"time.gap_lidar", "The path over such a gap is predicted, not measured."},
        {"time", "Stamps were mended; if they were wrong by more, the map is smeared."},
        {"gnss", "Positions of the satellites were not used there."},
        {"loop", "Places seen twice may not lie exactly on each other."},
        {"match", "Positions there are less certain; see where the path is marked as weak."},
        {"inventory", "Trees may be missing from the list."},
-       {"folder", "Times were assumed; speeds and deskewing depend on them."}}};
+       {"recording.assumed_rate", "Times were assumed; speeds and deskewing depend on them."}}};
   for (const auto& [beginning, meaning] : kMeanings) {
     if (key.rfind(beginning, 0) == 0) return meaning;
   }

@@ -74,6 +74,10 @@ RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, dou
       judgement.reasons.push_back(
           fmt::format("the recording is damaged ({} place(s), the first: {})", warning.count,
                       warning.first_message));
+    } else if (warning.key == "recording.damaged_packet" &&
+               warning.count > session.counts().scans) {  // more than one a scan
+      judgement.reasons.push_back(fmt::format("{} packets of the lidar are damaged, the first: {}",
+                                              warning.count, warning.first_message));
     } else if (warning.key == "recording.truncated") {
       cut = true;
       missing.push_back("the recording is cut off; what came after is missing: " +

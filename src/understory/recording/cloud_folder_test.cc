@@ -127,7 +127,7 @@ TEST(CloudFolder, MergesImuAndGnssByTime) {
   EXPECT_EQ(fix.covariance(1, 1), 4.0);
   EXPECT_EQ(std::get<ImuSample>(events[3]).angular_rate.x(), 1.0);
   EXPECT_EQ(recording->rig().body_frame, "imu");
-  EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U);
+  EXPECT_EQ(test::count_of(log, "recording.damaged_line"), 1U);
   EXPECT_EQ(test::count_of(log, "recording.no_imu_extrinsics"), 1U);
 }
 

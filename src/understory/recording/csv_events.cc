@@ -93,7 +93,7 @@ std::optional<TimeNs> CsvRows::time(std::size_t column) const {
 }
 
 void CsvRows::damaged(const std::string& what) {
-  log_.warn("recording.damaged",
+  log_.warn("recording.damaged_line",
             file_->name() + ": line " + std::to_string(lines_.number()) + ": " + what);
 }
 

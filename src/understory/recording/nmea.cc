@@ -228,8 +228,9 @@ std::optional<GnssFix> NmeaLogReader::next() {
     if (text.find('$') == std::string_view::npos) continue;
     const auto sentence = parse_nmea(text);
     if (!sentence) {
-      log_.warn("recording.damaged", source_ + ": line " + std::to_string(line_number_) +
-                                         ": not an NMEA sentence with a right checksum, left out");
+      log_.warn("recording.damaged_line",
+                source_ + ": line " + std::to_string(line_number_) +
+                    ": not an NMEA sentence with a right checksum, left out");
       continue;
     }
     if (const auto fix = add(*sentence)) return fix;

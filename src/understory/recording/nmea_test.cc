@@ -74,7 +74,7 @@ TEST(Nmea, LeavesOutWhatIsNoFix) {
       log);
   ASSERT_EQ(fixes.size(), 1U);  // the last one has no checksum, which is allowed
   EXPECT_EQ(fixes[0].stamp % (60 * kNsPerSecond), 6 * kNsPerSecond);
-  EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U);
+  EXPECT_EQ(test::count_of(log, "recording.damaged_line"), 1U);
 }
 
 TEST(Nmea, WithoutAnyDateThereIsNoTime) {

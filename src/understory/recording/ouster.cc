@@ -98,7 +98,7 @@ void OusterDecoder::make_beams() {
 }
 
 void OusterDecoder::damaged(const std::string& what) {
-  log_.warn("recording.damaged",
+  log_.warn("recording.damaged_packet",
             source_ + ": Ouster packet " + std::to_string(received_) + ": " + what);
 }
 

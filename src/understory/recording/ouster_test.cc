@@ -172,7 +172,7 @@ TEST(Ouster, GoesOnBehindAGapAndPassesOverDamage) {
   EXPECT_EQ(scans[0]->points.size(), 16U);
   EXPECT_EQ(scans[1]->points.size(), 16U);
   EXPECT_EQ(scans[1]->stamp, 11'000'000'000);
-  EXPECT_EQ(test::count_of(log, "recording.damaged"), 3U) << test::all_warnings(log);
+  EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 3U) << test::all_warnings(log);
 }
 
 TEST(Ouster, LeavesOutPixelsWithoutReturn) {

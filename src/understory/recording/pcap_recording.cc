@@ -47,7 +47,8 @@ class PcapRecording : public Recording {
       const auto datagram = udp_.add(frame.link_type, frame.bytes, frame.stamp);
       if (!datagram) continue;
       if (survey_.trust_checksums() && datagram->has_checksum && !datagram->checksum_ok) {
-        log_.warn("recording.damaged", place(frame) + ": a packet with a wrong checksum, left out");
+        log_.warn("recording.damaged_packet",
+                  place(frame) + ": a packet with a wrong checksum, left out");
         continue;
       }
       take(*datagram);

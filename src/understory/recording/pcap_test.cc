@@ -177,7 +177,7 @@ TEST(Pcap, LeavesOutPacketsWhoseChecksumIsWrong) {
   }
   Log log;
   EXPECT_EQ(read(file, log).points, (kPackets - 1) * 384U);
-  EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U) << test::all_warnings(log);
+  EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 1U) << test::all_warnings(log);
 }
 
 // A capture made on the sending machine: no checksum is filled in yet.

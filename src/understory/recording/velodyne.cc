@@ -69,7 +69,7 @@ VelodyneDecoder::VelodyneDecoder(const VelodyneConfig& config, std::string sourc
 }
 
 void VelodyneDecoder::damaged(const std::string& what) {
-  log_.warn("recording.damaged",
+  log_.warn("recording.damaged_packet",
             source_ + ": Velodyne packet " + std::to_string(received_) + ": " + what);
 }
 

@@ -207,7 +207,7 @@ TEST(Velodyne, PassesOverDamageAndGoesOn) {
   ASSERT_EQ(scans.size(), 1U);
   EXPECT_EQ(scans[0]->points.size(), 10U * 32 + 384);
   EXPECT_LT(to_seconds(scans[0]->end() - scans[0]->stamp), 0.01);
-  EXPECT_EQ(test::count_of(log, "recording.damaged"), 5U) << test::all_warnings(log);
+  EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 5U) << test::all_warnings(log);
 }
 
 }  // namespace
