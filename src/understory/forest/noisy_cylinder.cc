@@ -90,6 +90,7 @@ class Estimator {
     result.radius_m = radius_;
     result.taper = taper_;
     result.scatter_m = scatter_;
+    result.strays = strays_;
     Matrix6 unsqueeze = Matrix6::Identity();
     unsqueeze.topLeftCorner<2, 2>() = back;
     unsqueeze.block<2, 2>(2, 2) = back;

@@ -21,6 +21,7 @@ struct NoisyCylinder {
   double radius_m = 0.0;  // at breast height
   double taper = 0.0;
   double scatter_m = 0.0;       // of the points about the surface, in each direction
+  double strays = 0.0;          // share of the returns that belong to something else
   double log_likelihood = 0.0;  // mean over the returns; compares fits to the same points
   // Of centre, slope, radius, taper: what it would be if returns were independent and each place on
   // the surface known.

@@ -307,7 +307,9 @@ StemFitResult refine_stem(const std::vector<SlicePoint>& points, const StemFitRe
   if (fit.evidence.scatter_m > 0.12 * start.radius_m || fit.evidence.fill < 0.7 ||
       fit.evidence.even_arc_deg < 0.5 * start.arc_deg) {
     const NoisyCylinder thin = fit_noisy_cylinder(near, thin_start(near, start), {});
-    if (thin.converged && (!best.converged || thin.log_likelihood > best.log_likelihood))
+    // It must not win by leaving out the half of a stem that was seen in few points.
+    if (thin.converged && (!best.converged || (thin.log_likelihood > best.log_likelihood &&
+                                               thin.strays < best.strays + 0.05)))
       best = thin;
   }
   StemFitResult result = fit;
