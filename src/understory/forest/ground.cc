@@ -163,13 +163,24 @@ std::vector<LowCell> lowest_points(const PointBlocks& cloud, double cell_m, Rast
   return low;
 }
 
+void heights_over(const Raster& terrain, std::span<const Eigen::Vector3d> points,
+                  std::vector<double>& heights) {
+  heights.resize(points.size());
+  parallel_for(points.size(), 4096, [&](std::size_t i) {
+    heights[i] = points[i].z() - terrain.interpolate(points[i].x(), points[i].y());
+  });
+}
+
 // Pass 2: the mean of the points in a thin layer around the provisional terrain. The lowest point
 // of a cell lies below the ground by the noise of the ranges; the mean does not.
 double refine(const PointBlocks& cloud, const GroundConfig& config, Raster& terrain) {
   std::vector<MeanCell> cells(terrain.values.size());
+  std::vector<double> heights;
   cloud([&](std::span<const Eigen::Vector3d> points) {
-    for (const Eigen::Vector3d& point : points) {
-      const double height = point.z() - terrain.interpolate(point.x(), point.y());
+    heights_over(terrain, points, heights);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Vector3d& point = points[i];
+      const double height = heights[i];
       if (!(std::abs(height) <= config.class_m)) continue;
       const int column = terrain.column_of(point.x());
       const int row = terrain.row_of(point.y());
@@ -209,6 +220,11 @@ void describe(ConfigTable& table, GroundConfig& config) {
 
 double GroundModel::height_above(const Eigen::Vector3d& point) const {
   return point.z() - terrain.interpolate(point.x(), point.y());
+}
+
+void GroundModel::heights_above(std::span<const Eigen::Vector3d> points,
+                                std::vector<double>& heights) const {
+  heights_over(terrain, points, heights);
 }
 
 std::uint8_t GroundModel::las_class(double height_above_ground) const {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "understory/forest/point_blocks.h"
 #include "understory/forest/raster.h"
@@ -28,6 +30,8 @@ struct GroundModel {
 
   // Metres above the ground; NaN where the terrain is unknown.
   [[nodiscard]] double height_above(const Eigen::Vector3d& point) const;
+  // The same for many points, on all threads.
+  void heights_above(std::span<const Eigen::Vector3d> points, std::vector<double>& heights) const;
   // LAS classes: 2 ground, 3 / 4 / 5 low, medium, high vegetation (to 0.5 m, to 2 m, above),
   // 1 unclassified (no terrain there), 7 noise (more than a metre below the ground).
   [[nodiscard]] std::uint8_t las_class(double height_above_ground) const;

@@ -28,10 +28,13 @@ struct Gathered {
 
 void gather(const PointBlocks& cloud, const InventoryConfig& config, const InventoryResult& result,
             Gathered& gathered) {
+  std::vector<double> heights;
   cloud([&](std::span<const Eigen::Vector3d> points) {
-    for (const Eigen::Vector3d& point : points) {
+    result.ground.heights_above(points, heights);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Vector3d& point = points[i];
       ++gathered.points;
-      const double height = result.ground.height_above(point);
+      const double height = heights[i];
       if (std::isnan(height)) {
         ++gathered.without_ground;
         continue;

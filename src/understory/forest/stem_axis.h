@@ -37,6 +37,14 @@ class StemAxis {
     if (place.distance_m > 0.0) place.outward = out / place.distance_m;
     return place;
   }
+  // Whether a point may lie within `reach` of the centre line: false only if it does not.
+  [[nodiscard]] bool may_be_within(const SlicePoint& point, double reach) const {
+    // Across the axis a horizontal distance shrinks at most by the cosine of the lean.
+    const double run = (static_cast<double>(point.height_m) - kBreastHeight) / axis_.z();
+    const double x = static_cast<double>(point.x) - centre_.x() - run * axis_.x();
+    const double y = static_cast<double>(point.y) - centre_.y() - run * axis_.y();
+    return (x * x + y * y) * axis_.z() * axis_.z() <= reach * reach * (1.0 + 1e-9);
+  }
   // How far a point lies outside of the surface; negative inside.
   [[nodiscard]] double surface_error(const AxisPlace& place) const {
     return place.distance_m - (radius_m_ + taper_ * place.along_m);

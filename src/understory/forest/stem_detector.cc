@@ -244,7 +244,9 @@ std::vector<StemFit> detect_stems(const std::vector<SlicePoint>& points,
       std::vector<SlicePoint> near;
       const StemAxis axis(start);
       for (const std::uint32_t k : index.near(start.centre, reach)) {
-        if (explained[k] == 0 && axis.place(sorted[k]).distance_m < start.radius_m + 0.35) {
+        const double within = start.radius_m + 0.35;
+        if (explained[k] == 0 && axis.may_be_within(sorted[k], within) &&
+            axis.place(sorted[k]).distance_m < within) {
           near.push_back(sorted[k]);
         }
       }
