@@ -19,6 +19,7 @@ constexpr std::size_t kFewPoints = 100;
 constexpr double kMostSpeedMS = 100.0;
 constexpr double kSparseCell_m = 1.0;
 constexpr double kSparseKeyframe_m = 0.3;
+constexpr double kSparseVolumeWeight = 1.0;
 // Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
 // and the sigma of a prediction that is no better than staying where one was.
 constexpr double kOutageS = 1.0;
@@ -138,8 +139,8 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
   opening_.reset();
 }
 
-// A sparse scan is not thinned away, its keyframes lie closer, and the map's cells are as large as
-// the gaps between its rings ask for.
+// A sparse scan is not thinned away, its keyframes lie closer, the map's cells are as large as the
+// gaps between its rings ask for, and all of them count: there are not enough surfaces.
 void MappingSession::adapt_to(std::size_t scan_points) {
   sparse_ = scan_points < static_cast<std::size_t>(config_.sparse_scan_points) ? 1 : 0;
   if (sparse_ == 0) return;
@@ -149,6 +150,7 @@ void MappingSession::adapt_to(std::size_t scan_points) {
   local.cells.min_points = std::min(local.cells.min_points, 4);
   for (double& size : local.cell_sizes_m)
     size = std::max(size, kSparseCell_m);
+  local.cells.volume_weight = std::max(local.cells.volume_weight, kSparseVolumeWeight);
   double& distance = config_.keyframe_map.keyframe.distance_m;
   distance = std::min(distance, kSparseKeyframe_m);
   map_ = std::make_unique<KeyframeMap>(config_.keyframe_map, folder_, times_, log_);
