@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "understory/forest/inventory.h"
 #include "understory/output/geo_files.h"
@@ -26,6 +27,7 @@ constexpr double kSmearRangeM = 10.0;
 // What walking through the finished trajectory yields for report and run.json.
 struct TrajectoryFacts {
   std::vector<ReportScan> scans;
+  std::vector<float> cpu_ms;  // of each scan, all threads
   double length_m = 0.0;
   double duration_s = 0.0;
   double period_ms = 0.0;  // median time between scans
@@ -78,6 +80,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
                     Eigen::Vector3d::Map(record.gyro_bias.data()),
                     Eigen::Vector3d::Map(record.accel_bias.data()), record.pose_covariance()});
         facts.scans.push_back(report_scan(scan));
+        facts.cpu_ms.push_back(record.cpu_ms);
         const Pose step = last.inverse() * scan.world_from_body;
         if (facts.scans.size() > 1) {
           facts.length_m += step.translation().norm();
@@ -238,7 +241,20 @@ void fill_counts(RunSummary& summary, const MappingSession& session, const RunFa
   if (facts.realtime) count("scans_dropped", facts.dropped_scans);
 }
 
+// Whether the work on a scan grows with the length of the run.
+void fill_constancy(RunSummary& summary, const TrajectoryFacts& trajectory) {
+  const std::vector<float>& cpu_ms = trajectory.cpu_ms;
+  const auto tenth = static_cast<std::ptrdiff_t>(cpu_ms.size() / 10);
+  if (tenth == 0) return;
+  const auto count = static_cast<double>(tenth);
+  summary.quality["scan_cpu_ms_first_tenth"] =
+      std::accumulate(cpu_ms.begin(), cpu_ms.begin() + tenth, 0.0) / count;
+  summary.quality["scan_cpu_ms_last_tenth"] =
+      std::accumulate(cpu_ms.end() - tenth, cpu_ms.end(), 0.0) / count;
+}
+
 void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const RunFacts& facts) {
+  fill_constancy(summary, trajectory);
   summary.quality["length_m"] = trajectory.length_m;
   summary.quality["inlier_ratio_mean"] = trajectory.inlier_ratio_mean;
   summary.quality["match_distance_rms_m"] = trajectory.fitness_rms_m;
