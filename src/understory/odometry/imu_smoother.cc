@@ -162,6 +162,12 @@ void ImuSmoother::set_initial_motion(const Eigen::Vector3d& velocity_m_s,
   if (!use_imu()) angular_rate_ = angular_rate_rad_s;
 }
 
+ImuTrust ImuSmoother::imu_trust() const {
+  ImuTrust trust = monitor_.trust();
+  trust.on_probation = monitor_.on_probation();
+  return trust;
+}
+
 void ImuSmoother::suspect_imu(TimeNs now) {
   monitor_.suspect(now);
   note_standing(now, false, monitor_.trust().trusted);
@@ -324,7 +330,10 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
   add_state(stamp, interval, lidar);
   MotionUpdate update;
   update.status = MotionStatus::kAccepted;
-  update.reason = gate(predicted, before, lidar, update.velocity_jump_m_s);
+  // Constant velocity is no witness against a match: a walker's quick turn would be dropped.
+  const bool previous = config_.velocity_gate_reference == VelocityGateReference::kPreviousState;
+  if (!interval.samples.empty() || previous)
+    update.reason = gate(predicted, before, lidar, update.velocity_jump_m_s);
   if (update.reason.empty()) {
     dropped_in_a_row_ = 0;
     return update;

@@ -23,7 +23,7 @@ class ImuSmoother : public MotionModel {
   [[nodiscard]] std::vector<StampedPose> predict_path(TimeNs from, TimeNs to) const override;
   MotionUpdate add_scan(TimeNs stamp, const std::optional<LidarFactor>& factor) override;
   void move_world(const Pose& new_world_from_old_world) override;
-  [[nodiscard]] ImuTrust imu_trust() const override { return monitor_.trust(); }
+  [[nodiscard]] ImuTrust imu_trust() const override;
   void suspect_imu(TimeNs now) override;
   [[nodiscard]] Eigen::Quaterniond level_from_world() const override;
   void save(BinaryWriter& writer) const override;

@@ -57,9 +57,10 @@ enum class Initialisation { kNone, kStill, kInMotion, kNoImu };
 // Agreement between the IMU and the lidar, judged over the run.
 struct ImuTrust {
   bool trusted = true;
-  bool usable = true;   // false: sure to do harm; the model goes on without it
-  bool proven = false;  // agreed with the lidar over enough turning
-  std::string reason;   // one sentence for run.json if not trusted
+  bool usable = true;         // false: sure to do harm; the model goes on without it
+  bool on_probation = false;  // contradicted; left out until it is clear whether it is right
+  bool proven = false;        // agreed with the lidar over enough turning
+  std::string reason;         // one sentence for run.json if not trusted
 };
 
 // The first graph of P4 F2: a state for every scan, prediction in between. One per run, not

@@ -107,7 +107,9 @@ std::string two_decimals(double value) {
 
 void TrustMonitor::distrust(const std::string& reason, bool usable) {
   if (!trust_.trusted) return;
-  trust_ = {false, usable, trust_.proven, reason};
+  trust_.trusted = false;
+  trust_.usable = usable;
+  trust_.reason = reason;
 }
 
 void TrustMonitor::join_anew() {

@@ -43,10 +43,7 @@ class MappingRun {
       }
       handle_ready();
       if (!ended) checkpoint_if_due();
-      if (session_->imu_is_wrong() && player_ == nullptr) {
-        start_over_without_imu();
-        ended = false;
-      }
+      if (player_ == nullptr && start_over_for_imu()) ended = false;
     }
     if (stopped && session_->settled()) state_.save(request_, *session_, *orderer_, log_, events_);
     return finish(stopped);
@@ -74,18 +71,24 @@ class MappingRun {
     }
   }
 
-  // An IMU that contradicts the lidar bends what is positioned with it, the map included.
-  void start_over_without_imu() {
+  // An IMU that contradicts the lidar bends what is positioned with it, the map included, and by
+  // that the lidar's word against it. So the recording is begun anew: once to find out who is
+  // right, with scans alone, and if the IMU is wrong, without it. True if it was.
+  bool start_over_for_imu() {
+    const bool wrong = session_->imu_is_wrong();
+    if (!wrong && !session_->imu_is_suspected()) return false;
     const std::string reason = session_->odometry().motion().imu_trust().reason;
-    log_.forget_all_but("imu.untrusted");
-    log_.info("the recording is mapped again from its beginning, without the IMU");
+    log_.forget_all_but(wrong ? "imu.untrusted" : "imu.probation");
+    log_.info(wrong ? "the recording is mapped again from its beginning, without the IMU"
+                    : "the recording is begun anew to find out");
     session_.reset();  // lets go of its files
     session_.emplace(request_.config, state_.work(), log_);
-    session_->refuse_imu(reason);
+    wrong ? session_->refuse_imu(reason) : session_->doubt_imu();
     orderer_.emplace(request_.config.time_repair, log_);
     source_ = open_source(request_.recording, request_.open, log_);
     events_ = 0;
     state_.save(request_, *session_, *orderer_, log_, 0);
+    return true;
   }
 
   void handle_ready() {

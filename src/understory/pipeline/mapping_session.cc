@@ -49,6 +49,11 @@ void MappingSession::refuse_imu(const std::string& reason) {
   config_.odometry.imu_enabled = false;
 }
 
+bool MappingSession::imu_is_suspected() const {
+  return started() && !imu_doubted_ && odometry_->uses_imu() &&
+         odometry_->motion().imu_trust().on_probation;
+}
+
 bool MappingSession::imu_is_wrong() const {
   return started() && odometry_->uses_imu() && !odometry_->motion().imu_trust().usable;
 }
@@ -104,6 +109,8 @@ void MappingSession::start_anew() {
   last_good_inliers_ = 0.0;
   for (const ImuSample& waiting : recent_imu_)
     odometry_->add_imu(waiting);
+  const Scan& first = *std::get<ScanPtr>(opening_->events.front());
+  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(first.stamp);
 }
 
 void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
@@ -118,8 +125,9 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
                                              map_->keyframes().front().world_from_body) /
                             between;
     // Right differences are along the screw: to first order the velocity at the first scan.
-    const Eigen::Vector3d rate = odometry_->uses_imu() ? Eigen::Vector3d(opening_->angular_rate)
-                                                       : Eigen::Vector3d(turned.head<3>());
+    const Eigen::Vector3d rate = odometry_->uses_imu() && !imu_doubted_
+                                     ? Eigen::Vector3d(opening_->angular_rate)
+                                     : Eigen::Vector3d(turned.head<3>());
     const double smear = (turned.tail<3>() - opening_->velocity).norm() * lasting +
                          (rate - opening_->angular_rate).norm() * lasting * kSmearRangeM;
     if (smear > kLeastSmearM) {
@@ -140,19 +148,27 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
 }
 
 // A sparse scan is not thinned away, its keyframes lie closer, the map's cells are as large as the
-// gaps between its rings ask for, and all of them count: there are not enough surfaces.
+// gaps between its rings ask for, and all of them count: there are not enough surfaces. Without an
+// IMU predictions are often off by more than the finest cells bridge, and the coarsest are too
+// coarse to lead to them: a map in between helps.
 void MappingSession::adapt_to(std::size_t scan_points) {
   sparse_ = scan_points < static_cast<std::size_t>(config_.sparse_scan_points) ? 1 : 0;
-  if (sparse_ == 0) return;
-  VoxelFilterConfig& voxel = config_.odometry.voxel;
-  voxel.voxel_size_m = std::min(voxel.voxel_size_m, 0.1);
+  const bool alone = !config_.odometry.imu_enabled || !rig_.body_from_imu || imu_doubted_;
+  if (sparse_ == 0 && !alone) return;
   LocalMapConfig& local = config_.keyframe_map.local_map;
-  local.cells.min_points = std::min(local.cells.min_points, 4);
-  for (double& size : local.cell_sizes_m)
-    size = std::max(size, kSparseCell_m);
-  local.cells.volume_weight = std::max(local.cells.volume_weight, kSparseVolumeWeight);
-  double& distance = config_.keyframe_map.keyframe.distance_m;
-  distance = std::min(distance, kSparseKeyframe_m);
+  std::vector<double>& cells = local.cell_sizes_m;
+  if (sparse_ != 0) {
+    VoxelFilterConfig& voxel = config_.odometry.voxel;
+    voxel.voxel_size_m = std::min(voxel.voxel_size_m, 0.1);
+    local.cells.min_points = std::min(local.cells.min_points, 4);
+    for (double& size : cells)
+      size = std::max(size, kSparseCell_m);
+    local.cells.volume_weight = std::max(local.cells.volume_weight, kSparseVolumeWeight);
+    double& distance = config_.keyframe_map.keyframe.distance_m;
+    distance = std::min(distance, kSparseKeyframe_m);
+  } else if (cells.size() == 2) {
+    cells.insert(cells.begin() + 1, std::sqrt(cells[0] * cells[1]));
+  }
   map_ = std::make_unique<KeyframeMap>(config_.keyframe_map, folder_, times_, log_);
   if (at_once_) map_->take_outcomes_at_once();
 }
@@ -344,6 +360,7 @@ void MappingSession::flush() {
 void MappingSession::save(BinaryWriter& writer) const {
   UNDERSTORY_CHECK(settled() || !started());
   writer.put(imu_refused_);
+  writer.put(imu_doubted_);
   writer.put(static_cast<std::uint64_t>(fixes_.size()));
   for (const GnssFix& fix : fixes_)
     put_fix(writer, fix);
@@ -368,6 +385,7 @@ void MappingSession::save(BinaryWriter& writer) const {
 void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);
+  imu_doubted_ = reader.get<bool>();
   const auto fixes = reader.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < fixes; ++i)
     fixes_.push_back(get_fix(reader));
@@ -386,7 +404,8 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   journal_ = std::make_unique<Journal>(folder_ / "journal.bin", reader.get<std::uint64_t>());
   clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", reader.get<std::uint64_t>());
   opening_.reset();
-  if (sparse) adapt_to(0);
+  rig_ = rig;
+  adapt_to(sparse ? 0 : std::numeric_limits<std::size_t>::max());
   map_->load(reader);
   make_odometry(rig);
   odometry_->load(reader);

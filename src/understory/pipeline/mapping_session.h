@@ -44,6 +44,11 @@ class MappingSession {
   // Before the first event: this run does without the IMU, for this reason.
   void refuse_imu(const std::string& reason);
   [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
+  // Before the first event: the IMU is left out from the start until it is clear whether it is
+  // right.
+  void doubt_imu() { imu_doubted_ = true; }
+  // The IMU is contradicted, and this run did not doubt it from the start.
+  [[nodiscard]] bool imu_is_suspected() const;
   // The IMU has turned out to be wrong: what was positioned with it is better done again without.
   [[nodiscard]] bool imu_is_wrong() const;
 
@@ -121,6 +126,7 @@ class MappingSession {
   double last_good_inliers_ = 0.0;  // share of that scan's points near the map
   TimeNs last_scan_ = 0;            // stamp
   std::string imu_refused_;
+  bool imu_doubted_ = false;
   std::uint8_t sparse_ = 0;       // the first scan was
   std::uint64_t last_cloud_ = 0;  // keyframe whose cloud was kept last
   Pose last_good_;                // of the last scan that was matched
