@@ -202,6 +202,8 @@ DenseEstimate MappingSession::begin_segment(const Scan& scan, const Pose& about_
   for (const ImuSample& sample : recent_imu_)
     odometry_->add_imu(sample);
   if (odometry_->uses_imu() && !proven) odometry_->suspect_imu(scan.stamp);
+  // A better guess than standing still.
+  odometry_->set_initial_motion(last_good_velocity_, Eigen::Vector3d::Zero());
   map_->start_segment();
   if (counts_.segments++ == 1) counts_.first_lost = scan.stamp;
   counts_.lost_in_a_row = 0;
@@ -289,6 +291,7 @@ void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& recor
   counts_.lost_in_a_row = good ? 0 : counts_.lost_in_a_row + 1;
   if (good) {
     last_good_ = state.world_from_body;
+    last_good_velocity_ = state.world_from_body.rotation().conjugate() * state.velocity_in_world;
     if (estimate.matched) last_good_inliers_ = estimate.match.inlier_ratio;
   }
   const bool wanted = good && map_->wants(state.world_from_body);
@@ -370,6 +373,7 @@ void MappingSession::save(BinaryWriter& writer) const {
   writer.put(last_cloud_);
   put_pose(writer, last_good_);
   writer.put(last_good_inliers_);
+  writer.put_doubles(last_good_velocity_.data(), 3);
   writer.put(last_scan_);
   writer.put(started());
   writer.put(static_cast<std::uint64_t>(recent_imu_.size()));
@@ -395,6 +399,7 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   last_cloud_ = reader.get<std::uint64_t>();
   last_good_ = get_pose(reader);
   last_good_inliers_ = reader.get<double>();
+  reader.get_doubles(last_good_velocity_.data(), 3);
   last_scan_ = reader.get<TimeNs>();
   const bool was_started = reader.get<bool>();
   const auto waiting = reader.get<std::uint64_t>();

@@ -123,6 +123,7 @@ class MappingSession {
   std::vector<GnssFix> fixes_;
   MappingCounts counts_;
   TimeNs last_scan_end_ = 0;
+  Eigen::Vector3d last_good_velocity_ = Eigen::Vector3d::Zero();  // in its body frame
   double last_good_inliers_ = 0.0;  // share of that scan's points near the map
   TimeNs last_scan_ = 0;            // stamp
   std::string imu_refused_;
