@@ -187,7 +187,7 @@ std::uint64_t write_map(const std::filesystem::path& folder, MapTiles& tiles,
       picture.add(p.x, p.y, p.z, height);
     }
     done += static_cast<double>(points.size());
-    if (progress) progress({"writing map.laz", done / 1e6, 0.0, "million points", ""});
+    if (progress) progress({"writing map.laz", done / 1e3, 0.0, "thousand points", ""});
   });
   writer.commit();
   return writer.points();
