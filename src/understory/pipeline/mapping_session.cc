@@ -161,6 +161,7 @@ void MappingSession::adapt_to(std::size_t scan_points) {
     VoxelFilterConfig& voxel = config_.odometry.voxel;
     voxel.voxel_size_m = std::min(voxel.voxel_size_m, 0.1);
     local.cells.min_points = std::min(local.cells.min_points, 4);
+    local.cells.viewpoint_in_source = rig_.body_from_lidar.translation();
     for (double& size : cells)
       size = std::max(size, kSparseCell_m);
     local.cells.volume_weight = std::max(local.cells.volume_weight, kSparseVolumeWeight);

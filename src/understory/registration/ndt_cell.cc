@@ -12,6 +12,8 @@ namespace {
 constexpr double kLineRatio = 0.05;   // middle / largest below it: a line
 constexpr double kPlaneRatio = 0.15;  // smallest / middle below it: a surface
 constexpr double kPoleCosine = 0.7;   // lines steeper than 45 degrees are stems, not rings
+constexpr double kOneSide = 0.9;      // length of the mean of unit rays
+constexpr double kGrazing = 0.1;      // sine of the angle between a surface and the rays
 // In units of the squared floor of sigma.
 constexpr double kLineNoise = 1.0;
 constexpr double kPlaneNoise = 0.25;
@@ -35,6 +37,14 @@ bool is_plane(const Shape& shape, double floor) {
   return shape.variance[0] < kPlaneRatio * shape.variance[1] + kPlaneNoise * floor;
 }
 
+// Seen from one side only, and by rays that lie in it: a ring spreads whatever it meets, such as
+// grass, over the cone of its rays.
+bool is_edge_on(const CellMoments& moments, const Eigen::Vector3d& normal) {
+  const Eigen::Vector3d ray =
+      Eigen::Vector3d(moments.ray_x, moments.ray_y, moments.ray_z) / moments.n;
+  return ray.norm() > kOneSide && std::abs(normal.dot(ray)) < kGrazing;
+}
+
 void add_row(NdtCell& cell, const Eigen::Vector3d& direction, double information) {
   if (information <= 0.0) return;
   cell.row[static_cast<std::size_t>(cell.rows++)] =
@@ -48,8 +58,8 @@ void add_row_of_surroundings(NdtCell& cell, const Eigen::Matrix3d& covariance, d
     const CellMoments moments = around(reach);
     const Shape shape = shape_of(moments.covariance());
     if (is_line(shape, floor)) continue;
-    if (!is_plane(shape, floor)) return;
     const Eigen::Vector3d normal = shape.axes.col(0);
+    if (!is_plane(shape, floor) || is_edge_on(moments, normal)) return;
     const double own = normal.dot(covariance * normal);
     add_row(cell, normal, 1.0 / (std::max(own, shape.variance[0]) + floor));
     return;
@@ -63,6 +73,9 @@ void CellMoments::add(const CellMoments& other, const Eigen::Vector3d& offset) {
   const double b = offset.y();
   const double c = offset.z();
   n += other.n;
+  ray_x += other.ray_x;
+  ray_y += other.ray_y;
+  ray_z += other.ray_z;
   x += other.x + other.n * a;
   y += other.y + other.n * b;
   z += other.z + other.n * c;
@@ -100,6 +113,10 @@ NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
       return cell;
     }
   } else if (is_plane(shape, floor)) {
+    if (is_edge_on(moments, shape.axes.col(0))) {
+      add_row_of_surroundings(cell, covariance, floor, around);
+      return cell;
+    }
     add_row(cell, shape.axes.col(0), 1.0 / (shape.variance[0] + floor) - 1.0 / box);
     return cell;
   }

@@ -12,6 +12,7 @@ namespace understory::internal {
 struct CellMoments {
   double n = 0.0;
   double x = 0.0, y = 0.0, z = 0.0;
+  double ray_x = 0.0, ray_y = 0.0, ray_z = 0.0;  // directions from the lidar, of unit length
   double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
 
   void add(double px, double py, double pz) {
@@ -25,6 +26,11 @@ struct CellMoments {
     yy += py * py;
     yz += py * pz;
     zz += pz * pz;
+  }
+  void add_ray(double dx, double dy, double dz) {
+    ray_x += dx;
+    ray_y += dy;
+    ray_z += dz;
   }
   // Adds sums taken from a centre that lies at `offset` from this one's.
   void add(const CellMoments& other, const Eigen::Vector3d& offset);

@@ -37,6 +37,7 @@ struct NdtMapBuilder::State {
   struct Located {
     std::array<int, 3> at;
     float from_center[3];
+    Eigen::Vector3f ray;  // direction from the lidar, map axes
   };
 
   NdtMapConfig config;
@@ -134,9 +135,13 @@ void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_
   const Eigen::Vector3f t = (map_from_source.translation() / size - origin).cast<float>();
   const auto edge = static_cast<float>(size);
   s.located.resize(points_in_source.size());
+  const bool rays = s.config.viewpoint_in_source.has_value();
+  const Eigen::Vector3f viewpoint =
+      rays ? Eigen::Vector3f(s.config.viewpoint_in_source->cast<float>()) : Eigen::Vector3f::Zero();
   parallel_for(points_in_source.size(), 4096, [&](std::size_t i) {
     const Eigen::Vector3f p = r * points_in_source[i] + t;
     State::Located& to = s.located[i];
+    if (rays) to.ray = (r * (points_in_source[i] - viewpoint)).normalized();
     for (int k = 0; k < 3; ++k) {
       const int whole = voxel_floor(p[k]);
       to.at[static_cast<std::size_t>(k)] = base[static_cast<std::size_t>(k)] + whole;
@@ -146,6 +151,7 @@ void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_
   for (const State::Located& point : s.located) {
     const std::uint32_t cell = s.find_or_add(point.at);
     s.moments[cell].add(point.from_center[0], point.from_center[1], point.from_center[2]);
+    if (rays) s.moments[cell].add_ray(point.ray.x(), point.ray.y(), point.ray.z());
     s.dirty[cell] = 1;
   }
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,6 +20,9 @@ struct NdtMapConfig {
   double sigma_floor_m = 0.03;  // a surface is never taken to be thinner: sensor and pose noise
   double second_axis_weight = 0.25;  // of a cell's second thinnest direction, 0..1
   double volume_weight = 0.03;       // of cells that are neither surface nor line, 0..1
+  // Where the lidar is in the frames of the sources, if known: then what looks like a surface and
+  // was seen exactly edge-on is taken for what it is, the trace of one ring. For few rings.
+  std::optional<Eigen::Vector3d> viewpoint_in_source = std::nullopt;
 };
 void describe(ConfigTable& table, NdtMapConfig& config);
 
