@@ -190,5 +190,45 @@ TEST(NdtMap, ForgetsWhatIsFarAway) {
   EXPECT_TRUE(builder.snapshot()->empty());
 }
 
+// One ring, 3 degrees downwards, in grass 8 to 9 m away: its points lie on the cone of its rays.
+Points ring_in_grass() {
+  Random random(3);
+  Points points;
+  for (int i = 0; i < 300; ++i) {
+    const double azimuth = random.uniform(0.05, 0.11);
+    const double range = random.uniform(8.05, 8.95);
+    const double elevation = -3.0 / 57.3 + random.normal() * 1e-4;
+    points.push_back(range * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
+                                             std::cos(elevation) * std::sin(azimuth),
+                                             std::sin(elevation))
+                                 .cast<float>());
+  }
+  return points;
+}
+
+double steepest_row(const NdtMapConfig& config) {
+  const Points points = ring_in_grass();
+  const PlacedCloud cloud{&points, Pose()};
+  const NdtMapPtr map = build_ndt_map({&cloud, 1}, config);
+  double steepest = 0.0;
+  for (const NdtCell& cell : map->cells()) {
+    for (int k = 0; k < cell.rows; ++k) {
+      const Eigen::Vector3f& row = cell.row[static_cast<std::size_t>(k)];
+      steepest = std::max(steepest, static_cast<double>(std::abs(row.z())));
+    }
+  }
+  return steepest;
+}
+
+TEST(NdtMap, WhatWasSeenEdgeOnIsNoGround) {
+  NdtMapConfig config;
+  EXPECT_GT(steepest_row(config), 10.0) << "without knowing the lidar it passes for level ground";
+  config.viewpoint_in_source = Eigen::Vector3d::Zero();
+  EXPECT_LT(steepest_row(config), 0.1);
+  // The same points seen from above are ground.
+  config.viewpoint_in_source = Eigen::Vector3d(4.0, 0.0, 3.0);
+  EXPECT_GT(steepest_row(config), 10.0);
+}
+
 }  // namespace
 }  // namespace understory
