@@ -8,6 +8,7 @@ double Raster::interpolate(double x, double y) const {
   const double u = (x - x0) / cell_m - 0.5;
   const double v = (y - y0) / cell_m - 0.5;
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  if (columns == 0 || rows == 0) return kUnknown;
   if (!(u >= -1.5 && v >= -1.5 && u <= columns + 0.5 && v <= rows + 0.5)) return kUnknown;
   const double uc = std::clamp(u, 0.0, columns - 1.0);
   const double vc = std::clamp(v, 0.0, rows - 1.0);

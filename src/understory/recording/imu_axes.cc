@@ -56,8 +56,8 @@ void ImuAxisCheck::close_window() {
   window_ = {};
   window_.start = end;
   if (windows_.size() < 3) return;
-  const Window& a = windows_[0];
-  const Window& c = windows_[2];
+  const Window a = windows_[0];
+  const Window c = windows_[2];
   const Eigen::Vector3d turn = 0.5 * a.turn + windows_[1].turn + 0.5 * c.turn;
   const Eigen::Vector3d up_a = a.force.normalized();
   const Eigen::Vector3d up_c = c.force.normalized();
