@@ -29,9 +29,9 @@ struct InventoryOptions {
 
 // The cloud itself, or the map of a run.
 fs::path cloud_of(const std::string& given) {
-  const fs::path path(given);
+  fs::path path(given);
   if (!fs::is_directory(path)) return path;
-  const fs::path map = path / "map.laz";
+  fs::path map = path / "map.laz";
   if (!fs::exists(map)) {
     throw InputError(given, "", "expected a point cloud, or a run folder with a map.laz in it");
   }

@@ -15,8 +15,8 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::size_t kScoringPoints = 1200;  // enough to rank starts
 // Two answers nearer than this are the same place.
-constexpr double kSamePlace_m = 1.0;
-constexpr double kSamePlace_rad = 3.0 * kDegree;
+constexpr double kSamePlaceM = 1.0;
+constexpr double kSamePlaceRad = 3.0 * kDegree;
 
 // A side of the loop, turned so that z is up.
 struct Side {
@@ -130,8 +130,8 @@ struct Match {
 };
 
 bool same_place(const Pose& a, const Pose& b) {
-  return (a.translation() - b.translation()).norm() < kSamePlace_m &&
-         (a.inverse() * b).angle() < kSamePlace_rad;
+  return (a.translation() - b.translation()).norm() < kSamePlaceM &&
+         (a.inverse() * b).angle() < kSamePlaceRad;
 }
 
 double chance_overlap(const Structure& target, const Points& source, const Pose& pose,
@@ -199,7 +199,7 @@ void measure_asymmetry(const Side& target, const Side& source, const Pose& targe
   }
   const Pose circle = target_from_source * back.target_from_source;
   // At the middle of the source's points, where the lever of a small turn is not counted twice.
-  const Eigen::Vector3d middle = target_from_source.translation();
+  const Eigen::Vector3d& middle = target_from_source.translation();
   report.asymmetry_m = (circle * middle - middle).norm();
   report.asymmetry_deg = circle.angle() / kDegree;
 }

@@ -17,10 +17,10 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr TimeNs kHistory = 2 * kNsPerSecond;  // of the IMU, kept before the first scan
 // The world is levelled once its tilt is known this well, or after this long.
 constexpr double kLevelSigma = 0.1 * kDegree;
-constexpr double kLevelFirst_s = 1.0;
-constexpr double kLevelLast_s = 3.0;
+constexpr double kLevelFirstS = 1.0;
+constexpr double kLevelLastS = 3.0;
 constexpr double kLevelSmallest = 0.02 * kDegree;
-constexpr double kPathStep_s = 0.02;  // between poses where constant velocity stands in
+constexpr double kPathStepS = 0.02;  // between poses where constant velocity stands in
 
 }  // namespace
 
@@ -148,7 +148,7 @@ std::vector<StampedPose> ImuSmoother::predict_path(TimeNs from, TimeNs to) const
     path.push_back({at.state.stamp, at.state.world_from_imu * imu_from_body});
   }
   while (at.state.stamp < to) {
-    const TimeNs next = std::min(to, at.state.stamp + from_seconds(kPathStep_s));
+    const TimeNs next = std::min(to, at.state.stamp + from_seconds(kPathStepS));
     const double dt = to_seconds(next - at.state.stamp);
     at.state = predict_state(at.state, coast(dt, at.angular_rate), next, gravity());
     path.push_back({next, at.state.world_from_imu * imu_from_body});
@@ -417,7 +417,7 @@ void ImuSmoother::level(MotionUpdate& update) {
   if (levelled_ || !vertical_since_ || isam_ || !use_imu()) return;
   const double age = to_seconds(latest().stamp - *vertical_since_);
   const double sigma = std::sqrt(window_.tilt_covariance().diagonal().maxCoeff());
-  if (age < kLevelFirst_s || (age < kLevelLast_s && sigma > kLevelSigma)) return;
+  if (age < kLevelFirstS || (age < kLevelLastS && sigma > kLevelSigma)) return;
   levelled_ = true;
   const Eigen::Quaterniond rotation = level_from_world();
   if (Pose(rotation, Eigen::Vector3d::Zero()).angle() < kLevelSmallest) return;
@@ -428,7 +428,7 @@ void ImuSmoother::level(MotionUpdate& update) {
 
 void ImuSmoother::hand_over_to_isam() {
   if (config_.method != SmootherMethod::kIsam2 || isam_ || !vertical_since_) return;
-  if (to_seconds(latest().stamp - *vertical_since_) < kLevelLast_s) return;
+  if (to_seconds(latest().stamp - *vertical_since_) < kLevelLastS) return;
   isam_ =
       std::make_unique<Isam2Smoother>(Isam2Smoother::Config{config_.isam2_restart, config_.imu},
                                       window_.latest(), window_.covariance(), window_.gravity());

@@ -5,7 +5,7 @@
 namespace understory {
 namespace {
 
-constexpr double kShortestStill_s = 0.3;
+constexpr double kShortestStillS = 0.3;
 // Scatter beyond the noise that a tripod, a harness or an idling engine adds.
 constexpr double kVibrationRate = 0.02;   // rad/s
 constexpr double kVibrationForce = 0.25;  // m/s^2
@@ -55,7 +55,7 @@ Eigen::Quaterniond levelled(const Eigen::Vector3d& up_in_body) {
 bool is_still(const std::vector<InertialSample>& samples, const ImuNoiseConfig& config) {
   if (samples.size() < 10) return false;
   const double span = to_seconds(samples.back().stamp - samples.front().stamp);
-  if (span < kShortestStill_s) return false;
+  if (span < kShortestStillS) return false;
   const Statistics s = statistics(samples);
   const double root_rate = std::sqrt(3.0 * static_cast<double>(samples.size() - 1) / span);
   return s.rate_scatter < kVibrationRate + 2.0 * root_rate * config.gyro_noise_rad_s_sqrt_hz &&

@@ -17,8 +17,8 @@ constexpr double kSmallestTurn = 0.3 * kDegree;
 constexpr double kEnoughTurning = 30.0 * kDegree;
 constexpr int kEnoughTurns = 10;
 constexpr double kEnoughUnexplained = 120.0 * kDegree;  // before a verdict without a cause
-constexpr double kLongestProbation_s = 20.0;
-constexpr double kProbationTurn_s = 0.5;
+constexpr double kLongestProbationS = 20.0;
+constexpr double kProbationTurnS = 0.5;
 constexpr double kLargestBias = 0.06;  // rad/s
 // Share of the turning that is unexplained: below kGood all is well; above kBad something is wrong.
 constexpr double kBad = 0.4;
@@ -146,7 +146,7 @@ void TrustMonitor::suspect(TimeNs now) {
 
 void TrustMonitor::pass_time(TimeNs now) {
   now_ = now;
-  if (on_probation() && to_seconds(now - probation_since_) > kLongestProbation_s) {
+  if (on_probation() && to_seconds(now - probation_since_) > kLongestProbationS) {
     standing_ = Standing::kUnproven;
     begin_anew();
   }
@@ -160,7 +160,7 @@ void TrustMonitor::add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector
   joined_lidar_ = (joined_lidar_ * so3_exp(by_lidar)).normalized();
   joined_gyro_ = (joined_gyro_ * so3_exp(by_gyro)).normalized();
   joined_time_ += duration_s;
-  if (joined_time_ < kProbationTurn_s) return;
+  if (joined_time_ < kProbationTurnS) return;
   const Eigen::Vector3d lidar = so3_log(joined_lidar_);
   const Eigen::Vector3d gyro = so3_log(joined_gyro_);
   const double time = joined_time_;

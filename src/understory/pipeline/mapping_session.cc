@@ -17,8 +17,8 @@ constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
 constexpr std::size_t kFewPoints = 100;
 constexpr double kMostSpeedMS = 100.0;
-constexpr double kSparseCell_m = 1.0;
-constexpr double kSparseKeyframe_m = 0.3;
+constexpr double kSparseCellM = 1.0;
+constexpr double kSparseKeyframeM = 0.3;
 constexpr double kSparseVolumeWeight = 1.0;
 // Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
 // and the sigma of a prediction that is no better than staying where one was.
@@ -41,7 +41,8 @@ MappingSession::MappingSession(const MappingConfig& config, std::filesystem::pat
     : config_(config),
       folder_(std::move(folder)),
       log_(log),
-      map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)) {}
+      map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)),
+      opening_(std::make_unique<Opening>()) {}
 
 void MappingSession::refuse_imu(const std::string& reason) {
   UNDERSTORY_CHECK(!started());
@@ -163,10 +164,10 @@ void MappingSession::adapt_to(std::size_t scan_points) {
     local.cells.min_points = std::min(local.cells.min_points, 4);
     local.cells.viewpoint_in_source = rig_.body_from_lidar.translation();
     for (double& size : cells)
-      size = std::max(size, kSparseCell_m);
+      size = std::max(size, kSparseCellM);
     local.cells.volume_weight = std::max(local.cells.volume_weight, kSparseVolumeWeight);
     double& distance = config_.keyframe_map.keyframe.distance_m;
-    distance = std::min(distance, kSparseKeyframe_m);
+    distance = std::min(distance, kSparseKeyframeM);
   } else if (cells.size() == 2) {
     cells.insert(cells.begin() + 1, std::sqrt(cells[0] * cells[1]));
   }

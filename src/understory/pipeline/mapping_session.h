@@ -63,7 +63,7 @@ class MappingSession {
 
   [[nodiscard]] bool started() const { return odometry_ != nullptr; }
   // False during the first scans, which may be done again; no state can be saved then.
-  [[nodiscard]] bool settled() const { return !opening_.has_value(); }
+  [[nodiscard]] bool settled() const { return opening_ == nullptr; }
   [[nodiscard]] const Rig& rig() const { return rig_; }
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }
   [[nodiscard]] const KeyframeMap& map() const { return *map_; }
@@ -132,7 +132,7 @@ class MappingSession {
   std::uint64_t last_cloud_ = 0;  // keyframe whose cloud was kept last
   Pose last_good_;                // of the last scan that was matched
   bool at_once_ = false;
-  std::optional<Opening> opening_{std::in_place};
+  std::unique_ptr<Opening> opening_;  // until the first scans are settled
 };
 
 }  // namespace understory

@@ -34,7 +34,7 @@ class MessageMerger {
   }
   // Drops blocks that are used up, the last message's block with them.
   void tidy() {
-    std::erase_if(blocks_, [&](const Reading& reading) {
+    std::erase_if(blocks_, [&](Reading& reading) {
       const bool done = reading.next >= reading.block.entries.size();
       if (done) {
         bytes_ -= reading.block.bytes.size();

@@ -233,7 +233,7 @@ std::optional<GnssFix> NmeaLogReader::next() {
                     ": not an NMEA sentence with a right checksum, left out");
       continue;
     }
-    if (const auto fix = add(*sentence)) return fix;
+    if (auto fix = add(*sentence)) return fix;
   }
   return close_epoch();
 }

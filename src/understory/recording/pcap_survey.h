@@ -13,7 +13,7 @@ namespace understory {
 struct UdpStream {
   std::uint32_t source = 0;
   std::uint16_t port = 0;
-  auto operator<=>(const UdpStream&) const = default;
+  auto operator<=>(const UdpStream&) const = default;  // NOLINT(modernize-use-nullptr)
   [[nodiscard]] std::string name() const { return "udp " + std::to_string(port); }
 };
 
