@@ -131,7 +131,7 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
   for (std::size_t i = std::max(known, segment_start_); i < keyframes_.size(); ++i) {
     insert(i);
   }
-  snapshot_ = local_map_.snapshot();
+  take_snapshot();
   return moved;
 }
 
@@ -157,6 +157,12 @@ void KeyframeMap::update_local_map(std::size_t keyframe) {
     return;
   }
   insert(keyframe);
+  take_snapshot();
+}
+
+// The old one goes first, so that the new one is written in its place.
+void KeyframeMap::take_snapshot() {
+  snapshot_.clear();
   snapshot_ = local_map_.snapshot();
 }
 
@@ -190,7 +196,8 @@ void KeyframeMap::insert_all() {
     local_map_.insert({points.get(), keyframes_[insertion.keyframe].world_from_body},
                       insertion.forget != 0);
   }
-  snapshot_ = inserted_.empty() ? std::vector<NdtMapPtr>{} : local_map_.snapshot();
+  snapshot_.clear();
+  if (!inserted_.empty()) take_snapshot();
 }
 
 void KeyframeMap::start_segment() {

@@ -75,6 +75,8 @@ class KeyframeMap {
   [[nodiscard]] const std::vector<LoopAttempt>& loops() const { return loops_.attempts(); }
   // Which of the verified loops the graph believes in; of the size of loops().
   [[nodiscard]] const std::vector<char>& loops_used() const { return loops_used_; }
+  // CPU time of the searches for loops, which run beside the scan loop.
+  [[nodiscard]] double search_cpu_seconds() const { return loops_.search_cpu_seconds(); }
   // --realtime: outcomes are taken over as soon as they are there.
   void take_outcomes_at_once() { at_once_ = true; }
   // Makes what has been added so far safe on disk.
@@ -85,6 +87,7 @@ class KeyframeMap {
  private:
   void update_local_map(std::size_t keyframe);
   void insert(std::size_t keyframe);
+  void take_snapshot();
   void rebuild_local_map();
   [[nodiscard]] Matrix6d edge_covariance(const Pose& previous_from_this) const;
   [[nodiscard]] std::optional<Pose> take_over(LoopOutcome outcome);

@@ -51,7 +51,6 @@ struct LoopOutcome {
   std::vector<Pose> world_from_keyframe;  // of all those, if a loop was verified; else empty
   std::optional<LocalMap> local_map;      // made of them around the last one, if it accumulates
   std::vector<LocalMapInsertion> inserted;
-  double cpu_ms = 0.0;
 };
 
 // Looks for loops beside the scan loop: one search at a time in the background, begun at most every
@@ -73,6 +72,8 @@ class LoopCloser {
   [[nodiscard]] std::optional<LoopOutcome> take(std::size_t keyframes, bool wait, bool at_once);
 
   [[nodiscard]] const std::vector<LoopAttempt>& attempts() const { return attempts_; }
+  // CPU time of all searches so far, that which is running included.
+  [[nodiscard]] double search_cpu_seconds() const { return work_.cpu_seconds(); }
   // The graph optimised with all verified loops; without any, no poses.
   [[nodiscard]] PoseGraphResult optimise(const std::vector<Keyframe>& keyframes) const;
 
@@ -93,6 +94,7 @@ class LoopCloser {
   LoopCloserConfig config_;
   LocalMapConfig local_map_config_;
   std::vector<LoopAttempt> attempts_;
+  SideWork work_;
   TimeNs last_search_ = kNoSearchYet;
   std::optional<Running> running_;
 };

@@ -36,8 +36,8 @@ struct ScanRecord {
   float fitness_m2 = 0.0F;
   float inlier_ratio = 0.0F;
   float wall_ms = 0.0F;
-  float cpu_ms = 0.0F;
-  std::uint32_t points = 0;          // of the scan as read
+  float cpu_ms = 0.0F;       // of all threads, without what looks for loops beside the scan loop
+  std::uint32_t points = 0;  // of the scan as read
   std::uint32_t matched_points = 0;  // after the voxel filter
 
   [[nodiscard]] Pose keyframe_from_body() const;

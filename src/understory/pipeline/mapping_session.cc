@@ -221,7 +221,7 @@ DenseEstimate MappingSession::begin_segment(const Scan& scan, const Pose& about_
 
 void MappingSession::on_scan(const Scan& scan) {
   const ScopedTimer timer(times_, "scan");
-  const double cpu_start = process_cpu_seconds();
+  const double cpu_start = process_cpu_seconds() - map_->search_cpu_seconds();
   const bool outage = to_seconds(scan.stamp - last_scan_) > kOutageS;
   const NavState predicted = outage ? odometry_->motion().predict(scan.stamp) : NavState();
   DenseEstimate estimate = odometry_->process(scan, map_->local_map());
@@ -243,7 +243,8 @@ void MappingSession::on_scan(const Scan& scan) {
   note_outcome(estimate, record);
   update_map(estimate, record);
   record.wall_ms = static_cast<float>(timer.wall_ms());
-  record.cpu_ms = static_cast<float>(1e3 * (process_cpu_seconds() - cpu_start));
+  record.cpu_ms =
+      static_cast<float>(1e3 * (process_cpu_seconds() - map_->search_cpu_seconds() - cpu_start));
   journal_->append(record);
   last_scan_end_ = scan.end();
   if (opening_) consider_opening(scan, estimate);

@@ -27,7 +27,8 @@ constexpr double kSmearRangeM = 10.0;
 // What walking through the finished trajectory yields for report and run.json.
 struct TrajectoryFacts {
   std::vector<ReportScan> scans;
-  std::vector<float> cpu_ms;  // of each scan, all threads
+  std::vector<float> cpu_ms;  // of each scan, see ScanRecord
+  std::vector<float> wall_ms;
   double length_m = 0.0;
   double duration_s = 0.0;
   double period_ms = 0.0;  // median time between scans
@@ -81,6 +82,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
                     Eigen::Vector3d::Map(record.accel_bias.data()), record.pose_covariance()});
         facts.scans.push_back(report_scan(scan));
         facts.cpu_ms.push_back(record.cpu_ms);
+        facts.wall_ms.push_back(record.wall_ms);
         const Pose step = last.inverse() * scan.world_from_body;
         if (facts.scans.size() > 1) {
           facts.length_m += step.translation().norm();
@@ -243,14 +245,17 @@ void fill_counts(RunSummary& summary, const MappingSession& session, const RunFa
 
 // Whether the work on a scan grows with the length of the run.
 void fill_constancy(RunSummary& summary, const TrajectoryFacts& trajectory) {
-  const std::vector<float>& cpu_ms = trajectory.cpu_ms;
-  const auto tenth = static_cast<std::ptrdiff_t>(cpu_ms.size() / 10);
+  const auto tenth = static_cast<std::ptrdiff_t>(trajectory.cpu_ms.size() / 10);
   if (tenth == 0) return;
-  const auto count = static_cast<double>(tenth);
-  summary.quality["scan_cpu_ms_first_tenth"] =
-      std::accumulate(cpu_ms.begin(), cpu_ms.begin() + tenth, 0.0) / count;
-  summary.quality["scan_cpu_ms_last_tenth"] =
-      std::accumulate(cpu_ms.end() - tenth, cpu_ms.end(), 0.0) / count;
+  const auto fill = [&](const std::string& name, const std::vector<float>& ms) {
+    const auto count = static_cast<double>(tenth);
+    summary.quality[name + "_first_tenth"] =
+        std::accumulate(ms.begin(), ms.begin() + tenth, 0.0) / count;
+    summary.quality[name + "_last_tenth"] =
+        std::accumulate(ms.end() - tenth, ms.end(), 0.0) / count;
+  };
+  fill("scan_cpu_ms", trajectory.cpu_ms);
+  fill("scan_wall_ms", trajectory.wall_ms);
 }
 
 void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const RunFacts& facts) {
@@ -283,6 +288,7 @@ RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
   summary.reasons = judgement.reasons;
   fill_counts(summary, session, facts);
   fill_quality(summary, trajectory, facts);
+  summary.quality["loop_search_cpu_s"] = session.map().search_cpu_seconds();
   return summary;
 }
 

@@ -1,6 +1,7 @@
 #include "understory/registration/ndt_map.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "understory/registration/ndt_cell.h"
 #include "understory/util/error.h"
@@ -29,6 +30,32 @@ Eigen::Vector3d NdtMap::mean(std::size_t index) const {
          cells_[index].mean.cast<double>();
 }
 
+void NdtMap::place(std::uint32_t index) {
+  const std::array<int, 3>& at = coordinates_[index];
+  const std::uint64_t key = voxel_key(at[0], at[1], at[2]);
+  std::uint64_t i = voxel_hash(key) & mask_;
+  while (slots_[i].cell_plus_1 != 0)
+    i = (i + 1) & mask_;
+  slots_[i] = {key, index + 1};
+}
+
+void NdtMap::rehash(std::size_t slots) {
+  slots_.assign(slots, Slot{});
+  mask_ = slots - 1;
+  for (std::uint32_t c = 0; c < cells_.size(); ++c)
+    place(c);
+}
+
+void NdtMap::add(const std::array<int, 3>& at, const NdtCell& cell) {
+  cells_.push_back(cell);
+  coordinates_.push_back(at);
+  if (2 * cells_.size() > slots_.size()) {
+    rehash(std::max<std::size_t>(16, 2 * slots_.size()));
+  } else {
+    place(static_cast<std::uint32_t>(cells_.size() - 1));
+  }
+}
+
 struct NdtMapBuilder::State {
   struct Slot {
     std::uint64_t key = 0;
@@ -44,8 +71,9 @@ struct NdtMapBuilder::State {
   std::vector<CellMoments> moments;
   std::vector<std::array<int, 3>> coordinates;
   std::vector<std::uint8_t> dirty;
-  std::vector<std::uint8_t> leans;  // its distribution rests on its neighbours too
-  std::vector<NdtCell> cells;       // as of the last snapshot
+  std::vector<std::uint8_t> leans;    // its distribution rests on its neighbours too
+  std::vector<std::uint32_t> in_map;  // index in `map`, plus one; 0: too few points so far
+  std::shared_ptr<NdtMap> map;        // as of the last snapshot
   std::vector<Slot> slots;
   std::uint64_t mask = 0;
   std::vector<Located> located;  // workspace
@@ -86,8 +114,26 @@ struct NdtMapBuilder::State {
     coordinates.push_back(at);
     dirty.push_back(1);
     leans.push_back(0);
+    in_map.push_back(0);
     if (moments.size() * 2 > slots.size()) rehash(slots.size() * 2);
     return cell;
+  }
+
+  // The map, to be written on: a new one if somebody else holds the last.
+  NdtMap& own_map() {
+    if (map.use_count() > 1) {
+      map = std::make_shared<NdtMap>(*map);
+    } else {
+      // What its other holders read is over.
+      std::atomic_thread_fence(std::memory_order_acquire);
+    }
+    return *map;
+  }
+
+  void start_map() {
+    map = std::make_shared<NdtMap>();
+    map->cell_size_ = config.cell_size_m;
+    map->rehash(16);
   }
 
   [[nodiscard]] CellMoments around(std::size_t cell, int reach) const {
@@ -120,8 +166,9 @@ void NdtMapBuilder::clear() {
   state_->coordinates.clear();
   state_->dirty.clear();
   state_->leans.clear();
-  state_->cells.clear();
+  state_->in_map.clear();
   state_->rehash(std::size_t{1} << 12);
+  state_->start_map();
 }
 
 void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_source) {
@@ -159,26 +206,37 @@ void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_
 void NdtMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m) {
   State& s = *state_;
   const double size = s.config.cell_size_m;
+  const std::shared_ptr<const NdtMap> before = s.map;
   std::size_t kept = 0;
-  s.cells.resize(s.moments.size());
-  for (std::size_t c = 0; c < s.moments.size(); ++c) {
+  const std::size_t all = s.moments.size();
+  const auto is_near = [&](std::size_t c) {
     const std::array<int, 3>& at = s.coordinates[c];
     const Eigen::Vector3d middle =
         size * (Eigen::Vector3d(at[0], at[1], at[2]) + Eigen::Vector3d::Constant(0.5));
-    if ((middle - center).squaredNorm() > radius_m * radius_m) continue;
-    s.moments[kept] = s.moments[c];
-    s.coordinates[kept] = s.coordinates[c];
-    s.dirty[kept] = s.dirty[c];
-    s.leans[kept] = s.leans[c];
-    s.cells[kept] = s.cells[c];
+    return (middle - center).squaredNorm() <= radius_m * radius_m;
+  };
+  while (kept < all && is_near(kept))
     ++kept;
+  if (kept == all) return;
+  kept = 0;
+  s.start_map();
+  for (std::size_t c = 0; c < all; ++c) {
+    if (!is_near(c)) continue;
+    const std::size_t to = kept++;
+    s.moments[to] = s.moments[c];
+    s.coordinates[to] = s.coordinates[c];
+    s.dirty[to] = s.dirty[c];
+    s.leans[to] = s.leans[c];
+    s.in_map[to] = 0;
+    if (s.in_map[c] == 0) continue;
+    s.map->add(s.coordinates[to], before->cells()[s.in_map[c] - 1]);
+    s.in_map[to] = static_cast<std::uint32_t>(s.map->size());
   }
-  if (kept == s.moments.size()) return;
   s.moments.resize(kept);
   s.coordinates.resize(kept);
   s.dirty.resize(kept);
   s.leans.resize(kept);
-  s.cells.resize(kept);
+  s.in_map.resize(kept);
   std::size_t table = std::size_t{1} << 12;
   while (table < 2 * kept)
     table *= 2;
@@ -187,39 +245,26 @@ void NdtMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m
 
 NdtMapPtr NdtMapBuilder::snapshot() {
   State& s = *state_;
-  s.cells.resize(s.moments.size());
-  parallel_for(s.moments.size(), 512, [&](std::size_t c) {
-    if (s.moments[c].n < s.config.min_points) return;
-    if (s.dirty[c] == 0 && s.leans[c] == 0) return;
+  NdtMap& map = s.own_map();
+  std::vector<std::uint32_t> changed;
+  for (std::uint32_t c = 0; c < s.moments.size(); ++c) {
+    if ((s.dirty[c] | s.leans[c]) == 0) continue;
+    s.dirty[c] = 0;
+    if (s.moments[c].n < s.config.min_points) continue;
+    changed.push_back(c);
+    if (s.in_map[c] != 0) continue;
+    map.add(s.coordinates[c], {});
+    s.in_map[c] = static_cast<std::uint32_t>(map.size());
+  }
+  parallel_for(changed.size(), 256, [&](std::size_t i) {
+    const std::uint32_t c = changed[i];
     s.leans[c] = 0;
-    s.cells[c] = internal::make_cell(s.moments[c], s.config, [&](int reach) {
+    map.cells_[s.in_map[c] - 1] = internal::make_cell(s.moments[c], s.config, [&](int reach) {
       s.leans[c] = 1;
       return s.around(c, reach);
     });
   });
-  std::fill(s.dirty.begin(), s.dirty.end(), std::uint8_t{0});
-
-  auto map = std::make_shared<NdtMap>();
-  map->cell_size_ = s.config.cell_size_m;
-  for (std::size_t c = 0; c < s.moments.size(); ++c) {
-    if (s.moments[c].n < s.config.min_points) continue;
-    map->cells_.push_back(s.cells[c]);
-    map->coordinates_.push_back(s.coordinates[c]);
-  }
-  std::size_t table = 16;
-  while (table < 2 * map->cells_.size())
-    table *= 2;
-  map->slots_.assign(table, NdtMap::Slot{});
-  map->mask_ = table - 1;
-  for (std::uint32_t c = 0; c < map->cells_.size(); ++c) {
-    const std::array<int, 3>& at = map->coordinates_[c];
-    const std::uint64_t key = voxel_key(at[0], at[1], at[2]);
-    std::uint64_t i = voxel_hash(key) & map->mask_;
-    while (map->slots_[i].cell_plus_1 != 0)
-      i = (i + 1) & map->mask_;
-    map->slots_[i] = {key, c + 1};
-  }
-  return map;
+  return s.map;
 }
 
 NdtMapPtr build_ndt_map(std::span<const PlacedCloud> clouds, const NdtMapConfig& config) {

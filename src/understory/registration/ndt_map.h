@@ -38,8 +38,8 @@ struct NdtCell {
   std::array<Eigen::Vector3f, 3> row;  // 1/m, most certain first
 };
 
-// Target of NDT: a grid of normal distributions. Immutable and shared between threads; made by
-// NdtMapBuilder. Cells are addressed by integers: floor(coordinate / cell_size).
+// Target of NDT: a grid of normal distributions. Immutable for all who hold it, and shared between
+// threads; made by NdtMapBuilder. Cells are addressed by integers: floor(coordinate / cell_size).
 class NdtMap {
  public:
   [[nodiscard]] double cell_size() const { return cell_size_; }
@@ -59,7 +59,7 @@ class NdtMap {
   void prefetch(int x, int y, int z) const {
     __builtin_prefetch(slots_.data() + (voxel_hash(voxel_key(x, y, z)) & mask_));
   }
-  // All cells with enough points, and their coordinates, in the order of first insertion.
+  // All cells with enough points, and their coordinates, in no order that means anything.
   [[nodiscard]] const std::vector<NdtCell>& cells() const { return cells_; }
   [[nodiscard]] const std::vector<std::array<int, 3>>& coordinates() const { return coordinates_; }
   // Mean of a cell in the map frame.
@@ -76,6 +76,10 @@ class NdtMap {
   std::vector<std::array<int, 3>> coordinates_;
   std::vector<Slot> slots_;
   std::uint64_t mask_ = 0;
+
+  void add(const std::array<int, 3>& at, const NdtCell& cell);
+  void rehash(std::size_t slots);
+  void place(std::uint32_t index);
 };
 using NdtMapPtr = std::shared_ptr<const NdtMap>;
 
@@ -95,7 +99,8 @@ class NdtMapBuilder {
   void remove_beyond(const Eigen::Vector3d& center, double radius_m);
   void clear();
   // The map as it is now. Only what changed since the last snapshot is worked out again; the
-  // outcome is the same as if all were.
+  // outcome is the same as if all were. If nobody holds the last snapshot any more, its memory is
+  // written on, and the work does not grow with the map; else it is copied first.
   [[nodiscard]] NdtMapPtr snapshot();
 
  private:

@@ -165,11 +165,35 @@ TEST(NdtMap, GrowingIsTheSameAsBuildingAtOnce) {
   with_threads(2, [&] { at_once = build_ndt_map(placed, {}); });
   ASSERT_EQ(last->size(), at_once->size());
   for (std::size_t i = 0; i < last->size(); ++i) {
-    EXPECT_EQ(last->coordinates()[i], at_once->coordinates()[i]);
-    EXPECT_EQ(last->cells()[i].mean, at_once->cells()[i].mean);
-    EXPECT_EQ(last->cells()[i].rows, at_once->cells()[i].rows);
-    EXPECT_EQ(last->cells()[i].row[0], at_once->cells()[i].row[0]);
+    const std::array<int, 3>& at = last->coordinates()[i];
+    const NdtCell* expected = at_once->find(at[0], at[1], at[2]);
+    ASSERT_NE(expected, nullptr);
+    EXPECT_EQ(last->cells()[i].mean, expected->mean);
+    EXPECT_EQ(last->cells()[i].rows, expected->rows);
+    EXPECT_EQ(last->cells()[i].row[0], expected->row[0]);
   }
+}
+
+TEST(NdtMap, ASnapshotThatSomebodyHoldsDoesNotChange) {
+  NdtMapBuilder builder({});
+  builder.insert(random_points(2'000, 5), Pose());
+  const NdtMapPtr held = builder.snapshot();
+  const std::vector<NdtCell> before = held->cells();
+  builder.insert(random_points(2'000, 6), Pose());
+  NdtMapPtr next = builder.snapshot();
+  EXPECT_NE(next, held);
+  ASSERT_EQ(held->size(), before.size());
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_EQ(held->cells()[i].mean, before[i].mean);
+    if (next->cells()[i].mean != before[i].mean) ++changed;
+  }
+  EXPECT_GT(changed, before.size() / 2);
+
+  const NdtMap* place = next.get();
+  next.reset();
+  builder.insert(random_points(100, 7), Pose());
+  EXPECT_EQ(builder.snapshot().get(), place);  // nobody held it: no copy
 }
 
 TEST(NdtMap, ForgetsWhatIsFarAway) {

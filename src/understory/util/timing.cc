@@ -1,11 +1,14 @@
 #include "understory/util/timing.h"
 
+#include <pthread.h>
 #include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <numeric>
+
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -20,9 +23,6 @@ double seconds_of(clockid_t clock) {
 
 }  // namespace
 
-double thread_cpu_seconds() {
-  return seconds_of(CLOCK_THREAD_CPUTIME_ID);
-}
 double process_cpu_seconds() {
   return seconds_of(CLOCK_PROCESS_CPUTIME_ID);
 }
@@ -96,6 +96,27 @@ ScopedTimer::~ScopedTimer() {
 double ScopedTimer::wall_ms() const {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_)
       .count();
+}
+
+SideWork::Scope::Scope(SideWork& work) : work_(work) {
+  clockid_t clock{};
+  const int failure = pthread_getcpuclockid(pthread_self(), &clock);
+  UNDERSTORY_CHECK(failure == 0);
+  const std::lock_guard lock(work_.mutex_);
+  UNDERSTORY_CHECK(!work_.running_);
+  work_.running_ = clock;
+  work_.began_s_ = seconds_of(clock);
+}
+
+SideWork::Scope::~Scope() {
+  const std::lock_guard lock(work_.mutex_);
+  work_.finished_s_ += seconds_of(*work_.running_) - work_.began_s_;
+  work_.running_.reset();
+}
+
+double SideWork::cpu_seconds() const {
+  const std::lock_guard lock(mutex_);
+  return running_ ? finished_s_ + seconds_of(*running_) - began_s_ : finished_s_;
 }
 
 }  // namespace understory

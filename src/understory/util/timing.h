@@ -3,15 +3,16 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <ctime>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace understory {
 
-// CPU time of the calling thread and of the whole process so far, in seconds.
-[[nodiscard]] double thread_cpu_seconds();
+// CPU time of the whole process so far, in seconds.
 [[nodiscard]] double process_cpu_seconds();
 // Largest resident memory of the process so far, in megabytes (1e6 bytes).
 [[nodiscard]] double peak_memory_mb();
@@ -49,6 +50,31 @@ class StageTimes {
   };
   mutable std::mutex mutex_;
   std::map<std::string, Series> series_;
+};
+
+// CPU time of work that runs beside the scan loop on a thread of its own, counted while it runs:
+// what the process used less this is what the loop used. One thread at a time may work; any may
+// read.
+class SideWork {
+ public:
+  // Counts the calling thread's CPU time for as long as it lives, on that thread.
+  class Scope {
+   public:
+    explicit Scope(SideWork& work);
+    ~Scope();
+    Scope(const Scope&) = delete;
+    Scope& operator=(const Scope&) = delete;
+
+   private:
+    SideWork& work_;
+  };
+  [[nodiscard]] double cpu_seconds() const;
+
+ private:
+  mutable std::mutex mutex_;
+  double finished_s_ = 0.0;
+  std::optional<clockid_t> running_;  // clock of the thread that works
+  double began_s_ = 0.0;              // on that clock
 };
 
 // Adds the time from construction to destruction to `times`. CPU time is the process's, so that the

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <future>
 #include <numeric>
+#include <thread>
 
 #include "understory/util/binary_io.h"
 #include "understory/util/log.h"
@@ -33,6 +35,33 @@ TEST(Parallel, ForVisitsEveryIndexOnce) {
   std::vector<int> visits(10'000, 0);
   with_threads(3, [&] { parallel_for(visits.size(), 7, [&](std::size_t i) { ++visits[i]; }); });
   EXPECT_EQ(visits, std::vector<int>(10'000, 1));
+}
+
+TEST(SideWork, CountsAThreadsTimeWhileItRunsAndAfter) {
+  SideWork work;
+  EXPECT_EQ(work.cpu_seconds(), 0.0);
+  std::promise<void> halfway;
+  std::promise<void> go_on;
+  std::thread worker([&] {
+    const SideWork::Scope scope(work);
+    const auto burn = [&] {
+      const double until = work.cpu_seconds() + 0.02;
+      while (work.cpu_seconds() < until) {
+      }
+    };
+    burn();
+    halfway.set_value();
+    go_on.get_future().wait();
+    burn();
+  });
+  halfway.get_future().wait();
+  EXPECT_GE(work.cpu_seconds(), 0.02);
+  EXPECT_LT(work.cpu_seconds(), 0.04);
+  go_on.set_value();
+  worker.join();
+  EXPECT_GE(work.cpu_seconds(), 0.04);
+  EXPECT_LT(work.cpu_seconds(), 1.0);
+  EXPECT_EQ(work.cpu_seconds(), work.cpu_seconds());
 }
 
 TEST(Random, SameSeedSameNumbersOtherStreamOthers) {
