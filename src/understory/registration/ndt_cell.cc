@@ -54,7 +54,7 @@ void add_row(NdtCell& cell, const Eigen::Vector3d& direction, double information
 // A line that is no stem: what surrounds it may show the surface on which it lies.
 void add_row_of_surroundings(NdtCell& cell, const Eigen::Matrix3d& covariance, double floor,
                              const MomentsAround& around) {
-  for (const int reach : {1, 2}) {
+  for (int reach = 1; reach <= kSurroundings; ++reach) {
     const CellMoments moments = around(reach);
     const Shape shape = shape_of(moments.covariance());
     if (is_line(shape, floor)) continue;

@@ -38,6 +38,9 @@ struct CellMoments {
   [[nodiscard]] Eigen::Matrix3d covariance() const;
 };
 
+// As far as a cell's surroundings are asked, in cells.
+constexpr int kSurroundings = 2;
+
 // Moments of a cell together with its neighbours up to `reach` cells away on each side.
 using MomentsAround = std::function<CellMoments(int reach)>;
 

@@ -30,110 +30,135 @@ Eigen::Vector3d NdtMap::mean(std::size_t index) const {
          cells_[index].mean.cast<double>();
 }
 
-void NdtMap::place(std::uint32_t index) {
-  const std::array<int, 3>& at = coordinates_[index];
-  const std::uint64_t key = voxel_key(at[0], at[1], at[2]);
-  std::uint64_t i = voxel_hash(key) & mask_;
-  while (slots_[i].cell_plus_1 != 0)
-    i = (i + 1) & mask_;
-  slots_[i] = {key, index + 1};
+namespace {
+
+std::uint64_t key_of(const std::array<int, 3>& cell) {
+  return voxel_key(cell[0], cell[1], cell[2]);
 }
 
-void NdtMap::rehash(std::size_t slots) {
-  slots_.assign(slots, Slot{});
-  mask_ = slots - 1;
-  for (std::uint32_t c = 0; c < cells_.size(); ++c)
-    place(c);
-}
-
-void NdtMap::add(const std::array<int, 3>& at, const NdtCell& cell) {
-  cells_.push_back(cell);
-  coordinates_.push_back(at);
-  if (2 * cells_.size() > slots_.size()) {
-    rehash(std::max<std::size_t>(16, 2 * slots_.size()));
-  } else {
-    place(static_cast<std::uint32_t>(cells_.size() - 1));
+// Which parts of a grid have changed, in blocks of cells.
+class ChangedBlocks {
+ public:
+  void add(const std::array<int, 3>& cell) {
+    const std::uint64_t key = voxel_key(cell[0] >> kShift, cell[1] >> kShift, cell[2] >> kShift);
+    if (key == last_) return;
+    blocks_.set(key, 0);
+    last_ = key;
   }
-}
+  void clear() { *this = ChangedBlocks(); }
+  // Whether something changed up to kReach cells away; sometimes true if it is a little farther.
+  [[nodiscard]] bool may_reach(const std::array<int, 3>& cell) const {
+    for (int corner = 0; corner < 8; ++corner) {
+      const auto block = [&](std::size_t axis) {
+        return (cell[axis] + ((corner >> axis) % 2 == 0 ? -kReach : kReach)) >> kShift;
+      };
+      if (blocks_.find(voxel_key(block(0), block(1), block(2))) != VoxelIndex::kNone) return true;
+    }
+    return false;
+  }
+
+ private:
+  static constexpr int kReach = internal::kSurroundings;
+  static constexpr int kShift = 2;
+  static_assert(2 * kReach <= (1 << kShift), "what is in reach lies in the corners' blocks");
+  VoxelIndex blocks_;
+  std::uint64_t last_ = UINT64_MAX;
+};
+
+}  // namespace
 
 struct NdtMapBuilder::State {
-  struct Slot {
-    std::uint64_t key = 0;
-    std::uint32_t cell_plus_1 = 0;
-  };
   struct Located {
     std::array<int, 3> at;
     float from_center[3];
     Eigen::Vector3f ray;  // direction from the lidar, map axes
+    std::uint32_t cell;
   };
 
   NdtMapConfig config;
+  // Of each cell that has points.
   std::vector<CellMoments> moments;
   std::vector<std::array<int, 3>> coordinates;
-  std::vector<std::uint8_t> dirty;
+  std::vector<std::uint8_t> dirty;    // it has changed since the last snapshot
   std::vector<std::uint8_t> leans;    // its distribution rests on its neighbours too
-  std::vector<std::uint32_t> in_map;  // index in `map`, plus one; 0: too few points so far
-  std::shared_ptr<NdtMap> map;        // as of the last snapshot
-  std::vector<Slot> slots;
-  std::uint64_t mask = 0;
-  std::vector<Located> located;  // workspace
+  std::vector<std::uint32_t> in_map;  // index in `map`, or kNone: too few points so far
+  VoxelIndex index;
 
-  [[nodiscard]] std::uint32_t find(const std::array<int, 3>& at) const {
-    const std::uint64_t key = voxel_key(at[0], at[1], at[2]);
-    for (std::uint64_t i = voxel_hash(key) & mask;; i = (i + 1) & mask) {
-      if (slots[i].cell_plus_1 == 0 || slots[i].key == key) return slots[i].cell_plus_1;
-    }
-  }
+  std::shared_ptr<NdtMap> map;       // as of the last snapshot
+  std::vector<std::uint32_t> owner;  // of each of its cells, the cell here
+  ChangedBlocks removed;             // since the last snapshot
+  std::vector<Located> located;      // workspace
 
-  void place(std::uint64_t key, std::uint32_t cell_plus_1) {
-    std::uint64_t i = voxel_hash(key) & mask;
-    while (slots[i].cell_plus_1 != 0)
-      i = (i + 1) & mask;
-    slots[i] = {key, cell_plus_1};
-  }
-
-  void rehash(std::size_t size) {
-    slots.assign(size, Slot{});
-    mask = size - 1;
-    for (std::uint32_t c = 0; c < coordinates.size(); ++c) {
-      const std::array<int, 3>& at = coordinates[c];
-      place(voxel_key(at[0], at[1], at[2]), c + 1);
-    }
-  }
+  static constexpr std::uint32_t kNone = VoxelIndex::kNone;
 
   std::uint32_t find_or_add(const std::array<int, 3>& at) {
-    const std::uint64_t key = voxel_key(at[0], at[1], at[2]);
-    std::uint64_t i = voxel_hash(key) & mask;
-    while (slots[i].cell_plus_1 != 0) {
-      if (slots[i].key == key) return slots[i].cell_plus_1 - 1;
-      i = (i + 1) & mask;
-    }
+    const std::uint64_t key = key_of(at);
+    const std::uint32_t found = index.find(key);
+    if (found != kNone) return found;
     const auto cell = static_cast<std::uint32_t>(moments.size());
-    slots[i] = {key, cell + 1};
+    index.set(key, cell);
     moments.emplace_back();
     coordinates.push_back(at);
     dirty.push_back(1);
     leans.push_back(0);
-    in_map.push_back(0);
-    if (moments.size() * 2 > slots.size()) rehash(slots.size() * 2);
+    in_map.push_back(kNone);
     return cell;
   }
 
-  // The map, to be written on: a new one if somebody else holds the last.
-  NdtMap& own_map() {
+  // The last cell takes the place of the one removed.
+  void remove(std::uint32_t cell) {
+    removed.add(coordinates[cell]);
+    if (in_map[cell] != kNone) remove_from_map(in_map[cell]);
+    index.erase(key_of(coordinates[cell]));
+    const auto last = static_cast<std::uint32_t>(moments.size() - 1);
+    if (cell != last) {
+      moments[cell] = moments[last];
+      coordinates[cell] = coordinates[last];
+      dirty[cell] = dirty[last];
+      leans[cell] = leans[last];
+      in_map[cell] = in_map[last];
+      index.set(key_of(coordinates[cell]), cell);
+      if (in_map[cell] != kNone) owner[in_map[cell]] = cell;
+    }
+    moments.pop_back();
+    coordinates.pop_back();
+    dirty.pop_back();
+    leans.pop_back();
+    in_map.pop_back();
+  }
+
+  void add_to_map(std::uint32_t cell) {
+    in_map[cell] = static_cast<std::uint32_t>(owner.size());
+    owner.push_back(cell);
+    map->index_.set(key_of(coordinates[cell]), in_map[cell]);
+    map->cells_.emplace_back();
+    map->coordinates_.push_back(coordinates[cell]);
+  }
+
+  void remove_from_map(std::uint32_t place) {
+    own_map();
+    map->index_.erase(key_of(map->coordinates_[place]));
+    const auto last = static_cast<std::uint32_t>(owner.size() - 1);
+    if (place != last) {
+      map->cells_[place] = map->cells_[last];
+      map->coordinates_[place] = map->coordinates_[last];
+      map->index_.set(key_of(map->coordinates_[place]), place);
+      owner[place] = owner[last];
+      in_map[owner[place]] = place;
+    }
+    map->cells_.pop_back();
+    map->coordinates_.pop_back();
+    owner.pop_back();
+  }
+
+  // Makes `map` one that nobody else holds.
+  void own_map() {
     if (map.use_count() > 1) {
       map = std::make_shared<NdtMap>(*map);
     } else {
       // What its other holders read is over.
       std::atomic_thread_fence(std::memory_order_acquire);
     }
-    return *map;
-  }
-
-  void start_map() {
-    map = std::make_shared<NdtMap>();
-    map->cell_size_ = config.cell_size_m;
-    map->rehash(16);
   }
 
   [[nodiscard]] CellMoments around(std::size_t cell, int reach) const {
@@ -142,9 +167,9 @@ struct NdtMapBuilder::State {
     for (int x = -reach; x <= reach; ++x) {
       for (int y = -reach; y <= reach; ++y) {
         for (int z = -reach; z <= reach; ++z) {
-          const std::uint32_t found = find({at[0] + x, at[1] + y, at[2] + z});
-          if (found != 0)
-            total.add(moments[found - 1], config.cell_size_m * Eigen::Vector3d(x, y, z));
+          const std::uint32_t found = index.find(voxel_key(at[0] + x, at[1] + y, at[2] + z));
+          if (found != kNone)
+            total.add(moments[found], config.cell_size_m * Eigen::Vector3d(x, y, z));
         }
       }
     }
@@ -162,13 +187,11 @@ NdtMapBuilder::NdtMapBuilder(NdtMapBuilder&&) noexcept = default;
 NdtMapBuilder& NdtMapBuilder::operator=(NdtMapBuilder&&) noexcept = default;
 
 void NdtMapBuilder::clear() {
-  state_->moments.clear();
-  state_->coordinates.clear();
-  state_->dirty.clear();
-  state_->leans.clear();
-  state_->in_map.clear();
-  state_->rehash(std::size_t{1} << 12);
-  state_->start_map();
+  const NdtMapConfig config = state_->config;
+  *state_ = State();
+  state_->config = config;
+  state_->map = std::make_shared<NdtMap>();
+  state_->map->cell_size_ = config.cell_size_m;
 }
 
 void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_source) {
@@ -195,71 +218,60 @@ void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_
       to.from_center[k] = (p[k] - static_cast<float>(whole) - 0.5F) * edge;
     }
   });
-  for (const State::Located& point : s.located) {
-    const std::uint32_t cell = s.find_or_add(point.at);
-    s.moments[cell].add(point.from_center[0], point.from_center[1], point.from_center[2]);
-    if (rays) s.moments[cell].add_ray(point.ray.x(), point.ray.y(), point.ray.z());
-    s.dirty[cell] = 1;
+  // Memory is asked for some points ahead: cells lie scattered, and the processor would wait.
+  constexpr std::size_t kAhead = 12;
+  const std::size_t count = s.located.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    s.index.prefetch(key_of(s.located[std::min(i + kAhead, count - 1)].at));
+    s.located[i].cell = s.find_or_add(s.located[i].at);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    __builtin_prefetch(&s.moments[s.located[std::min(i + kAhead, count - 1)].cell], 1);
+    const State::Located& point = s.located[i];
+    CellMoments& moments = s.moments[point.cell];
+    moments.add(point.from_center[0], point.from_center[1], point.from_center[2]);
+    if (rays) moments.add_ray(point.ray.x(), point.ray.y(), point.ray.z());
+    s.dirty[point.cell] = 1;
   }
 }
 
 void NdtMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m) {
   State& s = *state_;
   const double size = s.config.cell_size_m;
-  const std::shared_ptr<const NdtMap> before = s.map;
-  std::size_t kept = 0;
-  const std::size_t all = s.moments.size();
-  const auto is_near = [&](std::size_t c) {
+  for (std::uint32_t c = 0; c < s.moments.size();) {
     const std::array<int, 3>& at = s.coordinates[c];
     const Eigen::Vector3d middle =
         size * (Eigen::Vector3d(at[0], at[1], at[2]) + Eigen::Vector3d::Constant(0.5));
-    return (middle - center).squaredNorm() <= radius_m * radius_m;
-  };
-  while (kept < all && is_near(kept))
-    ++kept;
-  if (kept == all) return;
-  kept = 0;
-  s.start_map();
-  for (std::size_t c = 0; c < all; ++c) {
-    if (!is_near(c)) continue;
-    const std::size_t to = kept++;
-    s.moments[to] = s.moments[c];
-    s.coordinates[to] = s.coordinates[c];
-    s.dirty[to] = s.dirty[c];
-    s.leans[to] = s.leans[c];
-    s.in_map[to] = 0;
-    if (s.in_map[c] == 0) continue;
-    s.map->add(s.coordinates[to], before->cells()[s.in_map[c] - 1]);
-    s.in_map[to] = static_cast<std::uint32_t>(s.map->size());
+    if ((middle - center).squaredNorm() > radius_m * radius_m) {
+      s.remove(c);  // another one is here now
+    } else {
+      ++c;
+    }
   }
-  s.moments.resize(kept);
-  s.coordinates.resize(kept);
-  s.dirty.resize(kept);
-  s.leans.resize(kept);
-  s.in_map.resize(kept);
-  std::size_t table = std::size_t{1} << 12;
-  while (table < 2 * kept)
-    table *= 2;
-  s.rehash(table);
 }
 
 NdtMapPtr NdtMapBuilder::snapshot() {
   State& s = *state_;
-  NdtMap& map = s.own_map();
+  s.own_map();
+  ChangedBlocks blocks = std::move(s.removed);
+  s.removed.clear();
+  for (std::size_t c = 0; c < s.moments.size(); ++c) {
+    if (s.dirty[c] != 0) blocks.add(s.coordinates[c]);
+  }
   std::vector<std::uint32_t> changed;
   for (std::uint32_t c = 0; c < s.moments.size(); ++c) {
-    if ((s.dirty[c] | s.leans[c]) == 0) continue;
+    const bool affected =
+        s.dirty[c] != 0 || (s.leans[c] != 0 && blocks.may_reach(s.coordinates[c]));
+    if (!affected) continue;
     s.dirty[c] = 0;
     if (s.moments[c].n < s.config.min_points) continue;
     changed.push_back(c);
-    if (s.in_map[c] != 0) continue;
-    map.add(s.coordinates[c], {});
-    s.in_map[c] = static_cast<std::uint32_t>(map.size());
+    if (s.in_map[c] == State::kNone) s.add_to_map(c);
   }
   parallel_for(changed.size(), 256, [&](std::size_t i) {
     const std::uint32_t c = changed[i];
     s.leans[c] = 0;
-    map.cells_[s.in_map[c] - 1] = internal::make_cell(s.moments[c], s.config, [&](int reach) {
+    s.map->cells_[s.in_map[c]] = internal::make_cell(s.moments[c], s.config, [&](int reach) {
       s.leans[c] = 1;
       return s.around(c, reach);
     });

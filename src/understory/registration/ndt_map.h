@@ -9,7 +9,7 @@
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
-#include "understory/geometry/voxel_key.h"
+#include "understory/geometry/voxel_index.h"
 #include "understory/util/config.h"
 
 namespace understory {
@@ -47,18 +47,11 @@ class NdtMap {
   [[nodiscard]] bool empty() const { return cells_.empty(); }
   // The cell at integer coordinates, or null.
   [[nodiscard]] const NdtCell* find(int x, int y, int z) const {
-    if (slots_.empty()) return nullptr;
-    const std::uint64_t key = voxel_key(x, y, z);
-    for (std::uint64_t at = voxel_hash(key) & mask_;; at = (at + 1) & mask_) {
-      const Slot& slot = slots_[at];
-      if (slot.cell_plus_1 == 0) return nullptr;
-      if (slot.key == key) return &cells_[slot.cell_plus_1 - 1];
-    }
+    const std::uint32_t found = index_.find(voxel_key(x, y, z));
+    return found == VoxelIndex::kNone ? nullptr : &cells_[found];
   }
   // Asks for the memory that find() will look at first.
-  void prefetch(int x, int y, int z) const {
-    __builtin_prefetch(slots_.data() + (voxel_hash(voxel_key(x, y, z)) & mask_));
-  }
+  void prefetch(int x, int y, int z) const { index_.prefetch(voxel_key(x, y, z)); }
   // All cells with enough points, and their coordinates, in no order that means anything.
   [[nodiscard]] const std::vector<NdtCell>& cells() const { return cells_; }
   [[nodiscard]] const std::vector<std::array<int, 3>>& coordinates() const { return coordinates_; }
@@ -67,19 +60,10 @@ class NdtMap {
 
  private:
   friend class NdtMapBuilder;
-  struct Slot {
-    std::uint64_t key = 0;
-    std::uint32_t cell_plus_1 = 0;  // 0 = free
-  };
   double cell_size_ = 1.0;
   std::vector<NdtCell> cells_;
   std::vector<std::array<int, 3>> coordinates_;
-  std::vector<Slot> slots_;
-  std::uint64_t mask_ = 0;
-
-  void add(const std::array<int, 3>& at, const NdtCell& cell);
-  void rehash(std::size_t slots);
-  void place(std::uint32_t index);
+  VoxelIndex index_;
 };
 using NdtMapPtr = std::shared_ptr<const NdtMap>;
 

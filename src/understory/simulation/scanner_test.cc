@@ -1,6 +1,7 @@
 #include "understory/simulation/scanner.h"
 
 #include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
 
 #include <cmath>
 #include <cstring>
@@ -310,6 +311,14 @@ TEST(Scanner, WideBeamsMakeStemsWider) {
   site.lidar.rays_per_beam = 16;
   const int wide = width(site);
   EXPECT_GT(wide, 1.02 * narrow);
+}
+
+TEST(ForestScene, LeavesTheProcessItsThreads) {
+  using Control = oneapi::tbb::global_control;
+  const Terrain terrain({}, 40.0, 40.0, 1);
+  const std::size_t before = Control::active_value(Control::max_allowed_parallelism);
+  const ForestScene scene({}, terrain, {}, 1);
+  EXPECT_EQ(Control::active_value(Control::max_allowed_parallelism), before);
 }
 
 TEST(ForestScene, OpenSkyIsOpenAndAStandHidesIt) {

@@ -11,6 +11,7 @@
 #include "understory/simulation/embree.h"
 #include "understory/simulation/shapes.h"
 #include "understory/util/error.h"
+#include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
@@ -124,13 +125,18 @@ CrownSize size_class(Species species, double height_m) {
   return size;
 }
 
+// One thread builds, so that the tree of boxes does not depend on how many there are.
+void commit(RTCScene scene) {
+  in_arena(1, [&] { rtcJoinCommitScene(scene); });
+}
+
 }  // namespace
 
 class ForestScene::Impl {
  public:
   Impl(const StandConfig& config, const Terrain& terrain, const Stand& stand, std::uint64_t seed) {
-    // One thread builds, so that the tree of boxes does not depend on how many there are.
-    device_ = rtcNewDevice("threads=1,set_affinity=0");
+    // No number of threads here: the library would hold the whole process to it.
+    device_ = rtcNewDevice("set_affinity=0");
     UNDERSTORY_CHECK(device_ != nullptr);
     top_ = rtcNewScene(device_);
     add_static(terrain, stand);
@@ -138,7 +144,7 @@ class ForestScene::Impl {
     wind_sway_m_ = config.wind_sway_m;
     add_crowns(stand);
     add_plants(stand);
-    rtcCommitScene(top_);
+    commit(top_);
     if (wind_sway_m_ > 0.0) still_ = copy_of_instances();
     UNDERSTORY_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
   }
@@ -193,7 +199,7 @@ class ForestScene::Impl {
                               world_from_shape.data());
       rtcCommitGeometry(geometry);
     }
-    rtcCommitScene(top_);
+    commit(top_);
   }
 
   [[nodiscard]] bool occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& to) const {
@@ -303,7 +309,7 @@ class ForestScene::Impl {
     if (!wood.first.empty()) {
       UNDERSTORY_CHECK(attach(static_, cone_geometry(device_, wood)) == kWoodGeometry);
     }
-    rtcCommitScene(static_);
+    commit(static_);
   }
 
   void add_stem(const Tree& tree, Cones& stems) {
@@ -414,7 +420,7 @@ class ForestScene::Impl {
     }
     RTCScene scene = new_scene();
     attach(scene, shape_geometry(device_, shape));
-    rtcCommitScene(scene);
+    commit(scene);
     return scene;
   }
 
@@ -440,7 +446,7 @@ class ForestScene::Impl {
                               world_from_shape.data());
       attach(copy, geometry);
     }
-    rtcCommitScene(copy);
+    commit(copy);
     return copy;
   }
 
