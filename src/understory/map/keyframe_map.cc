@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -32,6 +33,7 @@ void KeyframeMap::describe(ConfigTable& table, Config& config) {
   table.section("keyframe", [&] { understory::describe(table, config.keyframe); });
   table.section("local_map", [&] { understory::describe(table, config.local_map); });
   table.section("loop_closure", [&] { understory::describe(table, config.loop_closure); });
+  table.section("beginning", [&] { understory::describe(table, config.beginning); });
   table.section("odometry_edge", [&] {
     table.add("rotation_deg_per_sqrt_m", config.edge_rotation_deg_per_sqrt_m, {1e-6, 10.0},
               "deg/sqrt(m)", "noise of the odometry between keyframes");
@@ -58,14 +60,14 @@ constexpr const char* kPointsFile = "keyframe_points.bin";
 
 void KeyframeMap::start() {
   keyframes_.clear();
-  segment_start_ = 0;
+  segment_starts_ = {0};
   inserted_.clear();
   insert_all();
   points_ = std::make_unique<KeyframePoints>(folder_ / kPointsFile, 0, kCachedKeyframes);
 }
 
 bool KeyframeMap::wants(const Pose& world_from_body) const {
-  if (keyframes_.size() == segment_start_) return true;
+  if (keyframes_.size() == segment_start()) return true;
   return keyframe_distance(keyframes_.back().world_from_body, world_from_body, config_.keyframe) >=
          config_.keyframe.distance_m;
 }
@@ -88,13 +90,13 @@ std::optional<Pose> KeyframeMap::add(TimeNs stamp, const Pose& world_from_body,
   keyframes_.push_back(keyframe);
   points_->append(stamp, points_in_body);
   update_local_map(keyframes_.size() - 1);
-  loops_.consider(keyframes_, segment_start_, *points_);
+  loops_.consider(keyframes_, segment_start(), *points_);
   return moved;
 }
 
 Matrix6d KeyframeMap::edge_covariance(const Pose& previous_from_this) const {
   // A new segment hangs on a prediction over an outage: its edge says almost nothing.
-  const bool joined = keyframes_.size() != segment_start_;
+  const bool joined = keyframes_.size() != segment_start();
   const double length = std::max(previous_from_this.translation().norm(), 0.1);
   const double grown = std::sqrt(length) * (joined ? 1.0 : 1e3);
   const double rotation = grown * config_.edge_rotation_deg_per_sqrt_m * std::numbers::pi / 180.0;
@@ -128,14 +130,14 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
   }
   local_map_ = std::move(*outcome.local_map);
   inserted_ = std::move(outcome.inserted);
-  for (std::size_t i = std::max(known, segment_start_); i < keyframes_.size(); ++i) {
+  for (std::size_t i = std::max(known, segment_start()); i < keyframes_.size(); ++i) {
     insert(i);
   }
   take_snapshot();
   return moved;
 }
 
-void KeyframeMap::finish() {
+void KeyframeMap::finish(const NdtConfig& ndt) {
   if (keyframes_.empty()) return;
   if (auto outcome = loops_.take(keyframes_.size(), true, true)) {
     static_cast<void>(take_over(std::move(*outcome)));
@@ -148,6 +150,26 @@ void KeyframeMap::finish() {
   }
   for (std::size_t i = 0; i < result.world_from_keyframe.size(); ++i) {
     keyframes_[i].world_from_body = result.world_from_keyframe[i];
+  }
+  if (config_.beginning.enabled) refine_beginnings(ndt);
+}
+
+void KeyframeMap::refine_beginnings(const NdtConfig& ndt) {
+  for (std::size_t s = 0; s < segment_starts_.size(); ++s) {
+    const std::size_t first = segment_starts_[s];
+    const bool is_last = s + 1 == segment_starts_.size();
+    const std::size_t end = is_last ? keyframes_.size() : segment_starts_[s + 1];
+    const std::vector<Pose> refined = refine_beginning(
+        std::span(keyframes_).subspan(first, end - first),
+        [&](std::size_t i) { return points_->get(first + i); }, config_.local_map, ndt,
+        config_.beginning);
+    if (refined.empty()) continue;
+    for (std::size_t i = 0; i < refined.size(); ++i)
+      keyframes_[first + i].world_from_body = refined[i];
+    for (std::size_t i = std::max<std::size_t>(first, 1); i <= first + refined.size(); ++i) {
+      keyframes_[i].previous_from_this =
+          keyframes_[i - 1].world_from_body.inverse() * keyframes_[i].world_from_body;
+    }
   }
 }
 
@@ -175,16 +197,16 @@ void KeyframeMap::insert(std::size_t keyframe) {
 // Chooses the keyframes of the local map anew, e.g. after a loop closure has moved them.
 void KeyframeMap::rebuild_local_map() {
   std::vector<Eigen::Vector3d> positions;
-  for (std::size_t i = segment_start_; i < keyframes_.size(); ++i) {
+  for (std::size_t i = segment_start(); i < keyframes_.size(); ++i) {
     positions.push_back(keyframes_[i].world_from_body.translation());
   }
   inserted_.clear();
   if (config_.local_map.method == LocalMapConfig::Method::kRecent) {
     for (const std::size_t i : recent_keyframes(positions, config_.local_map)) {
-      inserted_.push_back({segment_start_ + i, 0});
+      inserted_.push_back({segment_start() + i, 0});
     }
   } else {
-    inserted_ = keyframes_within_reach(positions, segment_start_, config_.local_map);
+    inserted_ = keyframes_within_reach(positions, segment_start(), config_.local_map);
   }
   insert_all();
 }
@@ -201,7 +223,7 @@ void KeyframeMap::insert_all() {
 }
 
 void KeyframeMap::start_segment() {
-  segment_start_ = keyframes_.size();
+  if (segment_start() != keyframes_.size()) segment_starts_.push_back(keyframes_.size());
   inserted_.clear();
   insert_all();
 }
@@ -228,7 +250,7 @@ void KeyframeMap::save(BinaryWriter& writer) const {
     put_pose(writer, keyframe.previous_from_this);
     writer.put_doubles(keyframe.covariance.data(), 36);
   }
-  writer.put(static_cast<std::uint64_t>(segment_start_));
+  writer.put(segment_starts_);
   writer.put(inserted_);
   loops_.save(writer);
 }
@@ -241,7 +263,7 @@ void KeyframeMap::load(BinaryReader& reader) {
     keyframe.previous_from_this = get_pose(reader);
     reader.get_doubles(keyframe.covariance.data(), 36);
   }
-  segment_start_ = reader.get<std::uint64_t>();
+  segment_starts_ = reader.get_vector<std::uint64_t>();
   inserted_ = reader.get_vector<LocalMapInsertion>();
   points_ =
       std::make_unique<KeyframePoints>(folder_ / kPointsFile, keyframes_.size(), kCachedKeyframes);

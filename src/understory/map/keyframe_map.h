@@ -8,6 +8,7 @@
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
+#include "understory/map/beginning.h"
 #include "understory/map/keyframe.h"
 #include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
@@ -44,6 +45,7 @@ class KeyframeMap {
     KeyframeConfig keyframe;
     LocalMapConfig local_map;
     LoopCloserConfig loop_closure;
+    BeginningConfig beginning;
     // Noise of the odometry between keyframes: grows with the square root of the distance.
     double edge_rotation_deg_per_sqrt_m = 0.02;
     double edge_translation_m_per_sqrt_m = 0.01;
@@ -65,8 +67,9 @@ class KeyframeMap {
   // Begins anew after the scans could not be matched any more: the next keyframe is joined to the
   // last one by a prediction only, and the local map starts empty.
   void start_segment();
-  // The recording is over: waits for what is running, looks for a last loop, optimises.
-  void finish();
+  // The recording is over: waits for what is running, optimises, and positions the first keyframes
+  // of each segment again.
+  void finish(const NdtConfig& ndt);
   // Moves everything, e.g. to level the world.
   void move_world(const Pose& new_world_from_old_world);
 
@@ -85,6 +88,8 @@ class KeyframeMap {
   void load(BinaryReader& reader);
 
  private:
+  void refine_beginnings(const NdtConfig& ndt);
+  [[nodiscard]] std::size_t segment_start() const { return segment_starts_.back(); }
   void update_local_map(std::size_t keyframe);
   void insert(std::size_t keyframe);
   void take_snapshot();
@@ -99,7 +104,7 @@ class KeyframeMap {
   Log& log_;
   std::unique_ptr<KeyframePoints> points_;
   std::vector<Keyframe> keyframes_;
-  std::size_t segment_start_ = 0;  // first keyframe of the present segment
+  std::vector<std::uint64_t> segment_starts_ = {0};  // first keyframe of each segment
   LocalMap local_map_;
   std::vector<LocalMapInsertion>
       inserted_;  // since the local map was empty, in order: builds it again

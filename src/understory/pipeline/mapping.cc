@@ -122,7 +122,7 @@ class MappingRun {
 
   MappingOutcome finish(bool stopped) {
     if (session_->map().keyframes().empty()) return nothing_to_map(stopped);
-    session_->map().finish();
+    session_->map().finish(request_.config.odometry.ndt);
     session_->flush();
     RunFacts facts;
     facts.stopped = stopped;

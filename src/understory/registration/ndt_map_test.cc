@@ -163,24 +163,25 @@ void expect_same_cells(const NdtMap& a, const NdtMap& b) {
 // With snapshots on the way and without, with cells forgotten that others lean on.
 TEST(NdtMap, GrowingIsTheSameAsBuildingAtOnce) {
   const testing::Stand stand = testing::make_stand({.half_width_m = 15.0}, 1);
-  NdtMapBuilder growing({});
-  NdtMapBuilder at_once({});
+  const NdtMapConfig config = {.cell_size_m = 0.5};
+  NdtMapBuilder growing(config);
+  NdtMapBuilder at_once(config);
   NdtMapPtr last;
   for (int i = 0; i < 6; ++i) {
     const Pose pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.5 * i, 0, 1.6));
     const Points cloud = testing::scan_stand(stand, pose, testing::vlp16(), 10);
     for (NdtMapBuilder* builder : {&growing, &at_once}) {
       builder->insert(cloud, pose);
-      if (i % 2 == 1) builder->remove_beyond(pose.translation(), 8.0);
+      if (i % 2 == 1) builder->remove_beyond(pose.translation(), 15.0);
     }
     last = growing.snapshot();
   }
   for (NdtMapBuilder* builder : {&growing, &at_once})
-    builder->remove_beyond(Eigen::Vector3d::Zero(), 5.0);
+    builder->remove_beyond(Eigen::Vector3d(8.0, 0.0, 0.0), 5.0);
   last = growing.snapshot();
   NdtMapPtr expected;
   with_threads(2, [&] { expected = at_once.snapshot(); });
-  EXPECT_GT(expected->size(), 100U);
+  EXPECT_GT(expected->size(), 30U);
   expect_same_cells(*last, *expected);
 }
 
