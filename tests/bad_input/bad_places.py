@@ -22,6 +22,19 @@ def same_as_whole(folder):
     assert not different, f"{different} differ from those of an undisturbed run"
 
 
+def map_until_stopped(run, **options):
+    """`map` that cannot write all of its results, and says how to go on."""
+    done = program("map", good, "-o", run, **options)
+    assert done.returncode == 3 and done.stderr.startswith(f"error: {run}/"), done.stderr
+    assert f"map --resume {run}" in done.stderr, done.stderr
+    return done.stderr.strip()
+
+
+def expect_resumed(run):
+    assert program("map", "--resume", run).returncode == 0
+    same_as_whole(run)
+
+
 def refused(recording, place, *words):
     outcome = map_recording(recording, place)
     assert outcome.code == 3 and outcome.said.startswith(f"error: {place}"), outcome.said
@@ -65,15 +78,12 @@ def full_disk(folder):
         return "not tried: nothing can be mounted (see the limit on files)"
     try:
         run = place / "run"
-        done = program("map", good, "-o", run)
-        assert done.returncode == 3 and done.stderr.startswith(f"error: {run}/"), done.stderr
-        assert f"map --resume {run}" in done.stderr, done.stderr
+        said = map_until_stopped(run)
         subprocess.run(["mount", "-o", "remount,size=200m", str(place)], check=True)
-        assert program("map", "--resume", run).returncode == 0
-        same_as_whole(run)
+        expect_resumed(run)
     finally:
         subprocess.run(["umount", str(place)], check=True)
-    return done.stderr.strip().replace(str(folder), "")
+    return said.replace(str(folder), "")
 
 
 @cases.case("files that may not grow")
@@ -81,25 +91,21 @@ def limited(folder):
     """The same by a limit on the size of files, which needs no rights."""
     run = folder / "run"
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, resource.RLIM_INFINITY))
-    done = program("map", good, "-o", run, preexec_fn=limit)
-    assert done.returncode == 3 and f"error: {run}/" in done.stderr, (done.returncode, done.stderr)
+    said = map_until_stopped(run, preexec_fn=limit)
     assert not (run / "run.json").exists() and not (run / "trajectory.tum").exists()
-    assert program("map", "--resume", run).returncode == 0
-    same_as_whole(run)
-    return done.stderr.strip().replace(str(folder), "")
+    expect_resumed(run)
+    return said.replace(str(folder), "")
 
 
 @cases.case("result that cannot be written")
 def blocked_result(folder):
     run = folder / "run"
     (run / "map.laz" / "mine").mkdir(parents=True)
-    done = program("map", good, "-o", run)
-    assert done.returncode == 3 and f"error: {run / 'map.laz'}" in done.stderr, done.stderr
-    assert f"map --resume {run}" in done.stderr and not list(run.glob(".part*")), done.stderr
+    said = map_until_stopped(run)
+    assert f"error: {run / 'map.laz'}" in said and not list(run.glob(".part*")), said
     shutil.rmtree(run / "map.laz")
-    assert program("map", "--resume", run).returncode == 0
-    same_as_whole(run)
-    return done.stderr.strip().replace(str(folder), "")
+    expect_resumed(run)
+    return said.replace(str(folder), "")
 
 
 @cases.case("folder that holds other things")
@@ -146,8 +152,7 @@ def ctrl_c(folder):
     assert 10 < len(poses) < 120 and (run / "map.laz").exists(), len(poses)
     assert '"partial"' in (run / "run.json").read_text()
     assert map_recording(good, run).code == 3  # nothing is thrown away unasked
-    assert program("map", "--resume", run).returncode == 0
-    same_as_whole(run)
+    expect_resumed(run)
     assert not (run / "work").exists()
     return f"exit 4 with {len(poses)} of 120 scans, the rest by --resume: the same bytes"
 

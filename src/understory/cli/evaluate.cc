@@ -8,6 +8,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/evaluate_trees.h"
+#include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/trajectory_errors.h"
 #include "understory/util/error.h"
 
@@ -25,17 +26,6 @@ struct EvaluateOptions {
   std::vector<double> deltas_m = {10.0};
   bool json = false;
 };
-
-// A trajectory file, or the one inside a run or truth folder.
-fs::path trajectory_file(const std::string& given) {
-  const fs::path path(given);
-  if (!fs::is_directory(path)) return path;
-  const fs::path inside = path / "trajectory.tum";
-  if (!fs::exists(inside)) {
-    throw InputError(given, "", "expected a folder that holds trajectory.tum");
-  }
-  return inside;
-}
 
 // The velocities beside a trajectory, empty if there are none.
 std::vector<StampedVelocity> velocities_beside(const std::string& given, Log& log) {
@@ -144,9 +134,9 @@ int evaluate(const EvaluateOptions& options, CommandContext& context) {
   settings.alignment = alignment_from_name(options.alignment);
   settings.tolerance_s = options.tolerance_s;
   settings.rpe_deltas_m = options.deltas_m;
-  const fs::path estimate_file = trajectory_file(options.estimate);
+  const fs::path estimate_file = file_in_folder(options.estimate, "trajectory.tum");
   const Trajectory estimate = read_trajectory(estimate_file);
-  const Trajectory truth = read_trajectory(trajectory_file(options.truth));
+  const Trajectory truth = read_trajectory(file_in_folder(options.truth, "trajectory.tum"));
   const auto errors = evaluate_trajectory(estimate, truth, settings);
   if (!errors) {
     throw InputError(

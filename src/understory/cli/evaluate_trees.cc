@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/tree_errors.h"
 #include "understory/util/error.h"
 
@@ -26,15 +27,6 @@ struct TreeOptions {
   double within_m = 15.0;
   bool json = false;
 };
-
-fs::path inside_folder(const std::string& given, const std::string& name) {
-  const fs::path path(given);
-  if (!fs::is_directory(path)) return path;
-  if (!fs::exists(path / name)) {
-    throw InputError(given, "", "expected a folder that holds " + name);
-  }
-  return path / name;
-}
 
 struct Comparison {
   TreeErrors all;
@@ -93,16 +85,16 @@ std::optional<VisibleTreeErrors> compare_visible(const TreeOptions& options,
     throw ConfigError({"--truth-returns and --path belong together"});
   }
   Visibility visibility;
-  visibility.returns_by_tree = read_returns(inside_folder(options.returns, "returns.csv.gz"));
-  visibility.path = read_trajectory(inside_folder(options.path, "trajectory.tum"));
+  visibility.returns_by_tree = read_returns(file_in_folder(options.returns, "returns.csv.gz"));
+  visibility.path = read_trajectory(file_in_folder(options.path, "trajectory.tum"));
   visibility.min_returns = options.min_returns;
   visibility.within_m = options.within_m;
   return compare_visible_trees(a, b, options.radius_m, visibility);
 }
 
 int evaluate_trees(const TreeOptions& options, CommandContext& context) {
-  std::vector<Tree> a = read_trees(inside_folder(options.a, "trees.csv"));
-  const std::vector<Tree> b = read_trees(inside_folder(options.b, "trees.csv"));
+  std::vector<Tree> a = read_trees(file_in_folder(options.a, "trees.csv"));
+  const std::vector<Tree> b = read_trees(file_in_folder(options.b, "trees.csv"));
   const Alignment alignment = alignment_from_name(options.alignment);
   bool aligned = true;
   if (alignment != Alignment::kNone) {

@@ -313,8 +313,7 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
 void remove_old_results(const std::filesystem::path& folder) {
   for (const char* name :
        {"gnss.csv", "map.laz", "trees.csv", "trees.gpkg", "dtm.tif", "chm.tif"}) {
-    std::error_code
-        ignored;  // what cannot be removed cannot be replaced either, and then it is said
+    std::error_code ignored;  // what cannot be removed cannot be replaced, which is then said
     std::filesystem::remove(folder / name, ignored);
   }
 }

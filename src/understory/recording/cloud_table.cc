@@ -30,40 +30,8 @@ bool ends_with(const std::string& text, const std::string& end) {
 
 }  // namespace
 
-std::uint32_t field_size(FieldType type) {
-  switch (type) {
-    case FieldType::kInt8:
-    case FieldType::kUint8:
-      return 1;
-    case FieldType::kInt16:
-    case FieldType::kUint16:
-      return 2;
-    case FieldType::kFloat64:
-      return 8;
-    default:
-      return 4;
-  }
-}
-
 void store_number(double value, FieldType type, std::uint8_t* into) {
-  switch (type) {
-    case FieldType::kInt8:
-      return store<std::int8_t>(value, into);
-    case FieldType::kUint8:
-      return store<std::uint8_t>(value, into);
-    case FieldType::kInt16:
-      return store<std::int16_t>(value, into);
-    case FieldType::kUint16:
-      return store<std::uint16_t>(value, into);
-    case FieldType::kInt32:
-      return store<std::int32_t>(value, into);
-    case FieldType::kUint32:
-      return store<std::uint32_t>(value, into);
-    case FieldType::kFloat32:
-      return store<float>(value, into);
-    case FieldType::kFloat64:
-      return store<double>(value, into);
-  }
+  visit_field_type(type, [&](auto zero) { store<decltype(zero)>(value, into); });
 }
 
 void CloudTable::add_field(const std::string& name, FieldType type, std::uint32_t count) {

@@ -31,7 +31,6 @@ struct CloudTable {
   [[nodiscard]] PointCloud2Message message(TimeNs stamp) const;
 };
 
-[[nodiscard]] std::uint32_t field_size(FieldType type);
 // Writes a number as the field's type; out of range values are clamped, NaN in an integer is 0.
 void store_number(double value, FieldType type, std::uint8_t* into);
 

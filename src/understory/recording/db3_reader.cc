@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "understory/recording/byte_source.h"
@@ -37,12 +38,12 @@ class Db3Source : public MessageSource {
     sqlite3_limit(database_.get(), SQLITE_LIMIT_LENGTH, static_cast<int>(kLongestBlock));
     read_topics();
     read_extent();
-    const bool indexed = scalar(
-                             "SELECT count(*) FROM sqlite_master WHERE type = 'index' AND "
-                             "tbl_name = 'messages' AND sql LIKE '%timestamp%'") > 0;
+    indexed_ = scalar(
+                   "SELECT count(*) FROM sqlite_master WHERE type = 'index' AND "
+                   "tbl_name = 'messages' AND sql LIKE '%timestamp%'") > 0;
     // Without an index an order by time would need memory for all messages.
     rows_ = prepare(std::string("SELECT id, topic_id, timestamp, data FROM messages ORDER BY ") +
-                    (indexed ? "timestamp, id" : "id"));
+                    (indexed_ ? "timestamp, id" : "id"));
     if (rows_ == nullptr) fail("expected a table of messages: ");
   }
   ~Db3Source() override {
@@ -53,10 +54,12 @@ class Db3Source : public MessageSource {
     while (!ended_) {
       const int state = step();
       if (state == SQLITE_DONE) break;
+      const Place place{plausible_time(sqlite3_column_int64(rows_.get(), 2)),
+                        sqlite3_column_int64(rows_.get(), 0)};
+      if (damaged_after_ && place <= *damaged_after_) continue;  // was read before the damage
+      last_ = place;
+      const TimeNs time = place.first;
       const auto topic = topics_.find(sqlite3_column_int64(rows_.get(), 1));
-      const TimeNs time = plausible_time(sqlite3_column_int64(rows_.get(), 2));
-      if (by_row_ && time < last_time_) continue;  // was read before the damage
-      last_time_ = time;
       if (topic == topics_.end()) {
         log_.warn("recording.unknown_channel",
                   name_ + ": a message of an unknown topic is passed over");
@@ -74,13 +77,15 @@ class Db3Source : public MessageSource {
 
   [[nodiscard]] std::string format() const override { return "ROS 2 bag (SQLite)"; }
   [[nodiscard]] double progress() const override {
-    return last_ > first_ ? std::clamp(static_cast<double>(last_time_ - first_) /
-                                           static_cast<double>(last_ - first_),
-                                       0.0, 1.0)
-                          : 0.0;
+    return end_ > begin_ ? std::clamp(static_cast<double>(last_.first - begin_) /
+                                          static_cast<double>(end_ - begin_),
+                                      0.0, 1.0)
+                         : 0.0;
   }
 
  private:
+  using Place = std::pair<TimeNs, std::int64_t>;  // time and row, the order of reading
+
   [[noreturn]] void fail(const std::string& expected) const {
     throw InputError(name_, "", expected + sqlite3_errmsg(database_.get()));
   }
@@ -120,8 +125,8 @@ class Db3Source : public MessageSource {
   }
 
   void read_extent() {
-    first_ = plausible_time(scalar("SELECT min(timestamp) FROM messages"));
-    last_ = plausible_time(scalar("SELECT max(timestamp) FROM messages"));
+    begin_ = plausible_time(scalar("SELECT min(timestamp) FROM messages"));
+    end_ = plausible_time(scalar("SELECT max(timestamp) FROM messages"));
     last_row_ = scalar("SELECT max(id) FROM messages");
   }
 
@@ -133,12 +138,17 @@ class Db3Source : public MessageSource {
   // The next row, SQLITE_ROW or SQLITE_DONE. At the first damage it goes over to reading row by
   // row, which finds whatever the intact pages hold.
   int step() {
-    if (!by_row_) {
+    if (!damaged_after_) {
       const int state = sqlite3_step(rows_.get());
       if (state == SQLITE_ROW || state == SQLITE_DONE) return state;
       warn_damage("the database is damaged after " + std::to_string(read_) +
                   " messages; reading row by row from there");
-      by_row_ = true;
+      damaged_after_ = last_;
+      // In order of rows those up to the last one are done; in order of time they may be anywhere.
+      if (!indexed_) {
+        row_ = last_.second;
+        damaged_after_ = {-kLatestTime, 0};
+      }
       rows_ = prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id = ?");
       if (rows_ == nullptr) return SQLITE_DONE;
     }
@@ -169,11 +179,12 @@ class Db3Source : public MessageSource {
   Log& log_;
   Statement rows_;
   std::map<std::int64_t, std::shared_ptr<const MessageChannel>> topics_;
-  TimeNs first_ = 0;
-  TimeNs last_ = 0;
-  TimeNs last_time_ = 0;
+  TimeNs begin_ = 0;
+  TimeNs end_ = 0;
+  bool indexed_ = false;                // and so in order of time
+  Place last_{-kLatestTime, 0};         // of the last message
+  std::optional<Place> damaged_after_;  // set: reading row by row what comes later
   std::uint64_t read_ = 0;
-  bool by_row_ = false;
   bool ended_ = false;
   std::int64_t row_ = 0;
   std::int64_t last_row_ = 0;  // 0 if the damage hides it

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
+#include "understory/recording/field_type.h"
 #include "understory/recording/message_reader.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/imu_sample.h"
@@ -18,18 +19,6 @@ namespace understory {
 struct MessageHeader {
   TimeNs stamp = 0;
   std::string frame;
-};
-
-// sensor_msgs/PointField datatypes.
-enum class FieldType : std::uint8_t {
-  kInt8 = 1,
-  kUint8 = 2,
-  kInt16 = 3,
-  kUint16 = 4,
-  kInt32 = 5,
-  kUint32 = 6,
-  kFloat32 = 7,
-  kFloat64 = 8
 };
 
 struct CloudField {

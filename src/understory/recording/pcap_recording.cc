@@ -113,11 +113,33 @@ class PcapRecording : public Recording {
   bool finished_ = false;
 };
 
-class VelodynePcap : public PcapRecording {
+// With the decoder of one kind of sensor.
+template <typename Decoder>
+class DecodedPcap : public PcapRecording {
+ protected:
+  template <typename Settings>
+  DecodedPcap(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar,
+              const Settings& settings, Log& log)
+      : PcapRecording(std::move(file), std::move(survey), lidar, log),
+        decoder_(settings, file_->name(), log) {}
+
+  void finish() override {
+    decoder_.finish();
+    take_scans();
+  }
+
+  void take_scans() {
+    while (ScanPtr scan = decoder_.take_scan())
+      emit_scan(std::move(scan));
+  }
+
+  Decoder decoder_;
+};
+
+class VelodynePcap : public DecodedPcap<VelodyneDecoder> {
  public:
   VelodynePcap(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar, Log& log)
-      : PcapRecording(std::move(file), std::move(survey), lidar, log),
-        decoder_(VelodyneConfig{}, file_->name(), log) {
+      : DecodedPcap(std::move(file), std::move(survey), lidar, VelodyneConfig{}, log) {
     lidar_statistics_.report().type = "Velodyne packets";
     second_statistics_.report().role = "gnss";
     second_statistics_.report().type = "Velodyne position packets";
@@ -175,28 +197,14 @@ class VelodynePcap : public PcapRecording {
     }
   }
 
-  void finish() override {
-    decoder_.finish();
-    take_scans();
-  }
-
-  void take_scans() {
-    while (ScanPtr scan = decoder_.take_scan())
-      emit_scan(std::move(scan));
-  }
-
   std::string sensor() const override { return "Velodyne " + rig_.lidar_model; }
-
-  VelodyneDecoder decoder_;
 };
 
-class OusterPcap : public PcapRecording {
+class OusterPcap : public DecodedPcap<OusterDecoder> {
  public:
   OusterPcap(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar,
              const OusterMetadata& metadata, Log& log)
-      : PcapRecording(std::move(file), std::move(survey), lidar, log),
-        metadata_(metadata),
-        decoder_(metadata, file_->name(), log) {
+      : DecodedPcap(std::move(file), std::move(survey), lidar, metadata, log), metadata_(metadata) {
     lidar_statistics_.report().type = "Ouster packets";
     lidar_statistics_.report().conventions = decoder_.conventions();
     second_statistics_.report().role = "imu";
@@ -244,20 +252,9 @@ class OusterPcap : public PcapRecording {
     }
   }
 
-  void finish() override {
-    decoder_.finish();
-    take_scans();
-  }
-
-  void take_scans() {
-    while (ScanPtr scan = decoder_.take_scan())
-      emit_scan(std::move(scan));
-  }
-
   std::string sensor() const override { return "Ouster " + metadata_.product; }
 
   OusterMetadata metadata_;
-  OusterDecoder decoder_;
   std::optional<UdpStream> imu_;
 };
 

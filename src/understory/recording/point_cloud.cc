@@ -24,25 +24,6 @@ constexpr std::string_view kTimeNames[] = {
     "ts",         "gps_time",    "timestamp_offset"};
 constexpr std::string_view kReturnNames[] = {"return_index"};
 
-std::uint32_t size_of(FieldType type) {
-  switch (type) {
-    case FieldType::kInt8:
-    case FieldType::kUint8:
-      return 1;
-    case FieldType::kInt16:
-    case FieldType::kUint16:
-      return 2;
-    case FieldType::kInt32:
-    case FieldType::kUint32:
-    case FieldType::kFloat32:
-      return 4;
-    case FieldType::kFloat64:
-      return 8;
-    default:
-      return 0;
-  }
-}
-
 template <typename T>
 double load(const std::uint8_t* raw, bool swap) {
   std::array<std::uint8_t, sizeof(T)> bytes;
@@ -139,25 +120,8 @@ void count_from_first(const std::vector<TimeNs>& relative, TimeNs header, Scan& 
 }  // namespace
 
 double CloudLayout::Slot::read(const std::uint8_t* point) const {
-  const std::uint8_t* raw = point + offset;
-  switch (type) {
-    case FieldType::kFloat32:
-      return load<float>(raw, swap);
-    case FieldType::kInt8:
-      return load<std::int8_t>(raw, swap);
-    case FieldType::kUint8:
-      return load<std::uint8_t>(raw, swap);
-    case FieldType::kInt16:
-      return load<std::int16_t>(raw, swap);
-    case FieldType::kUint16:
-      return load<std::uint16_t>(raw, swap);
-    case FieldType::kInt32:
-      return load<std::int32_t>(raw, swap);
-    case FieldType::kUint32:
-      return load<std::uint32_t>(raw, swap);
-    default:
-      return load<double>(raw, swap);
-  }
+  return visit_field_type(type,
+                          [&](auto zero) { return load<decltype(zero)>(point + offset, swap); });
 }
 
 std::optional<CloudLayout> CloudLayout::find(const PointCloud2Message& cloud) {
@@ -165,7 +129,7 @@ std::optional<CloudLayout> CloudLayout::find(const PointCloud2Message& cloud) {
   const auto take = [&](std::span<const std::string_view> names, Slot& slot) -> std::string {
     for (const std::string_view name : names) {
       for (const CloudField& field : cloud.fields) {
-        const std::uint32_t size = size_of(field.type);
+        const std::uint32_t size = field_size(field.type);
         if (!same_name(field.name, name) || size == 0) continue;
         if (field.offset > cloud.point_step || size > cloud.point_step - field.offset) continue;
         slot = {field.offset, size, field.type, cloud.big_endian};

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nanoflann.hpp>
 
-#include "understory/registration/solve.h"
+#include "understory/registration/conclude.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -131,31 +131,6 @@ IcpTarget::~IcpTarget() = default;
 
 namespace {
 
-struct Sums {
-  Matrix6d hessian = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
-  double cost = 0.0;
-  double nearest_squared = 0.0;
-  double weight = 0.0;
-  double weighted_residual = 0.0;
-  double weighted_rows = 0.0;
-  double surface_squared = 0.0;
-  std::size_t matched = 0;
-
-  Sums& operator+=(const Sums& other) {
-    hessian += other.hessian;
-    gradient += other.gradient;
-    cost += other.cost;
-    nearest_squared += other.nearest_squared;
-    weight += other.weight;
-    weighted_residual += other.weighted_residual;
-    weighted_rows += other.weighted_rows;
-    surface_squared += other.surface_squared;
-    matched += other.matched;
-    return *this;
-  }
-};
-
 class Accumulator {
  public:
   Accumulator(const IcpTarget::Tree& target, const Points& source, const Pose& pose,
@@ -168,7 +143,7 @@ class Accumulator {
         precision_(1.0 / (config.sigma_m * config.sigma_m)),
         kernel_(config.kernel_m * config.kernel_m) {}
 
-  void operator()(Sums& sums, std::size_t i) const {
+  void operator()(MatchSums& sums, std::size_t i) const {
     const Eigen::Vector3d point = source_[i].cast<double>();
     const Eigen::Vector3d placed = pose_ * point;
     std::uint32_t index = 0;
@@ -205,7 +180,7 @@ class Accumulator {
  private:
   template <int Rows>
   void add(const Eigen::Matrix<double, Rows, 6>& jacobian,
-           const Eigen::Matrix<double, Rows, 1>& residual, Sums& sums) const {
+           const Eigen::Matrix<double, Rows, 1>& residual, MatchSums& sums) const {
     const double squared = residual.squaredNorm();
     const double share = kernel_ / (kernel_ + squared);  // Geman-McClure
     const double weight = share * share;
@@ -227,14 +202,6 @@ class Accumulator {
   double kernel_;
 };
 
-RegistrationResult refused(RegistrationStatus status, std::string reason, const Pose& guess) {
-  RegistrationResult result;
-  result.status = status;
-  result.reason = std::move(reason);
-  result.target_from_source = guess;
-  return result;
-}
-
 }  // namespace
 
 RegistrationResult register_icp(const IcpTarget& target, const Points& source, const Pose& guess,
@@ -242,15 +209,15 @@ RegistrationResult register_icp(const IcpTarget& target, const Points& source, c
   const IcpTarget::Tree& tree = target.tree();
   const auto least = static_cast<std::size_t>(config.min_matches);
   if (tree.points.size() < least || source.size() < least) {
-    return refused(RegistrationStatus::kTooFewPoints,
-                   "only " + std::to_string(source.size()) + " source and " +
-                       std::to_string(tree.points.size()) + " target points",
-                   guess);
+    return internal::refused(RegistrationStatus::kTooFewPoints,
+                             "only " + std::to_string(source.size()) + " source and " +
+                                 std::to_string(tree.points.size()) + " target points",
+                             guess);
   }
-  Sums at;
+  MatchSums at;
   const auto evaluate = [&](const Pose& pose) {
     const Accumulator accumulator(tree, source, pose, config);
-    at = ordered_sum(source.size(), 64, Sums{}, accumulator);
+    at = ordered_sum(source.size(), 64, MatchSums{}, accumulator);
     const double share = config.independent_share;
     internal::Quadratic sum{share * at.cost, share * at.gradient, share * at.hessian};
     if (prior) internal::add_prior(*prior, pose, sum);
@@ -262,31 +229,7 @@ RegistrationResult register_icp(const IcpTarget& target, const Points& source, c
                          {config.max_iterations, config.step_translation_m,
                           config.step_rotation_rad, config.max_step_m, range});
   (void)evaluate(minimum.pose);
-  if (at.matched < least) {
-    return refused(RegistrationStatus::kTooFewMatches,
-                   "only " + std::to_string(at.matched) + " of " + std::to_string(source.size()) +
-                       " points near the target",
-                   guess);
-  }
-  if (!(at.hessian.trace() > 0.0)) {
-    return refused(RegistrationStatus::kDegenerate, "nothing near constrains the pose", guess);
-  }
-  RegistrationResult result;
-  result.target_from_source = minimum.pose;
-  result.iterations = minimum.iterations;
-  result.status =
-      minimum.converged ? RegistrationStatus::kConverged : RegistrationStatus::kIterationLimit;
-  if (!minimum.converged)
-    result.reason = "no small step within " + std::to_string(config.max_iterations) + " iterations";
-  const auto matched = static_cast<double>(at.matched);
-  result.inlier_ratio = matched / static_cast<double>(source.size());
-  result.fitness_m2 = at.nearest_squared / matched;
-  result.surface_residual_m2 = at.weight > 0.0 ? at.surface_squared / at.weight : 0.0;
-  const double variance = at.weighted_rows > 0.0 ? at.weighted_residual / at.weighted_rows : 1.0;
-  result.information = config.independent_share / std::max(variance, 0.1) * at.hessian;
-  result.degenerate_directions =
-      internal::degenerate_directions(result.information, range, config.degenerate_ratio);
-  return result;
+  return internal::conclude(minimum, at, source, range, guess, internal::Judgement(config));
 }
 
 }  // namespace understory

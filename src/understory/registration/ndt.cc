@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "understory/registration/solve.h"
+#include "understory/registration/conclude.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -38,47 +38,18 @@ void describe(ConfigTable& table, NdtConfig& config) {
             "share of matched points that counts as independent");
 }
 
-namespace {
-
-RegistrationResult refused(RegistrationStatus status, std::string reason, const Pose& guess) {
-  RegistrationResult result;
-  result.status = status;
-  result.reason = std::move(reason);
-  result.target_from_source = guess;
-  return result;
-}
-
-// The Hessian promises what independent points with exactly modelled residuals would give; the
-// residuals themselves tell by how much they are wider.
-Matrix6d realistic_information(const NdtCost& at, const NdtConfig& config) {
-  const double variance = at.weighted_rows > 0.0 ? at.weighted_residual / at.weighted_rows : 1.0;
-  return config.independent_share / std::max(variance, 0.1) * at.hessian;
-}
-
-void describe_fit(const NdtCost& at, const Points& source, double range_m, const NdtConfig& config,
-                  RegistrationResult& result) {
-  const auto matched = static_cast<double>(at.matched);
-  result.inlier_ratio = matched / static_cast<double>(source.size());
-  result.fitness_m2 = at.matched > 0 ? at.nearest_squared / matched : 0.0;
-  result.surface_residual_m2 = at.weight > 0.0 ? at.surface_squared / at.weight : 0.0;
-  result.information = realistic_information(at, config);
-  result.degenerate_directions =
-      internal::degenerate_directions(result.information, range_m, config.degenerate_ratio);
-}
-
-}  // namespace
-
 RegistrationResult register_ndt(const NdtMap& target, const Points& source, const Pose& guess,
                                 const std::optional<PosePrior>& prior, const NdtConfig& config) {
-  if (target.empty()) return refused(RegistrationStatus::kTooFewPoints, "empty target", guess);
+  if (target.empty())
+    return internal::refused(RegistrationStatus::kTooFewPoints, "empty target", guess);
   if (source.size() < static_cast<std::size_t>(config.min_matches)) {
-    return refused(RegistrationStatus::kTooFewPoints,
-                   "only " + std::to_string(source.size()) + " source points", guess);
+    return internal::refused(RegistrationStatus::kTooFewPoints,
+                             "only " + std::to_string(source.size()) + " source points", guess);
   }
   const double range = internal::mean_range(source);
   double widening = config.widening;
   const auto evaluate = [&](const Pose& pose) {
-    const NdtCost at = ndt_cost(target, source, pose, config, widening);
+    const MatchSums at = ndt_cost(target, source, pose, config, widening);
     const double share = config.independent_share;
     internal::Quadratic sum{share * at.cost, share * at.gradient, share * at.hessian};
     if (prior) internal::add_prior(*prior, pose, sum);
@@ -103,25 +74,8 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
 
   NdtConfig plain = config;  // information has to be positive
   plain.hessian = NdtConfig::Hessian::kGaussNewton;
-  const NdtCost at = ndt_cost(target, source, minimum.pose, plain);
-  if (at.matched < static_cast<std::size_t>(config.min_matches)) {
-    return refused(RegistrationStatus::kTooFewMatches,
-                   "only " + std::to_string(at.matched) + " of " + std::to_string(source.size()) +
-                       " points near the target",
-                   guess);
-  }
-  if (!(at.hessian.trace() > 0.0)) {
-    return refused(RegistrationStatus::kDegenerate, "nothing near constrains the pose", guess);
-  }
-  RegistrationResult result;
-  result.target_from_source = minimum.pose;
-  result.iterations = minimum.iterations;
-  result.status =
-      minimum.converged ? RegistrationStatus::kConverged : RegistrationStatus::kIterationLimit;
-  if (!minimum.converged)
-    result.reason = "no small step within " + std::to_string(config.max_iterations) + " iterations";
-  describe_fit(at, source, range, config, result);
-  return result;
+  const MatchSums at = ndt_cost(target, source, minimum.pose, plain);
+  return internal::conclude(minimum, at, source, range, guess, internal::Judgement(config));
 }
 
 RegistrationResult register_ndt(std::span<const NdtMapPtr> targets, const Points& source,

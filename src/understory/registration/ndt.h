@@ -3,6 +3,7 @@
 #include <optional>
 #include <span>
 
+#include "understory/registration/match_sums.h"
 #include "understory/registration/ndt_map.h"
 #include "understory/registration/registration.h"
 #include "understory/util/config.h"
@@ -57,19 +58,8 @@ void describe(ConfigTable& table, NdtConfig& config);
 
 // The cost that register_ndt minimises (prior left out), with its gradient and Hessian with respect
 // to a right perturbation. For tests and for those who optimise it with other terms.
-struct NdtCost {
-  double cost = 0.0;
-  Vector6d gradient = Vector6d::Zero();
-  Matrix6d hessian = Matrix6d::Zero();
-  std::size_t matched = 0;         // points with at least one cell
-  double nearest_squared = 0.0;    // sum over matched points, see RegistrationResult::fitness_m2
-  double weight = 0.0;             // sum of weights
-  double weighted_residual = 0.0;  // sum of weight * squared normalised residual
-  double weighted_rows = 0.0;      // sum of weight * rows
-  double surface_squared = 0.0;    // sum of weight * squared distance from the surface, m^2
-};
-[[nodiscard]] NdtCost ndt_cost(const NdtMap& target, const Points& source,
-                               const Pose& target_from_source, const NdtConfig& config,
-                               double widening = 1.0);
+[[nodiscard]] MatchSums ndt_cost(const NdtMap& target, const Points& source,
+                                 const Pose& target_from_source, const NdtConfig& config,
+                                 double widening = 1.0);
 
 }  // namespace understory

@@ -6,23 +6,17 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "understory/registration/match_sums.h"
 #include "understory/registration/ndt_map.h"
 
 namespace understory::internal {
 
 // Sums over a block of points, in axes of the target around the source's origin.
-struct NdtSums {
+struct NdtSums : MatchCounts {
   // Upper triangle of sum of w j j^T, each row followed by its part of the gradient: for row i the
   // columns i..5 and the residual.
   std::array<float, 27> hessian{};
   std::array<std::array<float, 6>, 6> exact{};  // what the exact Hessian has beyond that
-  double cost = 0.0;
-  double nearest_squared = 0.0;
-  double weight = 0.0;
-  double weighted_residual = 0.0;
-  double weighted_rows = 0.0;
-  double surface_squared = 0.0;
-  std::uint32_t matched = 0;
 };
 
 // exp(x) for x <= 0 to 2e-7, without branches or calls, so that loops over it become vector code.

@@ -228,7 +228,7 @@ class Accumulator {
   float pull_ = 1.0F;  // weight of a perfect match
 };
 
-void add_block(const NdtSums& block, NdtCost& to) {
+void add_block(const NdtSums& block, MatchSums& to) {
   const float* from = block.hessian.data();
   for (int row = 0; row < 6; ++row) {
     for (int column = row; column < 6; ++column) {
@@ -242,26 +242,20 @@ void add_block(const NdtSums& block, NdtCost& to) {
           block.exact[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]);
     }
   }
-  to.cost += block.cost;
-  to.matched += block.matched;
-  to.nearest_squared += block.nearest_squared;
-  to.weight += block.weight;
-  to.weighted_residual += block.weighted_residual;
-  to.weighted_rows += block.weighted_rows;
-  to.surface_squared += block.surface_squared;
+  to.MatchCounts::operator+=(block);
 }
 
 }  // namespace
 
-NdtCost ndt_cost(const NdtMap& target, const Points& source, const Pose& target_from_source,
-                 const NdtConfig& config, double widening) {
+MatchSums ndt_cost(const NdtMap& target, const Points& source, const Pose& target_from_source,
+                   const NdtConfig& config, double widening) {
   const Accumulator accumulator(target, source, target_from_source, config, widening);
   const std::size_t blocks = (source.size() + kBlock - 1) / kBlock;
   std::vector<NdtSums> sums(blocks);
   parallel_for(blocks, 2, [&](std::size_t b) {
     sums[b] = accumulator.block(b * kBlock, std::min(source.size(), (b + 1) * kBlock));
   });
-  NdtCost total;
+  MatchSums total;
   for (const NdtSums& block : sums)
     add_block(block, total);
   // From steps in axes of the target to right perturbations: both parts turn with the source.

@@ -86,7 +86,7 @@ TEST_P(NdtDerivatives, AgreeWithDifferences) {
   config.hessian = NdtConfig::Hessian::kNewton;
   const bool trilinear = GetParam() == NdtConfig::Search::k8;
   if (trilinear) GTEST_SKIP() << "its weights move with the point and are held fixed on purpose";
-  const NdtCost at = ndt_cost(*map, source, pose, config);
+  const MatchSums at = ndt_cost(*map, source, pose, config);
   ASSERT_GE(at.matched, source.size() * 9 / 10);
   const auto h = [](int i) { return i < 3 ? 1e-4 : 1e-3; };  // levers of up to 10 m
   const auto cost = [&](const Vector6d& step) {
