@@ -67,7 +67,7 @@ AlignmentResult align_points_se3(const std::vector<Eigen::Vector3d>& source,
       svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();  // eq. 40
   AlignmentResult result;
   result.target_from_source = Pose(rotation, m.target_mean - rotation * m.source_mean);  // eq. 41
-  const Eigen::Vector3d extent = svd.singularValues();
+  const Eigen::Vector3d& extent = svd.singularValues();
   result.determined = extent(0) > 0.0 && extent(1) > kRankTolerance * extent(0);
   return result;
 }

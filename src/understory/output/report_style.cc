@@ -20,8 +20,8 @@ section{background:var(--card);border:1px solid var(--rule);border-radius:8px;pa
 .verdict{border-left:8px solid var(--good)}.verdict.fair{border-left-color:var(--fair)}
 .verdict.bad{border-left-color:var(--bad)}.verdict h2{margin:0;color:var(--good)}
 .verdict.fair h2{color:var(--fair)}.verdict.bad h2{color:var(--bad)}.verdict p,.verdict ul{margin:.2rem 0 0}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(135px,1fr));gap:12px}
-.tile b{display:block;font-size:1.35rem;font-variant-numeric:tabular-nums}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(170px,1fr));gap:12px}
+.tile b{display:block;white-space:nowrap;font-size:1.35rem;font-variant-numeric:tabular-nums}
 .tile span{color:var(--soft);font-size:.85rem;line-height:1.25;display:block}
 .paper{background:#fff;border:1px solid var(--rule);border-radius:4px}
 svg{display:block;width:100%;height:auto}
