@@ -4,75 +4,13 @@
 
 #include "understory/simulation/carrier.h"
 #include "understory/simulation/counter_noise.h"
+#include "understory/simulation/motion.h"
 
 namespace understory {
+
+using namespace motion;
+
 namespace {
-
-constexpr double kStep = 0.05;  // seconds between control points of the path
-constexpr double kTau = 2.0 * std::numbers::pi;
-constexpr double kDegree = std::numbers::pi / 180.0;
-
-// From 0 to 1 with two continuous derivatives.
-double ease(double t) {
-  t = std::clamp(t, 0.0, 1.0);
-  return t * t * t * (t * (6.0 * t - 15.0) + 10.0);
-}
-
-// A smooth random function of time with frequencies of a band, standard deviation 1.
-class Wander {
- public:
-  Wander(Random& random, double low_hz, double high_hz) {
-    for (Wave& wave : waves_) {
-      wave.frequency = low_hz * std::pow(high_hz / low_hz, random.uniform());
-      wave.phase = random.uniform(0.0, kTau);
-    }
-  }
-  [[nodiscard]] double at(double time_s) const {
-    double sum = 0.0;
-    for (const Wave& wave : waves_)
-      sum += std::sin(kTau * wave.frequency * time_s + wave.phase);
-    return sum * std::sqrt(2.0 / std::size(waves_));
-  }
-
- private:
-  struct Wave {
-    double frequency = 0.0;
-    double phase = 0.0;
-  };
-  Wave waves_[6];
-};
-
-// A quantity that rests at values and eases from one to the next.
-class Moves {
- public:
-  void add(double start_s, double duration_s, double target) {
-    moves_.push_back({start_s, duration_s, target});
-  }
-  [[nodiscard]] double at(double time_s) const {
-    double value = 0.0;
-    for (const Move& move : moves_) {
-      if (time_s <= move.start_s) break;
-      value += (move.target - value) * ease((time_s - move.start_s) / move.duration_s);
-    }
-    return value;
-  }
-
- private:
-  struct Move {
-    double start_s;
-    double duration_s;
-    double target;
-  };
-  std::vector<Move> moves_;  // in order, not overlapping
-};
-
-double turn_time(double angle_rad, double peak_rate_deg_s) {
-  return std::max(0.5, 1.875 * std::abs(angle_rad) / (peak_rate_deg_s * kDegree));
-}
-
-std::size_t steps_of(double duration_s) {
-  return static_cast<std::size_t>(std::ceil(duration_s / kStep)) + 4;
-}
 
 // ---- a walker with the sensor on a pole ------------------------------------------------------
 
@@ -81,9 +19,8 @@ struct Walk {
   std::vector<double> pace;      // share of the usual speed, 0 standing
 };
 
-Walk walk_along(const SiteConfig& config, double length_m, Random& random) {
-  const CarrierConfig& c = config.carrier;
-  const Wander speed(random, 0.02, 0.15);
+Walk walk_at(const SiteConfig& config, const CarrierConfig& c, double length_m,
+             const Wander& speed) {
   Walk walk;
   double distance = 0.0;
   const double limit = config.duration_s > 0.0 ? config.duration_s : 1e6;
@@ -101,6 +38,23 @@ Walk walk_along(const SiteConfig& config, double length_m, Random& random) {
   walk.distance.insert(walk.distance.end(), rest, distance);
   walk.pace.insert(walk.pace.end(), rest, 0.0);
   return walk;
+}
+
+Walk walk_along(const SiteConfig& config, double length_m, Random& random) {
+  const Wander speed(random, 0.02, 0.15);
+  CarrierConfig c = config.carrier;
+  if (c.route_time_s > 0.0) {
+    // The speed at which the whole route takes the time that it should.
+    SiteConfig whole = config;
+    whole.duration_s = 0.0;
+    c.speed_m_s = length_m / std::max(1.0, c.route_time_s - c.still_s - 4.0);
+    for (int i = 0; i < 3; ++i) {
+      const double time =
+          kStep * static_cast<double>(walk_at(whole, c, length_m, speed).distance.size());
+      c.speed_m_s *= (time - c.still_s) / std::max(1.0, c.route_time_s - c.still_s);
+    }
+  }
+  return walk_at(config, c, length_m, speed);
 }
 
 Moves quick_turns(const CarrierConfig& c, double duration_s, Random& random) {
@@ -158,7 +112,7 @@ CarrierPlan plan_walk(const SiteConfig& config, const Route& route, const Terrai
         kDegree * (c.yaw_wander_deg * sway * yaw.at(t) + c.gait_deg * pace * std::sin(0.5 * step));
     controls.push_back(control);
   }
-  return {CarrierPath(CarrierPath::Spline(std::move(controls), kStep)), BoomPath()};
+  return {CarrierPath(CarrierPath::Spline(std::move(controls), kStep)), BoomPath(), {}, {}};
 }
 
 // ---- a harvester ----------------------------------------------------------------------------
@@ -223,17 +177,6 @@ Work harvester_work(const SiteConfig& config, double road_m, Random& random) {
   return work;
 }
 
-// Rocking after a jolt: damped at about 1 Hz.
-double rocking(const std::vector<double>& jolts_s, double t) {
-  double sum = 0.0;
-  for (const double jolt : jolts_s) {
-    const double age = t - jolt;
-    if (age <= 0.0 || age > 6.0) continue;
-    sum += ease(age / 0.25) * std::exp(-age / 1.1) * std::sin(kTau * 0.9 * age);
-  }
-  return sum;
-}
-
 CarrierPlan plan_harvester(const SiteConfig& config, const Route& route, const Terrain& terrain) {
   const CarrierConfig& c = config.carrier;
   Random random(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kCarrier));
@@ -277,12 +220,19 @@ CarrierPlan plan_harvester(const SiteConfig& config, const Route& route, const T
     boom.emplace_back(3.0 + work.reach.at(t), 2.6 + work.lift.at(t));
   }
   return {CarrierPath(CarrierPath::Spline(std::move(controls), kStep)),
-          BoomPath(std::move(boom), kStep)};
+          BoomPath(std::move(boom), kStep),
+          {},
+          {}};
 }
 
 }  // namespace
 
 CarrierPlan plan_carrier(const SiteConfig& config, const Route& route, const Terrain& terrain) {
+  if (config.carrier.kind == "harvester" && config.carrier.work == "thinning") {
+    return plan_thinning(config, route, terrain);
+  }
+  if (config.carrier.kind == "uav") return plan_uav(config, route, terrain);
+  if (config.carrier.kind == "sleigh") return plan_sleigh(config, route, terrain);
   if (config.carrier.kind == "harvester") return plan_harvester(config, route, terrain);
   return plan_walk(config, route, terrain);
 }

@@ -61,6 +61,8 @@ enum class NoiseStream : std::uint64_t {
   kImu,
   kGnss,
   kBoom,
+  kMag,
+  kWeather,
 };
 
 [[nodiscard]] inline std::uint64_t stream_of(NoiseStream stream) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace understory {
 namespace {
@@ -48,10 +49,34 @@ double meet_bar(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
   return best;
 }
 
+// The stem in the head: its foot end just below the grip while it stands; falling, it turns to the
+// side; level, it is fed through the grip to and fro.
+Machine::Bar stem_in(const HeldStem& stem, const Eigen::Vector3d& head, double time_s) {
+  const double fallen = std::clamp((time_s - stem.fall_s) / (stem.level_s - stem.fall_s), 0.0, 1.0);
+  const double tilt = 0.5 * std::numbers::pi * fallen * fallen;
+  const Eigen::Vector3d along(0.0, stem.side * std::sin(tilt), std::cos(tilt));
+  const double work = std::max(1.0, stem.drop_s - stem.level_s);
+  const double share = std::clamp((time_s - stem.level_s) / work, 0.0, 1.0);
+  const double fed = 0.4 + (stem.length_m - 2.0) * std::abs(std::sin(2.5 * share));
+  const double length = stem.length_m * (1.0 - 0.55 * share);  // logs are cut off
+  return {head - std::min(fed, length - 0.5) * along, head + std::max(0.5, length - fed) * along,
+          stem.radius_m};
+}
+
+// Whether a ray stays clear of the ball around a bar.
+bool passes_by(const Machine::Bar& bar, const Eigen::Vector3d& origin,
+               const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d middle = 0.5 * (bar.from + bar.to) - origin;
+  const double radius = 0.5 * (bar.to - bar.from).norm() + bar.radius_m + 1e-6;
+  const double along = middle.dot(direction);
+  const double aside = middle.squaredNorm() - along * along;
+  return aside > radius * radius || (along < 0.0 && middle.squaredNorm() > radius * radius);
+}
+
 }  // namespace
 
-Machine::Machine(const CarrierConfig& config, const BoomPath& boom)
-    : present_(config.kind == "harvester"), boom_(boom) {}
+Machine::Machine(const CarrierConfig& config, const CarrierPlan& plan)
+    : present_(config.kind == "harvester"), boom_(plan.boom), held_(plan.held) {}
 
 Machine::Parts Machine::at(double time_s) const {
   const BoomPath::Vector boom = boom_.value(time_s);
@@ -75,12 +100,18 @@ Machine::Parts Machine::at(double time_s) const {
       {{1.5, -1.4, 0.6}, {1.5, -1.05, 0.6}, 0.6},
       {{0.35, 0.75, 1.0}, {0.35, 0.75, 2.9}, 0.06},
       {{0.35, -0.45, 1.0}, {0.35, -0.45, 2.9}, 0.06}};
+  for (const HeldStem& stem : held_) {
+    if (time_s >= stem.grab_s && time_s < stem.drop_s) {
+      parts.bars.push_back(stem_in(stem, head, time_s));
+    }
+  }
   return parts;
 }
 
 void Machine::cast(const Parts& parts, const Eigen::Vector3d& origin,
                    const Eigen::Vector3d& direction, double near_m, double far_m, Hit& hit) {
   for (const Bar& bar : parts.bars) {
+    if (passes_by(bar, origin, direction)) continue;
     Eigen::Vector3d normal;
     const double t = meet_bar(origin, direction, bar, near_m, normal);
     if (t < 0.0 || t > far_m) continue;

@@ -11,8 +11,9 @@ namespace understory {
 // The carrier's own parts in the lidar's view, in the body frame: round bars (capsules) and boxes.
 class Machine {
  public:
-  // A walker has none; a harvester has wheels, a cabin and a boom that moves along `boom`.
-  Machine(const CarrierConfig& config, const BoomPath& boom);
+  // A walker has none; a harvester has wheels, a cabin, a boom that moves along the plan's and, in
+  // its head, the stems of the plan.
+  Machine(const CarrierConfig& config, const CarrierPlan& plan);
 
   // The parts at one moment, to be met by rays given in the body frame.
   struct Bar {
@@ -33,6 +34,7 @@ class Machine {
  private:
   bool present_ = false;
   BoomPath boom_;
+  std::vector<HeldStem> held_;
 };
 
 }  // namespace understory

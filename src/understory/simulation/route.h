@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "understory/simulation/site.h"
+#include "understory/util/random.h"
 
 namespace understory {
 
@@ -12,8 +13,10 @@ namespace understory {
 // Immutable, thread-safe.
 class Route {
  public:
-  // `walk`: a closed loop of config.length_m around the middle of the stand. `harvester`: a strip
-  // road of half that length, driven out and back.
+  // A loop: a closed curve of config.length_m that winds config.laps times around the middle of the
+  // stand. A strip road: of config.length_m if it is driven one way, else of half that length;
+  // beside it the other roads of the stand, on which nobody drives today. Roads of even numbers
+  // are driven westwards.
   Route(const CarrierConfig& config, std::uint64_t seed);
 
   [[nodiscard]] double length_m() const {
@@ -22,15 +25,23 @@ class Route {
   // Place and direction (radians from east, unwrapped) at a distance from the start; clamped.
   [[nodiscard]] Eigen::Vector2d place(double distance_m) const;
   [[nodiscard]] double heading(double distance_m) const;
-  // Smallest distance of a place to the curve.
+  // Smallest distance of a place to the curve (where the stand has several roads: to any of them).
   [[nodiscard]] double distance_to(const Eigen::Vector2d& place) const;
+  // Whether a place lies within a distance of the curve.
+  [[nodiscard]] bool near(const Eigen::Vector2d& place, double distance_m) const;
+  // Smallest distance to a stretch of the curve, given by shares of its length.
+  [[nodiscard]] double distance_to(const Eigen::Vector2d& place, double from, double to) const;
 
  private:
   void resample(const std::vector<Eigen::Vector2d>& dense, double length_m);
+  void make_roads(const CarrierConfig& config, Random& random);
 
   double step_m_ = 0.25;
   std::vector<Eigen::Vector2d> points_;  // step_m_ apart
   std::vector<double> headings_;
+  // Points along all roads of the stand where there are several: the same whichever is driven, so
+  // that the trees beside them are.
+  std::vector<Eigen::Vector2d> roads_;
 };
 
 }  // namespace understory

@@ -60,7 +60,8 @@ SatelliteReceiver::SatelliteReceiver(const SiteConfig& config, const CarrierPath
       path_(path),
       scene_(scene),
       start_(start),
-      seed_(hash_numbers(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kGnss))) {
+      seed_(hash_numbers(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kGnss),
+                         static_cast<std::uint64_t>(config.carrier.strip_road - 1))) {
   CounterNoise noise(seed_, 0, 1);
   slow_ = normal3(noise);
   fast_ = normal3(noise);
@@ -91,6 +92,34 @@ bool SatelliteReceiver::in_outage(double dt_s, CounterNoise& noise) {
   return outage_left_s_ > 0.0;
 }
 
+// A burst: the solution runs away to one side and comes back. The receiver does not know of it.
+Eigen::Vector3d SatelliteReceiver::burst(double dt_s) {
+  if (config_.burst_interval_s <= 0.0) return Eigen::Vector3d::Zero();
+  CounterNoise noise(seed_ + 3, static_cast<std::uint64_t>(count_), 0);
+  const bool begins = noise.uniform() < cover_ * cover_ * dt_s / config_.burst_interval_s;
+  const double angle = 2.0 * std::numbers::pi * noise.uniform();
+  const double share = 0.7 + 0.6 * noise.uniform();
+  if (burst_left_s_ <= 0.0 && begins) {
+    burst_s_ = share * config_.burst_s;
+    burst_left_s_ = burst_s_;
+    burst_peak_ =
+        share * config_.burst_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), noise.normal());
+  }
+  if (burst_left_s_ <= 0.0) return Eigen::Vector3d::Zero();
+  burst_left_s_ -= dt_s;
+  const double sine = std::sin(std::numbers::pi * std::max(0.0, burst_left_s_) / burst_s_);
+  return sine * sine * burst_peak_;
+}
+
+// The set of satellites changes: the solution steps aside, and stays there until the next change.
+void SatelliteReceiver::jump(double dt_s) {
+  if (config_.jump_interval_s <= 0.0) return;
+  CounterNoise noise(seed_ + 4, static_cast<std::uint64_t>(count_), 0);
+  if (noise.uniform() >= cover_ * cover_ * dt_s / config_.jump_interval_s) return;
+  jump_ = config_.jump_m * normal3(noise);
+  jump_.z() *= config_.height_factor;
+}
+
 std::optional<GnssFix> SatelliteReceiver::next() {
   const TimeNs stamp = next_stamp();
   const double dt = 1.0 / config_.rate_hz;
@@ -103,11 +132,14 @@ std::optional<GnssFix> SatelliteReceiver::next() {
   CounterNoise noise(seed_ + 2, static_cast<std::uint64_t>(count_), 0);
   walk(dt);
   const bool lost = in_outage(dt, noise);
+  jump(dt);
+  const Eigen::Vector3d runaway = burst(dt) + jump_;
   ++count_;
 
   const double sd = config_.open_sd_m + config_.canopy_sd_m * cover_ * cover_;
   error_ = sd * (slow_ + config_.multipath_share * fast_) + config_.white_sd_m * normal3(noise);
   error_.z() *= config_.height_factor;
+  error_ += runaway;
   if (lost) return std::nullopt;
 
   const Eigen::Vector3d geodetic = geodetic_from_enu(origin_, antenna + error_);

@@ -17,8 +17,8 @@ namespace understory {
                                                 const Eigen::Vector3d& point_in_enu);
 
 // The GNSS receiver under trees: slow and fast errors correlated in time, both growing with the
-// share of the sky that the stand hides, height worse than plane, outages, and a covariance that
-// promises too much. Fixes come one after another.
+// share of the sky that the stand hides, height worse than plane, outages, bursts, jumps, and a
+// covariance that promises too much. Fixes come one after another.
 class SatelliteReceiver {
  public:
   // `path` and `scene` must outlive the receiver.
@@ -36,6 +36,8 @@ class SatelliteReceiver {
  private:
   void walk(double dt_s);
   [[nodiscard]] bool in_outage(double dt_s, CounterNoise& noise);
+  [[nodiscard]] Eigen::Vector3d burst(double dt_s);
+  void jump(double dt_s);
 
   GnssConfig config_;
   OriginConfig origin_;
@@ -48,6 +50,10 @@ class SatelliteReceiver {
   Eigen::Vector3d error_ = Eigen::Vector3d::Zero();
   double cover_ = 0.0;
   double outage_left_s_ = 0.0;
+  Eigen::Vector3d jump_ = Eigen::Vector3d::Zero();
+  double burst_s_ = 1.0;
+  double burst_left_s_ = 0.0;
+  Eigen::Vector3d burst_peak_ = Eigen::Vector3d::Zero();
   std::int64_t count_ = 0;
 };
 

@@ -84,7 +84,8 @@ std::optional<ScanReadings> unflatten(ByteSpan bytes, float step_m) {
 }  // namespace
 
 bool ScanCache::fits(const LidarConfig& config) {
-  return config.range_step_m > 0.0 && config.max_range_m / config.range_step_m < 65535.0;
+  return config.returns == 1 && config.range_step_m > 0.0 &&
+         config.max_range_m / config.range_step_m < 65535.0;
 }
 
 ScanCache::ScanCache(const std::string& folder, std::uint64_t key, double range_step_m)

@@ -26,7 +26,7 @@ class ScanCache {
   ScanCache(const ScanCache&) = delete;
   ScanCache& operator=(const ScanCache&) = delete;
 
-  // Whether ranges of that step and reach can be kept (16 bits a range).
+  // Whether ranges of that step and reach can be kept (one return a beam, 16 bits a range).
   [[nodiscard]] static bool fits(const LidarConfig& config);
 
   [[nodiscard]] std::optional<ScanReadings> find(std::int64_t scan) const;

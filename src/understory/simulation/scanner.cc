@@ -13,6 +13,10 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::int64_t kBlockFirings = 16;
+constexpr double kSnowDrop = 3.0;       // seconds that a load of snow takes to come down
+constexpr double kSnowDropPerM = 0.08;  // flakes in a metre of beam then
+constexpr float kFlakeEnergy = 0.06F;   // of a large flake, as reflectivity x share of the beam
+constexpr float kGlaring = 130.0F;      // intensity from which an echo blooms
 
 // A rotation about the sensor's axis.
 struct Turn {
@@ -52,6 +56,7 @@ struct Scanner::Block {
   std::vector<Eigen::Vector3f> direction_in_lidar;  // reported, by beam
   std::vector<Eigen::Vector3f> origin_in_lidar;     // by firing
   std::vector<ScanReadings::Reading> readings;      // by beam
+  std::vector<ScanReadings::Reading> seconds;       // by beam, if two returns are asked for
   std::vector<std::uint64_t> stems;                 // tree << 16 | ring of each return from a stem
 };
 
@@ -126,6 +131,7 @@ ScanReadings Scanner::measure(std::int64_t number) {
   std::vector<std::uint64_t> stems;
   for (const Block& block : blocks) {
     readings.beams.insert(readings.beams.end(), block.readings.begin(), block.readings.end());
+    readings.seconds.insert(readings.seconds.end(), block.seconds.begin(), block.seconds.end());
     stems.insert(stems.end(), block.stems.begin(), block.stems.end());
   }
   readings.stems = count_stems(std::move(stems));
@@ -153,15 +159,19 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
         origin =
             (model_.beam_origin_m * Eigen::Vector3d(head.cosine, head.sine, 0.0)).cast<float>();
       }
-      const ScanReadings::Reading& reading = readings.beams[i];
-      if (!present(reading)) continue;
-      const Eigen::Vector3f point =
-          origin + reading.range_m * (head * beam_directions_[b]).cast<float>();
-      scan->points.push_back({point.x(), point.y(), point.z(), reading.intensity,
-                              static_cast<std::uint32_t>(start_ + time - scan->stamp),
-                              model_.beams[b].ring, 0, 0});
+      const auto add = [&](const ScanReadings::Reading& reading, std::uint8_t return_index) {
+        if (!present(reading)) return;
+        const Eigen::Vector3f point =
+            origin + reading.range_m * (head * beam_directions_[b]).cast<float>();
+        scan->points.push_back({point.x(), point.y(), point.z(), reading.intensity,
+                                static_cast<std::uint32_t>(start_ + time - scan->stamp),
+                                model_.beams[b].ring, return_index, 0});
+      };
+      add(readings.beams[i], 0);
+      if (!readings.seconds.empty()) add(readings.seconds[i], 1);
     }
   }
+  scan->stamp += from_seconds(config_.time_offset_s);
   return scan;
 }
 
@@ -172,14 +182,81 @@ void Scanner::cast_block(std::int64_t first, std::int64_t end, Block& block) con
   const std::size_t beams = model_.beams.size();
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
   block.readings.resize(block.direction_in_lidar.size());
+  const bool two = config_.returns == 2;
+  if (two) block.seconds.resize(block.readings.size());
   for (std::size_t i = 0; i < block.readings.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;
-    const Echo echo = strongest(&block.hits[i * rays_per_beam]);
+    Echo second;
+    Echo echo = strongest(&block.hits[i * rays_per_beam], two ? &second : nullptr);
+    if (config_.snow_fall_per_m > 0.0 || config_.snow_drop_interval_s > 0.0) {
+      const double time = to_seconds(model_.firing_time(static_cast<std::int64_t>(firing)));
+      const Echo behind = echo;
+      meet_snow(CounterNoise(seed_ + 6, firing, i % beams), snow_per_m(time), echo);
+      if (two && echo.surface == Surface::kSnow) second = behind;
+    }
+    if (second.surface != Surface::kNone) {
+      block.seconds[i] = read_beam(CounterNoise(seed_ + 5, firing, i % beams), second);
+    }
     if (echo.surface == Surface::kNone) continue;
     block.readings[i] = read_beam(CounterNoise(seed_, firing, i % beams), echo);
     if (echo.tree > 0 && block.readings[i].range_m > 0.0F) {
       block.stems.push_back(static_cast<std::uint64_t>(echo.tree) << 16 |
                             model_.beams[i % beams].ring);
+    }
+  }
+  if (config_.blooming > 0.0 || config_.crosstalk > 0.0) add_ghosts(first, block);
+}
+
+// Flakes in a metre of beam at a time: the fall of snow, and for a few seconds what a branch lets
+// go nearby.
+double Scanner::snow_per_m(double time_s) const {
+  if (config_.snow_drop_interval_s <= 0.0) return config_.snow_fall_per_m;
+  const double share = time_s / config_.snow_drop_interval_s;
+  CounterNoise noise(seed_ + 7, static_cast<std::uint64_t>(std::max(0.0, share)), 0);
+  const double begin = std::floor(share) * config_.snow_drop_interval_s +
+                       noise.uniform() * std::max(0.0, config_.snow_drop_interval_s - kSnowDrop);
+  const bool drops = time_s >= begin && time_s < begin + kSnowDrop;
+  return config_.snow_fall_per_m + (drops ? kSnowDropPerM : 0.0);
+}
+
+// A flake in front of what the beam would have met gives the first echo; whether it is strong
+// enough is settled as for any other.
+void Scanner::meet_snow(CounterNoise noise, double per_m, Echo& echo) const {
+  if (per_m <= 0.0) return;
+  const double range = config_.min_range_m - std::log(1.0 - noise.uniform()) / per_m;
+  const double reach = echo.surface == Surface::kNone ? config_.max_range_m : echo.range_m;
+  if (range >= reach) return;
+  Echo flake;
+  flake.range_m = static_cast<float>(range);
+  flake.energy = kFlakeEnergy * noise.uniform();
+  flake.surface = Surface::kSnow;
+  // Too weak a flake lets the beam pass.
+  const double signal = 10.0 * flake.energy * std::pow(config_.range_10_percent_m / range, 2.0);
+  if (signal > 1.0) echo = flake;
+}
+
+// Readings that nothing stands for: glaring echoes repeat in the beam's neighbours of the firings
+// before and after (within a block), and other sensors' pulses give any range.
+void Scanner::add_ghosts(std::int64_t first, Block& block) const {
+  const std::size_t beams = model_.beams.size();
+  const std::vector<ScanReadings::Reading> real = block.readings;
+  const auto step = static_cast<float>(std::max(config_.range_step_m, 1e-4));
+  for (std::size_t i = 0; i < real.size(); ++i) {
+    const auto firing = static_cast<std::uint64_t>(first) + i / beams;
+    CounterNoise noise(seed_ + 8, firing, i % beams);
+    if (noise.uniform() < config_.crosstalk) {
+      const double range = config_.min_range_m + noise.uniform() * 0.6 * config_.max_range_m;
+      block.readings[i] = {std::round(static_cast<float>(range) / step) * step,
+                           std::round(1.0F + 12.0F * noise.uniform())};
+      continue;
+    }
+    const bool blooms = noise.uniform() < config_.blooming;
+    if (!blooms) continue;
+    for (const std::size_t other : {i - beams, i + beams}) {  // before the first wraps: too large
+      if (other >= real.size() || real[other].intensity < kGlaring) continue;
+      const bool behind = real[i].range_m <= 0.0F || real[i].range_m > real[other].range_m + 0.3F;
+      if (behind)
+        block.readings[i] = {real[other].range_m, std::round(0.3F * real[other].intensity)};
     }
   }
 }
@@ -278,8 +355,9 @@ void Scanner::meet_machine(std::int64_t first, Block& block) const {
   }
 }
 
-// Hits of one beam that lie within a pulse's length merge into one echo; the strongest is reported.
-Scanner::Echo Scanner::strongest(const Hit* hits) const {
+// Hits of one beam that lie within a pulse's length merge into one echo; the strongest is reported,
+// and the one after it where `second` is given.
+Scanner::Echo Scanner::strongest(const Hit* hits, Echo* second) const {
   struct Piece {
     float range_m;
     float energy;
@@ -299,6 +377,8 @@ Scanner::Echo Scanner::strongest(const Hit* hits) const {
   }
   Echo best;
   float best_signal = 0.0F;
+  Echo echoes[64];
+  std::size_t echo_count = 0;
   for (std::size_t k = 0; k < used;) {
     Echo echo;
     float strongest_piece = 0.0F;
@@ -322,7 +402,19 @@ Scanner::Echo Scanner::strongest(const Hit* hits) const {
       best_signal = signal;
       best = echo;
     }
+    echoes[echo_count++] = echo;
     k = last;
+  }
+  if (second == nullptr) return best;
+  float second_signal = 0.0F;
+  for (std::size_t k = 0; k < echo_count; ++k) {
+    const Echo& echo = echoes[k];
+    const float signal = echo.energy / (echo.range_m * echo.range_m);
+    // What lies nearer to the first than a pulse cannot be told apart from it.
+    if (std::abs(echo.range_m - best.range_m) < config_.pulse_m || signal <= second_signal)
+      continue;
+    second_signal = signal;
+    *second = echo;
   }
   return best;
 }

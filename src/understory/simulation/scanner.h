@@ -27,6 +27,7 @@ struct ScanReadings {
     float intensity = 0.0F;  // whole number, 0 to 255
   };
   std::vector<Reading> beams;
+  std::vector<Reading> seconds;    // the weaker of two echoes, beam by beam; empty if not asked for
   std::vector<StemReturns> stems;  // by increasing id
 };
 
@@ -64,7 +65,10 @@ class Scanner {
   void trace(std::size_t firings, Block& block) const;
   void meet_machine(std::int64_t first, Block& block) const;
   [[nodiscard]] ScanReadings::Reading read_beam(CounterNoise noise, const Echo& echo) const;
-  [[nodiscard]] Echo strongest(const Hit* hits) const;
+  [[nodiscard]] Echo strongest(const Hit* hits, Echo* second) const;
+  [[nodiscard]] double snow_per_m(double time_s) const;
+  void meet_snow(CounterNoise noise, double per_m, Echo& echo) const;
+  void add_ghosts(std::int64_t first, Block& block) const;
 
   const LidarConfig config_;
   ForestScene& scene_;

@@ -26,7 +26,7 @@ struct World {
         stand(grow_stand(site.stand, site.carrier, terrain, route, seed)),
         plan(plan_carrier(site, route, terrain)),
         scene(site.stand, terrain, stand, seed),
-        machine(site.carrier, plan.boom),
+        machine(site.carrier, plan),
         scanner(site, scene, plan.path, machine, 0) {}
 
   [[nodiscard]] Eigen::Vector3d in_world(const Scan& scan, const ScanPoint& point) const {

@@ -1,5 +1,6 @@
 #include "understory/simulation/scene.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,6 +20,8 @@ namespace {
 constexpr unsigned kGroundGeometry = 0;
 constexpr unsigned kStemGeometry = 1;
 constexpr unsigned kWoodGeometry = 2;
+constexpr unsigned kBoulderGeometry = 3;
+constexpr unsigned kBuildingGeometry = 4;
 
 struct Vertex4 {
   float x, y, z, radius;
@@ -88,6 +91,31 @@ RTCGeometry shape_geometry(RTCDevice device, const Shape& shape) {
   return geometry;
 }
 
+Shape building_shape(const Building& house) {
+  const Eigen::Vector3f half = 0.5F * house.size_m.cast<float>();
+  const float wall = house.size_m.cast<float>().z();
+  const float ridge = wall + 0.6F * half.y();
+  const Eigen::Vector3f corners[10] = {{-half.x(), -half.y(), -1.0F}, {half.x(), -half.y(), -1.0F},
+                                       {half.x(), half.y(), -1.0F},   {-half.x(), half.y(), -1.0F},
+                                       {-half.x(), -half.y(), wall},  {half.x(), -half.y(), wall},
+                                       {half.x(), half.y(), wall},    {-half.x(), half.y(), wall},
+                                       {-half.x(), 0.0F, ridge},      {half.x(), 0.0F, ridge}};
+  const Eigen::AngleAxisf turn(static_cast<float>(house.yaw_rad), Eigen::Vector3f::UnitZ());
+  Shape shape;
+  for (const Eigen::Vector3f& corner : corners)
+    shape.vertices.push_back(house.foot.cast<float>() + turn * corner);
+  shape.triangles = {{0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4},
+                     {3, 4, 7}, {4, 5, 9}, {4, 9, 8}, {7, 8, 9}, {7, 9, 6}, {4, 8, 7}, {5, 6, 9}};
+  return shape;
+}
+
+// The same with a number of one's own choice.
+void attach_as(RTCScene scene, RTCGeometry geometry, unsigned id) {
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(scene, geometry, id);
+  rtcReleaseGeometry(geometry);
+}
+
 // Attaches and lets go of a finished geometry; returns its number in the scene.
 unsigned attach(RTCScene scene, RTCGeometry geometry) {
   rtcCommitGeometry(geometry);
@@ -104,7 +132,7 @@ struct CrownShape {
   RTCScene dead;  // branches below the crown: a slim thing, looked into far less often
 };
 
-CrownSize size_class(Species species, double height_m) {
+CrownSize size_class(Species species, double height_m, double crown_base_share) {
   CrownSize size;
   size.height_m = height_m;
   const double dbh = 0.0115 * height_m;
@@ -122,6 +150,7 @@ CrownSize size_class(Species species, double height_m) {
       size.crown_radius_m = 0.6 + 6.0 * dbh;
       break;
   }
+  if (crown_base_share > 0.0) size.crown_base_m = crown_base_share * height_m;
   return size;
 }
 
@@ -134,7 +163,9 @@ void commit(RTCScene scene) {
 
 class ForestScene::Impl {
  public:
-  Impl(const StandConfig& config, const Terrain& terrain, const Stand& stand, std::uint64_t seed) {
+  Impl(const StandConfig& config, const Terrain& terrain, const Stand& stand, std::uint64_t seed,
+       double snow_m)
+      : snowy_(snow_m > 0.0), snow_m_(snow_m) {
     // No number of threads here: the library would hold the whole process to it.
     device_ = rtcNewDevice("set_affinity=0");
     UNDERSTORY_CHECK(device_ != nullptr);
@@ -280,6 +311,15 @@ class ForestScene::Impl {
     } else if (packet.hit.geomID[i] == kWoodGeometry) {
       hit.surface = Surface::kDeadWood;
       hit.reflectivity = 0.32F;
+    } else if (packet.hit.geomID[i] == kBoulderGeometry) {
+      hit.surface = Surface::kBoulder;
+      hit.reflectivity = 0.28F;
+    } else if (packet.hit.geomID[i] == kBuildingGeometry) {
+      hit.surface = Surface::kBuilding;
+      hit.reflectivity = 0.55F;
+    } else if (snowy_) {
+      hit.reflectivity =
+          0.72F + 0.14F * static_cast<float>(hash_numbers(primitive) >> 40) * 0x1p-24F;
     } else {
       // Litter, moss and soil in patches.
       hit.reflectivity =
@@ -291,7 +331,10 @@ class ForestScene::Impl {
     static_ = new_scene();
     UNDERSTORY_CHECK(attach(static_, terrain_geometry(device_, terrain)) == kGroundGeometry);
     Cones stems;
-    bark_.assign(stand.trees.size() + 1, 0.3F);
+    int largest = 0;
+    for (const Tree& tree : stand.trees)
+      largest = std::max(largest, tree.id);
+    bark_.assign(static_cast<std::size_t>(largest) + 1, 0.3F);
     for (const Tree& tree : stand.trees)
       add_stem(tree, stems);
     // Always present, so that geometry numbers stay what they are: a cone below the ground.
@@ -309,7 +352,31 @@ class ForestScene::Impl {
     if (!wood.first.empty()) {
       UNDERSTORY_CHECK(attach(static_, cone_geometry(device_, wood)) == kWoodGeometry);
     }
+    add_solids(stand);
     commit(static_);
+  }
+
+  void add_solids(const Stand& stand) {
+    Cones boulders;
+    for (const Wood& boulder : stand.boulders) {
+      boulders.add(boulder.from, boulder.radius_from_m);
+      boulders.join();
+      boulders.add(boulder.to, boulder.radius_to_m);
+    }
+    if (!boulders.first.empty()) {
+      attach_as(static_, cone_geometry(device_, boulders), kBoulderGeometry);
+    }
+    Shape houses;
+    for (const Building& building : stand.buildings) {
+      const Shape house = building_shape(building);
+      const int first = static_cast<int>(houses.vertices.size());
+      houses.vertices.insert(houses.vertices.end(), house.vertices.begin(), house.vertices.end());
+      for (const Eigen::Vector3i& triangle : house.triangles)
+        houses.triangles.push_back(triangle + Eigen::Vector3i::Constant(first));
+    }
+    if (!houses.triangles.empty()) {
+      attach_as(static_, shape_geometry(device_, houses), kBuildingGeometry);
+    }
   }
 
   void add_stem(const Tree& tree, Cones& stems) {
@@ -323,6 +390,19 @@ class ForestScene::Impl {
         cone_tree_.push_back(tree.id);
       }
     }
+    if (tree.fork_m <= 0.0) return;
+    std::vector<double> twin = {tree.fork_m};
+    for (const double height : heights) {
+      if (height > tree.fork_m + 0.1) twin.push_back(height);
+    }
+    for (std::size_t i = 0; i < twin.size(); ++i) {
+      const Tree::Joint joint = tree.fork_joint(twin[i]);
+      stems.add(joint.centre, joint.radius_m);
+      if (i + 1 < twin.size()) {
+        stems.join();
+        cone_tree_.push_back(tree.id);
+      }
+    }
   }
 
   void grow_shapes(const StandConfig& config, std::uint64_t seed) {
@@ -332,7 +412,7 @@ class ForestScene::Impl {
       for (const double height : kHeights) {
         for (int variant = 0; variant < 2; ++variant) {
           Random random(hash_numbers(seed, stream_of(NoiseStream::kShapes)), ++number);
-          CrownSize size = size_class(species, height);
+          CrownSize size = size_class(species, height, config.crown_base_share);
           size.foliage = config.foliage;
           size.dead_branches = config.dead_branches;
           const RTCScene living = shape_scene(grow_crown(species, size, random));
@@ -352,6 +432,7 @@ class ForestScene::Impl {
 
   void add_crowns(const Stand& stand) {
     for (const Tree& tree : stand.trees) {
+      if (tree.broken_m > 0.0) continue;  // dead: no crown
       const CrownShape* best = nullptr;
       double nearest = 1e9;
       for (std::size_t i = 0; i < crowns_.size(); ++i) {
@@ -394,6 +475,7 @@ class ForestScene::Impl {
       const Plant& plant = stand.plants[i];
       const auto cos_yaw = static_cast<float>(std::cos(plant.yaw_rad));
       const auto sin_yaw = static_cast<float>(std::sin(plant.yaw_rad));
+      if (snowy_ && plant.height_m < snow_m_) continue;  // covered
       const auto high = static_cast<float>(plant.height_m);
       const float wide = plant.kind == PlantKind::kGroundPlants ? 1.0F : high;
       Eigen::Matrix<float, 3, 4> world_from_shape;
@@ -401,6 +483,7 @@ class ForestScene::Impl {
       world_from_shape.col(1) << -wide * sin_yaw, wide * cos_yaw, 0.0F;
       world_from_shape.col(2) << 0.0F, 0.0F, high;
       world_from_shape.col(3) = plant.foot.cast<float>();
+      if (snowy_) world_from_shape(2, 3) -= static_cast<float>(snow_m_);
       add_instance(plants_[3 * static_cast<std::size_t>(plant.kind) + i % 3], world_from_shape,
                    {Surface::kPlant, cos_yaw, sin_yaw, 0.45F});
     }
@@ -461,13 +544,15 @@ class ForestScene::Impl {
   std::vector<std::pair<RTCScene, Eigen::Matrix<float, 3, 4>>> shapes_;  // of the instances
   std::vector<Swaying> swaying_;
   double wind_sway_m_ = 0.0;
+  bool snowy_ = false;
+  double snow_m_ = 0.0;
   std::vector<int> cone_tree_;  // id of the tree of each cone
   std::vector<float> bark_;     // reflectivity by id
 };
 
 ForestScene::ForestScene(const StandConfig& config, const Terrain& terrain, const Stand& stand,
-                         std::uint64_t seed)
-    : impl_(std::make_unique<Impl>(config, terrain, stand, seed)) {}
+                         std::uint64_t seed, double snow_m)
+    : impl_(std::make_unique<Impl>(config, terrain, stand, seed, snow_m)) {}
 ForestScene::~ForestScene() = default;
 
 void ForestScene::sway(double time_s) {

@@ -11,7 +11,18 @@
 
 namespace understory {
 
-enum class Surface : std::uint8_t { kNone, kGround, kStem, kDeadWood, kFoliage, kPlant, kMachine };
+enum class Surface : std::uint8_t {
+  kNone,
+  kGround,
+  kStem,
+  kDeadWood,
+  kFoliage,
+  kPlant,
+  kMachine,
+  kBoulder,
+  kBuilding,
+  kSnow
+};
 
 struct Ray {
   Eigen::Vector3f origin = Eigen::Vector3f::Zero();     // world frame
@@ -31,8 +42,9 @@ struct Hit {
 // thread-safe; results depend on the rays and on the moment of the wind alone.
 class ForestScene {
  public:
+  // With snow_m above zero the ground is bright.
   ForestScene(const StandConfig& config, const Terrain& terrain, const Stand& stand,
-              std::uint64_t seed);
+              std::uint64_t seed, double snow_m = 0.0);
   ~ForestScene();
   ForestScene(const ForestScene&) = delete;
   ForestScene& operator=(const ForestScene&) = delete;

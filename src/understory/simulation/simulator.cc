@@ -9,6 +9,7 @@
 #include "understory/simulation/carrier.h"
 #include "understory/simulation/inertial.h"
 #include "understory/simulation/machine.h"
+#include "understory/simulation/magnetometer.h"
 #include "understory/simulation/route.h"
 #include "understory/simulation/satellite.h"
 #include "understory/simulation/scan_cache.h"
@@ -25,17 +26,6 @@ constexpr double kTerrainMargin = 12.0;  // of ground around the stand, metres
 
 std::uint64_t seed_of(const SiteConfig& site) {
   return static_cast<std::uint64_t>(site.seed);
-}
-
-// Names a site with all its settings.
-std::uint64_t key_of(const SiteConfig& site) {
-  SiteConfig copy = site;
-  ConfigTable table;
-  describe(table, copy);
-  std::uint64_t key = 0;
-  for (const char c : table.to_yaml(false))
-    key = hash_numbers(key, static_cast<std::uint64_t>(c));
-  return key;
 }
 
 bool same_readings(const ScanReadings& a, const ScanReadings& b) {
@@ -62,14 +52,15 @@ class Simulator::Impl {
         start(from_start(config.origin.start_time_s)),
         route(config.carrier, seed_of(config)),
         terrain(config.terrain, 0.5 * config.stand.size_x_m + kTerrainMargin,
-                0.5 * config.stand.size_y_m + kTerrainMargin, seed_of(config)),
+                0.5 * config.stand.size_y_m + kTerrainMargin, seed_of(config), &route),
         stand(grow_stand(config.stand, config.carrier, terrain, route, seed_of(config))),
         plan(plan_carrier(config, route, terrain)),
-        scene(config.stand, terrain, stand, seed_of(config)),
-        machine(config.carrier, plan.boom),
+        scene(config.stand, terrain, stand, seed_of(config), config.terrain.snow_m),
+        machine(config.carrier, plan),
         scanner(config, scene, plan.path, machine, start),
-        imu(config, plan.path, start),
-        gnss(config, plan.path, scene, start) {
+        imu(config, plan.path, start, plan.shocks_s),
+        gnss(config, plan.path, scene, start),
+        mag(config, plan.path, start) {
     duration_s = config.duration_s > 0.0 ? config.duration_s : plan.path.duration_s() - 0.5;
     end = start + from_seconds(duration_s);
     describe_rig();
@@ -79,15 +70,25 @@ class Simulator::Impl {
 
   // The next event; a scan is cast only if `wanted`. Returns false at the end.
   bool advance(bool wanted, std::optional<Event>& event) {
-    const TimeNs imu_time = imu.next_stamp();
-    const TimeNs fix_time = next_fix ? next_fix->stamp : std::numeric_limits<TimeNs>::max();
-    const TimeNs scan_time = scanner.end(scan_number);
-    const TimeNs first = std::min({imu_time, fix_time, scan_time});
+    while (site.imu.enabled && imu.next_stamp() < end && imu.lost()) {
+      note_biases(imu.next_stamp());
+      imu.skip();
+    }
+    constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
+    const TimeNs imu_time = site.imu.enabled ? imu.next_stamp() : kNever;
+    const TimeNs mag_time = site.mag.enabled ? mag.next_stamp() : kNever;
+    const TimeNs fix_time = next_fix ? next_fix->stamp + from_seconds(site.gnss.latency_s) : kNever;
+    const TimeNs scan_time = scanner.end(number_of(scan_number));
+    const TimeNs first = std::min({imu_time, mag_time, fix_time, scan_time});
     if (first >= end) return false;
     if (imu_time == first) {
       take_imu(wanted, event);
+    } else if (mag_time == first) {
+      note(reports[3], mag_time);
+      const MagSample sample = mag.next();
+      if (wanted) event = sample;
     } else if (fix_time == first) {
-      note(reports[2], fix_time);
+      note(reports[2], next_fix->stamp);
       if (wanted) event = *next_fix;
       next_fix = find_fix();
     } else {
@@ -102,7 +103,7 @@ class Simulator::Impl {
       log.warn("simulation.cache", "ranges are too fine or too long to be kept");
       return;
     }
-    cache = std::make_unique<ScanCache>(folder, key_of(site), site.lidar.range_step_m);
+    cache = std::make_unique<ScanCache>(folder, site_key(site), site.lidar.range_step_m);
     const auto span = cache->span();
     if (!span) return;
     for (const std::int64_t scan : {span->first, span->second}) {
@@ -127,6 +128,7 @@ class Simulator::Impl {
   Scanner scanner;
   InertialSensor imu;
   SatelliteReceiver gnss;
+  Magnetometer mag;
   std::optional<GnssFix> next_fix;
   std::int64_t scan_number = 0;
   TimeNs now = 0;
@@ -143,10 +145,20 @@ class Simulator::Impl {
     return static_cast<TimeNs>(whole) * kNsPerSecond + from_seconds(start_time_s - whole);
   }
 
+  // The revolution that is recorded as the scan of that place in the recording.
+  [[nodiscard]] std::int64_t number_of(std::int64_t scan) const {
+    return scan * site.lidar.keep_every;
+  }
+
+  // Keeps the biases of the scans that began before a sample.
+  void note_biases(TimeNs stamp) {
+    while (scanner.stamp(number_of(static_cast<std::int64_t>(biases.size()))) <= stamp)
+      biases.emplace_back(imu.gyro_bias(), imu.accel_bias());
+  }
+
   void take_imu(bool wanted, std::optional<Event>& event) {
     const TimeNs stamp = imu.next_stamp();
-    while (scanner.stamp(static_cast<std::int64_t>(biases.size())) <= stamp)
-      biases.emplace_back(imu.gyro_bias(), imu.accel_bias());
+    note_biases(stamp);
     note(reports[1], stamp);
     if (wanted) {
       event = imu.next();
@@ -157,17 +169,21 @@ class Simulator::Impl {
 
   void take_scan(bool wanted, std::optional<Event>& event) {
     ScanTruth truth;
-    truth.stamp = scanner.stamp(scan_number);
+    const std::int64_t number = number_of(scan_number);
+    truth.stamp = scanner.stamp(number);
     const CarrierState state = plan.path.state(to_seconds(truth.stamp - start));
+    truth.stamp += from_seconds(site.lidar.time_offset_s);
     truth.world_from_body = state.world_from_body;
     truth.velocity = state.velocity;
-    const std::size_t at = std::min(static_cast<std::size_t>(scan_number), biases.size() - 1);
-    truth.gyro_bias = biases[at].first;
-    truth.accel_bias = biases[at].second;
+    if (!biases.empty()) {
+      const std::size_t at = std::min(static_cast<std::size_t>(scan_number), biases.size() - 1);
+      truth.gyro_bias = biases[at].first;
+      truth.accel_bias = biases[at].second;
+    }
     note(reports[0], truth.stamp);
     if (wanted) {
-      ScanReadings readings = measure(scan_number);
-      ScanPtr scan = scanner.assemble(scan_number, readings);
+      ScanReadings readings = measure(number);
+      ScanPtr scan = scanner.assemble(number, readings);
       reports[0].points += scan->points.size();
       truth.stems = std::move(readings.stems);
       event = std::move(scan);
@@ -193,19 +209,21 @@ class Simulator::Impl {
 
   void describe_rig() {
     rig.body_frame = site.carrier.body;
-    rig.body_from_lidar = scanner.body_from_lidar();
-    rig.body_from_imu = imu.body_from_imu();
+    rig.body_from_lidar =
+        scanner.body_from_lidar() * mount_pose(site.lidar.error_m, site.lidar.error_rpy_deg);
+    if (site.imu.enabled) rig.body_from_imu = imu.body_from_imu();
     rig.body_from_gnss =
         Pose(Eigen::Quaterniond::Identity(),
              Eigen::Vector3d(site.gnss.mount_m[0], site.gnss.mount_m[1], site.gnss.mount_m[2]));
-    rig.lidar_model = site.lidar.model == "OS0-128" ? "OS-0-128" : site.lidar.model;
+    rig.lidar_model = site.lidar.model;
+    if (rig.lidar_model.rfind("OS", 0) == 0) rig.lidar_model.insert(2, "-");
     rig.lidar_extrinsic_source = "simulation";
-    rig.imu_extrinsic_source = "simulation";
+    if (site.imu.enabled) rig.imu_extrinsic_source = "simulation";
     rig.gnss_extrinsic_source = "simulation";
   }
 
   void describe_topics() {
-    reports.resize(3);
+    reports.resize(4);
     reports[0].name = "/lidar";
     reports[0].type = "simulated " + site.lidar.model;
     reports[0].frame = "lidar";
@@ -221,6 +239,11 @@ class Simulator::Impl {
     reports[2].frame = "gnss";
     reports[2].role = "gnss";
     reports[2].conventions = "WGS 84, ellipsoidal height";
+    reports[3].name = "/mag";
+    reports[3].type = "simulated magnetometer";
+    reports[3].frame = "imu";
+    reports[3].role = "mag";
+    reports[3].conventions = "tesla";
   }
 };
 
@@ -249,8 +272,12 @@ const Rig& Simulator::rig() const {
 }
 
 std::vector<TopicReport> Simulator::topics() const {
-  std::vector<TopicReport> reports = impl_->reports;
-  if (!impl_->site.gnss.enabled) reports.pop_back();
+  const SiteConfig& site = impl_->site;
+  const bool present[] = {true, site.imu.enabled, site.gnss.enabled, site.mag.enabled};
+  std::vector<TopicReport> reports;
+  for (std::size_t i = 0; i < impl_->reports.size(); ++i) {
+    if (present[i]) reports.push_back(impl_->reports[i]);
+  }
   return reports;
 }
 

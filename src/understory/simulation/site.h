@@ -26,6 +26,11 @@ struct TerrainConfig {
   double slope_azimuth_deg = 30.0;  // uphill, from east to north
   double hummock_m = 0.10;          // standard deviation of hummocks a few metres wide
   double roughness_m = 0.025;       // standard deviation of the grid's own noise
+  int ditches = 0;                  // across the site, evenly apart
+  double ditch_depth_m = 0.8;
+  double ditch_width_m = 2.0;
+  double snow_m = 0.0;       // depth of snow: hides hummocks and the feet of plants
+  double track_depth = 0.0;  // share of the snow that the carrier presses down on its way
 };
 
 struct StandConfig {
@@ -50,7 +55,19 @@ struct StandConfig {
   double ground_plants_per_ha = 2500.0;
   double stumps_per_ha = 60.0;
   double logs_per_ha = 30.0;
-  double wind_sway_m = 0.08;  // standard deviation of the sway of a crown's top
+  double wind_sway_m = 0.08;      // standard deviation of the sway of a crown's top
+  std::string trees;              // file with a list of trees instead of random ones
+  double height_min_m = 3.0;      // no tree lower
+  double crown_base_share = 0.0;  // of the tree's height, 0 = usual for the species
+  double edge_m = 0.0;            // width of a border of tall trees
+  double edge_dbh_mean_m = 0.24;
+  double edge_height_mean_m = 19.0;
+  double margin_m = 0.0;  // the stand reaches so far from the route, 0 = all over its rectangle
+  double narrow_clearance_m = 0.5;  // bark to the path where it is narrow
+  double fork_share = 0.0;          // of the trees: two stems from a height on
+  double broken_share = 0.0;        // of the trees: without their top
+  double boulders_per_ha = 0.0;
+  int buildings = 0;  // beside the route: the first at its start, the second at its end
 };
 
 struct CarrierConfig {
@@ -67,6 +84,22 @@ struct CarrierConfig {
   double turn_interval_s = 11.0;   // mean time between quick turns or work stops
   double turn_deg = 130.0;         // largest quick turn or swing
   double turn_rate_deg_s = 140.0;  // peak rate of a quick turn
+  std::string route = "auto";      // loop, strip; auto: as suits the kind
+  int laps = 1;                    // of a loop around its middle, each on a way of its own
+  double route_time_s = 0.0;       // how long the route takes, 0 = as speed and stops give
+  bool one_way = false;            // a strip road is driven once, not out and back
+  int strip_roads = 1;             // parallel roads of the stand
+  int strip_road = 1;              // which of them is driven
+  double strip_spacing_m = 22.5;
+  std::string work = "quick";  // of a harvester at its stops: quick, thinning
+  double back_up_m = 0.0;      // farthest that it backs up during a stop
+  double narrow_from = 0.0;    // share of the route where a narrow path begins
+  double narrow_to = 0.0;      // and ends
+  double narrow_speed_m_s = 1.0;
+  int halts = 0;  // of a sleigh on its way
+  double halt_s = 20.0;
+  int tumbles = 0;  // times that a sleigh nearly turns over
+  double tumble_deg = 30.0;
 };
 
 struct LidarConfig {
@@ -90,9 +123,19 @@ struct LidarConfig {
   double range_10_percent_m = 17.0;  // where half the returns of a 10 % target are lost
   double dropout = 0.004;            // share of returns lost for no reason
   double azimuth_jitter_deg = 0.01;
+  int keep_every = 1;                 // of the scans only each so-manieth is recorded
+  int returns = 1;                    // of a beam: the strongest, or two
+  double blooming = 0.0;              // chance that a beam beside a glaring echo repeats its range
+  double crosstalk = 0.0;             // share of beams that report a range out of nothing
+  double snow_fall_per_m = 0.0;       // snow flakes that a beam meets in a metre
+  double snow_drop_interval_s = 0.0;  // mean time between loads of snow off a branch, 0 = none
+  double time_offset_s = 0.0;         // of the lidar's clock: stamps are late by this much
+  std::vector<double> error_m = {0.0, 0.0, 0.0};  // of the extrinsics that the recording claims
+  std::vector<double> error_rpy_deg = {0.0, 0.0, 0.0};
 };
 
 struct ImuConfig {
+  bool enabled = true;
   double rate_hz = 200.0;
   std::vector<double> mount_m = {0.0, 0.0, 0.0};  // in the body frame
   std::vector<double> mount_rpy_deg = {0.0, 0.0, 0.0};
@@ -105,9 +148,27 @@ struct ImuConfig {
   double scale_sd = 5.0e-4;         // of scale and misalignment, both sensors
   double vibration_m_s2 = 0.05;     // amplitude of the carrier's vibration
   double vibration_hz = 31.0;
+  int vibration_tones = 1;         // the main one and its harmonics, ever weaker
+  double gyro_instability = 0.0;   // bias instability, rad/s: Allan deviation's floor / 0.664
+  double accel_instability = 0.0;  // m/s^2
+  double gyro_temperature = 0.0;   // bias per kelvin, rad/s
+  double accel_temperature = 0.0;  // m/s^2
+  double warm_up_k = 0.0;          // how much warmer the sensor gets while it runs
+  double warm_up_s = 300.0;        // time constant of that
+  double shock_m_s2 = 0.0;         // peak of the ringing when a stem falls or a runner hits
+  double shock_rad_s = 0.0;
+  double accel_range_m_s2 = 0.0;  // full scale, 0 = unlimited
+  double gyro_range_rad_s = 0.0;
+  double missing = 0.0;         // share of samples lost one by one
+  double gap_interval_s = 0.0;  // mean time between gaps, 0 = none
+  double gap_s = 0.1;           // their length
+  double time_offset_s = 0.0;   // of the IMU's clock: stamps are late by this much
 };
 
 struct GnssConfig {
+  double jump_interval_s = 0.0;  // mean time between jumps under closed canopy, 0 = none
+  double jump_m = 1.5;           // standard deviation of a jump in the plane
+  double latency_s = 0.0;        // from the moment of a fix to its place in the stream
   bool enabled = true;
   double rate_hz = 5.0;
   std::vector<double> mount_m = {0.0, 0.0, 0.15};  // antenna in the body frame
@@ -120,6 +181,20 @@ struct GnssConfig {
   double reported_factor = 0.5;     // reported over true standard deviation: overconfident
   double outage_interval_s = 70.0;  // mean time between outages under closed canopy
   double outage_s = 4.0;
+  double burst_interval_s = 0.0;  // mean time between bursts under closed canopy, 0 = none
+  double burst_s = 25.0;          // length of a burst
+  double burst_m = 4.0;           // its height in the plane
+};
+
+struct MagnetometerConfig {
+  bool enabled = false;
+  double rate_hz = 100.0;
+  double field_ut = 54.0;          // of the earth
+  double inclination_deg = 72.0;   // downwards
+  double declination_deg = -12.0;  // of magnetic north, positive to the east
+  double hard_iron_ut = 0.0;       // size of the field of the carrier itself
+  double soft_iron = 0.0;          // how much iron bends the earth's field
+  double noise_ut = 0.15;
 };
 
 struct SiteConfig {
@@ -132,10 +207,15 @@ struct SiteConfig {
   LidarConfig lidar;
   ImuConfig imu;
   GnssConfig gnss;
+  MagnetometerConfig mag;
 };
 
-// Binds every key of a site to `config`.
-void describe(ConfigTable& table, SiteConfig& config);
+// Binds every key of a site to `config`; `first_keys_only` leaves out those that came after the
+// first version, so that the name under which casts of older sites are kept stays what it was.
+void describe(ConfigTable& table, SiteConfig& config, bool first_keys_only = false);
+
+// Names a site with all its settings. A later key counts only where it differs from its default.
+[[nodiscard]] std::uint64_t site_key(const SiteConfig& config);
 
 // A site that the program carries with it.
 struct ShippedSite {

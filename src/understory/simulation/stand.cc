@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "understory/simulation/counter_noise.h"
+#include "understory/simulation/stand_drawing.h"
 
 namespace understory {
 namespace {
@@ -21,52 +22,21 @@ double taper(double height, double top) {
   return flare * std::pow((top - height) / top, 0.8);
 }
 
+// Growth by an own stream, so that stands without them are what they were.
+void draw_damage(const StandConfig& config, Tree& tree, Random& random) {
+  if (random.uniform() < config.fork_share) {
+    tree.fork_m = std::min(0.6 * tree.height_m, random.uniform(0.8, 6.0));
+  }
+  if (random.uniform() < config.broken_share) {
+    tree.broken_m = std::max(2.0, tree.height_m * random.uniform(0.3, 0.8));
+    tree.fork_m = 0.0;
+  }
+}
+
 Species draw_species(const StandConfig& config, Random& random) {
   const double u = random.uniform();
   if (u < config.pine_share) return Species::kPine;
   return u < config.pine_share + config.spruce_share ? Species::kSpruce : Species::kBirch;
-}
-
-void draw_crown(Tree& tree, Random& random) {
-  const double height = tree.height_m;
-  switch (tree.species) {
-    case Species::kPine:
-      tree.crown_base_m = height * random.uniform(0.48, 0.66);
-      tree.crown_radius_m = 0.55 + 4.6 * tree.dbh_m * random.uniform(0.8, 1.2);
-      tree.bark_reflectivity = random.uniform(0.28, 0.45);
-      break;
-    case Species::kSpruce:
-      tree.crown_base_m = std::min(0.5 * height, random.uniform(0.6, 4.5));
-      tree.crown_radius_m = 0.6 + 5.0 * tree.dbh_m * random.uniform(0.8, 1.2);
-      tree.bark_reflectivity = random.uniform(0.22, 0.38);
-      break;
-    case Species::kBirch:
-      tree.crown_base_m = height * random.uniform(0.4, 0.55);
-      tree.crown_radius_m = 0.6 + 6.0 * tree.dbh_m * random.uniform(0.8, 1.2);
-      tree.bark_reflectivity = random.uniform(0.5, 0.75);
-      break;
-  }
-}
-
-Tree draw_tree(const StandConfig& config, Random& random) {
-  Tree tree;
-  tree.species = draw_species(config, random);
-  do {
-    tree.dbh_m = random.normal(config.dbh_mean_m, config.dbh_sd_m);
-  } while (tree.dbh_m < config.dbh_min_m || tree.dbh_m > config.dbh_max_m);
-  // Heights rise with the diameter, ever more slowly (Naeslund's curve through the mean tree).
-  const double mean = config.dbh_mean_m;
-  const double ratio = tree.dbh_m / mean;
-  const double curve = std::pow(ratio / (0.32 + 0.68 * ratio), 2.0);
-  tree.height_m =
-      (kBreastHeight + (config.height_mean_m - kBreastHeight) * curve) * random.uniform(0.9, 1.1);
-  tree.height_m = std::max(tree.height_m, 3.0);
-  const double lean_sd = std::tan(config.lean_sd_deg * kDegree);
-  tree.lean = {random.normal(0.0, lean_sd), random.normal(0.0, lean_sd)};
-  tree.sweep = {random.normal(0.0, config.sweep_m), random.normal(0.0, config.sweep_m)};
-  tree.yaw_rad = random.uniform(0.0, kTau);
-  draw_crown(tree, random);
-  return tree;
 }
 
 // Finds what lies near a place without looking at everything.
@@ -114,8 +84,28 @@ Eigen::Vector2d draw_place(const StandConfig& config, Random& random) {
   return {x, y};
 }
 
+// Draws of which those outside of the stand are thrown away.
 std::size_t count_of(double per_ha, const StandConfig& config) {
   return static_cast<std::size_t>(std::lround(per_ha * config.size_x_m * config.size_y_m / 1e4));
+}
+
+bool outside(const StandConfig& config, const Route& route, const Eigen::Vector2d& place) {
+  return config.margin_m > 0.0 && !route.near(place, config.margin_m);
+}
+
+// Share of the rectangle that the stand fills, on a grid of 4 m.
+double filled_share(const StandConfig& config, const Route& route) {
+  if (config.margin_m <= 0.0) return 1.0;
+  constexpr double kCell = 4.0;
+  std::size_t all = 0;
+  std::size_t inside = 0;
+  for (double x = -0.5 * config.size_x_m + 0.5 * kCell; x < 0.5 * config.size_x_m; x += kCell) {
+    for (double y = -0.5 * config.size_y_m + 0.5 * kCell; y < 0.5 * config.size_y_m; y += kCell) {
+      ++all;
+      inside += outside(config, route, {x, y}) ? 0 : 1;
+    }
+  }
+  return static_cast<double>(inside) / static_cast<double>(std::max<std::size_t>(all, 1));
 }
 
 // Whether the carrier can pass: the bark stays clear of the path at the height of the sensors, and
@@ -123,6 +113,13 @@ std::size_t count_of(double per_ha, const StandConfig& config) {
 bool clear_of_route(const Tree& tree, const Eigen::Vector2d& foot, const StandConfig& config,
                     const CarrierConfig& carrier, const Route& route) {
   const double sensor = std::max(1.5, carrier.height_m);
+  if (carrier.kind == "uav" && tree.height_m < sensor - 0.8) return true;  // it flies over it
+  if (carrier.narrow_to > carrier.narrow_from &&
+      route.distance_to(foot, carrier.narrow_from, carrier.narrow_to) <
+          route.distance_to(foot) + 1e-9) {
+    const double needed = config.narrow_clearance_m + 0.5 * tree.dbh_m;
+    return route.distance_to(foot) > needed;
+  }
   const Eigen::Vector2d there = foot + (tree.centre(sensor) - tree.foot).head<2>();
   double needed = config.path_clearance_m + 0.5 * tree.dbh_m;
   if (tree.crown_base_m < sensor + 0.8) {
@@ -131,14 +128,40 @@ bool clear_of_route(const Tree& tree, const Eigen::Vector2d& foot, const StandCo
   return std::min(route.distance_to(foot), route.distance_to(there)) > needed;
 }
 
+bool on_edge(const StandConfig& config, const Eigen::Vector2d& place) {
+  return config.edge_m > 0.0 && (std::abs(place.x()) > 0.5 * config.size_x_m - config.edge_m ||
+                                 std::abs(place.y()) > 0.5 * config.size_y_m - config.edge_m);
+}
+
+// The trees of the border.
+StandConfig edge_stand(const StandConfig& config) {
+  StandConfig edge = config;
+  edge.dbh_mean_m = config.edge_dbh_mean_m;
+  edge.dbh_sd_m = 0.25 * config.edge_dbh_mean_m;
+  edge.dbh_min_m = 0.5 * config.edge_dbh_mean_m;
+  edge.dbh_max_m = 1.8 * config.edge_dbh_mean_m;
+  edge.height_mean_m = config.edge_height_mean_m;
+  edge.crown_base_share = 0.0;
+  return edge;
+}
+
 std::vector<Tree> place_trees(const StandConfig& config, const CarrierConfig& carrier,
                               const Terrain& terrain, const Route& route, Random& random) {
-  const std::size_t wanted = count_of(config.trees_per_ha, config);
+  const std::size_t drawn = count_of(config.trees_per_ha, config);
+  const auto wanted = static_cast<std::size_t>(
+      std::lround(static_cast<double>(drawn) * filled_share(config, route)));
   Grid grid(0.5 * config.size_x_m, 0.5 * config.size_y_m, std::max(1.0, config.spacing_m));
   std::vector<Tree> trees;
-  for (std::size_t attempt = 0; attempt < 40 * wanted && trees.size() < wanted; ++attempt) {
+  const StandConfig edge = edge_stand(config);
+  for (std::size_t attempt = 0; attempt < 40 * drawn && trees.size() < wanted; ++attempt) {
     Tree tree = draw_tree(config, random);
     const Eigen::Vector2d place = draw_place(config, random);
+    if (outside(config, route, place)) continue;
+    if (on_edge(config, place)) {
+      // Tall trees need more room each.
+      if (random.uniform() > 0.3) continue;
+      tree = draw_tree(edge, random);
+    }
     if (!grid.free(place, config.spacing_m + 2.0 * tree.dbh_m)) continue;
     if (!clear_of_route(tree, place, config, carrier, route)) continue;
     tree.id = static_cast<int>(trees.size()) + 1;
@@ -153,7 +176,7 @@ void add_dead_wood(const StandConfig& config, const CarrierConfig& carrier, cons
                    const Route& route, Random& random, std::vector<Wood>& pieces) {
   for (std::size_t i = 0; i < count_of(config.stumps_per_ha, config); ++i) {
     const Eigen::Vector2d place = draw_place(config, random);
-    if (route.distance_to(place) < 0.8) continue;
+    if (outside(config, route, place) || route.distance_to(place) < 0.8) continue;
     const double ground = terrain.height(place.x(), place.y());
     const double radius = random.uniform(0.08, 0.2);
     pieces.push_back({{place.x(), place.y(), ground - 0.2},
@@ -167,6 +190,7 @@ void add_dead_wood(const StandConfig& config, const CarrierConfig& carrier, cons
     const double length = random.uniform(3.0, 11.0);
     const Eigen::Vector2d end = place + length * Eigen::Vector2d(std::cos(yaw), std::sin(yaw));
     const double thick = random.uniform(0.07, 0.16);
+    if (outside(config, route, place)) continue;
     if (carrier.height_m < 1.0 && route.distance_to(0.5 * (place + end)) < 0.5 * length) continue;
     pieces.push_back(
         {{place.x(), place.y(), terrain.smooth_height(place.x(), place.y(), 0.5) + 0.8 * thick},
@@ -183,13 +207,103 @@ void add_plants(PlantKind kind, double per_ha, double low_m, double high_m, doub
     const Eigen::Vector2d place = draw_place(config, random);
     const double height = random.uniform(low_m, high_m);
     const double yaw = random.uniform(0.0, kTau);
-    if (route.distance_to(place) < clearance_m) continue;
+    if (outside(config, route, place) || route.distance_to(place) < clearance_m) continue;
     plants.push_back(
         {kind, {place.x(), place.y(), terrain.height(place.x(), place.y())}, height, yaw});
   }
 }
 
+void add_boulders(const StandConfig& config, const Terrain& terrain, const Route& route,
+                  std::uint64_t seed, std::vector<Wood>& boulders) {
+  Random random(hash_numbers(seed, stream_of(NoiseStream::kUndergrowth), 1));
+  for (std::size_t i = 0; i < count_of(config.boulders_per_ha, config); ++i) {
+    const Eigen::Vector2d place = draw_place(config, random);
+    const double radius = 0.25 + random.exponential(0.3);
+    const double yaw = random.uniform(0.0, kTau);
+    const double sunk = random.uniform(-0.1, 0.5) * radius;
+    if (outside(config, route, place) || radius > 2.0 || route.distance_to(place) < radius + 1.5)
+      continue;
+    const Eigen::Vector3d middle(place.x(), place.y(), terrain.height(place.x(), place.y()) - sunk);
+    const Eigen::Vector3d along(std::cos(yaw), std::sin(yaw), 0.0);
+    boulders.push_back(
+        {middle - 0.4 * radius * along, middle + 0.4 * radius * along, radius, 0.75 * radius});
+  }
+}
+
+// The first 12 m to the left of the route's start, the second to the right of its end. Trees make
+// room.
+void add_buildings(const StandConfig& config, const CarrierConfig& carrier, const Terrain& terrain,
+                   const Route& route, Stand& stand) {
+  for (int i = 0; i < config.buildings; ++i) {
+    const double at = i == 0 ? 0.0 : route.length_m();
+    const double yaw = route.heading(at);
+    const double side = (i == 0 ? 1.0 : -1.0) * (9.0 + carrier.height_m);
+    const Eigen::Vector2d place =
+        route.place(at) + side * Eigen::Vector2d(-std::sin(yaw), std::cos(yaw));
+    Building house;
+    house.foot = {place.x(), place.y(), terrain.smooth_height(place.x(), place.y(), 3.0)};
+    house.yaw_rad = yaw;
+    const auto inside = [&](const Eigen::Vector3d& foot) {
+      return (foot - house.foot).head<2>().norm() < 7.5;
+    };
+    stand.trees.erase(std::remove_if(stand.trees.begin(), stand.trees.end(),
+                                     [&](const Tree& tree) { return inside(tree.foot); }),
+                      stand.trees.end());
+    stand.plants.erase(std::remove_if(stand.plants.begin(), stand.plants.end(),
+                                      [&](const Plant& plant) { return inside(plant.foot); }),
+                       stand.plants.end());
+    stand.buildings.push_back(house);
+  }
+}
+
 }  // namespace
+
+void draw_crown(const StandConfig& config, Tree& tree, Random& random) {
+  const double height = tree.height_m;
+  switch (tree.species) {
+    case Species::kPine:
+      tree.crown_base_m = height * random.uniform(0.48, 0.66);
+      tree.crown_radius_m = 0.55 + 4.6 * tree.dbh_m * random.uniform(0.8, 1.2);
+      tree.bark_reflectivity = random.uniform(0.28, 0.45);
+      break;
+    case Species::kSpruce:
+      tree.crown_base_m = std::min(0.5 * height, random.uniform(0.6, 4.5));
+      tree.crown_radius_m = 0.6 + 5.0 * tree.dbh_m * random.uniform(0.8, 1.2);
+      tree.bark_reflectivity = random.uniform(0.22, 0.38);
+      break;
+    case Species::kBirch:
+      tree.crown_base_m = height * random.uniform(0.4, 0.55);
+      tree.crown_radius_m = 0.6 + 6.0 * tree.dbh_m * random.uniform(0.8, 1.2);
+      tree.bark_reflectivity = random.uniform(0.5, 0.75);
+      break;
+  }
+  if (config.crown_base_share > 0.0) {
+    tree.crown_base_m = std::min(0.95, config.crown_base_share * random.uniform(0.7, 1.3)) * height;
+  }
+}
+
+// Heights rise with the diameter, ever more slowly (Naeslund's curve through the mean tree).
+double height_of(double dbh_m, const StandConfig& config) {
+  const double ratio = dbh_m / config.dbh_mean_m;
+  const double curve = std::pow(ratio / (0.32 + 0.68 * ratio), 2.0);
+  return kBreastHeight + (config.height_mean_m - kBreastHeight) * curve;
+}
+
+Tree draw_tree(const StandConfig& config, Random& random) {
+  Tree tree;
+  tree.species = draw_species(config, random);
+  do {
+    tree.dbh_m = random.normal(config.dbh_mean_m, config.dbh_sd_m);
+  } while (tree.dbh_m < config.dbh_min_m || tree.dbh_m > config.dbh_max_m);
+  tree.height_m = height_of(tree.dbh_m, config) * random.uniform(0.9, 1.1);
+  tree.height_m = std::max(tree.height_m, config.height_min_m);
+  const double lean_sd = std::tan(config.lean_sd_deg * kDegree);
+  tree.lean = {random.normal(0.0, lean_sd), random.normal(0.0, lean_sd)};
+  tree.sweep = {random.normal(0.0, config.sweep_m), random.normal(0.0, config.sweep_m)};
+  tree.yaw_rad = random.uniform(0.0, kTau);
+  draw_crown(config, tree, random);
+  return tree;
+}
 
 std::string species_name(Species species) {
   switch (species) {
@@ -215,12 +329,26 @@ Eigen::Vector3d Tree::centre(double height_above_foot) const {
   return foot + Eigen::Vector3d(side.x(), side.y(), height_above_foot);
 }
 
+Tree::Joint Tree::fork_joint(double height_above_foot) const {
+  Joint twin = joint(height_above_foot);
+  // It leaves at a slant and then grows up beside the first, a little thinner.
+  const double above = std::max(0.0, height_above_foot - fork_m);
+  const double aside = 0.9 * (1.0 - std::exp(-above / 2.0)) + 0.03 * above;
+  twin.centre += aside * Eigen::Vector3d(std::cos(yaw_rad), std::sin(yaw_rad), 0.0);
+  twin.radius_m *= 0.85;
+  return twin;
+}
+
 std::vector<double> Tree::joints() const {
   std::vector<double> heights = {-0.3, 0.0, 0.12, 0.3, 0.6, 1.0, kBreastHeight};
   const double step = std::max(0.5, (height_m - kBreastHeight) / 26.0);
   for (double h = kBreastHeight + step; h < height_m - 0.2 * step; h += step)
     heights.push_back(h);
   heights.push_back(height_m);
+  if (broken_m > 0.0) {
+    heights.erase(std::upper_bound(heights.begin(), heights.end(), broken_m), heights.end());
+    heights.push_back(broken_m);
+  }
   return heights;
 }
 
@@ -241,7 +369,11 @@ Stand grow_stand(const StandConfig& config, const CarrierConfig& carrier, const 
   Random tree_random(seed, stream_of(NoiseStream::kStand));
   Random random(seed, stream_of(NoiseStream::kUndergrowth));
   Stand stand;
-  stand.trees = place_trees(config, carrier, terrain, route, tree_random);
+  stand.trees = config.trees.empty() ? place_trees(config, carrier, terrain, route, tree_random)
+                                     : read_trees(config.trees, config, terrain, seed);
+  Random damage(hash_numbers(seed, stream_of(NoiseStream::kStand), 1));
+  for (Tree& tree : stand.trees)
+    draw_damage(config, tree, damage);
   add_dead_wood(config, carrier, terrain, route, random, stand.dead_wood);
   add_plants(PlantKind::kSeedling, config.seedlings_per_ha, 0.4, 2.2, 0.8, config, terrain, route,
              random, stand.plants);
@@ -249,6 +381,8 @@ Stand grow_stand(const StandConfig& config, const CarrierConfig& carrier, const 
              stand.plants);
   add_plants(PlantKind::kGroundPlants, config.ground_plants_per_ha, 0.15, 0.45, 0.0, config,
              terrain, route, random, stand.plants);
+  add_boulders(config, terrain, route, seed, stand.boulders);
+  add_buildings(config, carrier, terrain, route, stand);
   return stand;
 }
 

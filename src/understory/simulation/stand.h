@@ -27,6 +27,8 @@ struct Tree {
   Eigen::Vector2d sweep = Eigen::Vector2d::Zero();  // bow of the stem at half its height, metres
   double yaw_rad = 0.0;                             // turns its crown
   double bark_reflectivity = 0.3;
+  double fork_m = 0.0;    // height above the foot where a second stem leaves, 0 = none
+  double broken_m = 0.0;  // height above the foot where the top is broken off, 0 = whole
 
   // Diameter of the stem at a height above the foot, metres; 0 at the top.
   [[nodiscard]] double diameter(double height_m_above_foot) const;
@@ -41,6 +43,8 @@ struct Tree {
     double radius_m = 0.0;
   };
   [[nodiscard]] Joint joint(double height_m_above_foot) const;
+  // The same of the second stem of a fork, from fork_m up.
+  [[nodiscard]] Joint fork_joint(double height_m_above_foot) const;
   // Tilt of the stem's lowest 3 m against the vertical.
   [[nodiscard]] double lean_deg() const;
 };
@@ -61,14 +65,31 @@ struct Plant {
   double yaw_rad = 0.0;
 };
 
+// A house: a box with a pitched roof, its floor's middle on the ground.
+struct Building {
+  Eigen::Vector3d foot = Eigen::Vector3d::Zero();
+  double yaw_rad = 0.0;
+  Eigen::Vector3d size_m = Eigen::Vector3d(9.0, 6.0, 3.0);  // length, width, height of the walls
+};
+
 struct Stand {
   std::vector<Tree> trees;
   std::vector<Wood> dead_wood;  // stumps and logs
   std::vector<Plant> plants;
+  std::vector<Wood> boulders;
+  std::vector<Building> buildings;
 };
 
-// Places trees and undergrowth at random in the stand's rectangle, clear of the route.
+// Places trees and undergrowth at random in the stand's rectangle, clear of the route; or the trees
+// of the list config.trees as they are. Throws InputError for a bad list.
 [[nodiscard]] Stand grow_stand(const StandConfig& config, const CarrierConfig& carrier,
                                const Terrain& terrain, const Route& route, std::uint64_t seed);
+
+// Reads a list of trees: a CSV with a head line of column names. Needed: x, y (metres in the world
+// frame) and dbh_m; used where given and not empty: id, height_m, lean_deg, species (pine, spruce,
+// birch); others are passed over, z too: trees stand on the terrain. What the list leaves open is
+// drawn as for random trees. Throws InputError with file, line and what was expected.
+[[nodiscard]] std::vector<Tree> read_trees(const std::string& path, const StandConfig& config,
+                                           const Terrain& terrain, std::uint64_t seed);
 
 }  // namespace understory

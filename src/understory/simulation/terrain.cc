@@ -40,9 +40,34 @@ class ValueNoise {
   double scale_;
 };
 
+// Depth of the ditches: straight lines across the site at 25 degrees to its edges, evenly apart,
+// with sides as steep as a bell's.
+double ditch_depth(const TerrainConfig& config, double x, double y, double half_m) {
+  if (config.ditches == 0) return 0.0;
+  constexpr double kCosine = 0.90631;
+  constexpr double kSine = 0.42262;
+  const double across = -kSine * x + kCosine * y;
+  double depth = 0.0;
+  for (int i = 0; i < config.ditches; ++i) {
+    const double place = half_m * (2.0 * (i + 0.5) / config.ditches - 1.0);
+    const double share = (across - place) / (0.5 * config.ditch_width_m);
+    depth += config.ditch_depth_m * std::exp(-share * share);
+  }
+  return depth;
+}
+
+// How far the carrier pressed the snow down at a place: two ruts half a metre to both sides.
+double rut_depth(const TerrainConfig& config, double distance_m) {
+  const double depth = config.snow_m * config.track_depth;
+  if (distance_m > 1.6) return 0.0;
+  const double share = (distance_m - 0.5) / 0.4;
+  return depth * std::exp(-share * share);
+}
+
 }  // namespace
 
-Terrain::Terrain(const TerrainConfig& config, double half_x_m, double half_y_m, std::uint64_t seed)
+Terrain::Terrain(const TerrainConfig& config, double half_x_m, double half_y_m, std::uint64_t seed,
+                 const Route* way)
     : columns_(static_cast<int>(std::ceil(2.0 * half_x_m / config.cell_m)) + 1),
       rows_(static_cast<int>(std::ceil(2.0 * half_y_m / config.cell_m)) + 1),
       cell_m_(config.cell_m),
@@ -55,6 +80,9 @@ Terrain::Terrain(const TerrainConfig& config, double half_x_m, double half_y_m, 
   const ValueNoise tufts(hash_numbers(key, 4), 1.1);
   const double slope = std::tan(config.slope_deg * std::numbers::pi / 180.0);
   const double azimuth = config.slope_azimuth_deg * std::numbers::pi / 180.0;
+  // Snow lies even: what is lower than its depth shows less and less.
+  const double bare = 1.0 / (1.0 + 8.0 * config.snow_m);
+  const double half_m = std::max(half_x_m, half_y_m);
   heights_.reserve(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
@@ -62,10 +90,17 @@ Terrain::Terrain(const TerrainConfig& config, double half_x_m, double half_y_m, 
       const double y = south_m_ + cell_m_ * row;
       CounterNoise noise(hash_numbers(key, 5), static_cast<std::uint64_t>(column),
                          static_cast<std::uint64_t>(row));
-      heights_.push_back(slope * (x * std::cos(azimuth) + y * std::sin(azimuth)) +
-                         config.relief_m * (0.93 * hills.at(x, y) + 0.36 * knolls.at(x, y)) +
-                         config.hummock_m * (0.9 * hummocks.at(x, y) + 0.43 * tufts.at(x, y)) +
-                         config.roughness_m * noise.normal());
+      const double hummock = config.hummock_m * bare;
+      const double roughness = config.roughness_m * bare;
+      double height = slope * (x * std::cos(azimuth) + y * std::sin(azimuth)) +
+                      config.relief_m * (0.93 * hills.at(x, y) + 0.36 * knolls.at(x, y)) +
+                      hummock * (0.9 * hummocks.at(x, y) + 0.43 * tufts.at(x, y)) +
+                      roughness * noise.normal();
+      height -= ditch_depth(config, x, y, half_m);
+      if (way != nullptr && config.snow_m * config.track_depth > 0.0 && way->near({x, y}, 1.6)) {
+        height -= rut_depth(config, way->distance_to({x, y}));
+      }
+      heights_.push_back(height);
     }
   }
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "understory/simulation/route.h"
 #include "understory/simulation/site.h"
 
 namespace understory {
@@ -14,8 +15,10 @@ namespace understory {
 // scanned is the same surface. Immutable, thread-safe.
 class Terrain {
  public:
-  // Covers the rectangle of +-half_x_m, +-half_y_m around the origin.
-  Terrain(const TerrainConfig& config, double half_x_m, double half_y_m, std::uint64_t seed);
+  // Covers the rectangle of +-half_x_m, +-half_y_m around the origin. With snow, the surface is
+  // that of the snow, pressed down along `way` where one is given.
+  Terrain(const TerrainConfig& config, double half_x_m, double half_y_m, std::uint64_t seed,
+          const Route* way = nullptr);
 
   // Height of the surface in metres; outside of the grid that of its edge.
   [[nodiscard]] double height(double x, double y) const;

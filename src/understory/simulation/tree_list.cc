@@ -1,0 +1,134 @@
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <numbers>
+#include <set>
+#include <string>
+
+#include "understory/simulation/counter_noise.h"
+#include "understory/simulation/stand_drawing.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr int kLargestId = 10'000'000;
+
+std::vector<std::string> fields_of(std::string line) {
+  while (!line.empty() && (line.back() == '\r' || line.back() == ' '))
+    line.pop_back();
+  std::vector<std::string> fields(1);
+  for (const char c : line) {
+    if (c == ',') {
+      fields.emplace_back();
+    } else if (c != '"') {
+      fields.back() += c;
+    }
+  }
+  return fields;
+}
+
+// One line of the list, by the names of its columns.
+class Row {
+ public:
+  Row(const std::string& path, std::size_t line, const std::map<std::string, std::size_t>& columns,
+      std::vector<std::string> fields)
+      : path_(path), line_(line), columns_(columns), fields_(std::move(fields)) {}
+
+  [[nodiscard]] std::string text(const std::string& name) const {
+    const auto found = columns_.find(name);
+    return found == columns_.end() || found->second >= fields_.size() ? "" : fields_[found->second];
+  }
+  [[nodiscard]] bool has(const std::string& name) const { return !text(name).empty(); }
+
+  [[nodiscard]] double number(const std::string& name, double low, double high) const {
+    const std::string value = text(name);
+    double parsed = 0.0;
+    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), parsed);
+    const bool whole = error == std::errc() && end == value.data() + value.size();
+    if (!whole || !(parsed >= low && parsed <= high)) {
+      fail(fmt::format("{} is \"{}\", expected a number in {}..{}", name, value, low, high));
+    }
+    return parsed;
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw InputError(path_, fmt::format("line {}", line_), what);
+  }
+
+ private:
+  const std::string& path_;
+  std::size_t line_;
+  const std::map<std::string, std::size_t>& columns_;
+  std::vector<std::string> fields_;
+};
+
+Species species_of(const Row& row, Species drawn) {
+  const std::string name = row.text("species");
+  if (name.empty()) return drawn;
+  for (const Species species : {Species::kPine, Species::kSpruce, Species::kBirch}) {
+    if (name == species_name(species)) return species;
+  }
+  row.fail("species is \"" + name + "\", expected pine, spruce or birch");
+}
+
+Tree read_tree(const Row& row, int number, const StandConfig& config, const Terrain& terrain,
+               Random& random) {
+  Tree tree = draw_tree(config, random);
+  tree.species = species_of(row, tree.species);
+  const double x = row.number("x", -0.5 * config.size_x_m, 0.5 * config.size_x_m);
+  const double y = row.number("y", -0.5 * config.size_y_m, 0.5 * config.size_y_m);
+  tree.foot = {x, y, terrain.height(x, y)};
+  if (row.has("dbh_m")) tree.dbh_m = row.number("dbh_m", 0.005, 5.0);
+  tree.height_m = row.has("height_m")
+                      ? row.number("height_m", 1.5, 120.0)
+                      : std::max(config.height_min_m, height_of(tree.dbh_m, config));
+  if (row.has("lean_deg")) {
+    const double lean = std::tan(row.number("lean_deg", 0.0, 60.0) * std::numbers::pi / 180.0);
+    const double way = random.uniform(0.0, 2.0 * std::numbers::pi);
+    tree.lean = {lean * std::cos(way), lean * std::sin(way)};
+    tree.sweep.setZero();
+  }
+  tree.id = row.has("id") ? static_cast<int>(row.number("id", 1, kLargestId)) : number;
+  draw_crown(config, tree, random);
+  return tree;
+}
+
+}  // namespace
+
+std::vector<Tree> read_trees(const std::string& path, const StandConfig& config,
+                             const Terrain& terrain, std::uint64_t seed) {
+  std::ifstream file(path);
+  std::string line;
+  if (!file || !std::getline(file, line)) {
+    throw InputError(path, "", "expected a list of trees: a CSV with the columns x, y, dbh_m");
+  }
+  std::map<std::string, std::size_t> columns;
+  const std::vector<std::string> names = fields_of(line);
+  for (std::size_t i = 0; i < names.size(); ++i)
+    columns.emplace(names[i], i);
+  for (const char* needed : {"x", "y", "dbh_m"}) {
+    if (!columns.count(needed)) {
+      throw InputError(path, "line 1",
+                       fmt::format("no column {}, expected at least x, y, dbh_m", needed));
+    }
+  }
+  std::vector<Tree> trees;
+  std::set<int> ids;
+  for (std::size_t number = 2; std::getline(file, line); ++number) {
+    std::vector<std::string> fields = fields_of(line);
+    if (fields.size() == 1 && fields[0].empty()) continue;
+    const Row row(path, number, columns, std::move(fields));
+    Random random(hash_numbers(seed, stream_of(NoiseStream::kStand), number));
+    trees.push_back(read_tree(row, static_cast<int>(trees.size()) + 1, config, terrain, random));
+    if (!ids.insert(trees.back().id).second) {
+      row.fail(fmt::format("id {} stands in the list twice", trees.back().id));
+    }
+  }
+  return trees;
+}
+
+}  // namespace understory
