@@ -30,6 +30,7 @@ using Command = std::function<int(CommandContext&)>;
 // with an example, and a callback that sets `chosen`.
 void add_map_command(CLI::App& app, Command& chosen);
 void add_demo_command(CLI::App& app, Command& chosen);
+void add_correct_command(CLI::App& app, Command& chosen);
 void add_info_command(CLI::App& app, Command& chosen);
 void add_convert_command(CLI::App& app, Command& chosen);
 void add_simulate_command(CLI::App& app, Command& chosen);

@@ -52,6 +52,7 @@ int run(int argc, char** argv) {
   // In the order of the help page; each lives in a file of its own.
   add_demo_command(app, chosen);
   add_map_command(app, chosen);
+  add_correct_command(app, chosen);
   add_info_command(app, chosen);
   add_convert_command(app, chosen);
   add_simulate_command(app, chosen);

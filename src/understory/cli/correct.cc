@@ -1,0 +1,64 @@
+#include <cstdio>
+#include <memory>
+
+#include "understory/cli/command.h"
+#include "understory/pipeline/correction.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+struct CorrectOptions {
+  std::string stems;
+  std::string run_folder;
+  std::string config_file;
+  std::vector<std::string> settings;
+  bool print_config = false;
+};
+
+int run_correct(const CorrectOptions& options, CommandContext& context) {
+  CorrectionRequest request;
+  ConfigTable table;
+  describe(table, request.config);
+  if (!options.config_file.empty()) table.read_file(options.config_file);
+  table.set(options.settings);
+  if (options.print_config) {
+    std::fputs(table.to_yaml(true).c_str(), stdout);
+    return kExitDone;
+  }
+  if (options.stems.empty() || options.run_folder.empty())
+    throw ConfigError({"understory correct needs STEMS.csv.gz and -o RUN"});
+  request.stems = options.stems;
+  request.run_folder = options.run_folder;
+  request.config_yaml = table.to_yaml(false);
+  const CorrectionOutcome outcome =
+      run_correction(request, context.log, context.progress, context.stop_requested);
+  std::printf("%s\n", outcome.summary.c_str());
+  for (const std::string& reason : outcome.reasons)
+    std::fprintf(stderr, "warning: result %s: %s\n", to_string(outcome.status).c_str(),
+                 reason.c_str());
+  return outcome.status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
+}
+
+}  // namespace
+
+void add_correct_command(CLI::App& app, Command& chosen) {
+  auto* command =
+      app.add_subcommand("correct", "Trajectory and tree map from the stems of a recording alone");
+  const auto options = std::make_shared<CorrectOptions>();
+  command->add_option("STEMS", options->stems, "Stems of the views (stems.csv.gz)");
+  command->add_option("-o,--output", options->run_folder, "Run folder to write");
+  command->add_option("--config", options->config_file, "YAML file of settings");
+  command->add_option("--set", options->settings, "One setting, key=value (may be repeated)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false)
+      ->take_all();
+  command->add_flag("--print-config", options->print_config,
+                    "Print every setting with default, unit, range and meaning");
+  command->footer("Example:\n  understory correct stems.csv.gz -o forest");
+  command->callback([&chosen, options] {
+    chosen = [options](CommandContext& context) { return run_correct(*options, context); };
+  });
+}
+
+}  // namespace understory

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+#include "understory/sensor/stem_view.h"
+
+namespace understory {
+
+// One tree of a sparse map: the mean of the points at which its stem was seen.
+struct MappedStem {
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
+  Eigen::Vector3d axis_in_world = Eigen::Vector3d::UnitZ();
+  Eigen::Vector2d variance_m2 = Eigen::Vector2d::Zero();  // of one sight, x and y
+  double dbh_m = std::numeric_limits<double>::quiet_NaN();
+  double dbh_sd_m = std::numeric_limits<double>::quiet_NaN();  // of the mean; needs two sights
+  int dbh_sights = 0;
+  int sights = 0;
+  int first_view = 0;  // indices into the views
+  int last_view = 0;
+};
+
+struct StemMapConfig {
+  double merge_m = 0.6;  // sights nearer than this in the plane are of one tree
+  int min_sights = 3;    // trees seen less often are left out
+};
+
+// Gathers the stems of all views, placed by their poses, into trees, in the order of the views.
+// Deterministic; memory grows with the trees, not with the views.
+[[nodiscard]] std::vector<MappedStem> build_stem_map(const std::vector<StemView>& views,
+                                                     const std::vector<Pose>& world_from_body,
+                                                     const StemMapConfig& config);
+
+}  // namespace understory

@@ -1,0 +1,136 @@
+#include "understory/odometry/sparse_odometry.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+// Takes out what is left of tilt in a level pose's rotation, keeping the heading of its x axis.
+Pose upright(const Pose& pose) {
+  const Eigen::Vector3d x = pose.rotation() * Eigen::Vector3d::UnitX();
+  return Pose(
+      Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(x.y(), x.x()), Eigen::Vector3d::UnitZ())),
+      pose.translation());
+}
+
+// Turns a body about its own place towards the tilt that its stems show, by a share.
+Pose hold_tilt(const Pose& world_from_body, const StemUp& up, double share) {
+  if (up.stems == 0) return world_from_body;
+  const Eigen::Vector3d seen = world_from_body.rotation() * up.up_in_body;
+  const Eigen::Quaterniond whole =
+      Eigen::Quaterniond::FromTwoVectors(seen, Eigen::Vector3d::UnitZ());
+  return Pose(so3_exp(share * so3_log(whole)) * world_from_body.rotation(),
+              world_from_body.translation());
+}
+
+Matrix6d step_covariance(const SparseIcpResult& icp) {
+  // What no pair constrains has this much freedom: a radian, ten metres.
+  Matrix6d information = icp.information;
+  information.topLeftCorner<3, 3>() += Eigen::Matrix3d::Identity();
+  information.bottomRightCorner<3, 3>() += 0.01 * Eigen::Matrix3d::Identity();
+  return information.inverse();
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, SparseOdometryConfig& config) {
+  table.add_enum("target", config.target,
+                 {{"frame", SparseOdometryConfig::Target::kFrame},
+                  {"map", SparseOdometryConfig::Target::kMap}},
+                 "what a view is matched to: the one before, or a local map of stems");
+  table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
+            "share of a view's stems that must be found again; below it a search is made");
+  table.add("map_forgetting", config.map_forgetting, {0.01, 1.0}, "",
+            "share by which a stem of the map moves to where it is seen");
+  table.add("map_frames", config.map_frames, {1, 10'000}, "",
+            "stems not seen for that many views leave the local map");
+  table.add("tilt_gain", config.tilt_gain, {0.0, 1.0}, "",
+            "share of the tilt from the stems' axes taken over at each view");
+  table.section("icp", [&] { describe(table, config.icp); });
+  table.section("search", [&] { describe(table, config.search); });
+}
+
+SparsePoints SparseOdometry::target_points() const {
+  SparsePoints points;
+  points.reserve(landmarks_.size());
+  for (const Landmark& landmark : landmarks_)
+    points.push_back(landmark.point_in_world - world_from_body_.translation());
+  return points;
+}
+
+// In the world's axes with the origin at the last position.
+SparseOdometry::Match SparseOdometry::match(const SparsePoints& source) const {
+  const SparseTarget target(target_points());
+  const Pose last = Pose(upright(world_from_level_).rotation(), Eigen::Vector3d::Zero());
+  const Pose guess(last.rotation(), last * last_shift_in_level_);
+  Match match;
+  match.icp = register_sparse_icp(target, source, guess, config_.icp);
+  if (match.icp.overlap >= config_.min_overlap) return match;
+  match.searched = true;
+  for (const YawVoteCandidate& candidate : vote_yaw(target, source, last, config_.search)) {
+    const SparseIcpResult icp =
+        register_sparse_icp(target, source, candidate.target_from_source, config_.icp);
+    if (icp.overlap > match.icp.overlap) match.icp = icp;
+  }
+  return match;
+}
+
+void SparseOdometry::take_up(const SparsePoints& source, const Pose& world_from_level) {
+  if (config_.target == SparseOdometryConfig::Target::kFrame) landmarks_.clear();
+  SparsePoints known;
+  known.reserve(landmarks_.size());
+  for (const Landmark& landmark : landmarks_)
+    known.push_back(landmark.point_in_world);
+  const SparseTarget grid(known);
+  const double near = config_.icp.overlap_distance_ratio * grid.l0_m * 2.0;
+  std::vector<char> taken(landmarks_.size(), 0);
+  for (const Eigen::Vector3d& point : source) {
+    const Eigen::Vector3d at = world_from_level * point;
+    const auto found = known.empty() ? PlaneGrid::Neighbour{} : grid.grid.nearest(at, near, 0.0);
+    const auto k = static_cast<std::size_t>(found.index);
+    if (found.index >= 0 && taken[k] == 0) {
+      taken[k] = 1;
+      landmarks_[k].point_in_world += config_.map_forgetting * (at - landmarks_[k].point_in_world);
+      landmarks_[k].last_seen = count_;
+    } else if (found.index < 0) {
+      landmarks_.push_back({at, count_});
+    }
+  }
+  std::erase_if(landmarks_, [&](const Landmark& landmark) {
+    return count_ - landmark.last_seen > config_.map_frames;
+  });
+}
+
+SparseStep SparseOdometry::add(const StemView& view) {
+  const StemUp up = stem_up(view);
+  const Pose level_from_body(understory::level_from_body(up), Eigen::Vector3d::Zero());
+  const SparsePoints source = stem_points(view, level_from_body.rotation());
+  SparseStep step;
+  if (count_ == 0) {
+    // The first body frame's x axis, laid level, is the world's.
+    world_from_body_ = upright(level_from_body).inverse() * level_from_body;
+  } else {
+    const Match found = match(source);
+    step.status = found.icp.status == SparseIcpStatus::kTooFewPoints ? SparseStepStatus::kUnmatched
+                  : found.icp.overlap < config_.min_overlap          ? SparseStepStatus::kWeak
+                  : found.searched                                   ? SparseStepStatus::kSearched
+                                                                     : SparseStepStatus::kTracked;
+    step.overlap = found.icp.overlap;
+    step.error_m = found.icp.error_m;
+    step.covariance =
+        compose_covariance(step_covariance(found.icp), level_from_body, Matrix6d::Zero());
+    const Pose origin(Eigen::Quaterniond::Identity(), world_from_body_.translation());
+    const Pose matched = origin * found.icp.target_from_source * level_from_body;
+    step.previous_from_body = world_from_body_.inverse() * matched;
+    world_from_body_ = hold_tilt(matched, up, config_.tilt_gain);
+    last_shift_in_level_ = upright(world_from_level_).inverse() * world_from_body_.translation();
+  }
+  step.world_from_body = world_from_body_;
+  world_from_level_ = world_from_body_ * level_from_body.inverse();
+  take_up(source, world_from_level_);
+  ++count_;
+  return step;
+}
+
+}  // namespace understory

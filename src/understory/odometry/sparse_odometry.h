@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+#include "understory/odometry/stem_levelling.h"
+#include "understory/registration/sparse_icp.h"
+#include "understory/registration/yaw_vote.h"
+#include "understory/sensor/stem_view.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+struct SparseOdometryConfig {
+  // Frame: each view to the one before, P0 (16). Map: to the stems of the views before, gathered.
+  enum class Target { kFrame, kMap };
+  Target target = Target::kMap;
+  SparseIcpConfig icp;
+  YawVoteConfig search;
+  double min_overlap = 0.5;  // below it the guess was wrong: search; if still below: weak
+  // A stem of the local map moves by this share of the difference to where it is seen. Averaging
+  // (small values) did not help on real views, whose errors change slowly from view to view.
+  double map_forgetting = 1.0;
+  int map_frames = 12;     // stems not seen for longer leave the local map
+  double tilt_gain = 0.2;  // share of the tilt from the stems' axes taken over at each view
+};
+void describe(ConfigTable& table, SparseOdometryConfig& config);
+
+enum class SparseStepStatus {
+  kFirst,
+  kTracked,   // matched from the prediction
+  kSearched,  // matched after a search over yaw and translation
+  kWeak,      // little overlap even after the search: the best match, not to be trusted
+  kUnmatched  // too few stems: the pose is the prediction
+};
+
+struct SparseStep {
+  SparseStepStatus status = SparseStepStatus::kFirst;
+  Pose world_from_body;
+  Pose previous_from_body;                     // the step itself
+  Matrix6d covariance = Matrix6d::Identity();  // of the step, right perturbation
+  double overlap = 0.0;                        // P0's lambda, measured
+  double error_m = 0.0;                        // P0's e
+};
+
+// Odometry from stems alone: one view after another to a local map of stems, tilt held by the axes
+// of the stems. The world frame has z up and its x axis along the first view's, origin there.
+// Not thread-safe; deterministic.
+class SparseOdometry {
+ public:
+  explicit SparseOdometry(const SparseOdometryConfig& config) : config_(config) {}
+
+  SparseStep add(const StemView& view);
+
+ private:
+  struct Landmark {
+    Eigen::Vector3d point_in_world;
+    int last_seen = 0;
+  };
+  struct Match {
+    SparseIcpResult icp;
+    bool searched = false;
+  };
+
+  [[nodiscard]] SparsePoints target_points() const;
+  [[nodiscard]] Match match(const SparsePoints& source) const;
+  void take_up(const SparsePoints& source, const Pose& world_from_level);
+
+  SparseOdometryConfig config_;
+  std::vector<Landmark> landmarks_;
+  int count_ = 0;
+  Pose world_from_body_;
+  Pose world_from_level_;  // z up, turned like the body, of the last view
+  Eigen::Vector3d last_shift_in_level_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace understory

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "understory/map/stem_map.h"
+#include "understory/odometry/sparse_odometry.h"
+#include "understory/output/run_summary.h"
+#include "understory/util/config.h"
+#include "understory/util/log.h"
+#include "understory/util/progress.h"
+
+namespace understory {
+
+struct CorrectionConfig {
+  SparseOdometryConfig odometry;
+};
+void describe(ConfigTable& table, CorrectionConfig& config);
+
+// One call of `understory correct`.
+struct CorrectionRequest {
+  std::filesystem::path stems;  // stems.csv.gz
+  std::filesystem::path run_folder;
+  CorrectionConfig config;
+  std::string config_yaml;  // resolved, every key, for run.json
+};
+
+struct CorrectionOutcome {
+  RunStatus status = RunStatus::kComplete;
+  std::vector<std::string> reasons;
+  std::string summary;  // a few lines for the terminal
+};
+
+// From the stems of a recording to the run folder: odometry, trajectory, tree map.
+// Throws InputError or OutputError.
+[[nodiscard]] CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
+                                               const ProgressSink& progress,
+                                               const StopRequested& stop_requested);
+
+}  // namespace understory

@@ -1,0 +1,166 @@
+#include "understory/pipeline/correction_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <system_error>
+
+#include "understory/output/report.h"
+#include "understory/output/run_tables.h"
+#include "understory/util/error.h"
+#include "understory/util/version.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+void write_tum(const fs::path& path, const std::vector<StemView>& views,
+               const std::vector<Pose>& poses) {
+  TumWriter writer(path);
+  for (std::size_t i = 0; i < views.size(); ++i)
+    writer.add({views[i].stamp, poses[i]});
+  writer.commit();
+}
+
+std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
+  std::vector<Tree> trees;
+  for (const MappedStem& stem : stems) {
+    Tree tree;
+    tree.id = static_cast<int>(trees.size()) + 1;
+    tree.x = stem.point_in_world.x();
+    tree.y = stem.point_in_world.y();
+    tree.z = stem.point_in_world.z();
+    tree.dbh_m = stem.dbh_m;
+    tree.dbh_sd_m = stem.dbh_sd_m;
+    tree.lean_deg = std::acos(std::clamp(stem.axis_in_world.z(), -1.0, 1.0)) * 180.0 / M_PI;
+    tree.observations = stem.sights;
+    tree.x_sd_m = std::sqrt(stem.variance_m2.x() / stem.sights);
+    tree.y_sd_m = std::sqrt(stem.variance_m2.y() / stem.sights);
+    trees.push_back(tree);
+  }
+  return trees;
+}
+
+std::size_t count_of(const std::vector<SparseStep>& steps, SparseStepStatus status) {
+  return static_cast<std::size_t>(std::count_if(
+      steps.begin(), steps.end(), [&](const SparseStep& step) { return step.status == status; }));
+}
+
+double path_length(const std::vector<Pose>& poses) {
+  double length = 0.0;
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    length += (poses[i].translation() - poses[i - 1].translation()).norm();
+  return length;
+}
+
+// Root mean square distance of a tree's sights from their mean: the noise of the map, without
+// truth.
+double sight_noise_m(const std::vector<MappedStem>& stems) {
+  double sum = 0.0;
+  double sights = 0.0;
+  for (const MappedStem& stem : stems) {
+    sum += stem.variance_m2.sum() * (stem.sights - 1);
+    sights += stem.sights;
+  }
+  return sights > 0.0 ? std::sqrt(sum / sights) : std::nan("");
+}
+
+void judge(const CorrectionRun& run, RunSummary& summary) {
+  const auto lower = [&](RunStatus status, const std::string& reason) {
+    summary.status = status;
+    summary.reasons.push_back(reason);
+  };
+  if (run.stopped) lower(RunStatus::kPartial, "stopped before the end of the recording");
+  const std::size_t lost = count_of(run.steps, SparseStepStatus::kUnmatched);
+  const std::size_t weak = count_of(run.steps, SparseStepStatus::kWeak);
+  if (lost + weak == 0) return;
+  lower(RunStatus::kUntrusted,
+        fmt::format("{} of {} views found too few of the stems seen before: the path may be bent "
+                    "or broken there",
+                    lost + weak, run.steps.size()));
+}
+
+RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run,
+                      const std::vector<MappedStem>& stems, const Log& log) {
+  RunSummary summary;
+  summary.command = "correct";
+  summary.version = kVersion;
+  summary.config_yaml = request.config_yaml;
+  summary.inputs.push_back(hash_input(request.stems));
+  summary.warnings = log.warnings();
+  summary.scans = run.views.size();
+  summary.poses = run.world_from_body.size();
+  summary.counts["trees"] = static_cast<std::int64_t>(stems.size());
+  summary.counts["steps_searched"] =
+      static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kSearched));
+  summary.counts["steps_weak"] =
+      static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kWeak));
+  summary.quality["path_length_m"] = path_length(run.world_from_body);
+  summary.quality["sight_noise_m"] = sight_noise_m(stems);
+  judge(run, summary);
+  return summary;
+}
+
+ReportInput report_of(const CorrectionRequest& request, const CorrectionRun& run,
+                      const RunSummary& summary) {
+  ReportInput report;
+  report.title = request.stems.filename().string();
+  report.made_from = fmt::format("stems of {} views", run.views.size());
+  report.summary = summary;
+  const auto samples = run.times.samples("scan");
+  for (std::size_t i = 0; i < run.views.size(); ++i) {
+    ReportScan scan;
+    scan.stamp = run.views[i].stamp;
+    scan.position = run.world_from_body[i].translation().cast<float>();
+    if (i < samples.size()) scan.wall_ms = samples[i].wall_ms;
+    scan.inlier_ratio = static_cast<float>(i == 0 ? 1.0 : run.steps[i].overlap);
+    scan.weak = run.steps[i].status == SparseStepStatus::kWeak ||
+                run.steps[i].status == SparseStepStatus::kUnmatched;
+    report.scans.push_back(scan);
+  }
+  return report;
+}
+
+}  // namespace
+
+CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionRun& run,
+                                   const Log& log) {
+  const fs::path& folder = request.run_folder;
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw OutputError(folder.string(), "cannot be made: " + error.message());
+  std::vector<MappedStem> stems;
+  {
+    const ScopedTimer timer(run.times, "tree_map");
+    stems = build_stem_map(run.views, run.world_from_body, {});
+  }
+  {
+    const ScopedTimer timer(run.times, "writing");
+    std::vector<Pose> chained;
+    for (const SparseStep& step : run.steps)
+      chained.push_back(step.world_from_body);
+    write_tum(folder / "odometry.tum", run.views, chained);
+    write_tum(folder / "trajectory.tum", run.views, run.world_from_body);
+    write_trees_csv(folder / "trees.csv", trees_of(stems));
+  }
+  RunSummary summary = summary_of(request, run, stems, log);
+  summary.stages = summarise(run.times);
+  for (const auto& [name, stage] : summary.stages)
+    summary.wall_s += stage.total_wall_s;
+  summary.cpu_s = process_cpu_seconds();
+  summary.peak_memory_mb = peak_memory_mb();
+  write_report(folder / "report.html", report_of(request, run, summary));
+  write_run_json(folder / "run.json", summary);
+  CorrectionOutcome outcome;
+  outcome.status = summary.status;
+  outcome.reasons = summary.reasons;
+  outcome.summary = fmt::format("{} views over {:.0f} m, {} trees, in {:.1f} s; see {}",
+                                run.views.size(), path_length(run.world_from_body), stems.size(),
+                                summary.wall_s, (folder / "report.html").string());
+  return outcome;
+}
+
+}  // namespace understory
