@@ -201,6 +201,39 @@ TEST(Inventory, FewReturnsAreEnoughForAFreeStem) {
   EXPECT_EQ(take_inventory(blocks_of(plot.cloud), {}).trees.size(), 4U);
 }
 
+TEST(Inventory, AHeightDoesNotReachOverAGapOfSky) {
+  Plot plot(14);
+  plot.add_ground(20.0, 40);
+  plot.add_stem({6.0, 6.0, 0.3});
+  plot.add_stem({14.0, 14.0, 0.3});
+  for (int i = 0; i < 40; ++i) {
+    plot.cloud.emplace_back(6.0 + 0.01 * i, 6.0,
+                            plot.ground(6.0, 6.0) + 24.0 + 0.02 * i);  // a bird
+    plot.cloud.emplace_back(14.0 + 0.01 * i, 14.0, plot.ground(14.0, 14.0) + 17.2 + 0.02 * i);
+  }
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  const Tree* below_a_bird = nearest(result.trees, 6.0, 6.0);
+  const Tree* loose_top = nearest(result.trees, 14.0, 14.0);
+  ASSERT_NE(below_a_bird, nullptr);
+  ASSERT_NE(loose_top, nullptr);
+  EXPECT_NEAR(below_a_bird->height_m, 15.0, 0.3);
+  EXPECT_NEAR(loose_top->height_m, 18.0, 0.3);
+}
+
+TEST(Inventory, AStemHiddenAroundBreastHeightIsNotMeasured) {
+  Plot plot(15);
+  plot.add_ground(12.0, 40);
+  Plot::Stem stem{6.0, 6.0, 0.3};
+  stem.points = 3000;
+  plot.add_stem(stem);
+  EXPECT_EQ(take_inventory(blocks_of(plot.cloud), {}).trees.size(), 1U);
+  std::erase_if(plot.cloud, [&](const Eigen::Vector3d& p) {
+    const double height = p.z() - plot.ground(p.x(), p.y());
+    return height > 0.15 && height < 1.8;
+  });
+  EXPECT_TRUE(take_inventory(blocks_of(plot.cloud), {}).trees.empty());
+}
+
 TEST(Inventory, AnAirborneCloudSaysThatStemsAreNotSeen) {
   Plot plot(9);
   plot.add_ground(20.0, 4);

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "understory/map/keyframe_clouds.h"
+#include "understory/map/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/util/error.h"
 #include "understory/util/random.h"
@@ -65,6 +67,26 @@ TEST(KeyframeClouds, ATruncatedFileIsAnInputError) {
   }
   std::filesystem::resize_file(scratch("c.bin"), std::filesystem::file_size(scratch("c.bin")) - 1);
   EXPECT_THROW(KeyframeClouds(scratch("c.bin"), 2), InputError);
+}
+
+// P2 (37): metres and turns on one scale.
+TEST(KeyframeDistance, WeighsTurnsAgainstMetres) {
+  KeyframeConfig config;
+  config.rotation_as_metre_deg = 20.0;
+  const Pose last(Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitX())),
+                  {5.0, -3.0, 1.0});
+  const auto turned = [&](double degrees) {
+    const Eigen::Vector3d turn(0.0, 0.0, degrees * std::numbers::pi / 180.0);
+    return last * Pose(so3_exp(turn), Eigen::Vector3d::Zero());
+  };
+  EXPECT_NEAR(keyframe_distance(last, last, config), 0.0, 1e-12);
+  EXPECT_NEAR(keyframe_distance(last, turned(20.0), config), 1.0, 1e-9);
+  EXPECT_NEAR(keyframe_distance(last, turned(-50.0), config), 2.5, 1e-9);
+  const Pose moved(last.rotation(), last.translation() + Eigen::Vector3d(0.0, 0.6, 0.8));
+  EXPECT_NEAR(keyframe_distance(last, moved, config), 1.0, 1e-9);
+  const Pose screw =
+      last * Pose::exp((Vector6d() << 0, 0, std::numbers::pi / 9.0, 0, 0, 1.0).finished());
+  EXPECT_NEAR(keyframe_distance(last, screw, config), std::sqrt(2.0), 1e-9);
 }
 
 TEST(MapTiles, HandsBackEveryPointOnceInOrderOfTiles) {
