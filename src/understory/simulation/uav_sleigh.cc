@@ -149,9 +149,8 @@ Flight fly(const SiteConfig& config, const Route& route, const Terrain& terrain,
     // A little faster than need be: what is left at the end it hovers.
     speed_of_way = 1.03 * route.length_m() / std::max(1.0, c.route_time_s - start - 6.0);
   }
-  const double whole = c.route_time_s > 0.0
-                           ? c.route_time_s + 1.0
-                           : start + 1.04 * route.length_m() / speed_of_way + 8.0;
+  const double whole = c.route_time_s > 0.0 ? c.route_time_s + 1.0
+                                            : start + 1.04 * route.length_m() / speed_of_way + 8.0;
   const double total = config.duration_s > 0.0 ? config.duration_s + 1.0 : whole;
   Flight flight;
   double distance = 0.0;
