@@ -126,7 +126,10 @@ std::optional<GnssFix> SatelliteReceiver::next() {
   const CarrierState state = path_.state(to_seconds(stamp - start_));
   const Eigen::Vector3d arm(config_.mount_m[0], config_.mount_m[1], config_.mount_m[2]);
   const Eigen::Vector3d antenna = state.world_from_body * arm;
-  const double cover_now = scene_.canopy_cover(antenna);
+  // The sky changes slowly: a fast receiver looks up ten times a second.
+  const auto every = static_cast<std::int64_t>(std::max(1.0, std::floor(config_.rate_hz / 10.0)));
+  if (count_ % every == 0) cover_now_ = scene_.canopy_cover(antenna);
+  const double cover_now = cover_now_;
   // A receiver's filter forgets slowly: what hides the sky counts for a second or two.
   cover_ = count_ == 0 ? cover_now : cover_ + std::min(1.0, dt / 1.5) * (cover_now - cover_);
   CounterNoise noise(seed_ + 2, static_cast<std::uint64_t>(count_), 0);

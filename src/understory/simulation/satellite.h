@@ -48,6 +48,7 @@ class SatelliteReceiver {
   Eigen::Vector3d slow_;  // unit variance
   Eigen::Vector3d fast_;
   Eigen::Vector3d error_ = Eigen::Vector3d::Zero();
+  double cover_now_ = 0.0;
   double cover_ = 0.0;
   double outage_left_s_ = 0.0;
   Eigen::Vector3d jump_ = Eigen::Vector3d::Zero();

@@ -14,7 +14,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::int64_t kBlockFirings = 16;
 constexpr double kSnowDrop = 3.0;       // seconds that a load of snow takes to come down
-constexpr double kSnowDropPerM = 0.08;  // flakes in a metre of beam then
+constexpr double kSnowDropPerM = 0.03;  // flakes in a metre of beam then
 constexpr float kFlakeEnergy = 0.06F;   // of a large flake, as reflectivity x share of the beam
 constexpr float kGlaring = 130.0F;      // intensity from which an echo blooms
 

@@ -10,6 +10,7 @@
 
 #include "understory/simulation/counter_noise.h"
 #include "understory/simulation/embree.h"
+#include "understory/simulation/scene_geometry.h"
 #include "understory/simulation/shapes.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
@@ -22,92 +23,6 @@ constexpr unsigned kStemGeometry = 1;
 constexpr unsigned kWoodGeometry = 2;
 constexpr unsigned kBoulderGeometry = 3;
 constexpr unsigned kBuildingGeometry = 4;
-
-struct Vertex4 {
-  float x, y, z, radius;
-};
-
-// Round cones (spheres joined by their tangent cones) between consecutive points.
-struct Cones {
-  std::vector<Vertex4> points;
-  std::vector<unsigned> first;  // index of the first point of each cone
-  void add(const Eigen::Vector3d& place, double radius) {
-    points.push_back({static_cast<float>(place.x()), static_cast<float>(place.y()),
-                      static_cast<float>(place.z()), static_cast<float>(radius)});
-  }
-  void join() { first.push_back(static_cast<unsigned>(points.size()) - 1); }  // to the next point
-};
-
-template <typename T>
-T* buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t count) {
-  void* memory = rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T),
-                                         std::max<std::size_t>(count, 1));
-  UNDERSTORY_CHECK(memory != nullptr);
-  return static_cast<T*>(memory);
-}
-
-RTCGeometry terrain_geometry(RTCDevice device, const Terrain& terrain) {
-  const int columns = terrain.columns();
-  const int rows = terrain.rows();
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices =
-      buffer<Eigen::Vector3f>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3,
-                              static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column)
-      *vertices++ = terrain.vertex(column, row).cast<float>();
-  }
-  auto* triangles = buffer<Eigen::Vector3i>(
-      geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
-      2 * static_cast<std::size_t>(columns - 1) * static_cast<std::size_t>(rows - 1));
-  for (int row = 0; row + 1 < rows; ++row) {
-    for (int column = 0; column + 1 < columns; ++column) {
-      const int sw = row * columns + column;
-      *triangles++ = {sw, sw + 1, sw + columns + 1};
-      *triangles++ = {sw, sw + columns + 1, sw + columns};
-    }
-  }
-  return geometry;
-}
-
-RTCGeometry cone_geometry(RTCDevice device, const Cones& cones) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
-  std::copy(
-      cones.points.begin(), cones.points.end(),
-      buffer<Vertex4>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, cones.points.size()));
-  std::copy(cones.first.begin(), cones.first.end(),
-            buffer<unsigned>(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT, cones.first.size()));
-  return geometry;
-}
-
-RTCGeometry shape_geometry(RTCDevice device, const Shape& shape) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  std::copy(shape.vertices.begin(), shape.vertices.end(),
-            buffer<Eigen::Vector3f>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3,
-                                    shape.vertices.size()));
-  std::copy(shape.triangles.begin(), shape.triangles.end(),
-            buffer<Eigen::Vector3i>(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
-                                    shape.triangles.size()));
-  return geometry;
-}
-
-Shape building_shape(const Building& house) {
-  const Eigen::Vector3f half = 0.5F * house.size_m.cast<float>();
-  const float wall = house.size_m.cast<float>().z();
-  const float ridge = wall + 0.6F * half.y();
-  const Eigen::Vector3f corners[10] = {{-half.x(), -half.y(), -1.0F}, {half.x(), -half.y(), -1.0F},
-                                       {half.x(), half.y(), -1.0F},   {-half.x(), half.y(), -1.0F},
-                                       {-half.x(), -half.y(), wall},  {half.x(), -half.y(), wall},
-                                       {half.x(), half.y(), wall},    {-half.x(), half.y(), wall},
-                                       {-half.x(), 0.0F, ridge},      {half.x(), 0.0F, ridge}};
-  const Eigen::AngleAxisf turn(static_cast<float>(house.yaw_rad), Eigen::Vector3f::UnitZ());
-  Shape shape;
-  for (const Eigen::Vector3f& corner : corners)
-    shape.vertices.push_back(house.foot.cast<float>() + turn * corner);
-  shape.triangles = {{0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4},
-                     {3, 4, 7}, {4, 5, 9}, {4, 9, 8}, {7, 8, 9}, {7, 9, 6}, {4, 8, 7}, {5, 6, 9}};
-  return shape;
-}
 
 // The same with a number of one's own choice.
 void attach_as(RTCScene scene, RTCGeometry geometry, unsigned id) {
