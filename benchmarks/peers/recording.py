@@ -42,18 +42,22 @@ def scan_of(message):
                 cloud["ring"][good].astype(np.int32), cloud["intensity"][good])
 
 
-def matrix(transform):
-    q = transform.rotation
-    x, y, z, w = q.x, q.y, q.z, q.w
+def pose_of(quaternion_xyzw, translation):
+    x, y, z, w = quaternion_xyzw
     result = np.eye(4)
     result[:3, :3] = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    t = transform.translation
-    result[:3, 3] = [t.x, t.y, t.z]
+    result[:3, 3] = translation
     return result
+
+
+def matrix(transform):
+    """Of a geometry_msgs Transform."""
+    q, t = transform.rotation, transform.translation
+    return pose_of((q.x, q.y, q.z, q.w), (t.x, t.y, t.z))
 
 
 def transforms(path):
@@ -119,6 +123,26 @@ def quaternion(rotation):
     _, vectors = np.linalg.eigh(k)
     q = vectors[:, -1]
     return q if q[3] >= 0 else -q
+
+
+def rates(path):
+    """Messages a second of lidar and IMU (0: none), from the times in the file."""
+    result = {"lidar": 0.0, "imu": 0.0}
+    with AnyReader([Path(path)]) as reader:
+        for connection in reader.connections:
+            if connection.topic not in ("/lidar", "/imu"):
+                continue
+            times = [t for _, t, _ in reader.messages(connections=[connection])]
+            if len(times) > 1:
+                result[connection.topic[1:]] = 1e9 / float(np.median(np.diff(times)))
+    return result
+
+
+def interpolated(a, b, u):
+    """Pose between two, the rotation by normalised quaternions (for small steps)."""
+    qa, qb = quaternion(a[:3, :3]), quaternion(b[:3, :3])
+    q = (1 - u) * qa + u * (qb if qa @ qb >= 0 else -qb)
+    return pose_of(q / np.linalg.norm(q), (1 - u) * a[:3, 3] + u * b[:3, 3])
 
 
 def write_tum(path, stamped_poses):

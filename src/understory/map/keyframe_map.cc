@@ -52,7 +52,7 @@ KeyframeMap::KeyframeMap(const Config& config, const std::filesystem::path& fold
       loops_(config.loop_closure, config.local_map) {}
 
 namespace {
-constexpr std::size_t kCachedKeyframes = 300;
+constexpr std::size_t kCachedKeyframes = 150;
 // What is too far away is looked for only now and then: it means going over the whole local map.
 constexpr std::size_t kForgetEvery = 8;
 constexpr const char* kPointsFile = "keyframe_points.bin";

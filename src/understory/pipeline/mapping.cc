@@ -109,6 +109,7 @@ class MappingRun {
         state_.last_checkpoint() + from_seconds(request_.config.checkpoint_interval_s);
     if (session_->settled() && session_->last_scan_end() >= due) {
       state_.save(request_, *session_, *orderer_, log_, events_);
+      memory_mb_.push_back(resident_memory_mb());
     }
   }
 
@@ -130,6 +131,7 @@ class MappingRun {
     facts.format = source_->format();
     facts.time_repair = orderer_->report();
     facts.latencies_ms = latencies_ms_;
+    facts.memory_mb = memory_mb_;
     facts.realtime = player_ != nullptr;
     facts.dropped_scans = player_ != nullptr ? player_->dropped_scans() : 0;
     if (player_ != nullptr) player_->stop();
@@ -180,6 +182,7 @@ class MappingRun {
   std::unique_ptr<Recording> source_;
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
   std::uint64_t events_ = 0;
+  std::vector<double> memory_mb_;
   std::vector<double> latencies_ms_;
 };
 

@@ -260,6 +260,10 @@ void fill_constancy(RunSummary& summary, const TrajectoryFacts& trajectory) {
 
 void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const RunFacts& facts) {
   fill_constancy(summary, trajectory);
+  if (facts.memory_mb.size() > 1) {
+    summary.quality["memory_mb_half"] = facts.memory_mb[facts.memory_mb.size() / 2];
+    summary.quality["memory_mb_end"] = facts.memory_mb.back();
+  }
   summary.quality["length_m"] = trajectory.length_m;
   summary.quality["inlier_ratio_mean"] = trajectory.inlier_ratio_mean;
   summary.quality["match_distance_rms_m"] = trajectory.fitness_rms_m;

@@ -19,6 +19,7 @@ struct RunFacts {
   bool realtime = false;
   std::vector<double> latencies_ms;  // one per scan, --realtime only
   std::uint64_t dropped_scans = 0;
+  std::vector<double> memory_mb;  // resident, at each checkpoint
 };
 
 // Writes the run folder (design: formats): trajectory, states, keyframes, graph, fixes, map, trees,

@@ -14,8 +14,9 @@ namespace understory {
 
 // CPU time of the whole process so far, in seconds.
 [[nodiscard]] double process_cpu_seconds();
-// Largest resident memory of the process so far, in megabytes (1e6 bytes).
+// Resident memory of the process: the largest so far, and now; megabytes (1e6 bytes).
 [[nodiscard]] double peak_memory_mb();
+[[nodiscard]] double resident_memory_mb();
 
 // Mean, percentiles (nearest rank) and largest of a set of values; zeros for an empty set.
 struct Distribution {

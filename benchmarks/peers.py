@@ -1,0 +1,149 @@
+#!/usr/bin/env python3
+"""`./run bench peers`: the field's systems and this one on the same recordings, site by site.
+
+  ./run bench peers                               60 s of handheld and harvester, seed 21
+  ./run bench peers --sites handheld --duration-s 180 --seed 22
+  ./run bench peers --only DLIO KissICP           some of them
+  ./run bench peers --write                       puts the tables into docs/results.md
+
+From PyPI, into an environment of their own: evalio (LIO-SAM, DLIO, LOAM, KISS-ICP, GenZ-ICP, CT-ICP,
+MAD-ICP, FORM) and RKO-LIO. One after another, two threads, pinned to the same two processors. Errors
+are against the recording's truth; CPU and wall time a scan are without reading.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from program import (Failed, TOP, machine, map_recording, own_cpus, run, say, understory,
+                     understory_json, version)
+
+PEERS = TOP / "benchmarks" / "peers"
+RESULTS = TOP / "docs" / "results.md"
+BEGIN, END = "<!-- peers table: ./run bench peers --write -->", "<!-- end of peers table -->"
+# DLIO and LIO-SAM work in threads of their own and are fed at the sensor's rate.
+EVALIO = {"LioSAM": 1.0, "DLIO": 1.0, "LOAM": 0, "KissICP": 0, "GenZICP": 0, "CTICP": 0,
+          "MadICP": 0, "FORM": 0}
+WITH_IMU = {"understory", "LioSAM", "DLIO", "RKO-LIO"}
+
+
+def ours(recording, work, cpus, name, settings):
+    result = map_recording(recording, work / name, threads=2, cpus=cpus,
+                           settings=["map.enabled=false", *settings])
+    scan = result["stages"]["scan"]
+    return {"name": name, "version": version().split()[-1], "scans": result["scans"],
+            "answered": result["poses"] / max(1, result["scans"]), "cpu_ms": scan["cpu_ms"],
+            "wall_ms": scan["wall_ms"], "peak_memory_mb": result["process"]["peak_memory_mb"],
+            "trajectory": work / name / "trajectory.tum"}
+
+
+def peer(name, recording, work, cpus):
+    trajectory, summary = work / f"{name}.tum", work / f"{name}.json"
+    if name in EVALIO:
+        script, more = "evalio_peer", [name, EVALIO[name]]
+    else:
+        script, more = "rko_lio_peer", []
+    done = run(sys.executable, PEERS / f"{script}.py", recording, trajectory, summary, 2, *more,
+               cpus=cpus)
+    if done.code != 0:
+        reason = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        return {"name": name, "failed": f"ended with {done.code}: {reason[:120]}"}
+    return {**json.loads(summary.read_text()), "name": name, "trajectory": trajectory}
+
+
+def add_errors(result, truth):
+    if "failed" in result:
+        return result
+    try:
+        aligned = understory_json("evaluate", result["trajectory"], truth, "--align", "se3")
+        first = understory_json("evaluate", result["trajectory"], truth, "--align", "first")
+    except Failed as error:
+        return {**result, "failed": str(error).strip().splitlines()[-1][:120]}
+    segments = [s["translation_percent"] for s in first.get("segments", [])]
+    return {**result, "ape_cm": 100.0 * aligned["ape_rmse_m"], "drift": first["drift_percent"],
+            "segments": sum(segments) / len(segments) if segments else None}
+
+
+def cell(value, decimals):
+    return "" if value is None else f"{value:.{decimals}f}"
+
+
+def render(results, what):
+    lines = [f"**{what}** ({version()}, {time.strftime('%Y-%m-%d')}, {machine()})", "",
+             "| | IMU | APE SE(3) cm | drift % | segments % | scans answered % | CPU ms a scan "
+             "| wall ms mean | p99 | memory MB |", "|---|---|---|---|---|---|---|---|---|---|"]
+    for r in results:
+        imu = "yes" if r["name"] in WITH_IMU else "no"
+        if "failed" in r:
+            lines.append(f"| {r['name']} | {imu} | failed: {r['failed']} | | | | | | | |")
+            continue
+        wall = r.get("wall_ms") or {}
+        lines.append("| " + " | ".join([
+            f"{r['name']} ({r['version']})", imu, cell(r["ape_cm"], 1), cell(r["drift"], 2),
+            cell(r["segments"], 2), cell(100.0 * r["answered"], 0), cell(r["cpu_ms"]["mean"], 0),
+            cell(wall.get("mean"), 0), cell(wall.get("p99"), 0),
+            cell(r["peak_memory_mb"], 0)]) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def measure(site, options, work):
+    what = f"{site}, seed {options.seed}, {options.duration_s:g} s"
+    recording = work / f"{site}.mcap"
+    say(f"  simulating {what}")
+    understory("simulate", site, "-o", recording, "--seed", options.seed, "--duration-s",
+               options.duration_s)
+    cpus, truth, results = own_cpus(), recording.with_suffix(".truth"), []
+    jobs = {"understory": lambda: ours(recording, work, cpus, "understory", []),
+            "understory, no IMU, no loops": lambda: ours(
+                recording, work, cpus, "understory, no IMU, no loops",
+                ["motion.imu_enabled=false", "loop_closure.enabled=false"])}
+    for name in [*EVALIO, "RKO-LIO"]:
+        jobs[name] = lambda name=name: peer(name, recording, work, cpus)
+    for name, job in jobs.items():
+        if options.only and name not in options.only:
+            continue
+        say(f"  {name}")
+        results.append(add_errors(job(), truth))
+        say("    " + ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}"
+                               for k, v in results[-1].items()
+                               if k in ("failed", "ape_cm", "drift", "answered")))
+    recording.unlink()
+    return render(results, what)
+
+
+def write_results(text):
+    page = RESULTS.read_text()
+    if BEGIN not in page:
+        page += f"\n## Peers\n{BEGIN}\n{END}\n"
+    head, rest = page.split(BEGIN, 1)
+    _, tail = rest.split(END, 1)
+    RESULTS.write_text(f"{head}{BEGIN}\n{text}{END}{tail}")
+    say(f"written into {RESULTS}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sites", nargs="+", default=["handheld", "harvester"])
+    parser.add_argument("--seed", type=int, default=21)
+    parser.add_argument("--duration-s", type=float, default=60.0)
+    parser.add_argument("--only", nargs="+", help="names as in the table")
+    parser.add_argument("--write", action="store_true")
+    options = parser.parse_args()
+    work = Path(tempfile.mkdtemp(prefix="understory-peers-"))
+    try:
+        text = "\n".join(measure(site, options, work) for site in options.sites)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    print(text)
+    if options.write:
+        write_results(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
