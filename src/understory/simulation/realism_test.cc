@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "understory/simulation/inertial.h"
 #include "understory/simulation/magnetometer.h"
@@ -233,8 +234,9 @@ struct Receiver {
     const CarrierPlan plan = plan_carrier(site, route, terrain);
     SatelliteReceiver receiver(site, plan.path, scene, 0);
     for (int i = 0; i < static_cast<int>(seconds * site.gnss.rate_hz); ++i) {
-      (void)receiver.next();
+      const std::optional<GnssFix> fix = receiver.next();
       errors.push_back(receiver.last_error_enu());
+      if (fix) promised_m = std::sqrt(fix->covariance(0, 0));
     }
   }
   [[nodiscard]] double largest() const {
@@ -246,6 +248,7 @@ struct Receiver {
   SiteConfig site;
   Route route;
   std::vector<Eigen::Vector3d> errors;
+  double promised_m = 0.0;  // standard deviation east that the last fix claims
 };
 
 SiteConfig quiet_receiver() {
@@ -284,6 +287,21 @@ TEST(GnssRealism, JumpsStepAsideAndStay) {
   EXPECT_GE(steps, 2U);
   EXPECT_LE(steps, 30U);
   EXPECT_GT(under.largest(), 0.5);
+}
+
+TEST(GnssRealism, CovarianceIsHonestOrOverconfidentAsAsked) {
+  SiteConfig site = quiet_receiver();
+  site.gnss.open_sd_m = 1.0;
+  site.gnss.correlation_s = 4.0;
+  site.gnss.multipath_share = 0.0;
+  for (const double factor : {1.0, 0.12}) {
+    site.gnss.reported_factor = factor;
+    const Receiver open(site, 0.0, 4000.0);
+    double sum = 0.0;
+    for (const Eigen::Vector3d& error : open.errors)
+      sum += error.x() * error.x() / static_cast<double>(open.errors.size());
+    EXPECT_NEAR(open.promised_m / std::sqrt(sum), factor, 0.12 * factor);
+  }
 }
 
 TEST(Magnetometer, PointsNorthUntilIronBendsIt) {
