@@ -34,6 +34,7 @@ if(UNDERSTORY_SANITIZERS)
   target_compile_options(understory_flags INTERFACE
     -fsanitize=${UNDERSTORY_SANITIZERS} -fno-omit-frame-pointer)
   target_link_options(understory_flags INTERFACE -fsanitize=${UNDERSTORY_SANITIZERS})
+  target_compile_definitions(understory_flags INTERFACE UNDERSTORY_SANITIZED)
   if(UNDERSTORY_SANITIZERS MATCHES "undefined")
     target_compile_options(understory_flags INTERFACE -fno-sanitize-recover=undefined)
   endif()

@@ -1,6 +1,7 @@
 #include "understory/recording/las.h"
 
 #include <laszip/laszip_api.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <istream>
 #include <memory>
 #include <streambuf>
@@ -308,9 +310,26 @@ bool write_all(int pipe, const void* data, std::size_t size) {
 }
 
 // In the process that decodes: never returns.
+// LASzip believes the sizes that a damaged file states, up to 4 GB. (A sanitizer's own memory is
+// far beyond any limit.)
+void limit_memory() {
+#if !defined(UNDERSTORY_SANITIZED)
+  constexpr rlim_t kMore = rlim_t{1} << 30;
+  std::ifstream file("/proc/self/statm");
+  rlim_t size = 0, resident = 0, shared = 0, text = 0, library = 0, data = 0;
+  if (!(file >> size >> resident >> shared >> text >> library >> data)) return;
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_DATA, &limit) != 0) return;
+  const rlim_t wanted = data * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + kMore;
+  limit.rlim_cur = std::min(limit.rlim_cur, wanted);
+  ::setrlimit(RLIMIT_DATA, &limit);
+#endif
+}
+
 [[noreturn]] void serve_points(ByteSource& file, const LasHeader& header, int pipe) {
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGPIPE})
     std::signal(signal, SIG_DFL);
+  limit_memory();
   try {
     decode_compressed(file, header, [&](const std::vector<LasPoint>& points) {
       if (!write_all(pipe, points.data(), points.size() * sizeof(LasPoint))) ::_exit(1);
