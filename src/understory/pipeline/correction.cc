@@ -31,6 +31,9 @@ std::vector<SparseStep> position(const std::vector<StemView>& views,
 
 void describe(ConfigTable& table, CorrectionConfig& config) {
   table.section("odometry", [&] { describe(table, config.odometry); });
+  table.add("close_loops", config.close_loops, "find places seen before and correct the path");
+  table.section("loops", [&] { describe(table, config.loops); });
+  table.section("pose_graph", [&] { describe(table, config.graph); });
 }
 
 CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
@@ -45,7 +48,13 @@ CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
   run.stopped = run.steps.size() < run.views.size();
   run.views.resize(run.steps.size());
   for (const SparseStep& step : run.steps)
-    run.world_from_body.push_back(step.world_from_body);
+    run.correction.world_from_body.push_back(step.world_from_body);
+  if (request.config.close_loops && !run.stopped) {
+    if (progress) progress({"loops", 0.0, 0.0, "", ""});
+    const ScopedTimer timer(run.times, "loops");
+    run.correction =
+        close_stem_loops(run.views, run.steps, request.config.loops, request.config.graph);
+  }
   return write_correction(request, run, log);
 }
 

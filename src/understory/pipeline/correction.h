@@ -4,7 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "understory/map/stem_map.h"
+#include "understory/graph/pose_graph.h"
+#include "understory/graph/stem_loops.h"
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/output/run_summary.h"
 #include "understory/util/config.h"
@@ -15,6 +16,9 @@ namespace understory {
 
 struct CorrectionConfig {
   SparseOdometryConfig odometry;
+  bool close_loops = true;
+  StemLoopConfig loops;
+  PoseGraphConfig graph;
 };
 void describe(ConfigTable& table, CorrectionConfig& config);
 
@@ -32,7 +36,7 @@ struct CorrectionOutcome {
   std::string summary;  // a few lines for the terminal
 };
 
-// From the stems of a recording to the run folder: odometry, trajectory, tree map.
+// From the stems of a recording to the run folder: odometry, loops, trajectory, tree map.
 // Throws InputError or OutputError.
 [[nodiscard]] CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
                                                const ProgressSink& progress,

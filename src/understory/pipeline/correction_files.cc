@@ -7,6 +7,7 @@
 #include <numeric>
 #include <system_error>
 
+#include "understory/map/stem_map.h"
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
 #include "understory/util/error.h"
@@ -23,6 +24,20 @@ void write_tum(const fs::path& path, const std::vector<StemView>& views,
   for (std::size_t i = 0; i < views.size(); ++i)
     writer.add({views[i].stamp, poses[i]});
   writer.commit();
+}
+
+// A row per view for which an earlier place was found, by the views' frame numbers.
+void write_loops(const fs::path& path, const CorrectionRun& run) {
+  AtomicTextFile file(path);
+  file.write("query,match,score,accepted\n");
+  for (std::size_t k = 0; k < run.correction.loops.size(); ++k) {
+    const StemLoop& loop = run.correction.loops[k];
+    file.write(fmt::format("{},{},{:.4f},{}\n",
+                           run.views[static_cast<std::size_t>(loop.query)].frame,
+                           run.views[static_cast<std::size_t>(loop.match)].frame, loop.score,
+                           run.correction.accepted[k] != 0 ? 1 : 0));
+  }
+  file.commit();
 }
 
 std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
@@ -74,6 +89,8 @@ void judge(const CorrectionRun& run, RunSummary& summary) {
     summary.reasons.push_back(reason);
   };
   if (run.stopped) lower(RunStatus::kPartial, "stopped before the end of the recording");
+  if (!run.correction.converged)
+    lower(RunStatus::kUntrusted, "the loops were not solved: " + run.correction.reason);
   const std::size_t lost = count_of(run.steps, SparseStepStatus::kUnmatched);
   const std::size_t weak = count_of(run.steps, SparseStepStatus::kWeak);
   if (lost + weak == 0) return;
@@ -92,13 +109,16 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   summary.inputs.push_back(hash_input(request.stems));
   summary.warnings = log.warnings();
   summary.scans = run.views.size();
-  summary.poses = run.world_from_body.size();
+  summary.poses = run.correction.world_from_body.size();
   summary.counts["trees"] = static_cast<std::int64_t>(stems.size());
   summary.counts["steps_searched"] =
       static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kSearched));
   summary.counts["steps_weak"] =
       static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kWeak));
-  summary.quality["path_length_m"] = path_length(run.world_from_body);
+  summary.counts["loops_found"] = static_cast<std::int64_t>(run.correction.loops.size());
+  summary.counts["loops_accepted"] = static_cast<std::int64_t>(
+      std::count(run.correction.accepted.begin(), run.correction.accepted.end(), 1));
+  summary.quality["path_length_m"] = path_length(run.correction.world_from_body);
   summary.quality["sight_noise_m"] = sight_noise_m(stems);
   judge(run, summary);
   return summary;
@@ -114,13 +134,28 @@ ReportInput report_of(const CorrectionRequest& request, const CorrectionRun& run
   for (std::size_t i = 0; i < run.views.size(); ++i) {
     ReportScan scan;
     scan.stamp = run.views[i].stamp;
-    scan.position = run.world_from_body[i].translation().cast<float>();
+    scan.position = run.correction.world_from_body[i].translation().cast<float>();
     if (i < samples.size()) scan.wall_ms = samples[i].wall_ms;
     scan.inlier_ratio = static_cast<float>(i == 0 ? 1.0 : run.steps[i].overlap);
     scan.weak = run.steps[i].status == SparseStepStatus::kWeak ||
                 run.steps[i].status == SparseStepStatus::kUnmatched;
     report.scans.push_back(scan);
   }
+  for (std::size_t k = 0; k < run.correction.loops.size(); ++k) {
+    const StemLoop& found = run.correction.loops[k];
+    if (!found.verified) continue;
+    const auto query = static_cast<std::size_t>(found.query);
+    const auto match = static_cast<std::size_t>(found.match);
+    ReportLoop loop;
+    loop.from = run.correction.world_from_body[match].translation();
+    loop.to = run.correction.world_from_body[query].translation();
+    loop.from_stamp = run.views[match].stamp;
+    loop.to_stamp = run.views[query].stamp;
+    loop.accepted = run.correction.accepted[k] != 0;
+    if (!loop.accepted) loop.reason = "contradicts the other loops";
+    report.loops.push_back(loop);
+  }
+  report.loop_closure_enabled = request.config.close_loops;
   return report;
 }
 
@@ -135,7 +170,7 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   std::vector<MappedStem> stems;
   {
     const ScopedTimer timer(run.times, "tree_map");
-    stems = build_stem_map(run.views, run.world_from_body, {});
+    stems = build_stem_map(run.views, run.correction.world_from_body, {});
   }
   {
     const ScopedTimer timer(run.times, "writing");
@@ -143,7 +178,8 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
     for (const SparseStep& step : run.steps)
       chained.push_back(step.world_from_body);
     write_tum(folder / "odometry.tum", run.views, chained);
-    write_tum(folder / "trajectory.tum", run.views, run.world_from_body);
+    write_tum(folder / "trajectory.tum", run.views, run.correction.world_from_body);
+    write_loops(folder / "loops.csv", run);
     write_trees_csv(folder / "trees.csv", trees_of(stems));
   }
   RunSummary summary = summary_of(request, run, stems, log);
@@ -158,8 +194,8 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   outcome.status = summary.status;
   outcome.reasons = summary.reasons;
   outcome.summary = fmt::format("{} views over {:.0f} m, {} trees, in {:.1f} s; see {}",
-                                run.views.size(), path_length(run.world_from_body), stems.size(),
-                                summary.wall_s, (folder / "report.html").string());
+                                run.views.size(), path_length(run.correction.world_from_body),
+                                stems.size(), summary.wall_s, (folder / "report.html").string());
   return outcome;
 }
 

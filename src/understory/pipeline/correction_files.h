@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "understory/pipeline/correction.h"
+#include "understory/pipeline/stem_correction.h"
 #include "understory/sensor/stem_view.h"
 #include "understory/util/timing.h"
 
@@ -11,13 +12,13 @@ namespace understory {
 // What a correction run has found.
 struct CorrectionRun {
   std::vector<StemView> views;
-  std::vector<SparseStep> steps;      // the chained odometry
-  std::vector<Pose> world_from_body;  // the answer
+  std::vector<SparseStep> steps;  // the chained odometry
+  StemCorrection correction;      // the answer
   bool stopped = false;
   StageTimes times;
 };
 
-// Writes the run folder: odometry.tum, trajectory.tum, trees.csv, run.json, report.html.
+// Writes the run folder: odometry.tum, trajectory.tum, loops.csv, trees.csv, run.json, report.html.
 [[nodiscard]] CorrectionOutcome write_correction(const CorrectionRequest& request,
                                                  CorrectionRun& run, const Log& log);
 

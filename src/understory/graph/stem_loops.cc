@@ -1,0 +1,147 @@
+#include "understory/graph/stem_loops.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "understory/util/error.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+constexpr int kNeighbourhood =
+    30;  // views around a place among which the nearest one is looked for
+
+double median_l0(const std::vector<SparsePoints>& views) {
+  std::vector<double> values(views.size());
+  parallel_for(views.size(), 16, [&](std::size_t i) {
+    if (i % 8 == 0) values[i] = SparseTarget(views[i]).l0_m;
+  });
+  std::erase_if(values, [](double value) { return value <= 0.0; });
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+TreePatterns places_of(const std::vector<SparsePoints>& views, const std::vector<Pose>& poses,
+                       double l0_m, const StemLoopConfig& config) {
+  TreePatterns patterns(l0_m, config.pattern);
+  std::optional<Eigen::Vector3d> last;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Eigen::Vector3d& at = poses[i].translation();
+    if (last && (at - *last).norm() < config.place_spacing * l0_m) continue;
+    last = at;
+    patterns.add(static_cast<int>(i), views[i]);
+  }
+  patterns.finish();
+  return patterns;
+}
+
+// The covariance of a loop: its own noise, and what both views got wrong alike.
+Matrix6d loop_covariance(const SparseIcpResult& icp, double l0_m) {
+  Matrix6d information = icp.information + 1e-6 * Matrix6d::Identity();
+  Matrix6d covariance = 9.0 * information.inverse();
+  const double tilt = 0.5 * M_PI / 180.0;
+  const double yaw = 0.1 * M_PI / 180.0;
+  const double shift = 0.02 * l0_m;
+  covariance.diagonal() += (Vector6d() << tilt * tilt, tilt * tilt, yaw * yaw, shift * shift,
+                            shift * shift, shift * shift)
+                               .finished();
+  return covariance;
+}
+
+class Finder {
+ public:
+  Finder(const std::vector<SparsePoints>& views, const std::vector<Pose>& poses,
+         const StemLoopConfig& config)
+      : views_(views),
+        poses_(poses),
+        config_(config),
+        l0_m_(median_l0(views)),
+        patterns_(places_of(views, poses, l0_m_, config)) {}
+
+  [[nodiscard]] std::optional<StemLoop> find(int query) const {
+    const int before = query - config_.exclude_recent + 1;
+    if (before <= 0 || l0_m_ <= 0.0) return std::nullopt;
+    std::optional<StemLoop> best;
+    for (const PatternCandidate& candidate : patterns_.find(view(query), before)) {
+      const StemLoop loop = verify(query, candidate.place, candidate.place_from_query);
+      if (!best || loop.score > best->score) best = loop;
+    }
+    if (!best || best->score < 0.5 * config_.min_overlap) return best;
+    return nearest(*best);
+  }
+
+ private:
+  [[nodiscard]] const SparsePoints& view(int i) const {
+    return views_[static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] const Pose& pose(int i) const { return poses_[static_cast<std::size_t>(i)]; }
+
+  [[nodiscard]] StemLoop verify(int query, int match, const Pose& guess) const {
+    const SparseIcpResult icp =
+        register_sparse_icp(SparseTarget(view(match)), view(query), guess, config_.icp);
+    StemLoop loop;
+    loop.query = query;
+    loop.match = match;
+    loop.score = icp.overlap;
+    loop.match_from_query = icp.target_from_source;
+    loop.covariance = loop_covariance(icp, l0_m_);
+    loop.verified = icp.overlap >= config_.min_overlap &&
+                    icp.target_from_source.translation().norm() <= config_.max_distance_m;
+    return loop;
+  }
+
+  // The view around the place that the query stands nearest to.
+  [[nodiscard]] StemLoop nearest(const StemLoop& loop) const {
+    const Eigen::Vector3d at = pose(loop.match) * loop.match_from_query.translation();
+    int best = loop.match;
+    const int last = std::min(loop.query - config_.exclude_recent, loop.match + kNeighbourhood);
+    for (int j = std::max(0, loop.match - kNeighbourhood); j <= last; ++j) {
+      if ((pose(j).translation() - at).norm() < (pose(best).translation() - at).norm()) best = j;
+    }
+    if (best == loop.match) return loop;
+    const StemLoop moved =
+        verify(loop.query, best, pose(best).inverse() * pose(loop.match) * loop.match_from_query);
+    return moved.score >= 0.8 * loop.score ? moved : loop;
+  }
+
+  const std::vector<SparsePoints>& views_;
+  const std::vector<Pose>& poses_;
+  const StemLoopConfig& config_;
+  double l0_m_;
+  TreePatterns patterns_;
+};
+
+}  // namespace
+
+void describe(ConfigTable& table, StemLoopConfig& config) {
+  table.add("exclude_recent", config.exclude_recent, {1, 1'000'000}, "",
+            "views nearer than this in the recording are the same passage");
+  table.add("place_spacing", config.place_spacing, {0.1, 100.0}, "L0",
+            "along the path between the places that are kept to be found again");
+  table.add("max_distance_m", config.max_distance_m, {0.1, 100.0}, "m",
+            "views farther apart are not of the same place");
+  table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "", "P0's lambda0");
+  table.section("pattern", [&] { describe(table, config.pattern); });
+  table.section("icp", [&] { describe(table, config.icp); });
+}
+
+std::vector<StemLoop> find_stem_loops(const std::vector<SparsePoints>& level_views,
+                                      const std::vector<Pose>& world_from_level,
+                                      const StemLoopConfig& config) {
+  UNDERSTORY_CHECK(level_views.size() == world_from_level.size());
+  const Finder finder(level_views, world_from_level, config);
+  std::vector<std::optional<StemLoop>> found(level_views.size());
+  parallel_for(level_views.size(), 4,
+               [&](std::size_t i) { found[i] = finder.find(static_cast<int>(i)); });
+  std::vector<StemLoop> loops;
+  for (const std::optional<StemLoop>& loop : found) {
+    if (loop) loops.push_back(*loop);
+  }
+  return loops;
+}
+
+}  // namespace understory

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "understory/registration/sparse_icp.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+// Globally optimal matching of levelled sparse clouds, Go-ICP (Yang et al. 2015) with the bounds of
+// P0 section 2.3. The search is over yaw and the horizontal translation, in which the trimmed error
+// of the plane is bounded from below, P0 (22); height and tilt follow by ICP in space.
+struct GoIcpConfig {
+  // Certified: splits until no other place can be better by more than `gap_m`. Paper: stops at
+  // boxes inside the convergence region of ICP, P0 (24-26), and hands over to it.
+  enum class Mode { kCertified, kPaper };
+
+  Mode mode = Mode::kCertified;
+  double yaw_range_deg = 180.0;  // around the guess
+  double shift_range_m = 5.0;    // around the guess, per axis
+  double outlier_ratio = 0.4;    // P0's gamma
+  double gap_m = 0.02;           // of the root mean square error; certified below it
+  int max_nodes = 2'000'000;     // given up beyond
+  bool refine = true;            // all six degrees of freedom by ICP in space at the end
+};
+void describe(ConfigTable& table, GoIcpConfig& config);
+
+enum class GoIcpStatus { kCertified, kConverged, kNodeLimit, kTooFewPoints };
+[[nodiscard]] std::string to_string(GoIcpStatus status);
+
+struct [[nodiscard]] GoIcpResult {
+  GoIcpStatus status = GoIcpStatus::kTooFewPoints;
+  std::string reason;        // empty if certified (or, in the paper's mode, converged)
+  Pose target_from_source;   // with `refine`: refined in space from the optimum of the plane
+  Pose plane_optimum;        // what the certificate is about
+  double error_rms_m = 0.0;  // trimmed error in the plane at plane_optimum
+  double gap_m = 0.0;        // no place in the box has an error smaller by more than this
+  double overlap = 0.0;      // at target_from_source
+  double cells = 0.0;        // boxes of the finest size that the whole range holds (P0 T3)
+  std::int64_t nodes = 0;    // boxes whose bound was computed
+  int icp_runs = 0;
+};
+
+// `guess` is the middle of the search: its yaw and translation; both clouds are level in their
+// frames (z up), or made level by the tilt of the guess. Deterministic; thread-safe.
+GoIcpResult register_go_icp(const SparseTarget& target, const SparsePoints& source,
+                            const Pose& guess, const GoIcpConfig& config);
+
+}  // namespace understory

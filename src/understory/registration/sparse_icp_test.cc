@@ -1,0 +1,195 @@
+#include "understory/registration/sparse_icp.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "understory/registration/go_icp.h"
+#include "understory/registration/nearest_table.h"
+#include "understory/registration/yaw_vote.h"
+
+namespace understory {
+namespace {
+
+// A stand around the origin, and the same seen again: moved, with noise and with other stems.
+struct Pair {
+  SparsePoints target;
+  SparsePoints source;
+  Pose target_from_source;
+};
+
+Pair make_pair(unsigned seed, int stems, double noise_m, double lost, const Pose& truth) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> place(-25.0, 25.0);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::normal_distribution<double> noise(0.0, noise_m);
+  Pair pair;
+  pair.target_from_source = truth;
+  for (int i = 0; i < stems; ++i) {
+    const Eigen::Vector3d at(place(random), place(random), 0.03 * place(random));
+    if (unit(random) > 0.5 * lost) pair.target.push_back(at);
+    if (unit(random) > 0.5 * lost)
+      pair.source.push_back(truth.inverse() *
+                            (at + Eigen::Vector3d(noise(random), noise(random), noise(random))));
+  }
+  return pair;
+}
+
+Pose yaw_pose(double yaw, double x, double y, double z) {
+  return Pose(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), {x, y, z});
+}
+
+TEST(PlaneGrid, NearestIsThatOfAllPoints) {
+  const Pair pair = make_pair(3, 140, 0.0, 0.0, Pose());
+  const PlaneGrid grid(pair.target);
+  const NearestTable table(grid, 2.0);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> place(-60.0, 60.0);
+  for (int i = 0; i < 3000; ++i) {
+    const Eigen::Vector3d at(place(random), place(random), 0.05 * place(random));
+    double plane = 1e300;
+    double space = 1e300;
+    for (const auto& point : pair.target) {
+      plane = std::min(plane, (point - at).head<2>().squaredNorm());
+      space = std::min(space, (point - at).squaredNorm());
+    }
+    EXPECT_NEAR(grid.nearest(at, 1e9, 0.0).squared_m2, plane, 1e-9 * plane);
+    EXPECT_NEAR(grid.nearest(at, 1e9, 1.0).squared_m2, space, 1e-9 * space);
+    EXPECT_NEAR(table.squared_distance(at.x(), at.y()), plane, 1e-9 * plane);
+    EXPECT_EQ(grid.nearest(at, 1.0, 0.0).index >= 0, plane <= 1.0);
+  }
+}
+
+TEST(SparseIcp, FindsTheMotionInSpaceDespiteOutliers) {
+  const Pose truth = Pose(so3_exp({0.02, -0.01, 0.06}), {0.5, -0.4, 0.3});
+  const Pair pair = make_pair(5, 150, 0.02, 0.4, truth);
+  const auto result = register_sparse_icp(SparseTarget(pair.target), pair.source, Pose(), {});
+  EXPECT_EQ(result.status, SparseIcpStatus::kConverged);
+  const Pose error = truth.inverse() * result.target_from_source;
+  EXPECT_LT(error.translation().norm(), 0.02);
+  EXPECT_LT(error.angle(), 0.002);
+  EXPECT_NEAR(result.overlap, 0.8, 0.1);
+  EXPECT_NEAR(result.outlier_ratio, 1.0 - result.overlap, 1e-12);
+  EXPECT_NEAR(result.sigma_plane_m, 0.02, 0.015);
+}
+
+TEST(SparseIcp, PlaneLeavesHeightAndTilt) {
+  const Pose truth = yaw_pose(0.05, 0.4, 0.3, 0.7);
+  const Pair pair = make_pair(6, 120, 0.01, 0.2, truth);
+  SparseIcpConfig config;
+  config.metric = SparseIcpConfig::Metric::kPlane;
+  const auto result = register_sparse_icp(SparseTarget(pair.target), pair.source, Pose(), config);
+  const Pose& found = result.target_from_source;
+  EXPECT_NEAR(found.translation().x(), 0.4, 0.02);
+  EXPECT_NEAR(found.translation().y(), 0.3, 0.02);
+  EXPECT_NEAR(found.translation().z(), 0.0, 1e-3);
+  EXPECT_GT((found.rotation() * Eigen::Vector3d::UnitZ()).z(), 1.0 - 1e-6);
+}
+
+TEST(SparseIcp, FewStemsAreSaid) {
+  const SparsePoints few = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const auto result = register_sparse_icp(SparseTarget(few), few, Pose(), {});
+  EXPECT_EQ(result.status, SparseIcpStatus::kTooFewPoints);
+  EXPECT_FALSE(result.reason.empty());
+  EXPECT_EQ(register_go_icp(SparseTarget(few), few, Pose(), {}).status, GoIcpStatus::kTooFewPoints);
+}
+
+// P0 (25) with the paper's numbers, as corrected in the errata: gamma 0.6 gives 4.5 degrees.
+TEST(SparseIcp, ConvergenceRegionOfThePaper) {
+  const ConvergenceRegion region = convergence_region(3.5, 35.0, 0.6);
+  EXPECT_DOUBLE_EQ(region.delta0_m, 1.75);
+  EXPECT_NEAR(region.theta0_rad * 180.0 / M_PI, 4.53, 0.01);
+  EXPECT_NEAR(convergence_region(3.5, 35.0, 0.4).theta0_rad * 180.0 / M_PI, 3.70, 0.01);
+  EXPECT_TRUE(region.contains(1.7, 0.0, 0.0));
+  EXPECT_FALSE(region.contains(1.3, 0.06, 0.0));
+}
+
+TEST(YawVote, FindsAnyTurn) {
+  for (const double yaw : {-2.9, -1.0, 0.4, 2.2}) {
+    const Pose truth = yaw_pose(yaw, 3.0, -4.0, 0.4);
+    const Pair pair = make_pair(7, 150, 0.05, 0.5, truth);
+    const auto found = vote_yaw(SparseTarget(pair.target), pair.source, Pose(), {});
+    ASSERT_FALSE(found.empty());
+    const Pose error = truth.inverse() * found.front().target_from_source;
+    EXPECT_LT(error.translation().norm(), 1.0);
+    EXPECT_LT(error.angle(), 0.06);
+  }
+}
+
+// Trimmed error in the plane, computed the plain way.
+double plain_error(const Pair& pair, const Pose& pose, double outlier_ratio) {
+  std::vector<double> squared;
+  for (const auto& point : pair.source) {
+    double best = 1e300;
+    for (const auto& other : pair.target)
+      best = std::min(best, (other - pose * point).head<2>().squaredNorm());
+    squared.push_back(best);
+  }
+  std::sort(squared.begin(), squared.end());
+  const auto keep = static_cast<std::size_t>(
+      std::lround((1.0 - outlier_ratio) * static_cast<double>(squared.size())));
+  double sum = 0.0;
+  for (std::size_t i = 0; i < keep; ++i)
+    sum += squared[i];
+  return std::sqrt(sum / static_cast<double>(keep));
+}
+
+// The certificate against an exhaustive grid: no place of the grid beats the answer by more than
+// the gap, on stands that match and on two that have nothing to do with each other.
+TEST(GoIcp, NoPlaceOfAnExhaustiveGridIsBetter) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    Pair pair = make_pair(seed, 40, 0.1, 0.4, yaw_pose(0.15, 0.9, -0.7, 0.2));
+    if (seed % 2 == 0) pair.source = make_pair(seed + 50, 40, 0.0, 0.3, Pose()).source;
+    GoIcpConfig config;
+    config.yaw_range_deg = 20.0;
+    config.shift_range_m = 1.5;
+    const auto result = register_go_icp(SparseTarget(pair.target), pair.source, Pose(), config);
+    ASSERT_EQ(result.status, GoIcpStatus::kCertified);
+    EXPECT_LE(result.gap_m, config.gap_m);
+    EXPECT_NEAR(plain_error(pair, result.plane_optimum, config.outlier_ratio), result.error_rms_m,
+                1e-9);
+    double best = 1e300;
+    for (int a = -20; a <= 20; ++a) {
+      for (int x = -15; x <= 15; ++x) {
+        for (int y = -15; y <= 15; ++y) {
+          const Pose pose = yaw_pose(a * M_PI / 180.0, 0.1 * x, 0.1 * y, 0.0);
+          best = std::min(best, plain_error(pair, pose, config.outlier_ratio));
+        }
+      }
+    }
+    EXPECT_GE(best, result.error_rms_m - result.gap_m);
+    EXPECT_LE(result.error_rms_m, best + 1e-9 + config.gap_m);
+  }
+}
+
+TEST(GoIcp, FindsAnyTurnWithoutAGuessInBothModes) {
+  for (const auto mode : {GoIcpConfig::Mode::kCertified, GoIcpConfig::Mode::kPaper}) {
+    const Pose truth = yaw_pose(2.6, -3.5, 4.1, 0.5);
+    const Pair pair = make_pair(9, 130, 0.05, 0.3, truth);
+    GoIcpConfig config;
+    config.mode = mode;
+    const auto result = register_go_icp(SparseTarget(pair.target), pair.source, Pose(), config);
+    const Pose error = truth.inverse() * result.target_from_source;
+    EXPECT_LT(error.translation().norm(), 0.05);
+    EXPECT_LT(error.angle(), 0.005);
+    EXPECT_EQ(to_string(result.status),
+              mode == GoIcpConfig::Mode::kCertified ? "certified" : "converged");
+    EXPECT_GT(result.overlap, 0.6);
+  }
+}
+
+TEST(GoIcp, SaysWhenItGivesUp) {
+  const Pair pair = make_pair(11, 60, 0.3, 1.2, yaw_pose(0.1, 0.5, 0.5, 0.0));
+  GoIcpConfig config;
+  config.max_nodes = 10;
+  config.gap_m = 0.001;
+  const auto result = register_go_icp(SparseTarget(pair.target), pair.source, Pose(), config);
+  EXPECT_EQ(result.status, GoIcpStatus::kNodeLimit);
+  EXPECT_GT(result.gap_m, config.gap_m);
+  EXPECT_FALSE(result.reason.empty());
+}
+
+}  // namespace
+}  // namespace understory
