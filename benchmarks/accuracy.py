@@ -46,11 +46,12 @@ ROWS = {
     "harvester_drift": Row("harvester: drift", "%", 0.15, 1.5),
     "scan_mean": Row("whole pipeline per scan, mean", "ms", 45.0, 2.0, decimals=1),
     "scan_p99": Row("whole pipeline per scan, p99", "ms", 90.0, 2.0, decimals=1),
-    "constancy": Row("CPU per scan, last tenth / first tenth", "", 1.1, 1.5, decimals=2),
+    # In the short form the first tenth is almost all standing still.
+    "constancy": Row("CPU per scan, last tenth / first tenth", "", 1.1, 2.0, decimals=2),
     "constancy_alone": Row("the same without loop closure", "", 1.1, 1.5, decimals=2),
     "kiss_ratio": Row("CPU per scan / KISS-ICP's", "", 2.0, 1.0, decimals=2),
     "memory": Row("peak memory", "MB", 1500.0, 1.0, decimals=0),
-    "memory_growth": Row("memory at the end of the recording / at its half", "", 1.1, 1.2,
+    "memory_growth": Row("memory at the end of the recording / at its half", "", 1.1, 1.0,
                          decimals=2),
     "recall": Row("stems found within 15 m (30 returns or more)", "%", 90.0, 1.1, True, 1),
     "false": Row("false stems within 15 m", "%", 5.0, 1.5, decimals=1),
@@ -91,12 +92,14 @@ def add_trees(table, seed, folder):
     table.add("false", seed, 100.0 * result["false_share"] if result["reported"] else None)
 
 
-def add_cost(table, seed, result):
+def add_cost(table, seed, result, short=False):
     scan = result["stages"]["scan"]
     table.add("scan_mean", seed, scan["wall_ms"]["mean"])
     table.add("scan_p99", seed, scan["wall_ms"]["p99"])
     table.add("memory", seed, result["process"]["peak_memory_mb"])
     add_constancy(table, "constancy", seed, result)
+    if short:  # caches of bounded size are still filling
+        return
     half, end = (result["quality"].get(f"memory_mb_{at}") for at in ("half", "end"))
     table.add("memory_growth", seed, end / half if half and end else None)
 
@@ -147,7 +150,7 @@ def measure_short(table, work, seed):
     result = mapped(table, folder, "handheld", seed, [NO_LOOPS], duration_s=45)
     table.add("handheld_drift", seed, drift_percent(folder))
     table.add("handheld_ape", seed, 100.0 * evaluate(folder, "se3")["ape_rmse_m"])
-    add_cost(table, seed, result)
+    add_cost(table, seed, result, short=True)
     add_trees(table, seed, folder)
     measure_harvester(table, work, seed, duration_s=60)
 
