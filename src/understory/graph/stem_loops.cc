@@ -68,9 +68,9 @@ class Finder {
     std::optional<StemLoop> best;
     for (const PatternCandidate& candidate : patterns_.find(view(query), before)) {
       const StemLoop loop = verify(query, candidate.place, candidate.place_from_query);
-      if (!best || loop.score > best->score) best = loop;
+      if (!best || loop.overlap > best->overlap) best = loop;
     }
-    if (!best || best->score < 0.5 * config_.min_overlap) return best;
+    if (!best || best->overlap < 0.5 * config_.min_overlap) return best;
     return nearest(*best);
   }
 
@@ -86,7 +86,9 @@ class Finder {
     StemLoop loop;
     loop.query = query;
     loop.match = match;
-    loop.score = icp.overlap;
+    loop.overlap = icp.overlap;
+    const double apart = icp.target_from_source.translation().norm() / config_.max_distance_m;
+    loop.score = icp.overlap * std::exp(-apart * apart);
     loop.match_from_query = icp.target_from_source;
     loop.covariance = loop_covariance(icp, l0_m_);
     loop.verified = icp.overlap >= config_.min_overlap &&
@@ -105,7 +107,7 @@ class Finder {
     if (best == loop.match) return loop;
     const StemLoop moved =
         verify(loop.query, best, pose(best).inverse() * pose(loop.match) * loop.match_from_query);
-    return moved.score >= 0.8 * loop.score ? moved : loop;
+    return moved.overlap >= 0.8 * loop.overlap ? moved : loop;
   }
 
   const std::vector<SparsePoints>& views_;

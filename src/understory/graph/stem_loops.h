@@ -22,8 +22,11 @@ void describe(ConfigTable& table, StemLoopConfig& config);
 // The best place that was found for one view. Poses are of level frames (z up).
 struct StemLoop {
   int query = 0;
-  int match = 0;       // an earlier view
-  double score = 0.0;  // overlap after matching, 0..1
+  int match = 0;         // an earlier view
+  double overlap = 0.0;  // after matching, 0..1
+  // Overlap, less the farther the views are apart (views of one place overlap wherever they look
+  // from, but also with the next place): overlap * exp(-(distance / max_distance_m)^2).
+  double score = 0.0;
   Pose match_from_query;
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation
   bool verified = false;                       // overlap and distance are those of a loop
