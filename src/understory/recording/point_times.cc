@@ -43,19 +43,16 @@ double raw_span(const std::vector<CloudTimes>& clouds) {
   return median(spans);
 }
 
-// The unit in which the clouds last about as long as a scan does.
+// The unit in which the clouds last about as long as the time between them: hardly longer, but much
+// shorter where scans are left out.
 std::optional<double> fitting_unit(double span, double period) {
+  constexpr double kLongest = 3.0;
   const double expected = period > 0.0 ? period : kUsualPeriod;
-  std::optional<double> best;
-  double best_misfit = std::log(30.0);
   for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
-    const double misfit = std::abs(std::log(span * unit / expected));
-    if (misfit < best_misfit) {
-      best = unit;
-      best_misfit = misfit;
-    }
+    const double share = span * unit / expected;
+    if (share <= kLongest) return share > 1e-3 * kLongest ? std::optional(unit) : std::nullopt;
   }
-  return best;
+  return std::nullopt;
 }
 
 // Whether all values lie close to zero, as offsets do.

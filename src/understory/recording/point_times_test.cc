@@ -117,10 +117,11 @@ RawCloud make_cloud(const Style& style, TimeNs start) {
   return cloud;
 }
 
-TimeConvention detect(const Style& style) {
+// `every`: of so many scans one is recorded.
+TimeConvention detect(const Style& style, int every = 1) {
   std::vector<CloudTimes> clouds;
   for (int k = 0; k < 8; ++k) {
-    const TimeNs start = kStart + k * kPeriod;
+    const TimeNs start = kStart + k * every * kPeriod;
     const RawCloud cloud = make_cloud(style, start);
     const auto layout = CloudLayout::find(cloud.message);
     const TimeNs log_time =
@@ -148,6 +149,12 @@ TEST_P(PointTimes, AreUnderstood) {
     const TimeNs time = converted.scan->stamp + converted.scan->points[i].t_ns;
     ASSERT_NEAR(static_cast<double>(time - start - offset_of(i)), 0.0, 2'000.0) << "point " << i;
   }
+}
+
+TEST_P(PointTimes, AreUnderstoodWhereMostScansWereLeftOut) {
+  const TimeConvention convention = detect(GetParam(), 60);
+  EXPECT_EQ(convention.kind, GetParam().kind) << convention.text;
+  EXPECT_EQ(convention.unit_s, GetParam().unit_s) << convention.text;
 }
 
 TEST(PointTimes, AbsentOrConstantTimesAreSaidToBeMissing) {
