@@ -5,13 +5,14 @@
 #include <optional>
 
 #include "understory/util/error.h"
+#include "understory/util/median.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
-constexpr int kNeighbourhood =
-    30;  // views around a place among which the nearest one is looked for
+// Views around a place, to each side, among which the nearest one is looked for.
+constexpr int kNeighbourhood = 30;
 
 double median_l0(const std::vector<SparsePoints>& views) {
   std::vector<double> values(views.size());
@@ -19,10 +20,7 @@ double median_l0(const std::vector<SparsePoints>& views) {
     if (i % 8 == 0) values[i] = SparseTarget(views[i]).l0_m;
   });
   std::erase_if(values, [](double value) { return value <= 0.0; });
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return upper_median(std::move(values));
 }
 
 TreePatterns places_of(const std::vector<SparsePoints>& views, const std::vector<Pose>& poses,

@@ -309,7 +309,6 @@ bool write_all(int pipe, const void* data, std::size_t size) {
   return true;
 }
 
-// In the process that decodes: never returns.
 // LASzip believes the sizes that a damaged file states, up to 4 GB. (A sanitizer's own memory is
 // far beyond any limit.)
 void limit_memory() {
@@ -326,6 +325,7 @@ void limit_memory() {
 #endif
 }
 
+// In the process that decodes: never returns.
 [[noreturn]] void serve_points(ByteSource& file, const LasHeader& header, int pipe) {
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGPIPE})
     std::signal(signal, SIG_DFL);

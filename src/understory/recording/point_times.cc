@@ -1,4 +1,5 @@
 #include "understory/recording/point_times.h"
+#include "understory/util/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,12 +15,6 @@ constexpr double kSame = 0.15;
 constexpr TimeNs kNoDelay = 1'000;
 constexpr std::size_t kCloudsForDelay = 4;
 
-template <typename T>
-T median(std::vector<T> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
-
 std::string unit_name(double unit) {
   if (unit == 1.0) return "s";
   if (unit == 1e-3) return "ms";
@@ -33,14 +28,14 @@ double scan_period(const std::vector<CloudTimes>& clouds) {
     const double step = to_seconds(clouds[i].stamp - clouds[i - 1].stamp);
     if (step > 1e-4 && step < 10.0) steps.push_back(step);
   }
-  return steps.empty() ? 0.0 : median(steps);
+  return steps.empty() ? 0.0 : upper_median(steps);
 }
 
 double raw_span(const std::vector<CloudTimes>& clouds) {
   std::vector<double> spans;
   for (const CloudTimes& cloud : clouds)
     spans.push_back(cloud.high - cloud.low);
-  return median(spans);
+  return upper_median(spans);
 }
 
 // The unit in which the clouds last about as long as the time between them: hardly longer, but much
@@ -72,7 +67,7 @@ std::optional<double> delay_behind_imu(const std::vector<CloudTimes>& clouds,
   const auto tells_nothing = [](TimeNs delay) { return std::abs(delay) < kNoDelay; };
   if (delays.size() < kCloudsForDelay || imu_delays.size() < kCloudsForDelay) return std::nullopt;
   if (std::all_of(delays.begin(), delays.end(), tells_nothing)) return std::nullopt;
-  return to_seconds(median(delays) - median(imu_delays));
+  return to_seconds(upper_median(delays) - upper_median(imu_delays));
 }
 
 enum class Arrival { kUnknown, kAfterFullScan, kTooEarly };
@@ -131,7 +126,7 @@ TimeConvention with_offsets(const std::string& name, double unit,
     lows.push_back(cloud.low / span);
     highs.push_back(cloud.high / span);
   }
-  result.stamp = stamp_place(median(lows), median(highs));
+  result.stamp = stamp_place(upper_median(lows), upper_median(highs));
   result.text = name + ": offset in " + unit_name(unit) + " from the header stamp; ";
   std::string how;
   const double duration = span * unit;
@@ -140,7 +135,7 @@ TimeConvention with_offsets(const std::string& name, double unit,
     if (arrival == Arrival::kAfterFullScan) how = " (arrival times agree)";
     if (arrival == Arrival::kTooEarly) {
       result.stamp = TimeConvention::Stamp::kLastPoint;
-      result.shift = -from_seconds(median(highs) * duration);
+      result.shift = -from_seconds(upper_median(highs) * duration);
       how = " although offsets count from the first one";
       result.warning =
           "the clouds arrive before their last points could have been measured: the "
@@ -163,9 +158,9 @@ TimeConvention with_absolute_times(const std::string& name, double unit,
     firsts.push_back(to_seconds(raw_time_to_ns(cloud.low, unit) - cloud.stamp) / duration);
     lasts.push_back(to_seconds(raw_time_to_ns(cloud.high, unit) - cloud.stamp) / duration);
   }
-  const double first = median(firsts);
+  const double first = upper_median(firsts);
   if (std::abs(first) <= 5.0) {
-    result.stamp = stamp_place(first, median(lasts));
+    result.stamp = stamp_place(first, upper_median(lasts));
     result.text = name + ": absolute, in " + unit_name(unit) + "; " + stamp_text(result.stamp);
     return result;
   }

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "understory/recording/imu_axes.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -38,12 +39,7 @@ class StampRow {
     first_ = std::min(first_, stamp);
     last_ = std::max(last_, stamp);
   }
-  [[nodiscard]] TimeNs median_step() const {
-    if (steps_.empty()) return 0;
-    std::vector<TimeNs> sorted = steps_;
-    std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
-    return sorted[sorted.size() / 2];
-  }
+  [[nodiscard]] TimeNs median_step() const { return upper_median(steps_); }
   [[nodiscard]] double rate_hz() const {
     const TimeNs step = median_step();
     return step > 0 ? 1.0 / to_seconds(step) : 0.0;

@@ -8,6 +8,7 @@
 
 #include "understory/recording/nmea.h"
 #include "understory/recording/scan_assembly.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -156,11 +157,9 @@ void VelodyneDecoder::set_rates(Blocks& blocks) {
     block.cdeg_per_us = wrap_cdeg(next.azimuth_cdeg - block.azimuth_cdeg) / us;
     rates.push_back(block.cdeg_per_us);
   }
-  if (!rates.empty()) {
-    const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
-    std::nth_element(rates.begin(), middle, rates.end());
-    if (*middle >= 0.0 && *middle < kFastestCdegPerUs) rate_cdeg_per_us_ = *middle;
-  }
+  const bool too_few_to_judge = rates.size() < 3;
+  const double rate = upper_median(std::move(rates), -1.0);
+  if (rate >= 0.0 && rate < kFastestCdegPerUs) rate_cdeg_per_us_ = rate;
   std::array<bool, kBlocks> plausible{};
   for (std::size_t b = 0; b < kBlocks; b += step) {
     plausible[b] =
@@ -169,7 +168,7 @@ void VelodyneDecoder::set_rates(Blocks& blocks) {
   double before = rate_cdeg_per_us_;
   for (std::size_t b = 0; b < kBlocks; b += step) {
     Block& block = blocks[b];
-    const bool fits = plausible[b] || (b >= step && plausible[b - step]) || rates.size() < 3;
+    const bool fits = plausible[b] || (b >= step && plausible[b - step]) || too_few_to_judge;
     if (block.returns != nullptr && !fits) {
       damaged("the azimuth of block " + std::to_string(b) + " does not go with its neighbours");
       block.returns = nullptr;

@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "understory/registration/nearest_table.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {
-
-constexpr std::size_t kFewest = 6;
 
 // A box of yaws and shifts about the guess: middle and half sizes.
 struct Box {
@@ -38,9 +37,7 @@ class Bounds {
   Bounds(const SparseTarget& target, const SparsePoints& source, const Pose& guess,
          const GoIcpConfig& config)
       : table_(target.grid, config.shift_range_m),
-        keep_(std::max<std::size_t>(
-            kFewest / 2, static_cast<std::size_t>(std::lround(
-                             (1.0 - config.outlier_ratio) * static_cast<double>(source.size()))))),
+        keep_(trimmed_count(source.size(), config.outlier_ratio)),
         origin_(guess.translation()) {
     for (const Eigen::Vector3d& point : source) {
       const Eigen::Vector3d turned = guess.rotation() * point;
@@ -219,10 +216,8 @@ class Search {
         heights.push_back(target_.grid.points()[static_cast<std::size_t>(found.index)].z() -
                           at.z());
     }
-    if (heights.empty()) return pose;
-    const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
-    std::nth_element(heights.begin(), middle, heights.end());
-    return Pose(pose.rotation(), pose.translation() + Eigen::Vector3d(0.0, 0.0, *middle));
+    const Eigen::Vector3d up(0.0, 0.0, upper_median(std::move(heights)));
+    return Pose(pose.rotation(), pose.translation() + up);
   }
 
   const SparseTarget& target_;
@@ -271,10 +266,11 @@ std::string to_string(GoIcpStatus status) {
 
 GoIcpResult register_go_icp(const SparseTarget& target, const SparsePoints& source,
                             const Pose& guess, const GoIcpConfig& config) {
-  if (source.size() < kFewest || target.grid.points().size() < kFewest || target.l0_m <= 0.0) {
+  if (source.size() < kFewestStems || target.grid.points().size() < kFewestStems ||
+      target.l0_m <= 0.0) {
     GoIcpResult result;
     result.target_from_source = guess;
-    result.reason = "fewer than 6 stems, or all on one line";
+    result.reason = too_few_stems();
     return result;
   }
   return Search(target, source, guess, config).run();

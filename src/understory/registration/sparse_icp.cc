@@ -11,7 +11,6 @@
 namespace understory {
 namespace {
 
-constexpr std::size_t kFewest = 6;  // points in either cloud
 constexpr double kNoLimit = 1e9;
 
 struct Pair {
@@ -169,7 +168,7 @@ void refine(const SparseTarget& target, const SparsePoints& source, const Sparse
   Pose& pose = result.target_from_source;
   for (int i = 0; i < config.max_iterations; ++i) {
     state.pairs = match(target.grid, source, pose, limit_m, height_weight(config));
-    if (state.pairs.size() < kFewest) return;
+    if (state.pairs.size() < kFewestStems) return;
     weigh(target.grid.points(), source, pose, plane, state);
     const Vector6d step =
         newton_step(target.grid.points(), source, pose, plane, state, result.information);
@@ -227,18 +226,26 @@ SparseTarget::SparseTarget(const SparsePoints& points) : grid(points) {
   l0_m = mean_neighbour_distance(flat);
 }
 
+std::size_t trimmed_count(std::size_t points, double outlier_ratio) {
+  const double kept = (1.0 - outlier_ratio) * static_cast<double>(points);
+  return std::max(kFewestStems / 2, static_cast<std::size_t>(std::lround(kept)));
+}
+
+std::string too_few_stems() {
+  return "fewer than " + std::to_string(kFewestStems) + " stems, or all on one line";
+}
+
 SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoints& source,
                                     const Pose& guess, const SparseIcpConfig& config) {
   SparseIcpResult result;
   result.target_from_source = guess;
-  if (source.size() < kFewest || target.grid.points().size() < kFewest || target.l0_m <= 0.0) {
-    result.reason = "fewer than " + std::to_string(kFewest) + " stems, or all on one line";
+  if (source.size() < kFewestStems || target.grid.points().size() < kFewestStems ||
+      target.l0_m <= 0.0) {
+    result.reason = too_few_stems();
     return result;
   }
   const bool plane = config.metric == SparseIcpConfig::Metric::kPlane;
-  const std::size_t keep = std::max<std::size_t>(
-      kFewest / 2, static_cast<std::size_t>(std::lround((1.0 - config.outlier_ratio) *
-                                                        static_cast<double>(source.size()))));
+  const std::size_t keep = trimmed_count(source.size(), config.outlier_ratio);
   result.status = SparseIcpStatus::kIterationLimit;
   result.reason = "the steps had not become small";
   Pose& pose = result.target_from_source;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -50,6 +51,13 @@ struct SparseTarget {
   PlaneGrid grid;
   double l0_m = 0.0;
 };
+
+// Fewer in either cloud are not matched; `too_few_stems` says so.
+constexpr std::size_t kFewestStems = 6;
+[[nodiscard]] std::string too_few_stems();
+// How many source points trimming keeps: the same in ICP and in the bounds of Go-ICP, whose
+// certificate rests on it.
+[[nodiscard]] std::size_t trimmed_count(std::size_t points, double outlier_ratio);
 
 // Trimmed ICP between points. Deterministic; thread-safe.
 SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoints& source,

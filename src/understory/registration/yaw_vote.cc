@@ -1,4 +1,5 @@
 #include "understory/registration/yaw_vote.h"
+#include "understory/util/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -78,10 +79,7 @@ double median_height(const PlaneGrid& grid, const SparsePoints& turned, const Pe
     const double d = grid.points()[static_cast<std::size_t>(found.index)].z() - point.z();
     if (std::abs(d) <= height) heights.push_back(d);
   }
-  if (heights.empty()) return 0.0;
-  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
-  std::nth_element(heights.begin(), middle, heights.end());
-  return *middle;
+  return upper_median(std::move(heights));
 }
 
 SparsePoints turn(const SparsePoints& source, const Pose& guess, double yaw) {
