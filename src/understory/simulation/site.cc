@@ -16,109 +16,6 @@ const ConfigTable::Range kNotNegative{0.0, 1e9};
 const std::vector<std::string> kLidarModels = {"OS0-128", "VLP-16", "OS1-64",
                                                "OS1-128", "HDL-64", "RS-16"};
 
-// ---- keys that came after the first version ---------------------------------------------------
-
-void describe_later(ConfigTable& table, TerrainConfig& c) {
-  table.add("ditches", c.ditches, {0, 100}, "", "ditches across the site");
-  table.add("ditch_depth_m", c.ditch_depth_m, {0.0, 5.0}, "m", "of a ditch");
-  table.add("ditch_width_m", c.ditch_width_m, {0.2, 20.0}, "m", "of a ditch");
-  table.add("snow_m", c.snow_m, {0.0, 3.0}, "m", "depth of the snow on the ground");
-  table.add("track_depth", c.track_depth, {0.0, 1.0}, "",
-            "share of the snow that the carrier presses down on its way");
-}
-
-void describe_later(ConfigTable& table, StandConfig& c) {
-  table.add("trees", c.trees, "CSV with a list of trees (columns of trees.csv), empty = random");
-  table.add("height_min_m", c.height_min_m, {1.5, 50.0}, "m", "no tree lower");
-  table.add("crown_base_share", c.crown_base_share, {0.0, 0.95}, "",
-            "of a tree's height, 0 = usual for the species");
-  table.add("edge_m", c.edge_m, {0.0, 500.0}, "m", "width of a border of tall trees");
-  table.add("edge_dbh_mean_m", c.edge_dbh_mean_m, {0.05, 1.5}, "m", "their mean diameter");
-  table.add("edge_height_mean_m", c.edge_height_mean_m, {2.0, 50.0}, "m", "their height");
-  table.add("margin_m", c.margin_m, {0.0, 1000.0}, "m",
-            "the stand reaches so far from the route, 0 = all over its rectangle");
-  table.add("narrow_clearance_m", c.narrow_clearance_m, {0.2, 20.0}, "m",
-            "bark to the path where it is narrow; branches may reach into it");
-  table.add("fork_share", c.fork_share, {0.0, 1.0}, "", "of the trees: two stems higher up");
-  table.add("broken_share", c.broken_share, {0.0, 1.0}, "", "of the trees: top broken off");
-  table.add("boulders_per_ha", c.boulders_per_ha, {0.0, 5000.0}, "1/ha", "boulders");
-  table.add("buildings", c.buildings, {0, 2}, "", "beside the start and the end of the route");
-}
-
-void describe_later(ConfigTable& table, CarrierConfig& c) {
-  table.add_choice("route", c.route, {"auto", "loop", "strip"},
-                   "auto: a strip road for a harvester, a loop for others");
-  table.add("laps", c.laps, {1, 20}, "", "of a loop around its middle, each on its own way");
-  table.add("route_time_s", c.route_time_s, {0.0, 1e5}, "s",
-            "how long the route takes, 0 = as speed and stops give");
-  table.add("one_way", c.one_way, "a strip road is driven once, not out and back");
-  table.add("strip_roads", c.strip_roads, {1, 50}, "", "parallel roads of the stand");
-  table.add("strip_road", c.strip_road, {1, 50}, "", "which of them is driven");
-  table.add("strip_spacing_m", c.strip_spacing_m, {3.0, 200.0}, "m", "from road to road");
-  table.add_choice("work", c.work, {"quick", "thinning"},
-                   "of a harvester at its stops; thinning fills route_time_s with work cycles");
-  table.add("back_up_m", c.back_up_m, {0.0, 50.0}, "m", "farthest backing up during a stop");
-  table.add("narrow_from", c.narrow_from, {0.0, 1.0}, "", "share of the route: narrow from here");
-  table.add("narrow_to", c.narrow_to, {0.0, 1.0}, "", "share of the route: narrow up to here");
-  table.add("narrow_speed_m_s", c.narrow_speed_m_s, {0.05, 15.0}, "m/s", "there");
-  table.add("halts", c.halts, {0, 1000}, "", "times that a sleigh stands still on its way");
-  table.add("halt_s", c.halt_s, {1.0, 1000.0}, "s", "mean length of a halt");
-  table.add("tumbles", c.tumbles, {0, 1000}, "", "times that a sleigh nearly turns over");
-  table.add("tumble_deg", c.tumble_deg, {0.0, 60.0}, "deg", "its roll then");
-}
-
-void describe_later(ConfigTable& table, LidarConfig& c) {
-  table.add("keep_every", c.keep_every, {1, 100}, "", "only each so-manieth scan is recorded");
-  table.add("returns", c.returns, {1, 2}, "", "of a beam: the strongest, or the two strongest");
-  table.add("blooming", c.blooming, {0.0, 1.0}, "",
-            "chance that a beam beside a glaring echo repeats its range");
-  table.add("crosstalk", c.crosstalk, {0.0, 0.5}, "",
-            "share of beams that report a range out of nothing");
-  table.add("snow_fall_per_m", c.snow_fall_per_m, {0.0, 1.0}, "1/m",
-            "snow flakes that a beam meets in a metre");
-  table.add("snow_drop_interval_s", c.snow_drop_interval_s, {0.0, 1e9}, "s",
-            "mean time between loads of snow off a branch, 0 = none");
-  table.add("time_offset_s", c.time_offset_s, {-1.0, 1.0}, "s", "scan stamps are late by this");
-  table.add("error_m", c.error_m, "m", "by which the claimed place is wrong, in the lidar's frame");
-  table.add("error_rpy_deg", c.error_rpy_deg, "deg", "by which the claimed attitude is wrong");
-}
-
-void describe_later(ConfigTable& table, ImuConfig& c) {
-  table.add("enabled", c.enabled, "whether there is an IMU");
-  table.add("vibration_tones", c.vibration_tones, {1, 8}, "", "main tone and harmonics");
-  table.add("gyro_instability", c.gyro_instability, kNotNegative, "rad/s",
-            "bias instability: the Allan deviation's floor / 0.664");
-  table.add("accel_instability", c.accel_instability, kNotNegative, "m/s^2", "bias instability");
-  table.add("gyro_temperature", c.gyro_temperature, kNotNegative, "rad/s/K", "bias per kelvin");
-  table.add("accel_temperature", c.accel_temperature, kNotNegative, "m/s^2/K", "bias per kelvin");
-  table.add("warm_up_k", c.warm_up_k, {0.0, 100.0}, "K", "how much warmer it gets while it runs");
-  table.add("warm_up_s", c.warm_up_s, {1.0, 1e5}, "s", "time constant of the warming");
-  table.add("shock_m_s2", c.shock_m_s2, kNotNegative, "m/s^2",
-            "peak of the ringing when a stem falls or a runner hits");
-  table.add("shock_rad_s", c.shock_rad_s, kNotNegative, "rad/s", "the same of the gyroscope");
-  table.add("accel_range_m_s2", c.accel_range_m_s2, kNotNegative, "m/s^2",
-            "full scale, 0 = unlimited");
-  table.add("gyro_range_rad_s", c.gyro_range_rad_s, kNotNegative, "rad/s",
-            "full scale, 0 = unlimited");
-  table.add("missing", c.missing, {0.0, 0.9}, "", "share of samples lost one by one");
-  table.add("gap_interval_s", c.gap_interval_s, {0.0, 1e9}, "s",
-            "mean time between gaps, 0 = none");
-  table.add("gap_s", c.gap_s, {0.001, 100.0}, "s", "length of a gap");
-  table.add("time_offset_s", c.time_offset_s, {-1.0, 1.0}, "s", "stamps are late by this");
-}
-
-void describe_later(ConfigTable& table, GnssConfig& c) {
-  table.add("burst_interval_s", c.burst_interval_s, {0.0, 1e9}, "s",
-            "mean time between bursts of error under closed canopy, 0 = none");
-  table.add("burst_s", c.burst_s, {0.1, 1e6}, "s", "length of a burst");
-  table.add("burst_m", c.burst_m, kNotNegative, "m", "its height in the plane");
-  table.add("jump_interval_s", c.jump_interval_s, {0.0, 1e9}, "s",
-            "mean time between jumps under closed canopy, 0 = none");
-  table.add("jump_m", c.jump_m, kNotNegative, "m", "standard deviation of a jump in the plane");
-  table.add("latency_s", c.latency_s, {0.0, 10.0}, "s",
-            "from the moment of a fix to its place in the stream");
-}
-
 void describe_mag(ConfigTable& table, MagnetometerConfig& c) {
   table.section("mag", [&] {
     table.add("enabled", c.enabled, "whether the IMU has a magnetometer");
@@ -133,9 +30,7 @@ void describe_mag(ConfigTable& table, MagnetometerConfig& c) {
   });
 }
 
-// ---- keys of the first version ----------------------------------------------------------------
-
-void describe_ground(ConfigTable& table, SiteConfig& c, bool first) {
+void describe_ground(ConfigTable& table, SiteConfig& c) {
   table.section("origin", [&] {
     table.add("latitude_deg", c.origin.latitude_deg, {-89.0, 89.0}, "deg", "of the truth's origin");
     table.add("longitude_deg", c.origin.longitude_deg, {-180.0, 180.0}, "deg", "of the origin");
@@ -152,11 +47,16 @@ void describe_ground(ConfigTable& table, SiteConfig& c, bool first) {
     table.add("hummock_m", c.terrain.hummock_m, {0.0, 1.0}, "m", "standard deviation of hummocks");
     table.add("roughness_m", c.terrain.roughness_m, {0.0, 0.3}, "m",
               "standard deviation of the grid's own noise");
-    if (!first) describe_later(table, c.terrain);
+    table.add("ditches", c.terrain.ditches, {0, 100}, "", "ditches across the site");
+    table.add("ditch_depth_m", c.terrain.ditch_depth_m, {0.0, 5.0}, "m", "of a ditch");
+    table.add("ditch_width_m", c.terrain.ditch_width_m, {0.2, 20.0}, "m", "of a ditch");
+    table.add("snow_m", c.terrain.snow_m, {0.0, 3.0}, "m", "depth of the snow on the ground");
+    table.add("track_depth", c.terrain.track_depth, {0.0, 1.0}, "",
+              "share of the snow that the carrier presses down on its way");
   });
 }
 
-void describe_stand(ConfigTable& table, StandConfig& c, bool first) {
+void describe_stand(ConfigTable& table, StandConfig& c) {
   table.section("stand", [&] {
     table.add("size_x_m", c.size_x_m, {5.0, 3000.0}, "m", "of the stand, east");
     table.add("size_y_m", c.size_y_m, {5.0, 3000.0}, "m", "of the stand, north");
@@ -182,11 +82,25 @@ void describe_stand(ConfigTable& table, StandConfig& c, bool first) {
     table.add("logs_per_ha", c.logs_per_ha, {0.0, 5000.0}, "1/ha", "lying stems");
     table.add("wind_sway_m", c.wind_sway_m, {0.0, 2.0}, "m",
               "standard deviation of the sway of a crown's top");
-    if (!first) describe_later(table, c);
+    table.add("trees", c.trees, "CSV with a list of trees (columns of trees.csv), empty = random");
+    table.add("height_min_m", c.height_min_m, {1.5, 50.0}, "m", "no tree lower");
+    table.add("crown_base_share", c.crown_base_share, {0.0, 0.95}, "",
+              "of a tree's height, 0 = usual for the species");
+    table.add("edge_m", c.edge_m, {0.0, 500.0}, "m", "width of a border of tall trees");
+    table.add("edge_dbh_mean_m", c.edge_dbh_mean_m, {0.05, 1.5}, "m", "their mean diameter");
+    table.add("edge_height_mean_m", c.edge_height_mean_m, {2.0, 50.0}, "m", "their height");
+    table.add("margin_m", c.margin_m, {0.0, 1000.0}, "m",
+              "the stand reaches so far from the route, 0 = all over its rectangle");
+    table.add("narrow_clearance_m", c.narrow_clearance_m, {0.2, 20.0}, "m",
+              "bark to the path where it is narrow; branches may reach into it");
+    table.add("fork_share", c.fork_share, {0.0, 1.0}, "", "of the trees: two stems higher up");
+    table.add("broken_share", c.broken_share, {0.0, 1.0}, "", "of the trees: top broken off");
+    table.add("boulders_per_ha", c.boulders_per_ha, {0.0, 5000.0}, "1/ha", "boulders");
+    table.add("buildings", c.buildings, {0, 2}, "", "beside the start and the end of the route");
   });
 }
 
-void describe_carrier(ConfigTable& table, CarrierConfig& c, bool first) {
+void describe_carrier(ConfigTable& table, CarrierConfig& c) {
   table.section("carrier", [&] {
     table.add_choice("kind", c.kind, {"walk", "harvester", "uav", "sleigh"},
                      "how the sensors are carried");
@@ -203,11 +117,29 @@ void describe_carrier(ConfigTable& table, CarrierConfig& c, bool first) {
               "mean time between quick turns, or between stops of a machine");
     table.add("turn_deg", c.turn_deg, {0.0, 360.0}, "deg", "largest turn or swing");
     table.add("turn_rate_deg_s", c.turn_rate_deg_s, {1.0, 600.0}, "deg/s", "peak rate of a turn");
-    if (!first) describe_later(table, c);
+    table.add_choice("route", c.route, {"auto", "loop", "strip"},
+                     "auto: a strip road for a harvester, a loop for others");
+    table.add("laps", c.laps, {1, 20}, "", "of a loop around its middle, each on its own way");
+    table.add("route_time_s", c.route_time_s, {0.0, 1e5}, "s",
+              "how long the route takes, 0 = as speed and stops give");
+    table.add("one_way", c.one_way, "a strip road is driven once, not out and back");
+    table.add("strip_roads", c.strip_roads, {1, 50}, "", "parallel roads of the stand");
+    table.add("strip_road", c.strip_road, {1, 50}, "", "which of them is driven");
+    table.add("strip_spacing_m", c.strip_spacing_m, {3.0, 200.0}, "m", "from road to road");
+    table.add_choice("work", c.work, {"quick", "thinning"},
+                     "of a harvester at its stops; thinning fills route_time_s with work cycles");
+    table.add("back_up_m", c.back_up_m, {0.0, 50.0}, "m", "farthest backing up during a stop");
+    table.add("narrow_from", c.narrow_from, {0.0, 1.0}, "", "share of the route: narrow from here");
+    table.add("narrow_to", c.narrow_to, {0.0, 1.0}, "", "share of the route: narrow up to here");
+    table.add("narrow_speed_m_s", c.narrow_speed_m_s, {0.05, 15.0}, "m/s", "there");
+    table.add("halts", c.halts, {0, 1000}, "", "times that a sleigh stands still on its way");
+    table.add("halt_s", c.halt_s, {1.0, 1000.0}, "s", "mean length of a halt");
+    table.add("tumbles", c.tumbles, {0, 1000}, "", "times that a sleigh nearly turns over");
+    table.add("tumble_deg", c.tumble_deg, {0.0, 60.0}, "deg", "its roll then");
   });
 }
 
-void describe_lidar(ConfigTable& table, LidarConfig& c, bool first) {
+void describe_lidar(ConfigTable& table, LidarConfig& c) {
   table.section("lidar", [&] {
     table.add_choice("model", c.model, kLidarModels, "beams and firing times");
     table.add("rate_hz", c.rate_hz, {1.0, 40.0}, "Hz", "revolutions");
@@ -233,11 +165,24 @@ void describe_lidar(ConfigTable& table, LidarConfig& c, bool first) {
               "where half the returns of a 10 % target are lost");
     table.add("dropout", c.dropout, {0.0, 1.0}, "", "share of returns lost for no reason");
     table.add("azimuth_jitter_deg", c.azimuth_jitter_deg, {0.0, 1.0}, "deg", "of the encoder");
-    if (!first) describe_later(table, c);
+    table.add("keep_every", c.keep_every, {1, 100}, "", "only each so-manieth scan is recorded");
+    table.add("returns", c.returns, {1, 2}, "", "of a beam: the strongest, or the two strongest");
+    table.add("blooming", c.blooming, {0.0, 1.0}, "",
+              "chance that a beam beside a glaring echo repeats its range");
+    table.add("crosstalk", c.crosstalk, {0.0, 0.5}, "",
+              "share of beams that report a range out of nothing");
+    table.add("snow_fall_per_m", c.snow_fall_per_m, {0.0, 1.0}, "1/m",
+              "snow flakes that a beam meets in a metre");
+    table.add("snow_drop_interval_s", c.snow_drop_interval_s, {0.0, 1e9}, "s",
+              "mean time between loads of snow off a branch, 0 = none");
+    table.add("time_offset_s", c.time_offset_s, {-1.0, 1.0}, "s", "scan stamps are late by this");
+    table.add("error_m", c.error_m, "m",
+              "by which the claimed place is wrong, in the lidar's frame");
+    table.add("error_rpy_deg", c.error_rpy_deg, "deg", "by which the claimed attitude is wrong");
   });
 }
 
-void describe_imu(ConfigTable& table, ImuConfig& c, bool first) {
+void describe_imu(ConfigTable& table, ImuConfig& c) {
   table.section("imu", [&] {
     table.add("rate_hz", c.rate_hz, {10.0, 2000.0}, "Hz", "samples");
     table.add("mount_m", c.mount_m, "m", "place in the body frame");
@@ -251,11 +196,31 @@ void describe_imu(ConfigTable& table, ImuConfig& c, bool first) {
     table.add("scale_sd", c.scale_sd, {0.0, 0.1}, "", "scale and misalignment errors");
     table.add("vibration_m_s2", c.vibration_m_s2, kNotNegative, "m/s^2", "of the carrier");
     table.add("vibration_hz", c.vibration_hz, kPositive, "Hz", "its main frequency");
-    if (!first) describe_later(table, c);
+    table.add("enabled", c.enabled, "whether there is an IMU");
+    table.add("vibration_tones", c.vibration_tones, {1, 8}, "", "main tone and harmonics");
+    table.add("gyro_instability", c.gyro_instability, kNotNegative, "rad/s",
+              "bias instability: the Allan deviation's floor / 0.664");
+    table.add("accel_instability", c.accel_instability, kNotNegative, "m/s^2", "bias instability");
+    table.add("gyro_temperature", c.gyro_temperature, kNotNegative, "rad/s/K", "bias per kelvin");
+    table.add("accel_temperature", c.accel_temperature, kNotNegative, "m/s^2/K", "bias per kelvin");
+    table.add("warm_up_k", c.warm_up_k, {0.0, 100.0}, "K", "how much warmer it gets while it runs");
+    table.add("warm_up_s", c.warm_up_s, {1.0, 1e5}, "s", "time constant of the warming");
+    table.add("shock_m_s2", c.shock_m_s2, kNotNegative, "m/s^2",
+              "peak of the ringing when a stem falls or a runner hits");
+    table.add("shock_rad_s", c.shock_rad_s, kNotNegative, "rad/s", "the same of the gyroscope");
+    table.add("accel_range_m_s2", c.accel_range_m_s2, kNotNegative, "m/s^2",
+              "full scale, 0 = unlimited");
+    table.add("gyro_range_rad_s", c.gyro_range_rad_s, kNotNegative, "rad/s",
+              "full scale, 0 = unlimited");
+    table.add("missing", c.missing, {0.0, 0.9}, "", "share of samples lost one by one");
+    table.add("gap_interval_s", c.gap_interval_s, {0.0, 1e9}, "s",
+              "mean time between gaps, 0 = none");
+    table.add("gap_s", c.gap_s, {0.001, 100.0}, "s", "length of a gap");
+    table.add("time_offset_s", c.time_offset_s, {-1.0, 1.0}, "s", "stamps are late by this");
   });
 }
 
-void describe_gnss(ConfigTable& table, GnssConfig& c, bool first) {
+void describe_gnss(ConfigTable& table, GnssConfig& c) {
   table.section("gnss", [&] {
     table.add("enabled", c.enabled, "whether there is a receiver");
     table.add("rate_hz", c.rate_hz, {0.1, 500.0}, "Hz", "fixes");
@@ -271,7 +236,15 @@ void describe_gnss(ConfigTable& table, GnssConfig& c, bool first) {
     table.add("outage_interval_s", c.outage_interval_s, {1.0, 1e9}, "s",
               "mean time between outages under closed canopy");
     table.add("outage_s", c.outage_s, {0.0, 1e6}, "s", "mean length of an outage");
-    if (!first) describe_later(table, c);
+    table.add("burst_interval_s", c.burst_interval_s, {0.0, 1e9}, "s",
+              "mean time between bursts of error under closed canopy, 0 = none");
+    table.add("burst_s", c.burst_s, {0.1, 1e6}, "s", "length of a burst");
+    table.add("burst_m", c.burst_m, kNotNegative, "m", "its height in the plane");
+    table.add("jump_interval_s", c.jump_interval_s, {0.0, 1e9}, "s",
+              "mean time between jumps under closed canopy, 0 = none");
+    table.add("jump_m", c.jump_m, kNotNegative, "m", "standard deviation of a jump in the plane");
+    table.add("latency_s", c.latency_s, {0.0, 10.0}, "s",
+              "from the moment of a fix to its place in the stream");
   });
 }
 
@@ -312,36 +285,24 @@ void check_site(const SiteConfig& site) {
 
 }  // namespace
 
-void describe(ConfigTable& table, SiteConfig& config, bool first_keys_only) {
+void describe(ConfigTable& table, SiteConfig& config) {
   table.add("seed", config.seed, {0, 2e9}, "", "of everything random");
   table.add("duration_s", config.duration_s, {0.0, 1e5}, "s",
             "of the recording, 0 = as long as the route takes");
-  describe_ground(table, config, first_keys_only);
-  describe_stand(table, config.stand, first_keys_only);
-  describe_carrier(table, config.carrier, first_keys_only);
-  describe_lidar(table, config.lidar, first_keys_only);
-  describe_imu(table, config.imu, first_keys_only);
-  describe_gnss(table, config.gnss, first_keys_only);
-  if (!first_keys_only) describe_mag(table, config.mag);
+  describe_ground(table, config);
+  describe_stand(table, config.stand);
+  describe_carrier(table, config.carrier);
+  describe_lidar(table, config.lidar);
+  describe_imu(table, config.imu);
+  describe_gnss(table, config.gnss);
+  describe_mag(table, config.mag);
 }
 
 std::uint64_t site_key(const SiteConfig& config) {
   SiteConfig copy = config;
-  SiteConfig usual;
-  ConfigTable first;
-  ConfigTable all;
-  ConfigTable defaults;
-  describe(first, copy, true);
-  describe(all, copy);
-  describe(defaults, usual);
-  std::string text = first.to_yaml(false);
-  for (std::size_t i = 0; i < all.fields().size(); ++i) {
-    const ConfigTable::Field& field = all.fields()[i];
-    const bool later = std::none_of(first.fields().begin(), first.fields().end(),
-                                    [&](const auto& old) { return old.key == field.key; });
-    const std::string value = field.get();
-    if (later && value != defaults.fields()[i].get()) text += field.key + ": " + value + "\n";
-  }
+  ConfigTable table;
+  describe(table, copy);
+  std::string text = table.to_yaml(false);
   if (!config.stand.trees.empty()) {  // its content counts, not its name alone
     std::ifstream file(config.stand.trees, std::ios::binary);
     text.append(std::istreambuf_iterator<char>(file), {});

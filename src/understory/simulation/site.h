@@ -210,11 +210,10 @@ struct SiteConfig {
   MagnetometerConfig mag;
 };
 
-// Binds every key of a site to `config`; `first_keys_only` leaves out those that came after the
-// first version, so that the name under which casts of older sites are kept stays what it was.
-void describe(ConfigTable& table, SiteConfig& config, bool first_keys_only = false);
+// Binds every key of a site to `config`.
+void describe(ConfigTable& table, SiteConfig& config);
 
-// Names a site with all its settings. A later key counts only where it differs from its default.
+// Names a site with all its settings, for the cache of scans.
 [[nodiscard]] std::uint64_t site_key(const SiteConfig& config);
 
 // A site that the program carries with it.
