@@ -13,6 +13,7 @@ struct CorrectOptions {
   std::string run_folder;
   std::string config_file;
   std::vector<std::string> settings;
+  bool overwrite = false;
   bool print_config = false;
 };
 
@@ -30,6 +31,7 @@ int run_correct(const CorrectOptions& options, CommandContext& context) {
     throw ConfigError({"understory correct needs STEMS.csv.gz and -o RUN"});
   request.stems = options.stems;
   request.run_folder = options.run_folder;
+  request.overwrite = options.overwrite;
   request.config_yaml = table.to_yaml(false);
   const CorrectionOutcome outcome =
       run_correction(request, context.log, context.progress, context.stop_requested);
@@ -53,6 +55,8 @@ void add_correct_command(CLI::App& app, Command& chosen) {
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false)
       ->take_all();
+  command->add_flag("--overwrite", options->overwrite,
+                    "Even if the folder holds an unfinished mapping run");
   command->add_flag("--print-config", options->print_config,
                     "Print every setting with default, unit, range and meaning");
   command->footer("Example:\n  understory correct stems.csv.gz -o forest");

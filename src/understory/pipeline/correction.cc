@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "understory/pipeline/correction_files.h"
+#include "understory/pipeline/run_folder.h"
 #include "understory/recording/stems_file.h"
 
 namespace understory {
@@ -39,6 +40,7 @@ void describe(ConfigTable& table, CorrectionConfig& config) {
 CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
                                  const ProgressSink& progress,
                                  const StopRequested& stop_requested) {
+  if (!request.overwrite) refuse_unfinished_run(request.run_folder);
   CorrectionRun run;
   {
     const ScopedTimer timer(run.times, "reading");

@@ -26,6 +26,7 @@ void describe(ConfigTable& table, CorrectionConfig& config);
 struct CorrectionRequest {
   std::filesystem::path stems;  // stems.csv.gz
   std::filesystem::path run_folder;
+  bool overwrite = false;  // also a mapping run that is not finished
   CorrectionConfig config;
   std::string config_yaml;  // resolved, every key, for run.json
 };

@@ -10,6 +10,7 @@
 #include "understory/map/stem_map.h"
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/run_folder.h"
 #include "understory/util/error.h"
 #include "understory/util/version.h"
 
@@ -167,6 +168,8 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw OutputError(folder.string(), "cannot be made: " + error.message());
+  fs::remove(checkpoint_of(folder), error);
+  remove_old_results(folder);
   std::vector<MappedStem> stems;
   {
     const ScopedTimer timer(run.times, "tree_map");

@@ -1,6 +1,7 @@
 #include "understory/pipeline/run_state.h"
 
 #include "understory/pipeline/checkpoint.h"
+#include "understory/pipeline/run_folder.h"
 #include "understory/util/error.h"
 #include "understory/util/version.h"
 
@@ -43,11 +44,7 @@ void get_request(BinaryReader& reader, const std::filesystem::path& path, Mappin
 
 RunState RunState::create(const MappingRequest& request) {
   const std::filesystem::path work = request.run_folder / "work";
-  if (std::filesystem::exists(work / kCheckpoint) && !request.overwrite) {
-    throw OutputError(request.run_folder.string(),
-                      "holds an unfinished run; go on with `understory map --resume " +
-                          request.run_folder.string() + "` or give --overwrite to start anew");
-  }
+  if (!request.overwrite) refuse_unfinished_run(request.run_folder);
   std::error_code error;
   std::filesystem::remove_all(work, error);
   std::filesystem::create_directories(work, error);

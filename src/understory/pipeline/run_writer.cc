@@ -14,9 +14,11 @@
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/finished_map.h"
 #include "understory/pipeline/finished_trajectory.h"
+#include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_judgement.h"
 #include "understory/pipeline/run_truth.h"
 #include "understory/pipeline/source.h"
+#include "understory/util/median.h"
 #include "understory/util/version.h"
 
 namespace understory {
@@ -57,10 +59,7 @@ double median_period_ms(const std::vector<ReportScan>& scans) {
   for (std::size_t i = 1; i < scans.size(); ++i) {
     steps.push_back(scans[i].stamp - scans[i - 1].stamp);
   }
-  if (steps.empty()) return 0.0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return 1e3 * to_seconds(*middle);
+  return 1e3 * to_seconds(upper_median(std::move(steps)));
 }
 
 // trajectory.tum and states.csv.gz.
@@ -311,15 +310,6 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
     text += to_string(summary.status) + ": " + reason + "\n";
   }
   return text + "report: " + (folder / "report.html").string();
-}
-
-// What an earlier run may have left in the folder and this one may not write.
-void remove_old_results(const std::filesystem::path& folder) {
-  for (const char* name :
-       {"gnss.csv", "map.laz", "trees.csv", "trees.gpkg", "dtm.tif", "chm.tif"}) {
-    std::error_code ignored;  // what cannot be removed cannot be replaced, which is then said
-    std::filesystem::remove(folder / name, ignored);
-  }
 }
 
 }  // namespace
