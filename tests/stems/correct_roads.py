@@ -1,0 +1,181 @@
+"""`understory correct` from end to end: made-up strip roads against their truth, one and two
+threads, and input that is damaged or in the wrong place."""
+
+import gzip
+import json
+import math
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
+from program import Cases, program
+from strip_roads import Roads, write_strip_roads
+
+# Everything but these is the same bytes for any number of threads: they hold times and memory.
+TIMED = {"run.json", "report.html"}
+
+cases = Cases()
+SITE = cases.folder / "site"
+VIEWS = write_strip_roads(SITE, seed=3)
+STEMS = SITE / "stems.csv.gz"
+LINES = gzip.decompress(STEMS.read_bytes()).decode().splitlines()
+
+
+def correct(stems, run, *options):
+    return program("correct", stems, "-o", run, *options)
+
+
+def evaluated(*arguments):
+    done = program("evaluate", *arguments, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def lean_deg(run):
+    """Mean angle between where up is in the answer's frame and where it really is, tilt only."""
+    def ups(path):
+        for line in path.read_text().splitlines():
+            if line.startswith("#"):
+                continue
+            x, y, z, w = map(float, line.split()[4:])
+            yield 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    pairs = zip(ups(run / "trajectory.tum"), ups(SITE / "truth" / "trajectory.tum"))
+    angles = [math.degrees(math.acos(min(1.0, sum(a * b for a, b in zip(u, v))))) for u, v in pairs]
+    return sum(angles) / len(angles)
+
+
+@cases.case("strip roads against their truth")
+def roads(folder):
+    done = correct(STEMS, folder / "run", "--threads", 2)
+    assert done.returncode == 0, done.stderr
+    run = folder / "run"
+    told = json.loads((run / "run.json").read_text())
+    assert told["status"] == "complete" and told["poses"] == VIEWS, told["reasons"]
+    path = evaluated(run, SITE / "truth", "--align", "se3")
+    assert path["pairs"] == VIEWS
+    segments = {s["length_m"]: s["translation_plane_percent"] for s in path["segments"]}
+    longest = max(segments)
+    assert path["ape_plane_rmse_m"] < 0.25, path["ape_plane_rmse_m"]
+    assert segments[longest] < 0.2, segments  # 0.2 m in 100 m
+    assert lean_deg(run) < 1.0, lean_deg(run)
+    trees = evaluated("trees", run / "trees.csv", SITE / "truth" / "trees.csv", "--align", "yaw")
+    assert trees["recall"] > 0.75 and trees["position_rmse_m"] < 0.25, trees
+    return (f"{100 * path['ape_plane_rmse_m']:.0f} cm in the plane over {path['length_m']:.0f} m, "
+            f"{trees['recall']:.0%} of the trees, to {100 * trees['position_rmse_m']:.0f} cm")
+
+
+@cases.case("same bytes with one thread and with two")
+def threads(folder):
+    for count in (1, 2):
+        assert correct(STEMS, folder / str(count), "--threads", count).returncode == 0
+    names = {p.name for p in (folder / "1").iterdir()}
+    assert names == {p.name for p in (folder / "2").iterdir()} and len(names - TIMED) >= 4, names
+    for name in names - TIMED:
+        assert (folder / "1" / name).read_bytes() == (folder / "2" / name).read_bytes(), name
+    return ", ".join(sorted(names - TIMED))
+
+
+def refused(path, run, *words):
+    done = correct(path, run)
+    assert done.returncode == 3 and done.stderr.startswith(f"error: {path}"), done.stderr
+    for word in words:
+        assert word in done.stderr, (word, done.stderr)
+    assert not (run / "trajectory.tum").exists()
+    return done.stderr.strip().replace(str(path), path.name)
+
+
+def spoilt(folder, change):
+    lines = list(LINES[:2000])
+    change(lines)
+    path = folder / "stems.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@cases.case("stream cut short")
+def cut(folder):
+    path = folder / "stems.csv.gz"
+    path.write_bytes(STEMS.read_bytes()[:60_000])
+    return refused(path, folder / "run", "line ", "gzip")
+
+
+@cases.case("stream with a flipped bit")
+def flipped(folder):
+    path = folder / "stems.csv.gz"
+    data = bytearray(STEMS.read_bytes())
+    data[len(data) // 2] ^= 0x10
+    path.write_bytes(data)
+    return refused(path, folder / "run", "line ")
+
+
+@cases.case("column missing")
+def column(folder):
+    path = spoilt(folder, lambda lines: lines.__setitem__(0, lines[0].replace(",y,", ",why,")))
+    return refused(path, folder / "run", "line 1", "'y'")
+
+
+@cases.case("time goes backwards")
+def backwards(folder):
+    def swap(lines):
+        at = next(i for i, line in enumerate(lines) if line.startswith("9,"))
+        lines[at] = lines[at].replace(",4.50,", ",0.25,", 1)
+        lines[1:] = lines[1:at + 1]
+        swap.line = len(lines)
+    path = spoilt(folder, swap)
+    return refused(path, folder / "run", f"line {swap.line}", "timestamp")
+
+
+@cases.case("a position that is no number")
+def not_a_number(folder):
+    def put(lines):
+        cells = lines[700].split(",")
+        cells[3] = "nan"
+        lines[700] = ",".join(cells)
+    return refused(spoilt(folder, put), folder / "run", "line 701")
+
+
+@cases.case("nothing but a header")
+def empty(folder):
+    return refused(spoilt(folder, lambda lines: lines.__delitem__(slice(1, None))), folder / "run",
+                   "at least one row")
+
+
+@cases.case("no such file")
+def absent(folder):
+    return refused(folder / "stems.csv.gz", folder / "run", "can be read")
+
+
+@cases.case("folder of a mapping run that is not finished")
+def unfinished(folder):
+    run = folder / "run"
+    (run / "work").mkdir(parents=True)
+    (run / "work" / "checkpoint.bin").write_bytes(b"half")
+    done = correct(STEMS, run)
+    assert done.returncode == 3 and str(run) in done.stderr, done.stderr
+    assert (run / "work" / "checkpoint.bin").read_bytes() == b"half"
+    assert correct(STEMS, run, "--overwrite").returncode == 0
+    assert (run / "trajectory.tum").exists() and not (run / "work" / "checkpoint.bin").exists()
+    return done.stderr.strip().replace(str(run), run.name)
+
+
+@cases.case("stems without axes, times and diameters")
+def bare(folder):
+    """Only frame, x, y, z are needed: without axes the z axis of the sensor is taken as up."""
+    site = folder / "site"
+    write_strip_roads(site, seed=4, roads=Roads(roads=1, tilt_deg=0.2))
+    rows = [line.split(",") for line in
+            gzip.decompress((site / "stems.csv.gz").read_bytes()).decode().splitlines()]
+    path = folder / "stems.csv"
+    path.write_text("\n".join(",".join((r[0], r[2], r[3], r[4])) for r in rows) + "\n")
+    done = correct(path, folder / "run")
+    assert done.returncode == 0, done.stderr
+    # Times are the frames' numbers, in seconds; the truth's are half of them.
+    truth = [line.split(" ") for line in (site / "truth" / "trajectory.tum").read_text().splitlines()]
+    (folder / "truth.tum").write_text("\n".join(" ".join([f"{k}.0", *t[1:]])
+                                                for k, t in enumerate(truth)) + "\n")
+    errors = evaluated(folder / "run" / "trajectory.tum", folder / "truth.tum", "--align", "se3")
+    assert errors["ape_plane_rmse_m"] < 0.3, errors["ape_plane_rmse_m"]
+    return f"{100 * errors['ape_plane_rmse_m']:.0f} cm in the plane"
+
+
+cases.run()
