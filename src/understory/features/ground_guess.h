@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+namespace understory {
+
+// Where the ground is in one frame: the lowest return of each cell, and planes through those near a
+// place. Level frame, metres. Keeps the planes that were asked for: not thread-safe.
+class GroundGuess {
+ public:
+  explicit GroundGuess(const std::vector<Eigen::Vector3f>& points);
+
+  // Height of the ground at a place; nothing where too little was seen near it.
+  [[nodiscard]] std::optional<double> at(const Eigen::Vector2d& place);
+
+ private:
+  struct Plane {
+    bool known = false;
+    Eigen::Vector3d height_and_slope = Eigen::Vector3d::Zero();  // at the middle of the patch
+  };
+  [[nodiscard]] Plane fit(const Eigen::Vector2d& middle) const;
+
+  std::unordered_map<std::int64_t, Eigen::Vector3f> lowest_;
+  std::unordered_map<std::int64_t, Plane> planes_;
+};
+
+}  // namespace understory

@@ -1,0 +1,340 @@
+#include "understory/features/stem_chain.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "understory/util/median.h"
+
+namespace understory {
+namespace {
+
+constexpr double kGate = 12.0;       // of a squared Mahalanobis distance in the plane
+constexpr double kLongestGap = 3.0;  // metres along a stem without a section
+constexpr double kMeanDepth = std::numbers::pi / 4.0;  // of a round surface, in radii
+
+// A section's centre with its error, given a radius.
+struct Centre {
+  Eigen::Vector2d place;
+  Eigen::Matrix2d covariance;
+};
+
+Centre centre_of(const StemSection& section, double radius, double radius_sd, double range_sd) {
+  const Eigen::Vector2d along = section.sight;
+  const Eigen::Vector2d left(-along.y(), along.x());
+  const double n = section.returns;
+  const double s = section.spacing_m;
+  Centre centre;
+  centre.place = section.surface;
+  double along_var = range_sd * range_sd / n + 1e-5;
+  double across_var = 0.0;
+  if (section.range_m > 0.0) {
+    centre.place += kMeanDepth * radius * along;
+    along_var += std::pow(kMeanDepth * radius_sd, 2) + std::pow(0.22 * radius, 2) / n;
+  }
+  const bool hidden_left = section.left == Side::kHidden;
+  const bool hidden_right = section.right == Side::kHidden;
+  const double missing = 2.0 * radius - section.width_m;
+  if (hidden_left != hidden_right && missing > 0.0) {
+    // The open edge and the radius tell where the centre is.
+    centre.place += (hidden_left ? 0.5 : -0.5) * missing * left;
+    across_var = s * s / 12.0 + radius_sd * radius_sd;
+  } else if (hidden_left && missing > 0.0) {
+    across_var = radius * radius / 3.0;
+  } else if (section.returns == 1) {
+    const double width = std::min(2.0 * radius, 2.0 * s);
+    across_var = width * width / 12.0;
+  } else {
+    across_var = s * s / 24.0;
+  }
+  across_var += 1e-4;
+  centre.covariance = along_var * along * along.transpose() + across_var * left * left.transpose();
+  return centre;
+}
+
+using Observation = Eigen::Matrix<double, 2, 4>;
+Observation observation(double above_base) {
+  Observation h = Observation::Zero();
+  h.leftCols<2>().setIdentity();
+  h.rightCols<2>() = above_base * Eigen::Matrix2d::Identity();
+  return h;
+}
+
+// The growing of one chain from its first section.
+class Grower {
+ public:
+  Grower(const SectionView& view, const StemChainConfig& config,
+         const std::vector<std::vector<int>>& by_x, std::vector<char>& used)
+      : view_(view), config_(config), sections_(view.sections()), by_x_(by_x), used_(used) {
+    centres_.reserve(sections_.size());
+    for (const StemSection& section : sections_)
+      centres_.push_back(
+          centre_of(section, config.usual_radius_m, config.radius_spread_m, view.range_sd_m()));
+  }
+
+  StemChain grow(int seed) {
+    const StemSection& section = at(seed);
+    chain_ = {};
+    chain_.sections = {seed};
+    const Centre& centre = centre_at(seed);
+    StemLine& line = chain_.line;
+    line.base_m = section.height_m;
+    line.state << centre.place, 0.0, 0.0;
+    line.covariance.setZero();
+    line.covariance.topLeftCorner<2, 2>() = centre.covariance;
+    line.covariance.bottomRightCorner<2, 2>() =
+        config_.slope_sd * config_.slope_sd * Eigen::Matrix2d::Identity();
+    extend(section.level, 1, section.height_m);
+    extend(section.level, -1, section.height_m);
+    std::sort(chain_.sections.begin(), chain_.sections.end(), [&](int a, int b) {
+      return at(a).level != at(b).level ? at(a).level < at(b).level : a < b;
+    });
+    return chain_;
+  }
+
+ private:
+  [[nodiscard]] const StemSection& at(int i) const {
+    return sections_[static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] const Centre& centre_at(int i) const {
+    return centres_[static_cast<std::size_t>(i)];
+  }
+
+  void extend(int level, int direction, double last_height) {
+    int passed = 0;
+    int blocked = 0;
+    for (level += direction; level >= 0 && level < view_.levels(); level += direction) {
+      Eigen::Vector2d place = chain_.line.at(last_height);
+      const double height = view_.height_at(level, place);
+      if (std::abs(height - last_height) > kLongestGap) return;
+      place = chain_.line.at(height);
+      const int next = best_in(level, place);
+      if (next >= 0) {
+        take(next);
+        last_height = at(next).height_m;
+        passed = 0;
+        blocked = 0;
+        continue;
+      }
+      const Sight sight = view_.look(level, place, 0.5 * config_.usual_radius_m);
+      passed += sight == Sight::kPassed ? 1 : 0;
+      blocked += sight == Sight::kHit ? 1 : 0;
+      if (passed >= 2 || blocked >= 3) return;
+    }
+  }
+
+  // The unused section of a level that lies best on the line.
+  [[nodiscard]] int best_in(int level, const Eigen::Vector2d& place) const {
+    constexpr double kReach = 0.8;
+    const std::vector<int>& row = by_x_[static_cast<std::size_t>(level)];
+    auto it = std::lower_bound(row.begin(), row.end(), place.x() - kReach,
+                               [&](int i, double x) { return at(i).surface.x() < x; });
+    int best = -1;
+    double least = kGate;
+    for (; it != row.end() && at(*it).surface.x() <= place.x() + kReach; ++it) {
+      if (used_[static_cast<std::size_t>(*it)] != 0) continue;
+      if (std::abs(at(*it).surface.y() - place.y()) > kReach) continue;
+      const Centre& centre = centre_at(*it);
+      const double height = at(*it).height_m;
+      const Eigen::Vector2d off = centre.place - chain_.line.at(height);
+      const Eigen::Matrix2d spread = centre.covariance + chain_.line.covariance_at(height);
+      const double distance = off.dot(spread.inverse() * off);
+      if (distance >= least) continue;
+      least = distance;
+      best = *it;
+    }
+    return best;
+  }
+
+  void take(int i) {
+    const Centre& centre = centre_at(i);
+    StemLine& line = chain_.line;
+    const Observation h = observation(at(i).height_m - line.base_m);
+    const Eigen::Matrix2d spread = centre.covariance + h * line.covariance * h.transpose();
+    const Eigen::Matrix<double, 4, 2> gain = line.covariance * h.transpose() * spread.inverse();
+    line.state += gain * (centre.place - h * line.state);
+    line.covariance -= gain * h * line.covariance;
+    chain_.sections.push_back(i);
+  }
+
+  const SectionView& view_;
+  const StemChainConfig& config_;
+  const std::vector<StemSection>& sections_;
+  std::vector<Centre> centres_;
+  const std::vector<std::vector<int>>& by_x_;
+  std::vector<char>& used_;
+  StemChain chain_;
+};
+
+// Sections from the one that says most down.
+std::vector<int> seed_order(const std::vector<StemSection>& sections) {
+  std::vector<int> order(sections.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto worth = [&](int i) {
+    const StemSection& section = sections[static_cast<std::size_t>(i)];
+    const int open = (section.left == Side::kOpen ? 1 : 0) + (section.right == Side::kOpen ? 1 : 0);
+    return 100 * open + std::min(section.returns, 20);
+  };
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return worth(a) > worth(b); });
+  return order;
+}
+
+void count_between(const SectionView& view, StemChain& chain) {
+  chain.passed = chain.hits = chain.hidden = chain.blank = 0;
+  std::size_t next = 0;
+  const auto& sections = view.sections();
+  const auto level_of = [&](std::size_t k) {
+    return sections[static_cast<std::size_t>(chain.sections[k])].level;
+  };
+  for (int level = level_of(0); level <= level_of(chain.sections.size() - 1); ++level) {
+    if (level_of(next) == level) {
+      while (next + 1 < chain.sections.size() && level_of(next) <= level)
+        ++next;
+      continue;
+    }
+    Eigen::Vector2d place = chain.line.state.head<2>();
+    place = chain.line.at(view.height_at(level, place));
+    switch (view.look(level, place, 0.5 * chain.radius_m)) {
+      case Sight::kHit:
+        ++chain.hits;
+        break;
+      case Sight::kPassed:
+        ++chain.passed;
+        break;
+      case Sight::kHidden:
+        ++chain.hidden;
+        break;
+      case Sight::kUnknown:
+        ++chain.blank;
+        break;
+    }
+  }
+}
+
+}  // namespace
+
+Eigen::Matrix2d StemLine::covariance_at(double height_m) const {
+  const Observation h = observation(height_m - base_m);
+  return h * covariance * h.transpose();
+}
+
+OwnRadius own_radius(const SectionView& view, const StemChain& chain) {
+  std::vector<double> widths;
+  std::vector<const StemSection*> whole;
+  for (const int i : chain.sections) {
+    const StemSection& section = view.sections()[static_cast<std::size_t>(i)];
+    if (section.left == Side::kHidden || section.right == Side::kHidden) continue;
+    if (section.range_m <= 0.0) continue;
+    whole.push_back(&section);
+    widths.push_back(section.width_m);
+  }
+  if (whole.empty()) return {};
+  // Runs that something else has widened are left out.
+  const double most = 1.6 * upper_median(widths) + 0.02;
+  double sum = 0.0;
+  double count = 0.0;
+  double variance = 0.0;
+  double range = 0.0;
+  for (const StemSection* section : whole) {
+    if (section->width_m > most) continue;
+    sum += section->width_m;
+    range += section->range_m;
+    variance += section->spacing_m * section->spacing_m / 6.0;
+    count += 1.0;
+  }
+  range /= count;
+  // Beams that went by on both sides of a narrow stem count as a width of zero.
+  const double missed = chain.blank + chain.passed;
+  variance += missed * std::pow(whole.front()->spacing_m, 2) / 6.0;
+  count += missed;
+  const double width = sum / count;
+  OwnRadius own;
+  own.radius_m = 0.5 * width;
+  own.radius_m *= 1.0 + kMeanDepth * own.radius_m / range;
+  own.sd_m = 0.5 * std::sqrt(variance) / count + 0.004;
+  return own;
+}
+
+void fit_chain(const SectionView& view, const StemChainConfig& config, StemChain& chain) {
+  if (chain.radius_m <= 0.0) chain.radius_m = config.usual_radius_m;
+  count_between(view, chain);
+  const OwnRadius own = own_radius(view, chain);
+  const double usual = 1.0 / (config.radius_spread_m * config.radius_spread_m);
+  const double seen = own.radius_m > 0.0 ? 1.0 / (own.sd_m * own.sd_m) : 0.0;
+  chain.radius_m = (usual * config.usual_radius_m + seen * own.radius_m) / (usual + seen);
+  chain.radius_sd_m = 1.0 / std::sqrt(usual + seen);
+
+  // The base in the middle of what was seen keeps place and slope nearly independent.
+  const auto& sections = view.sections();
+  const auto height_of = [&](int i) { return sections[static_cast<std::size_t>(i)].height_m; };
+  StemLine line;
+  line.base_m = 0.5 * (height_of(chain.sections.front()) + height_of(chain.sections.back()));
+  line.state << chain.line.at(line.base_m), chain.line.state.tail<2>();
+  Eigen::Matrix4d prior = Eigen::Matrix4d::Zero();
+  prior(2, 2) = prior(3, 3) = 1.0 / (config.slope_sd * config.slope_sd);
+  std::vector<Centre> centres;
+  for (const int i : chain.sections)
+    // What all sections of a stem share, the radius, is added at the end.
+    centres.push_back(
+        centre_of(sections[static_cast<std::size_t>(i)], chain.radius_m, 0.0, view.range_sd_m()));
+  Eigen::Matrix4d information;
+  double squares = 0.0;
+  for (int round = 0; round < 4; ++round) {
+    information = prior;
+    Eigen::Vector4d right = Eigen::Vector4d::Zero();
+    squares = 0.0;
+    for (std::size_t k = 0; k < centres.size(); ++k) {
+      const Observation h = observation(height_of(chain.sections[k]) - line.base_m);
+      const Eigen::Matrix2d inverse = centres[k].covariance.inverse();
+      const Eigen::Vector2d off = centres[k].place - h * line.state;
+      const double distance = off.dot(inverse * off);
+      // Student's t with 4 degrees of freedom.
+      const double weight = 6.0 / (4.0 + distance);
+      squares += std::min(distance, 25.0);
+      information += weight * h.transpose() * inverse * h;
+      right += weight * h.transpose() * inverse * centres[k].place;
+    }
+    line.state = information.ldlt().solve(right);
+  }
+  chain.misfit = std::sqrt(squares / (2.0 * static_cast<double>(centres.size())));
+  line.covariance = information.inverse();
+  const Eigen::Vector2d sight = sections[static_cast<std::size_t>(chain.sections.front())].sight;
+  line.covariance.topLeftCorner<2, 2>() +=
+      std::pow(kMeanDepth * chain.radius_sd_m, 2) * sight * sight.transpose();
+  chain.line = line;
+}
+
+std::vector<StemChain> chain_sections(const SectionView& view, const StemChainConfig& config) {
+  const auto& sections = view.sections();
+  std::vector<std::vector<int>> by_x(static_cast<std::size_t>(view.levels()));
+  for (std::size_t i = 0; i < sections.size(); ++i)
+    by_x[static_cast<std::size_t>(sections[i].level)].push_back(static_cast<int>(i));
+  for (std::vector<int>& row : by_x) {
+    std::sort(row.begin(), row.end(), [&](int a, int b) {
+      const double xa = sections[static_cast<std::size_t>(a)].surface.x();
+      const double xb = sections[static_cast<std::size_t>(b)].surface.x();
+      return xa != xb ? xa < xb : a < b;
+    });
+  }
+  std::vector<char> used(sections.size(), 0);
+  std::vector<StemChain> chains;
+  Grower grower(view, config, by_x, used);
+  for (const int seed : seed_order(sections)) {
+    if (used[static_cast<std::size_t>(seed)] != 0) continue;
+    used[static_cast<std::size_t>(seed)] = 1;
+    StemChain chain = grower.grow(seed);
+    if (chain.sections.size() < 2) {
+      used[static_cast<std::size_t>(seed)] = 0;
+      continue;
+    }
+    for (const int i : chain.sections)
+      used[static_cast<std::size_t>(i)] = 1;
+    chains.push_back(std::move(chain));
+  }
+  return chains;
+}
+
+}  // namespace understory

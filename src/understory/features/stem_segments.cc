@@ -1,0 +1,196 @@
+#include "understory/features/stem_segments.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "understory/features/ground_guess.h"
+#include "understory/features/ring_view.h"
+#include "understory/features/stem_chain.h"
+#include "understory/features/stem_score.h"
+#include "understory/util/median.h"
+
+namespace understory {
+namespace {
+
+constexpr double kLeanSd = 0.05;     // of stems against up
+constexpr double kUpMatters = 0.03;  // radians: levels differ enough to look again
+
+// The smallest turn that makes `up` the z axis.
+Eigen::Matrix3d level_from(const Eigen::Vector3d& up) {
+  return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+}
+
+// Median and spread of the radii that the stems show by themselves.
+StemChainConfig with_usual_radius(const SectionView& view, const std::vector<StemChain>& chains,
+                                  StemChainConfig config) {
+  std::vector<double> radii;
+  for (const StemChain& chain : chains) {
+    if (chain.sections.size() < 3 || chain.passed > 0) continue;
+    const OwnRadius own = own_radius(view, chain);
+    if (own.radius_m > 0.0 && own.sd_m < 0.02) radii.push_back(own.radius_m);
+  }
+  if (radii.size() < 5) return config;
+  config.usual_radius_m = upper_median(radii);
+  for (double& radius : radii)
+    radius = std::abs(radius - config.usual_radius_m);
+  config.radius_spread_m = std::clamp(1.5 * upper_median(radii), 0.015, 0.1);
+  return config;
+}
+
+// A chain with what is found out about it in the end.
+struct Candidate {
+  StemChain chain;
+  std::optional<double> ground_m;
+  double score = 0.0;
+};
+
+StemSegment segment_of(const SectionView& view, const Candidate& candidate,
+                       const Eigen::Matrix3d& level_from_frame) {
+  const StemChain& chain = candidate.chain;
+  const auto& sections = view.sections();
+  const double lowest = sections[static_cast<std::size_t>(chain.sections.front())].height_m;
+  const double highest = sections[static_cast<std::size_t>(chain.sections.back())].height_m;
+  const double foot = candidate.ground_m ? *candidate.ground_m : lowest;
+  const Eigen::Vector3d along(chain.line.state[2], chain.line.state[3], 1.0);
+  const Eigen::Vector2d place = chain.line.at(foot);
+  StemSegment segment;
+  segment.foot = level_from_frame.transpose() * Eigen::Vector3d(place.x(), place.y(), foot);
+  segment.foot_on_ground = candidate.ground_m.has_value();
+  segment.axis = (level_from_frame.transpose() * along).normalized();
+  segment.lowest_m = (lowest - foot) * along.norm();
+  segment.highest_m = (highest - foot) * along.norm();
+  segment.radius_m = chain.radius_m;
+  segment.radius_sd_m = chain.radius_sd_m;
+  segment.score = candidate.score;
+  double time = 0.0;
+  for (const int i : chain.sections) {
+    const StemSection& section = sections[static_cast<std::size_t>(i)];
+    segment.returns += section.returns;
+    segment.levels_with_3 += section.returns >= 3 ? 1 : 0;
+    time += static_cast<double>(section.t_ns) * section.returns;
+  }
+  segment.levels = static_cast<int>(chain.sections.size());
+  segment.t_ns = static_cast<std::uint32_t>(std::max(0.0, time / segment.returns));
+  Eigen::Matrix4d move = Eigen::Matrix4d::Identity();
+  move(0, 2) = move(1, 3) = foot - chain.line.base_m;
+  segment.covariance = move * chain.line.covariance * move.transpose();
+  return segment;
+}
+
+// Of segments that stand at one place the better one stays.
+std::vector<StemSegment> without_doubles(std::vector<StemSegment> segments) {
+  std::stable_sort(segments.begin(), segments.end(),
+                   [](const StemSegment& a, const StemSegment& b) { return a.score > b.score; });
+  std::vector<StemSegment> kept;
+  for (const StemSegment& segment : segments) {
+    const bool taken = std::any_of(kept.begin(), kept.end(), [&](const StemSegment& other) {
+      const double near = 0.15 + std::max(segment.radius_m, other.radius_m);
+      const double middle = 0.5 * (segment.lowest_m + segment.highest_m);
+      return (other.foot + middle * other.axis - segment.foot - middle * segment.axis)
+                     .head<2>()
+                     .squaredNorm() < near * near ||
+             (other.foot - segment.foot).head<2>().squaredNorm() < near * near;
+    });
+    if (!taken) kept.push_back(segment);
+  }
+  std::stable_sort(kept.begin(), kept.end(), [](const StemSegment& a, const StemSegment& b) {
+    return a.foot.head<2>().squaredNorm() < b.foot.head<2>().squaredNorm();
+  });
+  return kept;
+}
+
+// Chains of a view with what is usual among them.
+struct Chains {
+  StemChainConfig config;
+  std::vector<StemChain> chains;
+};
+
+Chains chains_of(const SectionView& view) {
+  Chains result;
+  result.chains = chain_sections(view, result.config);
+  for (StemChain& chain : result.chains)
+    fit_chain(view, result.config, chain);
+  result.config = with_usual_radius(view, result.chains, result.config);
+  for (StemChain& chain : result.chains)
+    fit_chain(view, result.config, chain);
+  return result;
+}
+
+// Most chains are branches whatever the ground is like under them.
+double score_without_ground(const SectionView& view, const Chains& all, const StemChain& chain) {
+  constexpr double kUsualStart = 0.3;
+  return stem_score(stem_traits(view, chain, all.config, kUsualStart));
+}
+
+std::vector<StemSegment> segments_of(const SectionView& view, Chains& all,
+                                     const std::vector<Eigen::Vector3f>& points,
+                                     const Eigen::Matrix3d& level_from_frame, double min_score) {
+  GroundGuess ground(points);
+  std::vector<StemSegment> segments;
+  for (StemChain& chain : all.chains) {
+    if (score_without_ground(view, all, chain) < 0.3 * min_score) continue;
+    Candidate candidate;
+    const double lowest =
+        view.sections()[static_cast<std::size_t>(chain.sections.front())].height_m;
+    candidate.ground_m = ground.at(chain.line.at(lowest));
+    if (candidate.ground_m) *candidate.ground_m = std::min(*candidate.ground_m, lowest);
+    const double above = candidate.ground_m ? lowest - *candidate.ground_m : 1.0;
+    const StemTraits traits = stem_traits(view, chain, all.config, above);
+    candidate.score = stem_score(traits);
+    if (candidate.score < min_score) continue;
+    candidate.chain = std::move(chain);
+    segments.push_back(segment_of(view, candidate, level_from_frame));
+    segments.back().traits = traits;
+  }
+  return without_doubles(std::move(segments));
+}
+
+// Robust mean of the directions of sure stems, level frame; z where there are few.
+Eigen::Vector3d up_of(const SectionView& view, const Chains& all) {
+  std::vector<const StemChain*> sure;
+  for (const StemChain& chain : all.chains) {
+    if (chain.sections.size() >= 4 && score_without_ground(view, all, chain) > 0.8)
+      sure.push_back(&chain);
+  }
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  if (sure.size() < 5) return up;
+  for (int round = 0; round < 6; ++round) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const StemChain* chain : sure) {
+      const Eigen::Vector3d axis =
+          Eigen::Vector3d(chain->line.state[2], chain->line.state[3], 1.0).normalized();
+      const double own = 0.5 * (chain->line.covariance(2, 2) + chain->line.covariance(3, 3));
+      const double variance = own + kLeanSd * kLeanSd;
+      sum += axis / (variance * (1.0 + axis.cross(up).squaredNorm() / (4.0 * variance)));
+    }
+    up = sum.normalized();
+  }
+  return up;
+}
+
+}  // namespace
+
+StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config) {
+  StemSegments result;
+  result.up = config.up.normalized();
+  for (int round = 0;; ++round) {
+    const Eigen::Matrix3d level = level_from(result.up);
+    const RingView view(scan, level, config.max_range_m);
+    result.levels = view.levels();
+    result.step = view.step_rad();
+    result.range_sd_m = view.range_sd_m();
+    if (view.sections().empty()) return result;
+    Chains all = chains_of(view);
+    const Eigen::Vector3d up = up_of(view, all);
+    result.up = level.transpose() * up;
+    // Stems look for each other along the upright: a wrong one loses some.
+    if (round == 0 && up.head<2>().norm() > kUpMatters) continue;
+    result.usual_radius_m = all.config.usual_radius_m;
+    result.stems = segments_of(view, all, view.points(), level, config.min_score);
+    return result;
+  }
+}
+
+}  // namespace understory

@@ -1,0 +1,166 @@
+#include "understory/features/stem_segments.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+#include "understory/features/test_frames.h"
+
+namespace understory {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+struct Cylinder {
+  Eigen::Vector2d centre;
+  double radius_m;
+};
+
+// A scan of upright cylinders on level ground 1.5 m below a sensor with 16 rings, without noise.
+Scan scan_cylinders(const std::vector<Cylinder>& cylinders) {
+  constexpr double kStep = 0.2 * kDegree;
+  Scan scan;
+  scan.ring_count = 16;
+  for (int column = 0; column < 1800; ++column) {
+    const double azimuth = std::numbers::pi - kStep * column;
+    const Eigen::Vector2d ray(std::cos(azimuth), std::sin(azimuth));
+    for (int ring = 0; ring < 16; ++ring) {
+      const double slope = std::tan((-15.0 + 2.0 * ring) * kDegree);
+      double range = slope < 0.0 ? -1.5 / slope : 1e9;
+      for (const Cylinder& cylinder : cylinders) {
+        const double along = cylinder.centre.dot(ray);
+        const double across = cylinder.centre.squaredNorm() - along * along;
+        const double depth = cylinder.radius_m * cylinder.radius_m - across;
+        if (along > 0.0 && depth > 0.0) range = std::min(range, along - std::sqrt(depth));
+      }
+      if (range > 80.0) continue;
+      ScanPoint point;
+      point.x = static_cast<float>(range * ray.x());
+      point.y = static_cast<float>(range * ray.y());
+      point.z = static_cast<float>(range * slope);
+      point.ring = static_cast<std::uint16_t>(ring);
+      point.t_ns = static_cast<std::uint32_t>(55'296 * column);
+      scan.points.push_back(point);
+    }
+  }
+  return scan;
+}
+
+std::vector<Cylinder> ring_of_cylinders() {
+  std::vector<Cylinder> cylinders;
+  for (int i = 0; i < 12; ++i) {
+    const double range = 5.0 + 0.9 * i;
+    const double azimuth = 29.0 * i * kDegree;
+    cylinders.push_back(
+        {range * Eigen::Vector2d(std::cos(azimuth), std::sin(azimuth)), 0.06 + 0.01 * (i % 9)});
+  }
+  return cylinders;
+}
+
+const StemSegment* nearest(const StemSegments& found, const Eigen::Vector3d& foot) {
+  const StemSegment* best = nullptr;
+  for (const StemSegment& stem : found.stems) {
+    if (best == nullptr || (stem.foot - foot).norm() < (best->foot - foot).norm()) best = &stem;
+  }
+  return best;
+}
+
+TEST(StemSegments, CentresAreNotDrawnTowardsTheScanner) {
+  const std::vector<Cylinder> cylinders = ring_of_cylinders();
+  const StemSegments found = find_stem_segments(scan_cylinders(cylinders), {});
+  EXPECT_EQ(found.stems.size(), cylinders.size());
+  EXPECT_EQ(found.levels, 16);
+  EXPECT_NEAR(found.step, 0.2 * kDegree, 1e-4);
+  double bias = 0.0;
+  for (const Cylinder& cylinder : cylinders) {
+    const Eigen::Vector3d foot(cylinder.centre.x(), cylinder.centre.y(), -1.5);
+    const StemSegment* stem = nearest(found, foot);
+    ASSERT_NE(stem, nullptr);
+    EXPECT_LT((stem->foot - foot).head<2>().norm(), 0.02);
+    EXPECT_NEAR(stem->foot.z(), -1.5, 0.05);
+    EXPECT_TRUE(stem->foot_on_ground);
+    EXPECT_NEAR(stem->radius_m, cylinder.radius_m, 0.012);
+    EXPECT_GT(stem->axis.z(), std::cos(1.0 * kDegree));
+    EXPECT_GT(stem->score, 0.9);
+    bias += (stem->foot - foot).head<2>().dot(foot.head<2>().normalized());
+  }
+  // The mean of the returns themselves lies pi/4 of the radius, 8 cm, too near.
+  EXPECT_NEAR(bias / static_cast<double>(cylinders.size()), 0.0, 0.006);
+}
+
+TEST(StemSegments, StandsByTheStemsWhereTheSensorIsTilted) {
+  const std::vector<Cylinder> cylinders = ring_of_cylinders();
+  Scan scan = scan_cylinders(cylinders);
+  const Eigen::Quaterniond tilt(
+      Eigen::AngleAxisd(12.0 * kDegree, Eigen::Vector3d(1.0, 0.4, 0.0).normalized()));
+  // The same returns told in a tilted frame: its rings are no longer cones about z, so only the
+  // direction of up is asked for here.
+  for (ScanPoint& point : scan.points) {
+    const Eigen::Vector3f turned = tilt.cast<float>() * Eigen::Vector3f(point.x, point.y, point.z);
+    point.x = turned.x();
+    point.y = turned.y();
+    point.z = turned.z();
+  }
+  StemSegmentConfig config;
+  config.up = tilt * Eigen::Vector3d(0.05, 0.05, 1.0);
+  const StemSegments found = find_stem_segments(scan, config);
+  EXPECT_LT(found.up.cross(tilt * Eigen::Vector3d::UnitZ()).norm(), 1.0 * kDegree);
+}
+
+TEST(StemSegments, AreEmptyWithoutRingsOrPoints) {
+  EXPECT_TRUE(find_stem_segments(Scan{}, {}).stems.empty());
+  Scan flat = scan_cylinders(ring_of_cylinders());
+  for (ScanPoint& point : flat.points)
+    point.ring = 0;
+  EXPECT_TRUE(find_stem_segments(flat, {}).stems.empty());
+}
+
+TEST(StemSegments, EachIsTimedWhereTheHeadLookedAtIt) {
+  const StemSegments found = find_stem_segments(scan_cylinders(ring_of_cylinders()), {});
+  ASSERT_FALSE(found.stems.empty());
+  for (const StemSegment& stem : found.stems) {
+    const double azimuth = std::atan2(stem.foot.y(), stem.foot.x());
+    const double column = (std::numbers::pi - azimuth) / (0.2 * kDegree);
+    EXPECT_NEAR(stem.t_ns, 55'296.0 * column, 4.0 * 55'296.0);
+  }
+}
+
+StemBand within_15_m(TestFrames& site, int every) {
+  std::vector<StemBand> bands(9);
+  StemSegmentConfig config;
+  for (std::int64_t k = 0; to_seconds(site.scanner.end(k)) < site.duration_s(); k += every) {
+    const SimulatedScan frame = site.scanner.cast(k);
+    const StemSegments found = find_stem_segments(*frame.scan, config);
+    config.up = found.up;
+    compare_stems(site, frame, found, bands);
+  }
+  StemBand near = bands[0];
+  near += bands[1];
+  near += bands[2];
+  return near;
+}
+
+// Seeds that the score was not fitted to.
+TEST(StemSegments, AreFoundInFramesOfSixteenRings) {
+  TestFrames site(load_site("lieksa2", {"seed=5"}));
+  const StemBand near = within_15_m(site, 2800);
+  EXPECT_GT(near.clear, 150);
+  EXPECT_GT(near.recall(), 0.97);
+  EXPECT_GT(near.precision(), 0.97);
+  EXPECT_LT(near.centre_rmse_m(), 0.03);
+  EXPECT_LT(std::abs(near.along / near.right), 0.005);
+}
+
+TEST(StemSegments, AreFoundByTheSameCodeInFramesOf128Rings) {
+  TestFrames site(load_site("handheld", {"seed=33", "lidar.rays_per_beam=1"}));
+  const StemBand near = within_15_m(site, 700);
+  EXPECT_GT(near.clear, 80);
+  EXPECT_GT(near.recall(), 0.95);
+  EXPECT_GT(near.precision(), 0.92);
+  EXPECT_LT(near.centre_rmse_m(), 0.06);
+}
+
+}  // namespace
+}  // namespace understory
