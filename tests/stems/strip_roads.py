@@ -30,7 +30,7 @@ class Roads:
     bias_m: float = 0.015        # centres drawn to the scanner
     missed: float = 0.08         # near; more with the range
     false_share: float = 0.06
-    bushes_per_ha: float = 60.0
+    bushes_per_ha: float = 30.0
 
 
 @dataclass

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "understory/cli/command.h"
+#include "understory/cli/evaluate_map.h"
 #include "understory/cli/evaluate_trees.h"
 #include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/trajectory_errors.h"
@@ -182,6 +183,7 @@ void add_evaluate_command(CLI::App& app, Command& chosen) {
     if (!command->get_subcommands().empty()) return;
     chosen = [options](CommandContext& context) { return evaluate(*options, context); };
   });
+  add_evaluate_map_command(*command, chosen);
   add_evaluate_trees_command(*command, chosen);
 }
 

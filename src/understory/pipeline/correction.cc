@@ -32,9 +32,7 @@ std::vector<SparseStep> position(const std::vector<StemView>& views,
 
 void describe(ConfigTable& table, CorrectionConfig& config) {
   table.section("odometry", [&] { describe(table, config.odometry); });
-  table.add("close_loops", config.close_loops, "find places seen before and correct the path");
-  table.section("loops", [&] { describe(table, config.loops); });
-  table.section("pose_graph", [&] { describe(table, config.graph); });
+  describe(table, config.stems);
 }
 
 CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
@@ -49,13 +47,12 @@ CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
   run.steps = position(run.views, request.config.odometry, progress, stop_requested, run.times);
   run.stopped = run.steps.size() < run.views.size();
   run.views.resize(run.steps.size());
-  for (const SparseStep& step : run.steps)
-    run.correction.world_from_body.push_back(step.world_from_body);
-  if (request.config.close_loops && !run.stopped) {
-    if (progress) progress({"loops", 0.0, 0.0, "", ""});
-    const ScopedTimer timer(run.times, "loops");
-    run.correction =
-        close_stem_loops(run.views, run.steps, request.config.loops, request.config.graph);
+  if (run.stopped) {
+    for (const SparseStep& step : run.steps)
+      run.correction.world_from_body.push_back(step.world_from_body);
+  } else {
+    if (progress) progress({"correction", 0.0, 0.0, "", ""});
+    run.correction = correct_stems(run.views, run.steps, request.config.stems, run.times);
   }
   return write_correction(request, run, log);
 }

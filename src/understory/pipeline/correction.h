@@ -4,10 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "understory/graph/pose_graph.h"
-#include "understory/graph/stem_loops.h"
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/output/run_summary.h"
+#include "understory/pipeline/stem_correction.h"
 #include "understory/util/config.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
@@ -16,9 +15,7 @@ namespace understory {
 
 struct CorrectionConfig {
   SparseOdometryConfig odometry;
-  bool close_loops = true;
-  StemLoopConfig loops;
-  PoseGraphConfig graph;
+  StemCorrectionConfig stems;
 };
 void describe(ConfigTable& table, CorrectionConfig& config);
 

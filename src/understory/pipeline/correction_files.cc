@@ -41,6 +41,24 @@ void write_loops(const fs::path& path, const CorrectionRun& run) {
   file.commit();
 }
 
+// A row per pair of views that was matched again to correct the map.
+void write_corrections(const fs::path& path, const CorrectionRun& run) {
+  AtomicTextFile file(path);
+  file.write(
+      "earlier,later,overlap,expected_gain,error_before_m,error_after_m,overlap_after,moved_m,"
+      "go_icp,accepted,kept,beta,reason\n");
+  for (const TriedCorrection& tried : run.correction.self.tried) {
+    file.write(fmt::format("{},{},{:.3f},{:.4f},{:.4f},{:.4f},{:.3f},{:.4f},{},{},{},{:.5f},{}\n",
+                           run.views[static_cast<std::size_t>(tried.pair.j)].frame,
+                           run.views[static_cast<std::size_t>(tried.pair.i)].frame,
+                           tried.pair.overlap, tried.expected_gain, tried.error_before_m,
+                           tried.error_after_m, tried.overlap_after, tried.moved_m,
+                           tried.by_go_icp ? 1 : 0, tried.accepted ? 1 : 0, tried.kept ? 1 : 0,
+                           tried.beta, tried.reason));
+  }
+  file.commit();
+}
+
 std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
   std::vector<Tree> trees;
   for (const MappedStem& stem : stems) {
@@ -101,6 +119,32 @@ void judge(const CorrectionRun& run, RunSummary& summary) {
                     lost + weak, run.steps.size()));
 }
 
+void add_sharpness(const std::string& when, const MapSharpness& map, RunSummary& summary) {
+  summary.quality["beta_" + when] = map.beta;
+  summary.quality["beta_3d_" + when] = map.beta_3d;
+  summary.quality["box_dimension_" + when] = map.dimension;
+  summary.quality["box_dimension_3d_" + when] = map.dimension_3d;
+  summary.quality["registration_noise_" + when + "_m"] = map.noise_m;
+  summary.quality["registration_noise_mean_" + when + "_m"] = map.noise_mean_m;
+}
+
+// beta, d and e_C of P0 before and after, and how many corrections it took.
+void add_self_correction(const CorrectionRun& run, RunSummary& summary) {
+  if (run.stopped) return;
+  const SelfCorrectionResult& self = run.correction.self;
+  add_sharpness("before", self.before, summary);
+  add_sharpness("after", self.after, summary);
+  summary.counts["corrections"] = self.kept;
+  summary.counts["corrections_tried"] = static_cast<std::int64_t>(self.tried.size());
+  summary.counts["corrections_by_go_icp"] = self.go_icp_calls;
+  summary.counts["promising_pairs"] = static_cast<std::int64_t>(self.promising);
+  summary.counts["views_eliminated"] =
+      static_cast<std::int64_t>(std::count(self.use.begin(), self.use.end(), 0));
+  summary.quality["corrections_share"] =
+      static_cast<double>(self.kept) / static_cast<double>(run.views.size());
+  summary.quality["correction_ended"] = self.stopped_because;
+}
+
 RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run,
                       const std::vector<MappedStem>& stems, const Log& log) {
   RunSummary summary;
@@ -121,6 +165,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
       std::count(run.correction.accepted.begin(), run.correction.accepted.end(), 1));
   summary.quality["path_length_m"] = path_length(run.correction.world_from_body);
   summary.quality["sight_noise_m"] = sight_noise_m(stems);
+  add_self_correction(run, summary);
   judge(run, summary);
   return summary;
 }
@@ -156,7 +201,7 @@ ReportInput report_of(const CorrectionRequest& request, const CorrectionRun& run
     if (!loop.accepted) loop.reason = "contradicts the other loops";
     report.loops.push_back(loop);
   }
-  report.loop_closure_enabled = request.config.close_loops;
+  report.loop_closure_enabled = request.config.stems.close_loops;
   return report;
 }
 
@@ -183,6 +228,7 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
     write_tum(folder / "odometry.tum", run.views, chained);
     write_tum(folder / "trajectory.tum", run.views, run.correction.world_from_body);
     write_loops(folder / "loops.csv", run);
+    write_corrections(folder / "corrections.csv", run);
     write_trees_csv(folder / "trees.csv", trees_of(stems));
   }
   RunSummary summary = summary_of(request, run, stems, log);

@@ -20,9 +20,10 @@ void refuse_unfinished_run(const fs::path& run_folder) {
 }
 
 void remove_old_results(const fs::path& run_folder) {
-  for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum", "states.csv.gz",
-                           "graph.g2o", "gnss.csv", "loops.csv", "map.laz", "trees.csv",
-                           "trees.gpkg", "dtm.tif", "chm.tif", "run.json", "report.html"}) {
+  for (const char* name :
+       {"trajectory.tum", "odometry.tum", "keyframes.tum", "states.csv.gz", "graph.g2o", "gnss.csv",
+        "loops.csv", "corrections.csv", "map.laz", "trees.csv", "trees.gpkg", "dtm.tif", "chm.tif",
+        "run.json", "report.html"}) {
     std::error_code ignored;  // what cannot be removed cannot be replaced, which is then said
     fs::remove(run_folder / name, ignored);
   }

@@ -8,6 +8,27 @@
 namespace understory {
 namespace {
 
+// The views turned level by their own stems.
+struct LevelViews {
+  std::vector<SparsePoints> points;
+  std::vector<Pose> level_from_body;
+  std::vector<Pose> world_from_level;
+};
+
+LevelViews level(const std::vector<StemView>& views, const std::vector<SparseStep>& steps) {
+  LevelViews result;
+  result.points.resize(views.size());
+  result.level_from_body.resize(views.size());
+  result.world_from_level.resize(views.size());
+  parallel_for(views.size(), 16, [&](std::size_t i) {
+    const Eigen::Quaterniond turn = understory::level_from_body(stem_up(views[i]));
+    result.points[i] = stem_points(views[i], turn);
+    result.level_from_body[i] = Pose(turn, Eigen::Vector3d::Zero());
+    result.world_from_level[i] = steps[i].world_from_body * result.level_from_body[i].inverse();
+  });
+  return result;
+}
+
 // Of a step: what matching says, and what both views got wrong alike, which it cannot know: a
 // hundredth of the way, and the tilt that the stems' axes hold.
 Matrix6d odometry_covariance(const SparseStep& step, const Pose& previous_from_body) {
@@ -18,55 +39,98 @@ Matrix6d odometry_covariance(const SparseStep& step, const Pose& previous_from_b
   covariance.diagonal() += (Vector6d() << tilt * tilt, tilt * tilt, yaw * yaw, shift * shift,
                             shift * shift, shift * shift)
                                .finished();
-  if (step.status == SparseStepStatus::kWeak || step.status == SparseStepStatus::kUnmatched)
-    covariance += Matrix6d::Identity();
+  // Little overlap may be the view's fault and the match still be right; without a match there is
+  // nothing but the last motion.
+  if (step.status == SparseStepStatus::kWeak) {
+    covariance.diagonal().head<3>().array() += tilt * tilt;
+    covariance.diagonal().tail<3>().array() += 0.05 * 0.05;
+  }
+  if (step.status == SparseStepStatus::kUnmatched) covariance += Matrix6d::Identity();
   return covariance;
 }
 
-}  // namespace
-
-StemCorrection close_stem_loops(const std::vector<StemView>& views,
-                                const std::vector<SparseStep>& steps, const StemLoopConfig& loops,
-                                const PoseGraphConfig& graph) {
-  std::vector<SparsePoints> level_views(views.size());
-  std::vector<Pose> level_from_body(views.size());
-  std::vector<Pose> world_from_level(views.size());
-  parallel_for(views.size(), 16, [&](std::size_t i) {
-    const Eigen::Quaterniond level = understory::level_from_body(stem_up(views[i]));
-    level_views[i] = stem_points(views[i], level);
-    level_from_body[i] = Pose(level, Eigen::Vector3d::Zero());
-    world_from_level[i] = steps[i].world_from_body * level_from_body[i].inverse();
-  });
-  StemCorrection result;
-  result.loops = find_stem_loops(level_views, world_from_level, loops);
-  PoseGraphProblem problem;
+// In level frames, with loops not looked for yet.
+SelfCorrectionProblem problem_of(LevelViews& level, const std::vector<SparseStep>& steps) {
+  SelfCorrectionProblem problem;
+  problem.views = std::move(level.points);
+  problem.world_from_view = level.world_from_level;
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    problem.world_from_keyframe.push_back(steps[i].world_from_body);
+    problem.steps.emplace_back();
+    problem.step_errors.push_back(steps[i].error_m);
+    problem.step_covariances.push_back(Matrix6d::Identity());
     if (i == 0) continue;
-    const Pose step = steps[i - 1].world_from_body.inverse() * steps[i].world_from_body;
-    problem.odometry.push_back(
-        {static_cast<int>(i) - 1, static_cast<int>(i), step, odometry_covariance(steps[i], step)});
+    problem.steps[i] = level.world_from_level[i - 1].inverse() * level.world_from_level[i];
+    const Pose body_step = steps[i - 1].world_from_body.inverse() * steps[i].world_from_body;
+    problem.step_covariances[i] =
+        compose_covariance(odometry_covariance(steps[i], body_step),
+                           level.level_from_body[i].inverse(), Matrix6d::Zero());
   }
+  return problem;
+}
+
+// Loops over the odometry; leaves the poses and the accepted loops in the problem.
+void close_loops(const StemCorrectionConfig& config, SelfCorrectionProblem& problem,
+                 StemCorrection& result) {
+  result.loops = find_stem_loops(problem.views, problem.world_from_view, config.loops);
+  result.accepted.assign(result.loops.size(), 0);
+  PoseGraphProblem graph;
+  graph.world_from_keyframe = problem.world_from_view;
+  for (std::size_t i = 1; i < problem.steps.size(); ++i)
+    graph.odometry.push_back({static_cast<int>(i) - 1, static_cast<int>(i), problem.steps[i],
+                              problem.step_covariances[i]});
   std::vector<std::size_t> rows;
   for (std::size_t k = 0; k < result.loops.size(); ++k) {
     const StemLoop& loop = result.loops[k];
     if (!loop.verified) continue;
     rows.push_back(k);
-    const Pose& body = level_from_body[static_cast<std::size_t>(loop.query)];
-    const Pose& match = level_from_body[static_cast<std::size_t>(loop.match)];
-    problem.loops.push_back({loop.match, loop.query, match.inverse() * loop.match_from_query * body,
-                             compose_covariance(loop.covariance, body, Matrix6d::Zero())});
+    graph.loops.push_back({loop.match, loop.query, loop.match_from_query, loop.covariance});
   }
-  result.accepted.assign(result.loops.size(), 0);
-  result.world_from_body = problem.world_from_keyframe;
-  if (problem.loops.empty()) return result;
-  PoseGraphResult solved = optimise_pose_graph(problem, graph);
+  if (graph.loops.empty()) return;
+  const PoseGraphResult solved = optimise_pose_graph(graph, config.graph);
   result.converged = solved.converged;
   result.reason = solved.reason;
-  result.world_from_body = std::move(solved.world_from_keyframe);
-  for (std::size_t k = 0; k < rows.size(); ++k)
+  problem.world_from_view = solved.world_from_keyframe;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
     result.accepted[rows[k]] = solved.loop_used[k];
+    if (solved.loop_used[k] != 0) problem.loops.push_back(graph.loops[k]);
+  }
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, StemCorrectionConfig& config) {
+  table.add("close_loops", config.close_loops, "find places seen before and correct the path");
+  table.section("loops", [&] { describe(table, config.loops); });
+  table.section("pose_graph", [&] { describe(table, config.graph); });
+  table.section("correction", [&] { describe(table, config.correction); });
+}
+
+StemCorrection correct_stems(const std::vector<StemView>& views,
+                             const std::vector<SparseStep>& steps,
+                             const StemCorrectionConfig& config, StageTimes& times) {
+  LevelViews leveled = level(views, steps);
+  SelfCorrectionProblem problem = problem_of(leveled, steps);
+  StemCorrection result;
+  if (config.close_loops) {
+    const ScopedTimer timer(times, "loops");
+    close_loops(config, problem, result);
+  }
+  {
+    const ScopedTimer timer(times, "self_correction");
+    result.self = self_correct(problem, config.correction);
+  }
+  for (std::size_t i = 0; i < views.size(); ++i)
+    result.world_from_body.push_back(result.self.world_from_view[i] * leveled.level_from_body[i]);
   return result;
+}
+
+MapSharpness stem_sharpness(const std::vector<StemView>& views,
+                            const std::vector<Pose>& world_from_body,
+                            const SharpnessConfig& config) {
+  std::vector<SparsePoints> points;
+  for (const StemView& view : views)
+    points.push_back(stem_points(view, Eigen::Quaterniond::Identity()));
+  return map_sharpness(points, world_from_body, {}, config);
 }
 
 }  // namespace understory

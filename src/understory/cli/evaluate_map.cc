@@ -1,0 +1,135 @@
+#include "understory/cli/evaluate_map.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "understory/cli/file_in_folder.h"
+#include "understory/evaluation/strip_roads.h"
+#include "understory/evaluation/trajectory.h"
+#include "understory/pipeline/stem_correction.h"
+#include "understory/recording/stems_file.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+struct MapOptions {
+  std::string stems;
+  std::string trajectory;
+  double tolerance_s = 0.01;
+  bool json = false;
+};
+
+// Views that have a pose within the tolerance of their time, and these poses.
+struct Placed {
+  std::vector<StemView> views;
+  std::vector<Pose> world_from_body;
+  std::size_t without = 0;
+};
+
+Placed place(std::vector<StemView> views, const Trajectory& trajectory, double tolerance_s) {
+  Placed placed;
+  for (StemView& view : views) {
+    auto after =
+        std::lower_bound(trajectory.begin(), trajectory.end(), view.stamp,
+                         [](const StampedPose& pose, TimeNs stamp) { return pose.stamp < stamp; });
+    if (after == trajectory.end() ||
+        (after != trajectory.begin() &&
+         view.stamp - std::prev(after)->stamp < after->stamp - view.stamp))
+      --after;
+    if (std::abs(to_seconds(after->stamp - view.stamp)) > tolerance_s) {
+      ++placed.without;
+      continue;
+    }
+    placed.views.push_back(std::move(view));
+    placed.world_from_body.push_back(after->world_from_body);
+  }
+  return placed;
+}
+
+nlohmann::ordered_json to_json(const Placed& placed, const MapSharpness& map,
+                               const std::vector<RoadConsistency>& roads) {
+  nlohmann::ordered_json json;
+  json["views"] = placed.views.size();
+  json["views_without_pose"] = placed.without;
+  json["beta"] = map.beta;
+  json["beta_3d"] = map.beta_3d;
+  json["box_dimension"] = map.dimension;
+  json["box_dimension_3d"] = map.dimension_3d;
+  json["registration_noise_m"] = map.noise_m;
+  json["registration_noise_mean_m"] = map.noise_mean_m;
+  json["trees"] = map.trees;
+  json["roads"] = nlohmann::ordered_json::array();
+  for (const RoadConsistency& road : roads) {
+    json["roads"].push_back({{"road", road.road},
+                             {"other", road.other},
+                             {"trees", road.trees},
+                             {"trees_other", road.trees_other},
+                             {"consistency", road.as_placed},
+                             {"consistency_moved", road.moved},
+                             {"consistency_in_parts", road.in_parts},
+                             {"match_rms_m", road.match_rms_m}});
+  }
+  return json;
+}
+
+std::string to_text(const Placed& placed, const MapSharpness& map,
+                    const std::vector<RoadConsistency>& roads) {
+  std::string text = fmt::format(
+      "views               {} placed, {} without a pose\n"
+      "blur ratio beta     {:.4f} from above, {:.6f} in space\n"
+      "box dimension d     {:.2f} from above, {:.2f} in space\n"
+      "noise e_C           {:.4f} m over all sights, {:.4f} m mean over {} trees\n",
+      placed.views.size(), placed.without, map.beta, map.beta_3d, map.dimension, map.dimension_3d,
+      map.noise_m, map.noise_mean_m, map.trees);
+  for (const RoadConsistency& road : roads) {
+    text += fmt::format(
+        "roads {} and {}       {} and {} trees, {:.1f} % the same; {:.1f} % after one motion, "
+        "{:.1f} % in parts\n",
+        road.road, road.other, road.trees, road.trees_other, 100.0 * road.as_placed,
+        100.0 * road.moved, 100.0 * road.in_parts);
+  }
+  return text;
+}
+
+int evaluate_map(const MapOptions& options, CommandContext& context) {
+  const Placed placed = place(read_stem_views(options.stems, context.log),
+                              read_trajectory(file_in_folder(options.trajectory, "trajectory.tum")),
+                              options.tolerance_s);
+  if (placed.views.empty())
+    throw InputError(options.trajectory, "",
+                     "expected poses at the times of the views in " + options.stems);
+  const MapSharpness map = stem_sharpness(placed.views, placed.world_from_body, {});
+  const std::vector<RoadConsistency> roads =
+      road_consistencies(placed.views, placed.world_from_body, {});
+  const std::string text =
+      options.json ? to_json(placed, map, roads).dump(2) + "\n" : to_text(placed, map, roads);
+  std::fputs(text.c_str(), stdout);
+  return kExitDone;
+}
+
+}  // namespace
+
+void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
+  auto* command = evaluate.add_subcommand(
+      "map", "Sharpness of the map of a recording's stems, placed by any trajectory");
+  const auto options = std::make_shared<MapOptions>();
+  command->add_option("STEMS", options->stems, "Stems of the views (stems.csv.gz)")->required();
+  command->add_option("TRAJECTORY", options->trajectory, "Run folder or trajectory (TUM)")
+      ->required();
+  command->add_option("--tolerance-s", options->tolerance_s, "Largest difference of times")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--json", options->json, "Print one JSON object");
+  command->footer("Example:\n  understory evaluate map stems.csv.gz forest");
+  command->callback([&chosen, options] {
+    chosen = [options](CommandContext& context) { return evaluate_map(*options, context); };
+  });
+}
+
+}  // namespace understory

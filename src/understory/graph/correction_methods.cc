@@ -1,0 +1,188 @@
+#include "understory/graph/correction_methods.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/graph/pair_matching.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+double beta_of(const CorrectionViews& views, const std::vector<Pose>& poses,
+               const SelfCorrectionConfig& config) {
+  return blur_ratio(map_points(views.problem.views, poses, {}), config.sharpness);
+}
+
+TriedCorrection told(const CorrectionPair& pair, const PairMatch& match,
+                     const std::vector<Pose>& poses) {
+  TriedCorrection tried;
+  tried.pair = pair;
+  tried.error_before_m = match.error_before_m;
+  tried.error_after_m = match.error_m;
+  tried.overlap_after = match.overlap;
+  tried.by_go_icp = match.by_go_icp;
+  tried.accepted = match.accepted;
+  tried.reason = match.reason;
+  const Pose before = poses[at(pair.j)].inverse() * poses[at(pair.i)];
+  tried.moved_m = (match.j_from_i.translation() - before.translation()).head<2>().norm();
+  return tried;
+}
+
+// Applies one correction after the other and ends with the sharpest map on the way: the stop rule
+// that the paper asks for in its section 4.
+class PowerChain {
+ public:
+  PowerChain(const CorrectionViews& views, const SelfCorrectionConfig& config,
+             const PowerConfig& power, SelfCorrectionResult& result)
+      : views_(views),
+        config_(config),
+        power_(power),
+        result_(result),
+        poses_(result.world_from_view),
+        least_beta_(beta_of(views, poses_, config)) {}
+
+  // False: no sharper map for longer than patience allows.
+  template <typename Match>
+  [[nodiscard]] bool add(const CorrectionPair& pair, const Match& match_views) {
+    const PairMatch match =
+        match_views(views_.targets[at(pair.j)], views_.problem.views[at(pair.i)],
+                    poses_[at(pair.j)].inverse() * poses_[at(pair.i)], views_.overlap, config_);
+    TriedCorrection tried = told(pair, match, poses_);
+    if (match.accepted) {
+      apply_power_correction(poses_, views_.problem.step_errors, pair.j, pair.i, match.j_from_i,
+                             power_);
+      tried.beta = beta_of(views_, poses_, config_);
+      ++accepted_;
+      ++since_best_;
+    }
+    result_.tried.push_back(tried);
+    if (match.accepted && tried.beta < least_beta_) {
+      least_beta_ = tried.beta;
+      since_best_ = 0;
+      result_.world_from_view = poses_;
+      best_length_ = result_.tried.size();
+    }
+    return since_best_ < config_.patience;
+  }
+
+  [[nodiscard]] int accepted() const { return accepted_; }
+
+  void finish(const std::string& reason) {
+    result_.stopped_because = reason;
+    for (std::size_t k = 0; k < result_.tried.size(); ++k) {
+      TriedCorrection& tried = result_.tried[k];
+      tried.kept = tried.accepted && k < best_length_;
+      if (tried.accepted && !tried.kept) tried.reason = "the map did not become sharper by it";
+    }
+  }
+
+ private:
+  const CorrectionViews& views_;
+  const SelfCorrectionConfig& config_;
+  const PowerConfig& power_;
+  SelfCorrectionResult& result_;
+  std::vector<Pose> poses_;
+  double least_beta_;
+  int since_best_ = 0;
+  int accepted_ = 0;
+  std::size_t best_length_ = 0;
+};
+
+// P0's pairs, section 2.4.
+std::vector<CorrectionPair> chosen_pairs(const CorrectionViews& views,
+                                         const SelfCorrectionConfig& config,
+                                         SelfCorrectionResult& result) {
+  const auto seed = static_cast<std::uint64_t>(config.seed);
+  const std::vector<CorrectionPair> promising =
+      promising_pairs(views.targets, result.world_from_view, views.overlap, config.pairs, seed);
+  result.promising = promising.size();
+  return ordered(
+      poisson_disk_choice(promising, std::max(1, correction_budget(views.targets.size(), config))),
+      config.order, seed);
+}
+
+}  // namespace
+
+PoseGraphProblem chain_problem(const SelfCorrectionProblem& problem,
+                               const std::vector<Pose>& world_from_view) {
+  PoseGraphProblem graph;
+  graph.world_from_keyframe = world_from_view;
+  for (std::size_t i = 1; i < world_from_view.size(); ++i)
+    graph.odometry.push_back({static_cast<int>(i) - 1, static_cast<int>(i), problem.steps[i],
+                              problem.step_covariances[i]});
+  return graph;
+}
+
+void correct_by_powers(const CorrectionViews& views, const SelfCorrectionConfig& config,
+                       SelfCorrectionResult& result) {
+  PowerConfig power = config.power;
+  power.form = config.method == CorrectionMethod::kPowersPrinted ? PowerForm::kPrinted
+                                                                 : PowerForm::kCorrected;
+  const int budget = correction_budget(views.targets.size(), config);
+  const std::vector<CorrectionPair> pairs = chosen_pairs(views, config, result);
+  PowerChain chain(views, config, power, result);
+  for (const CorrectionPair& pair : pairs) {
+    if (chain.accepted() >= budget) return chain.finish("as many corrections as are allowed");
+    if (!chain.add(pair, match_pair)) return chain.finish("the map did not become sharper");
+  }
+  chain.finish("all chosen pairs were tried");
+}
+
+void correct_by_lattice(const CorrectionViews& views, const SelfCorrectionConfig& config,
+                        SelfCorrectionResult& result) {
+  PowerConfig power = config.power;
+  power.coefficient = PowerCoefficient::kMatchError;  // P1 (5)
+  const std::vector<CorrectionPair> pairs = lattice_pairs(
+      static_cast<int>(views.targets.size()), config.lattice.spacing, config.lattice.longest_gap);
+  result.promising = pairs.size();
+  PowerChain chain(views, config, power, result);
+  for (const CorrectionPair& pair : pairs) {
+    const double overlap =
+        views.overlap(result.world_from_view[at(pair.i)], result.world_from_view[at(pair.j)]);
+    // Views that share nothing cannot be matched: no search is spent on them.
+    if (overlap <= 0.0) continue;
+    (void)chain.add(pair, match_lattice_pair);
+  }
+  chain.finish("the lattice was tried");
+}
+
+void correct_by_pose_graph(const CorrectionViews& views, const SelfCorrectionConfig& config,
+                           SelfCorrectionResult& result) {
+  const std::vector<CorrectionPair> pairs = chosen_pairs(views, config, result);
+  const std::vector<Pose>& poses = views.problem.world_from_view;
+  std::vector<PairMatch> matches(pairs.size());
+  parallel_for(pairs.size(), 1, [&](std::size_t k) {
+    const CorrectionPair& pair = pairs[k];
+    matches[k] = match_pair(views.targets[at(pair.j)], views.problem.views[at(pair.i)],
+                            poses[at(pair.j)].inverse() * poses[at(pair.i)], views.overlap, config);
+  });
+  PoseGraphProblem graph = chain_problem(views.problem, poses);
+  graph.loops = views.problem.loops;
+  std::vector<std::size_t> rows;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    result.tried.push_back(told(pairs[k], matches[k], poses));
+    if (!matches[k].accepted) continue;
+    rows.push_back(k);
+    graph.loops.push_back({pairs[k].j, pairs[k].i, matches[k].j_from_i, matches[k].covariance});
+  }
+  const PoseGraphResult solved = optimise_pose_graph(graph, {});
+  result.stopped_because = solved.converged ? "solved at once" : solved.reason;
+  const double beta = beta_of(views, poses, config);
+  if (beta_of(views, solved.world_from_keyframe, config) >= beta) {
+    result.stopped_because = "the map would not have become sharper";
+    return;
+  }
+  result.world_from_view = solved.world_from_keyframe;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    TriedCorrection& tried = result.tried[rows[k]];
+    tried.kept = solved.loop_used[views.problem.loops.size() + k] != 0;
+    if (!tried.kept) tried.reason = "contradicts the others";
+  }
+}
+
+}  // namespace understory

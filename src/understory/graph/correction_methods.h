@@ -1,0 +1,38 @@
+#pragma once
+
+#include <vector>
+
+#include "understory/graph/self_correction.h"
+#include "understory/graph/view_cone.h"
+
+namespace understory {
+
+// What the methods of self_correct share.
+struct CorrectionViews {
+  explicit CorrectionViews(const SelfCorrectionProblem& problem);
+
+  const SelfCorrectionProblem& problem;
+  std::vector<SparseTarget> targets;
+  ConeOverlap overlap;
+  double l0_m = 0.0;  // median over the views
+};
+
+// Corrections that may be added, of `views` views.
+[[nodiscard]] int correction_budget(std::size_t views, const SelfCorrectionConfig& config);
+
+// Each fills result.world_from_view, tried, promising, kept and stopped_because; the first poses
+// are in result.world_from_view already.
+void correct_by_powers(const CorrectionViews& views, const SelfCorrectionConfig& config,
+                       SelfCorrectionResult& result);
+void correct_by_lattice(const CorrectionViews& views, const SelfCorrectionConfig& config,
+                        SelfCorrectionResult& result);
+void correct_by_pose_graph(const CorrectionViews& views, const SelfCorrectionConfig& config,
+                           SelfCorrectionResult& result);
+void correct_by_expected_gain(const CorrectionViews& views, const SelfCorrectionConfig& config,
+                              SelfCorrectionResult& result);
+
+// Odometry as edges between the poses given, with the problem's covariances of the steps.
+[[nodiscard]] PoseGraphProblem chain_problem(const SelfCorrectionProblem& problem,
+                                             const std::vector<Pose>& world_from_view);
+
+}  // namespace understory

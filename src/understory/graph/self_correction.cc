@@ -1,0 +1,157 @@
+#include "understory/graph/self_correction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/graph/correction_methods.h"
+#include "understory/util/error.h"
+#include "understory/util/median.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+std::vector<SparseTarget> targets_of(const std::vector<SparsePoints>& views) {
+  std::vector<SparseTarget> targets(views.size(), SparseTarget({}));
+  parallel_for(views.size(), 16, [&](std::size_t i) { targets[i] = SparseTarget(views[i]); });
+  return targets;
+}
+
+void describe_power(ConfigTable& table, PowerConfig& config) {
+  table.add_enum("coefficient", config.coefficient,
+                 {{"index", PowerCoefficient::kIndex},
+                  {"path_length", PowerCoefficient::kPathLength},
+                  {"match_error", PowerCoefficient::kMatchError},
+                  {"metric", PowerCoefficient::kMetric},
+                  {"screw", PowerCoefficient::kScrew}},
+                 "share of a correction that a view between is given: P0 (21), its section 4.1 "
+                 "(path_length), P1 (5), P0 (31), P0 (32)");
+  table.add("metric_rotation_m2", config.metric_rotation_m2, {0.0, 1e6}, "m^2",
+            "a of P0 (31): weight of a squared angle");
+  table.add("metric_translation", config.metric_translation, {0.0, 1e6}, "",
+            "b of P0 (31): weight of a squared distance");
+}
+
+void describe_gain(ConfigTable& table, GainConfig& config) {
+  table.add("pool", config.pool, {1, 1'000'000}, "", "pairs among which the next is chosen");
+  table.add("window_l0", config.window_l0, {0.0, 100.0}, "L0",
+            "views within that part of the way to each side are gathered for a match");
+  table.add("window_views", config.window_views, {1, 1000}, "", "at most that many to each side");
+  table.add("match_sd_m", config.match_sd_m, {1e-4, 10.0}, "m",
+            "what a match of gathered views with full overlap is worth");
+  table.add("least_gain", config.least_gain, {0.0, 100.0}, "nats",
+            "it ends where no pair is expected to tell more");
+  table.add("revisits", config.revisits, {0, 100}, "",
+            "rounds in which accepted pairs are matched again from the better poses");
+  table.add("largest_step_l0", config.largest_step_l0, {0.0, 100.0}, "L0",
+            "a match that moves views farther is not believed");
+}
+
+}  // namespace
+
+SelfCorrectionConfig::SelfCorrectionConfig() {
+  // P1 section 2.3: the search of the matches.
+  go_icp.yaw_range_deg = 15.0;
+  go_icp.shift_range_m = 1.5;
+}
+
+void describe(ConfigTable& table, SelfCorrectionConfig& config) {
+  table.add_enum("method", config.method,
+                 {{"none", CorrectionMethod::kNone},
+                  {"powers", CorrectionMethod::kPowers},
+                  {"powers_printed", CorrectionMethod::kPowersPrinted},
+                  {"lattice", CorrectionMethod::kLattice},
+                  {"pose_graph", CorrectionMethod::kPoseGraph},
+                  {"expected_gain", CorrectionMethod::kExpectedGain}},
+                 "powers: P0 section 2; lattice: P1 section 2.3; the others are described in "
+                 "docs/sparse.md");
+  table.add_enum("order", config.order,
+                 {{"small", CorrectionOrder::kSmallGaps},
+                  {"medium", CorrectionOrder::kMediumGaps},
+                  {"random", CorrectionOrder::kRandom}},
+                 "which gaps first, P0 table 1 (powers)");
+  table.section("pairs", [&] { describe(table, config.pairs); });
+  table.section("power", [&] { describe_power(table, config.power); });
+  table.section("lattice", [&] {
+    table.add("spacing", config.lattice.spacing, {1, 1'000'000}, "", "every that many views");
+    table.add("longest_gap", config.lattice.longest_gap, {1, 1'000'000}, "", "views");
+    table.add("largest_outlier_ratio", config.lattice.largest_outlier_ratio, {0.0, 1.0}, "",
+              "of a match; 0.6 in P1's text, 0.4 in its figure 5");
+  });
+  table.section("gain", [&] { describe_gain(table, config.gain); });
+  table.section("icp", [&] { describe(table, config.icp); });
+  table.section("go_icp", [&] { describe(table, config.go_icp); });
+  table.add("least_final_overlap", config.least_final_overlap, {0.0, 1.0}, "",
+            "P0's lambda0: of the views' sectors where a match ends");
+  table.add("largest_share", config.largest_share, {0.0, 1.0}, "",
+            "corrections at most, as a share of the views (the lattice has its own number)");
+  table.add("patience", config.patience, {1, 1'000'000}, "",
+            "it ends after that many corrections without a sharper map (powers)");
+  table.add("eliminate_factor", config.eliminate_factor, {0.0, 1e6}, "",
+            "views are left out of the map whose mean square distance from the trees is more than "
+            "that times the median, P0 (33); 0: none");
+  table.add("eliminate_share", config.eliminate_share, {0.0, 1.0}, "", "views left out at most");
+  table.add("seed", config.seed, {0, 1'000'000'000}, "", "of the pairs drawn at random");
+}
+
+CorrectionViews::CorrectionViews(const SelfCorrectionProblem& given)
+    : problem(given), targets(targets_of(given.views)), overlap(estimate_view_cone(given.views)) {
+  std::vector<double> spacings;
+  for (const SparseTarget& target : targets) {
+    if (target.l0_m > 0.0) spacings.push_back(target.l0_m);
+  }
+  l0_m = upper_median(spacings);
+}
+
+int correction_budget(std::size_t views, const SelfCorrectionConfig& config) {
+  return std::min(config.pairs.chosen,
+                  static_cast<int>(config.largest_share * static_cast<double>(views)));
+}
+
+SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
+                                  const SelfCorrectionConfig& config) {
+  UNDERSTORY_CHECK(problem.views.size() == problem.world_from_view.size());
+  UNDERSTORY_CHECK(problem.views.size() == problem.steps.size());
+  UNDERSTORY_CHECK(problem.views.size() == problem.step_errors.size());
+  UNDERSTORY_CHECK(problem.views.size() == problem.step_covariances.size());
+  SelfCorrectionResult result;
+  result.world_from_view = problem.world_from_view;
+  result.use.assign(problem.views.size(), 1);
+  result.before = map_sharpness(problem.views, problem.world_from_view, {}, config.sharpness);
+  result.after = result.before;
+  if (config.method == CorrectionMethod::kNone || problem.views.size() < 3) {
+    result.stopped_because = "not asked for, or too few views";
+    return result;
+  }
+  const CorrectionViews views(problem);
+  switch (config.method) {
+    case CorrectionMethod::kNone:
+      break;
+    case CorrectionMethod::kPowers:
+    case CorrectionMethod::kPowersPrinted:
+      correct_by_powers(views, config, result);
+      break;
+    case CorrectionMethod::kLattice:
+      correct_by_lattice(views, config, result);
+      break;
+    case CorrectionMethod::kPoseGraph:
+      correct_by_pose_graph(views, config, result);
+      break;
+    case CorrectionMethod::kExpectedGain:
+      correct_by_expected_gain(views, config, result);
+      break;
+  }
+  result.kept = static_cast<int>(std::count_if(result.tried.begin(), result.tried.end(),
+                                               [](const auto& t) { return t.kept; }));
+  result.go_icp_calls = static_cast<int>(std::count_if(result.tried.begin(), result.tried.end(),
+                                                       [](const auto& t) { return t.by_go_icp; }));
+  if (config.eliminate_factor > 0.0) {
+    const RegistrationNoise noise =
+        registration_noise(problem.views, result.world_from_view, {}, config.sharpness);
+    result.use = views_worth_keeping(noise, config.eliminate_factor, config.eliminate_share);
+  }
+  result.after = map_sharpness(problem.views, result.world_from_view, result.use, config.sharpness);
+  return result;
+}
+
+}  // namespace understory
