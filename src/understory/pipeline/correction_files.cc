@@ -102,6 +102,34 @@ double sight_noise_m(const std::vector<MappedStem>& stems) {
   return sights > 0.0 ? std::sqrt(sum / sights) : std::nan("");
 }
 
+// Steps that nothing vouches for: those without a match, and those with a weak one that no loop and
+// no correction bridges.
+std::size_t doubtful_steps(const CorrectionRun& run) {
+  std::vector<int> bridges(run.steps.size() + 1, 0);  // begin and end of each, to be summed up
+  const auto bridge = [&](int from, int to) {
+    ++bridges[static_cast<std::size_t>(std::min(from, to)) + 1];
+    --bridges[static_cast<std::size_t>(std::max(from, to)) + 1];
+  };
+  for (std::size_t k = 0; k < run.correction.loops.size(); ++k) {
+    if (run.correction.accepted[k] != 0)
+      bridge(run.correction.loops[k].match, run.correction.loops[k].query);
+  }
+  for (const TriedCorrection& tried : run.correction.self.tried) {
+    if (tried.kept) bridge(tried.pair.j, tried.pair.i);
+  }
+  std::size_t doubtful = 0;
+  int bridged = 0;
+  for (std::size_t k = 0; k < run.steps.size(); ++k) {
+    bridged += bridges[k];
+    const SparseStepStatus status = run.steps[k].status;
+    doubtful += status == SparseStepStatus::kUnmatched ||
+                        (status == SparseStepStatus::kWeak && bridged == 0)
+                    ? 1
+                    : 0;
+  }
+  return doubtful;
+}
+
 void judge(const CorrectionRun& run, RunSummary& summary) {
   const auto lower = [&](RunStatus status, const std::string& reason) {
     summary.status = status;
@@ -110,13 +138,12 @@ void judge(const CorrectionRun& run, RunSummary& summary) {
   if (run.stopped) lower(RunStatus::kPartial, "stopped before the end of the recording");
   if (!run.correction.converged)
     lower(RunStatus::kUntrusted, "the loops were not solved: " + run.correction.reason);
-  const std::size_t lost = count_of(run.steps, SparseStepStatus::kUnmatched);
-  const std::size_t weak = count_of(run.steps, SparseStepStatus::kWeak);
-  if (lost + weak == 0) return;
+  const std::size_t doubtful = doubtful_steps(run);
+  if (doubtful == 0) return;
   lower(RunStatus::kUntrusted,
         fmt::format("{} of {} views found too few of the stems seen before: the path may be bent "
                     "or broken there",
-                    lost + weak, run.steps.size()));
+                    doubtful, run.steps.size()));
 }
 
 void add_sharpness(const std::string& when, const MapSharpness& map, RunSummary& summary) {
