@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "understory/cli/command.h"
+#include "understory/cli/map_sparse.h"
 #include "understory/cli/open_options.h"
 #include "understory/cli/outcome.h"
 #include "understory/pipeline/mapping.h"
@@ -50,7 +51,22 @@ MappingConfig resolved(const MapOptions& options) {
   return read_mapping_config(options.profile, options.config_file, settings);
 }
 
+int run_sparse(const MapOptions& options, CommandContext& context) {
+  std::vector<std::string> problems;
+  const auto refuse = [&](bool given, const std::string& option) {
+    if (given) problems.push_back("--front-end sparse: " + option + " is for the dense front end");
+  };
+  refuse(!options.resume.empty(), "--resume");
+  refuse(!options.profile.empty(), "--profile");
+  refuse(options.realtime, "--realtime");
+  if (!problems.empty()) throw ConfigError(problems);
+  return run_sparse_map({options.recording, options.run_folder, options.config_file,
+                         options.settings, options.overwrite, options.print_config, options.open},
+                        context);
+}
+
 int run_map(const MapOptions& options, CommandContext& context) {
+  if (options.front_end == "sparse") return run_sparse(options, context);
   if (options.print_config) {
     MappingConfig config = resolved(options);
     std::fputs(mapping_table(config).to_yaml(true).c_str(), stdout);
@@ -94,8 +110,10 @@ void add_map_command(CLI::App& app, Command& chosen) {
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false)
       ->take_all();
-  command->add_option("--front-end", options->front_end, "How scans are positioned")
-      ->check(CLI::IsMember({"dense"}));
+  command
+      ->add_option("--front-end", options->front_end,
+                   "How scans are positioned: all points (dense) or stems alone (sparse)")
+      ->check(CLI::IsMember({"dense", "sparse"}));
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "
                     "(sets time_repair.window_s=0)");
@@ -106,7 +124,8 @@ void add_map_command(CLI::App& app, Command& chosen) {
   add_open_options(*command, options->open);
   command->footer(
       "Example:\n  understory map plot7.mcap -o plot7 --profile handheld\n"
-      "  understory map sim:handheld?seed=3 -o run --set loop_closure.enabled=false");
+      "  understory map sim:handheld?seed=3 -o run --set loop_closure.enabled=false\n"
+      "  understory map sim:lieksa2 -o forest --front-end sparse");
   command->callback([&chosen, options] {
     chosen = [options](CommandContext& context) { return run_map(*options, context); };
   });

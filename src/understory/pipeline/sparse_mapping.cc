@@ -1,0 +1,128 @@
+#include "understory/pipeline/sparse_mapping.h"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <system_error>
+
+#include "understory/output/run_tables.h"
+#include "understory/pipeline/run_folder.h"
+#include "understory/pipeline/run_truth.h"
+#include "understory/pipeline/source.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+void write_view(const StemView& view, StemsWriter& writer) {
+  for (const Stem& stem : view.stems) {
+    StemRow row;
+    row.frame = view.frame;
+    row.stamp = view.stamp;
+    row.point = stem.point.cast<double>();
+    row.axis = stem.axis.cast<double>();
+    row.length_m = static_cast<double>(stem.length_m);
+    row.dbh_m = static_cast<double>(stem.dbh_m);
+    row.score = static_cast<double>(stem.score);
+    writer.add(row);
+  }
+}
+
+// The scans of a recording in order of time, one after another through the front end.
+class SparseRun {
+ public:
+  SparseRun(const SparseMappingRequest& request, Log& log)
+      : request_(request),
+        orderer_(request.config.time_repair, log),
+        source_(open_source(request.recording, request.open, log)),
+        front_end_(request.config.front_end),
+        stems_(request.run_folder / "stems.csv.gz") {}
+
+  // True if it was stopped.
+  bool run(const ProgressSink& progress, const StopRequested& stop_requested) {
+    bool stopped = false;
+    bool ended = false;
+    while (!ended && !(stopped = stop_requested && stop_requested())) {
+      std::optional<Event> event = source_->next();
+      ended = !event;
+      if (event) {
+        orderer_.push(std::move(*event));
+      } else {
+        orderer_.finish();
+      }
+      while (auto ready = orderer_.pop()) {
+        if (const auto* scan = std::get_if<ScanPtr>(&*ready)) take(**scan, progress);
+      }
+    }
+    if (kept_ > 0) stems_.commit();
+    return stopped;
+  }
+
+  [[nodiscard]] std::size_t scans() const { return path_.size(); }
+  [[nodiscard]] std::size_t kept() const { return kept_; }
+  [[nodiscard]] const Recording& source() const { return *source_; }
+
+ private:
+  void take(const Scan& scan, const ProgressSink& progress) {
+    const StemScan result = front_end_.add(scan, source_->rig());
+    path_.push_back({scan.stamp, result.step.world_from_body});
+    if (result.keep && !result.view.stems.empty()) {
+      write_view(result.view, stems_);
+      ++kept_;
+    }
+    if (!progress) return;
+    const double share = source_->progress();
+    const auto done = static_cast<double>(path_.size());
+    progress({"stems", done, share > 0.0 ? done / share : 0.0, "scans",
+              fmt::format("{} stems", result.view.stems.size())});
+  }
+
+  const SparseMappingRequest& request_;
+  EventOrderer orderer_;
+  std::unique_ptr<Recording> source_;
+  StemFrontEnd front_end_;
+  StemsWriter stems_;
+  std::vector<StampedPose> path_;  // of every scan
+  std::size_t kept_ = 0;
+};
+
+}  // namespace
+
+ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
+  ConfigTable table;
+  table.section("time_repair", [&] { EventOrderer::describe(table, config.time_repair); });
+  table.section("stems", [&] { describe(table, config.front_end); });
+  describe(table, config.correction);
+  return table;
+}
+
+CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& log,
+                                     const ProgressSink& progress,
+                                     const StopRequested& stop_requested) {
+  if (!request.overwrite) refuse_unfinished_run(request.run_folder);
+  std::error_code error;
+  fs::create_directories(request.run_folder, error);
+  if (error) throw OutputError(request.run_folder.string(), "cannot be made: " + error.message());
+  SparseRun run(request, log);
+  const bool stopped = run.run(progress, stop_requested);
+  if (run.kept() == 0) {
+    throw InputError(request.recording, "",
+                     fmt::format("no stems in any of its {} scans: expected upright stems in scans "
+                                 "with ring numbers",
+                                 run.scans()));
+  }
+  CorrectionRequest correction;
+  correction.stems = request.run_folder / "stems.csv.gz";
+  correction.run_folder = request.run_folder;
+  correction.overwrite = true;
+  correction.config = request.config.correction;
+  correction.config_yaml = request.config_yaml;
+  CorrectionOutcome outcome =
+      run_correction(correction, log, progress, stopped ? StopRequested() : stop_requested);
+  (void)compare_with_truth(request.run_folder, run.source());
+  return outcome;
+}
+
+}  // namespace understory
