@@ -221,13 +221,13 @@ Eigen::Matrix2d StemLine::covariance_at(double height_m) const {
   return h * covariance * h.transpose();
 }
 
-OwnRadius own_radius(const SectionView& view, const StemChain& chain) {
+OwnRadius own_radius(const SectionView& view, const StemChain& chain, double from_m, double to_m) {
   std::vector<double> widths;
   std::vector<const StemSection*> whole;
   for (const int i : chain.sections) {
     const StemSection& section = view.sections()[static_cast<std::size_t>(i)];
     if (section.left == Side::kHidden || section.right == Side::kHidden) continue;
-    if (section.range_m <= 0.0) continue;
+    if (section.range_m <= 0.0 || section.height_m < from_m || section.height_m > to_m) continue;
     whole.push_back(&section);
     widths.push_back(section.width_m);
   }
@@ -246,12 +246,14 @@ OwnRadius own_radius(const SectionView& view, const StemChain& chain) {
     count += 1.0;
   }
   range /= count;
+  const double seen = count;
   // Beams that went by on both sides of a narrow stem count as a width of zero.
   const double missed = chain.blank + chain.passed;
   variance += missed * std::pow(whole.front()->spacing_m, 2) / 6.0;
   count += missed;
   const double width = sum / count;
   OwnRadius own;
+  own.sections = static_cast<int>(seen);
   own.radius_m = 0.5 * width;
   own.radius_m *= 1.0 + kMeanDepth * own.radius_m / range;
   own.sd_m = 0.5 * std::sqrt(variance) / count + 0.004;

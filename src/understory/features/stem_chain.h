@@ -50,10 +50,13 @@ struct StemChainConfig {
 void fit_chain(const SectionView& view, const StemChainConfig& config, StemChain& chain);
 
 // The chain's radius from its own widths alone, and its error; a radius of 0 where none shows one.
+// Only sections between the heights given count.
 struct OwnRadius {
   double radius_m = 0.0;
   double sd_m = 0.0;
+  int sections = 0;
 };
-[[nodiscard]] OwnRadius own_radius(const SectionView& view, const StemChain& chain);
+[[nodiscard]] OwnRadius own_radius(const SectionView& view, const StemChain& chain,
+                                   double from_m = -1e9, double to_m = 1e9);
 
 }  // namespace understory

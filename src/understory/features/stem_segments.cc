@@ -39,6 +39,20 @@ StemChainConfig with_usual_radius(const SectionView& view, const std::vector<Ste
   return config;
 }
 
+// How far stems lean against up, from those that show it well; what is taken off is their own
+// error.
+double usual_lean(const std::vector<StemChain>& chains, double before) {
+  std::vector<double> squares;
+  for (const StemChain& chain : chains) {
+    const double own = 0.5 * (chain.line.covariance(2, 2) + chain.line.covariance(3, 3));
+    if (chain.sections.size() < 5 || chain.passed > 0 || own > 4e-4) continue;
+    squares.push_back(0.5 * chain.line.state.tail<2>().squaredNorm() - own);
+  }
+  if (squares.size() < 8) return before;
+  // Of two squared normals the mean is chi-squared with 2 degrees over 2: its median is 0.69.
+  return std::clamp(std::sqrt(std::max(0.0, upper_median(squares) / 0.69)), 0.015, before);
+}
+
 // A chain with what is found out about it in the end.
 struct Candidate {
   StemChain chain;
@@ -64,6 +78,13 @@ StemSegment segment_of(const SectionView& view, const Candidate& candidate,
   segment.radius_m = chain.radius_m;
   segment.radius_sd_m = chain.radius_sd_m;
   segment.score = candidate.score;
+  if (candidate.ground_m) {
+    const OwnRadius breast = own_radius(view, chain, foot + 0.5, foot + 2.3);
+    if (breast.sections >= 2) {
+      segment.dbh_m = 2.0 * breast.radius_m;
+      segment.dbh_sd_m = 2.0 * breast.sd_m;
+    }
+  }
   double time = 0.0;
   for (const int i : chain.sections) {
     const StemSection& section = sections[static_cast<std::size_t>(i)];
@@ -113,6 +134,7 @@ Chains chains_of(const SectionView& view) {
   for (StemChain& chain : result.chains)
     fit_chain(view, result.config, chain);
   result.config = with_usual_radius(view, result.chains, result.config);
+  result.config.slope_sd = usual_lean(result.chains, result.config.slope_sd);
   for (StemChain& chain : result.chains)
     fit_chain(view, result.config, chain);
   return result;

@@ -28,6 +28,9 @@ struct StemSegment {
   double highest_m = 0.0;  // ... and last seen
   double radius_m = 0.0;   // best guess, from its own width and those of the others
   double radius_sd_m = 0.0;
+  // From its own width 0.5 to 2.3 m above the ground; 0 where it was not seen whole there.
+  double dbh_m = 0.0;
+  double dbh_sd_m = 0.0;
   double score = 0.0;     // probability that this is a stem, 0..1
   int levels = 0;         // rings or slices that got it
   int levels_with_3 = 0;  // of these with three returns or more

@@ -6,8 +6,8 @@
 namespace understory {
 namespace {
 
-// Above this a radius says more about the spacing of the beams than about the stem.
-constexpr double kRadiusKnown = 0.015;
+// Above this error a diameter says more about the spacing of the beams than about the stem.
+constexpr double kDiameterKnown = 0.025;
 // A pause of the recording: what moved before it says nothing about now.
 constexpr double kLongestStep = 2.0;
 

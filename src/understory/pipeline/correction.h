@@ -4,12 +4,15 @@
 #include <string>
 #include <vector>
 
+#include "understory/geometry/stamped_pose.h"
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/stem_correction.h"
+#include "understory/recording/recording.h"
 #include "understory/util/config.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
+#include "understory/util/timing.h"
 
 namespace understory {
 
@@ -19,6 +22,15 @@ struct CorrectionConfig {
 };
 void describe(ConfigTable& table, CorrectionConfig& config);
 
+// The recording that the stems come from, where `understory map` has just read it.
+struct SparseScans {
+  std::string recording;  // as the user named it
+  const Recording* source = nullptr;
+  std::vector<StampedPose> path;      // of every scan, chained
+  const StageTimes* times = nullptr;  // "scan": all of one scan
+  bool stopped = false;               // before the recording's end
+};
+
 // One call of `understory correct`.
 struct CorrectionRequest {
   std::filesystem::path stems;  // stems.csv.gz
@@ -26,6 +38,9 @@ struct CorrectionRequest {
   bool overwrite = false;  // also a mapping run that is not finished
   CorrectionConfig config;
   std::string config_yaml;  // resolved, every key, for run.json
+  // With it odometry.tum and trajectory.tum have a row per scan instead of one per view, and
+  // run.json and the report speak of the recording.
+  const SparseScans* scans = nullptr;
 };
 
 struct CorrectionOutcome {

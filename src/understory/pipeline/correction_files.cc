@@ -11,6 +11,9 @@
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/run_folder.h"
+#include "understory/pipeline/run_truth.h"
+#include "understory/pipeline/scan_path.h"
+#include "understory/pipeline/source.h"
 #include "understory/util/error.h"
 #include "understory/util/version.h"
 
@@ -19,12 +22,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void write_tum(const fs::path& path, const std::vector<StemView>& views,
-               const std::vector<Pose>& poses) {
+void write_tum(const fs::path& path, const std::vector<StampedPose>& poses) {
   TumWriter writer(path);
-  for (std::size_t i = 0; i < views.size(); ++i)
-    writer.add({views[i].stamp, poses[i]});
+  for (const StampedPose& pose : poses)
+    writer.add(pose);
   writer.commit();
+}
+
+// The chained odometry and the corrected path: of every scan where they are known, else of the
+// views.
+void write_paths(const CorrectionRequest& request, const CorrectionRun& run) {
+  std::vector<StampedPose> corrected;
+  std::vector<StampedPose> chained;
+  for (std::size_t i = 0; i < run.views.size(); ++i) {
+    corrected.push_back({run.views[i].stamp, run.correction.world_from_body[i]});
+    chained.push_back({run.views[i].stamp, run.steps[i].world_from_body});
+  }
+  if (request.scans != nullptr) {
+    chained = request.scans->path;
+    corrected = spread_corrections(chained, corrected);
+  }
+  write_tum(request.run_folder / "odometry.tum", chained);
+  write_tum(request.run_folder / "trajectory.tum", corrected);
 }
 
 // A row per view for which an earlier place was found, by the views' frame numbers.
@@ -130,12 +149,13 @@ std::size_t doubtful_steps(const CorrectionRun& run) {
   return doubtful;
 }
 
-void judge(const CorrectionRun& run, RunSummary& summary) {
+void judge(const CorrectionRequest& request, const CorrectionRun& run, RunSummary& summary) {
   const auto lower = [&](RunStatus status, const std::string& reason) {
     summary.status = status;
     summary.reasons.push_back(reason);
   };
-  if (run.stopped) lower(RunStatus::kPartial, "stopped before the end of the recording");
+  if (run.stopped || (request.scans != nullptr && request.scans->stopped))
+    lower(RunStatus::kPartial, "stopped before the end of the recording");
   if (!run.correction.converged)
     lower(RunStatus::kUntrusted, "the loops were not solved: " + run.correction.reason);
   const std::size_t doubtful = doubtful_steps(run);
@@ -193,7 +213,16 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   summary.quality["path_length_m"] = path_length(run.correction.world_from_body);
   summary.quality["sight_noise_m"] = sight_noise_m(stems);
   add_self_correction(run, summary);
-  judge(run, summary);
+  if (request.scans != nullptr) {
+    const SparseScans& scans = *request.scans;
+    summary.command = "map";
+    summary.inputs = hash_inputs(scans.recording);
+    summary.scans = summary.poses = scans.path.size();
+    summary.counts["views"] = static_cast<std::int64_t>(run.views.size());
+    if (!scans.path.empty())
+      summary.recording_s = to_seconds(scans.path.back().stamp - scans.path.front().stamp);
+  }
+  judge(request, run, summary);
   return summary;
 }
 
@@ -202,6 +231,13 @@ ReportInput report_of(const CorrectionRequest& request, const CorrectionRun& run
   ReportInput report;
   report.title = request.stems.filename().string();
   report.made_from = fmt::format("stems of {} views", run.views.size());
+  if (request.scans != nullptr) {
+    report.title = fs::path(request.scans->recording).filename().string();
+    report.made_from =
+        fmt::format("{}, {} scans, stems of {} views", request.scans->source->format(),
+                    request.scans->path.size(), run.views.size());
+    report.truth = compare_with_truth(request.run_folder, *request.scans->source);
+  }
   report.summary = summary;
   const auto samples = run.times.samples("scan");
   for (std::size_t i = 0; i < run.views.size(); ++i) {
@@ -249,17 +285,14 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   }
   {
     const ScopedTimer timer(run.times, "writing");
-    std::vector<Pose> chained;
-    for (const SparseStep& step : run.steps)
-      chained.push_back(step.world_from_body);
-    write_tum(folder / "odometry.tum", run.views, chained);
-    write_tum(folder / "trajectory.tum", run.views, run.correction.world_from_body);
+    write_paths(request, run);
     write_loops(folder / "loops.csv", run);
     write_corrections(folder / "corrections.csv", run);
     write_trees_csv(folder / "trees.csv", trees_of(stems));
   }
   RunSummary summary = summary_of(request, run, stems, log);
   summary.stages = summarise(run.times);
+  if (request.scans != nullptr) summary.stages.merge(summarise(*request.scans->times));
   for (const auto& [name, stage] : summary.stages)
     summary.wall_s += stage.total_wall_s;
   summary.cpu_s = process_cpu_seconds();

@@ -194,24 +194,6 @@ std::uint64_t write_map(const std::filesystem::path& folder, MapTiles& tiles,
   return writer.points();
 }
 
-// Hashes of the recording's files; none for the simulator.
-std::vector<InputHash> hash_inputs(const std::string& recording) {
-  std::vector<InputHash> hashes;
-  if (is_simulation(recording)) return hashes;
-  std::vector<std::filesystem::path> files;
-  if (std::filesystem::is_directory(recording)) {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(recording)) {
-      if (entry.is_regular_file()) files.push_back(entry.path());
-    }
-    std::sort(files.begin(), files.end());
-  } else {
-    files.emplace_back(recording);
-  }
-  for (const auto& file : files)
-    hashes.push_back(hash_input(file));
-  return hashes;
-}
-
 void fill_counts(RunSummary& summary, const MappingSession& session, const RunFacts& facts) {
   const MappingCounts& counts = session.counts();
   const auto count = [&](const char* name, std::uint64_t value) {

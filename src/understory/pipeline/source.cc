@@ -1,5 +1,8 @@
 #include "understory/pipeline/source.h"
 
+#include <algorithm>
+#include <filesystem>
+
 #include "understory/simulation/simulator.h"
 
 namespace understory {
@@ -17,6 +20,23 @@ std::unique_ptr<Recording> open_source(const std::string& name, const OpenOption
                                        Log& log) {
   if (is_simulation(name)) return open_simulation(name, log);
   return open_recording(name, options, log);
+}
+
+std::vector<InputHash> hash_inputs(const std::string& recording) {
+  std::vector<InputHash> hashes;
+  if (is_simulation(recording)) return hashes;
+  std::vector<std::filesystem::path> files;
+  if (std::filesystem::is_directory(recording)) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(recording)) {
+      if (entry.is_regular_file()) files.push_back(entry.path());
+    }
+    std::sort(files.begin(), files.end());
+  } else {
+    files.emplace_back(recording);
+  }
+  for (const auto& file : files)
+    hashes.push_back(hash_input(file));
+  return hashes;
 }
 
 }  // namespace understory

@@ -2,7 +2,9 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "understory/output/run_summary.h"
 #include "understory/recording/recording.h"
 
 namespace understory {
@@ -14,5 +16,8 @@ namespace understory {
 
 // Whether `name` is a simulated recording.
 [[nodiscard]] bool is_simulation(const std::string& name);
+
+// Hashes of the recording's files; none for the simulator. Throws InputError.
+[[nodiscard]] std::vector<InputHash> hash_inputs(const std::string& recording);
 
 }  // namespace understory

@@ -7,7 +7,6 @@
 
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/run_folder.h"
-#include "understory/pipeline/run_truth.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
 
@@ -60,12 +59,22 @@ class SparseRun {
     return stopped;
   }
 
-  [[nodiscard]] std::size_t scans() const { return path_.size(); }
+  [[nodiscard]] std::size_t count() const { return path_.size(); }
   [[nodiscard]] std::size_t kept() const { return kept_; }
-  [[nodiscard]] const Recording& source() const { return *source_; }
+  // What the correction needs to know of the recording; lives as long as this.
+  [[nodiscard]] SparseScans scans(bool stopped) {
+    SparseScans scans;
+    scans.recording = request_.recording;
+    scans.source = source_.get();
+    scans.path = std::move(path_);
+    scans.times = &times_;
+    scans.stopped = stopped;
+    return scans;
+  }
 
  private:
   void take(const Scan& scan, const ProgressSink& progress) {
+    const ScopedTimer timer(times_, "scan");
     const StemScan result = front_end_.add(scan, source_->rig());
     path_.push_back({scan.stamp, result.step.world_from_body});
     if (result.keep && !result.view.stems.empty()) {
@@ -85,6 +94,7 @@ class SparseRun {
   StemFrontEnd front_end_;
   StemsWriter stems_;
   std::vector<StampedPose> path_;  // of every scan
+  StageTimes times_;
   std::size_t kept_ = 0;
 };
 
@@ -111,18 +121,18 @@ CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& l
     throw InputError(request.recording, "",
                      fmt::format("no stems in any of its {} scans: expected upright stems in scans "
                                  "with ring numbers",
-                                 run.scans()));
+                                 run.count()));
   }
+  const SparseScans scans = run.scans(stopped);
   CorrectionRequest correction;
   correction.stems = request.run_folder / "stems.csv.gz";
   correction.run_folder = request.run_folder;
   correction.overwrite = true;
   correction.config = request.config.correction;
   correction.config_yaml = request.config_yaml;
-  CorrectionOutcome outcome =
-      run_correction(correction, log, progress, stopped ? StopRequested() : stop_requested);
-  (void)compare_with_truth(request.run_folder, run.source());
-  return outcome;
+  correction.scans = &scans;
+  // What was seen until the user stopped it is still corrected.
+  return run_correction(correction, log, progress, stopped ? StopRequested() : stop_requested);
 }
 
 }  // namespace understory
