@@ -103,9 +103,20 @@ void SparseOdometry::take_up(const SparsePoints& source, const Pose& world_from_
 }
 
 SparseStep SparseOdometry::add(const StemView& view) {
+  const SparseStep step = track(view);
+  take_up_last();
+  return step;
+}
+
+void SparseOdometry::take_up_last() {
+  take_up(last_source_, world_from_level_);
+  ++count_;
+}
+
+SparseStep SparseOdometry::track(const StemView& view) {
   const StemUp up = stem_up(view);
   const Pose level_from_body(understory::level_from_body(up), Eigen::Vector3d::Zero());
-  const SparsePoints source = stem_points(view, level_from_body.rotation());
+  SparsePoints source = stem_points(view, level_from_body.rotation());
   SparseStep step;
   if (count_ == 0) {
     // The first body frame's x axis, laid level, is the world's.
@@ -128,8 +139,7 @@ SparseStep SparseOdometry::add(const StemView& view) {
   }
   step.world_from_body = world_from_body_;
   world_from_level_ = world_from_body_ * level_from_body.inverse();
-  take_up(source, world_from_level_);
-  ++count_;
+  last_source_ = std::move(source);
   return step;
 }
 

@@ -52,7 +52,13 @@ class SparseOdometry {
  public:
   explicit SparseOdometry(const SparseOdometryConfig& config) : config_(config) {}
 
+  // Positions a view and takes its stems up into the local map.
   SparseStep add(const StemView& view);
+  // Positions a view against the local map and leaves the map as it is. Views that are close
+  // together should not all enter the map: each adds the error of its own match to those after it.
+  SparseStep track(const StemView& view);
+  // Takes up the stems of the view that was positioned last.
+  void take_up_last();
 
  private:
   struct Landmark {
@@ -70,7 +76,8 @@ class SparseOdometry {
 
   SparseOdometryConfig config_;
   std::vector<Landmark> landmarks_;
-  int count_ = 0;
+  SparsePoints last_source_;
+  int count_ = 0;  // views in the map
   Pose world_from_body_;
   Pose world_from_level_;  // z up, turned like the body, of the last view
   Eigen::Vector3d last_shift_in_level_ = Eigen::Vector3d::Zero();

@@ -36,7 +36,8 @@ StemView StemFrontEnd::view_of(const Scan& scan, const Rig& rig, const StemSegme
     stem.point = (stamp_from_lidar * segment.foot).cast<float>();
     stem.axis = (stamp_from_lidar.rotation() * segment.axis).cast<float>();
     stem.length_m = static_cast<float>(segment.highest_m - segment.lowest_m);
-    if (segment.radius_sd_m < kRadiusKnown) stem.dbh_m = static_cast<float>(2.0 * segment.radius_m);
+    if (segment.radius_sd_m < kDiameterKnown)
+      stem.dbh_m = static_cast<float>(2.0 * segment.radius_m);
     stem.score = static_cast<float>(segment.score);
     view.stems.push_back(stem);
   }
@@ -73,19 +74,20 @@ StemScan StemFrontEnd::add(const Scan& scan, const Rig& rig) {
     // The step of a first try says how the body moved up to this scan; the scan itself lies half a
     // step later than the middle of that.
     SparseOdometry trial = odometry_;
-    const SparseStep step = trial.add(view_of(scan, rig, found, motion));
+    const SparseStep step = trial.track(view_of(scan, rig, found, motion));
     const Vector6d latest = (last_->world_from_body.inverse() * step.world_from_body).log() / since;
     if (step.status == SparseStepStatus::kTracked || step.status == SparseStepStatus::kSearched)
       motion = 1.5 * latest - 0.5 * motion_per_s_;
   }
   result.view = view_of(scan, rig, found, motion);
   result.motion_rad_s = motion.head<3>().norm();
-  result.step = odometry_.add(result.view);
+  result.step = odometry_.track(result.view);
   motion_per_s_.setZero();
   if (follows)
     motion_per_s_ = (last_->world_from_body.inverse() * result.step.world_from_body).log() / since;
   last_ = StampedPose{scan.stamp, result.step.world_from_body};
-  result.keep = to_be_kept(result.step.world_from_body);
+  result.keep = !result.view.stems.empty() && to_be_kept(result.step.world_from_body);
+  if (result.keep) odometry_.take_up_last();
   ++count_;
   return result;
 }

@@ -7,20 +7,20 @@
 #include "understory/pipeline/correction_files.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/recording/stems_file.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
 // The chained odometry, before any correction.
 std::vector<SparseStep> position(const std::vector<StemView>& views,
-                                 const SparseOdometryConfig& config, const std::string& stage,
-                                 const ProgressSink& progress, const StopRequested& stop_requested,
-                                 StageTimes& times) {
+                                 const SparseOdometryConfig& config, const ProgressSink& progress,
+                                 const StopRequested& stop_requested, StageTimes& times) {
   SparseOdometry odometry(config);
   std::vector<SparseStep> steps;
   for (const StemView& view : views) {
     if (stop_requested && stop_requested()) break;
-    const ScopedTimer timer(times, stage);
+    const ScopedTimer timer(times, "scan");
     steps.push_back(odometry.add(view));
     if (progress)
       progress({"odometry", static_cast<double>(steps.size()), static_cast<double>(views.size()),
@@ -45,9 +45,11 @@ CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
     const ScopedTimer timer(run.times, "reading");
     run.views = read_stem_views(request.stems, log);
   }
-  run.steps =
-      position(run.views, request.config.odometry, request.scans != nullptr ? "view" : "scan",
-               progress, stop_requested, run.times);
+  // The front end has positioned the views already, with the scans between them.
+  run.steps = request.scans != nullptr ? request.scans->steps
+                                       : position(run.views, request.config.odometry, progress,
+                                                  stop_requested, run.times);
+  UNDERSTORY_CHECK(run.steps.size() <= run.views.size());
   run.stopped = run.steps.size() < run.views.size();
   run.views.resize(run.steps.size());
   if (run.stopped) {

@@ -27,6 +27,7 @@ struct SparseScans {
   std::string recording;  // as the user named it
   const Recording* source = nullptr;
   std::vector<StampedPose> path;      // of every scan, chained
+  std::vector<SparseStep> steps;      // of the views in the stems' file
   const StageTimes* times = nullptr;  // "scan": all of one scan
   bool stopped = false;               // before the recording's end
 };

@@ -55,18 +55,19 @@ class SparseRun {
         if (const auto* scan = std::get_if<ScanPtr>(&*ready)) take(**scan, progress);
       }
     }
-    if (kept_ > 0) stems_.commit();
+    if (kept() > 0) stems_.commit();
     return stopped;
   }
 
   [[nodiscard]] std::size_t count() const { return path_.size(); }
-  [[nodiscard]] std::size_t kept() const { return kept_; }
+  [[nodiscard]] std::size_t kept() const { return steps_.size(); }
   // What the correction needs to know of the recording; lives as long as this.
   [[nodiscard]] SparseScans scans(bool stopped) {
     SparseScans scans;
     scans.recording = request_.recording;
     scans.source = source_.get();
     scans.path = std::move(path_);
+    scans.steps = std::move(steps_);
     scans.times = &times_;
     scans.stopped = stopped;
     return scans;
@@ -77,9 +78,9 @@ class SparseRun {
     const ScopedTimer timer(times_, "scan");
     const StemScan result = front_end_.add(scan, source_->rig());
     path_.push_back({scan.stamp, result.step.world_from_body});
-    if (result.keep && !result.view.stems.empty()) {
+    if (result.keep) {
       write_view(result.view, stems_);
-      ++kept_;
+      steps_.push_back(result.step);
     }
     if (!progress) return;
     const double share = source_->progress();
@@ -95,7 +96,7 @@ class SparseRun {
   StemsWriter stems_;
   std::vector<StampedPose> path_;  // of every scan
   StageTimes times_;
-  std::size_t kept_ = 0;
+  std::vector<SparseStep> steps_;  // of the views that were kept
 };
 
 }  // namespace
