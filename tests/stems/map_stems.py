@@ -1,0 +1,163 @@
+"""`understory map --front-end sparse` from end to end: a harvester's scans of 16 rings against their
+truth, single views against what each scan really got of each stem, threads, captures, wrong use."""
+
+import csv
+import gzip
+import json
+import math
+import sys
+from array import array
+from collections import defaultdict
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
+from program import Cases, program
+
+TIMED = {"run.json", "report.html"}
+
+cases = Cases()
+REC = cases.folder / "lieksa2.mcap"
+TRUTH = cases.folder / "lieksa2.truth"
+done = program("simulate", "lieksa2", "-o", REC, "--seed", 5, "--set", "duration_s=40")
+assert done.returncode == 0, done.stderr
+
+
+def sparse(recording, run, *options):
+    return program("map", recording, "-o", run, "--front-end", "sparse", *options)
+
+
+def evaluated(*arguments):
+    done = program("evaluate", *arguments, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def poses(path):
+    rows = (line.split() for line in path.read_text().splitlines() if not line.startswith("#"))
+    return {row[0]: [float(v) for v in row[1:]] for row in rows}
+
+
+def placed(pose, point):
+    x, y, z, qx, qy, qz, qw = pose
+    px, py, pz = point
+    tx, ty, tz = 2 * (qy * pz - qz * py), 2 * (qz * px - qx * pz), 2 * (qx * py - qy * px)
+    return (x + px + qw * tx + qy * tz - qz * ty, y + py + qw * ty + qz * tx - qx * tz,
+            z + pz + qw * tz + qx * ty - qy * tx)
+
+
+RUN = cases.folder / "run"
+FIRST = sparse(REC, RUN, "--threads", 2)
+
+
+@cases.case("the way, against the truth")
+def way(folder):
+    assert FIRST.returncode == 0, FIRST.stderr
+    told = json.loads((RUN / "run.json").read_text())
+    truth = poses(TRUTH / "trajectory.tum")
+    assert told["command"] == "map" and told["status"] == "complete", told["reasons"]
+    assert told["scans"] == told["poses"] == len(truth) 
+    assert 4 < told["counts"]["views"] < len(truth) / 3, told["counts"]
+    assert set(poses(RUN / "trajectory.tum")) == set(poses(RUN / "odometry.tum")) == set(truth)
+    errors = evaluated(RUN, TRUTH, "--align", "se3")
+    assert errors["pairs"] == len(truth)
+    assert errors["ape_plane_rmse_m"] < 0.04, errors["ape_plane_rmse_m"]
+    return f"{100 * errors['ape_plane_rmse_m']:.1f} cm over {errors['length_m']:.0f} m"
+
+
+@cases.case("views, against what each scan got of each stem")
+def views(folder):
+    """Moved to the scan's stamp by the odometry's own motion, in the middle of a swing too."""
+    truth = poses(TRUTH / "trajectory.tum")
+    trees = {r["id"]: (float(r["x"]), float(r["y"]))
+             for r in csv.DictReader((TRUTH / "trees.csv").open())}
+    returns = defaultdict(dict)
+    for row in csv.DictReader(gzip.open(TRUTH / "returns.csv.gz", "rt")):
+        returns[row["timestamp"]][row["tree_id"]] = int(row["rings_with_3"])
+    stems = defaultdict(list)
+    for row in csv.DictReader(gzip.open(RUN / "stems.csv.gz", "rt")):
+        stems[row["timestamp"]].append(tuple(float(row[k]) for k in "xyz"))
+    clear = found = near = right = 0
+    squares = 0.0
+    for stamp, points in stems.items():
+        key = next(k for k in truth if abs(float(k) - float(stamp)) < 1e-4)
+        here = truth[key]
+        at = [placed(here, p) for p in points]
+        for tree, rings in returns[key].items():
+            x, y = trees[tree]
+            if rings < 2 or math.hypot(x - here[0], y - here[1]) > 15.0:
+                continue
+            clear += 1
+            found += any(math.hypot(p[0] - x, p[1] - y) < 0.4 for p in at)
+        for p in at:
+            if math.hypot(p[0] - here[0], p[1] - here[1]) > 15.0:
+                continue
+            near += 1
+            off = min(math.hypot(p[0] - x, p[1] - y) for x, y in trees.values())
+            right += off < 0.4
+            squares += off * off if off < 0.4 else 0.0
+    rmse = math.sqrt(squares / right)
+    assert clear > 200, clear
+    assert found > 0.97 * clear and right > 0.95 * near and rmse < 0.06, (found / clear, right / near, rmse)
+    mean = sum(map(len, stems.values())) / len(stems)
+    assert 80 < mean < 200, mean
+    return (f"{found / clear:.1%} of {clear} found, {right / near:.1%} right, feet to "
+            f"{100 * rmse:.1f} cm, {mean:.0f} stems a view")
+
+
+@cases.case("correct from its stems alone")
+def again(folder):
+    done = program("correct", RUN / "stems.csv.gz", "-o", folder / "again")
+    assert done.returncode == 0, done.stderr
+    errors = evaluated(folder / "again", TRUTH, "--align", "se3")
+    assert errors["ape_plane_rmse_m"] < 0.06, errors["ape_plane_rmse_m"]
+
+
+@cases.case("same bytes with one thread and with two")
+def threads(folder):
+    done = sparse(REC, folder / "one", "--threads", 1)
+    assert done.returncode == 0, done.stderr
+    names = {p.name for p in RUN.iterdir()}
+    assert names == {p.name for p in (folder / "one").iterdir()}
+    assert {"stems.csv.gz", "trajectory.tum", "odometry.tum", "trees.csv"} <= names - TIMED, names
+    for name in names - TIMED:
+        assert (RUN / name).read_bytes() == (folder / "one" / name).read_bytes(), name
+
+
+@cases.case("a scanner's capture")
+def capture(folder):
+    rec = folder / "field.pcap"
+    done = program("simulate", "lieksa1", "-o", rec, "--seed", 6, "--set", "duration_s=15")
+    assert done.returncode == 0, done.stderr
+    done = sparse(rec, folder / "run", "--extrinsics", folder / "field.extrinsics.yaml")
+    assert done.returncode == 0, done.stderr
+    errors = evaluated(folder / "run", folder / "field.truth", "--align", "first")
+    assert errors["pairs"] > 50 and errors["ape_plane_rmse_m"] < 0.1, errors
+
+
+@cases.case("wrong use")
+def wrong(folder):
+    for words in (("--realtime",), ("--profile", "handheld"), ("--set", "stems.reach_m=3")):
+        done = sparse(REC, folder / "run", *words)
+        assert done.returncode == 2 and words[0] in done.stderr, (words, done.stderr)
+    done = sparse(folder / "none.mcap", folder / "run")
+    assert done.returncode == 3 and "none.mcap" in done.stderr, done.stderr
+    done = program("map", "--front-end", "sparse", "--print-config")
+    assert done.returncode == 0 and "keep_distance_m" in done.stdout, done.stderr
+
+
+@cases.case("scans without rings")
+def no_rings(folder):
+    clouds = folder / "clouds"
+    clouds.mkdir()
+    for k in range(3):
+        points = array("f")
+        for i in range(2000):
+            points.extend((5.0 + i % 7, math.sin(0.1 * i + k), 0.01 * (i % 50), 0.5))
+        (clouds / f"{k:06}.bin").write_bytes(points.tobytes())
+    done = sparse(clouds, folder / "run")
+    assert done.returncode == 3 and "ring numbers" in done.stderr, done.stderr
+    assert not (folder / "run" / "stems.csv.gz").exists()
+    return done.stderr.strip().splitlines()[-1].replace(str(folder), "")
+
+
+cases.run()
