@@ -227,7 +227,7 @@ OwnRadius own_radius(const SectionView& view, const StemChain& chain, double fro
   for (const int i : chain.sections) {
     const StemSection& section = view.sections()[static_cast<std::size_t>(i)];
     if (section.left == Side::kHidden || section.right == Side::kHidden) continue;
-    if (section.range_m <= 0.0 || section.height_m < from_m || section.height_m > to_m) continue;
+    if (section.height_m < from_m || section.height_m > to_m) continue;
     whole.push_back(&section);
     widths.push_back(section.width_m);
   }
@@ -255,7 +255,7 @@ OwnRadius own_radius(const SectionView& view, const StemChain& chain, double fro
   OwnRadius own;
   own.sections = static_cast<int>(seen);
   own.radius_m = 0.5 * width;
-  own.radius_m *= 1.0 + kMeanDepth * own.radius_m / range;
+  if (range > 0.0) own.radius_m *= 1.0 + kMeanDepth * own.radius_m / range;
   own.sd_m = 0.5 * std::sqrt(variance) / count + 0.004;
   return own;
 }

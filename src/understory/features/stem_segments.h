@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "understory/geometry/points.h"
 #include "understory/sensor/scan.h"
 
 namespace understory {
@@ -65,5 +66,9 @@ struct StemSegments {
 //
 // Empty for a frame without rings. Deterministic; thread-safe. P1 section 2.3 and figure 11.
 [[nodiscard]] StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config);
+
+// The same in a map: points from all sides, z up, in level slices of 25 cm in place of rings. Times
+// are 0, the step is in metres. Stems come by increasing x.
+[[nodiscard]] StemSegments find_stem_segments(const Points& cloud, const StemSegmentConfig& config);
 
 }  // namespace understory
