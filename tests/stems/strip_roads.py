@@ -151,13 +151,14 @@ def seen(roads, trees, at, turn, rng):
             continue
         axis = normalised(tuple(a + rng.gauss(0, 0.035) for a in tree.axis))
         rows.append((in_body, turned_back(turn, axis), 2 * tree.radius + rng.gauss(0, 0.02),
-                     min(1.0, 4.0 / reach)))
+                     min(1.0, rng.gauss(0.5 if tree.bush else 0.9, 0.12))))
     for _ in range(int(roads.false_share * len(rows) + rng.random())):
         a, r = rng.uniform(-VIEW_DEG / 2, VIEW_DEG / 2), RANGE_M * math.sqrt(rng.random())
         axis = normalised((rng.gauss(0, 0.15), rng.gauss(0, 0.15), 1.0))
         point = (r * math.cos(math.radians(a)), r * math.sin(math.radians(a)),
                  rng.gauss(-SCANNER_M, 0.7))
-        rows.append((point, axis, rng.uniform(0.06, 0.3), 0.1))
+        rows.append((point, axis, rng.uniform(0.06, 0.3),
+                     min(1.0, rng.gauss(0.45, 0.15))))
     return rows
 
 

@@ -54,7 +54,7 @@ Placed place(std::vector<StemView> views, const Trajectory& trajectory, double t
 }
 
 nlohmann::ordered_json to_json(const Placed& placed, const MapSharpness& map,
-                               const std::vector<RoadConsistency>& roads) {
+                               const MapSharpness& all, const std::vector<RoadConsistency>& roads) {
   nlohmann::ordered_json json;
   json["views"] = placed.views.size();
   json["views_without_pose"] = placed.without;
@@ -65,6 +65,11 @@ nlohmann::ordered_json to_json(const Placed& placed, const MapSharpness& map,
   json["registration_noise_m"] = map.noise_m;
   json["registration_noise_mean_m"] = map.noise_mean_m;
   json["trees"] = map.trees;
+  json["all_stems"] = {{"beta", all.beta},
+                       {"box_dimension", all.dimension},
+                       {"registration_noise_m", all.noise_m},
+                       {"registration_noise_mean_m", all.noise_mean_m},
+                       {"trees", all.trees}};
   json["roads"] = nlohmann::ordered_json::array();
   for (const RoadConsistency& road : roads) {
     json["roads"].push_back({{"road", road.road},
@@ -79,15 +84,18 @@ nlohmann::ordered_json to_json(const Placed& placed, const MapSharpness& map,
   return json;
 }
 
-std::string to_text(const Placed& placed, const MapSharpness& map,
+std::string to_text(const Placed& placed, const MapSharpness& map, const MapSharpness& all,
                     const std::vector<RoadConsistency>& roads) {
   std::string text = fmt::format(
       "views               {} placed, {} without a pose\n"
       "blur ratio beta     {:.4f} from above, {:.6f} in space\n"
       "box dimension d     {:.2f} from above, {:.2f} in space\n"
-      "noise e_C           {:.4f} m over all sights, {:.4f} m mean over {} trees\n",
+      "noise e_C           {:.4f} m over all sights, {:.4f} m mean over {} trees\n"
+      "of all stems, also far and doubtful ones: beta {:.4f}, d {:.2f}, e_C {:.4f} m and {:.4f} "
+      "m\n",
       placed.views.size(), placed.without, map.beta, map.beta_3d, map.dimension, map.dimension_3d,
-      map.noise_m, map.noise_mean_m, map.trees);
+      map.noise_m, map.noise_mean_m, map.trees, all.beta, all.dimension, all.noise_m,
+      all.noise_mean_m);
   for (const RoadConsistency& road : roads) {
     text += fmt::format(
         "roads {} and {}       {} and {} trees, {:.1f} % the same; {:.1f} % after one motion, "
@@ -105,11 +113,13 @@ int evaluate_map(const MapOptions& options, CommandContext& context) {
   if (placed.views.empty())
     throw InputError(options.trajectory, "",
                      "expected poses at the times of the views in " + options.stems);
-  const MapSharpness map = stem_sharpness(placed.views, placed.world_from_body, {});
+  const std::vector<StemView> sights = map_sights(placed.views, {});
+  const MapSharpness map = stem_sharpness(sights, placed.world_from_body, {});
+  const MapSharpness all = stem_sharpness(placed.views, placed.world_from_body, {});
   const std::vector<RoadConsistency> roads =
       road_consistencies(placed.views, placed.world_from_body, {});
-  const std::string text =
-      options.json ? to_json(placed, map, roads).dump(2) + "\n" : to_text(placed, map, roads);
+  const std::string text = options.json ? to_json(placed, map, all, roads).dump(2) + "\n"
+                                        : to_text(placed, map, all, roads);
   std::fputs(text.c_str(), stdout);
   return kExitDone;
 }

@@ -15,7 +15,7 @@ std::size_t at(int i) {
 
 double beta_of(const CorrectionViews& views, const std::vector<Pose>& poses,
                const SelfCorrectionConfig& config) {
-  return blur_ratio(map_points(views.problem.views, poses, {}), config.sharpness);
+  return blur_ratio(map_points(views.problem.map_views, poses, {}), config.sharpness);
 }
 
 TriedCorrection told(const CorrectionPair& pair, const PairMatch& match,

@@ -41,7 +41,7 @@ void describe(ConfigTable& table, PairConfig& config) {
   table.add("shortest_gap", config.shortest_gap, {1, 1'000'000}, "", "views from one to the other");
   table.add("longest_gap", config.longest_gap, {0, 100'000'000}, "", "the same; 0: any");
   table.add("least_overlap", config.least_overlap, {0.0, 1.0}, "",
-            "of the views' sectors, by their poses");
+            "of the views' sectors, by their poses; the paper draws from 0.2 on");
   table.add("error_m", config.error_m, {0.0, 10.0}, "m",
             "P0 (27): mean match error that is acceptable without any overlap");
   table.add("error_per_overlap_m", config.error_per_overlap_m, {0.0, 10.0}, "m",

@@ -22,10 +22,11 @@ struct CorrectionPair {
 };
 
 struct PairConfig {
-  int tested = 100'000;        // pairs of views drawn at random
-  int shortest_gap = 2;        // views
-  int longest_gap = 1000;      // views; 0: any
-  double least_overlap = 0.2;  // lambda of step 1
+  int tested = 100'000;    // pairs of views drawn at random
+  int shortest_gap = 2;    // views
+  int longest_gap = 1000;  // views; 0: any
+  // lambda of step 1. The paper draws from 0.2 on, but believes no match that ends below 0.4.
+  double least_overlap = 0.4;
   // (27): a match is acceptable if its error is below the first plus overlap times the second.
   double error_m = 0.3;
   double error_per_overlap_m = 0.5;

@@ -41,7 +41,8 @@ class GainCorrection {
 
   void run() {
     GainQueue queue = make_queue();
-    const int budget = correction_budget(views_.targets.size(), config_);
+    const auto budget =
+        static_cast<int>(config_.largest_share * static_cast<double>(views_.targets.size()));
     std::size_t next_solve = 4;
     result_.stopped_because = "no pair is expected to tell more";
     while (static_cast<int>(accepted_.size()) < budget) {
@@ -69,7 +70,7 @@ class GainCorrection {
 
  private:
   [[nodiscard]] double beta() const {
-    return blur_ratio(map_points(views_.problem.views, poses_, {}), config_.sharpness);
+    return blur_ratio(map_points(views_.problem.map_views, poses_, {}), config_.sharpness);
   }
 
   // Pairs with overlapping sectors; (27) is not asked of them, as it is the ones that do not fit

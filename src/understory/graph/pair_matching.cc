@@ -52,12 +52,14 @@ void require_better(PairMatch& match) {
 }  // namespace
 
 Matrix6d match_covariance(const Matrix6d& information, double shift_sd_m) {
-  const double tilt = 0.5 * M_PI / 180.0;
+  // Heights and tilt hang on feet of stems, which look higher the farther away they are.
+  const double tilt = 2.0 * M_PI / 180.0;
+  const double height = 0.15;
   const double yaw = 0.03 * M_PI / 180.0;
   Matrix6d covariance = 4.0 * (information + 1e-6 * Matrix6d::Identity()).inverse();
   const double shift = shift_sd_m * shift_sd_m;
   covariance.diagonal() +=
-      (Vector6d() << tilt * tilt, tilt * tilt, yaw * yaw, shift, shift, 4.0 * shift).finished();
+      (Vector6d() << tilt * tilt, tilt * tilt, yaw * yaw, shift, shift, height * height).finished();
   return covariance;
 }
 

@@ -111,13 +111,14 @@ int correction_budget(std::size_t views, const SelfCorrectionConfig& config) {
 SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
                                   const SelfCorrectionConfig& config) {
   UNDERSTORY_CHECK(problem.views.size() == problem.world_from_view.size());
+  UNDERSTORY_CHECK(problem.views.size() == problem.map_views.size());
   UNDERSTORY_CHECK(problem.views.size() == problem.steps.size());
   UNDERSTORY_CHECK(problem.views.size() == problem.step_errors.size());
   UNDERSTORY_CHECK(problem.views.size() == problem.step_covariances.size());
   SelfCorrectionResult result;
   result.world_from_view = problem.world_from_view;
   result.use.assign(problem.views.size(), 1);
-  result.before = map_sharpness(problem.views, problem.world_from_view, {}, config.sharpness);
+  result.before = map_sharpness(problem.map_views, problem.world_from_view, {}, config.sharpness);
   result.after = result.before;
   if (config.method == CorrectionMethod::kNone || problem.views.size() < 3) {
     result.stopped_because = "not asked for, or too few views";
@@ -147,10 +148,11 @@ SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
                                                        [](const auto& t) { return t.by_go_icp; }));
   if (config.eliminate_factor > 0.0) {
     const RegistrationNoise noise =
-        registration_noise(problem.views, result.world_from_view, {}, config.sharpness);
+        registration_noise(problem.map_views, result.world_from_view, {}, config.sharpness);
     result.use = views_worth_keeping(noise, config.eliminate_factor, config.eliminate_share);
   }
-  result.after = map_sharpness(problem.views, result.world_from_view, result.use, config.sharpness);
+  result.after =
+      map_sharpness(problem.map_views, result.world_from_view, result.use, config.sharpness);
   return result;
 }
 

@@ -66,6 +66,7 @@ void describe(ConfigTable& table, SelfCorrectionConfig& config);
 // Views with their first poses. All in level frames (z up).
 struct SelfCorrectionProblem {
   std::vector<SparsePoints> views;
+  std::vector<SparsePoints> map_views;     // the stems of each view by which the map is judged
   std::vector<Pose> world_from_view;       // where the correction begins
   std::vector<Pose> steps;                 // of the odometry, to each view from the one before it
   std::vector<double> step_errors;         // e of the step to each view; 0 for the first

@@ -102,6 +102,7 @@ void describe(ConfigTable& table, StemCorrectionConfig& config) {
   table.add("close_loops", config.close_loops, "find places seen before and correct the path");
   table.section("loops", [&] { describe(table, config.loops); });
   table.section("pose_graph", [&] { describe(table, config.graph); });
+  table.section("map", [&] { describe(table, config.map); });
   table.section("correction", [&] { describe(table, config.correction); });
 }
 
@@ -110,6 +111,9 @@ StemCorrection correct_stems(const std::vector<StemView>& views,
                              const StemCorrectionConfig& config, StageTimes& times) {
   LevelViews leveled = level(views, steps);
   SelfCorrectionProblem problem = problem_of(leveled, steps);
+  const std::vector<StemView> sights = map_sights(views, config.map);
+  for (std::size_t i = 0; i < views.size(); ++i)
+    problem.map_views.push_back(stem_points(sights[i], leveled.level_from_body[i].rotation()));
   StemCorrection result;
   if (config.close_loops) {
     const ScopedTimer timer(times, "loops");

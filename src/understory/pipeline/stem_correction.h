@@ -6,6 +6,7 @@
 #include "understory/graph/self_correction.h"
 #include "understory/graph/stem_loops.h"
 #include "understory/odometry/sparse_odometry.h"
+#include "understory/pipeline/stem_sights.h"
 #include "understory/sensor/stem_view.h"
 #include "understory/util/timing.h"
 
@@ -16,6 +17,7 @@ struct StemCorrectionConfig {
   StemLoopConfig loops;
   PoseGraphConfig graph;
   SelfCorrectionConfig correction;
+  StemSightConfig map;
 };
 void describe(ConfigTable& table, StemCorrectionConfig& config);
 
@@ -36,7 +38,7 @@ struct StemCorrection {
                                            const std::vector<SparseStep>& steps,
                                            const StemCorrectionConfig& config, StageTimes& times);
 
-// Sharpness of the map of these views placed by these poses (of the body): for evaluation.
+// Sharpness of the map of these views placed by these poses (of the body), of all their stems.
 [[nodiscard]] MapSharpness stem_sharpness(const std::vector<StemView>& views,
                                           const std::vector<Pose>& world_from_body,
                                           const SharpnessConfig& config);
