@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace understory {
 namespace {
@@ -25,10 +26,30 @@ int cell(double value) {
 }  // namespace
 
 GroundGuess::GroundGuess(const std::vector<Eigen::Vector3f>& points) {
+  if (points.empty()) return;
+  // A few strays far away must not make the grid huge.
+  constexpr float kFarthest = 300.0F;
+  Eigen::Vector2f low = Eigen::Vector2f::Constant(kFarthest);
+  Eigen::Vector2f high = -low;
   for (const Eigen::Vector3f& point : points) {
-    const auto [at, is_new] = lowest_.try_emplace(
-        key(cell(static_cast<double>(point.x())), cell(static_cast<double>(point.y()))), point);
-    if (!is_new && point.z() < at->second.z()) at->second = point;
+    low = low.cwiseMin(point.head<2>());
+    high = high.cwiseMax(point.head<2>());
+  }
+  low = low.cwiseMax(-kFarthest);
+  high = high.cwiseMin(kFarthest);
+  column0_ = cell(static_cast<double>(low.x()));
+  row0_ = cell(static_cast<double>(low.y()));
+  columns_ = std::max(0, cell(static_cast<double>(high.x())) - column0_ + 1);
+  rows_ = std::max(0, cell(static_cast<double>(high.y())) - row0_ + 1);
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  lowest_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_),
+                 Eigen::Vector3f::Constant(kNone));
+  for (const Eigen::Vector3f& point : points) {
+    const int column = cell(static_cast<double>(point.x())) - column0_;
+    const int row = cell(static_cast<double>(point.y())) - row0_;
+    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) continue;
+    Eigen::Vector3f& lowest = lowest_[static_cast<std::size_t>(row * columns_ + column)];
+    if (!(lowest.z() <= point.z())) lowest = point;
   }
 }
 
@@ -46,11 +67,15 @@ std::optional<double> GroundGuess::at(const Eigen::Vector2d& place) {
 // A plane that what stands on the ground does not lift: what lies above it counts ever less.
 GroundGuess::Plane GroundGuess::fit(const Eigen::Vector2d& middle) const {
   std::vector<Eigen::Vector3d> near;
-  for (int row = -kReach; row <= kReach; ++row) {
-    for (int column = -kReach; column <= kReach; ++column) {
-      const auto found = lowest_.find(key(cell(middle.x()) + column, cell(middle.y()) + row));
-      if (found == lowest_.end()) continue;
-      near.emplace_back(found->second.cast<double>());
+  const int middle_column = cell(middle.x()) - column0_;
+  const int middle_row = cell(middle.y()) - row0_;
+  for (int row = std::max(0, middle_row - kReach); row <= std::min(rows_ - 1, middle_row + kReach);
+       ++row) {
+    for (int column = std::max(0, middle_column - kReach);
+         column <= std::min(columns_ - 1, middle_column + kReach); ++column) {
+      const Eigen::Vector3f& lowest = lowest_[static_cast<std::size_t>(row * columns_ + column)];
+      if (std::isnan(lowest.z())) continue;
+      near.emplace_back(lowest.cast<double>());
       near.back().head<2>() -= middle;
     }
   }
@@ -60,7 +85,7 @@ GroundGuess::Plane GroundGuess::fit(const Eigen::Vector2d& middle) const {
       std::min_element(near.begin(), near.end(), [](const auto& a, const auto& b) {
         return a.z() < b.z();
       })->z();
-  for (int round = 0; round < 5; ++round) {
+  for (int round = 0; round < 4; ++round) {
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
     information(1, 1) = information(2, 2) = 1.0 / (kSlopeSd * kSlopeSd);
     Eigen::Vector3d right = Eigen::Vector3d::Zero();

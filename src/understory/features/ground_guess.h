@@ -24,7 +24,11 @@ class GroundGuess {
   };
   [[nodiscard]] Plane fit(const Eigen::Vector2d& middle) const;
 
-  std::unordered_map<std::int64_t, Eigen::Vector3f> lowest_;
+  int columns_ = 0;
+  int rows_ = 0;
+  int column0_ = 0;
+  int row0_ = 0;
+  std::vector<Eigen::Vector3f> lowest_;  // row by row; NaN where there is no return
   std::unordered_map<std::int64_t, Plane> planes_;
 };
 

@@ -166,15 +166,11 @@ void RingView::add_section(int level, std::size_t begin, std::size_t end) {
 
 double RingView::height_at(int level, const Eigen::Vector2d& place) const {
   const double slope = rings_[static_cast<std::size_t>(level)].slope;
-  const Eigen::Vector3d up = level_from_lidar_.row(2);
-  const Eigen::Vector3d base =
-      level_from_lidar_.transpose() * Eigen::Vector3d(place.x(), place.y(), 0.0);
-  double height = slope * place.norm();
-  for (int i = 0; i < 2; ++i) {
-    const Eigen::Vector3d at = base + height * up;
-    height += (slope * at.head<2>().norm() - at.z()) / up.z();
-  }
-  return height;
+  const double height = slope * place.norm();
+  // One step of Newton's method from an upright sensor: good to millimetres for tilts of degrees.
+  const Eigen::Vector3d at =
+      level_from_lidar_.transpose() * Eigen::Vector3d(place.x(), place.y(), height);
+  return height + (slope * at.head<2>().norm() - at.z()) / level_from_lidar_(2, 2);
 }
 
 bool RingView::covered(double azimuth) const {

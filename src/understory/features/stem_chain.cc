@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "understory/util/median.h"
 
@@ -169,10 +168,13 @@ class Grower {
   StemChain chain_;
 };
 
-// Sections from the one that says most down.
+// Sections from the one that says most down. One or two returns in a thicket begin nothing.
 std::vector<int> seed_order(const std::vector<StemSection>& sections) {
-  std::vector<int> order(sections.size());
-  std::iota(order.begin(), order.end(), 0);
+  std::vector<int> order;
+  for (std::size_t i = 0; i < sections.size(); ++i) {
+    const bool open = sections[i].left == Side::kOpen || sections[i].right == Side::kOpen;
+    if (open || sections[i].returns >= 3) order.push_back(static_cast<int>(i));
+  }
   const auto worth = [&](int i) {
     const StemSection& section = sections[static_cast<std::size_t>(i)];
     const int open = (section.left == Side::kOpen ? 1 : 0) + (section.right == Side::kOpen ? 1 : 0);
@@ -238,10 +240,12 @@ OwnRadius own_radius(const SectionView& view, const StemChain& chain, double fro
   double count = 0.0;
   double variance = 0.0;
   double range = 0.0;
+  double spacing = 0.0;
   for (const StemSection* section : whole) {
     if (section->width_m > most) continue;
     sum += section->width_m;
     range += section->range_m;
+    spacing += section->spacing_m;
     variance += section->spacing_m * section->spacing_m / 6.0;
     count += 1.0;
   }
@@ -254,6 +258,7 @@ OwnRadius own_radius(const SectionView& view, const StemChain& chain, double fro
   const double width = sum / count;
   OwnRadius own;
   own.sections = static_cast<int>(seen);
+  own.spacing_m = spacing / seen;
   own.radius_m = 0.5 * width;
   if (range > 0.0) own.radius_m *= 1.0 + kMeanDepth * own.radius_m / range;
   own.sd_m = 0.5 * std::sqrt(variance) / count + 0.004;

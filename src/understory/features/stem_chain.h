@@ -55,6 +55,7 @@ struct OwnRadius {
   double radius_m = 0.0;
   double sd_m = 0.0;
   int sections = 0;
+  double spacing_m = 0.0;  // between returns, mean
 };
 [[nodiscard]] OwnRadius own_radius(const SectionView& view, const StemChain& chain,
                                    double from_m = -1e9, double to_m = 1e9);

@@ -15,7 +15,10 @@
 namespace understory {
 namespace {
 
-constexpr double kLeanSd = 0.05;     // of stems against up
+constexpr double kLeanSd = 0.05;  // of stems against up
+// Diameters are told where returns are nearer to each other than this share of the usual radius:
+// where fewer than three fall on a stem, its edges are lost more often than not, and it looks thin.
+constexpr double kFineSpacing = 0.7;
 constexpr double kUpMatters = 0.03;  // radians: levels differ enough to look again
 
 // The smallest turn that makes `up` the z axis.
@@ -61,7 +64,7 @@ struct Candidate {
   double score = 0.0;
 };
 
-StemSegment segment_of(const SectionView& view, const Candidate& candidate,
+StemSegment segment_of(const SectionView& view, double usual_radius_m, const Candidate& candidate,
                        const Eigen::Matrix3d& level_from_frame) {
   const StemChain& chain = candidate.chain;
   const auto& sections = view.sections();
@@ -81,7 +84,7 @@ StemSegment segment_of(const SectionView& view, const Candidate& candidate,
   segment.score = candidate.score;
   if (candidate.ground_m) {
     const OwnRadius breast = own_radius(view, chain, foot + 0.5, foot + 2.3);
-    if (breast.sections >= 2) {
+    if (breast.sections >= 2 && breast.spacing_m < kFineSpacing * usual_radius_m) {
       segment.dbh_m = 2.0 * breast.radius_m;
       segment.dbh_sd_m = 2.0 * breast.sd_m;
     }
@@ -164,7 +167,7 @@ std::vector<StemSegment> segments_of(const SectionView& view, Chains& all,
     candidate.score = stem_score(traits);
     if (candidate.score < min_score) continue;
     candidate.chain = std::move(chain);
-    segments.push_back(segment_of(view, candidate, level_from_frame));
+    segments.push_back(segment_of(view, all.config.usual_radius_m, candidate, level_from_frame));
     segments.back().traits = traits;
   }
   return without_doubles(std::move(segments));

@@ -29,7 +29,8 @@ struct StemSegment {
   double highest_m = 0.0;  // ... and last seen
   double radius_m = 0.0;   // best guess, from its own width and those of the others
   double radius_sd_m = 0.0;
-  // From its own width 0.5 to 2.3 m above the ground; 0 where it was not seen whole there.
+  // From its own width 0.5 to 2.3 m above the ground; 0 where it was not seen whole there, or too
+  // far away: where fewer than three returns fall on a stem it looks thin.
   double dbh_m = 0.0;
   double dbh_sd_m = 0.0;
   double score = 0.0;     // probability that this is a stem, 0..1
