@@ -64,6 +64,15 @@ def way(folder):
     return f"{100 * errors['ape_plane_rmse_m']:.1f} cm over {errors['length_m']:.0f} m"
 
 
+@cases.case("trees, against the truth")
+def trees(folder):
+    errors = evaluated("trees", RUN / "trees.csv", TRUTH / "trees.csv", "--align", "se3")
+    assert errors["matched"] > 100 and errors["precision"] > 0.85, errors
+    assert errors["position_rmse_m"] < 0.12 and errors["dbh_rmse_m"] < 0.025, errors
+    return (f"{errors['precision']:.0%} of {errors['trees_a']} right, to "
+            f"{100 * errors['position_rmse_m']:.1f} cm, diameters to {100 * errors['dbh_rmse_m']:.1f} cm")
+
+
 @cases.case("views, against what each scan got of each stem")
 def views(folder):
     """Moved to the scan's stamp by the odometry's own motion, in the middle of a swing too."""

@@ -36,8 +36,8 @@ StemView StemFrontEnd::view_of(const Scan& scan, const Rig& rig, const StemSegme
     stem.point = (stamp_from_lidar * segment.foot).cast<float>();
     stem.axis = (stamp_from_lidar.rotation() * segment.axis).cast<float>();
     stem.length_m = static_cast<float>(segment.highest_m - segment.lowest_m);
-    if (segment.radius_sd_m < kDiameterKnown)
-      stem.dbh_m = static_cast<float>(2.0 * segment.radius_m);
+    if (segment.dbh_m > 0.0 && segment.dbh_sd_m < kDiameterKnown)
+      stem.dbh_m = static_cast<float>(segment.dbh_m);
     stem.score = static_cast<float>(segment.score);
     view.stems.push_back(stem);
   }
