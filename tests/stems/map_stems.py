@@ -5,6 +5,7 @@ import csv
 import gzip
 import json
 import math
+import os
 import sys
 from array import array
 from collections import defaultdict
@@ -141,6 +142,42 @@ def capture(folder):
     assert done.returncode == 0, done.stderr
     errors = evaluated(folder / "run", folder / "field.truth", "--align", "first")
     assert errors["pairs"] > 50 and errors["ape_plane_rmse_m"] < 0.1, errors
+
+
+def rows_of(path):
+    return list(csv.DictReader(gzip.open(path, "rt")))
+
+
+@cases.case("stems without positions")
+def converted(folder):
+    out = folder / "seen.csv.gz"
+    done = program("convert", REC, out)
+    assert done.returncode == 0, done.stderr
+    frames = {row["frame"] for row in rows_of(out)}
+    assert len(frames) == len(poses(TRUTH / "trajectory.tum")), len(frames)
+    # The views of the run are those of its frames, but for the motion within a scan.
+    seen = [r for r in rows_of(out) if r["frame"] == "0"]
+    kept = [r for r in rows_of(RUN / "stems.csv.gz") if r["frame"] == "0"]
+    assert len(kept) > 80 and abs(len(seen) - len(kept)) < 10, (len(seen), len(kept))
+
+
+@cases.case("stems of a real map")
+def real_map(folder):
+    """A scanned pine plot: the stems of single-frame code against those of the inventory."""
+    data = Path(os.environ.get("UNDERSTORY_DATA", Path(__file__).resolve().parents[2] / "../shared/data"))
+    cloud = data / "treels" / "pine_plot.laz"
+    if not cloud.exists():
+        return "skipped: no example data"
+    done = program("convert", cloud, folder / "plot.csv.gz")
+    assert done.returncode == 0, done.stderr
+    done = program("inventory", cloud, "-o", folder / "inventory")
+    assert done.returncode == 0, done.stderr
+    trees = list(csv.DictReader((folder / "inventory" / "trees.csv").open()))
+    stems = rows_of(folder / "plot.csv.gz")
+    both = sum(any(math.hypot(float(a["x"]) - float(b["x"]), float(a["y"]) - float(b["y"])) < 0.4
+                   for b in stems) for a in trees)
+    assert both >= 0.5 * len(trees) and both >= 0.6 * len(stems), (both, len(trees), len(stems))
+    return f"{both} of {len(stems)} segments among the inventory's {len(trees)} trees"
 
 
 @cases.case("wrong use")

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "understory/cli/command.h"
+#include "understory/cli/convert_stems.h"
 #include "understory/cli/open_options.h"
 #include "understory/output/las_writer.h"
 #include "understory/pipeline/source.h"
@@ -84,6 +85,8 @@ void refuse_same_place(const ConvertOptions& options) {
 
 int run_convert(const ConvertOptions& options, CommandContext& context) {
   refuse_same_place(options);
+  if (is_stems_file(options.output))
+    return convert_to_stems(options.input, options.output, options.open, context);
   const std::unique_ptr<Recording> recording =
       open_source(options.input, options.open, context.log);
   const std::unique_ptr<Target> target = make_target(options);
@@ -129,11 +132,13 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
 
 void add_convert_command(CLI::App& app, Command& chosen) {
   auto options = std::make_shared<ConvertOptions>();
-  CLI::App* command = app.add_subcommand(
-      "convert", "Write a recording as MCAP (OUT ends in .mcap) or as a folder of clouds");
+  CLI::App* command = app.add_subcommand("convert",
+                                         "Write a recording as MCAP (OUT ends in .mcap), as a "
+                                         "folder of clouds, or as the stems seen in "
+                                         "it (OUT ends in .csv.gz; of a cloud, too)");
   command->add_option("IN", options->input, "Recording: file or folder, or sim:SITE?key=value")
       ->required();
-  command->add_option("OUT", options->output, "File .mcap, or a folder")->required();
+  command->add_option("OUT", options->output, "File .mcap or .csv.gz, or a folder")->required();
   command->add_option("--format", options->format, "Clouds of a folder (default pcd)")
       ->check(CLI::IsMember({"pcd", "ply", "las", "laz", "bin"}));
   command->add_option("--compression", options->compression, "Chunks of an MCAP file")
@@ -142,7 +147,8 @@ void add_convert_command(CLI::App& app, Command& chosen) {
   add_open_options(*command, options->open);
   command->footer(
       "Examples:\n  understory convert walk.bag walk.mcap\n"
-      "  understory convert walk.mcap walk_clouds --format ply");
+      "  understory convert walk.mcap walk_clouds --format ply\n"
+      "  understory convert plot.laz plot.stems.csv.gz");
   command->callback([options, &chosen] {
     chosen = [options](CommandContext& context) { return run_convert(*options, context); };
   });

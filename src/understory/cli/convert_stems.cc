@@ -1,0 +1,108 @@
+#include "understory/cli/convert_stems.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <optional>
+
+#include "understory/features/stem_segments.h"
+#include "understory/output/run_tables.h"
+#include "understory/pipeline/source.h"
+#include "understory/recording/cloud_file.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_cloud(const std::string& input) {
+  constexpr std::array<const char*, 4> kEndings = {".las", ".laz", ".ply", ".pcd"};
+  const std::string ending = fs::path(input).extension().string();
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end() &&
+         fs::is_regular_file(input);
+}
+
+void write(const StemSegments& found, const Pose& body_from_points, int frame, TimeNs stamp,
+           StemsWriter& writer) {
+  for (const StemSegment& segment : found.stems) {
+    StemRow row;
+    row.frame = frame;
+    row.stamp = stamp;
+    row.point = body_from_points * segment.foot;
+    row.axis = body_from_points.rotation() * segment.axis;
+    row.length_m = segment.highest_m - segment.lowest_m;
+    if (segment.dbh_m > 0.0) row.dbh_m = segment.dbh_m;
+    row.score = segment.score;
+    writer.add(row);
+  }
+}
+
+int convert_cloud_to_stems(const std::string& input, const std::string& output,
+                           CommandContext& context) {
+  const PointCloudFile cloud = read_cloud(input, context.log);
+  const StemSegments found = find_stem_segments(cloud.points, {});
+  if (found.stems.empty())
+    throw InputError(input, "",
+                     fmt::format("no upright stems among its {} points", cloud.points.size()));
+  // Positions of a table of stems lie within 10 km of its zero.
+  constexpr double kNear = 9000.0;
+  Eigen::Vector3d shift = cloud.origin;
+  if (shift.cwiseAbs().maxCoeff() > kNear) {
+    context.log.info(
+        fmt::format("stems are told from {:.3f} {:.3f} {:.3f}", shift.x(), shift.y(), shift.z()));
+    shift.setZero();
+  }
+  StemsWriter writer(output);
+  write(found, Pose(Eigen::Quaterniond::Identity(), shift), 0, 0, writer);
+  writer.commit();
+  return kExitDone;
+}
+
+}  // namespace
+
+bool is_stems_file(const std::string& output) {
+  constexpr std::string_view kEnding = ".csv.gz";
+  return output.size() > kEnding.size() &&
+         output.compare(output.size() - kEnding.size(), kEnding.size(), kEnding) == 0;
+}
+
+int convert_to_stems(const std::string& input, const std::string& output, const OpenOptions& open,
+                     CommandContext& context) {
+  if (is_cloud(input)) return convert_cloud_to_stems(input, output, context);
+  const std::unique_ptr<Recording> recording = open_source(input, open, context.log);
+  StemsWriter writer(output);
+  std::optional<Eigen::Vector3d> up;
+  int frame = 0;
+  std::size_t stems = 0;
+  bool stopped = false;
+  TimeNs last = 0;
+  while (!stopped) {
+    const std::optional<Event> event = recording->next();
+    if (!event) break;
+    const auto* scan = std::get_if<ScanPtr>(&*event);
+    if (scan == nullptr) continue;
+    stopped = context.stop_requested();
+    if (frame > 0 && (*scan)->stamp <= last) continue;  // a table's times ascend
+    last = (*scan)->stamp;
+    const Pose& body_from_lidar = recording->rig().body_from_lidar;
+    StemSegmentConfig config;
+    config.up =
+        up ? *up : Eigen::Vector3d(body_from_lidar.rotation().inverse() * Eigen::Vector3d::UnitZ());
+    const StemSegments found = find_stem_segments(**scan, config);
+    if (!found.stems.empty()) up = found.up;
+    write(found, body_from_lidar, frame++, last, writer);
+    stems += found.stems.size();
+    context.progress({"stems", 100.0 * recording->progress(), 100.0, "%",
+                      std::to_string(found.stems.size()) + " stems"});
+  }
+  if (stems == 0)
+    throw InputError(input, "", fmt::format("no upright stems in any of its {} scans", frame));
+  writer.commit();
+  if (stopped) context.log.warn("convert.stopped", "stopped before the end: the output is partial");
+  return stopped ? kExitUntrusted : kExitDone;
+}
+
+}  // namespace understory
