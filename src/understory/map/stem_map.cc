@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
+#include <tuple>
 #include <unordered_map>
 
+#include "understory/graph/view_cone.h"
+#include "understory/registration/plane_grid.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -16,7 +20,36 @@ struct Gathered {
   Eigen::Vector2d squares = Eigen::Vector2d::Zero();
   Eigen::Vector3d axes = Eigen::Vector3d::Zero();
   double dbh_squares = 0.0;
+  std::vector<int> views;  // that saw it, ascending
 };
+
+// Both as one (Chan et al. 1983 for the moments).
+void merge(Gathered& tree, const Gathered& other) {
+  MappedStem& a = tree.stem;
+  const MappedStem& b = other.stem;
+  const double n = a.sights;
+  const double m = b.sights;
+  const Eigen::Vector3d d = b.point_in_world - a.point_in_world;
+  a.point_in_world += d * m / (n + m);
+  tree.squares += other.squares + d.head<2>().cwiseAbs2() * n * m / (n + m);
+  tree.axes += other.axes;
+  if (b.dbh_sights > 0) {
+    const double k = a.dbh_sights;
+    const double l = b.dbh_sights;
+    const double mean = k > 0.0 ? a.dbh_m : b.dbh_m;
+    const double e = b.dbh_m - mean;
+    a.dbh_m = mean + e * l / (k + l);
+    tree.dbh_squares += other.dbh_squares + e * e * k * l / (k + l);
+    a.dbh_sights += b.dbh_sights;
+  }
+  a.sights += b.sights;
+  a.first_view = std::min(a.first_view, b.first_view);
+  a.last_view = std::max(a.last_view, b.last_view);
+  std::vector<int> views;
+  std::set_union(tree.views.begin(), tree.views.end(), other.views.begin(), other.views.end(),
+                 std::back_inserter(views));
+  tree.views = std::move(views);
+}
 
 class Gatherer {
  public:
@@ -37,7 +70,7 @@ class Gatherer {
     move(found, before, tree.stem.point_in_world);
   }
 
-  [[nodiscard]] const std::vector<Gathered>& trees() const { return trees_; }
+  [[nodiscard]] std::vector<Gathered> trees() && { return std::move(trees_); }
 
  private:
   [[nodiscard]] std::uint64_t key(double x, double y, int dx, int dy) const {
@@ -73,6 +106,7 @@ class Gatherer {
     MappedStem& stem = tree.stem;
     ++stem.sights;
     stem.last_view = view;
+    if (tree.views.empty() || tree.views.back() != view) tree.views.push_back(view);
     const Eigen::Vector3d d = point - stem.point_in_world;
     stem.point_in_world += d / stem.sights;
     tree.squares += d.head<2>().cwiseProduct((point - stem.point_in_world).head<2>());
@@ -99,7 +133,97 @@ class Gatherer {
   std::unordered_map<std::uint64_t, std::vector<int>> cells_;
 };
 
+SparsePoints places_of(const std::vector<Gathered>& trees) {
+  SparsePoints places;
+  for (const Gathered& tree : trees)
+    places.push_back(tree.stem.point_in_world);
+  return places;
+}
+
+// In how many views each tree lies within the sector that the views usually see.
+std::vector<int> chances(const std::vector<Gathered>& trees, const std::vector<StemView>& views,
+                         const std::vector<Pose>& world_from_body) {
+  std::vector<SparsePoints> points(views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    for (const Stem& stem : views[i].stems)
+      points[i].push_back(stem.point.cast<double>());
+  }
+  const ConeOverlap sector(estimate_view_cone(points));
+  const PlaneGrid grid(places_of(trees));
+  std::vector<int> count(trees.size(), 0);
+  for (const Pose& pose : world_from_body) {
+    const Pose body_from_world = pose.inverse();
+    grid.around(pose.translation(), sector.cone().range_m, [&](int t) {
+      const auto k = static_cast<std::size_t>(t);
+      if (sector.holds(body_from_world * trees[k].stem.point_in_world)) ++count[k];
+    });
+  }
+  return count;
+}
+
+// Two trees side by side are seen together now and then; the two images of one tree that a bent
+// path makes are not, as a view has only one of them.
+bool same_tree(const Gathered& a, const Gathered& b, int chances) {
+  constexpr double kEnough = 3.0;  // views that should have seen both, if they were two
+  constexpr double kFew = 0.1;     // of these
+  const double expected = static_cast<double>(a.views.size()) *
+                          static_cast<double>(b.views.size()) / std::max(1, chances);
+  if (expected < kEnough) return false;
+  std::vector<int> both;
+  std::set_intersection(a.views.begin(), a.views.end(), b.views.begin(), b.views.end(),
+                        std::back_inserter(both));
+  return static_cast<double>(both.size()) < kFew * expected;
+}
+
+// Joins the nearest pairs first; the earlier tree stays.
+void join_duplicates(std::vector<Gathered>& trees, const std::vector<int>& chance,
+                     double duplicate_m) {
+  struct Near {
+    double squared;
+    std::size_t a;
+    std::size_t b;
+  };
+  std::vector<Near> pairs;
+  const PlaneGrid grid(places_of(trees));
+  for (std::size_t a = 0; a < trees.size(); ++a) {
+    grid.around(trees[a].stem.point_in_world, duplicate_m, [&](int found) {
+      const auto b = static_cast<std::size_t>(found);
+      if (b <= a) return;
+      const double squared =
+          (trees[a].stem.point_in_world - trees[b].stem.point_in_world).head<2>().squaredNorm();
+      if (squared <= duplicate_m * duplicate_m) pairs.push_back({squared, a, b});
+    });
+  }
+  std::sort(pairs.begin(), pairs.end(), [](const Near& p, const Near& q) {
+    return std::tie(p.squared, p.a, p.b) < std::tie(q.squared, q.a, q.b);
+  });
+  for (const Near& pair : pairs) {
+    Gathered& a = trees[pair.a];
+    Gathered& b = trees[pair.b];
+    if (a.stem.sights == 0 || b.stem.sights == 0) continue;
+    if (!same_tree(a, b, std::max(chance[pair.a], chance[pair.b]))) continue;
+    merge(a, b);
+    b.stem.sights = 0;
+  }
+}
+
+MappedStem finished(const Gathered& tree) {
+  MappedStem stem = tree.stem;
+  stem.variance_m2 = tree.squares / std::max(1, stem.sights - 1);
+  if (tree.axes.norm() > 0.0) stem.axis_in_world = tree.axes.normalized();
+  if (stem.dbh_sights > 1)
+    stem.dbh_sd_m = std::sqrt(tree.dbh_squares / (stem.dbh_sights - 1) / stem.dbh_sights);
+  return stem;
+}
+
 }  // namespace
+
+StemMapConfig tree_list_config() {
+  StemMapConfig config;
+  config.min_presence = 0.12;
+  config.duplicate_m = 1.2;
+  return config;
+}
 
 std::vector<MappedStem> build_stem_map(const std::vector<StemView>& views,
                                        const std::vector<Pose>& world_from_body,
@@ -114,14 +238,20 @@ std::vector<MappedStem> build_stem_map(const std::vector<StemView>& views,
                    static_cast<int>(i));
     }
   }
+  std::vector<Gathered> trees = std::move(gatherer).trees();
+  std::erase_if(trees, [&](const Gathered& t) { return t.stem.sights < config.min_sights; });
+  std::vector<int> chance(trees.size(), 0);
+  if (config.min_presence > 0.0 || config.duplicate_m > 0.0)
+    chance = chances(trees, views, world_from_body);
+  if (config.duplicate_m > 0.0) join_duplicates(trees, chance, config.duplicate_m);
   std::vector<MappedStem> result;
-  for (const Gathered& tree : gatherer.trees()) {
-    if (tree.stem.sights < config.min_sights) continue;
-    MappedStem stem = tree.stem;
-    stem.variance_m2 = tree.squares / std::max(1, stem.sights - 1);
-    if (tree.axes.norm() > 0.0) stem.axis_in_world = tree.axes.normalized();
-    if (stem.dbh_sights > 1)
-      stem.dbh_sd_m = std::sqrt(tree.dbh_squares / (stem.dbh_sights - 1) / stem.dbh_sights);
+  for (std::size_t k = 0; k < trees.size(); ++k) {
+    if (trees[k].stem.sights == 0) continue;  // joined to another
+    MappedStem stem = finished(trees[k]);
+    if (chance[k] > 0)
+      stem.presence =
+          std::min(1.0, static_cast<double>(trees[k].views.size()) / std::max(1, chance[k]));
+    if (config.min_presence > 0.0 && chance[k] > 0 && stem.presence < config.min_presence) continue;
     result.push_back(stem);
   }
   return result;

@@ -20,15 +20,26 @@ struct MappedStem {
   int sights = 0;
   int first_view = 0;  // indices into the views
   int last_view = 0;
+  // Share of the views in whose sector it lies that saw it; 0 if it was not asked for. What is no
+  // tree is seen now and then.
+  double presence = 0.0;
 };
 
 struct StemMapConfig {
   double merge_m = 0.6;  // sights nearer than this in the plane are of one tree
   int min_sights = 3;    // trees seen less often are left out
+  // And those seen in a smaller share of the views in whose sector they lie; 0: not asked for.
+  double min_presence = 0.0;
+  // Trees nearer than this that were never seen together, though they should have been some times,
+  // are one; 0: not asked for.
+  double duplicate_m = 0.0;
 };
+// What a tree list asks for.
+[[nodiscard]] StemMapConfig tree_list_config();
 
 // Gathers the stems of all views, placed by their poses, into trees, in the order of the views.
-// Deterministic; memory grows with the trees, not with the views.
+// Deterministic; memory grows with the trees and
+// their sights.
 [[nodiscard]] std::vector<MappedStem> build_stem_map(const std::vector<StemView>& views,
                                                      const std::vector<Pose>& world_from_body,
                                                      const StemMapConfig& config);

@@ -53,5 +53,68 @@ TEST(StemMap, GathersEachTreeOnce) {
   }
 }
 
+struct Ring {
+  std::vector<StemView> views;
+  std::vector<Pose> poses;
+};
+
+// Views all around from places along a line; what `sees` says is seen.
+template <typename Sees>
+Ring ring(const std::vector<Eigen::Vector3d>& trees, const Sees& sees) {
+  Ring result;
+  for (int i = 0; i < 60; ++i) {
+    const Pose pose(Eigen::Quaterniond::Identity(), {0.2 * i, 0.0, 0.0});
+    StemView view;
+    for (std::size_t t = 0; t < trees.size(); ++t) {
+      if (!sees(i, t)) continue;
+      Stem stem;
+      stem.point = (pose.inverse() * trees[t]).cast<float>();
+      stem.dbh_m = t == 0 ? 0.2F : 0.3F;
+      view.stems.push_back(stem);
+    }
+    result.views.push_back(view);
+    result.poses.push_back(pose);
+  }
+  return result;
+}
+
+std::vector<Eigen::Vector3d> some_trees() {
+  std::vector<Eigen::Vector3d> trees = {{5.0, 5.0, 0.0}, {5.0, 5.9, 0.0}};
+  for (int k = 0; k < 40; ++k)
+    trees.emplace_back(-10.0 + 4.0 * (k % 10), -12.0 + 6.0 * (k / 10), 0.0);
+  return trees;
+}
+
+TEST(StemMap, ImagesOfOneTreeThatWereNeverSeenTogetherAreOne) {
+  const auto trees = some_trees();
+  const Ring bent = ring(trees, [](int i, std::size_t t) {
+    return t > 1 || (i < 30) == (t == 0);  // the path bends in the middle
+  });
+  const auto plain = build_stem_map(bent.views, bent.poses, {});
+  EXPECT_EQ(plain.size(), trees.size());
+  const auto joined = build_stem_map(bent.views, bent.poses, tree_list_config());
+  ASSERT_EQ(joined.size(), trees.size() - 1);
+  EXPECT_NEAR(joined[0].point_in_world.y(), 5.45, 1e-4);
+  EXPECT_EQ(joined[0].sights, 60);
+  EXPECT_NEAR(joined[0].dbh_m, 0.25, 1e-6);
+  EXPECT_NEAR(joined[0].variance_m2.y(), 0.45 * 0.45 * 60.0 / 59.0, 1e-4);
+  EXPECT_EQ(joined[0].last_view, 59);
+}
+
+TEST(StemMap, TreesSideBySideStayTwo) {
+  const auto trees = some_trees();
+  const Ring seen = ring(trees, [](int i, std::size_t t) { return t > 1 || i % 2 == 0 || t == 0; });
+  EXPECT_EQ(build_stem_map(seen.views, seen.poses, tree_list_config()).size(), trees.size());
+}
+
+TEST(StemMap, WhatIsSeenNowAndThenIsNoTree) {
+  const auto trees = some_trees();
+  const Ring seen = ring(trees, [](int i, std::size_t t) { return t != 1 || i % 15 == 0; });
+  EXPECT_EQ(build_stem_map(seen.views, seen.poses, {}).size(), trees.size());
+  const auto list = build_stem_map(seen.views, seen.poses, tree_list_config());
+  ASSERT_EQ(list.size(), trees.size() - 1);
+  EXPECT_NEAR(list[0].presence, 1.0, 1e-9);
+}
+
 }  // namespace
 }  // namespace understory

@@ -281,7 +281,7 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   std::vector<MappedStem> stems;
   {
     const ScopedTimer timer(run.times, "tree_map");
-    stems = build_stem_map(run.views, run.correction.world_from_body, {});
+    stems = build_stem_map(run.views, run.correction.world_from_body, tree_list_config());
   }
   {
     const ScopedTimer timer(run.times, "writing");

@@ -1,0 +1,214 @@
+#!/usr/bin/env python3
+"""`./run bench stems`: maps of stems that correct themselves, and the stems of a real forest.
+
+  ./run bench stems                 ten seeds of made-up strip roads, every method of correction
+  ./run bench stems --seeds 21-23   fewer
+  ./run bench stems --real          Wild-Places V-03 (where the example data is): odometry, loops,
+                                    time, memory, and Go-ICP on its neighbouring views
+  ./run bench stems --write         puts the tables into docs/sparse.md
+
+The roads are those of tests/stems/strip_roads.py: three of 180 m, 22.5 m apart. Truth is for the
+columns of the table alone; `understory correct` never sees it. Everything runs on one thread.
+"""
+
+import argparse
+import json
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+
+from program import (DONE, PROGRAM, TOP, UNTRUSTED, machine, run, say, understory,
+                     understory_json, version)
+
+sys.path.insert(0, str(TOP / "tests" / "stems"))
+from strip_roads import write_strip_roads  # noqa: E402
+
+PAGE = TOP / "docs" / "sparse.md"
+METHODS = ("none", "powers", "powers_printed", "lattice", "pose_graph", "expected_gain")
+ODOMETRIES = {"frame": "view to view, P0 (16)", "map": "view to local map"}
+
+
+def data():
+    import os
+    return Path(os.environ.get("UNDERSTORY_DATA", TOP.parent / "shared" / "data"))
+
+
+def corrected(stems, folder, *settings):
+    """One run of correct on one thread: run.json with the kernel's figures."""
+    options = [word for setting in settings for word in ("--set", setting)]
+    done = understory("correct", stems, "-o", folder, "--threads", 1, *options,
+                      accept=(DONE, UNTRUSTED))
+    result = json.loads((folder / "run.json").read_text())
+    result["process"] = {"cpu_s": done.cpu_s, "peak_memory_mb": done.peak_memory_mb}
+    return result
+
+
+def longest_segment(errors):
+    return max(errors["segments"], key=lambda s: s["length_m"])["translation_plane_percent"]
+
+
+def measure(site, method, odometry):
+    folder = site / f"{odometry}-{method}"
+    told = corrected(site / "stems.csv.gz", folder, f"correction.method={method}",
+                     f"odometry.target={odometry}")
+    path = understory_json("evaluate", folder, site / "truth", "--align", "se3")
+    ours = understory_json("evaluate", "map", site / "stems.csv.gz", folder)
+    best = understory_json("evaluate", "map", site / "stems.csv.gz", site / "truth")
+    quality = told["quality"]
+    stage = told["stages"]["self_correction"]
+    return {
+        "beta": quality["beta_after"], "d": quality["box_dimension_after"],
+        "e_c": quality["registration_noise_after_m"],
+        "e_c_ratio": quality["registration_noise_after_m"] / best["registration_noise_m"],
+        "roads": statistics.mean(r["consistency"] for r in ours["roads"]) if ours["roads"]
+        else float("nan"),
+        "plane_m": path["ape_plane_rmse_m"], "space_m": path["ape_rmse_m"],
+        "segment": longest_segment(path),
+        "share": told["counts"]["corrections"] / told["scans"],
+        "cpu_s": stage["cpu_ms"]["mean"] / 1e3,
+    }
+
+
+def method_table(rows):
+    text = ("| odometry | correction | beta | d | e_C cm | of that with true poses | same trees on "
+            "two roads % | path, plane cm | in space cm | over the longest segments % | corrections "
+            "% of views | s |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n")
+    for odometry in ODOMETRIES:
+        for method in METHODS:
+            cell = [r for r in rows if r["odometry"] == odometry and r["method"] == method]
+
+            def mean(key, scale=1.0, digits=1):
+                values = [scale * r[key] for r in cell]
+                return f"{statistics.mean(values):.{digits}f} ({max(values):.{digits}f})"
+
+            text += (f"| {ODOMETRIES[odometry]} | {method} | {mean('beta', 1, 4)} | "
+                     f"{mean('d', 1, 2)} | {mean('e_c', 100)} | {mean('e_c_ratio', 1, 2)} | "
+                     f"{statistics.mean(100 * r['roads'] for r in cell):.1f} | "
+                     f"{mean('plane_m', 100)} | {mean('space_m', 100)} | {mean('segment', 1, 2)} | "
+                     f"{statistics.mean(100 * r['share'] for r in cell):.1f} | "
+                     f"{statistics.mean(r['cpu_s'] for r in cell):.1f} |\n")
+    return text
+
+
+def bench_methods(seeds):
+    rows = []
+    for seed in seeds:
+        with tempfile.TemporaryDirectory() as scratch:
+            site = Path(scratch)
+            write_strip_roads(site, seed)
+            for odometry in ODOMETRIES:
+                for method in METHODS:
+                    row = measure(site, method, odometry)
+                    rows.append({"seed": seed, "odometry": odometry, "method": method, **row})
+                    say(f"seed {seed} {odometry} {method}: e_C {100 * row['e_c']:.1f} cm, path "
+                        f"{100 * row['plane_m']:.1f} cm")
+    head = (f"{version()}, seeds {seeds[0]} to {seeds[-1]} ({len(seeds)}), mean and in brackets the "
+            "worst\n\n")
+    return head + method_table(rows)
+
+
+def loops_of(folder, truth_file):
+    """Recall at 1 and at full precision: views whose truth has an earlier place within 3 m, at
+    least 50 views apart, count."""
+    truth = [list(map(float, line.split()[1:4])) for line in truth_file.read_text().splitlines()
+             if line and line[0] != "#"]
+
+    def near(a, b):
+        return sum((p - q) ** 2 for p, q in zip(truth[a], truth[b])) <= 9.0
+
+    queries = [i for i in range(len(truth)) if any(near(i, j) for j in range(0, i - 49))]
+    rows = [line.split(",") for line in (folder / "loops.csv").read_text().splitlines()[1:]]
+    found = {int(q): (int(m), float(s)) for q, m, s, _ in rows}
+    right = {q for q, (m, _) in found.items() if near(q, m) and q - m >= 50}
+    wrong = [s for q, (m, s) in found.items() if q not in right]
+    over = [q for q in queries if q in right and found[q][1] > max(wrong, default=-1.0)]
+    accepted = [(int(q), int(m)) for q, m, _, a in rows if a == "1"]
+    return {"queries": len(queries), "recall": sum(q in right for q in queries) / len(queries),
+            "recall_full_precision": len(over) / len(queries), "accepted": len(accepted),
+            "accepted_right": sum(near(q, m) for q, m in accepted)}
+
+
+def go_icp_rows(stems, truth):
+    text = "| Go-ICP, neighbouring views, 130 stems | mean ms | p50 | p99 | right |\n|---|---|---|---|---|\n"
+    for name, mode, yaw, shift, stride in (
+            ("certified to 2 cm, ±1.5 m and ±15° around a wrong guess", "certified", 15, 1.5, 8),
+            ("certified to 2 cm, ±5 m and ±180°", "certified", 180, 5, 12),
+            ("the paper's mode, ±1.5 m and ±15°", "paper", 15, 1.5, 8)):
+        done = run(PROGRAM.parent / "benchmarks" / "stem_pairs", stems, truth, mode, yaw, shift,
+                   stride)
+        if done.code != 0:
+            return f"(stem_pairs cannot be run: {done.stderr.strip()[-200:]})\n"
+        r = json.loads(done.stdout)
+        text += (f"| {name} | {r['mean_ms']:.1f} | {r['p50_ms']:.1f} | {r['p99_ms']:.1f} | "
+                 f"{r['right']} of {r['pairs']} |\n")
+    return text
+
+
+def bench_real():
+    folder = data() / "wild_places_v03"
+    stems, truth = folder / "stems.csv.gz", folder / "trajectory.tum"
+    if not stems.exists():
+        return "The example data is not here (UNDERSTORY_DATA).\n"
+    with tempfile.TemporaryDirectory() as scratch:
+        out = Path(scratch) / "run"
+        told = corrected(stems, out)
+        before = understory_json("evaluate", out / "odometry.tum", truth, "--align", "se3")
+        after = understory_json("evaluate", out / "trajectory.tum", truth, "--align", "se3")
+        loops = loops_of(out, truth)
+    segments = [s for s in before["segments"] if s["length_m"] in (100, 200, 300, 400)]
+    quality = told["quality"]
+    rows = [
+        ("odometry, segments of 100 / 200 / 300 / 400 m, in plane",
+         " / ".join(f"{s['translation_plane_percent']:.2f}" for s in segments) + " %"),
+        ("the same in space", " / ".join(f"{s['translation_percent']:.1f}" for s in segments) + " %"),
+        ("APE in plane, aligned by SE(3): chained odometry / answer",
+         f"{before['ape_plane_rmse_m']:.2f} / {after['ape_plane_rmse_m']:.2f} m"),
+        ("the same in space", f"{before['ape_rmse_m']:.1f} / {after['ape_rmse_m']:.1f} m"),
+        (f"loops: recall@1 ({loops['queries']} queries) / at 100 % precision",
+         f"{loops['recall']:.3f} / {loops['recall_full_precision']:.3f}"),
+        ("loops accepted / right", f"{loops['accepted']} / {loops['accepted_right']}"),
+        ("beta, d, e_C of the map: after loops / after self-correction",
+         f"{quality['beta_before']:.4f}, {quality['box_dimension_before']:.2f}, "
+         f"{100 * quality['registration_noise_before_m']:.1f} cm / {quality['beta_after']:.4f}, "
+         f"{quality['box_dimension_after']:.2f}, {100 * quality['registration_noise_after_m']:.1f} cm"),
+        ("corrections", f"{told['counts']['corrections']} of {told['scans']} views"),
+        ("trees", str(told["counts"]["trees"])),
+        ("processor time, one thread / memory",
+         f"{told['process']['cpu_s']:.0f} s / {told['process']['peak_memory_mb']:.0f} MB"),
+    ]
+    text = f"{version()}, {machine()}\n\n| Wild-Places V-03 | |\n|---|---|\n"
+    text += "".join(f"| {name} | {value} |\n" for name, value in rows)
+    return text + "\n" + go_icp_rows(stems, truth)
+
+
+def put(name, text):
+    begin, end = f"<!-- {name}: ./run bench stems --write -->", f"<!-- end of {name} -->"
+    page = PAGE.read_text()
+    head, rest = page.split(begin, 1)
+    _, tail = rest.split(end, 1)
+    PAGE.write_text(f"{head}{begin}\n{text}{end}{tail}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", default="21-30", help="first-last")
+    parser.add_argument("--real", action="store_true", help="only the real forest")
+    parser.add_argument("--methods", action="store_true", help="only the made-up roads")
+    parser.add_argument("--write", action="store_true", help="into docs/sparse.md")
+    options = parser.parse_args()
+    first, last = map(int, options.seeds.split("-"))
+    tables = {}
+    if not options.methods:
+        tables["real forest"] = bench_real()
+    if not options.real:
+        tables["methods of correction"] = bench_methods(range(first, last + 1))
+    for name, text in tables.items():
+        print(text)
+        if options.write:
+            put(name, text)
+
+
+if __name__ == "__main__":
+    main()
