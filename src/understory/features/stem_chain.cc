@@ -118,6 +118,11 @@ class Grower {
         blocked = 0;
         continue;
       }
+      // Most sections begin nothing, and are left before their surroundings are looked at.
+      if (chain_.sections.size() == 1) {
+        if (++passed >= 2) return;
+        continue;
+      }
       const Sight sight = view_.look(level, place, 0.5 * config_.usual_radius_m);
       passed += sight == Sight::kPassed ? 1 : 0;
       blocked += sight == Sight::kHit ? 1 : 0;
@@ -127,15 +132,20 @@ class Grower {
 
   // The unused section of a level that lies best on the line.
   [[nodiscard]] int best_in(int level, const Eigen::Vector2d& place) const {
-    constexpr double kReach = 0.8;
+    // Far enough for the gate, given how well the line is known and how badly a section can be.
+    constexpr double kWorstSection = 0.06;
+    const Eigen::Matrix2d known = chain_.line.covariance_at(view_.height_at(level, place));
+    const double reach =
+        std::sqrt(kGate * (known.diagonal().maxCoeff() + kWorstSection * kWorstSection)) +
+        kMeanDepth * config_.usual_radius_m;
     const std::vector<int>& row = by_x_[static_cast<std::size_t>(level)];
-    auto it = std::lower_bound(row.begin(), row.end(), place.x() - kReach,
+    auto it = std::lower_bound(row.begin(), row.end(), place.x() - reach,
                                [&](int i, double x) { return at(i).surface.x() < x; });
     int best = -1;
     double least = kGate;
-    for (; it != row.end() && at(*it).surface.x() <= place.x() + kReach; ++it) {
+    for (; it != row.end() && at(*it).surface.x() <= place.x() + reach; ++it) {
       if (used_[static_cast<std::size_t>(*it)] != 0) continue;
-      if (std::abs(at(*it).surface.y() - place.y()) > kReach) continue;
+      if (std::abs(at(*it).surface.y() - place.y()) > reach) continue;
       const Centre& centre = centre_at(*it);
       const double height = at(*it).height_m;
       const Eigen::Vector2d off = centre.place - chain_.line.at(height);

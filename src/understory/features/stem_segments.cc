@@ -132,22 +132,25 @@ struct Chains {
   std::vector<StemChain> chains;
 };
 
-Chains chains_of(const SectionView& view) {
+// Most chains are branches whatever the ground is like under them.
+double score_without_ground(const SectionView& view, const Chains& all, const StemChain& chain) {
+  constexpr double kUsualStart = 0.3;
+  return stem_score(stem_traits(view, chain, all.config, kUsualStart));
+}
+
+Chains chains_of(const SectionView& view, double min_score) {
   Chains result;
   result.chains = chain_sections(view, result.config);
   for (StemChain& chain : result.chains)
     fit_chain(view, result.config, chain);
+  std::erase_if(result.chains, [&](const StemChain& chain) {
+    return score_without_ground(view, result, chain) < 0.05 * min_score;
+  });
   result.config = with_usual_radius(view, result.chains, result.config);
   result.config.slope_sd = usual_lean(result.chains, result.config.slope_sd);
   for (StemChain& chain : result.chains)
     fit_chain(view, result.config, chain);
   return result;
-}
-
-// Most chains are branches whatever the ground is like under them.
-double score_without_ground(const SectionView& view, const Chains& all, const StemChain& chain) {
-  constexpr double kUsualStart = 0.3;
-  return stem_score(stem_traits(view, chain, all.config, kUsualStart));
 }
 
 std::vector<StemSegment> segments_of(const SectionView& view, Chains& all,
@@ -208,7 +211,7 @@ StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& confi
     result.step = view.step_rad();
     result.range_sd_m = view.range_sd_m();
     if (view.sections().empty()) return result;
-    Chains all = chains_of(view);
+    Chains all = chains_of(view, config.min_score);
     const Eigen::Vector3d up = up_of(view, all);
     result.up = level.transpose() * up;
     // Stems look for each other along the upright: a wrong one loses some.
@@ -225,7 +228,7 @@ StemSegments find_stem_segments(const Points& cloud, const StemSegmentConfig& co
   result.levels = view.levels();
   result.step = view.spacing_m();
   if (view.sections().empty()) return result;
-  Chains all = chains_of(view);
+  Chains all = chains_of(view, config.min_score);
   result.usual_radius_m = all.config.usual_radius_m;
   result.stems = segments_of(view, all, cloud, Eigen::Matrix3d::Identity(), config.min_score);
   std::stable_sort(
