@@ -33,6 +33,7 @@ void merge(Gathered& tree, const Gathered& other) {
   a.point_in_world += d * m / (n + m);
   tree.squares += other.squares + d.head<2>().cwiseAbs2() * n * m / (n + m);
   tree.axes += other.axes;
+  tree.stem.axis_sights += other.stem.axis_sights;
   if (b.dbh_sights > 0) {
     const double k = a.dbh_sights;
     const double l = b.dbh_sights;
@@ -110,7 +111,10 @@ class Gatherer {
     const Eigen::Vector3d d = point - stem.point_in_world;
     stem.point_in_world += d / stem.sights;
     tree.squares += d.head<2>().cwiseProduct((point - stem.point_in_world).head<2>());
-    if (axis.allFinite()) tree.axes += axis.z() < 0.0 ? Eigen::Vector3d(-axis) : axis;
+    if (axis.allFinite()) {
+      tree.axes += axis.z() < 0.0 ? Eigen::Vector3d(-axis) : axis;
+      ++stem.axis_sights;
+    }
     if (!std::isfinite(dbh_m)) return;
     if (stem.dbh_sights == 0) stem.dbh_m = 0.0;
     ++stem.dbh_sights;
@@ -211,6 +215,12 @@ MappedStem finished(const Gathered& tree) {
   MappedStem stem = tree.stem;
   stem.variance_m2 = tree.squares / std::max(1, stem.sights - 1);
   if (tree.axes.norm() > 0.0) stem.axis_in_world = tree.axes.normalized();
+  if (stem.axis_sights > 1) {
+    // Of unit vectors near their mean, the mean's shortness is half the mean square angle.
+    const double shortness = 1.0 - tree.axes.norm() / stem.axis_sights;
+    stem.axis_noise_rad =
+        std::sqrt(2.0 * std::max(0.0, shortness) * stem.axis_sights / (stem.axis_sights - 1));
+  }
   if (stem.dbh_sights > 1)
     stem.dbh_sd_m = std::sqrt(tree.dbh_squares / (stem.dbh_sights - 1) / stem.dbh_sights);
   return stem;

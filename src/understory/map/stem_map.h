@@ -18,6 +18,9 @@ struct MappedStem {
   double dbh_sd_m = std::numeric_limits<double>::quiet_NaN();  // of the mean; needs two sights
   int dbh_sights = 0;
   int sights = 0;
+  // Root mean square angle between the axes of its sights and their mean; needs two with an axis.
+  double axis_noise_rad = std::numeric_limits<double>::quiet_NaN();
+  int axis_sights = 0;
   int first_view = 0;  // indices into the views
   int last_view = 0;
   // Share of the views in whose sector it lies that saw it; 0 if it was not asked for. What is no

@@ -53,6 +53,27 @@ TEST(StemMap, GathersEachTreeOnce) {
   }
 }
 
+// P1's vertical angular noise: sights lean to and fro about their tree by a known angle.
+TEST(StemMap, TellsTheNoiseOfTheAxes) {
+  std::vector<StemView> views;
+  constexpr double kLean = 0.04;
+  for (int i = 0; i < 200; ++i) {
+    Stem stem;
+    stem.point = Eigen::Vector3f(3.0F, 1.0F, 0.0F);
+    const double off = 0.03 + (i % 2 == 0 ? kLean : -kLean);
+    stem.axis = Eigen::Vector3d(std::sin(off), 0.0, std::cos(off)).cast<float>();
+    StemView view;
+    view.frame = i;
+    view.stems = {stem};
+    views.push_back(view);
+  }
+  const auto map = build_stem_map(views, std::vector<Pose>(views.size()), {});
+  ASSERT_EQ(map.size(), 1U);
+  EXPECT_EQ(map[0].axis_sights, 200);
+  EXPECT_NEAR(map[0].axis_noise_rad, kLean, 0.001);
+  EXPECT_NEAR(map[0].axis_in_world.x(), std::sin(0.03), 0.001);
+}
+
 struct Ring {
   std::vector<StemView> views;
   std::vector<Pose> poses;

@@ -121,6 +121,19 @@ double sight_noise_m(const std::vector<MappedStem>& stems) {
   return sights > 0.0 ? std::sqrt(sum / sights) : std::nan("");
 }
 
+// Root mean square angle between the axis of a sight and that of its tree: the vertical angular
+// noise of P1 table 1.
+double axis_noise_deg(const std::vector<MappedStem>& stems) {
+  double sum = 0.0;
+  double sights = 0.0;
+  for (const MappedStem& stem : stems) {
+    if (!std::isfinite(stem.axis_noise_rad)) continue;
+    sum += stem.axis_noise_rad * stem.axis_noise_rad * (stem.axis_sights - 1);
+    sights += stem.axis_sights - 1;
+  }
+  return sights > 0.0 ? std::sqrt(sum / sights) * 180.0 / M_PI : std::nan("");
+}
+
 // Steps that nothing vouches for: those without a match, and those with a weak one that no loop and
 // no correction bridges.
 std::size_t doubtful_steps(const CorrectionRun& run) {
@@ -212,6 +225,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
       std::count(run.correction.accepted.begin(), run.correction.accepted.end(), 1));
   summary.quality["path_length_m"] = path_length(run.correction.world_from_body);
   summary.quality["sight_noise_m"] = sight_noise_m(stems);
+  summary.quality["axis_noise_deg"] = axis_noise_deg(stems);
   add_self_correction(run, summary);
   if (request.scans != nullptr) {
     const SparseScans& scans = *request.scans;
