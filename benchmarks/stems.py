@@ -96,7 +96,7 @@ def bench_methods(seeds, length_m):
     for seed in seeds:
         with tempfile.TemporaryDirectory() as scratch:
             site = Path(scratch)
-            views = write_strip_roads(site, seed, Roads(length_m=length_m, step_m=0.8))
+            views = write_strip_roads(site, seed, Roads(length_m=length_m, step_m=1.0))
             for odometry in ODOMETRIES:
                 for method in METHODS:
                     row = measure(site, method, odometry)
@@ -194,7 +194,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", default="21-30", help="first-last")
-    parser.add_argument("--length-m", type=float, default=120.0, help="of each road")
+    parser.add_argument("--length-m", type=float, default=100.0, help="of each road")
     parser.add_argument("--real", action="store_true", help="only the real forest")
     parser.add_argument("--methods", action="store_true", help="only the made-up roads")
     parser.add_argument("--write", action="store_true", help="into docs/sparse.md")

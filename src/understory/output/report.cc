@@ -23,6 +23,7 @@ std::string report_html(const ReportInput& input) {
   html += stand_section(input);
   html += matching_section(input);
   html += loops_section(input);
+  html += correction_section(input);
   html += truth_section(input);
   html += time_section(input);
   html += made_section(input);

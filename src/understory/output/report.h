@@ -47,6 +47,21 @@ struct ReportTruth {
   std::vector<std::pair<std::string, std::string>> more;  // name, value with unit
 };
 
+// How a map of stems corrected itself (graph/self_correction.h).
+struct ReportCorrection {
+  struct Figure {
+    std::string name;  // with unit
+    double before = 0.0;
+    double after = 0.0;
+    int digits = 3;
+  };
+  using Pairs = std::vector<std::pair<double, double>>;  // later view, earlier view
+  std::vector<Figure> figures;
+  Pairs kept;
+  Pairs tried;  // and not kept
+  std::string ended;
+};
+
 // All that the report shows. What is empty is left out of the page.
 struct ReportInput {
   std::string title;      // name of the recording or cloud
@@ -54,10 +69,12 @@ struct ReportInput {
   RunSummary summary;
   const MapPicture* picture = nullptr;         // not owned
   const InventoryResult* inventory = nullptr;  // not owned
+  const std::vector<Tree>* trees = nullptr;    // not owned; without an inventory
   std::vector<ReportScan> scans;
   double sensor_period_ms = 0.0;  // 0: unknown
   std::vector<ReportLoop> loops;
   bool loop_closure_enabled = true;
+  std::optional<ReportCorrection> correction;
   std::optional<ReportTruth> truth;
   bool north_is_up = false;  // only where the world frame is east-north-up
 };

@@ -12,6 +12,10 @@
 namespace understory {
 namespace {
 
+const std::vector<Tree>* trees_of(const ReportInput& input) {
+  return input.inventory != nullptr ? &input.inventory->trees : input.trees;
+}
+
 constexpr double kWidth = 1100.0;
 
 // From metres of the world frame to the picture's units, y upwards.
@@ -40,8 +44,8 @@ View view_of(const ReportInput& input) {
   }
   for (const ReportScan& scan : input.scans)
     include(static_cast<double>(scan.position.x()), static_cast<double>(scan.position.y()));
-  if (input.inventory != nullptr) {
-    for (const Tree& tree : input.inventory->trees)
+  if (const std::vector<Tree>* trees = trees_of(input)) {
+    for (const Tree& tree : *trees)
       include(tree.x, tree.y);
   }
   View view;
@@ -128,10 +132,10 @@ std::string loops_svg(const std::vector<ReportLoop>& loops, const View& view) {
   return svg;
 }
 
-std::string trees_svg(const InventoryResult& inventory, const View& view) {
+std::string trees_svg(const std::vector<Tree>& trees, const View& view) {
   std::string svg;
   const auto out = std::back_inserter(svg);
-  for (const Tree& tree : inventory.trees) {
+  for (const Tree& tree : trees) {
     const double radius = std::isfinite(tree.dbh_m) ? 0.5 * tree.dbh_m : 0.1;
     fmt::format_to(
         out,
@@ -168,7 +172,7 @@ std::string north_arrow(const View& view) {
 
 std::string map_section(const ReportInput& input) {
   const View view = view_of(input);
-  if (input.picture == nullptr && input.scans.empty() && input.inventory == nullptr) return "";
+  if (input.picture == nullptr && input.scans.empty() && trees_of(input) == nullptr) return "";
   std::string svg = fmt::format(
       "<svg class=\"paper\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"map from "
       "above\" "
@@ -182,7 +186,7 @@ std::string map_section(const ReportInput& input) {
         view.x(p.x0()), view.y(p.y0() + p.height_m()), p.width_m() * view.scale,
         p.height_m() * view.scale, base64(p.png()));
   }
-  if (input.inventory != nullptr) svg += trees_svg(*input.inventory, view);
+  if (const std::vector<Tree>* trees = trees_of(input)) svg += trees_svg(*trees, view);
   svg += loops_svg(input.loops, view);
   svg += path_svg(input.scans, view);
   if (!input.scans.empty()) {
@@ -192,10 +196,13 @@ std::string map_section(const ReportInput& input) {
   svg += scale_bar(view);
   if (input.north_is_up) svg += north_arrow(view);
   svg += "</svg>";
-  std::string legend =
-      "<p class=\"legend\"><i class=\"box\" style=\"background:#9a9a9a\"></i>ground"
-      "<i class=\"box\" style=\"background:#4f9a4a\"></i>vegetation, the lighter the higher";
-  if (input.inventory != nullptr) {
+  std::string legend = "<p class=\"legend\">";
+  if (input.picture != nullptr) {
+    legend +=
+        "<i class=\"box\" style=\"background:#9a9a9a\"></i>ground"
+        "<i class=\"box\" style=\"background:#4f9a4a\"></i>vegetation, the lighter the higher";
+  }
+  if (trees_of(input) != nullptr) {
     legend += "<i class=\"dot\" style=\"border-color:#c0392b;background:#fff2c2\"></i>tree";
   }
   const auto entry = [&](const char* colour, const char* text) {

@@ -16,6 +16,7 @@ namespace understory {
 [[nodiscard]] std::string stand_section(const ReportInput& input);
 [[nodiscard]] std::string matching_section(const ReportInput& input);
 [[nodiscard]] std::string loops_section(const ReportInput& input);
+[[nodiscard]] std::string correction_section(const ReportInput& input);
 [[nodiscard]] std::string truth_section(const ReportInput& input);
 [[nodiscard]] std::string time_section(const ReportInput& input);
 [[nodiscard]] std::string made_section(const ReportInput& input);

@@ -98,6 +98,10 @@ std::string matching_section(const ReportInput& input) {
                            return 100.0 * static_cast<double>(s.inlier_ratio);
                          }))});
   html += "<h3>Share of a scan's points that found their place in the map</h3>" + svg_plot(plot);
+  const bool measured = std::any_of(input.scans.begin(), input.scans.end(), [](const auto& scan) {
+    return std::isfinite(scan.fitness_m2);
+  });
+  if (!measured) return html + "</section>\n";
   Plot fitness = plot;
   fitness.y_max = 0.0;
   fitness.y_label = "distance, cm";
@@ -119,8 +123,11 @@ std::string loops_section(const ReportInput& input) {
   if (input.loops.empty()) {
     return html +
            "<p>The path did not come back to a place that it had seen long before, or not "
-           "near enough to try. Errors that grew along the way are not corrected.</p>"
-           "</section>\n";
+           "near enough to try. " +
+           (input.correction && !input.correction->kept.empty()
+                ? "Errors that grew along the way are corrected by views matched again (below)."
+                : "Errors that grew along the way are not corrected.") +
+           "</p></section>\n";
   }
   const TimeAxis axis = time_axis(input);
   html += fmt::format(

@@ -10,6 +10,7 @@
 #include "understory/map/stem_map.h"
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/correction_report.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_truth.h"
 #include "understory/pipeline/scan_path.h"
@@ -240,48 +241,6 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   return summary;
 }
 
-ReportInput report_of(const CorrectionRequest& request, const CorrectionRun& run,
-                      const RunSummary& summary) {
-  ReportInput report;
-  report.title = request.stems.filename().string();
-  report.made_from = fmt::format("stems of {} views", run.views.size());
-  if (request.scans != nullptr) {
-    report.title = fs::path(request.scans->recording).filename().string();
-    report.made_from =
-        fmt::format("{}, {} scans, stems of {} views", request.scans->source->format(),
-                    request.scans->path.size(), run.views.size());
-    report.truth = compare_with_truth(request.run_folder, *request.scans->source);
-  }
-  report.summary = summary;
-  const auto samples = run.times.samples("scan");
-  for (std::size_t i = 0; i < run.views.size(); ++i) {
-    ReportScan scan;
-    scan.stamp = run.views[i].stamp;
-    scan.position = run.correction.world_from_body[i].translation().cast<float>();
-    if (i < samples.size()) scan.wall_ms = samples[i].wall_ms;
-    scan.inlier_ratio = static_cast<float>(i == 0 ? 1.0 : run.steps[i].overlap);
-    scan.weak = run.steps[i].status == SparseStepStatus::kWeak ||
-                run.steps[i].status == SparseStepStatus::kUnmatched;
-    report.scans.push_back(scan);
-  }
-  for (std::size_t k = 0; k < run.correction.loops.size(); ++k) {
-    const StemLoop& found = run.correction.loops[k];
-    if (!found.verified) continue;
-    const auto query = static_cast<std::size_t>(found.query);
-    const auto match = static_cast<std::size_t>(found.match);
-    ReportLoop loop;
-    loop.from = run.correction.world_from_body[match].translation();
-    loop.to = run.correction.world_from_body[query].translation();
-    loop.from_stamp = run.views[match].stamp;
-    loop.to_stamp = run.views[query].stamp;
-    loop.accepted = run.correction.accepted[k] != 0;
-    if (!loop.accepted) loop.reason = "contradicts the other loops";
-    report.loops.push_back(loop);
-  }
-  report.loop_closure_enabled = request.config.stems.close_loops;
-  return report;
-}
-
 }  // namespace
 
 CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionRun& run,
@@ -297,12 +256,13 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
     const ScopedTimer timer(run.times, "tree_map");
     stems = build_stem_map(run.views, run.correction.world_from_body, tree_list_config());
   }
+  const std::vector<Tree> trees = trees_of(stems);
   {
     const ScopedTimer timer(run.times, "writing");
     write_paths(request, run);
     write_loops(folder / "loops.csv", run);
     write_corrections(folder / "corrections.csv", run);
-    write_trees_csv(folder / "trees.csv", trees_of(stems));
+    write_trees_csv(folder / "trees.csv", trees);
   }
   RunSummary summary = summary_of(request, run, stems, log);
   summary.stages = summarise(run.times);
@@ -311,7 +271,7 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
     summary.wall_s += stage.total_wall_s;
   summary.cpu_s = process_cpu_seconds();
   summary.peak_memory_mb = peak_memory_mb();
-  write_report(folder / "report.html", report_of(request, run, summary));
+  write_report(folder / "report.html", correction_report(request, run, summary, trees));
   write_run_json(folder / "run.json", summary);
   CorrectionOutcome outcome;
   outcome.status = summary.status;
