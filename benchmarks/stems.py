@@ -13,6 +13,7 @@ columns of the table alone; `understory correct` never sees it. Everything runs 
 
 import argparse
 import json
+import os
 import statistics
 import sys
 import tempfile
@@ -30,7 +31,6 @@ ODOMETRIES = {"frame": "view to view, P0 (16)", "map": "view to local map"}
 
 
 def data():
-    import os
     return Path(os.environ.get("UNDERSTORY_DATA", TOP.parent / "shared" / "data"))
 
 
@@ -48,13 +48,12 @@ def longest_segment(errors):
     return max(errors["segments"], key=lambda s: s["length_m"])["translation_plane_percent"]
 
 
-def measure(site, method, odometry):
+def measure(site, method, odometry, best):
     folder = site / f"{odometry}-{method}"
     told = corrected(site / "stems.csv.gz", folder, f"correction.method={method}",
                      f"odometry.target={odometry}")
     path = understory_json("evaluate", folder, site / "truth", "--align", "se3")
     ours = understory_json("evaluate", "map", site / "stems.csv.gz", folder)
-    best = understory_json("evaluate", "map", site / "stems.csv.gz", site / "truth")
     quality = told["quality"]
     stage = told["stages"]["self_correction"]
     return {
@@ -91,20 +90,34 @@ def method_table(rows):
     return text
 
 
-def bench_methods(seeds, length_m):
+def measured_rows(seeds, length_m, keep):
     rows = []
     for seed in seeds:
         with tempfile.TemporaryDirectory() as scratch:
             site = Path(scratch)
             views = write_strip_roads(site, seed, Roads(length_m=length_m, step_m=1.0))
+            best = understory_json("evaluate", "map", site / "stems.csv.gz", site / "truth")
             for odometry in ODOMETRIES:
                 for method in METHODS:
-                    row = measure(site, method, odometry)
-                    rows.append({"seed": seed, "odometry": odometry, "method": method, **row})
+                    row = measure(site, method, odometry, best)
+                    rows.append({"seed": seed, "odometry": odometry, "method": method,
+                                 "views": views, **row})
+                    if keep:
+                        keep.write(json.dumps(rows[-1]) + "\n")
+                        keep.flush()
                     say(f"seed {seed} {odometry} {method}: e_C {100 * row['e_c']:.1f} cm, path "
                         f"{100 * row['plane_m']:.1f} cm")
-    head = (f"{version()}, seeds {seeds[0]} to {seeds[-1]} ({len(seeds)}), mean and in brackets the "
-            f"worst; three roads of {length_m:.0f} m, {views} views\n\n")
+    return rows
+
+
+def method_page(rows, length_m):
+    """Of the seeds that every method was measured on."""
+    wanted = len(METHODS) * len(ODOMETRIES)
+    seeds = sorted({r["seed"] for r in rows})
+    seeds = [s for s in seeds if sum(r["seed"] == s for r in rows) == wanted]
+    rows = [r for r in rows if r["seed"] in seeds]
+    head = (f"{version()}, seeds {', '.join(map(str, seeds))}: mean and in brackets the worst; three "
+            f"roads of {length_m:.0f} m, {rows[0]['views']} views\n\n")
     return head + method_table(rows)
 
 
@@ -197,6 +210,8 @@ def main():
     parser.add_argument("--length-m", type=float, default=100.0, help="of each road")
     parser.add_argument("--real", action="store_true", help="only the real forest")
     parser.add_argument("--methods", action="store_true", help="only the made-up roads")
+    parser.add_argument("--rows", help="file that keeps what was measured; its seeds are not "
+                        "measured again")
     parser.add_argument("--write", action="store_true", help="into docs/sparse.md")
     options = parser.parse_args()
     first, last = map(int, options.seeds.split("-"))
@@ -204,7 +219,14 @@ def main():
     if not options.methods:
         tables["real forest"] = bench_real()
     if not options.real:
-        tables["methods of correction"] = bench_methods(range(first, last + 1), options.length_m)
+        rows = []
+        if options.rows and Path(options.rows).exists():
+            rows = [json.loads(line) for line in Path(options.rows).read_text().splitlines()]
+        known = {r["seed"] for r in rows}
+        seeds = [seed for seed in range(first, last + 1) if seed not in known]
+        with open(options.rows or os.devnull, "a", encoding="utf-8") as keep:
+            rows += measured_rows(seeds, options.length_m, keep)
+        tables["methods of correction"] = method_page(rows, options.length_m)
     for name, text in tables.items():
         print(text)
         if options.write:
