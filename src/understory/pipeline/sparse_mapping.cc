@@ -34,6 +34,7 @@ class SparseRun {
  public:
   SparseRun(const SparseMappingRequest& request, Log& log)
       : request_(request),
+        log_(log),
         orderer_(request.config.time_repair, log),
         source_(open_source(request.recording, request.open, log)),
         front_end_(request.config.front_end),
@@ -53,6 +54,10 @@ class SparseRun {
       }
       while (auto ready = orderer_.pop()) {
         if (const auto* scan = std::get_if<ScanPtr>(&*ready)) take(**scan, progress);
+        if (std::holds_alternative<ImuSample>(*ready) && !told_of_imu_) {
+          log_.info("the sparse front end does not use the recording's IMU");
+          told_of_imu_ = true;
+        }
       }
     }
     if (kept() > 0) stems_.commit();
@@ -90,12 +95,14 @@ class SparseRun {
   }
 
   const SparseMappingRequest& request_;
+  Log& log_;
   EventOrderer orderer_;
   std::unique_ptr<Recording> source_;
   StemFrontEnd front_end_;
   StemsWriter stems_;
   std::vector<StampedPose> path_;  // of every scan
   StageTimes times_;
+  bool told_of_imu_ = false;
   std::vector<SparseStep> steps_;  // of the views that were kept
 };
 
