@@ -148,6 +148,16 @@ def rows_of(path):
     return list(csv.DictReader(gzip.open(path, "rt")))
 
 
+@cases.case("a walk with 128 rings")
+def walk(folder):
+    """Scans without a pause between them: what is taken out of one wrongly must not grow."""
+    done = sparse("sim:handheld?seed=5&duration_s=9", folder / "run")
+    assert done.returncode == 0, done.stderr
+    errors = evaluated(folder / "run", folder / "run.truth", "--align", "se3")
+    assert errors["length_m"] > 5 and errors["ape_plane_rmse_m"] < 0.1, errors
+    return f"{100 * errors['ape_plane_rmse_m']:.1f} cm over {errors['length_m']:.0f} m"
+
+
 @cases.case("stems without positions")
 def converted(folder):
     out = folder / "seen.csv.gz"

@@ -72,12 +72,14 @@ StemScan StemFrontEnd::add(const Scan& scan, const Rig& rig) {
   Vector6d motion = follows ? motion_per_s_ : Vector6d::Zero();
   if (follows && scan.has_point_times) {
     // The step of a first try says how the body moved up to this scan; the scan itself lies half a
-    // step later than the middle of that.
+    // step later than the middle of that. Where scans follow each other without a pause, what is
+    // taken out wrongly would come back larger by such an outlook, so there is none.
+    const bool pauses = to_seconds(scan.end() - scan.stamp) < 0.4 * since;
     SparseOdometry trial = odometry_;
     const SparseStep step = trial.track(view_of(scan, rig, found, motion));
     const Vector6d latest = (last_->world_from_body.inverse() * step.world_from_body).log() / since;
     if (step.status == SparseStepStatus::kTracked || step.status == SparseStepStatus::kSearched)
-      motion = 1.5 * latest - 0.5 * motion_per_s_;
+      motion = pauses ? Vector6d(1.5 * latest - 0.5 * motion_per_s_) : latest;
   }
   result.view = view_of(scan, rig, found, motion);
   result.motion_rad_s = motion.head<3>().norm();
