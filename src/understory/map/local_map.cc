@@ -18,6 +18,8 @@ void describe(ConfigTable& table, LocalMapConfig& config) {
   table.add("cell_sizes_m", config.cell_sizes_m, "m", "cells of the maps, coarse to fine");
   table.add("min_points", config.cells.min_points, {3, 1000}, "",
             "least points of a cell that has a distribution");
+  table.add("growth", config.cells.growth, {0.0, 1.0}, "",
+            "share of new points at which a cell's distribution is worked out again");
   table.add("sigma_floor_m", config.cells.sigma_floor_m, {1e-3, 1.0}, "m",
             "no surface is taken to be thinner");
   table.add("second_axis_weight", config.cells.second_axis_weight, {0.0, 1.0}, "",

@@ -326,6 +326,8 @@ TEST_F(OutputTest, RunJsonHasTheKeysThatOthersRead) {
   StageTimes times;
   times.add("scan", 10.0, 20.0);
   times.add("scan", 30.0, 40.0);
+  for (int i = 0; i < 205; ++i)
+    times.add("keyframe", 1.0, i < 20 ? 5.0 : 6.0);
   summary.stages = summarise(times);
   write_run_json(folder_ / "run.json", summary);
   const auto json = nlohmann::json::parse(content(folder_ / "run.json"));
@@ -333,6 +335,9 @@ TEST_F(OutputTest, RunJsonHasTheKeysThatOthersRead) {
   EXPECT_EQ(json["warnings"][0]["count"], 2);
   EXPECT_EQ(json["stages"]["scan"]["wall_ms"]["mean"], 20.0);
   EXPECT_EQ(json["stages"]["scan"]["cpu_ms"]["max"], 40.0);
+  EXPECT_FALSE(json["stages"]["scan"].contains("cpu_ms_by_tenth"));  // too few to tell
+  EXPECT_EQ(json["stages"]["keyframe"]["cpu_ms_by_tenth"],
+            nlohmann::json({5, 6, 6, 6, 6, 6, 6, 6, 6, 6}));
   EXPECT_EQ(json["config"]["ndt"]["voxel_size_m"], 0.5);
   EXPECT_EQ(json["config"]["ndt"]["method"], "ndt");
   EXPECT_EQ(json["config"]["ndt"]["on"], true);

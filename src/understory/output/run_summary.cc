@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "understory/output/atomic_file.h"
 
@@ -66,6 +67,18 @@ Json to_json(const YAML::Node& node) {
   return node.IsScalar() ? scalar_to_json(node) : Json(nullptr);
 }
 
+std::vector<double> means_by_tenth(const std::vector<double>& values) {
+  const std::size_t share = values.size() / 10;
+  if (share < 10) return {};
+  std::vector<double> means;
+  for (std::size_t k = 0; k < 10; ++k) {
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(k * share);
+    means.push_back(std::accumulate(first, first + static_cast<std::ptrdiff_t>(share), 0.0) /
+                    static_cast<double>(share));
+  }
+  return means;
+}
+
 }  // namespace
 
 std::string to_string(RunStatus status) {
@@ -89,8 +102,9 @@ std::map<std::string, StageSummary> summarise(const StageTimes& times) {
       wall.push_back(static_cast<double>(sample.wall_ms));
       cpu.push_back(static_cast<double>(sample.cpu_ms));
     }
+    std::vector<double> tenths = means_by_tenth(cpu);
     result[stage] = {distribution_of(std::move(wall)), distribution_of(std::move(cpu)),
-                     times.total_wall_ms(stage) * 1e-3};
+                     times.total_wall_ms(stage) * 1e-3, std::move(tenths)};
   }
   return result;
 }
@@ -118,6 +132,11 @@ std::string run_json(const RunSummary& summary) {
                             {"cpu_ms", to_json(stage.cpu_ms)},
                             {"runs", stage.wall_ms.count},
                             {"total_wall_s", number(stage.total_wall_s)}};
+    if (!stage.cpu_ms_by_tenth.empty()) {
+      Json& tenths = json["stages"][name]["cpu_ms_by_tenth"];
+      for (const double ms : stage.cpu_ms_by_tenth)
+        tenths.push_back(number(ms));
+    }
   }
   json["counts"] = to_json(summary.counts);
   json["quality"] = to_json(summary.quality);

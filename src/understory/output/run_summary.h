@@ -29,6 +29,9 @@ struct StageSummary {
   Distribution wall_ms;
   Distribution cpu_ms;
   double total_wall_s = 0.0;
+  // Mean CPU time of each tenth of the stage's runs in order, from 100 runs on: whether the work
+  // grows with the length of the run.
+  std::vector<double> cpu_ms_by_tenth = {};
 };
 [[nodiscard]] std::map<std::string, StageSummary> summarise(const StageTimes& times);
 

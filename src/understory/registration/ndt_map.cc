@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
+#include <limits>
 
 #include "understory/registration/ndt_cell.h"
 #include "understory/util/error.h"
@@ -16,6 +18,8 @@ void describe(ConfigTable& table, NdtMapConfig& config) {
             "edge of the cells of the normal distributions");
   table.add("min_points", config.min_points, {3, 1000}, "",
             "cells with fewer points are not matched");
+  table.add("growth", config.growth, {0.0, 1.0}, "",
+            "share of new points at which a cell's distribution is worked out again");
   table.add("sigma_floor_m", config.sigma_floor_m, {0.001, 1.0}, "m",
             "no surface is taken to be thinner; noise of the lidar and of the map's poses");
   table.add("second_axis_weight", config.second_axis_weight, {0.0, 1.0}, "",
@@ -34,6 +38,20 @@ namespace {
 
 std::uint64_t key_of(const std::array<int, 3>& cell) {
   return voxel_key(cell[0], cell[1], cell[2]);
+}
+
+// Calls `act` with the index of each flag that is set, in order; quick where few are.
+template <typename Act>
+void for_each_set(const std::vector<std::uint8_t>& flags, const Act& act) {
+  for (std::size_t i = 0; i < flags.size(); i += 8) {
+    const std::size_t count = std::min<std::size_t>(8, flags.size() - i);
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, &flags[i], count);
+    if (eight == 0) continue;
+    for (std::size_t k = i; k < i + count; ++k) {
+      if (flags[k] != 0) act(static_cast<std::uint32_t>(k));
+    }
+  }
 }
 
 // Which parts of a grid have changed, in blocks of cells.
@@ -75,9 +93,15 @@ struct NdtMapBuilder::State {
     std::uint32_t cell;
   };
 
+  struct Gathered {
+    CellMoments moments;  // of all points
+    double due = 0.0;     // so many are taken into the distribution, see NdtMapConfig::growth
+  };
+
   NdtMapConfig config;
   // Of each cell that has points.
-  std::vector<CellMoments> moments;
+  std::vector<Gathered> gathered;
+  std::vector<CellMoments> settled;  // as its distribution takes them
   std::vector<std::array<int, 3>> coordinates;
   std::vector<std::uint8_t> dirty;    // it has changed since the last snapshot
   std::vector<std::uint8_t> leans;    // its distribution rests on its neighbours too
@@ -88,6 +112,7 @@ struct NdtMapBuilder::State {
   std::vector<std::uint32_t> owner;  // of each of its cells, the cell here
   ChangedBlocks removed;             // since the last snapshot
   std::vector<Located> located;      // workspace
+  std::vector<std::uint32_t> due;    // workspace
 
   static constexpr std::uint32_t kNone = VoxelIndex::kNone;
 
@@ -95,9 +120,10 @@ struct NdtMapBuilder::State {
     const std::uint64_t key = key_of(at);
     const std::uint32_t found = index.find(key);
     if (found != kNone) return found;
-    const auto cell = static_cast<std::uint32_t>(moments.size());
+    const auto cell = static_cast<std::uint32_t>(gathered.size());
     index.set(key, cell);
-    moments.emplace_back();
+    gathered.emplace_back();
+    settled.emplace_back();
     coordinates.push_back(at);
     dirty.push_back(1);
     leans.push_back(0);
@@ -110,9 +136,10 @@ struct NdtMapBuilder::State {
     removed.add(coordinates[cell]);
     if (in_map[cell] != kNone) remove_from_map(in_map[cell]);
     index.erase(key_of(coordinates[cell]));
-    const auto last = static_cast<std::uint32_t>(moments.size() - 1);
+    const auto last = static_cast<std::uint32_t>(gathered.size() - 1);
     if (cell != last) {
-      moments[cell] = moments[last];
+      gathered[cell] = gathered[last];
+      settled[cell] = settled[last];
       coordinates[cell] = coordinates[last];
       dirty[cell] = dirty[last];
       leans[cell] = leans[last];
@@ -120,7 +147,8 @@ struct NdtMapBuilder::State {
       index.set(key_of(coordinates[cell]), cell);
       if (in_map[cell] != kNone) owner[in_map[cell]] = cell;
     }
-    moments.pop_back();
+    gathered.pop_back();
+    settled.pop_back();
     coordinates.pop_back();
     dirty.pop_back();
     leans.pop_back();
@@ -151,6 +179,14 @@ struct NdtMapBuilder::State {
     owner.pop_back();
   }
 
+  // Takes a cell's points into its distribution.
+  void settle(std::uint32_t cell) {
+    Gathered& points = gathered[cell];
+    settled[cell] = points.moments;
+    points.due = std::max(points.moments.n + 1.0, (1.0 + config.growth) * points.moments.n);
+    dirty[cell] = 1;
+  }
+
   // Makes `map` one that nobody else holds.
   void own_map() {
     if (map.use_count() > 1) {
@@ -169,7 +205,7 @@ struct NdtMapBuilder::State {
         for (int z = -reach; z <= reach; ++z) {
           const std::uint32_t found = index.find(voxel_key(at[0] + x, at[1] + y, at[2] + z));
           if (found != kNone)
-            total.add(moments[found], config.cell_size_m * Eigen::Vector3d(x, y, z));
+            total.add(settled[found], config.cell_size_m * Eigen::Vector3d(x, y, z));
         }
       }
     }
@@ -226,19 +262,24 @@ void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_
     s.located[i].cell = s.find_or_add(s.located[i].at);
   }
   for (std::size_t i = 0; i < count; ++i) {
-    __builtin_prefetch(&s.moments[s.located[std::min(i + kAhead, count - 1)].cell], 1);
+    __builtin_prefetch(&s.gathered[s.located[std::min(i + kAhead, count - 1)].cell], 1);
     const State::Located& point = s.located[i];
-    CellMoments& moments = s.moments[point.cell];
-    moments.add(point.from_center[0], point.from_center[1], point.from_center[2]);
-    if (rays) moments.add_ray(point.ray.x(), point.ray.y(), point.ray.z());
-    s.dirty[point.cell] = 1;
+    State::Gathered& cell = s.gathered[point.cell];
+    cell.moments.add(point.from_center[0], point.from_center[1], point.from_center[2]);
+    if (rays) cell.moments.add_ray(point.ray.x(), point.ray.y(), point.ray.z());
+    if (cell.moments.n < cell.due) continue;
+    cell.due = std::numeric_limits<double>::infinity();  // once is enough
+    s.due.push_back(point.cell);
   }
+  for (const std::uint32_t cell : s.due)
+    s.settle(cell);
+  s.due.clear();
 }
 
 void NdtMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m) {
   State& s = *state_;
   const double size = s.config.cell_size_m;
-  for (std::uint32_t c = 0; c < s.moments.size();) {
+  for (std::uint32_t c = 0; c < s.gathered.size();) {
     const std::array<int, 3>& at = s.coordinates[c];
     const Eigen::Vector3d middle =
         size * (Eigen::Vector3d(at[0], at[1], at[2]) + Eigen::Vector3d::Constant(0.5));
@@ -255,23 +296,21 @@ NdtMapPtr NdtMapBuilder::snapshot() {
   s.own_map();
   ChangedBlocks blocks = std::move(s.removed);
   s.removed.clear();
-  for (std::size_t c = 0; c < s.moments.size(); ++c) {
-    if (s.dirty[c] != 0) blocks.add(s.coordinates[c]);
-  }
+  for_each_set(s.dirty, [&](std::uint32_t c) { blocks.add(s.coordinates[c]); });
+  for_each_set(s.leans, [&](std::uint32_t c) {
+    if (s.dirty[c] == 0 && blocks.may_reach(s.coordinates[c])) s.dirty[c] = 1;
+  });
   std::vector<std::uint32_t> changed;
-  for (std::uint32_t c = 0; c < s.moments.size(); ++c) {
-    const bool affected =
-        s.dirty[c] != 0 || (s.leans[c] != 0 && blocks.may_reach(s.coordinates[c]));
-    if (!affected) continue;
+  for_each_set(s.dirty, [&](std::uint32_t c) {
     s.dirty[c] = 0;
-    if (s.moments[c].n < s.config.min_points) continue;
+    if (s.settled[c].n < s.config.min_points) return;
     changed.push_back(c);
     if (s.in_map[c] == State::kNone) s.add_to_map(c);
-  }
+  });
   parallel_for(changed.size(), 256, [&](std::size_t i) {
     const std::uint32_t c = changed[i];
     s.leans[c] = 0;
-    s.map->cells_[s.in_map[c]] = internal::make_cell(s.moments[c], s.config, [&](int reach) {
+    s.map->cells_[s.in_map[c]] = internal::make_cell(s.settled[c], s.config, [&](int reach) {
       s.leans[c] = 1;
       return s.around(c, reach);
     });

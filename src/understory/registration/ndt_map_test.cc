@@ -185,6 +185,38 @@ TEST(NdtMap, GrowingIsTheSameAsBuildingAtOnce) {
   expect_same_cells(*last, *expected);
 }
 
+// One cell gets 100 points, 5 more, 6 more; the distribution is that of 100, 100, 111 points.
+TEST(NdtMap, DistributionsWaitUntilTheirPointsHaveGrown) {
+  Random random(9);
+  const auto some = [&](int n) {
+    Points points;
+    for (int i = 0; i < n; ++i)
+      points.push_back({static_cast<float>(random.uniform(0.1, 0.9)),
+                        static_cast<float>(random.uniform(0.1, 0.9)), 0.5F});
+    return points;
+  };
+  NdtMapConfig config;
+  config.growth = 0.1;
+  NdtMapBuilder patient(config);
+  NdtMapBuilder often(config);
+  config.growth = 0.0;
+  NdtMapBuilder prompt(config);
+  std::uint32_t total = 0;
+  std::uint32_t settled = 0;
+  for (const int n : {100, 5, 6}) {
+    const Points points = some(n);
+    patient.insert(points, Pose());
+    often.insert(points, Pose());
+    prompt.insert(points, Pose());
+    total += static_cast<std::uint32_t>(n);
+    if (total != 105) settled = total;
+    EXPECT_EQ(often.snapshot()->find(0, 0, 0)->count, settled);
+    EXPECT_EQ(prompt.snapshot()->find(0, 0, 0)->count, total);
+  }
+  // When snapshots are taken makes no difference.
+  EXPECT_EQ(patient.snapshot()->find(0, 0, 0)->mean, often.snapshot()->find(0, 0, 0)->mean);
+}
+
 TEST(NdtMap, ASnapshotThatSomebodyHoldsDoesNotChange) {
   NdtMapBuilder builder({});
   builder.insert(random_points(2'000, 5), Pose());
