@@ -3,7 +3,13 @@
 #include <cmath>
 
 namespace understory {
+namespace {
 
+// Of the accelerations that the motion model allows for between scans: a path that may bend more
+// within one follows the noise of sparse scans.
+constexpr double kBendShare = 1.0 / 3.0;
+
+}  // namespace
 void describe(ConfigTable& table, DenseOdometryConfig& config) {
   table.section("preprocess", [&] {
     table.section("voxel", [&] { describe(table, config.voxel); });
@@ -23,6 +29,8 @@ void describe(ConfigTable& table, DenseOdometryConfig& config) {
               "weight of the prediction inside the match");
   });
   table.section("motion", [&] {
+    table.add("elastic_scans", config.elastic_scans,
+              "without an IMU: match the first and the last pose of a scan together");
     table.add("imu_enabled", config.imu_enabled, "use the IMU of the recording");
     describe(table, config.motion);
   });
@@ -48,8 +56,11 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const LocalMapSnapshot& l
   const double cpu_start = process_cpu_seconds();
   {
     const ScopedTimer timer(times_, "odometry");
-    preprocess(scan, estimate);
+    const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, scan.end());
+    preprocess(scan, guess, estimate);
     if (!local_map.empty()) match(local_map, motion_->predict(scan.stamp), estimate);
+    if (config_.elastic_scans && estimate.matched && by_scans_alone())
+      match_elastically(scan, *local_map.back(), guess, estimate);
     std::optional<LidarFactor> factor;
     if (estimate.matched) {
       factor = LidarFactor{estimate.match.target_from_source, estimate.match.fitness_m2,
@@ -67,13 +78,36 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const LocalMapSnapshot& l
   return estimate;
 }
 
-void DenseOdometry::preprocess(const Scan& scan, DenseEstimate& estimate) {
+void DenseOdometry::preprocess(const Scan& scan, const std::vector<StampedPose>& path,
+                               DenseEstimate& estimate) {
   const ScopedTimer timer(times_, "preprocess");
-  std::vector<std::uint8_t> keep;
-  if (!boxes_.empty()) keep = outside_machine(scan, rig_, boxes_);
-  const std::vector<StampedPose> path = motion_->predict_path(scan.stamp, scan.end());
-  estimate.cloud = deskew(scan, rig_, path, keep, config_.deskew).cloud;
-  estimate.thinned = filter_.filter(estimate.cloud, config_.voxel).points;
+  keep_.clear();
+  if (!boxes_.empty()) keep_ = outside_machine(scan, rig_, boxes_);
+  estimate.cloud = deskew(scan, rig_, path, keep_, config_.deskew).cloud;
+  estimate.thinned = filter_.filter(estimate.cloud, config_.voxel);
+}
+
+bool DenseOdometry::by_scans_alone() const {
+  if (!uses_imu_) return true;
+  const ImuTrust trust = motion_->imu_trust();
+  return !trust.usable || trust.on_probation;
+}
+
+void DenseOdometry::match_elastically(const Scan& scan, const NdtMap& target,
+                                      const std::vector<StampedPose>& guess,
+                                      DenseEstimate& estimate) {
+  const ScopedTimer timer(times_, "matching_elastic");
+  const TimeNs duration = scan.end() - scan.stamp;
+  if (duration <= 0) return;
+  const Pose start = estimate.match.target_from_source;
+  const ScanPathConfig path_config{kBendShare * config_.motion.motion_accel_sigma_m_s2,
+                                   kBendShare * config_.motion.motion_angular_accel_sigma_rad_s2};
+  const ScanPathCorrection correction =
+      match_scan_path(target, estimate.thinned, duration, start, config_.ndt, path_config);
+  if (correction.iterations == 0) return;
+  const std::vector<StampedPose> path = corrected_path(guess, start, duration, correction);
+  preprocess(scan, path, estimate);
+  estimate.match.target_from_source = path.front().world_from_body;
 }
 
 void DenseOdometry::match(const LocalMapSnapshot& local_map, const NavState& predicted,
@@ -88,7 +122,7 @@ void DenseOdometry::match(const LocalMapSnapshot& local_map, const NavState& pre
     prior = PosePrior{predicted.world_from_body, config_.prior_weight * loose.inverse()};
   }
   const std::span<const NdtMapPtr> maps(local_map);
-  estimate.match = register_ndt(coarse ? maps : maps.last(1), estimate.thinned,
+  estimate.match = register_ndt(coarse ? maps : maps.last(1), estimate.thinned.points,
                                 predicted.world_from_body, prior, config_.ndt);
   const double found = estimate.match.inlier_ratio;
   estimate.matched = estimate.match.usable() && found >= config_.min_inlier_ratio;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/odometry/motion_model.h"
+#include "understory/odometry/scan_path.h"
 #include "understory/preprocess/body_cloud.h"
 #include "understory/preprocess/deskew.h"
 #include "understory/preprocess/machine_boxes.h"
@@ -41,6 +42,9 @@ struct DenseOdometryConfig {
   // Weight of the prediction in the match, 0 = it is only the start. In directions that a scan
   // leaves undetermined the prior keeps the match from wandering.
   double prior_weight = 0.0;
+  // Where no IMU tells of the motion: the first and the last pose of a scan are matched together,
+  // see scan_path.h.
+  bool elastic_scans = true;
 };
 void describe(ConfigTable& table, DenseOdometryConfig& config);
 
@@ -51,7 +55,7 @@ struct DenseEstimate {
   RegistrationResult match;  // status kTooFewPoints where there was no map to match to
   bool matched = false;      // the match was usable and was offered to the motion model
   BodyCloud cloud;           // every return outside the machine, deskewed, body frame at the stamp
-  Points thinned;            // what was matched, body frame at the stamp
+  BodyCloud thinned;         // what was matched, of the cloud
   double wall_ms = 0.0;
   double cpu_ms = 0.0;
 };
@@ -81,7 +85,12 @@ class DenseOdometry {
   void load(BinaryReader& reader);
 
  private:
-  void preprocess(const Scan& scan, DenseEstimate& estimate);
+  // The cloud deskewed along a path, and thinned.
+  void preprocess(const Scan& scan, const std::vector<StampedPose>& path, DenseEstimate& estimate);
+  // Whether no IMU tells of the motion.
+  [[nodiscard]] bool by_scans_alone() const;
+  void match_elastically(const Scan& scan, const NdtMap& target,
+                         const std::vector<StampedPose>& guess, DenseEstimate& estimate);
   void match(const LocalMapSnapshot& local_map, const NavState& predicted, DenseEstimate& estimate);
 
   DenseOdometryConfig config_;
@@ -92,7 +101,8 @@ class DenseOdometry {
   std::vector<MachineBox> boxes_;
   VoxelFilter filter_;
   bool last_matched_ = false;
-  double usual_inliers_ = 0.0;  // running mean of the inlier ratio of matches; 0: none yet
+  std::vector<std::uint8_t> keep_;  // workspace: points of the scan outside the machine
+  double usual_inliers_ = 0.0;      // running mean of the inlier ratio of matches; 0: none yet
 };
 
 }  // namespace understory

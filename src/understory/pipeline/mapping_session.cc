@@ -320,7 +320,7 @@ void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& recor
 Points MappingSession::map_points(const DenseEstimate& estimate) {
   VoxelFilterConfig voxel = config_.odometry.voxel;
   voxel.voxel_size_m = std::min(voxel.voxel_size_m, config_.keyframe_map.keyframe.voxel_size_m);
-  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m) return estimate.thinned;
+  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m) return estimate.thinned.points;
   return cloud_filter_.filter(estimate.cloud, voxel).points;
 }
 
