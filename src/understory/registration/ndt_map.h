@@ -15,10 +15,11 @@
 namespace understory {
 
 struct NdtMapConfig {
-  double cell_size_m = 1.0;     // edge of a cell
-  int min_points = 5;           // cells with fewer have no distribution
+  double cell_size_m = 1.0;  // edge of a cell
+  int min_points = 5;        // cells with fewer have no distribution
   // A cell's distribution is worked out again once its points have grown by this share: what a few
-  // more among many tell is not worth the time, and grows with the time spent at a place. 0: always.
+  // more among many tell is not worth the time, and grows with the time spent at a place. 0:
+  // always.
   double growth = 0.1;
   double sigma_floor_m = 0.03;  // a surface is never taken to be thinner: sensor and pose noise
   double second_axis_weight = 0.25;  // of a cell's second thinnest direction, 0..1
