@@ -111,6 +111,10 @@ ScanPathCorrection match_scan_path(const NdtMap& target, const BodyCloud& source
     const double moved = std::max(step.segment<3>(3).norm(), step.tail<3>().norm());
     if (turned < ndt.step_rotation_rad && moved < ndt.step_translation_m) break;
   }
+  const double limit = config.most_sigmas * config.most_sigmas;
+  for (const Vector6d& end : {correction.at_start, correction.at_end}) {
+    if (end.cwiseProduct(information).dot(end) > limit) return {};
+  }
   return correction;
 }
 

@@ -15,6 +15,9 @@ struct ScanPathConfig {
   double accel_sigma_m_s2 = 1.0;
   double angular_accel_sigma_rad_s2 = 2.0;
   int max_iterations = 8;
+  // A bend of so many sigma is no motion but a match gone astray in a direction that the scan
+  // leaves open.
+  double most_sigmas = 6.0;
 };
 
 // Corrections of a path over one scan: right perturbations of the pose at its first moment, turned
@@ -22,7 +25,7 @@ struct ScanPathConfig {
 struct ScanPathCorrection {
   Vector6d at_start = Vector6d::Zero();
   Vector6d at_end = Vector6d::Zero();
-  int iterations = 0;
+  int iterations = 0;  // 0: none was found, and the others are zero
 };
 
 // Where the motion within a scan is a guess, as it is without an IMU, a rigid match averages over
