@@ -13,7 +13,6 @@ are against the recording's truth; CPU and wall time a scan are without reading.
 
 import argparse
 import json
-import shutil
 import sys
 import tempfile
 import time
@@ -134,11 +133,8 @@ def main():
     parser.add_argument("--only", nargs="+", help="names as in the table")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
-    work = Path(tempfile.mkdtemp(prefix="understory-peers-"))
-    try:
-        text = "\n".join(measure(site, options, work) for site in options.sites)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix="understory-peers-") as scratch:
+        text = "\n".join(measure(site, options, Path(scratch)) for site in options.sites)
     print(text)
     if options.write:
         write_results(text)

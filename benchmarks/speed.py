@@ -13,7 +13,6 @@ rounds is given. Accuracy is against the recording's truth (REC.truth), aligned 
 
 import argparse
 import json
-import shutil
 import statistics
 import sys
 import tempfile
@@ -129,8 +128,8 @@ def main():
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
-    work = Path(tempfile.mkdtemp(prefix="understory-bench-"))
-    try:
+    with tempfile.TemporaryDirectory(prefix="understory-bench-") as scratch:
+        work = Path(scratch)
         recording, what = options.recording, str(options.recording)
         if recording is None:
             recording = work / "bench.mcap"
@@ -139,8 +138,6 @@ def main():
             understory("simulate", options.site, "-o", recording, "--seed", options.seed,
                        "--duration-s", options.duration_s)
         text = render(measure(recording, options, work), what)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
     print(text)
     if options.write:
         write_results(text)
