@@ -57,18 +57,6 @@ void add_right(StemBand& band, const StemSegment& stem, const Tree& tree, const 
 
 }  // namespace
 
-TestFrames::TestFrames(const SiteConfig& site_config)
-    : config(site_config),
-      seed(static_cast<std::uint64_t>(config.seed)),
-      route(config.carrier, seed),
-      terrain(config.terrain, 0.5 * config.stand.size_x_m + 12.0,
-              0.5 * config.stand.size_y_m + 12.0, seed, &route),
-      stand(grow_stand(config.stand, config.carrier, terrain, route, seed)),
-      plan(plan_carrier(config, route, terrain)),
-      scene(config.stand, terrain, stand, seed, config.terrain.snow_m),
-      machine(config.carrier, plan),
-      scanner(config, scene, plan.path, machine, 0) {}
-
 Pose TestFrames::world_from_lidar(const Scan& scan, double after_s) const {
   return plan.path.pose(to_seconds(scan.stamp) + after_s) * scanner.body_from_lidar();
 }

@@ -8,33 +8,20 @@
 #include <vector>
 
 #include "understory/features/stem_segments.h"
-#include "understory/simulation/carrier.h"
-#include "understory/simulation/machine.h"
-#include "understory/simulation/route.h"
 #include "understory/simulation/scanner.h"
-#include "understory/simulation/scene.h"
-#include "understory/simulation/site.h"
-#include "understory/simulation/stand.h"
-#include "understory/simulation/terrain.h"
+#include "understory/simulation/world.h"
 
 namespace understory {
 
 // A simulated site whose frames and truth are at hand, for tests and benchmarks.
-struct TestFrames {
-  explicit TestFrames(const SiteConfig& site_config);
+struct TestFrames : SimulatedWorld {
+  explicit TestFrames(const SiteConfig& config)
+      : SimulatedWorld(config), scanner(site, scene, plan.path, machine, 0) {}
 
   // World from the lidar, seconds after the frame's stamp.
   [[nodiscard]] Pose world_from_lidar(const Scan& scan, double after_s) const;
   [[nodiscard]] double duration_s() const { return plan.path.duration_s() - 0.5; }
 
-  SiteConfig config;
-  std::uint64_t seed;
-  Route route;
-  Terrain terrain;
-  Stand stand;
-  CarrierPlan plan;
-  ForestScene scene;
-  Machine machine;
   Scanner scanner;
 };
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <numbers>
 
+#include "understory/simulation/world.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -16,18 +17,9 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 
 // A scanner with all that it needs, without noise.
-struct World {
-  explicit World(const SiteConfig& site)
-      : config(site),
-        seed(static_cast<std::uint64_t>(site.seed)),
-        route(site.carrier, seed),
-        terrain(site.terrain, 0.5 * site.stand.size_x_m + 5.0, 0.5 * site.stand.size_y_m + 5.0,
-                seed),
-        stand(grow_stand(site.stand, site.carrier, terrain, route, seed)),
-        plan(plan_carrier(site, route, terrain)),
-        scene(site.stand, terrain, stand, seed),
-        machine(site.carrier, plan),
-        scanner(site, scene, plan.path, machine, 0) {}
+struct World : SimulatedWorld {
+  explicit World(const SiteConfig& config)
+      : SimulatedWorld(config), scanner(site, scene, plan.path, machine, 0) {}
 
   [[nodiscard]] Eigen::Vector3d in_world(const Scan& scan, const ScanPoint& point) const {
     const Pose world_from_lidar =
@@ -35,14 +27,6 @@ struct World {
     return world_from_lidar * Eigen::Vector3d(point.x, point.y, point.z);
   }
 
-  SiteConfig config;
-  std::uint64_t seed;
-  Route route;
-  Terrain terrain;
-  Stand stand;
-  CarrierPlan plan;
-  ForestScene scene;
-  Machine machine;
   Scanner scanner;
 };
 

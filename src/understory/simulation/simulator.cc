@@ -6,27 +6,16 @@
 #include <cstring>
 #include <limits>
 
-#include "understory/simulation/carrier.h"
 #include "understory/simulation/inertial.h"
-#include "understory/simulation/machine.h"
 #include "understory/simulation/magnetometer.h"
-#include "understory/simulation/route.h"
 #include "understory/simulation/satellite.h"
 #include "understory/simulation/scan_cache.h"
 #include "understory/simulation/scanner.h"
-#include "understory/simulation/scene.h"
-#include "understory/simulation/stand.h"
-#include "understory/simulation/terrain.h"
 #include "understory/simulation/truth.h"
+#include "understory/simulation/world.h"
 
 namespace understory {
 namespace {
-
-constexpr double kTerrainMargin = 12.0;  // of ground around the stand, metres
-
-std::uint64_t seed_of(const SiteConfig& site) {
-  return static_cast<std::uint64_t>(site.seed);
-}
 
 bool same_readings(const ScanReadings& a, const ScanReadings& b) {
   if (a.beams.size() != b.beams.size() || a.stems.size() != b.stems.size()) return false;
@@ -45,18 +34,11 @@ void note(TopicReport& report, TimeNs stamp) {
 
 }  // namespace
 
-class Simulator::Impl {
+class Simulator::Impl : public SimulatedWorld {
  public:
   explicit Impl(const SiteConfig& config)
-      : site(config),
+      : SimulatedWorld(config),
         start(from_start(config.origin.start_time_s)),
-        route(config.carrier, seed_of(config)),
-        terrain(config.terrain, 0.5 * config.stand.size_x_m + kTerrainMargin,
-                0.5 * config.stand.size_y_m + kTerrainMargin, seed_of(config), &route),
-        stand(grow_stand(config.stand, config.carrier, terrain, route, seed_of(config))),
-        plan(plan_carrier(config, route, terrain)),
-        scene(config.stand, terrain, stand, seed_of(config), config.terrain.snow_m),
-        machine(config.carrier, plan),
         scanner(config, scene, plan.path, machine, start),
         imu(config, plan.path, start, plan.shocks_s),
         gnss(config, plan.path, scene, start),
@@ -115,16 +97,9 @@ class Simulator::Impl {
     }
   }
 
-  const SiteConfig site;
   const TimeNs start;
   double duration_s = 0.0;
   TimeNs end = 0;
-  const Route route;
-  const Terrain terrain;
-  const Stand stand;
-  const CarrierPlan plan;
-  ForestScene scene;
-  const Machine machine;
   Scanner scanner;
   InertialSensor imu;
   SatelliteReceiver gnss;

@@ -1,0 +1,21 @@
+#include "understory/simulation/world.h"
+
+namespace understory {
+namespace {
+
+constexpr double kTerrainMargin = 12.0;  // metres of ground around the stand's rectangle
+
+}  // namespace
+
+SimulatedWorld::SimulatedWorld(const SiteConfig& config)
+    : site(config),
+      seed(static_cast<std::uint64_t>(config.seed)),
+      route(config.carrier, seed),
+      terrain(config.terrain, 0.5 * config.stand.size_x_m + kTerrainMargin,
+              0.5 * config.stand.size_y_m + kTerrainMargin, seed, &route),
+      stand(grow_stand(config.stand, config.carrier, terrain, route, seed)),
+      plan(plan_carrier(config, route, terrain)),
+      scene(config.stand, terrain, stand, seed, config.terrain.snow_m),
+      machine(config.carrier, plan) {}
+
+}  // namespace understory

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+
+#include "understory/simulation/carrier.h"
+#include "understory/simulation/machine.h"
+#include "understory/simulation/route.h"
+#include "understory/simulation/scene.h"
+#include "understory/simulation/site.h"
+#include "understory/simulation/stand.h"
+#include "understory/simulation/terrain.h"
+
+namespace understory {
+
+// A site made real: all that its sensors meet and the carrier that they ride on. Members are made
+// in this order and refer to each other: it stays where it is.
+struct SimulatedWorld {
+  // Throws InputError for a list of trees that cannot be read.
+  explicit SimulatedWorld(const SiteConfig& config);
+  SimulatedWorld(const SimulatedWorld&) = delete;
+  SimulatedWorld& operator=(const SimulatedWorld&) = delete;
+
+  const SiteConfig site;
+  const std::uint64_t seed;
+  const Route route;
+  const Terrain terrain;
+  const Stand stand;
+  const CarrierPlan plan;
+  ForestScene scene;
+  const Machine machine;
+};
+
+}  // namespace understory
