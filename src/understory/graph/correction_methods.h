@@ -31,8 +31,4 @@ void correct_by_pose_graph(const CorrectionViews& views, const SelfCorrectionCon
 void correct_by_expected_gain(const CorrectionViews& views, const SelfCorrectionConfig& config,
                               SelfCorrectionResult& result);
 
-// Odometry as edges between the poses given, with the problem's covariances of the steps.
-[[nodiscard]] PoseGraphProblem chain_problem(const SelfCorrectionProblem& problem,
-                                             const std::vector<Pose>& world_from_view);
-
 }  // namespace understory

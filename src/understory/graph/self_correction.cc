@@ -108,6 +108,16 @@ int correction_budget(std::size_t views, const SelfCorrectionConfig& config) {
                   static_cast<int>(config.largest_share * static_cast<double>(views)));
 }
 
+PoseGraphProblem chain_problem(const SelfCorrectionProblem& problem,
+                               const std::vector<Pose>& world_from_view) {
+  PoseGraphProblem graph;
+  graph.world_from_keyframe = world_from_view;
+  for (std::size_t i = 1; i < world_from_view.size(); ++i)
+    graph.odometry.push_back({static_cast<int>(i) - 1, static_cast<int>(i), problem.steps[i],
+                              problem.step_covariances[i]});
+  return graph;
+}
+
 SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
                                   const SelfCorrectionConfig& config) {
   UNDERSTORY_CHECK(problem.views.size() == problem.world_from_view.size());

@@ -106,4 +106,8 @@ struct [[nodiscard]] SelfCorrectionResult {
 SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
                                   const SelfCorrectionConfig& config);
 
+// Odometry as edges between the poses given, with the problem's covariances of the steps.
+[[nodiscard]] PoseGraphProblem chain_problem(const SelfCorrectionProblem& problem,
+                                             const std::vector<Pose>& world_from_view);
+
 }  // namespace understory

@@ -76,7 +76,8 @@ struct ReportInput {
   bool loop_closure_enabled = true;
   std::optional<ReportCorrection> correction;
   std::optional<ReportTruth> truth;
-  bool north_is_up = false;  // only where the world frame is east-north-up
+  std::vector<std::string> remarks;  // what to distrust in results of this kind
+  bool north_is_up = false;          // only where the world frame is east-north-up
 };
 
 // One self-contained page: no network, no scripts needed to read it (one small script sorts the

@@ -139,7 +139,11 @@ std::string figures_section(const ReportInput& input) {
                  "of recording");
     html += tile(count_text(input.summary.scans), "scans");
   }
-  if (input.inventory != nullptr) html += stand_tiles(*input.inventory);
+  if (input.inventory != nullptr) {
+    html += stand_tiles(*input.inventory);
+  } else if (input.trees != nullptr) {
+    html += tile(count_text(input.trees->size()), "trees");
+  }
   const auto scan = input.summary.stages.find("scan");
   if (scan != input.summary.stages.end()) {
     html +=
@@ -172,13 +176,15 @@ std::string distrust_section(const ReportInput& input) {
     for (const std::string& remark : input.inventory->remarks)
       add(remark, "");
   }
+  for (const std::string& remark : input.remarks)
+    add(remark, "");
   if (!input.scans.empty() && !input.loop_closure_enabled) {
     add("Loop closure was switched off.", "Places seen twice need not lie on each other.");
   }
   if (!input.scans.empty() && input.summary.crs_wkt.empty() && !input.north_is_up) {
     add("The map is in a local frame: without satellite positions its heading and place on the "
         "earth are arbitrary.",
-        "Distances and heights within it hold.");
+        input.remarks.empty() ? "Distances and heights within it hold." : "");
   }
   if (items.empty()) {
     items = "<li>Nothing stood out: no warning was given during processing.</li>";

@@ -193,7 +193,9 @@ std::string truth_section(const ReportInput& input) {
 
 std::string time_section(const ReportInput& input) {
   std::string html;
-  if (!input.scans.empty()) {
+  const bool timed = std::any_of(input.scans.begin(), input.scans.end(),
+                                 [](const ReportScan& scan) { return scan.wall_ms > 0.0F; });
+  if (timed) {
     const TimeAxis axis = time_axis(input);
     Plot plot;
     plot.x_label = axis.label;

@@ -233,12 +233,12 @@ std::string single_trees(const InventoryResult& inventory) {
   return html + "</div>";
 }
 
-std::string diameters(const InventoryResult& inventory) {
+std::string diameters(const std::vector<Tree>& trees) {
   Histogram histogram;
   histogram.x_label = "diameter at 1.3 m, cm";
   histogram.y_label = "trees";
   histogram.step = 4.0;
-  for (const Tree& tree : inventory.trees) {
+  for (const Tree& tree : trees) {
     if (!std::isfinite(tree.dbh_m)) continue;
     const auto bin = static_cast<std::size_t>(100.0 * tree.dbh_m / histogram.step);
     if (histogram.counts.size() <= bin) histogram.counts.resize(bin + 1, 0);
@@ -248,38 +248,52 @@ std::string diameters(const InventoryResult& inventory) {
   return "<figure><h3>Diameters</h3>" + svg_histogram(histogram) + "</figure>";
 }
 
-std::string tree_table(const InventoryResult& inventory) {
+// `stems`: their fits in the same order, or null where trees come from sights of single views,
+// which have no heights.
+std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems) {
   std::string html =
       "<h3>All trees</h3><div class=\"scroll\"><table class=\"sort\"><thead><tr>"
       "<th class=\"n\">no.</th><th class=\"n\">x, m</th><th class=\"n\">y, m</th><th "
       "class=\"n\">ground, m</th><th class=\"n\">diameter, cm</th><th class=\"n\">± cm</th><th "
-      "class=\"n\">height, m</th><th class=\"n\">lean, °</th><th class=\"n\">returns</th><th "
-      "class=\"n\">seen around, °</th></tr></thead><tbody>";
+      "class=\"n\">lean, °</th>";
+  html += stems != nullptr
+              ? "<th class=\"n\">height, m</th><th class=\"n\">returns</th><th class=\"n\">seen "
+                "around, °</th></tr></thead><tbody>"
+              : "<th class=\"n\">views</th></tr></thead><tbody>";
   const auto out = std::back_inserter(html);
-  for (std::size_t i = 0; i < std::min(inventory.trees.size(), kLongestTable); ++i) {
-    const Tree& t = inventory.trees[i];
+  for (std::size_t i = 0; i < std::min(trees.size(), kLongestTable); ++i) {
+    const Tree& t = trees[i];
+    std::vector<std::string> cells = {
+        std::to_string(t.id), metres(t.x, 2),          metres(t.y, 2),       metres(t.z, 2),
+        centimetres(t.dbh_m), centimetres(t.dbh_sd_m), metres(t.lean_deg, 1)};
+    if (stems != nullptr) cells.push_back(metres(t.height_m, 1));
+    cells.push_back(std::to_string(t.observations));
+    if (stems != nullptr) cells.push_back(metres((*stems)[i].arc_deg, 0));
     fmt::format_to(out, "<tr>");
-    for (const std::string& cell :
-         {std::to_string(t.id), metres(t.x, 2), metres(t.y, 2), metres(t.z, 2),
-          centimetres(t.dbh_m), centimetres(t.dbh_sd_m), metres(t.height_m, 1),
-          metres(t.lean_deg, 1), std::to_string(t.observations),
-          metres(inventory.stems[i].arc_deg, 0)}) {
+    for (const std::string& cell : cells)
       fmt::format_to(out, "<td class=\"n\">{}</td>", cell);
-    }
     html += "</tr>";
   }
   html += "</tbody></table></div>";
-  if (inventory.trees.size() > kLongestTable) {
+  if (trees.size() > kLongestTable) {
     html += fmt::format("<p class=\"sub\">The first {} of {}; all are in trees.csv.</p>",
-                        kLongestTable, inventory.trees.size());
+                        kLongestTable, trees.size());
   }
   return html;
+}
+
+std::string section_of_views(const std::vector<Tree>& trees) {
+  return "<section><h2>Trees</h2><p>A tree is listed where many of the views that could see it saw "
+         "a stem. Its place is the mean of these sights, the diameter's ± is what they leave "
+         "uncertain; heights are not measured.</p><div class=\"two\">" +
+         diameters(trees) + "</div>" + tree_table(trees, nullptr) + "</section>\n";
 }
 
 }  // namespace
 
 std::string stand_section(const ReportInput& input) {
-  if (input.inventory == nullptr) return "";
+  if (input.inventory == nullptr)
+    return input.trees == nullptr || input.trees->empty() ? "" : section_of_views(*input.trees);
   const InventoryResult& inventory = *input.inventory;
   std::string html = "<section><h2>Trees</h2>";
   if (inventory.trees.empty()) {
@@ -290,10 +304,11 @@ std::string stand_section(const ReportInput& input) {
         "The diameter's ± is one standard deviation of the fit; it does not contain the "
         "widening by the laser's beam. A height is given only where points were seen above the "
         "stem, and it is a lower bound where the top was hidden.</p><div class=\"two\">" +
-        diameters(inventory) + "</div>";
+        diameters(inventory.trees) + "</div>";
   }
   html += cross_sections(inventory);
-  if (!inventory.trees.empty()) html += single_trees(inventory) + tree_table(inventory);
+  if (!inventory.trees.empty())
+    html += single_trees(inventory) + tree_table(inventory.trees, &inventory.stems);
   return html + "</section>\n";
 }
 

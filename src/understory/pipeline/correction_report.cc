@@ -36,6 +36,19 @@ ReportCorrection correction_of(const SelfCorrectionResult& self) {
   return report;
 }
 
+// Of each view: what its scan took, or its step where stems were all there was. 0: unknown.
+std::vector<float> scan_times_ms(const CorrectionRequest& request, const CorrectionRun& run) {
+  std::vector<float> times_ms(run.views.size(), 0.0F);
+  const bool of_scans = request.scans != nullptr;
+  const StageTimes* times = of_scans ? request.scans->times : &run.times;
+  const auto samples = times->samples("scan");
+  // A stage that ran very often keeps a part of its samples: then they belong to no view.
+  if (samples.size() != (of_scans ? request.scans->path.size() : run.views.size())) return times_ms;
+  for (std::size_t i = 0; i < run.views.size(); ++i)
+    times_ms[i] = samples[of_scans ? static_cast<std::size_t>(run.views[i].frame) : i].wall_ms;
+  return times_ms;
+}
+
 }  // namespace
 
 ReportInput correction_report(const CorrectionRequest& request, const CorrectionRun& run,
@@ -53,12 +66,15 @@ ReportInput correction_report(const CorrectionRequest& request, const Correction
     report.truth = compare_with_truth(request.run_folder, *request.scans->source);
   }
   report.summary = summary;
-  const auto samples = run.times.samples("scan");
+  report.remarks.push_back(
+      "Up is known from the stems alone: over a long way the map may tilt by degrees, and heights "
+      "far apart not hold. Distances in the plane do.");
+  const std::vector<float> times_ms = scan_times_ms(request, run);
   for (std::size_t i = 0; i < run.views.size(); ++i) {
     ReportScan scan;
     scan.stamp = run.views[i].stamp;
     scan.position = run.correction.world_from_body[i].translation().cast<float>();
-    if (i < samples.size()) scan.wall_ms = samples[i].wall_ms;
+    scan.wall_ms = times_ms[i];
     scan.inlier_ratio = static_cast<float>(i == 0 ? 1.0 : run.steps[i].overlap);
     scan.weak = run.steps[i].status == SparseStepStatus::kWeak ||
                 run.steps[i].status == SparseStepStatus::kUnmatched;
@@ -75,6 +91,7 @@ ReportInput correction_report(const CorrectionRequest& request, const Correction
     loop.from_stamp = run.views[match].stamp;
     loop.to_stamp = run.views[query].stamp;
     loop.accepted = run.correction.accepted[k] != 0;
+    loop.correction_m = run.correction.loop_shift_m[k];
     if (!loop.accepted) loop.reason = "contradicts the other loops";
     report.loops.push_back(loop);
   }

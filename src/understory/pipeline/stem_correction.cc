@@ -73,16 +73,16 @@ void close_loops(const StemCorrectionConfig& config, SelfCorrectionProblem& prob
                  StemCorrection& result) {
   result.loops = find_stem_loops(problem.views, problem.world_from_view, config.loops);
   result.accepted.assign(result.loops.size(), 0);
-  PoseGraphProblem graph;
-  graph.world_from_keyframe = problem.world_from_view;
-  for (std::size_t i = 1; i < problem.steps.size(); ++i)
-    graph.odometry.push_back({static_cast<int>(i) - 1, static_cast<int>(i), problem.steps[i],
-                              problem.step_covariances[i]});
+  result.loop_shift_m.assign(result.loops.size(), 0.0);
+  PoseGraphProblem graph = chain_problem(problem, problem.world_from_view);
   std::vector<std::size_t> rows;
   for (std::size_t k = 0; k < result.loops.size(); ++k) {
     const StemLoop& loop = result.loops[k];
     if (!loop.verified) continue;
     rows.push_back(k);
+    const Pose chained = problem.world_from_view[static_cast<std::size_t>(loop.match)].inverse() *
+                         problem.world_from_view[static_cast<std::size_t>(loop.query)];
+    result.loop_shift_m[k] = (loop.match_from_query.translation() - chained.translation()).norm();
     graph.loops.push_back({loop.match, loop.query, loop.match_from_query, loop.covariance});
   }
   if (graph.loops.empty()) return;

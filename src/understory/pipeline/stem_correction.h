@@ -25,6 +25,8 @@ void describe(ConfigTable& table, StemCorrectionConfig& config);
 struct StemCorrection {
   std::vector<StemLoop> loops;  // a row per view for which a place was found
   std::vector<char> accepted;   // verified, and in agreement with the rest
+  // By how much each disagrees with the chained odometry, 0 where it was not verified.
+  std::vector<double> loop_shift_m;
   std::vector<Pose> world_from_body;
   bool converged = true;
   std::string reason;  // if not
