@@ -178,9 +178,11 @@ class GainCorrection {
     PoseGraphProblem graph = chain_problem(views_.problem, poses_);
     graph.loops = views_.problem.loops;
     const std::size_t given = graph.loops.size();
-    const double scale = odometry_variance_scale();
+    // What the matches moved in the plane says nothing about heights and tilt.
+    const double scale = std::sqrt(odometry_variance_scale());
+    const Vector6d stretch = (Vector6d() << 1.0, 1.0, scale, scale, scale, 1.0).finished();
     for (PoseEdge& edge : graph.odometry)
-      edge.covariance *= scale;
+      edge.covariance = stretch.asDiagonal() * edge.covariance * stretch.asDiagonal();
     for (const Accepted& accepted : accepted_)
       graph.loops.push_back(accepted.edge);
     if (graph.loops.empty()) return;

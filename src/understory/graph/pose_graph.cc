@@ -1,6 +1,7 @@
 #include "understory/graph/pose_graph.h"
 
 #include <gtsam/geometry/Pose3.h>
+#include <gtsam/navigation/AttitudeFactor.h>
 #include <gtsam/nonlinear/GncOptimizer.h>
 #include <gtsam/nonlinear/LevenbergMarquardtOptimizer.h>
 #include <gtsam/slam/BetweenFactor.h>
@@ -28,6 +29,12 @@ void add_edge(gtsam::NonlinearFactorGraph& graph, const PoseEdge& edge) {
       gtsam::noiseModel::Gaussian::Covariance(gtsam::Matrix(edge.covariance)));
 }
 
+void add_tilt(gtsam::NonlinearFactorGraph& graph, const TiltPrior& tilt) {
+  graph.emplace_shared<gtsam::Pose3AttitudeFactor>(
+      static_cast<gtsam::Key>(tilt.keyframe), gtsam::Unit3(Eigen::Vector3d::UnitZ()),
+      gtsam::noiseModel::Isotropic::Sigma(2, tilt.sd_rad), gtsam::Unit3(tilt.up_in_keyframe));
+}
+
 gtsam::LevenbergMarquardtParams lm_params(const PoseGraphConfig& config) {
   gtsam::LevenbergMarquardtParams params;
   params.maxIterations = static_cast<std::size_t>(config.max_iterations);
@@ -45,6 +52,8 @@ void check(const PoseGraphProblem& problem) {
       UNDERSTORY_CHECK(edge.from != edge.to);
     }
   }
+  for (const TiltPrior& tilt : problem.tilts)
+    UNDERSTORY_CHECK(tilt.keyframe >= 0 && tilt.keyframe < n && tilt.sd_rad > 0.0);
 }
 
 double cost(const PoseGraphProblem& problem, const std::vector<Pose>& poses,
@@ -57,6 +66,10 @@ double cost(const PoseGraphProblem& problem, const std::vector<Pose>& poses,
     const PoseEdge& edge = problem.loops[i];
     if (used[i] != 0) sum += 0.5 * std::pow(edge_residual(edge, pose(edge.from), pose(edge.to)), 2);
   }
+  for (const TiltPrior& tilt : problem.tilts) {
+    const Eigen::Vector3d up = pose(tilt.keyframe).rotation() * tilt.up_in_keyframe.normalized();
+    sum += 0.5 * up.cross(Eigen::Vector3d::UnitZ()).squaredNorm() / (tilt.sd_rad * tilt.sd_rad);
+  }
   return sum;
 }
 
@@ -68,6 +81,8 @@ gtsam::NonlinearFactorGraph build(const PoseGraphProblem& problem, const std::ve
   for (std::size_t i = 0; i < problem.loops.size(); ++i) {
     if (used[i] != 0) add_edge(graph, problem.loops[i]);
   }
+  for (const TiltPrior& tilt : problem.tilts)
+    add_tilt(graph, tilt);
   return graph;
 }
 
@@ -99,7 +114,8 @@ void reject_by_gnc(const PoseGraphProblem& problem, const gtsam::Values& first,
   Params::IndexVector known;
   for (std::size_t i = 0; i < problem.odometry.size(); ++i)
     known.push_back(i);
-  known.push_back(graph.size() - 1);
+  for (std::size_t i = graph.size() - 1 - problem.tilts.size(); i < graph.size(); ++i)
+    known.push_back(i);
   params.setKnownInliers(known);
   gtsam::GncOptimizer<Params> optimiser(graph, first, params);
   optimiser.setInlierCostThresholds(0.5 * chi_squared_6(config.inlier_probability));

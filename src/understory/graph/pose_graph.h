@@ -31,18 +31,27 @@ struct PoseGraphConfig {
 };
 void describe(ConfigTable& table, PoseGraphConfig& config);
 
+// What a keyframe knows of up by itself: the direction that is the world's z axis there.
+struct TiltPrior {
+  int keyframe = 0;
+  Eigen::Vector3d up_in_keyframe = Eigen::Vector3d::UnitZ();
+  double sd_rad = 1.0;  // about each level axis
+};
+
 // The second graph of P4 F2. Keyframe 0 is held where it is.
 struct PoseGraphProblem {
   std::vector<Pose> world_from_keyframe;  // first values
   std::vector<PoseEdge> odometry;         // believed
   std::vector<PoseEdge> loops;            // each of them may be wrong
+  std::vector<TiltPrior> tilts;           // believed
 };
 
 struct [[nodiscard]] PoseGraphResult {
   bool converged = false;
   std::string reason;  // if not converged
   std::vector<Pose> world_from_keyframe;
-  double initial_cost = 0.0;  // half the sum of squared residuals over odometry and used loops
+  double initial_cost =
+      0.0;  // half the sum of squared residuals over odometry, tilts and used loops
   double final_cost = 0.0;
   // Residual of each edge at the answer, in standard deviations (root of the Mahalanobis square).
   std::vector<double> odometry_residual;

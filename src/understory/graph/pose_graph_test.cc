@@ -326,5 +326,50 @@ TEST(LoopSearch, AtMostOnceInItsTime) {
   EXPECT_TRUE(loop_search_due(0, 1'500'000'000, config));
 }
 
+// What the views know of up and what the step says weigh by their variances: the second keyframe
+// tilts by the weighted mean, worked out by hand for small angles.
+TEST(PoseGraph, TiltIsTheWeightedMeanOfTheStepsAndWhatTheKeyframesKnow) {
+  PoseGraphProblem problem;
+  problem.world_from_keyframe.assign(2, Pose());
+  const double said = 0.03;
+  problem.odometry.push_back({0, 1, Pose(so3_exp({said, 0.0, 0.2}), Eigen::Vector3d(1.0, 0.0, 0.0)),
+                              covariance(0.02, 0.01)});
+  problem.world_from_keyframe[1] = problem.odometry[0].from_from_to;
+  problem.tilts.push_back({1, Eigen::Vector3d::UnitZ(), 0.01});
+  const PoseGraphResult result = optimise_pose_graph(problem, {});
+  ASSERT_TRUE(result.converged) << result.reason;
+  const Eigen::Vector3d up = result.world_from_keyframe[1].rotation() * Eigen::Vector3d::UnitZ();
+  const double expected = said * (1.0 / 0.0004) * 1.0 / (1.0 / 0.0004 + 1.0 / 0.0001);
+  EXPECT_NEAR(std::asin(up.head<2>().norm()), expected, 1e-4);
+  EXPECT_LT(result.final_cost, result.initial_cost);
+  // 0.5 (0.006 / 0.01)^2 + 0.5 (0.024 / 0.02)^2
+  EXPECT_NEAR(result.final_cost, 0.9, 0.01);
+}
+
+TEST(PoseGraph, ALoopThatIsWrongInHeightDoesNotTiltWhatKnowsUp) {
+  PoseGraphProblem problem;
+  for (int k = 0; k <= 20; ++k) {
+    problem.world_from_keyframe.emplace_back(Eigen::Quaterniond::Identity(),
+                                             Eigen::Vector3d(k, 0.0, 0.0));
+    if (k > 0)
+      problem.odometry.push_back({k - 1, k, Pose(Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0}),
+                                  covariance(0.2 * kDegree, 0.01)});
+  }
+  problem.loops.push_back({0, 20, Pose(Eigen::Quaterniond::Identity(), {20.0, 0.0, 0.6}),
+                           covariance(2.0 * kDegree, 0.15)});
+  const auto worst_tilt = [](const PoseGraphResult& result) {
+    double worst = 0.0;
+    for (const Pose& pose : result.world_from_keyframe)
+      worst = std::max(worst, (pose.rotation() * Eigen::Vector3d::UnitZ()).head<2>().norm());
+    return worst / kDegree;
+  };
+  const double free = worst_tilt(optimise_pose_graph(problem, {}));
+  for (int k = 0; k <= 20; ++k)
+    problem.tilts.push_back({k, Eigen::Vector3d::UnitZ(), 0.5 * kDegree});
+  const double held = worst_tilt(optimise_pose_graph(problem, {}));
+  EXPECT_GT(free, 1.0);
+  EXPECT_LT(held, 0.35);
+}
+
 }  // namespace
 }  // namespace understory

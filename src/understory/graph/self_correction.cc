@@ -112,6 +112,7 @@ PoseGraphProblem chain_problem(const SelfCorrectionProblem& problem,
                                const std::vector<Pose>& world_from_view) {
   PoseGraphProblem graph;
   graph.world_from_keyframe = world_from_view;
+  graph.tilts = problem.tilts;
   for (std::size_t i = 1; i < world_from_view.size(); ++i)
     graph.odometry.push_back({static_cast<int>(i) - 1, static_cast<int>(i), problem.steps[i],
                               problem.step_covariances[i]});

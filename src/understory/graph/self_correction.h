@@ -72,6 +72,7 @@ struct SelfCorrectionProblem {
   std::vector<double> step_errors;         // e of the step to each view; 0 for the first
   std::vector<Matrix6d> step_covariances;  // of the step to each view, right perturbation
   std::vector<PoseEdge> loops;             // believed already, for the methods that solve a graph
+  std::vector<TiltPrior> tilts;            // what the views know of up, for the same methods
 };
 
 // A pair that was matched again.

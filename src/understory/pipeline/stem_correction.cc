@@ -13,6 +13,7 @@ struct LevelViews {
   std::vector<SparsePoints> points;
   std::vector<Pose> level_from_body;
   std::vector<Pose> world_from_level;
+  std::vector<StemUp> ups;
 };
 
 LevelViews level(const std::vector<StemView>& views, const std::vector<SparseStep>& steps) {
@@ -20,8 +21,10 @@ LevelViews level(const std::vector<StemView>& views, const std::vector<SparseSte
   result.points.resize(views.size());
   result.level_from_body.resize(views.size());
   result.world_from_level.resize(views.size());
+  result.ups.resize(views.size());
   parallel_for(views.size(), 16, [&](std::size_t i) {
-    const Eigen::Quaterniond turn = understory::level_from_body(stem_up(views[i]));
+    result.ups[i] = stem_up(views[i]);
+    const Eigen::Quaterniond turn = understory::level_from_body(result.ups[i]);
     result.points[i] = stem_points(views[i], turn);
     result.level_from_body[i] = Pose(turn, Eigen::Vector3d::Zero());
     result.world_from_level[i] = steps[i].world_from_body * result.level_from_body[i].inverse();
@@ -32,7 +35,7 @@ LevelViews level(const std::vector<StemView>& views, const std::vector<SparseSte
 // Of a step: what matching says, and what both views got wrong alike, which it cannot know: a
 // hundredth of the way, and the tilt that the stems' axes hold.
 Matrix6d odometry_covariance(const SparseStep& step, const Pose& previous_from_body) {
-  const double tilt = 0.5 * M_PI / 180.0;
+  const double tilt = 0.2 * M_PI / 180.0;
   const double yaw = 0.02 * M_PI / 180.0;
   const double shift = 0.005 + 0.01 * previous_from_body.translation().norm();
   Matrix6d covariance = step.covariance;
@@ -49,11 +52,42 @@ Matrix6d odometry_covariance(const SparseStep& step, const Pose& previous_from_b
   return covariance;
 }
 
+// Views within that part of the way of each view, itself included.
+std::vector<int> neighbours_on_the_way(const std::vector<Pose>& poses, double reach_m) {
+  std::vector<double> way(poses.size(), 0.0);
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    way[i] = way[i - 1] + (poses[i].translation() - poses[i - 1].translation()).norm();
+  std::vector<int> counts;
+  for (std::size_t i = 0; i < way.size(); ++i) {
+    const auto first = std::lower_bound(way.begin(), way.end(), way[i] - reach_m);
+    const auto last = std::upper_bound(way.begin(), way.end(), way[i] + reach_m);
+    counts.push_back(static_cast<int>(last - first));
+  }
+  return counts;
+}
+
+// A view has been turned level by its stems. As many views see the same trees, which lean as they
+// do, they know together no more of up than one of them.
+std::vector<TiltPrior> tilts_of(const LevelViews& level) {
+  constexpr double kStandLeans = 0.3 * M_PI / 180.0;
+  constexpr double kSameTrees = 10.0;  // metres of way to each side
+  const std::vector<int> sharing = neighbours_on_the_way(level.world_from_level, kSameTrees);
+  std::vector<TiltPrior> tilts;
+  for (std::size_t i = 0; i < level.ups.size(); ++i) {
+    const StemUp& up = level.ups[i];
+    if (up.stems == 0) continue;
+    const double one = std::hypot(kStandLeans, up.spread_rad / std::sqrt(up.stems));
+    tilts.push_back({static_cast<int>(i), Eigen::Vector3d::UnitZ(), one * std::sqrt(sharing[i])});
+  }
+  return tilts;
+}
+
 // In level frames, with loops not looked for yet.
 SelfCorrectionProblem problem_of(LevelViews& level, const std::vector<SparseStep>& steps) {
   SelfCorrectionProblem problem;
   problem.views = std::move(level.points);
   problem.world_from_view = level.world_from_level;
+  problem.tilts = tilts_of(level);
   for (std::size_t i = 0; i < steps.size(); ++i) {
     problem.steps.emplace_back();
     problem.step_errors.push_back(steps[i].error_m);

@@ -1,0 +1,135 @@
+#include "understory/pipeline/stem_correction.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+// A road of 60 m through a stand on level ground, views of 210 degrees to 35 m from a cabin that
+// swings. Where nothing shows the ground, feet are guessed too high: by a centimetre a metre of
+// range from 12 m on, and roughly. Trees lean by 2 degrees, each its own way.
+struct Road {
+  std::vector<StemView> views;
+  std::vector<Pose> truth;
+};
+
+struct Tree {
+  Eigen::Vector3d foot;
+  Eigen::Vector3d axis;
+};
+
+std::vector<Tree> stand(Random& random) {
+  std::vector<Tree> trees;
+  while (trees.size() < 500) {
+    Tree tree;
+    tree.foot = {random.uniform(-40.0, 100.0), random.uniform(-40.0, 40.0), 0.0};
+    tree.axis =
+        Eigen::Vector3d(2.0 * kDegree * random.normal(), 2.0 * kDegree * random.normal(), 1.0)
+            .normalized();
+    bool free = std::abs(tree.foot.y()) > 2.0;
+    for (const Tree& other : trees)
+      free = free && (tree.foot - other.foot).norm() > 1.8;
+    if (free) trees.push_back(tree);
+  }
+  return trees;
+}
+
+Road drive(std::uint64_t seed) {
+  Random random(seed);
+  const std::vector<Tree> trees = stand(random);
+  Road road;
+  for (int k = 0; k < 150; ++k) {
+    const double yaw = 0.9 * std::sin(0.3 * k);
+    const Eigen::Vector3d tilt(2.0 * kDegree * random.normal(), 2.0 * kDegree * random.normal(),
+                               0.0);
+    road.truth.emplace_back(so3_exp(Eigen::Vector3d(0.0, 0.0, yaw)) * so3_exp(tilt),
+                            Eigen::Vector3d(0.4 * k, 0.0, 2.5));
+    const Pose body_from_world = road.truth.back().inverse();
+    StemView view;
+    view.frame = k;
+    view.stamp = TimeNs{1'000'000'000} * k;
+    for (const Tree& tree : trees) {
+      Eigen::Vector3d foot = tree.foot;
+      const double range = (foot - road.truth.back().translation()).head<2>().norm();
+      foot +=
+          Eigen::Vector3d(0.02 * random.normal(), 0.02 * random.normal(), 0.05 * random.normal());
+      if (range > 12.0) foot.z() += (range - 12.0) * std::abs(0.01 + 0.006 * random.normal());
+      const Eigen::Vector3d seen = body_from_world * foot;
+      if (range > 35.0 || std::abs(std::atan2(seen.y(), seen.x())) > 1.83) continue;
+      if (random.uniform(0.0, 1.0) < 0.25) continue;
+      Stem stem;
+      stem.point = seen.cast<float>();
+      stem.axis =
+          (body_from_world.rotation() *
+           (tree.axis + 0.5 * kDegree * Eigen::Vector3d(random.normal(), random.normal(), 0.0)))
+              .normalized()
+              .cast<float>();
+      stem.score = 0.9F;
+      view.stems.push_back(stem);
+    }
+    road.views.push_back(view);
+  }
+  return road;
+}
+
+struct Errors {
+  double tilt_deg = 0.0;  // RMS
+  double height_m = 0.0;  // RMS, first pose at its true height
+  double plane_m = 0.0;   // RMS, first pose where it was, its heading the true one
+};
+
+Errors errors(const std::vector<Pose>& world_from_body, const std::vector<Pose>& truth) {
+  const auto heading = [](const Pose& pose) {
+    const Eigen::Vector3d x = pose.rotation() * Eigen::Vector3d::UnitX();
+    return std::atan2(x.y(), x.x());
+  };
+  const Pose turn(
+      so3_exp(Eigen::Vector3d(0.0, 0.0, heading(truth[0]) - heading(world_from_body[0]))),
+      Eigen::Vector3d::Zero());
+  const Eigen::Vector3d shift = truth[0].translation() - turn * world_from_body[0].translation();
+  Errors sums;
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    const Pose pose = turn * world_from_body[k];
+    const Eigen::Vector3d up =
+        (pose.rotation() * truth[k].rotation().inverse()) * Eigen::Vector3d::UnitZ();
+    sums.tilt_deg += up.head<2>().squaredNorm() / (kDegree * kDegree);
+    const Eigen::Vector3d off = pose.translation() + shift - truth[k].translation();
+    sums.height_m += off.z() * off.z();
+    sums.plane_m += off.head<2>().squaredNorm();
+  }
+  const auto n = static_cast<double>(truth.size());
+  return {std::sqrt(sums.tilt_deg / n), std::sqrt(sums.height_m / n), std::sqrt(sums.plane_m / n)};
+}
+
+TEST(StemCorrection, HeightsOfFeetThatAreGuessedDoNotTiltThePath) {
+  const Road road = drive(3);
+  SparseOdometryConfig view_to_view;  // leaves more to correct
+  view_to_view.target = SparseOdometryConfig::Target::kFrame;
+  SparseOdometry odometry(view_to_view);
+  std::vector<SparseStep> steps;
+  std::vector<Pose> chained;
+  for (const StemView& view : road.views) {
+    steps.push_back(odometry.add(view));
+    chained.push_back(steps.back().world_from_body);
+  }
+  StemCorrectionConfig config;
+  config.correction.largest_share = 0.1;
+  StageTimes times;
+  const StemCorrection corrected = correct_stems(road.views, steps, config, times);
+  EXPECT_GT(corrected.self.kept, 3);
+  const Errors before = errors(chained, road.truth);
+  const Errors after = errors(corrected.world_from_body, road.truth);
+  EXPECT_LT(after.tilt_deg, std::max(0.3, 1.2 * before.tilt_deg));
+  EXPECT_LT(after.height_m, 1.1 * before.height_m + 0.02);
+  EXPECT_LT(after.plane_m, before.plane_m + 0.01);
+}
+
+}  // namespace
+}  // namespace understory
