@@ -5,9 +5,11 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
+#include "understory/simulation/harvest.h"
 #include "understory/simulation/route.h"
 #include "understory/simulation/site.h"
 #include "understory/simulation/spline.h"
+#include "understory/simulation/stand.h"
 #include "understory/simulation/terrain.h"
 
 namespace understory {
@@ -40,29 +42,18 @@ class CarrierPath {
 // Where a harvester's boom is, in the body frame: reach and height of its tip, metres.
 using BoomPath = QuinticSpline<2>;
 
-// A stem in the harvester's head: upright until it falls, then level across the boom and fed
-// through the head, until it is dropped. Times since the path's zero.
-struct HeldStem {
-  double grab_s = 0.0;
-  double fall_s = 0.0;   // when it begins to fall
-  double level_s = 0.0;  // when it lies level: the moment of the shock
-  double drop_s = 0.0;
-  double length_m = 12.0;
-  double radius_m = 0.08;
-  double side = 1.0;  // the way it falls: 1 to the left of the boom, -1 to the right
-};
-
 struct CarrierPlan {
   CarrierPath path;
   BoomPath boom;
-  std::vector<HeldStem> held;    // in order
+  Harvest harvest;               // what a thinning cuts
   std::vector<double> shocks_s;  // when a falling stem or a jolt shakes the carrier, in order
 };
 
 // The motion along a route: a walker with a pole (gait, sway, quick turns), a harvester (work
 // stops, cabin swings, rocking), a UAV (hover, tilt with the acceleration) or a sleigh (jolts,
-// halts, near tumbles). config.duration_s cuts it or lengthens it by standing still.
+// halts, near tumbles). config.duration_s cuts it or lengthens it by standing still. A harvester
+// that thins fells trees of the stand, whose ids must differ.
 [[nodiscard]] CarrierPlan plan_carrier(const SiteConfig& config, const Route& route,
-                                       const Terrain& terrain);
+                                       const Terrain& terrain, const Stand& stand);
 
 }  // namespace understory

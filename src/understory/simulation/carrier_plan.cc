@@ -227,9 +227,10 @@ CarrierPlan plan_harvester(const SiteConfig& config, const Route& route, const T
 
 }  // namespace
 
-CarrierPlan plan_carrier(const SiteConfig& config, const Route& route, const Terrain& terrain) {
+CarrierPlan plan_carrier(const SiteConfig& config, const Route& route, const Terrain& terrain,
+                         const Stand& stand) {
   if (config.carrier.kind == "harvester" && config.carrier.work == "thinning") {
-    return plan_thinning(config, route, terrain);
+    return plan_thinning(config, route, terrain, stand);
   }
   if (config.carrier.kind == "uav") return plan_uav(config, route, terrain);
   if (config.carrier.kind == "sleigh") return plan_sleigh(config, route, terrain);

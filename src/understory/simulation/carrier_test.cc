@@ -15,7 +15,7 @@ struct Walk {
   explicit Walk(const SiteConfig& config)
       : route(config.carrier, static_cast<std::uint64_t>(config.seed)),
         terrain(config.terrain, 80.0, 80.0, static_cast<std::uint64_t>(config.seed)),
-        plan(plan_carrier(config, route, terrain)) {}
+        plan(plan_carrier(config, route, terrain, {})) {}
   Route route;
   Terrain terrain;
   CarrierPlan plan;

@@ -8,6 +8,9 @@ namespace understory {
 inline void embree_intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
   rtcIntersect16(valid, scene, rays, nullptr);
 }
+inline void embree_intersect1(RTCScene scene, RTCRayHit* ray) {
+  rtcIntersect1(scene, ray, nullptr);
+}
 inline void embree_occluded1(RTCScene scene, RTCRay* ray) {
   rtcOccluded1(scene, ray, nullptr);
 }
@@ -19,6 +22,11 @@ inline void embree_intersect16(const int* valid, RTCScene scene, RTCRayHit16* ra
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect16(valid, scene, &context, rays);
+}
+inline void embree_intersect1(RTCScene scene, RTCRayHit* ray) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(scene, &context, ray);
 }
 inline void embree_occluded1(RTCScene scene, RTCRay* ray) {
   RTCIntersectContext context;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <optional>
+
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -49,20 +51,6 @@ double meet_bar(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
   return best;
 }
 
-// The stem in the head: its foot end just below the grip while it stands; falling, it turns to the
-// side; level, it is fed through the grip to and fro.
-Machine::Bar stem_in(const HeldStem& stem, const Eigen::Vector3d& head, double time_s) {
-  const double fallen = std::clamp((time_s - stem.fall_s) / (stem.level_s - stem.fall_s), 0.0, 1.0);
-  const double tilt = 0.5 * std::numbers::pi * fallen * fallen;
-  const Eigen::Vector3d along(0.0, stem.side * std::sin(tilt), std::cos(tilt));
-  const double work = std::max(1.0, stem.drop_s - stem.level_s);
-  const double share = std::clamp((time_s - stem.level_s) / work, 0.0, 1.0);
-  const double fed = 0.4 + (stem.length_m - 2.0) * std::abs(std::sin(2.5 * share));
-  const double length = stem.length_m * (1.0 - 0.55 * share);  // logs are cut off
-  return {head - std::min(fed, length - 0.5) * along, head + std::max(0.5, length - fed) * along,
-          stem.radius_m};
-}
-
 // Whether a ray stays clear of the ball around a bar.
 bool passes_by(const Machine::Bar& bar, const Eigen::Vector3d& origin,
                const Eigen::Vector3d& direction) {
@@ -75,19 +63,24 @@ bool passes_by(const Machine::Bar& bar, const Eigen::Vector3d& origin,
 
 }  // namespace
 
-Machine::Machine(const CarrierConfig& config, const CarrierPlan& plan)
-    : present_(config.kind == "harvester"), boom_(plan.boom), held_(plan.held) {}
+Machine::Machine(const CarrierConfig& config, const CarrierPlan& plan, const Stand& stand)
+    : present_(config.kind == "harvester"), plan_(plan) {
+  for (const Felling& felling : plan.harvest.fellings) {
+    const auto tree = std::find_if(stand.trees.begin(), stand.trees.end(),
+                                   [&](const Tree& t) { return t.id == felling.tree; });
+    UNDERSTORY_CHECK(tree != stand.trees.end());
+    trees_.push_back(&*tree);
+  }
+}
 
 Machine::Parts Machine::at(double time_s) const {
-  const BoomPath::Vector boom = boom_.value(time_s);
-  const double reach = boom[0];
-  const double height = boom[1];
-  const double side = -0.75;  // the boom stands to the right of the sensor
+  const BoomPath::Vector boom = plan_.boom.value(time_s);
+  const Eigen::Vector3d head = head_in_body(boom);
+  const double side = head.y();  // the boom stands to the right of the sensor
   const Eigen::Vector3d pillar(0.9, side, 1.9);
-  const Eigen::Vector3d tip(0.9 + reach, side, height);
+  const Eigen::Vector3d tip(head.x(), side, boom[1]);
   Eigen::Vector3d elbow = 0.5 * (pillar + tip);
   elbow.z() += std::sqrt(std::max(0.3, 9.0 - 0.25 * (tip - pillar).squaredNorm())) * 0.7;
-  const Eigen::Vector3d head = tip - Eigen::Vector3d(0.0, 0.0, 0.75);
   Parts parts;
   parts.bars = {
       {{0.9, side, 0.9}, pillar, 0.16},
@@ -100,12 +93,23 @@ Machine::Parts Machine::at(double time_s) const {
       {{1.5, -1.4, 0.6}, {1.5, -1.05, 0.6}, 0.6},
       {{0.35, 0.75, 1.0}, {0.35, 0.75, 2.9}, 0.06},
       {{0.35, -0.45, 1.0}, {0.35, -0.45, 2.9}, 0.06}};
-  for (const HeldStem& stem : held_) {
-    if (time_s >= stem.grab_s && time_s < stem.drop_s) {
-      parts.bars.push_back(stem_in(stem, head, time_s));
-    }
+  for (const FallenLog& log : plan_.harvest.logs) {
+    if (time_s < log.cut_s || time_s >= log.lies_s) continue;
+    const Pose body_from_world = plan_.path.pose(time_s).inverse();
+    const Wood wood = log.at(time_s);
+    parts.bars.push_back({body_from_world * wood.from, body_from_world * wood.to,
+                          0.5 * (wood.radius_from_m + wood.radius_to_m), Surface::kDeadWood});
   }
   return parts;
+}
+
+std::optional<HeldTree> Machine::held(double time_s) const {
+  for (std::size_t i = 0; i < trees_.size(); ++i) {
+    const Felling& felling = plan_.harvest.fellings[i];
+    if (time_s < felling.grab_s) break;
+    if (time_s < felling.drop_s) return held_tree(plan_, felling, *trees_[i], time_s);
+  }
+  return std::nullopt;
 }
 
 void Machine::cast(const Parts& parts, const Eigen::Vector3d& origin,
@@ -120,7 +124,7 @@ void Machine::cast(const Parts& parts, const Eigen::Vector3d& origin,
     hit.cosine = static_cast<float>(std::min(1.0, std::abs(normal.dot(direction))));
     hit.reflectivity = 0.5F;
     hit.tree = 0;
-    hit.surface = Surface::kMachine;
+    hit.surface = bar.surface;
   }
 }
 

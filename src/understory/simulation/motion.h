@@ -111,7 +111,7 @@ inline Lie lie_on(const Terrain& terrain, const Eigen::Vector2d& place, double h
 }
 
 [[nodiscard]] CarrierPlan plan_thinning(const SiteConfig& config, const Route& route,
-                                        const Terrain& terrain);
+                                        const Terrain& terrain, const Stand& stand);
 [[nodiscard]] CarrierPlan plan_uav(const SiteConfig& config, const Route& route,
                                    const Terrain& terrain);
 [[nodiscard]] CarrierPlan plan_sleigh(const SiteConfig& config, const Route& route,

@@ -23,7 +23,7 @@ struct Receiver {
     const Terrain terrain(site.terrain, 42.0, 42.0, 1, &route);
     const Stand stand = grow_stand(site.stand, site.carrier, terrain, route, 1);
     const ForestScene scene(site.stand, terrain, stand, 1);
-    const CarrierPlan plan = plan_carrier(site, route, terrain);
+    const CarrierPlan plan = plan_carrier(site, route, terrain, {});
     SatelliteReceiver receiver(site, plan.path, scene, 0);
     for (int i = 0; i < static_cast<int>(seconds * site.gnss.rate_hz); ++i) {
       const std::optional<GnssFix> fix = receiver.next();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <tuple>
 
 #include "understory/util/parallel.h"
@@ -118,15 +119,32 @@ SimulatedScan Scanner::cast(std::int64_t number) {
 }
 
 ScanReadings Scanner::measure(std::int64_t number) {
-  scene_.sway(0.5 * (to_seconds(stamp(number) - start_) + to_seconds(end(number) - start_)));
   const LidarModel::Firings firings = model_.firings(number);
+  const double middle =
+      0.5 * (to_seconds(stamp(number) - start_) + to_seconds(end(number) - start_));
   const auto blocks_count =
       static_cast<std::size_t>((firings.end - firings.first + kBlockFirings - 1) / kBlockFirings);
+  const auto first_of = [&](std::size_t block) {
+    return firings.first + static_cast<std::int64_t>(block) * kBlockFirings;
+  };
+  const auto time_of = [&](std::size_t block) {
+    return to_seconds(model_.firing_time(first_of(block)));
+  };
   std::vector<Block> blocks(blocks_count);
-  parallel_for(blocks_count, 1, [&](std::size_t b) {
-    const std::int64_t first = firings.first + static_cast<std::int64_t>(b) * kBlockFirings;
-    cast_block(first, std::min(firings.end, first + kBlockFirings), blocks[b]);
-  });
+  // The stand changes between blocks only.
+  for (std::size_t b = 0; b < blocks_count;) {
+    const std::vector<double>& changes = scene_.changes();
+    const auto change = std::upper_bound(changes.begin(), changes.end(), time_of(b));
+    std::size_t until = b + 1;
+    while (until < blocks_count && (change == changes.end() || time_of(until) < *change))
+      ++until;
+    scene_.arrange(middle, time_of(b));
+    parallel_for(until - b, 1, [&](std::size_t i) {
+      const std::int64_t first = first_of(b + i);
+      cast_block(first, std::min(firings.end, first + kBlockFirings), middle, blocks[b + i]);
+    });
+    b = until;
+  }
   ScanReadings readings;
   std::vector<std::uint64_t> stems;
   for (const Block& block : blocks) {
@@ -175,8 +193,9 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
   return scan;
 }
 
-void Scanner::cast_block(std::int64_t first, std::int64_t end, Block& block) const {
-  make_rays(first, end, block);
+void Scanner::cast_block(std::int64_t first, std::int64_t end, double moment_s,
+                         Block& block) const {
+  make_rays(first, end, moment_s, block);
   trace(static_cast<std::size_t>(end - first), block);
   if (!machine_.empty()) meet_machine(first, block);
   const std::size_t beams = model_.beams.size();
@@ -292,7 +311,7 @@ void Scanner::trace(std::size_t firings, Block& block) const {
     block.hits[order[i]] = hits[i];
 }
 
-void Scanner::make_rays(std::int64_t first, std::int64_t end, Block& block) const {
+void Scanner::make_rays(std::int64_t first, std::int64_t end, double moment_s, Block& block) const {
   const std::size_t beams = model_.beams.size();
   const auto firings = static_cast<std::size_t>(end - first);
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
@@ -331,7 +350,8 @@ void Scanner::make_rays(std::int64_t first, std::int64_t end, Block& block) cons
         const Eigen::Vector3d offset = uv.first * side + uv.second * rise;
         const Eigen::Vector3d direction = (centre + spread * offset).normalized();
         block.rays.push_back({(place + rotation * (origin + exit * offset)).cast<float>(),
-                              (rotation * direction).cast<float>()});
+                              (rotation * direction).cast<float>(),
+                              static_cast<float>(to_seconds(time) - moment_s)});
       }
     }
   }
@@ -344,6 +364,7 @@ void Scanner::meet_machine(std::int64_t first, Block& block) const {
   for (std::size_t f = 0; f * per_firing < block.rays.size(); ++f) {
     const double time = to_seconds(model_.firing_time(first + static_cast<std::int64_t>(f)));
     const Machine::Parts parts = machine_.at(time);
+    const std::optional<HeldTree> held = machine_.held(time);
     for (std::size_t i = f * per_firing; i < (f + 1) * per_firing; ++i) {
       const std::size_t beam = i / rays_per_beam;
       const Eigen::Vector3d direction =
@@ -351,6 +372,10 @@ void Scanner::meet_machine(std::int64_t first, Block& block) const {
       const Eigen::Vector3d origin = body_from_lidar_ * block.origin_in_lidar[f].cast<double>();
       Machine::cast(parts, origin, direction, config_.min_range_m, config_.max_range_m,
                     block.hits[i]);
+      if (held) {
+        scene_.cast_held(*held, block.rays[i], static_cast<float>(config_.min_range_m),
+                         static_cast<float>(config_.max_range_m), block.hits[i]);
+      }
     }
   }
 }

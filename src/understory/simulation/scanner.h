@@ -38,7 +38,8 @@ struct SimulatedScan {
 
 // A spinning lidar carried through the forest. Every firing is cast from the true pose at its own
 // time. A scan is a function of its number alone: any order, any number of threads, same bytes. One
-// scan after another, as the wind moves the scene; within a scan crowns stand still.
+// scan after another, as wind and harvest move the scene. The stand changes between blocks of 16
+// firings only.
 class Scanner {
  public:
   // All references must outlive the scanner. `start` is the time of the path's zero.
@@ -60,8 +61,8 @@ class Scanner {
  private:
   struct Block;
   struct Echo;
-  void cast_block(std::int64_t first, std::int64_t end, Block& block) const;
-  void make_rays(std::int64_t first, std::int64_t end, Block& block) const;
+  void cast_block(std::int64_t first, std::int64_t end, double moment_s, Block& block) const;
+  void make_rays(std::int64_t first, std::int64_t end, double moment_s, Block& block) const;
   void trace(std::size_t firings, Block& block) const;
   void meet_machine(std::int64_t first, Block& block) const;
   [[nodiscard]] ScanReadings::Reading read_beam(CounterNoise noise, const Echo& echo) const;

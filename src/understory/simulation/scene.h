@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "understory/simulation/harvest.h"
 #include "understory/simulation/site.h"
 #include "understory/simulation/stand.h"
 #include "understory/simulation/terrain.h"
@@ -27,6 +28,7 @@ enum class Surface : std::uint8_t {
 struct Ray {
   Eigen::Vector3f origin = Eigen::Vector3f::Zero();     // world frame
   Eigen::Vector3f direction = Eigen::Vector3f::Zero();  // unit length
+  float time_s = 0.0F;  // after the moment to which the scene was brought, for the wind
 };
 
 struct Hit {
@@ -39,25 +41,35 @@ struct Hit {
 
 // Terrain and stand as Embree geometry: stems are round cones one by one; crowns and plants are
 // instances of a few grown shapes, so that memory hardly grows with the number of trees. Casting is
-// thread-safe; results depend on the rays and on the moment of the wind alone.
+// thread-safe; results depend on the rays and on the moment of the scene alone.
 class ForestScene {
  public:
-  // With snow_m above zero the ground is bright.
+  // With snow_m above zero the ground is bright. A harvest takes trees away and leaves logs.
   ForestScene(const StandConfig& config, const Terrain& terrain, const Stand& stand,
-              std::uint64_t seed, double snow_m = 0.0);
+              std::uint64_t seed, double snow_m = 0.0, const Harvest& harvest = {});
   ~ForestScene();
   ForestScene(const ForestScene&) = delete;
   ForestScene& operator=(const ForestScene&) = delete;
 
-  // Puts the crowns where the wind has them at a time; before that they hang at rest. What a later
-  // moment looks like does not depend on earlier ones. Not while others cast.
-  void sway(double time_s);
+  // Brings the scene to a moment (seconds since the path's zero): stems and crowns are where the
+  // wind has them at wind_s, what was felled by stand_s is gone and what fell by then lies there;
+  // before the first call all stand at rest. What a moment looks like does not depend on those
+  // before it. Not while others cast.
+  void arrange(double wind_s, double stand_s);
+  // When the harvest changes the scene, in order.
+  [[nodiscard]] const std::vector<double>& changes() const;
 
   // The first thing each ray meets within [near_m, far_m]. Neighbouring rays should lie beside each
-  // other: sixteen at a time go through the scene together.
+  // other: sixteen at a time go through the scene together. Between the moment of the scene and its
+  // own a ray sees what it hits moved on by the wind, to first order: surfaces move along the beam
+  // and across it, their outlines stay.
   void cast(const Ray* rays, std::size_t count, float near_m, float far_m, Hit* hits) const;
 
-  // Share of the upper sky (above 15 degrees) that is hidden from a place, 0..1, in still air.
+  // Replaces `hit` where a ray meets a cut tree before it; the stem's hits have no tree.
+  void cast_held(const HeldTree& held, const Ray& ray, float near_m, float far_m, Hit& hit) const;
+
+  // Share of the upper sky (above 15 degrees) that is hidden from a place, 0..1, in still air and
+  // before anything was felled.
   [[nodiscard]] double canopy_cover(const Eigen::Vector3d& place) const;
 
  private:

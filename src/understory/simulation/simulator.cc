@@ -275,7 +275,7 @@ double Simulator::duration_s() const {
 }
 
 void Simulator::write_truth(const std::string& folder) const {
-  write_truth_folder(folder, impl_->site, impl_->stand, impl_->terrain, impl_->truths);
+  write_truth_folder(folder, *impl_, impl_->start, impl_->truths);
 }
 
 std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {

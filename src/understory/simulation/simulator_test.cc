@@ -174,7 +174,7 @@ TEST(SatelliteReceiver, ErrorsGrowUnderTheCanopyAndAreWorseInHeight) {
       const Route route(site.carrier, key);
       const Terrain terrain(site.terrain, 40.0, 40.0, key);
       const Stand stand = grow_stand(site.stand, site.carrier, terrain, route, key);
-      const CarrierPlan plan = plan_carrier(site, route, terrain);
+      const CarrierPlan plan = plan_carrier(site, route, terrain, stand);
       const ForestScene scene(site.stand, terrain, stand, key);
       SatelliteReceiver receiver(site, plan.path, scene, 0);
       while (to_seconds(receiver.next_stamp()) < plan.path.duration_s()) {

@@ -23,7 +23,7 @@ struct Site {
         route(config.carrier, seed()),
         terrain(config.terrain, 0.5 * config.stand.size_x_m + 12.0,
                 0.5 * config.stand.size_y_m + 12.0, seed(), &route),
-        plan(plan_carrier(config, route, terrain)) {}
+        plan(plan_carrier(config, route, terrain, stand())) {}
   [[nodiscard]] std::uint64_t seed() const { return static_cast<std::uint64_t>(config.seed); }
   [[nodiscard]] Stand stand() const {
     return grow_stand(config.stand, config.carrier, terrain, route, seed());
@@ -166,13 +166,13 @@ TEST(LieksaSites, HarvesterWorksToAndFroAtThePapersPace) {
   EXPECT_GT(swung / duration, 0.3);  // the cabin is hardly ever straight
   EXPECT_GT(largest, 50.0 * std::numbers::pi / 180.0);
   double held = 0.0;
-  for (const HeldStem& stem : site.plan.held) {
+  for (const Felling& stem : site.plan.harvest.fellings) {
     EXPECT_LT(stem.grab_s, stem.fall_s);
     EXPECT_LT(stem.level_s, stem.drop_s);
     held += stem.drop_s - stem.grab_s;
   }
   EXPECT_GT(held / duration, 0.4);  // a stem is in view about half of the time
-  EXPECT_GT(site.plan.held.size(), 30U);
+  EXPECT_GT(site.plan.harvest.fellings.size(), 30U);
 }
 
 TEST(LieksaSites, RecordingHasFramesAndFixesAtTheirRatesAndNoImu) {

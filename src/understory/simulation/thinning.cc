@@ -1,11 +1,16 @@
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "understory/simulation/counter_noise.h"
 #include "understory/simulation/motion.h"
 
 namespace understory::motion {
 namespace {
+
+constexpr double kBoomReach = 3.0;   // of the boom at rest, metres ahead of its pillar
+constexpr double kBoomHeight = 2.6;  // of its tip above the body
 
 // What a harvester does over a whole strip road.
 struct Shift {
@@ -14,7 +19,7 @@ struct Shift {
   Moves reach;
   Moves lift;
   std::vector<double> jolts_s;
-  std::vector<HeldStem> held;
+  std::vector<Felling> fellings;
   double time_s = 0.0;  // of what is planned so far
   double swing_rad = 0.0;
   double at_m = 0.0;
@@ -41,43 +46,115 @@ void move_boom(Shift& shift, double time_s, double reach_m, double lift_m) {
   shift.time_s += time_s;
 }
 
-// One tree: out to it, cut, let it fall, feed it through the head with the cabin turning to and
-// fro, drop it. Ends at `end_s`, or a little later where that is too soon.
-void fell_tree(const CarrierConfig& c, Shift& shift, Random& random, double end_s) {
-  const double side = random.chance(0.5) ? 1.0 : -1.0;
-  swing_to(c, shift, side * random.uniform(0.3, 1.0) * c.turn_deg * kDegree);
-  shift.jolts_s.push_back(shift.time_s);
-  move_boom(shift, 3.0, random.uniform(2.0, 5.5), random.uniform(-1.8, -1.0));
-  HeldStem stem;
-  stem.grab_s = shift.time_s;
-  stem.fall_s = shift.time_s + 1.5;
-  stem.level_s = stem.fall_s + 2.2;
-  stem.length_m = random.uniform(10.0, 16.0);
-  stem.radius_m = random.uniform(0.06, 0.11);
-  stem.side = -side;
-  shift.time_s = stem.level_s;
-  shift.jolts_s.push_back(stem.level_s);
-  move_boom(shift, 2.0, random.uniform(0.5, 2.0), random.uniform(-1.0, -0.2));
-  // The stem is worked up in front, off the road's middle, while the cabin never quite rests.
+// Where a thinning harvester stands and what it may cut.
+struct Work {
+  const CarrierConfig& carrier;
+  const Route& route;
+  const Terrain& terrain;
+  const Stand& stand;
+  std::vector<const Tree*> cut;  // so far
+};
+
+// The swing and the boom that bring the head to a tree.
+struct Reach {
+  double swing_rad = 0.0;
+  double reach_m = 0.0;
+  double tip_m = 0.0;  // height of the tip in the body frame
+};
+
+constexpr double kGripHeight = kStumpHeight + 0.6;
+
+std::optional<Reach> reach_to(const Work& work, double at_m, const Tree& tree) {
+  const Eigen::Vector2d place = work.route.place(at_m);
+  const Eigen::Vector3d grip = tree.centre(kGripHeight);
+  const double distance = (grip.head<2>() - place).norm();
+  if (distance < 3.4 || distance > 9.0) return std::nullopt;
+  const double heading = work.route.heading(at_m);
+  const Lie lie = lie_on(work.terrain, place, heading, 3.6, 2.2, 0.7);
+  const Eigen::Quaterniond world_from_chassis =
+      Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()) *
+      Eigen::AngleAxisd(lie.pitch, Eigen::Vector3d::UnitY()) *
+      Eigen::AngleAxisd(lie.roll, Eigen::Vector3d::UnitX());
+  const Eigen::Vector3d origin(place.x(), place.y(), lie.height_m + work.carrier.height_m);
+  const Eigen::Vector3d grip_in_chassis = world_from_chassis.inverse() * (grip - origin);
+  const Eigen::Vector3d head = head_in_body({0.0, 0.0});  // the boom drawn in to the pillar
+  const double ahead = std::sqrt(grip_in_chassis.head<2>().squaredNorm() - head.y() * head.y());
+  const double swing = std::remainder(
+      std::atan2(grip_in_chassis.y(), grip_in_chassis.x()) - std::atan2(head.y(), ahead), kTau);
+  if (std::abs(swing) > work.carrier.turn_deg * kDegree) return std::nullopt;
+  return Reach{swing, ahead - head.x(), grip_in_chassis.z() - head.z()};
+}
+
+// A tree in reach, drawn among those whose neighbours were left standing.
+const Tree* choose_tree(const Work& work, double at_m, Random& random) {
+  constexpr double kApart = 2.2;  // a thinning leaves trees between those that it takes
+  std::vector<const Tree*> candidates;
+  for (const Tree& tree : work.stand.trees) {
+    if (!reach_to(work, at_m, tree)) continue;
+    const bool near = std::any_of(work.cut.begin(), work.cut.end(), [&](const Tree* other) {
+      return (other->foot - tree.foot).head<2>().norm() < kApart;
+    });
+    if (!near) candidates.push_back(&tree);
+  }
+  if (candidates.empty()) return nullptr;
+  return candidates[random.below(candidates.size())];
+}
+
+// The tree in the head is worked up in front, off the road's middle, while the cabin never quite
+// rests. Ends at `end_s`, or a little later where that is too soon.
+void work_up(const CarrierConfig& c, Shift& shift, Random& random, double side, double end_s) {
   const double front = -side * random.uniform(0.05, 0.5) * c.turn_deg * kDegree;
   do {
     swing_to(c, shift, front + 0.12 * c.turn_deg * kDegree * random.uniform(-1.0, 1.0));
     shift.time_s += random.uniform(1.0, 3.0);
     if (random.chance(0.4)) shift.jolts_s.push_back(shift.time_s);  // a log falls off
   } while (shift.time_s < end_s - 3.0);
-  stem.drop_s = shift.time_s;
-  shift.held.push_back(stem);
+}
+
+// One tree: out to it, cut, let it fall, feed it through the head with the cabin turning to and
+// fro, drop it. Where none is in reach the operator looks about and goes on.
+void fell_tree(Work& work, Shift& shift, Random& random, double end_s) {
+  const CarrierConfig& c = work.carrier;
+  const Tree* tree = choose_tree(work, shift.at_m, random);
+  if (tree == nullptr) {
+    work_up(c, shift, random, random.chance(0.5) ? 1.0 : -1.0, std::min(end_s, shift.time_s + 6.0));
+    shift.time_s = std::max(shift.time_s, end_s);
+    return;
+  }
+  const Reach reach = reach_to(work, shift.at_m, *tree).value();
+  const double side = reach.swing_rad > 0.0 ? 1.0 : -1.0;
+  swing_to(c, shift, reach.swing_rad);
+  shift.jolts_s.push_back(shift.time_s);
+  move_boom(shift, 3.0, reach.reach_m - kBoomReach, reach.tip_m - kBoomHeight);
+  shift.time_s += 0.3;
+  Felling felling;
+  felling.tree = tree->id;
+  felling.grab_s = shift.time_s;
+  felling.fall_s = shift.time_s + 1.5;
+  felling.level_s = felling.fall_s + 2.2;
+  felling.side = -side;
+  felling.cuts_m = cuts_of(*tree);
+  shift.time_s = felling.level_s;
+  shift.jolts_s.push_back(felling.level_s);
+  felling.feed_s = felling.level_s + 2.0;
+  // Drawn in, though never onto the machine, and held at a height to work at.
+  move_boom(shift, 2.0, random.uniform(0.5, 2.0), random.uniform(-0.6, 0.0));
+  work_up(c, shift, random, side, end_s);
+  felling.drop_s = shift.time_s;
+  shift.fellings.push_back(felling);
+  work.cut.push_back(tree);
 }
 
 // Works at one place for about the given time, backing up between trees as it comes.
-void work_here(const CarrierConfig& c, Shift& shift, Random& random, double budget_s) {
+void work_here(Work& work, Shift& shift, Random& random, double budget_s) {
+  const CarrierConfig& c = work.carrier;
   constexpr double kTree = 32.0;
   const double end = shift.time_s + budget_s;
   const int trees = std::max(1, static_cast<int>(std::lround(budget_s / kTree)));
   const double here = shift.at_m;
   for (int i = 0; i < trees; ++i) {
     const double rest = end - shift.time_s;
-    fell_tree(c, shift, random, shift.time_s + rest / (trees - i));
+    fell_tree(work, shift, random, shift.time_s + rest / (trees - i));
     if (c.back_up_m > 0.0 && random.chance(0.5)) {
       const double back = here - c.back_up_m * random.uniform(0.3, 1.0);
       drive_to(c, shift, shift.at_m < here ? here : std::max(0.0, back));
@@ -86,8 +163,9 @@ void work_here(const CarrierConfig& c, Shift& shift, Random& random, double budg
   swing_to(c, shift, 0.0);
 }
 
-Shift plan_shift(const SiteConfig& config, double road_m, Random& random) {
-  const CarrierConfig& c = config.carrier;
+Shift plan_shift(Work& work, Random& random) {
+  const CarrierConfig& c = work.carrier;
+  const double road_m = work.route.length_m();
   const double hop = std::max(2.0, c.turn_interval_s * c.speed_m_s);
   std::vector<double> stops;
   for (double at = hop * random.uniform(0.3, 1.0); at < road_m;
@@ -102,7 +180,7 @@ Shift plan_shift(const SiteConfig& config, double road_m, Random& random) {
     const double left = c.route_time_s - shift.time_s - drives;
     const double share = left / static_cast<double>(stops.size() - i);
     const bool last = i + 1 == stops.size();
-    work_here(c, shift, random, std::max(25.0, share * (last ? 1.0 : random.uniform(0.6, 1.4))));
+    work_here(work, shift, random, std::max(25.0, share * (last ? 1.0 : random.uniform(0.6, 1.4))));
   }
   drive_to(c, shift, road_m);
   shift.time_s = std::max(shift.time_s + 2.0, c.route_time_s + 0.5);
@@ -111,13 +189,15 @@ Shift plan_shift(const SiteConfig& config, double road_m, Random& random) {
 
 }  // namespace
 
-CarrierPlan plan_thinning(const SiteConfig& config, const Route& route, const Terrain& terrain) {
+CarrierPlan plan_thinning(const SiteConfig& config, const Route& route, const Terrain& terrain,
+                          const Stand& stand) {
   const CarrierConfig& c = config.carrier;
   // Each road has a shift of its own.
   const auto road = static_cast<std::uint64_t>(c.strip_road - 1);
   Random random(static_cast<std::uint64_t>(config.seed),
                 stream_of(NoiseStream::kCarrier) + 1000 * road);
-  Shift shift = plan_shift(config, route.length_m(), random);
+  Work work{c, route, terrain, stand, {}};
+  Shift shift = plan_shift(work, random);
   std::sort(shift.jolts_s.begin(), shift.jolts_s.end());
   const double rock_roll = c.gait_deg * random.uniform(0.6, 1.0);
   const double rock_pitch = c.gait_deg * random.uniform(0.6, 1.0);
@@ -146,14 +226,15 @@ CarrierPlan plan_thinning(const SiteConfig& config, const Route& route, const Te
         roll * std::cos(swing) + pitch * std::sin(swing),
         pitch * std::cos(swing) - roll * std::sin(swing), heading + swing;
     controls.push_back(control);
-    boom.emplace_back(3.0 + shift.reach.at(t), 2.6 + shift.lift.at(t));
+    boom.emplace_back(kBoomReach + shift.reach.at(t), kBoomHeight + shift.lift.at(t));
   }
   CarrierPlan plan{CarrierPath(CarrierPath::Spline(std::move(controls), kStep)),
                    BoomPath(std::move(boom), kStep),
-                   std::move(shift.held),
+                   {std::move(shift.fellings), {}, {}},
                    {}};
-  for (const HeldStem& stem : plan.held)
-    plan.shocks_s.push_back(stem.level_s);
+  for (const Felling& felling : plan.harvest.fellings)
+    plan.shocks_s.push_back(felling.level_s);
+  lay_out_logs(plan, stand, terrain);
   return plan;
 }
 

@@ -81,20 +81,28 @@ std::string returns_text(const std::vector<ScanTruth>& scans) {
   return text;
 }
 
-std::string trees_text(const Stand& stand, const std::vector<ScanTruth>& scans) {
+// Trees that were felled while the recording ran say when, by its clock.
+std::string trees_text(const SimulatedWorld& world, TimeNs start,
+                       const std::vector<ScanTruth>& scans) {
   std::map<int, int> observations;
   for (const ScanTruth& scan : scans) {
     for (const StemReturns& stem : scan.stems)
       ++observations[stem.tree];
   }
+  std::map<int, std::string> felled;
+  for (const Felling& felling : world.plan.harvest.fellings) {
+    const TimeNs time = start + from_seconds(felling.grab_s);
+    if (!scans.empty() && time < scans.back().stamp) felled[felling.tree] = format_seconds(time);
+  }
   std::string text =
-      "id,x,y,z,dbh_m,dbh_sd_m,height_m,lean_deg,observations,x_sd_m,y_sd_m,species\n";
-  for (const Tree& tree : stand.trees) {
+      "id,x,y,z,dbh_m,dbh_sd_m,height_m,lean_deg,observations,x_sd_m,y_sd_m,species,felled_at\n";
+  for (const Tree& tree : world.stand.trees) {
     const auto seen = observations.find(tree.id);
-    text += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.4f},0,{:.3f},{:.3f},{},0,0,{}\n", tree.id,
+    const auto cut = felled.find(tree.id);
+    text += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.4f},0,{:.3f},{:.3f},{},0,0,{},{}\n", tree.id,
                         tree.foot.x(), tree.foot.y(), tree.foot.z(), tree.dbh_m, tree.height_m,
                         tree.lean_deg(), seen == observations.end() ? 0 : seen->second,
-                        species_name(tree.species));
+                        species_name(tree.species), cut == felled.end() ? "" : cut->second);
   }
   return text;
 }
@@ -133,8 +141,8 @@ void write_terrain(const std::string& path, const Terrain& terrain) {
 
 }  // namespace
 
-void write_truth_folder(const std::string& folder, const SiteConfig& site, const Stand& stand,
-                        const Terrain& terrain, const std::vector<ScanTruth>& scans) {
+void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
+                        const std::vector<ScanTruth>& scans) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw OutputError(folder, "cannot be made: " + error.message());
@@ -142,9 +150,9 @@ void write_truth_folder(const std::string& folder, const SiteConfig& site, const
   write_text(folder + "/velocity.csv", velocity_text(scans));
   write_text(folder + "/imu_bias.csv", bias_text(scans));
   write_gzip(folder + "/returns.csv.gz", returns_text(scans));
-  write_text(folder + "/trees.csv", trees_text(stand, scans));
-  write_terrain(folder + "/dtm.tif", terrain);
-  SiteConfig copy = site;
+  write_text(folder + "/trees.csv", trees_text(world, start, scans));
+  write_terrain(folder + "/dtm.tif", world.terrain);
+  SiteConfig copy = world.site;
   ConfigTable table;
   describe(table, copy);
   write_text(folder + "/site.yaml", table.to_yaml(false));

@@ -6,9 +6,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/simulation/scanner.h"
-#include "understory/simulation/site.h"
-#include "understory/simulation/stand.h"
-#include "understory/simulation/terrain.h"
+#include "understory/simulation/world.h"
 #include "understory/util/time.h"
 
 namespace understory {
@@ -24,7 +22,7 @@ struct ScanTruth {
 };
 
 // Writes the truth folder (docs/simulation.md). Throws OutputError.
-void write_truth_folder(const std::string& folder, const SiteConfig& site, const Stand& stand,
-                        const Terrain& terrain, const std::vector<ScanTruth>& scans);
+void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
+                        const std::vector<ScanTruth>& scans);
 
 }  // namespace understory

@@ -14,8 +14,8 @@ SimulatedWorld::SimulatedWorld(const SiteConfig& config)
       terrain(config.terrain, 0.5 * config.stand.size_x_m + kTerrainMargin,
               0.5 * config.stand.size_y_m + kTerrainMargin, seed, &route),
       stand(grow_stand(config.stand, config.carrier, terrain, route, seed)),
-      plan(plan_carrier(config, route, terrain)),
-      scene(config.stand, terrain, stand, seed, config.terrain.snow_m),
-      machine(config.carrier, plan) {}
+      plan(plan_carrier(config, route, terrain, stand)),
+      scene(config.stand, terrain, stand, seed, config.terrain.snow_m, plan.harvest),
+      machine(config.carrier, plan, stand) {}
 
 }  // namespace understory

@@ -1,0 +1,73 @@
+// How fast the simulator casts: milliseconds a scan, wall and CPU, against the time that the sensor
+// takes for it (docs/simulation.md).
+//   scan_casting SITE SEED [THREADS] [key=value ...]
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "understory/simulation/scanner.h"
+#include "understory/simulation/world.h"
+#include "understory/util/parallel.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+namespace {
+
+constexpr int kScans = 60;
+
+struct Cast {
+  double wall_ms = 0.0;
+  double cpu_ms = 0.0;
+};
+
+void run(const SiteConfig& site, int threads) {
+  SimulatedWorld world(site);
+  Scanner scanner(site, world.scene, world.plan.path, world.machine, 0);
+  const double revolution_s = 1.0 / site.lidar.rate_hz;
+  const auto all = static_cast<std::int64_t>((world.plan.path.duration_s() - 1.0) / revolution_s);
+  std::vector<Cast> casts;
+  std::size_t points = 0;
+  for (int i = 0; i < kScans; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    const double cpu_begin = process_cpu_seconds();
+    const ScanReadings readings = scanner.measure(all * i / kScans);
+    const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - begin;
+    casts.push_back({wall.count(), 1e3 * (process_cpu_seconds() - cpu_begin)});
+    points += static_cast<std::size_t>(
+        std::count_if(readings.beams.begin(), readings.beams.end(),
+                      [](const ScanReadings::Reading& beam) { return beam.range_m > 0.0F; }));
+  }
+  Cast mean;
+  for (const Cast& cast : casts) {
+    mean.wall_ms += cast.wall_ms / kScans;
+    mean.cpu_ms += cast.cpu_ms / kScans;
+  }
+  std::printf("%d threads: %.1f ms wall, %.1f ms CPU a scan of %zu points, %.2f x sensor speed\n",
+              threads, mean.wall_ms, mean.cpu_ms, points / kScans,
+              1e3 * revolution_s / mean.wall_ms);
+}
+
+}  // namespace
+}  // namespace understory
+
+int main(int argc, char** argv) {
+  if (argc < 3) {
+    std::fprintf(stderr, "scan_casting SITE SEED [THREADS] [key=value ...]\n");
+    return 2;
+  }
+  std::vector<std::string> settings = {std::string("seed=") + argv[2]};
+  int threads = understory::hardware_threads();
+  for (int i = 3; i < argc; ++i) {
+    if (std::string(argv[i]).find('=') == std::string::npos) {
+      threads = std::max(1, std::atoi(argv[i]));
+    } else {
+      settings.emplace_back(argv[i]);
+    }
+  }
+  understory::with_threads(
+      threads, [&] { understory::run(understory::load_site(argv[1], settings), threads); });
+  return 0;
+}

@@ -1,0 +1,358 @@
+#include "understory/simulation/scene_content.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "understory/simulation/scene_geometry.h"
+#include "understory/util/error.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+// The same with a number of one's own choice.
+void attach_as(RTCScene scene, RTCGeometry geometry, unsigned id) {
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(scene, geometry, id);
+  rtcReleaseGeometry(geometry);
+}
+
+// Attaches and lets go of a finished geometry; returns its number in the scene.
+unsigned attach(RTCScene scene, RTCGeometry geometry) {
+  rtcCommitGeometry(geometry);
+  const unsigned id = rtcAttachGeometry(scene, geometry);
+  rtcReleaseGeometry(geometry);
+  return id;
+}
+
+// One cone of a stem.
+struct StemPart {
+  struct End {
+    double height = 0.0;
+    Tree::Joint joint;
+  };
+  End low;
+  End high;
+};
+
+std::vector<StemPart> stem_parts(const Tree& tree) {
+  std::vector<StemPart> parts;
+  const std::vector<double> heights = tree.joints();
+  for (std::size_t i = 0; i + 1 < heights.size(); ++i) {
+    parts.push_back(
+        {{heights[i], tree.joint(heights[i])}, {heights[i + 1], tree.joint(heights[i + 1])}});
+  }
+  if (tree.fork_m <= 0.0) return parts;
+  std::vector<double> twin = {tree.fork_m};
+  std::copy_if(heights.begin(), heights.end(), std::back_inserter(twin),
+               [&](double height) { return height > tree.fork_m + 0.1; });
+  for (std::size_t i = 0; i + 1 < twin.size(); ++i) {
+    parts.push_back(
+        {{twin[i], tree.fork_joint(twin[i])}, {twin[i + 1], tree.fork_joint(twin[i + 1])}});
+  }
+  return parts;
+}
+
+void add_part(const StemPart& part, const Eigen::Vector3d& shift, Cones& cones) {
+  // Parts that follow each other share a joint.
+  const Tree::Joint& low = part.low.joint;
+  const Eigen::Vector3f from = (low.centre + shift).cast<float>();
+  const bool follows = !cones.points.empty() && cones.points.back().x == from.x() &&
+                       cones.points.back().y == from.y() && cones.points.back().z == from.z();
+  if (!follows) cones.add(low.centre + shift, low.radius_m);
+  cones.join();
+  cones.add(part.high.joint.centre + shift, part.high.joint.radius_m);
+}
+
+}  // namespace
+
+// One thread builds, so that the tree of boxes does not depend on how many there are.
+void commit_alone(RTCScene scene) {
+  in_arena(1, [&] { rtcJoinCommitScene(scene); });
+}
+
+SceneContent::SceneContent(const StandConfig& config, const Terrain& terrain, const Stand& stand,
+                           std::uint64_t seed, double snow_m, const Harvest& harvest)
+    : snowy_(snow_m > 0.0), snow_m_(snow_m), wind_(config.wind_sway_m) {
+  // No number of threads here: the library would hold the whole process to it.
+  device_ = rtcNewDevice("set_affinity=0");
+  UNDERSTORY_CHECK(device_ != nullptr);
+  top_ = rtcNewScene(device_);
+  for (const Felling& felling : harvest.fellings)
+    felled_[felling.tree].grab_s = felling.grab_s;
+  GrownShapes grown = grow_shapes(config, seed);
+  add_shapes(grown);
+  add_static(terrain, stand);
+  for (const Tree& tree : stand.trees)
+    add_tree(tree, grown.crowns);
+  add_plants(stand);
+  if (!swaying_.empty() || !felled_.empty()) still_ = copy_of_instances();
+  add_remains(harvest, stand);
+  commit_alone(top_);
+  UNDERSTORY_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
+}
+
+SceneContent::~SceneContent() {
+  if (still_ != nullptr) rtcReleaseScene(still_);
+  rtcReleaseScene(top_);
+  for (const RTCScene scene : scenes_)
+    rtcReleaseScene(scene);
+  rtcReleaseDevice(device_);
+}
+
+void SceneContent::add_static(const Terrain& terrain, const Stand& stand) {
+  static_ = new_scene();
+  UNDERSTORY_CHECK(attach(static_, terrain_geometry(device_, terrain)) == kGroundGeometry);
+  Cones stems;
+  for (const Tree& tree : stand.trees) {
+    for (const StemPart& part : stem_parts(tree)) {
+      if (!felled_.count(tree.id) && (wind_.still() || part.low.height < stiff_height(tree))) {
+        add_part(part, Eigen::Vector3d::Zero(), stems);
+        cone_tree_.push_back(tree.id);
+      }
+    }
+    bark_.resize(std::max(bark_.size(), static_cast<std::size_t>(tree.id) + 1), 0.3F);
+    bark_[static_cast<std::size_t>(tree.id)] = static_cast<float>(tree.bark_reflectivity);
+  }
+  bark_.resize(std::max<std::size_t>(bark_.size(), 1), 0.3F);
+  // Always present, so that geometry numbers stay what they are: a cone below the ground.
+  stems.add({0.0, 0.0, -1000.0}, 0.01);
+  stems.join();
+  cone_tree_.push_back(0);
+  stems.add({0.0, 0.0, -1000.5}, 0.01);
+  UNDERSTORY_CHECK(attach(static_, cone_geometry(device_, stems)) == kStemGeometry);
+  Cones wood;
+  for (const Wood& piece : stand.dead_wood) {
+    wood.add(piece.from, piece.radius_from_m);
+    wood.join();
+    wood.add(piece.to, piece.radius_to_m);
+  }
+  if (!wood.first.empty()) {
+    UNDERSTORY_CHECK(attach(static_, cone_geometry(device_, wood)) == kWoodGeometry);
+  }
+  add_solids(stand);
+  commit_alone(static_);
+}
+
+void SceneContent::add_solids(const Stand& stand) {
+  Cones boulders;
+  for (const Wood& boulder : stand.boulders) {
+    boulders.add(boulder.from, boulder.radius_from_m);
+    boulders.join();
+    boulders.add(boulder.to, boulder.radius_to_m);
+  }
+  if (!boulders.first.empty()) {
+    attach_as(static_, cone_geometry(device_, boulders), kBoulderGeometry);
+  }
+  Shape houses;
+  for (const Building& building : stand.buildings) {
+    const Shape house = building_shape(building);
+    const int first = static_cast<int>(houses.vertices.size());
+    houses.vertices.insert(houses.vertices.end(), house.vertices.begin(), house.vertices.end());
+    for (const Eigen::Vector3i& triangle : house.triangles)
+      houses.triangles.push_back(triangle + Eigen::Vector3i::Constant(first));
+  }
+  if (!houses.triangles.empty()) {
+    attach_as(static_, shape_geometry(device_, houses), kBuildingGeometry);
+  }
+}
+
+void SceneContent::add_shapes(GrownShapes& grown) {
+  for (GrownCrown& crown : grown.crowns) {
+    const RTCScene living = shape_scene(std::move(crown.living));
+    crowns_.push_back({living, shape_scene(std::move(crown.dead))});
+  }
+  for (Shape& plant : grown.plants)
+    plants_.push_back(shape_scene(std::move(plant)));
+}
+
+// What of a tree is not part of the fixed scene: its crown, and of its stem what sways or falls.
+void SceneContent::add_tree(const Tree& tree, const std::vector<GrownCrown>& grown) {
+  const auto found = felled_.find(tree.id);
+  FelledTree* felled = found == felled_.end() ? nullptr : &found->second;
+  std::size_t sway = kStands;
+  if (!wind_.still() && felled == nullptr) {
+    sway = sways_.size();
+    sways_.push_back({wind_.sway_of(tree), stiff_height(tree), tree.height_m + 0.01,
+                      static_cast<float>(tree.foot.z())});
+  }
+  const unsigned stem = add_stem(tree, felled != nullptr, sway);
+  std::pair<unsigned, unsigned> crown(kNone, kNone);
+  if (tree.broken_m <= 0.0) {  // else dead: no crown
+    const std::size_t nearest = nearest_crown(grown, tree);
+    crown = add_crown(tree, crowns_[nearest], grown[nearest].size, sway);
+  }
+  if (felled == nullptr) return;
+  felled->foot = tree.foot.cast<float>();
+  felled->reach_m = static_cast<float>(1.4 * tree.crown_radius_m +
+                                       tree.lean.norm() * tree.height_m + tree.sweep.norm() + 0.5);
+  felled->stem = stem;
+  felled->living = crown.first;
+  felled->dead = crown.second;
+  for (const unsigned part : {stem, crown.first, crown.second}) {
+    if (part != kNone) time_limit(part, -kForever, felled->grab_s);
+  }
+}
+
+// The stem's upper part, which sways, or all of it where it will be felled; the feet of those
+// stand still.
+unsigned SceneContent::add_stem(const Tree& tree, bool all, std::size_t sway) {
+  Cones high;
+  for (const StemPart& part : stem_parts(tree)) {
+    const bool yields = sway != kStands && part.low.height >= stiff_height(tree);
+    if (all || yields) add_part(part, -tree.foot, high);
+  }
+  if (high.first.empty()) return kNone;
+  RTCScene scene = new_scene();
+  attach(scene, cone_geometry(device_, high));
+  commit_alone(scene);
+  Eigen::Matrix<float, 3, 4> world_from_shape;
+  world_from_shape << Eigen::Matrix3f::Identity(), tree.foot.cast<float>();
+  Instance instance{Surface::kStem, 1.0F, 0.0F, static_cast<float>(tree.bark_reflectivity)};
+  instance.tree = tree.id;
+  instance.sway = sway;
+  const unsigned number = add_instance(scene, world_from_shape, instance);
+  if (sway != kStands) swaying_.push_back({number, sway});
+  return number;
+}
+
+// The grown shape, stretched to the tree's height and crown, turned and sheared with its lean.
+std::pair<unsigned, unsigned> SceneContent::add_crown(const Tree& tree, const CrownScene& crown,
+                                                      const CrownSize& size, std::size_t sway) {
+  const auto cos_yaw = static_cast<float>(std::cos(tree.yaw_rad));
+  const auto sin_yaw = static_cast<float>(std::sin(tree.yaw_rad));
+  const auto wide = static_cast<float>(tree.crown_radius_m / size.crown_radius_m);
+  const auto high = static_cast<float>(tree.height_m / size.height_m);
+  Eigen::Matrix<float, 3, 4> world_from_shape;
+  world_from_shape.col(0) << wide * cos_yaw, wide * sin_yaw, 0.0F;
+  world_from_shape.col(1) << -wide * sin_yaw, wide * cos_yaw, 0.0F;
+  world_from_shape.col(2) << high * static_cast<float>(tree.lean.x()),
+      high * static_cast<float>(tree.lean.y()), high;
+  world_from_shape.col(3) = tree.foot.cast<float>();
+  const auto add = [&](RTCScene scene, float reflectivity) {
+    Instance instance{Surface::kFoliage, cos_yaw, sin_yaw, reflectivity};
+    instance.sway = sway;
+    const unsigned number = add_instance(scene, world_from_shape, instance);
+    if (sway != kStands) swaying_.push_back({number, sway});
+    return number;
+  };
+  const unsigned living = add(crown.living, tree.species == Species::kBirch ? 0.5F : 0.42F);
+  return {living, add(crown.dead, 0.3F)};
+}
+
+// Stumps, logs and branches that the harvest leaves.
+void SceneContent::add_remains(const Harvest& harvest, const Stand& stand) {
+  for (const Tree& tree : stand.trees) {
+    const auto felled = felled_.find(tree.id);
+    if (felled == felled_.end()) continue;
+    const Tree::Joint low = tree.joint(-0.2);
+    const Tree::Joint high = tree.joint(kStumpHeight);
+    add_wood({low.centre, high.centre, low.radius_m, high.radius_m}, felled->second.grab_s);
+    changes_.push_back(felled->second.grab_s);
+  }
+  for (const FallenLog& log : harvest.logs)
+    add_wood(log.lying, log.lies_s);
+  for (std::size_t i = 0; i < harvest.brash.size(); ++i) {
+    const auto& [from_s, plant] = harvest.brash[i];
+    time_limit(add_plant(plant, plant_scene(plant.kind, i), 0.0), from_s, kForever);
+  }
+  for (const Timed& part : timed_) {
+    if (part.from_s > -kForever) changes_.push_back(part.from_s);
+  }
+  std::sort(changes_.begin(), changes_.end());
+  changes_.erase(std::unique(changes_.begin(), changes_.end()), changes_.end());
+}
+
+void SceneContent::add_wood(const Wood& wood, double from_s) {
+  Cones cone;
+  cone.add(wood.from, wood.radius_from_m);
+  cone.join();
+  cone.add(wood.to, wood.radius_to_m);
+  RTCScene scene = new_scene();
+  attach(scene, cone_geometry(device_, cone));
+  commit_alone(scene);
+  Eigen::Matrix<float, 3, 4> world_from_shape;
+  world_from_shape << Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero();
+  time_limit(add_instance(scene, world_from_shape, {Surface::kDeadWood, 1.0F, 0.0F, 0.32F}), from_s,
+             kForever);
+}
+
+void SceneContent::time_limit(unsigned instance, double from_s, double until_s) {
+  timed_.push_back({instance, from_s, until_s});
+  present_[instance] = from_s <= -kForever;
+  if (!present_[instance]) rtcDisableGeometry(rtcGetGeometry(top_, instance));
+}
+
+void SceneContent::add_plants(const Stand& stand) {
+  for (std::size_t i = 0; i < stand.plants.size(); ++i) {
+    const Plant& plant = stand.plants[i];
+    if (snowy_ && plant.height_m < snow_m_) continue;  // covered
+    add_plant(plant, plant_scene(plant.kind, i), snowy_ ? snow_m_ : 0.0);
+  }
+}
+
+RTCScene SceneContent::plant_scene(PlantKind kind, std::size_t variant) const {
+  return plants_[3 * static_cast<std::size_t>(kind) + variant % 3];
+}
+
+unsigned SceneContent::add_plant(const Plant& plant, RTCScene scene, double sunk_m) {
+  const auto cos_yaw = static_cast<float>(std::cos(plant.yaw_rad));
+  const auto sin_yaw = static_cast<float>(std::sin(plant.yaw_rad));
+  const auto high = static_cast<float>(plant.height_m);
+  const float wide = plant.kind == PlantKind::kGroundPlants ? 1.0F : high;
+  Eigen::Matrix<float, 3, 4> world_from_shape;
+  world_from_shape.col(0) << wide * cos_yaw, wide * sin_yaw, 0.0F;
+  world_from_shape.col(1) << -wide * sin_yaw, wide * cos_yaw, 0.0F;
+  world_from_shape.col(2) << 0.0F, 0.0F, high;
+  world_from_shape.col(3) = plant.foot.cast<float>();
+  world_from_shape(2, 3) -= static_cast<float>(sunk_m);
+  return add_instance(scene, world_from_shape, {Surface::kPlant, cos_yaw, sin_yaw, 0.45F});
+}
+
+RTCScene SceneContent::new_scene() {
+  RTCScene scene = rtcNewScene(device_);
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_NONE);
+  scenes_.push_back(scene);
+  return scene;
+}
+
+RTCScene SceneContent::shape_scene(Shape shape) {
+  if (shape.triangles.empty()) {  // a bare crown: a triangle without area, which no ray meets
+    shape.vertices.assign(3, Eigen::Vector3f::Zero());
+    shape.triangles.emplace_back(0, 1, 2);
+  }
+  RTCScene scene = new_scene();
+  attach(scene, shape_geometry(device_, shape));
+  commit_alone(scene);
+  return scene;
+}
+
+unsigned SceneContent::add_instance(RTCScene scene,
+                                    const Eigen::Matrix<float, 3, 4>& world_from_shape,
+                                    const Instance& instance) {
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geometry, scene);
+  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, world_from_shape.data());
+  const unsigned id = attach(top_, geometry);
+  UNDERSTORY_CHECK(id == instances_.size());
+  instances_.push_back(instance);
+  shapes_.push_back({scene, world_from_shape});
+  present_.push_back(true);
+  return id;
+}
+
+// The same crowns and plants once more, to stay where they are.
+RTCScene SceneContent::copy_of_instances() {
+  RTCScene copy = rtcNewScene(device_);
+  for (const auto& [scene, world_from_shape] : shapes_) {
+    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(geometry, scene);
+    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, world_from_shape.data());
+    attach(copy, geometry);
+  }
+  commit_alone(copy);
+  return copy;
+}
+
+}  // namespace understory
