@@ -32,6 +32,14 @@ void describe(ConfigTable& table, LocalMapConfig& config) {
             "recent: one keyframe per cube of this edge");
 }
 
+namespace {
+
+// Cells that are twice as large or more have their shape from a part of a dense keyframe's points.
+constexpr std::size_t kEnoughForCoarse = 20000;
+constexpr std::size_t kCoarseEvery = 4;
+
+}  // namespace
+
 LocalMap::LocalMap(const LocalMapConfig& config) : config_(config) {
   if (config.cell_sizes_m.empty()) throw ConfigError({"local_map.cell_sizes_m: is empty"});
   for (const double size : config.cell_sizes_m) {
@@ -45,9 +53,13 @@ LocalMap::LocalMap(const LocalMapConfig& config) : config_(config) {
 }
 
 void LocalMap::insert(const PlacedPoints& keyframe, bool forget) {
+  const Points& all = *keyframe.points_in_body;
+  const Points part = thin_evenly(all, kEnoughForCoarse, kCoarseEvery);
+  const double finest = config_.cell_sizes_m.back();
   parallel_for(builders_.size(), 1, [&](std::size_t i) {
     NdtMapBuilder& builder = builders_[i];
-    builder.insert(*keyframe.points_in_body, keyframe.world_from_body);
+    const bool coarse = config_.cell_sizes_m[i] >= 2.0 * finest;
+    builder.insert(coarse ? part : all, keyframe.world_from_body);
     if (forget) builder.remove_beyond(keyframe.world_from_body.translation(), config_.radius_m);
   });
 }

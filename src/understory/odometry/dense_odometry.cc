@@ -56,7 +56,8 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const LocalMapSnapshot& l
   const double cpu_start = process_cpu_seconds();
   {
     const ScopedTimer timer(times_, "odometry");
-    const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, scan.end());
+    estimate.scan_end = scan.end();
+    const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, estimate.scan_end);
     preprocess(scan, guess, estimate);
     if (!local_map.empty()) match(local_map, motion_->predict(scan.stamp), estimate);
     if (config_.elastic_scans && estimate.matched && by_scans_alone())
@@ -97,7 +98,7 @@ void DenseOdometry::match_elastically(const Scan& scan, const NdtMap& target,
                                       const std::vector<StampedPose>& guess,
                                       DenseEstimate& estimate) {
   const ScopedTimer timer(times_, "matching_elastic");
-  const TimeNs duration = scan.end() - scan.stamp;
+  const TimeNs duration = estimate.scan_end - scan.stamp;
   if (duration <= 0) return;
   const Pose start = estimate.match.target_from_source;
   const ScanPathConfig path_config{kBendShare * config_.motion.motion_accel_sigma_m_s2,

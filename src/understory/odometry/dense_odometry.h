@@ -56,6 +56,7 @@ struct DenseEstimate {
   bool matched = false;      // the match was usable and was offered to the motion model
   BodyCloud cloud;           // every return outside the machine, deskewed, body frame at the stamp
   BodyCloud thinned;         // what was matched, of the cloud
+  TimeNs scan_end = 0;       // time of the scan's last point
   double wall_ms = 0.0;
   double cpu_ms = 0.0;
 };

@@ -246,7 +246,7 @@ void MappingSession::on_scan(const Scan& scan) {
   record.cpu_ms =
       static_cast<float>(1e3 * (process_cpu_seconds() - map_->search_cpu_seconds() - cpu_start));
   journal_->append(record);
-  last_scan_end_ = scan.end();
+  last_scan_end_ = estimate.scan_end;
   if (opening_) consider_opening(scan, estimate);
 }
 

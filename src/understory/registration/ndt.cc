@@ -38,6 +38,10 @@ void describe(ConfigTable& table, NdtConfig& config) {
             "share of matched points that counts as independent");
 }
 
+// The wide steps only look for where the last ones begin: a part of a dense scan is enough.
+constexpr std::size_t kEnoughForWideSteps = 8000;
+constexpr std::size_t kWideEvery = 4;
+
 RegistrationResult register_ndt(const NdtMap& target, const Points& source, const Pose& guess,
                                 const std::optional<PosePrior>& prior, const NdtConfig& config) {
   if (target.empty())
@@ -48,10 +52,14 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
   }
   const double range = internal::mean_range(source);
   double widening = config.widening;
+  MatchSums sums;
+  Pose summed_at;
+  const Points few = thin_evenly(source, kEnoughForWideSteps, kWideEvery);
   const auto evaluate = [&](const Pose& pose) {
-    const MatchSums at = ndt_cost(target, source, pose, config, widening);
+    sums = ndt_cost(target, widening > 1.0 ? few : source, pose, config, widening);
+    summed_at = pose;
     const double share = config.independent_share;
-    internal::Quadratic sum{share * at.cost, share * at.gradient, share * at.hessian};
+    internal::Quadratic sum{share * sums.cost, share * sums.gradient, share * sums.hessian};
     if (prior) internal::add_prior(*prior, pose, sum);
     return sum;
   };
@@ -62,6 +70,7 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
   int wide_iterations = 0;
   limits.step_translation_m = config.wide_until_m;
   limits.step_rotation_rad = config.wide_until_m / range;
+  limits.trust_last_step = true;
   for (; widening > 1.0; widening *= 0.5) {
     minimum = internal::minimise(evaluate, minimum.pose, limits);
     wide_iterations += minimum.iterations;
@@ -69,13 +78,17 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
   widening = 1.0;
   limits.step_translation_m = config.step_translation_m;
   limits.step_rotation_rad = config.step_rotation_rad;
+  limits.trust_last_step = false;
   minimum = internal::minimise(evaluate, minimum.pose, limits);
   minimum.iterations += wide_iterations;
 
-  NdtConfig plain = config;  // information has to be positive
-  plain.hessian = NdtConfig::Hessian::kGaussNewton;
-  const MatchSums at = ndt_cost(target, source, minimum.pose, plain);
-  return internal::conclude(minimum, at, source, range, guess, internal::Judgement(config));
+  const bool exact = config.hessian == NdtConfig::Hessian::kNewton;
+  if (exact || summed_at.matrix() != minimum.pose.matrix()) {
+    NdtConfig plain = config;  // information has to be positive
+    plain.hessian = NdtConfig::Hessian::kGaussNewton;
+    sums = ndt_cost(target, source, minimum.pose, plain);
+  }
+  return internal::conclude(minimum, sums, source, range, guess, internal::Judgement(config));
 }
 
 RegistrationResult register_ndt(std::span<const NdtMapPtr> targets, const Points& source,

@@ -57,8 +57,13 @@ Minimum minimise(const Evaluate& evaluate, const Pose& guess, const StepLimits& 
     shorten(step, limits);
     step *= fraction;
     const Pose pose = best.pose * Pose::exp(step);
-    const Quadratic at = evaluate(pose);
     ++best.iterations;
+    if (limits.trust_last_step && small(step, limits)) {
+      best.pose = pose;
+      best.converged = true;
+      break;
+    }
+    const Quadratic at = evaluate(pose);
     const double slope_before = best.at.gradient.dot(step);
     const double slope_after = at.gradient.dot(step);
     if (slope_after <= kMostOvershoot * std::abs(slope_before)) {

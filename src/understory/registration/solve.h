@@ -22,11 +22,14 @@ struct StepLimits {
   double step_rotation_rad = 5e-5;
   double max_step_m = 0.5;
   double range_m = 10.0;  // makes rotations comparable with translations
+  // A last step below the limits is taken without looking where it led: for a minimum that is only
+  // the start of the next.
+  bool trust_last_step = false;
 };
 
 struct Minimum {
   Pose pose;
-  Quadratic at;
+  Quadratic at;  // of the pose before, if its last step was trusted
   int iterations = 0;
   bool converged = false;
 };
