@@ -10,6 +10,7 @@
 #include "understory/cli/evaluate_map.h"
 #include "understory/cli/evaluate_trees.h"
 #include "understory/cli/file_in_folder.h"
+#include "understory/evaluation/prism_errors.h"
 #include "understory/evaluation/trajectory_errors.h"
 #include "understory/util/error.h"
 
@@ -25,6 +26,7 @@ struct EvaluateOptions {
   std::string alignment = "none";
   double tolerance_s = 0.01;
   std::vector<double> deltas_m = {10.0};
+  std::vector<double> prism_m;  // three numbers, or none
   bool json = false;
 };
 
@@ -127,10 +129,56 @@ void warn_of_doubts(const TrajectoryErrors& errors, Log& log) {
   }
 }
 
+Json to_json(const PrismErrors& errors) {
+  Json json;
+  json["pairs"] = errors.pairs;
+  json["alignment"] = to_string(errors.alignment);
+  json["ape_rmse_m"] = errors.ape_rmse_m;
+  json["ape_plane_rmse_m"] = errors.ape_plane_rmse_m;
+  json["ape_mean_m"] = errors.ape_mean_m;
+  json["ape_median_m"] = errors.ape_median_m;
+  json["ape_max_m"] = errors.ape_max_m;
+  return json;
+}
+
+// Against the places of a prism, which have no attitude.
+int evaluate_places(const EvaluateOptions& options, CommandContext& context) {
+  const fs::path file = file_in_folder(options.truth, "total_station.csv");
+  const Trajectory estimate = read_trajectory(file_in_folder(options.estimate, "trajectory.tum"));
+  const std::vector<StampedPoint> truth = read_points(file);
+  const Eigen::Vector3d arm(options.prism_m[0], options.prism_m[1], options.prism_m[2]);
+  const auto errors = evaluate_prism(estimate, truth, arm, alignment_from_name(options.alignment),
+                                     options.tolerance_s);
+  if (!errors) {
+    throw InputError(file.string(), "",
+                     fmt::format("expected places within {} s of the estimate's poses, which run "
+                                 "from {} to {} s",
+                                 options.tolerance_s, format_seconds(estimate.front().stamp),
+                                 format_seconds(estimate.back().stamp)));
+  }
+  if (!errors->alignment_determined) {
+    context.log.warn("evaluate.alignment",
+                     "the prism's places do not fix the " + options.alignment + " alignment");
+  }
+  const std::string text =
+      options.json
+          ? to_json(*errors).dump(2) + "\n"
+          : fmt::format(
+                "alignment           {}\npairs               {} within {} s\nAPE of the prism    "
+                "rmse {:.4f} m, in the plane {:.4f} m, mean {:.4f} m, median {:.4f} m, max {:.4f} "
+                "m\n",
+                to_string(errors->alignment), errors->pairs, options.tolerance_s,
+                errors->ape_rmse_m, errors->ape_plane_rmse_m, errors->ape_mean_m,
+                errors->ape_median_m, errors->ape_max_m);
+  std::fputs(text.c_str(), stdout);
+  return errors->alignment_determined ? kExitDone : kExitUntrusted;
+}
+
 int evaluate(const EvaluateOptions& options, CommandContext& context) {
   if (options.estimate.empty() || options.truth.empty()) {
     throw ConfigError({"understory evaluate needs ESTIMATE and TRUTH (files or folders)"});
   }
+  if (!options.prism_m.empty()) return evaluate_places(options, context);
   EvaluationOptions settings;
   settings.alignment = alignment_from_name(options.alignment);
   settings.tolerance_s = options.tolerance_s;
@@ -175,9 +223,15 @@ void add_evaluate_command(CLI::App& app, Command& chosen) {
       ->capture_default_str();
   command->add_option("--delta-m", options->deltas_m, "Path lengths for RPE (10 by default)")
       ->check(CLI::Range(1e-6, 1e7));
+  command
+      ->add_option("--prism-m", options->prism_m,
+                   "TRUTH holds places of a prism (total_station.csv), which is here in the body "
+                   "frame: x y z")
+      ->expected(3);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->footer(
       "Example:\n  understory evaluate run walk.truth --align se3\n"
+      "  understory evaluate run walk.truth --align yaw --prism-m -0.3 0.4 2.6\n"
       "  understory evaluate trees run walk.truth --align yaw");
   command->callback([&chosen, options, command] {
     if (!command->get_subcommands().empty()) return;

@@ -87,6 +87,25 @@ std::vector<StampedVelocity> read_velocities(const std::filesystem::path& path) 
   return rows;
 }
 
+std::vector<StampedPoint> read_points(const std::filesystem::path& path) {
+  CsvReader table(path, {"timestamp", "x", "y", "z"});
+  std::vector<StampedPoint> rows;
+  while (table.next()) {
+    StampedPoint row;
+    if (!parse_stamp(table.text("timestamp"), row.stamp)) {
+      throw InputError(path.string(), table.lines().position(),
+                       "expected seconds in column 'timestamp'");
+    }
+    row.point = {table.finite("x"), table.finite("y"), table.finite("z")};
+    rows.push_back(row);
+  }
+  if (rows.empty()) {
+    throw InputError(path.string(), "", "expected at least one place, found none");
+  }
+  sort_by_time(rows);
+  return rows;
+}
+
 double path_length(const Trajectory& poses, std::size_t first, std::size_t last) {
   double length = 0.0;
   for (std::size_t i = first + 1; i <= last && i < poses.size(); ++i) {

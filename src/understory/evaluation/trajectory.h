@@ -27,6 +27,16 @@ struct StampedVelocity {
 // InputError where a column is missing or a cell is no number.
 [[nodiscard]] std::vector<StampedVelocity> read_velocities(const std::filesystem::path& path);
 
+// Where a reference instrument saw a prism on the carrier.
+struct StampedPoint {
+  TimeNs stamp = 0;
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  // metres
+};
+
+// Reads the columns `timestamp,x,y,z` of a CSV table, plain or gzip, sorted by time. Throws
+// InputError where a column is missing or a cell is no number, and if there is no row.
+[[nodiscard]] std::vector<StampedPoint> read_points(const std::filesystem::path& path);
+
 // Length of the path in metres through poses[first..last].
 [[nodiscard]] double path_length(const Trajectory& poses, std::size_t first, std::size_t last);
 

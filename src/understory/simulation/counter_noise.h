@@ -63,6 +63,7 @@ enum class NoiseStream : std::uint64_t {
   kBoom,
   kMag,
   kWeather,
+  kTotalStation,
 };
 
 [[nodiscard]] inline std::uint64_t stream_of(NoiseStream stream) {

@@ -11,6 +11,7 @@
 #include "understory/simulation/satellite.h"
 #include "understory/simulation/scan_cache.h"
 #include "understory/simulation/scanner.h"
+#include "understory/simulation/total_station.h"
 #include "understory/simulation/truth.h"
 #include "understory/simulation/world.h"
 
@@ -275,7 +276,11 @@ double Simulator::duration_s() const {
 }
 
 void Simulator::write_truth(const std::string& folder) const {
-  write_truth_folder(folder, *impl_, impl_->start, impl_->truths);
+  // As far as scans were read; casting brings the scene to its own moments anyway.
+  const double until_s =
+      impl_->truths.empty() ? 0.0 : to_seconds(impl_->truths.back().stamp - impl_->start);
+  write_truth_folder(folder, *impl_, impl_->start, impl_->truths,
+                     track_prism(*impl_, impl_->start, until_s));
 }
 
 std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {

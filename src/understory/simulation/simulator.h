@@ -37,7 +37,7 @@ class Simulator : public Recording {
   // Writes the truth of what has been read so far into a folder, which is made if need be:
   // trajectory.tum, velocity.csv, imu_bias.csv (at every scan's stamp, skipped ones too),
   // returns.csv.gz (of the scans that were cast: a skipped scan has no returns), trees.csv,
-  // dtm.tif, site.yaml. Throws OutputError.
+  // total_station.csv (where the site has one), dtm.tif, site.yaml. Throws OutputError.
   void write_truth(const std::string& folder) const;
 
  private:

@@ -248,6 +248,36 @@ void describe_gnss(ConfigTable& table, GnssConfig& c) {
   });
 }
 
+void describe_total_station(ConfigTable& table, TotalStationConfig& c) {
+  table.section("total_station", [&] {
+    table.add("enabled", c.enabled, "whether a total station follows a prism on the carrier");
+    table.add("rate_hz", c.rate_hz, {0.1, 100.0}, "Hz", "measurements");
+    table.add("prism_m", c.prism_m, "m", "prism in the body frame of a level carrier");
+    table.add("levelling", c.levelling, {0.0, 1.0}, "",
+              "share of the carrier's tilt that the prism's link takes away");
+    table.add("distance_sd_m", c.distance_sd_m, {0.0, 1.0}, "m", "error of a distance");
+    table.add("distance_ppm", c.distance_ppm, {0.0, 1000.0}, "mm/km", "and its growth");
+    table.add("angle_sd_arcsec", c.angle_sd_arcsec, {0.0, 3600.0}, "arcsec", "of an angle");
+    table.add("setup_sd_m", c.setup_sd_m, {0.0, 10.0}, "m", "of the instrument's own place");
+    table.add("time_offset_s", c.time_offset_s, {-10.0, 10.0}, "s", "how late its clock is");
+    table.add("time_sd_s", c.time_sd_s, {0.0, 1.0}, "s", "error of a stamp");
+    table.add("search_s", c.search_s, {0.0, 600.0}, "s", "to find the prism again");
+  });
+}
+
+void describe_scanned(ConfigTable& table, SiteConfig& config) {
+  table.add("seed", config.seed, {0, 2e9}, "", "of everything random");
+  table.add("duration_s", config.duration_s, {0.0, 1e5}, "s",
+            "of the recording, 0 = as long as the route takes");
+  describe_ground(table, config);
+  describe_stand(table, config.stand);
+  describe_carrier(table, config.carrier);
+  describe_lidar(table, config.lidar);
+  describe_imu(table, config.imu);
+  describe_gnss(table, config.gnss);
+  describe_mag(table, config.mag);
+}
+
 void check_triple(const std::string& key, const std::vector<double>& value,
                   std::vector<std::string>& problems) {
   if (value.size() != 3) problems.push_back(key + ": expected three numbers");
@@ -262,6 +292,7 @@ void check_site(const SiteConfig& site) {
   check_triple("imu.mount_m", site.imu.mount_m, problems);
   check_triple("imu.mount_rpy_deg", site.imu.mount_rpy_deg, problems);
   check_triple("gnss.mount_m", site.gnss.mount_m, problems);
+  check_triple("total_station.prism_m", site.total_station.prism_m, problems);
   if (site.stand.pine_share + site.stand.spruce_share > 1.0 + 1e-9) {
     problems.push_back("stand: pine_share and spruce_share add up to more than 1");
   }
@@ -286,22 +317,14 @@ void check_site(const SiteConfig& site) {
 }  // namespace
 
 void describe(ConfigTable& table, SiteConfig& config) {
-  table.add("seed", config.seed, {0, 2e9}, "", "of everything random");
-  table.add("duration_s", config.duration_s, {0.0, 1e5}, "s",
-            "of the recording, 0 = as long as the route takes");
-  describe_ground(table, config);
-  describe_stand(table, config.stand);
-  describe_carrier(table, config.carrier);
-  describe_lidar(table, config.lidar);
-  describe_imu(table, config.imu);
-  describe_gnss(table, config.gnss);
-  describe_mag(table, config.mag);
+  describe_scanned(table, config);
+  describe_total_station(table, config.total_station);
 }
 
 std::uint64_t site_key(const SiteConfig& config) {
   SiteConfig copy = config;
   ConfigTable table;
-  describe(table, copy);
+  describe_scanned(table, copy);
   std::string text = table.to_yaml(false);
   if (!config.stand.trees.empty()) {  // its content counts, not its name alone
     std::ifstream file(config.stand.trees, std::ios::binary);

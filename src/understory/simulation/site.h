@@ -197,6 +197,20 @@ struct MagnetometerConfig {
   double noise_ut = 0.15;
 };
 
+struct TotalStationConfig {  // a reference beside the recording: REC.truth/total_station.csv
+  bool enabled = false;
+  double rate_hz = 8.0;
+  std::vector<double> prism_m = {-0.3, 0.4, 2.6};  // in the body frame when the carrier is level
+  double levelling = 0.1;  // share of the body's tilt that its link takes away
+  double distance_sd_m = 0.002;
+  double distance_ppm = 1.5;
+  double angle_sd_arcsec = 3.0;
+  double setup_sd_m = 0.005;   // of the instrument's own place
+  double time_offset_s = 0.0;  // its clock is late by this much
+  double time_sd_s = 0.001;    // of a stamp
+  double search_s = 2.0;       // to find the prism again
+};
+
 struct SiteConfig {
   int seed = 1;
   double duration_s = 0.0;  // 0: as long as the route takes
@@ -208,12 +222,13 @@ struct SiteConfig {
   ImuConfig imu;
   GnssConfig gnss;
   MagnetometerConfig mag;
+  TotalStationConfig total_station;
 };
 
 // Binds every key of a site to `config`.
 void describe(ConfigTable& table, SiteConfig& config);
 
-// Names a site with all its settings, for the cache of scans.
+// Names a site with all its settings but those of the total station, for the cache of scans.
 [[nodiscard]] std::uint64_t site_key(const SiteConfig& config);
 
 // A site that the program carries with it.

@@ -107,6 +107,15 @@ std::string trees_text(const SimulatedWorld& world, TimeNs start,
   return text;
 }
 
+std::string prism_text(const std::vector<PrismSample>& prism) {
+  std::string text = "timestamp,x,y,z\n";
+  for (const PrismSample& sample : prism) {
+    text += fmt::format("{},{:.5f},{:.5f},{:.5f}\n", format_seconds(sample.stamp), sample.place.x(),
+                        sample.place.y(), sample.place.z());
+  }
+  return text;
+}
+
 // Heights at the middle of cells of half a metre, in the truth's own frame (east, north; no
 // coordinate system).
 void write_terrain(const std::string& path, const Terrain& terrain) {
@@ -142,7 +151,8 @@ void write_terrain(const std::string& path, const Terrain& terrain) {
 }  // namespace
 
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
-                        const std::vector<ScanTruth>& scans) {
+                        const std::vector<ScanTruth>& scans,
+                        const std::vector<PrismSample>& prism) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw OutputError(folder, "cannot be made: " + error.message());
@@ -151,6 +161,7 @@ void write_truth_folder(const std::string& folder, const SimulatedWorld& world, 
   write_text(folder + "/imu_bias.csv", bias_text(scans));
   write_gzip(folder + "/returns.csv.gz", returns_text(scans));
   write_text(folder + "/trees.csv", trees_text(world, start, scans));
+  if (!prism.empty()) write_text(folder + "/total_station.csv", prism_text(prism));
   write_terrain(folder + "/dtm.tif", world.terrain);
   SiteConfig copy = world.site;
   ConfigTable table;

@@ -6,6 +6,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/simulation/scanner.h"
+#include "understory/simulation/total_station.h"
 #include "understory/simulation/world.h"
 #include "understory/util/time.h"
 
@@ -21,8 +22,9 @@ struct ScanTruth {
   std::vector<StemReturns> stems;
 };
 
-// Writes the truth folder (docs/simulation.md). Throws OutputError.
+// Writes the truth folder (docs/simulation.md); that of the total station only where it measured.
+// Throws OutputError.
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
-                        const std::vector<ScanTruth>& scans);
+                        const std::vector<ScanTruth>& scans, const std::vector<PrismSample>& prism);
 
 }  // namespace understory
