@@ -56,6 +56,7 @@ Eigen::Vector3d geodetic_from_enu(const OriginConfig& origin, const Eigen::Vecto
 SatelliteReceiver::SatelliteReceiver(const SiteConfig& config, const CarrierPath& path,
                                      const ForestScene& scene, TimeNs start)
     : config_(config.gnss),
+      hold_(config.receiver_hold),
       origin_(config.origin),
       path_(path),
       scene_(scene),
@@ -120,6 +121,17 @@ void SatelliteReceiver::jump(double dt_s) {
   jump_.z() *= config_.height_factor;
 }
 
+// What the receiver reports of its solution.
+Eigen::Vector3d SatelliteReceiver::hold(const Eigen::Vector3d& solution, double speed_m_s) {
+  if (speed_m_s >= hold_.below_m_s) {
+    held_.reset();
+    return solution;
+  }
+  const bool left = held_ && (solution - *held_).head<2>().norm() > hold_.release_m;
+  if (!held_ || left) held_ = solution;
+  return *held_;
+}
+
 std::optional<GnssFix> SatelliteReceiver::next() {
   const TimeNs stamp = next_stamp();
   const double dt = 1.0 / config_.rate_hz;
@@ -144,6 +156,7 @@ std::optional<GnssFix> SatelliteReceiver::next() {
   error_.z() *= config_.height_factor;
   error_ += runaway;
   if (lost) return std::nullopt;
+  error_ = hold(antenna + error_, state.velocity.head<2>().norm()) - antenna;
 
   const Eigen::Vector3d geodetic = geodetic_from_enu(origin_, antenna + error_);
   GnssFix fix;

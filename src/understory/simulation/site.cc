@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "understory/simulation/presets.h"
 #include "understory/util/error.h"
 #include "understory/util/random.h"
 
@@ -318,7 +319,16 @@ void check_site(const SiteConfig& site) {
 
 void describe(ConfigTable& table, SiteConfig& config) {
   describe_scanned(table, config);
+  table.section("receiver_hold", [&] {
+    table.add("below_m_s", config.receiver_hold.below_m_s, {0.0, 100.0}, "m/s",
+              "speed below which the GNSS receiver holds its position, 0 = never");
+    table.add("release_m", config.receiver_hold.release_m, {0.0, 1000.0}, "m",
+              "until its solution lies so far away in the plane");
+  });
   describe_total_station(table, config.total_station);
+  table.add("imu_preset", config.imu_preset,
+            "measured IMU: site (as the site says), vectornav, xsens");
+  table.add("gnss_preset", config.gnss_preset, "measured receiver: site (as the site says), phone");
 }
 
 std::uint64_t site_key(const SiteConfig& config) {
@@ -335,6 +345,19 @@ std::uint64_t site_key(const SiteConfig& config) {
     key = hash_numbers(key, static_cast<std::uint64_t>(c));
   return key;
 }
+
+namespace {
+
+// Settings are set once more, as they go over a preset that they may have named themselves.
+void work_in_presets(SiteConfig& site, ConfigTable& table,
+                     const std::vector<std::string>& settings) {
+  table.set(preset_settings(imu_presets(), "imu_preset", site.imu_preset));
+  table.set(preset_settings(gnss_presets(), "gnss_preset", site.gnss_preset));
+  table.set(settings);
+  site.imu_preset = site.gnss_preset = "site";
+}
+
+}  // namespace
 
 SiteConfig load_site(const std::string& name_or_path, const std::vector<std::string>& settings) {
   SiteConfig site;
@@ -356,6 +379,7 @@ SiteConfig load_site(const std::string& name_or_path, const std::vector<std::str
         "no such site: expected one of " + names + ", or the path of a site's YAML file");
   }
   table.set(settings);
+  work_in_presets(site, table, settings);
   check_site(site);
   return site;
 }

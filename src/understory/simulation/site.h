@@ -186,6 +186,11 @@ struct GnssConfig {
   double burst_m = 4.0;           // its height in the plane
 };
 
+struct ReceiverHoldConfig {  // a receiver that holds its position while the carrier stands
+  double below_m_s = 0.0;    // speed below which it does, 0 = never
+  double release_m = 3.0;    // until its solution lies so far away in the plane
+};
+
 struct MagnetometerConfig {
   bool enabled = false;
   double rate_hz = 100.0;
@@ -223,12 +228,16 @@ struct SiteConfig {
   GnssConfig gnss;
   MagnetometerConfig mag;
   TotalStationConfig total_station;
+  ReceiverHoldConfig receiver_hold;
+  std::string imu_preset = "site";  // a loaded site has its presets worked in and says "site"
+  std::string gnss_preset = "site";
 };
 
 // Binds every key of a site to `config`.
 void describe(ConfigTable& table, SiteConfig& config);
 
-// Names a site with all its settings but those of the total station, for the cache of scans.
+// Names a site with all its settings but those of the total station and the receiver's hold, for
+// the cache of scans.
 [[nodiscard]] std::uint64_t site_key(const SiteConfig& config);
 
 // A site that the program carries with it.

@@ -1,0 +1,41 @@
+#include "understory/simulation/presets.h"
+
+#include "understory/util/error.h"
+
+namespace understory {
+
+const std::vector<SensorPreset>& imu_presets() {
+  static const std::vector<SensorPreset> presets = {
+      {"vectornav",
+       {"imu.rate_hz=200", "imu.gyro_noise=5.55e-5", "imu.accel_noise=1.14e-3",
+        "imu.gyro_instability=1.04e-5", "imu.accel_instability=1.47e-4",
+        "imu.gyro_bias_walk=1.05e-6", "imu.accel_bias_walk=1.67e-5"}},
+      {"xsens",
+       {"imu.rate_hz=200", "imu.gyro_noise=5.30e-4", "imu.accel_noise=9.9e-4",
+        "imu.gyro_instability=7.22e-5", "imu.accel_instability=2.1e-4", "imu.gyro_bias_walk=7.7e-6",
+        "imu.accel_bias_walk=2.33e-5"}}};
+  return presets;
+}
+
+const std::vector<SensorPreset>& gnss_presets() {
+  static const std::vector<SensorPreset> presets = {
+      {"phone",
+       {"gnss.rate_hz=1", "gnss.open_sd_m=1.5", "gnss.canopy_sd_m=2.2", "gnss.correlation_s=600",
+        "gnss.multipath_share=0.35", "gnss.white_sd_m=0.02", "gnss.height_factor=1.7",
+        "gnss.outage_interval_s=60", "gnss.outage_s=12", "gnss.jump_interval_s=150",
+        "gnss.jump_m=4", "receiver_hold.below_m_s=0.4", "receiver_hold.release_m=3.5"}}};
+  return presets;
+}
+
+std::vector<std::string> preset_settings(const std::vector<SensorPreset>& presets,
+                                         const std::string& key, const std::string& name) {
+  if (name == "site") return {};
+  std::string names = "site";
+  for (const SensorPreset& preset : presets) {
+    if (preset.name == name) return preset.settings;
+    names += ", " + preset.name;
+  }
+  throw ConfigError({key + ": is \"" + name + "\", expected one of " + names});
+}
+
+}  // namespace understory
