@@ -27,17 +27,8 @@ bool is_cloud(const std::string& input) {
 
 void write(const StemSegments& found, const Pose& body_from_points, int frame, TimeNs stamp,
            StemsWriter& writer) {
-  for (const StemSegment& segment : found.stems) {
-    StemRow row;
-    row.frame = frame;
-    row.stamp = stamp;
-    row.point = body_from_points * segment.foot;
-    row.axis = body_from_points.rotation() * segment.axis;
-    row.length_m = segment.highest_m - segment.lowest_m;
-    if (segment.dbh_m > 0.0) row.dbh_m = segment.dbh_m;
-    row.score = segment.score;
-    writer.add(row);
-  }
+  for (const StemSegment& segment : found.stems)
+    writer.add(frame, stamp, stem_of(segment, body_from_points, found.up));
 }
 
 int convert_cloud_to_stems(const std::string& input, const std::string& output,

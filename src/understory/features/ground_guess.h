@@ -14,13 +14,18 @@ class GroundGuess {
  public:
   explicit GroundGuess(const std::vector<Eigen::Vector3f>& points);
 
+  struct Height {
+    double height_m = 0.0;
+    double sd_m = 0.0;  // 0.1 where the ground shows all around, up to 1 where it hides
+  };
   // Height of the ground at a place; nothing where too little was seen near it.
-  [[nodiscard]] std::optional<double> at(const Eigen::Vector2d& place);
+  [[nodiscard]] std::optional<Height> at(const Eigen::Vector2d& place);
 
  private:
   struct Plane {
     bool known = false;
     Eigen::Vector3d height_and_slope = Eigen::Vector3d::Zero();  // at the middle of the patch
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   };
   [[nodiscard]] Plane fit(const Eigen::Vector2d& middle) const;
 

@@ -19,6 +19,8 @@ constexpr double kLeanSd = 0.05;  // of stems against up
 // Diameters are told where returns are nearer to each other than this share of the usual radius:
 // where fewer than three fall on a stem, its edges are lost more often than not, and it looks thin.
 constexpr double kFineSpacing = 0.7;
+// Above this error a diameter says more about the spacing of the beams than about the stem.
+constexpr double kDiameterKnown = 0.025;
 constexpr double kUpMatters = 0.03;  // radians: levels differ enough to look again
 
 // The smallest turn that makes `up` the z axis.
@@ -61,6 +63,7 @@ double usual_lean(const std::vector<StemChain>& chains, double before) {
 struct Candidate {
   StemChain chain;
   std::optional<double> ground_m;
+  double ground_sd_m = 0.0;
   double score = 0.0;
 };
 
@@ -76,6 +79,7 @@ StemSegment segment_of(const SectionView& view, double usual_radius_m, const Can
   StemSegment segment;
   segment.foot = level_from_frame.transpose() * Eigen::Vector3d(place.x(), place.y(), foot);
   segment.foot_on_ground = candidate.ground_m.has_value();
+  if (candidate.ground_m) segment.foot_sd_m = candidate.ground_sd_m;
   segment.axis = (level_from_frame.transpose() * along).normalized();
   segment.lowest_m = (lowest - foot) * along.norm();
   segment.highest_m = (highest - foot) * along.norm();
@@ -163,8 +167,10 @@ std::vector<StemSegment> segments_of(const SectionView& view, Chains& all,
     Candidate candidate;
     const double lowest =
         view.sections()[static_cast<std::size_t>(chain.sections.front())].height_m;
-    candidate.ground_m = ground.at(chain.line.at(lowest));
-    if (candidate.ground_m) *candidate.ground_m = std::min(*candidate.ground_m, lowest);
+    if (const auto found = ground.at(chain.line.at(lowest))) {
+      candidate.ground_m = std::min(found->height_m, lowest);
+      candidate.ground_sd_m = found->sd_m;
+    }
     const double above = candidate.ground_m ? lowest - *candidate.ground_m : 1.0;
     const StemTraits traits = stem_traits(view, chain, all.config, above);
     candidate.score = stem_score(traits);
@@ -200,6 +206,30 @@ Eigen::Vector3d up_of(const SectionView& view, const Chains& all) {
 }
 
 }  // namespace
+
+Stem stem_of(const StemSegment& segment, const Pose& body_from_points,
+             const Eigen::Vector3d& up_in_points) {
+  Stem stem;
+  stem.point = (body_from_points * segment.foot).cast<float>();
+  stem.axis = (body_from_points.rotation() * segment.axis).cast<float>();
+  stem.length_m = static_cast<float>(segment.highest_m - segment.lowest_m);
+  if (segment.dbh_m > 0.0 && segment.dbh_sd_m < kDiameterKnown)
+    stem.dbh_m = static_cast<float>(segment.dbh_m);
+  stem.score = static_cast<float>(segment.score);
+  stem.radius_m = static_cast<float>(segment.radius_m);
+  stem.radius_sd_m = static_cast<float>(segment.radius_sd_m);
+  Eigen::Matrix3d level = Eigen::Matrix3d::Zero();
+  level.topLeftCorner<2, 2>() = segment.covariance.topLeftCorner<2, 2>();
+  level(2, 2) = segment.foot_sd_m * segment.foot_sd_m;
+  const Eigen::Matrix3d turn =
+      body_from_points.rotation_matrix() * level_from(up_in_points).transpose();
+  const Eigen::Matrix3f covariance = (turn * level * turn.transpose()).cast<float>();
+  stem.xx = covariance(0, 0);
+  stem.xy = covariance(0, 1);
+  stem.yy = covariance(1, 1);
+  stem.zz = covariance(2, 2);
+  return stem;
+}
 
 StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config) {
   StemSegments result;

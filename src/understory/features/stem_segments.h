@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "understory/geometry/points.h"
+#include "understory/geometry/pose.h"
 #include "understory/sensor/scan.h"
+#include "understory/sensor/stem_view.h"
 
 namespace understory {
 
@@ -24,6 +26,7 @@ struct StemSegment {
   // lowest point that was seen of it. Metres, frame of the points.
   Eigen::Vector3d foot = Eigen::Vector3d::Zero();
   bool foot_on_ground = false;
+  double foot_sd_m = 1.0;                           // of its height
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  // unit, upwards
   double lowest_m = 0.0;   // along the axis from the foot: where it was first ...
   double highest_m = 0.0;  // ... and last seen
@@ -40,7 +43,8 @@ struct StemSegment {
   std::uint32_t t_ns = 0;  // mean time of its returns since the frame's stamp
   // Of the foot's x and y and of the axis' slope in x and y, in the level frame (z up, turned as
   // little as possible against the frame of the points).
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  // Not aligned to more than malloc gives: std::stable_sort's buffer is not either.
+  Eigen::Matrix<double, 4, 4, Eigen::DontAlign> covariance = Eigen::Matrix4d::Zero();
   std::array<double, 15> traits{};  // what the score was made from (stem_score.h)
 };
 
@@ -71,5 +75,10 @@ struct StemSegments {
 // The same in a map: points from all sides, z up, in level slices of 25 cm in place of rings. Times
 // are 0, the step is in metres. Stems come by increasing x.
 [[nodiscard]] StemSegments find_stem_segments(const Points& cloud, const StemSegmentConfig& config);
+
+// A segment as a row of a view, in the body's frame. Its covariance leaves out what the height has
+// in common with the place. Diameters with a greater error than 2.5 cm are left out.
+[[nodiscard]] Stem stem_of(const StemSegment& segment, const Pose& body_from_points,
+                           const Eigen::Vector3d& up_in_points);
 
 }  // namespace understory

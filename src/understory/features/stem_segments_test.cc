@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "understory/features/test_frames.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -171,6 +172,65 @@ TEST(StemSegments, AreFoundByTheSameCodeInAMap) {
   EXPECT_GT(band.recall(), 0.85);
   EXPECT_GT(band.precision(), 0.9);
   EXPECT_LT(band.centre_rmse_m(), 0.03);
+}
+
+// Where nothing shows the ground, a foot is guessed, and its error is told.
+TEST(StemSegments, SayHowWellTheirFeetAreKnown) {
+  TestFrames site(load_site("lieksa2", {"seed=5"}));
+  StemSegmentConfig config;
+  std::vector<double> sure;
+  std::vector<double> unsure;
+  int within = 0;
+  for (std::int64_t k = 0; k < 11'000; k += 2800) {
+    const SimulatedScan frame = site.scanner.cast(k);
+    const StemSegments found = find_stem_segments(*frame.scan, config);
+    config.up = found.up;
+    for (const StemSegment& stem : found.stems) {
+      const Eigen::Vector3d foot = site.world_from_lidar(*frame.scan, 1e-9 * stem.t_ns) * stem.foot;
+      for (const Tree& tree : site.stand.trees) {
+        if (!stem.foot_on_ground || (tree.foot - foot).head<2>().norm() > 0.4) continue;
+        const double error = std::abs(foot.z() - tree.foot.z());
+        (stem.foot_sd_m < 0.2 ? sure : unsure).push_back(error);
+        if (error < 2.0 * stem.foot_sd_m) ++within;
+        break;
+      }
+    }
+  }
+  ASSERT_GT(sure.size(), 100U);
+  ASSERT_GT(unsure.size(), 100U);
+  const std::size_t all = sure.size() + unsure.size();
+  EXPECT_GT(upper_median(unsure), 2.0 * upper_median(sure));
+  EXPECT_LT(upper_median(sure), 0.12);
+  EXPECT_GT(within, static_cast<int>(0.85 * static_cast<double>(all)));
+}
+
+TEST(StemSegments, BecomeRowsInTheBodysFrame) {
+  StemSegment segment;
+  segment.foot = {5.0, 1.0, -2.0};
+  segment.axis = {0.1, 0.0, 0.995};
+  segment.lowest_m = 0.5;
+  segment.highest_m = 4.5;
+  segment.radius_m = 0.12;
+  segment.dbh_m = 0.25;
+  segment.dbh_sd_m = 0.03;  // not known well enough
+  segment.covariance.diagonal() << 0.04, 0.01, 1.0, 1.0;
+  segment.foot_sd_m = 0.3;
+  const Pose body_from_lidar(
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitZ())),
+      Eigen::Vector3d(0.0, 0.0, 3.0));
+  Stem stem = stem_of(segment, body_from_lidar, Eigen::Vector3d::UnitZ());
+  EXPECT_TRUE(stem.point.isApprox(Eigen::Vector3f(-1.0F, 5.0F, 1.0F)));
+  EXPECT_NEAR(stem.axis.y(), 0.1F, 1e-6F);
+  EXPECT_FLOAT_EQ(stem.length_m, 4.0F);
+  EXPECT_TRUE(std::isnan(stem.dbh_m));
+  EXPECT_FLOAT_EQ(stem.radius_m, 0.12F);
+  EXPECT_NEAR(stem.xx, 0.01F, 1e-7F);
+  EXPECT_NEAR(stem.yy, 0.04F, 1e-7F);
+  EXPECT_NEAR(stem.zz, 0.09F, 1e-7F);
+  // A lidar that lies on its side: the height's spread lies along its own axis, up in the body.
+  const Pose fallen(so3_exp({0.5 * std::numbers::pi, 0.0, 0.0}), Eigen::Vector3d::Zero());
+  stem = stem_of(segment, fallen, fallen.rotation().inverse() * Eigen::Vector3d::UnitZ());
+  EXPECT_NEAR(stem.zz, 0.09F, 1e-6F);
 }
 
 TEST(StemSegments, OfACloudNeedPoints) {

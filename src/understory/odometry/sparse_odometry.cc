@@ -1,5 +1,6 @@
 #include "understory/odometry/sparse_odometry.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -14,14 +15,24 @@ Pose upright(const Pose& pose) {
       pose.translation());
 }
 
-// Turns a body about its own place towards the tilt that its stems show, by a share.
-Pose hold_tilt(const Pose& world_from_body, const StemUp& up, double share) {
-  if (up.stems == 0) return world_from_body;
-  const Eigen::Vector3d seen = world_from_body.rotation() * up.up_in_body;
+// Turns a view that was matched towards the tilt that its stems show, by a share. In the plane its
+// feet stay on those that they were matched to, as well as they can: the body stands some metres
+// above them, and turned about its own place by a hundredth of a degree, always the same way, it
+// would lose half a millimetre at each view. Its height stays, as it is not the heights' tilt that
+// is believed.
+Pose hold_tilt(const Pose& world_from_level, const Matrix6d& information, double share) {
+  const Eigen::Vector3d seen = world_from_level.rotation() * Eigen::Vector3d::UnitZ();
   const Eigen::Quaterniond whole =
       Eigen::Quaterniond::FromTwoVectors(seen, Eigen::Vector3d::UnitZ());
-  return Pose(so3_exp(share * so3_log(whole)) * world_from_body.rotation(),
-              world_from_body.translation());
+  const Eigen::Vector3d turn =
+      world_from_level.rotation().inverse() * (share * so3_log(whole)).eval();
+  Vector6d step = Vector6d::Zero();
+  step.head<2>() = turn.head<2>();
+  // What heading and place do where the tilt is held: the conditional mean.
+  Eigen::Matrix3d rest = information.block<3, 3>(2, 2);
+  rest.diagonal().array() += 1e-6 + 1e-9 * rest.diagonal().maxCoeff();
+  step.segment<3>(2) = -rest.ldlt().solve(information.block<3, 2>(2, 0) * turn.head<2>());
+  return world_from_level * Pose::exp(step);
 }
 
 Matrix6d step_covariance(const SparseIcpResult& icp) {
@@ -51,32 +62,36 @@ void describe(ConfigTable& table, SparseOdometryConfig& config) {
   table.section("search", [&] { describe(table, config.search); });
 }
 
-SparsePoints SparseOdometry::target_points() const {
+SparseTarget SparseOdometry::target() const {
   SparsePoints points;
+  std::vector<double> sds;
   points.reserve(landmarks_.size());
-  for (const Landmark& landmark : landmarks_)
+  for (const Landmark& landmark : landmarks_) {
     points.push_back(landmark.point_in_world - world_from_body_.translation());
-  return points;
+    if (landmark.height_sd_m > 0.0) sds.push_back(landmark.height_sd_m);
+  }
+  if (sds.size() < points.size()) sds.clear();
+  return SparseTarget(points, std::move(sds));
 }
 
 // In the world's axes with the origin at the last position.
-SparseOdometry::Match SparseOdometry::match(const SparsePoints& source) const {
-  const SparseTarget target(target_points());
+SparseOdometry::Match SparseOdometry::match(const Source& source) const {
+  const SparseTarget target = this->target();
   const Pose last = Pose(upright(world_from_level_).rotation(), Eigen::Vector3d::Zero());
   const Pose guess(last.rotation(), last * last_shift_in_level_);
   Match match;
-  match.icp = register_sparse_icp(target, source, guess, config_.icp);
+  match.icp = register_sparse_icp(target, source.points, guess, config_.icp, source.height_sd_m);
   if (match.icp.overlap >= config_.min_overlap) return match;
   match.searched = true;
-  for (const YawVoteCandidate& candidate : vote_yaw(target, source, last, config_.search)) {
-    const SparseIcpResult icp =
-        register_sparse_icp(target, source, candidate.target_from_source, config_.icp);
+  for (const YawVoteCandidate& candidate : vote_yaw(target, source.points, last, config_.search)) {
+    const SparseIcpResult icp = register_sparse_icp(
+        target, source.points, candidate.target_from_source, config_.icp, source.height_sd_m);
     if (icp.overlap > match.icp.overlap) match.icp = icp;
   }
   return match;
 }
 
-void SparseOdometry::take_up(const SparsePoints& source, const Pose& world_from_level) {
+void SparseOdometry::take_up(const Source& source, const Pose& world_from_level) {
   if (config_.target == SparseOdometryConfig::Target::kFrame) landmarks_.clear();
   SparsePoints known;
   known.reserve(landmarks_.size());
@@ -85,16 +100,18 @@ void SparseOdometry::take_up(const SparsePoints& source, const Pose& world_from_
   const SparseTarget grid(known);
   const double near = config_.icp.overlap_distance_ratio * grid.l0_m * 2.0;
   std::vector<char> taken(landmarks_.size(), 0);
-  for (const Eigen::Vector3d& point : source) {
-    const Eigen::Vector3d at = world_from_level * point;
+  for (std::size_t i = 0; i < source.points.size(); ++i) {
+    const Eigen::Vector3d at = world_from_level * source.points[i];
+    const double height_sd = source.height_sd_m.empty() ? 0.0 : source.height_sd_m[i];
     const auto found = known.empty() ? PlaneGrid::Neighbour{} : grid.grid.nearest(at, near, 0.0);
     const auto k = static_cast<std::size_t>(found.index);
     if (found.index >= 0 && taken[k] == 0) {
       taken[k] = 1;
       landmarks_[k].point_in_world += config_.map_forgetting * (at - landmarks_[k].point_in_world);
+      landmarks_[k].height_sd_m = height_sd;
       landmarks_[k].last_seen = count_;
     } else if (found.index < 0) {
-      landmarks_.push_back({at, count_});
+      landmarks_.push_back({at, height_sd, count_});
     }
   }
   std::erase_if(landmarks_, [&](const Landmark& landmark) {
@@ -116,7 +133,7 @@ void SparseOdometry::take_up_last() {
 SparseStep SparseOdometry::track(const StemView& view) {
   const StemUp up = stem_up(view);
   const Pose level_from_body(understory::level_from_body(up), Eigen::Vector3d::Zero());
-  SparsePoints source = stem_points(view, level_from_body.rotation());
+  Source source{stem_points(view, level_from_body.rotation()), height_sds(view)};
   SparseStep step;
   if (count_ == 0) {
     // The first body frame's x axis, laid level, is the world's.
@@ -132,9 +149,11 @@ SparseStep SparseOdometry::track(const StemView& view) {
     step.covariance =
         compose_covariance(step_covariance(found.icp), level_from_body, Matrix6d::Zero());
     const Pose origin(Eigen::Quaterniond::Identity(), world_from_body_.translation());
-    const Pose matched = origin * found.icp.target_from_source * level_from_body;
-    step.previous_from_body = world_from_body_.inverse() * matched;
-    world_from_body_ = hold_tilt(matched, up, config_.tilt_gain);
+    const Pose matched = origin * found.icp.target_from_source;
+    step.previous_from_body = world_from_body_.inverse() * matched * level_from_body;
+    world_from_body_ =
+        (up.stems > 0 ? hold_tilt(matched, found.icp.information, config_.tilt_gain) : matched) *
+        level_from_body;
     last_shift_in_level_ = upright(world_from_level_).inverse() * world_from_body_.translation();
   }
   step.world_from_body = world_from_body_;

@@ -63,6 +63,7 @@ class SparseOdometry {
  private:
   struct Landmark {
     Eigen::Vector3d point_in_world;
+    double height_sd_m = 0.0;  // of the last sight; 0: the view did not say
     int last_seen = 0;
   };
   struct Match {
@@ -70,13 +71,19 @@ class SparseOdometry {
     bool searched = false;
   };
 
-  [[nodiscard]] SparsePoints target_points() const;
-  [[nodiscard]] Match match(const SparsePoints& source) const;
-  void take_up(const SparsePoints& source, const Pose& world_from_level);
+  // A view's stems with z up, and how well their heights are known (empty: not said).
+  struct Source {
+    SparsePoints points;
+    std::vector<double> height_sd_m;
+  };
+
+  [[nodiscard]] SparseTarget target() const;
+  [[nodiscard]] Match match(const Source& source) const;
+  void take_up(const Source& source, const Pose& world_from_level);
 
   SparseOdometryConfig config_;
   std::vector<Landmark> landmarks_;
-  SparsePoints last_source_;
+  Source last_source_;
   int count_ = 0;  // views in the map
   Pose world_from_body_;
   Pose world_from_level_;  // z up, turned like the body, of the last view

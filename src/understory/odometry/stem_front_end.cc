@@ -6,8 +6,6 @@
 namespace understory {
 namespace {
 
-// Above this error a diameter says more about the spacing of the beams than about the stem.
-constexpr double kDiameterKnown = 0.025;
 // A pause of the recording: what moved before it says nothing about now.
 constexpr double kLongestStep = 2.0;
 
@@ -32,14 +30,7 @@ StemView StemFrontEnd::view_of(const Scan& scan, const Rig& rig, const StemSegme
   for (const StemSegment& segment : found.stems) {
     const Pose stamp_from_lidar =
         Pose::exp(1e-9 * segment.t_ns * motion_per_s) * rig.body_from_lidar;
-    Stem stem;
-    stem.point = (stamp_from_lidar * segment.foot).cast<float>();
-    stem.axis = (stamp_from_lidar.rotation() * segment.axis).cast<float>();
-    stem.length_m = static_cast<float>(segment.highest_m - segment.lowest_m);
-    if (segment.dbh_m > 0.0 && segment.dbh_sd_m < kDiameterKnown)
-      stem.dbh_m = static_cast<float>(segment.dbh_m);
-    stem.score = static_cast<float>(segment.score);
-    view.stems.push_back(stem);
+    view.stems.push_back(stem_of(segment, stamp_from_lidar, found.up));
   }
   return view;
 }

@@ -49,6 +49,16 @@ Eigen::Quaterniond level_from_body(const StemUp& up) {
   return Eigen::Quaterniond::FromTwoVectors(up.up_in_body, Eigen::Vector3d::UnitZ());
 }
 
+std::vector<double> height_sds(const StemView& view) {
+  std::vector<double> sds;
+  sds.reserve(view.stems.size());
+  for (const Stem& stem : view.stems) {
+    if (!(stem.zz > 0.0F)) return {};
+    sds.push_back(std::sqrt(static_cast<double>(stem.zz)));
+  }
+  return sds;
+}
+
 SparsePoints stem_points(const StemView& view, const Eigen::Quaterniond& rotation) {
   const Eigen::Matrix3d matrix = rotation.toRotationMatrix();
   SparsePoints points;

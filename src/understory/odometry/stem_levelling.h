@@ -22,4 +22,7 @@ struct StemUp {
 // The points of a view, turned by `rotation`.
 [[nodiscard]] SparsePoints stem_points(const StemView& view, const Eigen::Quaterniond& rotation);
 
+// How well the heights of a view's points are known; empty where some stem does not say.
+[[nodiscard]] std::vector<double> height_sds(const StemView& view);
+
 }  // namespace understory

@@ -136,17 +136,29 @@ void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>&
 }
 
 StemsWriter::StemsWriter(const std::filesystem::path& path) : file_(path) {
-  file_.write("frame,timestamp,x,y,z,axis_x,axis_y,axis_z,length_m,dbh_m,score\n");
+  file_.write(
+      "frame,timestamp,x,y,z,axis_x,axis_y,axis_z,length_m,dbh_m,score,radius_m,radius_sd_m,xx,xy,"
+      "yy,zz\n");
 }
 
-void StemsWriter::add(const StemRow& row) {
-  std::string line = fmt::format("{},{}", row.frame, format_seconds(row.stamp));
+void StemsWriter::add(int frame, TimeNs stamp, const Stem& stem) {
+  std::string line = fmt::format("{},{}", frame, format_seconds(stamp));
+  const auto add_cell = [&](float value, int decimals) {
+    line += "," + cell(static_cast<double>(value), decimals);
+  };
   for (int i = 0; i < 3; ++i)
-    line += "," + cell(row.point[i], 4);
+    add_cell(stem.point[i], 4);
   for (int i = 0; i < 3; ++i)
-    line += "," + cell(row.axis[i], 6);
-  line += "," + cell(row.length_m, 3) + "," + cell(row.dbh_m, 4) + "," + cell(row.score, 4) + "\n";
-  file_.write(line);
+    add_cell(stem.axis[i], 6);
+  add_cell(stem.length_m, 3);
+  for (const float value : {stem.dbh_m, stem.score})
+    add_cell(value, 4);
+  for (const float value : {stem.radius_m, stem.radius_sd_m})
+    add_cell(value, 3);
+  // Two figures tell a spread.
+  for (const float value : {stem.xx, stem.xy, stem.yy, stem.zz})
+    line += std::isnan(value) ? std::string(",") : fmt::format(",{:.2g}", value);
+  file_.write(line + "\n");
 }
 
 }  // namespace understory

@@ -11,6 +11,7 @@
 #include "understory/geometry/stamped_pose.h"
 #include "understory/output/atomic_file.h"
 #include "understory/sensor/gnss_fix.h"
+#include "understory/sensor/stem_view.h"
 
 namespace understory {
 
@@ -91,20 +92,10 @@ void write_g2o(const std::filesystem::path& path, const std::vector<GraphVertex>
 void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>& trees);
 
 // One stem seen in one frame, for stems.csv.gz: body frame; NaN is written as empty.
-struct StemRow {
-  int frame = 0;
-  TimeNs stamp = 0;
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();  // on the centre line, the foot where seen
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
-  double length_m = std::numeric_limits<double>::quiet_NaN();
-  double dbh_m = std::numeric_limits<double>::quiet_NaN();
-  double score = std::numeric_limits<double>::quiet_NaN();
-};
-
 class StemsWriter {
  public:
   explicit StemsWriter(const std::filesystem::path& path);
-  void add(const StemRow& row);
+  void add(int frame, TimeNs stamp, const Stem& stem);
   void commit() { file_.commit(); }
 
  private:

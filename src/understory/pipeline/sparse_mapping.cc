@@ -15,20 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void write_view(const StemView& view, StemsWriter& writer) {
-  for (const Stem& stem : view.stems) {
-    StemRow row;
-    row.frame = view.frame;
-    row.stamp = view.stamp;
-    row.point = stem.point.cast<double>();
-    row.axis = stem.axis.cast<double>();
-    row.length_m = static_cast<double>(stem.length_m);
-    row.dbh_m = static_cast<double>(stem.dbh_m);
-    row.score = static_cast<double>(stem.score);
-    writer.add(row);
-  }
-}
-
 // The scans of a recording in order of time, one after another through the front end.
 class SparseRun {
  public:
@@ -84,7 +70,8 @@ class SparseRun {
     const StemScan result = front_end_.add(scan, source_->rig());
     path_.push_back({scan.stamp, result.step.world_from_body});
     if (result.keep) {
-      write_view(result.view, stems_);
+      for (const Stem& stem : result.view.stems)
+        stems_.add(result.view.frame, result.view.stamp, stem);
       steps_.push_back(result.step);
     }
     if (!progress) return;

@@ -19,10 +19,29 @@ namespace {
 constexpr std::size_t kMaxLineBytes = std::size_t{1} << 16;
 constexpr double kMaxRangeM = 10'000.0;  // no sensor sees a stem from farther away
 
-enum Column { kFrame, kTime, kX, kY, kZ, kAxisX, kAxisY, kAxisZ, kLength, kDbh, kScore, kColumns };
+enum Column {
+  kFrame,
+  kTime,
+  kX,
+  kY,
+  kZ,
+  kAxisX,
+  kAxisY,
+  kAxisZ,
+  kLength,
+  kDbh,
+  kScore,
+  kRadius,
+  kRadiusSd,
+  kXx,
+  kXy,
+  kYy,
+  kZz,
+  kColumns
+};
 constexpr std::array<std::string_view, kColumns> kNames = {
-    "frame",  "timestamp", "x",        "y",     "z",    "axis_x",
-    "axis_y", "axis_z",    "length_m", "dbh_m", "score"};
+    "frame", "timestamp", "x",        "y",           "z",  "axis_x", "axis_y", "axis_z", "length_m",
+    "dbh_m", "score",     "radius_m", "radius_sd_m", "xx", "xy",     "yy",     "zz"};
 
 class GzipLines {
  public:
@@ -140,6 +159,14 @@ class Row {
     return *value;
   }
 
+  // NaN where unknown.
+  [[nodiscard]] float variance(Column column) const {
+    const double value = number(column);
+    if (value <= 0.0)
+      lines_.fail("expected a variance above 0 in column '" + std::string(kNames[column]) + "'");
+    return static_cast<float>(value);
+  }
+
   [[nodiscard]] float position(Column column) const {
     const double value = number(column);
     if (!(std::abs(value) < kMaxRangeM))
@@ -187,6 +214,12 @@ Stem stem_of(const Row& row, const GzipLines& lines) {
   stem.length_m = static_cast<float>(row.number(kLength));
   stem.dbh_m = static_cast<float>(row.number(kDbh));
   stem.score = static_cast<float>(row.number(kScore));
+  stem.radius_m = static_cast<float>(row.number(kRadius));
+  stem.radius_sd_m = static_cast<float>(row.number(kRadiusSd));
+  stem.xx = row.variance(kXx);
+  stem.xy = static_cast<float>(row.number(kXy));
+  stem.yy = row.variance(kYy);
+  stem.zz = row.variance(kZz);
   return stem;
 }
 

@@ -68,6 +68,26 @@ TEST_F(StemsFile, ReadsWhatIsNeededAndWhatIsKnown) {
   EXPECT_TRUE(std::isnan(views[1].stems[0].length_m));
 }
 
+TEST_F(StemsFile, ReadsRadiusAndCovariance) {
+  std::vector<std::string> said;
+  Log log([&](LogLevel, const std::string& message) { said.push_back(message); });
+  const auto views = read_stem_views(plain("frame,x,y,z,radius_m,radius_sd_m,xx,xy,yy,zz\n"
+                                           "0,1,2,3,0.11,0.02,4e-4,-1e-4,9e-4,0.25\n"
+                                           "0,4,5,6,,,,,,\n"),
+                                     log);
+  const Stem& stem = views.at(0).stems.at(0);
+  EXPECT_FLOAT_EQ(stem.radius_m, 0.11F);
+  EXPECT_FLOAT_EQ(stem.radius_sd_m, 0.02F);
+  EXPECT_FLOAT_EQ(stem.xx, 4e-4F);
+  EXPECT_FLOAT_EQ(stem.xy, -1e-4F);
+  EXPECT_FLOAT_EQ(stem.yy, 9e-4F);
+  EXPECT_FLOAT_EQ(stem.zz, 0.25F);
+  EXPECT_TRUE(std::isnan(views[0].stems.at(1).zz));
+  EXPECT_TRUE(said.empty());
+  EXPECT_NE(complaint("frame,x,y,z,zz\n0,1,2,3,0\n").find("a variance above 0 in column 'zz'"),
+            std::string::npos);
+}
+
 TEST_F(StemsFile, OnlyFrameAndPositionAreNeeded) {
   std::vector<std::string> said;
   Log log([&](LogLevel, const std::string& message) { said.push_back(message); });

@@ -7,6 +7,8 @@
 #include <limits>
 
 #include "understory/geometry/delaunay.h"
+#include "understory/util/error.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -19,8 +21,28 @@ struct Pair {
   double squared_m2;
 };
 
-double height_weight(const SparseIcpConfig& config) {
-  return config.metric == SparseIcpConfig::Metric::kSpace ? 1.0 : 0.0;
+// What is known of the heights of both sides.
+struct Heights {
+  Heights(const std::vector<double>& of_target, const std::vector<double>& of_source)
+      : target(of_target), source(of_source), known(!of_target.empty() && !of_source.empty()) {}
+
+  const std::vector<double>& target;
+  const std::vector<double>& source;
+  bool known;
+
+  // Of the difference, up to a factor that the fit finds.
+  [[nodiscard]] double variance(const Pair& pair) const {
+    if (!known) return 1.0;
+    const double a = target[static_cast<std::size_t>(pair.target)];
+    const double b = source[static_cast<std::size_t>(pair.source)];
+    return a * a + b * b;
+  }
+};
+
+double height_weight(const SparseIcpConfig& config, const Heights& heights) {
+  constexpr double kUnsure = 0.05;  // a foot that is a metre too high still finds its stem
+  if (config.metric == SparseIcpConfig::Metric::kPlane) return 0.0;
+  return heights.known ? kUnsure : 1.0;
 }
 
 // Each source point with its nearest target point.
@@ -90,17 +112,11 @@ struct Refinement {
   std::vector<Pair> pairs;
   std::vector<double> weights;
   double variance_plane = 0.0;
-  double variance_height = 0.0;
+  double variance_height = 0.0;  // times that of Heights
 };
 
-// Squared distance of a pair in units of the noise.
-double normalised(const Eigen::Vector3d& d, const Refinement& state, bool plane) {
-  const double flat = d.head<2>().squaredNorm() / state.variance_plane;
-  return plane ? flat : flat + d.z() * d.z() / state.variance_height;
-}
-
-void weigh(const SparsePoints& target, const SparsePoints& source, const Pose& pose, bool plane,
-           Refinement& state) {
+void weigh(const SparsePoints& target, const SparsePoints& source, const Heights& heights,
+           const Pose& pose, bool plane, Refinement& state) {
   constexpr double kFloor = 1e-8;  // (0.1 mm)^2
   const double dimensions = plane ? 2.0 : 3.0;
   double sum_plane = 0.0;
@@ -110,10 +126,14 @@ void weigh(const SparsePoints& target, const SparsePoints& source, const Pose& p
     const Pair& pair = state.pairs[k];
     const Eigen::Vector3d d = pose * source[static_cast<std::size_t>(pair.source)] -
                               target[static_cast<std::size_t>(pair.target)];
-    const double w = (kFreedom + dimensions) / (kFreedom + normalised(d, state, plane));
+    const double high = d.z() * d.z() / heights.variance(pair);
+    const double flat = d.head<2>().squaredNorm();
+    const double squares =
+        flat / state.variance_plane + (plane ? 0.0 : high / state.variance_height);
+    const double w = (kFreedom + dimensions) / (kFreedom + squares);
     state.weights[k] = w;
-    sum_plane += w * d.head<2>().squaredNorm();
-    sum_height += w * d.z() * d.z();
+    sum_plane += w * flat;
+    sum_height += w * high;
   }
   const double n = static_cast<double>(state.pairs.size());
   state.variance_plane = std::max(sum_plane / (2.0 * n), kFloor);
@@ -121,15 +141,15 @@ void weigh(const SparsePoints& target, const SparsePoints& source, const Pose& p
 }
 
 // One Gauss-Newton step over the weighted pairs; returns the step, fills the information.
-Vector6d newton_step(const SparsePoints& target, const SparsePoints& source, const Pose& pose,
-                     bool plane, const Refinement& state, Matrix6d& information) {
+Vector6d newton_step(const SparsePoints& target, const SparsePoints& source, const Heights& heights,
+                     const Pose& pose, bool plane, const Refinement& state, Matrix6d& information) {
   information.setZero();
   Vector6d gradient = Vector6d::Zero();
   const Eigen::Matrix3d rotation = pose.rotation_matrix();
-  Eigen::Vector3d inverse(1.0 / state.variance_plane, 1.0 / state.variance_plane,
-                          plane ? 0.0 : 1.0 / state.variance_height);
+  Eigen::Vector3d inverse = Eigen::Vector3d::Constant(1.0 / state.variance_plane);
   for (std::size_t k = 0; k < state.pairs.size(); ++k) {
     const Pair& pair = state.pairs[k];
+    inverse.z() = plane ? 0.0 : 1.0 / (state.variance_height * heights.variance(pair));
     const Eigen::Vector3d& p = source[static_cast<std::size_t>(pair.source)];
     const Eigen::Vector3d d =
         rotation * p + pose.translation() - target[static_cast<std::size_t>(pair.target)];
@@ -158,32 +178,42 @@ bool small(const Vector6d& step, const SparseIcpConfig& config) {
          step.tail<3>().norm() < config.step_translation_m;
 }
 
-void refine(const SparseTarget& target, const SparsePoints& source, const SparseIcpConfig& config,
-            SparseIcpResult& result) {
+// Of the heights of all pairs, as they are known.
+double median_variance(const std::vector<Pair>& pairs, const Heights& heights) {
+  std::vector<double> variances;
+  variances.reserve(pairs.size());
+  for (const Pair& pair : pairs)
+    variances.push_back(heights.variance(pair));
+  return upper_median(variances, 1.0);
+}
+
+void refine(const SparseTarget& target, const SparsePoints& source, const Heights& heights,
+            const SparseIcpConfig& config, SparseIcpResult& result) {
   const bool plane = config.metric == SparseIcpConfig::Metric::kPlane;
   const double limit_m = 0.25 * target.l0_m;  // half of delta0: beyond it is another stem
   Refinement state;
   const double start = std::max(result.error_rms_m, 1e-3);
-  state.variance_plane = state.variance_height = start * start / 3.0;
+  state.variance_plane = start * start / 3.0;
+  state.variance_height = heights.known ? 1.0 : state.variance_plane;
   Pose& pose = result.target_from_source;
   for (int i = 0; i < config.max_iterations; ++i) {
-    state.pairs = match(target.grid, source, pose, limit_m, height_weight(config));
+    state.pairs = match(target.grid, source, pose, limit_m, height_weight(config, heights));
     if (state.pairs.size() < kFewestStems) return;
-    weigh(target.grid.points(), source, pose, plane, state);
+    weigh(target.grid.points(), source, heights, pose, plane, state);
     const Vector6d step =
-        newton_step(target.grid.points(), source, pose, plane, state, result.information);
+        newton_step(target.grid.points(), source, heights, pose, plane, state, result.information);
     pose = pose * Pose::exp(step);
     ++result.iterations;
     if (small(step, config)) break;
   }
   result.sigma_plane_m = std::sqrt(state.variance_plane);
-  result.sigma_height_m = std::sqrt(state.variance_height);
+  result.sigma_height_m = std::sqrt(state.variance_height * median_variance(state.pairs, heights));
 }
 
-void measure(const SparseTarget& target, const SparsePoints& source, const SparseIcpConfig& config,
-             std::size_t keep, SparseIcpResult& result) {
-  std::vector<Pair> pairs =
-      match(target.grid, source, result.target_from_source, kNoLimit, height_weight(config));
+void measure(const SparseTarget& target, const SparsePoints& source, const Heights& heights,
+             const SparseIcpConfig& config, std::size_t keep, SparseIcpResult& result) {
+  std::vector<Pair> pairs = match(target.grid, source, result.target_from_source, kNoLimit,
+                                  height_weight(config, heights));
   const double near = config.overlap_distance_ratio * target.l0_m;
   std::size_t overlapping = 0;
   for (const Pair& pair : pairs)
@@ -218,7 +248,9 @@ void describe(ConfigTable& table, SparseIcpConfig& config) {
             "pairs nearer than this share of the mean neighbour distance overlap");
 }
 
-SparseTarget::SparseTarget(const SparsePoints& points) : grid(points) {
+SparseTarget::SparseTarget(const SparsePoints& points, std::vector<double> height_sds_m)
+    : grid(points), height_sd_m(std::move(height_sds_m)) {
+  UNDERSTORY_CHECK(height_sd_m.empty() || height_sd_m.size() == points.size());
   std::vector<Eigen::Vector2d> flat;
   flat.reserve(points.size());
   for (const Eigen::Vector3d& point : points)
@@ -236,7 +268,10 @@ std::string too_few_stems() {
 }
 
 SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoints& source,
-                                    const Pose& guess, const SparseIcpConfig& config) {
+                                    const Pose& guess, const SparseIcpConfig& config,
+                                    const std::vector<double>& source_height_sd_m) {
+  UNDERSTORY_CHECK(source_height_sd_m.empty() || source_height_sd_m.size() == source.size());
+  const Heights heights(target.height_sd_m, source_height_sd_m);
   SparseIcpResult result;
   result.target_from_source = guess;
   if (source.size() < kFewestStems || target.grid.points().size() < kFewestStems ||
@@ -250,9 +285,12 @@ SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoin
   result.reason = "the steps had not become small";
   Pose& pose = result.target_from_source;
   for (; result.iterations < config.max_iterations; ++result.iterations) {
-    std::vector<Pair> pairs = match(target.grid, source, pose, kNoLimit, height_weight(config));
+    std::vector<Pair> pairs =
+        match(target.grid, source, pose, kNoLimit, height_weight(config, heights));
     trim(pairs, keep);
-    const Pose next = fit(target.grid.points(), source, pairs, pose, plane);
+    // Heights that are known each in its own way wait for the weights.
+    const bool flat = plane || (heights.known && config.refine);
+    const Pose next = fit(target.grid.points(), source, pairs, pose, flat);
     const Vector6d step = right_difference(next, pose);
     pose = next;
     if (!small(step, config)) continue;
@@ -260,10 +298,10 @@ SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoin
     result.reason.clear();
     break;
   }
-  measure(target, source, config, keep, result);
+  measure(target, source, heights, config, keep, result);
   if (config.refine) {
-    refine(target, source, config, result);
-    measure(target, source, config, keep, result);
+    refine(target, source, heights, config, result);
+    measure(target, source, heights, config, keep, result);
   }
   return result;
 }

@@ -47,8 +47,10 @@ struct [[nodiscard]] SparseIcpResult {
 
 // Target of sparse ICP with L0, the mean distance of natural neighbours, P0 (23).
 struct SparseTarget {
-  explicit SparseTarget(const SparsePoints& points);
+  // `height_sd_m`: how well each point's height is known; empty: all alike, not said how well.
+  explicit SparseTarget(const SparsePoints& points, std::vector<double> height_sd_m = {});
   PlaneGrid grid;
+  std::vector<double> height_sd_m;
   double l0_m = 0.0;
 };
 
@@ -59,9 +61,12 @@ constexpr std::size_t kFewestStems = 6;
 // certificate rests on it.
 [[nodiscard]] std::size_t trimmed_count(std::size_t points, double outlier_ratio);
 
-// Trimmed ICP between points. Deterministic; thread-safe.
+// Trimmed ICP between points. Where both sides say how well they know their heights, points are
+// paired by their places in the plane, mainly, and heights weigh by what is known of them.
+// Deterministic; thread-safe.
 SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoints& source,
-                                    const Pose& guess, const SparseIcpConfig& config);
+                                    const Pose& guess, const SparseIcpConfig& config,
+                                    const std::vector<double>& source_height_sd_m = {});
 
 // Where ICP converges, P0 (24-26): distances that a shift and a turn may have from the answer.
 struct ConvergenceRegion {

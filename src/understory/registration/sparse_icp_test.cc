@@ -89,6 +89,38 @@ TEST(SparseIcp, PlaneLeavesHeightAndTilt) {
   EXPECT_GT((found.rotation() * Eigen::Vector3d::UnitZ()).z(), 1.0 - 1e-6);
 }
 
+// Half of the source's feet are guessed up to a metre too high, and it says so.
+TEST(SparseIcp, HeightsWeighByWhatIsKnownOfThem) {
+  const Pose truth = Pose(so3_exp({0.01, -0.01, 0.05}), {0.4, -0.3, 0.2});
+  Pair pair = make_pair(8, 150, 0.02, 0.2, truth);
+  std::vector<double> source_sd;
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> too_high(0.0, 1.0);
+  for (Eigen::Vector3d& point : pair.source) {
+    const bool guessed = point.x() > 0.0;
+    if (guessed) point.z() += too_high(random);
+    source_sd.push_back(guessed ? 1.0 : 0.05);
+  }
+  const std::vector<double> target_sd(pair.target.size(), 0.05);
+  const auto tilt = [&](const SparseIcpResult& result) {
+    const Eigen::Vector3d up =
+        (truth.inverse() * result.target_from_source).rotation() * Eigen::Vector3d::UnitZ();
+    return up.head<2>().norm();
+  };
+  const auto blind = register_sparse_icp(SparseTarget(pair.target), pair.source, Pose(), {});
+  const auto told =
+      register_sparse_icp(SparseTarget(pair.target, target_sd), pair.source, Pose(), {}, source_sd);
+  EXPECT_GT(tilt(blind), 0.005);
+  EXPECT_LT(tilt(told), 0.002);
+  const Pose error = truth.inverse() * told.target_from_source;
+  EXPECT_LT(error.translation().norm(), 0.03);
+  EXPECT_GT(told.overlap, 0.7);
+  // One side that does not say: as before.
+  const auto half =
+      register_sparse_icp(SparseTarget(pair.target), pair.source, Pose(), {}, source_sd);
+  EXPECT_EQ(half.target_from_source.matrix(), blind.target_from_source.matrix());
+}
+
 TEST(SparseIcp, FewStemsAreSaid) {
   const SparsePoints few = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const auto result = register_sparse_icp(SparseTarget(few), few, Pose(), {});

@@ -18,6 +18,13 @@ struct Stem {
   float length_m = kUnknown;
   float dbh_m = kUnknown;
   float score = kUnknown;  // 0..1, higher is surer
+  float radius_m = kUnknown;
+  float radius_sd_m = kUnknown;
+  // Variances of the point and the covariance of its x and y, square metres.
+  float xx = kUnknown;
+  float xy = kUnknown;
+  float yy = kUnknown;
+  float zz = kUnknown;
 };
 
 // The stems of one frame (a scan, or a short piece of the way put together).
