@@ -118,7 +118,7 @@ class GainCorrection {
         placed_error(target, source, match.j_from_i, all_around_, config_.pairs.outlier_ratio);
     match.overlap = icp.overlap;
     match.outlier_ratio = icp.outlier_ratio;
-    match.covariance = match_covariance(icp.information, config_.gain.match_sd_m);
+    match.covariance = match_covariance(icp.information, source, config_.gain.match_sd_m);
     const double moved = (match.j_from_i.translation() - guess.translation()).head<2>().norm();
     if (icp.status == SparseIcpStatus::kTooFewPoints) {
       match.reason = icp.reason;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/registration/tilt_about.h"
+
 namespace understory {
 namespace {
 
@@ -51,7 +53,8 @@ void require_better(PairMatch& match) {
 
 }  // namespace
 
-Matrix6d match_covariance(const Matrix6d& information, double shift_sd_m) {
+Matrix6d match_covariance(const Matrix6d& information, const SparsePoints& source,
+                          double shift_sd_m) {
   // Heights and tilt hang on feet of stems, which look higher the farther away they are.
   const double tilt = 2.0 * M_PI / 180.0;
   const double height = 0.15;
@@ -59,8 +62,8 @@ Matrix6d match_covariance(const Matrix6d& information, double shift_sd_m) {
   Matrix6d covariance = 4.0 * (information + 1e-6 * Matrix6d::Identity()).inverse();
   const double shift = shift_sd_m * shift_sd_m;
   covariance.diagonal() +=
-      (Vector6d() << tilt * tilt, tilt * tilt, yaw * yaw, shift, shift, height * height).finished();
-  return covariance;
+      (Vector6d() << 0.0, 0.0, yaw * yaw, shift, shift, height * height).finished();
+  return covariance + tilt_about(middle_of(source), tilt);
 }
 
 PairMatch match_pair(const SparseTarget& target, const SparsePoints& source, const Pose& j_from_i,
@@ -87,7 +90,7 @@ PairMatch match_pair(const SparseTarget& target, const SparsePoints& source, con
     judge(target, source, overlap, config, match);
   }
   match.outlier_ratio = icp.outlier_ratio;
-  match.covariance = match_covariance(icp.information, 0.02 * target.l0_m);
+  match.covariance = match_covariance(icp.information, source, 0.02 * target.l0_m);
   require_better(match);
   return match;
 }

@@ -32,8 +32,10 @@ PairMatch match_lattice_pair(const SparseTarget& target, const SparsePoints& sou
                              const SelfCorrectionConfig& config);
 
 // Covariance of a match, right perturbation: its own, widened as stems are no independent points,
-// and what both sides got wrong alike, of which `shift_sd_m` is the part in the plane.
-[[nodiscard]] Matrix6d match_covariance(const Matrix6d& information, double shift_sd_m);
+// and what both sides got wrong alike, of which `shift_sd_m` is the part in the plane. A tilt turns
+// the view about the middle of its points (`source`).
+[[nodiscard]] Matrix6d match_covariance(const Matrix6d& information, const SparsePoints& source,
+                                        double shift_sd_m);
 
 // Views around one, laid together in its frame by their poses: stems seen in several views are
 // means, those seen once among three views or more are left out.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "understory/registration/tilt_about.h"
 #include "understory/util/error.h"
 #include "understory/util/median.h"
 #include "understory/util/parallel.h"
@@ -38,16 +39,15 @@ TreePatterns places_of(const std::vector<SparsePoints>& views, const std::vector
 }
 
 // The covariance of a loop: its own noise, and what both views got wrong alike.
-Matrix6d loop_covariance(const SparseIcpResult& icp, double l0_m) {
+Matrix6d loop_covariance(const SparseIcpResult& icp, const SparsePoints& source, double l0_m) {
   Matrix6d information = icp.information + 1e-6 * Matrix6d::Identity();
   Matrix6d covariance = 9.0 * information.inverse();
   const double tilt = 0.5 * M_PI / 180.0;
   const double yaw = 0.1 * M_PI / 180.0;
   const double shift = 0.02 * l0_m;
-  covariance.diagonal() += (Vector6d() << tilt * tilt, tilt * tilt, yaw * yaw, shift * shift,
-                            shift * shift, shift * shift)
-                               .finished();
-  return covariance;
+  covariance.diagonal() +=
+      (Vector6d() << 0.0, 0.0, yaw * yaw, shift * shift, shift * shift, shift * shift).finished();
+  return covariance + tilt_about(middle_of(source), tilt);
 }
 
 class Finder {
@@ -88,7 +88,7 @@ class Finder {
     const double apart = icp.target_from_source.translation().norm() / config_.max_distance_m;
     loop.score = icp.overlap * std::exp(-apart * apart);
     loop.match_from_query = icp.target_from_source;
-    loop.covariance = loop_covariance(icp, l0_m_);
+    loop.covariance = loop_covariance(icp, view(query), l0_m_);
     loop.verified = icp.overlap >= config_.min_overlap &&
                     icp.target_from_source.translation().norm() <= config_.max_distance_m;
     return loop;

@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/registration/tilt_about.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+constexpr double kStepTilt = 0.2 * kDegree;  // from one view to the next
 
 // The views turned level by their own stems.
 struct LevelViews {
@@ -33,15 +37,14 @@ LevelViews level(const std::vector<StemView>& views, const std::vector<SparseSte
 }
 
 // Of a step: what matching says, and what both views got wrong alike, which it cannot know: a
-// hundredth of the way, and the tilt that the stems' axes hold.
+// hundredth of the way. Tilt comes below.
 Matrix6d odometry_covariance(const SparseStep& step, const Pose& previous_from_body) {
-  const double tilt = 0.2 * M_PI / 180.0;
-  const double yaw = 0.02 * M_PI / 180.0;
+  constexpr double tilt = 0.5 * kDegree;  // where little matched
+  const double yaw = 0.02 * kDegree;
   const double shift = 0.005 + 0.01 * previous_from_body.translation().norm();
   Matrix6d covariance = step.covariance;
-  covariance.diagonal() += (Vector6d() << tilt * tilt, tilt * tilt, yaw * yaw, shift * shift,
-                            shift * shift, shift * shift)
-                               .finished();
+  covariance.diagonal() +=
+      (Vector6d() << 0.0, 0.0, yaw * yaw, shift * shift, shift * shift, shift * shift).finished();
   // Little overlap may be the view's fault and the match still be right; without a match there is
   // nothing but the last motion.
   if (step.status == SparseStepStatus::kWeak) {
@@ -69,7 +72,7 @@ std::vector<int> neighbours_on_the_way(const std::vector<Pose>& poses, double re
 // A view has been turned level by its stems. As many views see the same trees, which lean as they
 // do, they know together no more of up than one of them.
 std::vector<TiltPrior> tilts_of(const LevelViews& level) {
-  constexpr double kStandLeans = 0.3 * M_PI / 180.0;
+  constexpr double kStandLeans = 0.3 * kDegree;
   constexpr double kSameTrees = 10.0;  // metres of way to each side
   const std::vector<int> sharing = neighbours_on_the_way(level.world_from_level, kSameTrees);
   std::vector<TiltPrior> tilts;
@@ -98,6 +101,9 @@ SelfCorrectionProblem problem_of(LevelViews& level, const std::vector<SparseStep
     problem.step_covariances[i] =
         compose_covariance(odometry_covariance(steps[i], body_step),
                            level.level_from_body[i].inverse(), Matrix6d::Zero());
+    // The odometry holds the tilt as if the body turned about a point among the feet below it.
+    const Eigen::Vector3d below(0.0, 0.0, middle_of(problem.views[i]).z());
+    problem.step_covariances[i] += tilt_about(below, kStepTilt);
   }
   return problem;
 }

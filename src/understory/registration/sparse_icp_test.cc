@@ -8,6 +8,7 @@
 
 #include "understory/registration/go_icp.h"
 #include "understory/registration/nearest_table.h"
+#include "understory/registration/tilt_about.h"
 #include "understory/registration/yaw_vote.h"
 
 namespace understory {
@@ -119,6 +120,22 @@ TEST(SparseIcp, HeightsWeighByWhatIsKnownOfThem) {
   const auto half =
       register_sparse_icp(SparseTarget(pair.target), pair.source, Pose(), {}, source_sd);
   EXPECT_EQ(half.target_from_source.matrix(), blind.target_from_source.matrix());
+}
+
+// Where a tilt is uncertain, the middle of the points is not: it moves neither by it nor in its
+// covariance, while the origin 3 m above it does, by 3 m times the tilt.
+TEST(TiltAbout, LeavesTheMiddleOfThePointsInPlace) {
+  const SparsePoints points = {{2.0, -1.0, -3.5}, {8.0, 5.0, -2.5}};
+  const Eigen::Vector3d middle = middle_of(points);
+  EXPECT_TRUE(middle.isApprox(Eigen::Vector3d(5.0, 2.0, -3.0)));
+  const Matrix6d covariance = tilt_about(middle, 0.01);
+  Eigen::Matrix<double, 3, 6> moves;
+  moves << -skew(middle), Eigen::Matrix3d::Identity();
+  EXPECT_LT((moves * covariance * moves.transpose()).norm(), 1e-12);
+  EXPECT_NEAR(covariance(0, 0), 1e-4, 1e-12);
+  EXPECT_NEAR(covariance(2, 2), 0.0, 1e-15);
+  EXPECT_NEAR(std::sqrt(covariance(3, 3)), 0.03, 1e-9);
+  EXPECT_TRUE(middle_of({}).isZero());
 }
 
 TEST(SparseIcp, FewStemsAreSaid) {
