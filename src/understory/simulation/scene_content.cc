@@ -38,6 +38,7 @@ struct StemPart {
 
 std::vector<StemPart> stem_parts(const Tree& tree) {
   std::vector<StemPart> parts;
+  if (!tree.cloud.empty()) return parts;
   const std::vector<double> heights = tree.joints();
   for (std::size_t i = 0; i + 1 < heights.size(); ++i) {
     parts.push_back(
@@ -177,6 +178,10 @@ void SceneContent::add_tree(const Tree& tree, const std::vector<GrownCrown>& gro
     sways_.push_back({wind_.sway_of(tree), stiff_height(tree), tree.height_m + 0.01,
                       static_cast<float>(tree.foot.z())});
   }
+  if (!tree.cloud.empty()) {
+    add_cloud(tree, sway);
+    return;
+  }
   const unsigned stem = add_stem(tree, felled != nullptr, sway);
   std::pair<unsigned, unsigned> crown(kNone, kNone);
   if (tree.broken_m <= 0.0) {  // else dead: no crown
@@ -192,6 +197,49 @@ void SceneContent::add_tree(const Tree& tree, const std::vector<GrownCrown>& gro
   felled->dead = crown.second;
   for (const unsigned part : {stem, crown.first, crown.second}) {
     if (part != kNone) time_limit(part, -kForever, felled->grab_s);
+  }
+}
+
+void SceneContent::add_cloud(const Tree& tree, std::size_t sway) {
+  auto found = clouds_.find(tree.cloud);
+  if (found == clouds_.end()) {
+    const TreeCloud cloud = read_tree_cloud(tree.cloud, tree.dbh_m);
+    const auto scene_of = [&](const std::vector<TreeCloud::Disc>& discs, bool above) -> RTCScene {
+      std::vector<TreeCloud::Disc> part;
+      std::copy_if(discs.begin(), discs.end(), std::back_inserter(part), [&](const auto& disc) {
+        return (disc.centre.z() >= kStiffShare * cloud.height_m) == above;
+      });
+      if (part.empty()) return nullptr;
+      RTCScene scene = new_scene();
+      attach(scene, disc_geometry(device_, part));
+      commit_alone(scene);
+      return scene;
+    };
+    const CloudScenes scenes{{scene_of(cloud.stem, false), scene_of(cloud.stem, true)},
+                             {scene_of(cloud.crown, false), scene_of(cloud.crown, true)},
+                             cloud.height_m};
+    found = clouds_.emplace(tree.cloud, scenes).first;
+  }
+  const CloudScenes& scenes = found->second;
+  const auto stretch = static_cast<float>(tree.height_m / scenes.height_m);
+  const auto cos_yaw = static_cast<float>(std::cos(tree.yaw_rad));
+  const auto sin_yaw = static_cast<float>(std::sin(tree.yaw_rad));
+  Eigen::Matrix<float, 3, 4> world_from_shape;
+  world_from_shape.col(0) << stretch * cos_yaw, stretch * sin_yaw, 0.0F;
+  world_from_shape.col(1) << -stretch * sin_yaw, stretch * cos_yaw, 0.0F;
+  world_from_shape.col(2) << 0.0F, 0.0F, stretch;
+  world_from_shape.col(3) = tree.foot.cast<float>();
+  for (const bool above : {false, true}) {
+    const auto add = [&](RTCScene scene, Surface surface, double reflectivity, int id) {
+      if (scene == nullptr) return;
+      Instance instance{surface, cos_yaw, sin_yaw, static_cast<float>(reflectivity)};
+      instance.tree = id;
+      instance.sway = above ? sway : kStands;
+      const unsigned number = add_instance(scene, world_from_shape, instance);
+      if (instance.sway != kStands) swaying_.push_back({number, sway});
+    };
+    add(scenes.stem[above ? 1 : 0], Surface::kStem, tree.bark_reflectivity, tree.id);
+    add(scenes.crown[above ? 1 : 0], Surface::kFoliage, 0.42, 0);
   }
 }
 

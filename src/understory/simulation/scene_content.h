@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -106,6 +107,8 @@ class SceneContent {
   void add_shapes(GrownShapes& grown);
   // What of a tree is not part of the fixed scene: its crown, and of its stem what sways or falls.
   void add_tree(const Tree& tree, const std::vector<GrownCrown>& grown);
+  // A scanned tree: four instances, of stem and crown below and above where it yields.
+  void add_cloud(const Tree& tree, std::size_t sway);
   // The stem's upper part, which sways, or all of it where it will be felled; the feet of those
   // stand still.
   unsigned add_stem(const Tree& tree, bool all, std::size_t sway);
@@ -128,6 +131,13 @@ class SceneContent {
 
   std::vector<CrownScene> crowns_;
   std::vector<RTCScene> plants_;  // three of each kind
+  // A scanned tree, cut where it yields to the wind.
+  struct CloudScenes {
+    RTCScene stem[2];  // below and above, nullptr if there is nothing
+    RTCScene crown[2];
+    double height_m;
+  };
+  std::map<std::string, CloudScenes> clouds_;  // by file
 };
 
 }  // namespace understory

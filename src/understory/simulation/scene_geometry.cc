@@ -63,6 +63,19 @@ RTCGeometry shape_geometry(RTCDevice device, const Shape& shape) {
   return geometry;
 }
 
+RTCGeometry disc_geometry(RTCDevice device, const std::vector<TreeCloud::Disc>& discs) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
+  auto* vertices =
+      buffer<Vertex4>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, discs.size());
+  auto* normals =
+      buffer<Eigen::Vector3f>(geometry, RTC_BUFFER_TYPE_NORMAL, RTC_FORMAT_FLOAT3, discs.size());
+  for (const TreeCloud::Disc& disc : discs) {
+    *vertices++ = {disc.centre.x(), disc.centre.y(), disc.centre.z(), disc.radius_m};
+    *normals++ = disc.normal;
+  }
+  return geometry;
+}
+
 Shape building_shape(const Building& house) {
   const Eigen::Vector3f half = 0.5F * house.size_m.cast<float>();
   const float wall = house.size_m.cast<float>().z();

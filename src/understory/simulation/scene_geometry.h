@@ -7,6 +7,7 @@
 #include "understory/simulation/shapes.h"
 #include "understory/simulation/stand.h"
 #include "understory/simulation/terrain.h"
+#include "understory/simulation/tree_cloud.h"
 
 // Embree geometries of what stands in a scene. All are new and not yet committed: the caller
 // attaches and releases them.
@@ -30,6 +31,8 @@ struct Cones {
 [[nodiscard]] RTCGeometry terrain_geometry(RTCDevice device, const Terrain& terrain);
 [[nodiscard]] RTCGeometry cone_geometry(RTCDevice device, const Cones& cones);
 [[nodiscard]] RTCGeometry shape_geometry(RTCDevice device, const Shape& shape);
+[[nodiscard]] RTCGeometry disc_geometry(RTCDevice device,
+                                        const std::vector<TreeCloud::Disc>& discs);
 
 // Walls and a pitched roof in the world frame.
 [[nodiscard]] Shape building_shape(const Building& house);

@@ -24,6 +24,7 @@ double taper(double height, double top) {
 
 // Growth by an own stream, so that stands without them are what they were.
 void draw_damage(const StandConfig& config, Tree& tree, Random& random) {
+  if (!tree.cloud.empty()) return;  // as it was scanned
   if (random.uniform() < config.fork_share) {
     tree.fork_m = std::min(0.6 * tree.height_m, random.uniform(0.8, 6.0));
   }

@@ -29,6 +29,7 @@ struct Tree {
   double bark_reflectivity = 0.3;
   double fork_m = 0.0;    // height above the foot where a second stem leaves, 0 = none
   double broken_m = 0.0;  // height above the foot where the top is broken off, 0 = whole
+  std::string cloud;      // file of a scanned tree that stands here instead of a grown one
 
   // Diameter of the stem at a height above the foot, metres; 0 at the top.
   [[nodiscard]] double diameter(double height_m_above_foot) const;
@@ -87,8 +88,10 @@ struct Stand {
 
 // Reads a list of trees: a CSV with a head line of column names. Needed: x, y (metres in the world
 // frame) and dbh_m; used where given and not empty: id, height_m, lean_deg, species (pine, spruce,
-// birch); others are passed over, z too: trees stand on the terrain. What the list leaves open is
-// drawn as for random trees. Throws InputError with file, line and what was expected.
+// birch), cloud (file of a scanned tree, beside the list if its path is relative, stretched to
+// height_m where that is given); others are passed over, z too: trees stand on the terrain. What
+// the list leaves open is drawn as for random trees. Throws InputError with file, line and what was
+// expected.
 [[nodiscard]] std::vector<Tree> read_trees(const std::string& path, const StandConfig& config,
                                            const Terrain& terrain, std::uint64_t seed);
 

@@ -85,12 +85,12 @@ std::optional<Reach> reach_to(const Work& work, double at_m, const Tree& tree) {
   return Reach{swing, ahead - head.x(), grip_in_chassis.z() - head.z()};
 }
 
-// A tree in reach, drawn among those whose neighbours were left standing.
+// A grown tree in reach, drawn among those whose neighbours were left standing.
 const Tree* choose_tree(const Work& work, double at_m, Random& random) {
   constexpr double kApart = 2.2;  // a thinning leaves trees between those that it takes
   std::vector<const Tree*> candidates;
   for (const Tree& tree : work.stand.trees) {
-    if (!reach_to(work, at_m, tree)) continue;
+    if (!tree.cloud.empty() || !reach_to(work, at_m, tree)) continue;
     const bool near = std::any_of(work.cut.begin(), work.cut.end(), [&](const Tree* other) {
       return (other->foot - tree.foot).head<2>().norm() < kApart;
     });

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
+
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <numbers>
@@ -10,6 +13,7 @@
 
 #include "understory/simulation/counter_noise.h"
 #include "understory/simulation/stand_drawing.h"
+#include "understory/simulation/tree_cloud.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -75,8 +79,8 @@ Species species_of(const Row& row, Species drawn) {
   row.fail("species is \"" + name + "\", expected pine, spruce or birch");
 }
 
-Tree read_tree(const Row& row, int number, const StandConfig& config, const Terrain& terrain,
-               Random& random) {
+Tree read_tree(const std::string& list, const Row& row, int number, const StandConfig& config,
+               const Terrain& terrain, Random& random) {
   Tree tree = draw_tree(config, random);
   tree.species = species_of(row, tree.species);
   const double x = row.number("x", -0.5 * config.size_x_m, 0.5 * config.size_x_m);
@@ -86,15 +90,35 @@ Tree read_tree(const Row& row, int number, const StandConfig& config, const Terr
   tree.height_m = row.has("height_m")
                       ? row.number("height_m", 1.5, 120.0)
                       : std::max(config.height_min_m, height_of(tree.dbh_m, config));
+  const double given_height_m = row.has("height_m") ? tree.height_m : 0.0;
   if (row.has("lean_deg")) {
     const double lean = std::tan(row.number("lean_deg", 0.0, 60.0) * std::numbers::pi / 180.0);
     const double way = random.uniform(0.0, 2.0 * std::numbers::pi);
     tree.lean = {lean * std::cos(way), lean * std::sin(way)};
     tree.sweep.setZero();
   }
+  if (row.has("cloud")) {
+    tree.cloud = (std::filesystem::path(list).parent_path() / row.text("cloud")).string();
+    tree.sweep.setZero();
+    tree.lean.setZero();
+  }
   tree.id = row.has("id") ? static_cast<int>(row.number("id", 1, kLargestId)) : number;
   draw_crown(config, tree, random);
+  if (!tree.cloud.empty()) tree.height_m = given_height_m;
   return tree;
+}
+
+// Trees of a cloud take its height, if the list gives none, and its lean.
+void measure_clouds(std::vector<Tree>& trees) {
+  std::map<std::string, TreeCloud> clouds;
+  for (Tree& tree : trees) {
+    if (tree.cloud.empty()) continue;
+    auto found = clouds.find(tree.cloud);
+    if (found == clouds.end())
+      found = clouds.emplace(tree.cloud, read_tree_cloud(tree.cloud, tree.dbh_m)).first;
+    if (tree.height_m <= 0.0) tree.height_m = found->second.height_m;
+    tree.lean = Eigen::Rotation2Dd(tree.yaw_rad) * found->second.lean;
+  }
 }
 
 }  // namespace
@@ -123,11 +147,13 @@ std::vector<Tree> read_trees(const std::string& path, const StandConfig& config,
     if (fields.size() == 1 && fields[0].empty()) continue;
     const Row row(path, number, columns, std::move(fields));
     Random random(hash_numbers(seed, stream_of(NoiseStream::kStand), number));
-    trees.push_back(read_tree(row, static_cast<int>(trees.size()) + 1, config, terrain, random));
+    trees.push_back(
+        read_tree(path, row, static_cast<int>(trees.size()) + 1, config, terrain, random));
     if (!ids.insert(trees.back().id).second) {
       row.fail(fmt::format("id {} stands in the list twice", trees.back().id));
     }
   }
+  measure_clouds(trees);
   return trees;
 }
 

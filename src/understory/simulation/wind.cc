@@ -13,7 +13,6 @@ constexpr double kReferenceHeight = 15.0;  // metres
 constexpr double kWindSpeed = 4.0;         // at which gusts travel, m/s
 constexpr double kWindAzimuth = 0.6;       // radians from east to north
 constexpr double kAcross = 0.6;            // sway across the wind over that along it
-constexpr double kStiffShare = 0.2;        // of the height
 
 // Strength of the wind, 1 on average.
 double gust(double time_s) {
@@ -59,6 +58,7 @@ Eigen::Vector2d Wind::top_velocity(const Sway& sway, double time_s) {
 }
 
 double stiff_height(const Tree& tree) {
+  if (!tree.cloud.empty()) return kStiffShare * tree.height_m;
   for (const double height : tree.joints()) {
     if (height >= kStiffShare * tree.height_m) return height;
   }

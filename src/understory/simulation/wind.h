@@ -36,8 +36,9 @@ class Wind {
   double sway_m_;
 };
 
-// Height above the foot below which a stem does not yield: the lowest joint from a fifth of the
-// height up. Above it the stem bends over in proportion to the height.
+// Height above the foot below which a stem does not yield: a fifth of the height, or the lowest
+// joint from there up. Above it the stem bends over in proportion to the height.
+constexpr double kStiffShare = 0.2;  // of the height
 [[nodiscard]] double stiff_height(const Tree& tree);
 
 }  // namespace understory
