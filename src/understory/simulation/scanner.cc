@@ -1,6 +1,7 @@
 #include "understory/simulation/scanner.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -52,6 +53,13 @@ std::vector<StemReturns> count_stems(std::vector<std::uint64_t> returns) {
 
 // The rays of a few firings, in the order in which they are traced, and what came back.
 struct Scanner::Block {
+  // All blocks of a scan live at once: what only the casting needed goes back before its end.
+  void let_go_of_rays() {
+    std::vector<Ray>().swap(rays);
+    std::vector<Hit>().swap(hits);
+    std::vector<Eigen::Vector3f>().swap(direction_in_lidar);
+    std::vector<Eigen::Vector3f>().swap(origin_in_lidar);
+  }
   std::vector<Ray> rays;  // beam by beam, rays_per_beam each
   std::vector<Hit> hits;
   std::vector<Eigen::Vector3f> direction_in_lidar;  // reported, by beam
@@ -224,6 +232,7 @@ void Scanner::cast_block(std::int64_t first, std::int64_t end, double moment_s,
     }
   }
   if (config_.blooming > 0.0 || config_.crosstalk > 0.0) add_ghosts(first, block);
+  block.let_go_of_rays();
 }
 
 // Flakes in a metre of beam at a time: the fall of snow, and for a few seconds what a branch lets
@@ -287,28 +296,34 @@ void Scanner::trace(std::size_t firings, Block& block) const {
   const std::size_t beams = model_.beams.size();
   const std::size_t tile_firings = rays_per_beam == 1 ? 4 : (rays_per_beam < 8 ? 2 : 1);
   const std::size_t tile_beams = rays_per_beam < 4 ? 4 : (rays_per_beam < 16 ? 2 : 1);
-  std::vector<std::size_t> order;
-  order.reserve(block.rays.size());
+  constexpr std::size_t kTogether = 16;
+  std::array<std::size_t, kTogether> order{};
+  std::array<Ray, kTogether> rays;
+  std::array<Hit, kTogether> hits;
+  block.hits.resize(block.rays.size());
+  std::size_t waiting = 0;
+  const auto cast = [&] {
+    scene_.cast(rays.data(), waiting, static_cast<float>(config_.min_range_m),
+                static_cast<float>(config_.max_range_m), hits.data());
+    for (std::size_t i = 0; i < waiting; ++i)
+      block.hits[order[i]] = hits[i];
+    waiting = 0;
+  };
   for (std::size_t f = 0; f < firings; f += tile_firings) {
     for (std::size_t b = 0; b < beams; b += tile_beams) {
       for (std::size_t i = f; i < std::min(f + tile_firings, firings); ++i) {
         for (std::size_t j = b; j < std::min(b + tile_beams, beams); ++j) {
-          const std::size_t beam = i * beams + neighbours_[j];
-          for (std::size_t k = 0; k < rays_per_beam; ++k)
-            order.push_back(beam * rays_per_beam + k);
+          const std::size_t first = (i * beams + neighbours_[j]) * rays_per_beam;
+          for (std::size_t k = first; k < first + rays_per_beam; ++k) {
+            order[waiting] = k;
+            rays[waiting] = block.rays[k];
+            if (++waiting == kTogether) cast();
+          }
         }
       }
     }
   }
-  std::vector<Ray> rays(order.size());
-  std::vector<Hit> hits(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i)
-    rays[i] = block.rays[order[i]];
-  scene_.cast(rays.data(), rays.size(), static_cast<float>(config_.min_range_m),
-              static_cast<float>(config_.max_range_m), hits.data());
-  block.hits.resize(block.rays.size());
-  for (std::size_t i = 0; i < order.size(); ++i)
-    block.hits[order[i]] = hits[i];
+  if (waiting > 0) cast();
 }
 
 void Scanner::make_rays(std::int64_t first, std::int64_t end, double moment_s, Block& block) const {
@@ -380,6 +395,19 @@ void Scanner::meet_machine(std::int64_t first, Block& block) const {
   }
 }
 
+// A beam of one ray.
+Scanner::Echo Scanner::echo_of(const Hit& hit) {
+  Echo echo;
+  if (hit.surface == Surface::kNone) return echo;
+  echo.energy = hit.reflectivity * std::max(0.08F, hit.cosine);
+  echo.range_m = (echo.energy * hit.range_m) / echo.energy;  // as a mean of one
+  if (!(echo.energy / (echo.range_m * echo.range_m) > 0.0F)) return {};
+  echo.tree = hit.tree;
+  echo.surface = hit.surface;
+  echo.cosine = hit.cosine;
+  return echo;
+}
+
 // Hits of one beam that lie within a pulse's length merge into one echo; the strongest is reported,
 // and the one after it where `second` is given.
 Scanner::Echo Scanner::strongest(const Hit* hits, Echo* second) const {
@@ -389,6 +417,7 @@ Scanner::Echo Scanner::strongest(const Hit* hits, Echo* second) const {
     const Hit* hit;
   };
   const auto count = static_cast<std::size_t>(config_.rays_per_beam);
+  if (count == 1) return echo_of(*hits);
   Piece pieces[64];
   std::size_t used = 0;
   for (std::size_t k = 0; k < count; ++k) {

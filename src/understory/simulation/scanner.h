@@ -66,6 +66,7 @@ class Scanner {
   void trace(std::size_t firings, Block& block) const;
   void meet_machine(std::int64_t first, Block& block) const;
   [[nodiscard]] ScanReadings::Reading read_beam(CounterNoise noise, const Echo& echo) const;
+  [[nodiscard]] static Echo echo_of(const Hit& hit);
   [[nodiscard]] Echo strongest(const Hit* hits, Echo* second) const;
   [[nodiscard]] double snow_per_m(double time_s) const;
   void meet_snow(CounterNoise noise, double per_m, Echo& echo) const;
