@@ -15,17 +15,19 @@ void SliceThinner::add(double x, double y, double height_m) {
   };
   const std::uint64_t cube = part(y, 1 << 23, 0xffffff) << 40 | part(x, 1 << 23, 0xffffff) << 16 |
                              part(height_m, 1 << 15, 0xffff);
+  if (entries_.capacity() < limit_) entries_.reserve(limit_);
   entries_.push_back(
       {cube, static_cast<float>(x), static_cast<float>(y), static_cast<float>(height_m), 1});
   if (entries_.size() >= limit_) {
     compact();
-    limit_ = std::max(limit_, 2 * entries_.size());
+    limit_ = std::max(limit_, entries_.size() + entries_.size() / 2);
   }
 }
 
 void SliceThinner::compact() {
-  std::stable_sort(entries_.begin(), entries_.end(),
-                   [](const Entry& a, const Entry& b) { return a.cube < b.cube; });
+  // In place: a stable sort would take the same memory again.
+  std::sort(entries_.begin(), entries_.end(),
+            [](const Entry& a, const Entry& b) { return a.cube < b.cube; });
   std::size_t kept = 0;
   for (std::size_t i = 0; i < entries_.size();) {
     const std::uint64_t cube = entries_[i].cube;

@@ -26,7 +26,7 @@ class SliceThinner {
 
   double cube_m_;
   std::vector<Entry> entries_;
-  std::size_t limit_ = 4'000'000;
+  std::size_t limit_ = 1'000'000;
 };
 
 }  // namespace understory

@@ -10,6 +10,7 @@
 
 #include "understory/geometry/pose_io.h"
 #include "understory/util/error.h"
+#include "understory/util/timing.h"
 
 namespace understory {
 
@@ -151,7 +152,11 @@ void KeyframeMap::finish(const NdtConfig& ndt) {
   for (std::size_t i = 0; i < result.world_from_keyframe.size(); ++i) {
     keyframes_[i].world_from_body = result.world_from_keyframe[i];
   }
+  snapshot_.clear();
+  local_map_.clear();
   if (config_.beginning.enabled) refine_beginnings(ndt);
+  points_->forget();
+  give_free_memory_back();
 }
 
 void KeyframeMap::refine_beginnings(const NdtConfig& ndt) {

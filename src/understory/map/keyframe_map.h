@@ -67,8 +67,8 @@ class KeyframeMap {
   // Begins anew after the scans could not be matched any more: the next keyframe is joined to the
   // last one by a prediction only, and the local map starts empty.
   void start_segment();
-  // The recording is over: waits for what is running, optimises, and positions the first keyframes
-  // of each segment again.
+  // The recording is over: waits for what is running, optimises, positions the first keyframes of
+  // each segment again, and frees what only scans needed: there is no local map any more.
   void finish(const NdtConfig& ndt);
   // Moves everything, e.g. to level the world.
   void move_world(const Pose& new_world_from_old_world);

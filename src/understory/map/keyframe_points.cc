@@ -44,6 +44,11 @@ void KeyframePoints::remember(std::size_t keyframe, std::shared_ptr<const Points
   cache_.erase(oldest);
 }
 
+void KeyframePoints::forget() {
+  const std::lock_guard lock(mutex_);
+  cache_.clear();
+}
+
 void KeyframePoints::flush() {
   const std::lock_guard lock(mutex_);
   clouds_.flush();

@@ -19,6 +19,8 @@ class KeyframePoints {
   void append(TimeNs stamp, const Points& points);
   void flush();
   [[nodiscard]] std::shared_ptr<const Points> get(std::size_t keyframe);
+  // Frees what is in memory; everything can still be got.
+  void forget();
 
  private:
   struct Entry {

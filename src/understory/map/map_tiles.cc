@@ -2,15 +2,14 @@
 
 #include <cmath>
 #include <fstream>
-#include <unordered_set>
 
+#include "understory/geometry/voxel_index.h"
 #include "understory/util/error.h"
-#include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
-constexpr std::uint64_t kBufferedPoints = 4'000'000;  // 96 MB over all tiles
+constexpr std::uint64_t kBufferedPoints = 2'000'000;  // 48 MB over all tiles
 
 }  // namespace
 
@@ -84,15 +83,16 @@ std::vector<MapTiles::Record> MapTiles::load(TileIndex index, const Tile& tile) 
 }
 
 std::vector<MapTiles::Record> MapTiles::thinned(const std::vector<Record>& records) const {
-  std::unordered_set<std::uint64_t> taken;
-  taken.reserve(records.size());
+  VoxelIndex taken;
   const auto cell = [&](float value) {
-    return static_cast<std::uint64_t>(
-        static_cast<std::int64_t>(std::floor(static_cast<double>(value) / config_.thin_m)));
+    return voxel_floor(static_cast<double>(value) / config_.thin_m);
   };
   std::vector<Record> kept;
   for (const Record& r : records) {
-    if (taken.insert(hash_numbers(cell(r.x), cell(r.y), cell(r.z))).second) kept.push_back(r);
+    const std::uint64_t key = voxel_key(cell(r.x), cell(r.y), cell(r.z));
+    if (taken.find(key) != VoxelIndex::kNone) continue;
+    taken.set(key, 0);
+    kept.push_back(r);
   }
   return kept;
 }

@@ -1,5 +1,6 @@
 #include "understory/util/timing.h"
 
+#include <malloc.h>
 #include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -41,6 +42,12 @@ double resident_memory_mb() {
   double resident = 0.0;
   file >> pages >> resident;
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+void give_free_memory_back() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 Distribution distribution_of(std::vector<double> values) {

@@ -17,6 +17,9 @@ namespace understory {
 // Resident memory of the process: the largest so far, and now; megabytes (1e6 bytes).
 [[nodiscard]] double peak_memory_mb();
 [[nodiscard]] double resident_memory_mb();
+// Hands memory that has been freed back to the system where the C library would keep it. For the
+// end of a stage that needed much: it takes some milliseconds.
+void give_free_memory_back();
 
 // Mean, percentiles (nearest rank) and largest of a set of values; zeros for an empty set.
 struct Distribution {
