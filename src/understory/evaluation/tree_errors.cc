@@ -59,6 +59,7 @@ std::vector<Tree> read_trees(const std::filesystem::path& path) {
     tree.z = std::isfinite(z) ? z : 0.0;
     tree.dbh_m = table.number("dbh_m");
     tree.height_m = table.number("height_m");
+    tree.felled = !table.text("felled_at").empty();
     trees.push_back(tree);
   }
   return trees;
@@ -109,17 +110,21 @@ TreeErrors compare_trees(const std::vector<Tree>& a, const std::vector<Tree>& b,
   Differences position;
   Differences dbh;
   Differences height;
-  const std::vector<TreePair> pairs = match_trees(a, b, radius_m);
-  for (const auto& [i, j] : pairs) {
+  const auto felled = [](const Tree& tree) { return tree.felled; };
+  errors.trees_a = a.size();
+  errors.trees_b = b.size() - static_cast<std::size_t>(std::count_if(b.begin(), b.end(), felled));
+  for (const auto& [i, j] : match_trees(a, b, radius_m)) {
+    if (b[j].felled) {
+      --errors.trees_a;
+      continue;
+    }
+    ++errors.matched;
     position.add(plane_distance(a[i], b[j]));
     dbh.add(a[i].dbh_m - b[j].dbh_m);
     height.add(a[i].height_m - b[j].height_m);
   }
-  errors.trees_a = a.size();
-  errors.trees_b = b.size();
-  errors.matched = pairs.size();
-  errors.recall = ratio(pairs.size(), b.size());
-  errors.precision = ratio(pairs.size(), a.size());
+  errors.recall = ratio(errors.matched, errors.trees_b);
+  errors.precision = ratio(errors.matched, errors.trees_a);
   errors.position_rmse_m = position.rms();
   errors.dbh_rmse_m = dbh.rms();
   errors.dbh_bias_m = dbh.mean();
@@ -136,7 +141,8 @@ VisibleTreeErrors compare_visible_trees(const std::vector<Tree>& a, const std::v
   VisibleTreeErrors errors;
   for (std::size_t j = 0; j < b.size(); ++j) {
     const auto returns = visibility.returns_by_tree.find(b[j].id);
-    if (returns == visibility.returns_by_tree.end() || returns->second < visibility.min_returns ||
+    if (b[j].felled || returns == visibility.returns_by_tree.end() ||
+        returns->second < visibility.min_returns ||
         !near_path(b[j], visibility.path, visibility.within_m)) {
       continue;
     }

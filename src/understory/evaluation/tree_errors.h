@@ -12,8 +12,9 @@
 
 namespace understory {
 
-// Reads trees.csv (docs/outputs.md); of its columns only x and y are needed. Throws InputError with
-// the line where a position is missing or a cell is no number.
+// Reads trees.csv (docs/outputs.md); of its columns only x and y are needed; a time in felled_at
+// marks a tree as felled. Throws InputError with the line where a position is missing or a cell is
+// no number.
 [[nodiscard]] std::vector<Tree> read_trees(const std::filesystem::path& path);
 
 // An index into A and one into B.
@@ -35,7 +36,9 @@ using TreePair = std::pair<std::size_t, std::size_t>;
 [[nodiscard]] std::vector<Tree> moved(const std::vector<Tree>& trees,
                                       const Pose& target_from_source);
 
-// Errors of the trees A against the trees B (the truth). NaN where nothing can be compared.
+// Errors of the trees A against the trees B (the truth). NaN where nothing can be compared. A
+// felled tree of B is neither missed nor found: it counts nowhere, nor does the tree of A that
+// matches it.
 struct TreeErrors {
   std::size_t trees_a = 0;
   std::size_t trees_b = 0;
@@ -50,7 +53,8 @@ struct TreeErrors {
 [[nodiscard]] TreeErrors compare_trees(const std::vector<Tree>& a, const std::vector<Tree>& b,
                                        double radius_m);
 
-// The same for what the scanner could have seen.
+// The same for what the scanner could have seen. Felled trees of B are not expected, and a tree of
+// A that matches one is not false.
 struct VisibleTreeErrors {
   std::size_t expected = 0;     // of B: near the path and with enough returns
   std::size_t found = 0;        // of these, matched

@@ -113,6 +113,28 @@ TEST(TreeErrors, OnlyVisibleTreesNearThePathAreExpected) {
   EXPECT_NEAR(errors.false_share, 1.0 / 3.0, 1e-12);
 }
 
+TEST(TreeErrors, FelledTreesAreNeitherMissedNorFalse) {
+  std::vector<Tree> b = {tree_at(1, 0), tree_at(2, 3), tree_at(3, -3), tree_at(4, 1)};
+  for (std::size_t i = 0; i < b.size(); ++i)
+    b[i].id = static_cast<int>(i) + 1;
+  b[1].felled = b[3].felled = true;
+  // The first stands and is found, one of the felled ones is listed, the other is not.
+  const std::vector<Tree> a = {tree_at(1, 0.1), tree_at(2, 3.1)};
+  const TreeErrors errors = compare_trees(a, b, 0.5);
+  EXPECT_EQ(errors.trees_b, 2u);
+  EXPECT_EQ(errors.trees_a, 1u);
+  EXPECT_EQ(errors.matched, 1u);
+  EXPECT_NEAR(errors.recall, 0.5, 1e-12);
+  EXPECT_NEAR(errors.precision, 1.0, 1e-12);
+  Visibility visibility;
+  visibility.returns_by_tree = {{1, 90}, {2, 90}, {3, 90}, {4, 90}};
+  visibility.path = {{0, Pose(Eigen::Quaterniond::Identity(), {0, 0, 0})}};
+  const VisibleTreeErrors visible = compare_visible_trees(a, b, 0.5, visibility);
+  EXPECT_EQ(visible.expected, 2u);
+  EXPECT_EQ(visible.found, 1u);
+  EXPECT_EQ(visible.false_trees, 0u);
+}
+
 TEST(TreeErrors, ReadsTheColumnsByName) {
   const std::string path = ::testing::TempDir() + "understory_tree_errors.csv";
   std::ofstream(path) << "id,x,y,z,dbh_m,height_m,species\n7,1.5,-2,0.1,,21.5,pine\n";
@@ -122,6 +144,10 @@ TEST(TreeErrors, ReadsTheColumnsByName) {
   EXPECT_EQ(trees[0].y, -2.0);
   EXPECT_TRUE(std::isnan(trees[0].dbh_m));
   EXPECT_EQ(trees[0].height_m, 21.5);
+  EXPECT_FALSE(trees[0].felled);
+  std::ofstream(path) << "id,x,y,felled_at\n7,1.5,-2,\n8,3,4,1700000026.48\n";
+  EXPECT_FALSE(read_trees(path).at(0).felled);
+  EXPECT_TRUE(read_trees(path).at(1).felled);
   std::ofstream(path) << "id,x\n1,2\n";
   EXPECT_THROW((void)read_trees(path), InputError);
   std::ofstream(path) << "timestamp,tree_id,rings,rings_with_3,returns\n0,5,1,1,20\n1,5,1,1,11\n";

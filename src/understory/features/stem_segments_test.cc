@@ -187,7 +187,7 @@ TEST(StemSegments, SayHowWellTheirFeetAreKnown) {
     config.up = found.up;
     for (const StemSegment& stem : found.stems) {
       const Eigen::Vector3d foot = site.world_from_lidar(*frame.scan, 1e-9 * stem.t_ns) * stem.foot;
-      for (const Tree& tree : site.stand.trees) {
+      for (const GrownTree& tree : site.stand.trees) {
         if (!stem.foot_on_ground || (tree.foot - foot).head<2>().norm() > 0.4) continue;
         const double error = std::abs(foot.z() - tree.foot.z());
         (stem.foot_sd_m < 0.2 ? sure : unsure).push_back(error);

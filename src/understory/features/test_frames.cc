@@ -18,10 +18,10 @@ StemBand& band_of(std::vector<StemBand>& bands, double range) {
 }
 
 // The tree whose centre line passes nearest to a place, and how near.
-std::pair<const Tree*, double> nearest_tree(const Stand& stand, const Eigen::Vector3d& at) {
-  const Tree* best = nullptr;
+std::pair<const GrownTree*, double> nearest_tree(const Stand& stand, const Eigen::Vector3d& at) {
+  const GrownTree* best = nullptr;
   double least = kMatch;
-  for (const Tree& tree : stand.trees) {
+  for (const GrownTree& tree : stand.trees) {
     if ((tree.foot - at).head<2>().squaredNorm() > 9.0) continue;
     const double off = (tree.centre(at.z() - tree.foot.z()) - at).head<2>().norm();
     if (off >= least) continue;
@@ -38,8 +38,9 @@ void write_traits(std::FILE* file, bool right, double range, const StemSegment& 
   std::fprintf(file, "\n");
 }
 
-void add_right(StemBand& band, const StemSegment& stem, const Tree& tree, const Eigen::Vector3d& at,
-               const Eigen::Vector3d& foot, const Eigen::Vector3d& sight) {
+void add_right(StemBand& band, const StemSegment& stem, const GrownTree& tree,
+               const Eigen::Vector3d& at, const Eigen::Vector3d& foot,
+               const Eigen::Vector3d& sight) {
   ++band.right;
   const double height = at.z() - tree.foot.z();
   const Eigen::Vector2d off = (at - tree.centre(height)).head<2>();
@@ -100,13 +101,13 @@ void compare_stems(const TestFrames& site, const SimulatedScan& frame, const Ste
     hit.insert(tree->id);
     add_right(band, stem, *tree, at, now * stem.foot, sight);
   }
-  std::map<int, const Tree*> trees;
-  for (const Tree& tree : site.stand.trees)
+  std::map<int, const GrownTree*> trees;
+  for (const GrownTree& tree : site.stand.trees)
     trees[tree.id] = &tree;
   const Eigen::Vector3d lidar = site.world_from_lidar(*frame.scan, 0.0).translation();
   for (const StemReturns& returns : frame.stems) {
     if (returns.rings < 2) continue;
-    const Tree& tree = *trees.at(returns.tree);
+    const GrownTree& tree = *trees.at(returns.tree);
     StemBand& band = band_of(bands, (tree.foot - lidar).head<2>().norm());
     const int was_found = hit.count(tree.id) > 0 ? 1 : 0;
     ++band.seen;
@@ -157,7 +158,7 @@ StemBand compare_map_stems(const Stand& stand, const TestMap& map, const StemSeg
     hit.insert(tree->id);
     add_right(band, stem, *tree, middle + map.origin, stem.foot + map.origin, middle);
   }
-  for (const Tree& tree : stand.trees) {
+  for (const GrownTree& tree : stand.trees) {
     const auto returns = map.returns.find(tree.id);
     if (returns == map.returns.end() || returns->second < 30) continue;
     if ((tree.foot - map.origin).head<2>().norm() > within_m) continue;

@@ -17,6 +17,7 @@ struct Tree {
   int observations = 0;  // returns (or views, in a sparse map) that support the stem
   double x_sd_m = std::numeric_limits<double>::quiet_NaN();
   double y_sd_m = std::numeric_limits<double>::quiet_NaN();
+  bool felled = false;  // of a truth: cut down while it was scanned, so it may be listed or not
 };
 
 }  // namespace understory

@@ -106,7 +106,7 @@ TEST(CarrierPath, KeepsClearOfStems) {
     double nearest = 1e9;
     for (double t = 0.0; t < walk.plan.path.duration_s(); t += 0.2) {
       const Eigen::Vector3d place = walk.plan.path.pose(t).translation();
-      for (const Tree& tree : stand.trees) {
+      for (const GrownTree& tree : stand.trees) {
         const double up = place.z() - tree.foot.z();
         const double side = (tree.centre(up) - place).head<2>().norm();
         nearest = std::min(nearest, side - 0.5 * tree.diameter(up));

@@ -60,7 +60,7 @@ GrownShapes grow_shapes(const StandConfig& config, std::uint64_t seed) {
   return shapes;
 }
 
-std::size_t nearest_crown(const std::vector<GrownCrown>& crowns, const Tree& tree) {
+std::size_t nearest_crown(const std::vector<GrownCrown>& crowns, const GrownTree& tree) {
   std::size_t best = 0;
   double nearest = 1e9;
   for (std::size_t i = 0; i < crowns.size(); ++i) {

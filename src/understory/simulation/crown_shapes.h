@@ -25,6 +25,7 @@ struct GrownShapes {
 [[nodiscard]] GrownShapes grow_shapes(const StandConfig& config, std::uint64_t seed);
 
 // The crown that resembles a tree's most; trees of odd and even ids take different variants.
-[[nodiscard]] std::size_t nearest_crown(const std::vector<GrownCrown>& crowns, const Tree& tree);
+[[nodiscard]] std::size_t nearest_crown(const std::vector<GrownCrown>& crowns,
+                                        const GrownTree& tree);
 
 }  // namespace understory

@@ -30,9 +30,9 @@ double yaw_at(const CarrierPlan& plan, double time_s) {
   return std::atan2(rotation(1, 0), rotation(0, 0));
 }
 
-const Tree& tree_of(const Stand& stand, int id) {
+const GrownTree& tree_of(const Stand& stand, int id) {
   const auto found = std::find_if(stand.trees.begin(), stand.trees.end(),
-                                  [&](const Tree& tree) { return tree.id == id; });
+                                  [&](const GrownTree& tree) { return tree.id == id; });
   UNDERSTORY_CHECK(found != stand.trees.end());
   return *found;
 }
@@ -81,7 +81,7 @@ Wood FallenLog::at(double time_s) const {
   return wood;
 }
 
-std::vector<double> cuts_of(const Tree& tree) {
+std::vector<double> cuts_of(const GrownTree& tree) {
   const double end = tree.broken_m > 0.0 ? tree.broken_m : tree.height_m;
   std::vector<double> cuts;
   for (double at = kStumpHeight + kLog; at < end; at += kLog) {
@@ -96,7 +96,7 @@ Eigen::Vector3d head_in_body(const Eigen::Vector2d& boom) {
   return {kPillar + boom[0], kBoomSide, boom[1] - kHeadBelowTip};
 }
 
-HeldTree held_tree(const CarrierPlan& plan, const Felling& felling, const Tree& tree,
+HeldTree held_tree(const CarrierPlan& plan, const Felling& felling, const GrownTree& tree,
                    double time_s) {
   const auto turn = [](double angle, const Eigen::Vector3d& axis) {
     return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis));
@@ -124,7 +124,7 @@ HeldTree held_tree(const CarrierPlan& plan, const Felling& felling, const Tree& 
 void lay_out_logs(CarrierPlan& plan, const Stand& stand, const Terrain& terrain) {
   Harvest& harvest = plan.harvest;
   for (const Felling& felling : harvest.fellings) {
-    const Tree& tree = tree_of(stand, felling.tree);
+    const GrownTree& tree = tree_of(stand, felling.tree);
     const auto piece = [&](double time_s, double low_m, double high_m) {
       const HeldTree held = held_tree(plan, felling, tree, time_s - 1e-6);
       const auto at = [&](double height) -> Eigen::Vector3d {

@@ -65,14 +65,14 @@ struct Harvest {
 };
 
 // The cuts of a stem: logs of about 4.3 m up to a diameter of 7 cm; one at least.
-[[nodiscard]] std::vector<double> cuts_of(const Tree& tree);
+[[nodiscard]] std::vector<double> cuts_of(const GrownTree& tree);
 
 // Middle of the harvester head in the body frame, for the reach and the height of the boom's tip.
 [[nodiscard]] Eigen::Vector3d head_in_body(const Eigen::Vector2d& boom);
 
 // The tree in the head at a time, if there is one. `tree` is the one that `felling` names.
-[[nodiscard]] HeldTree held_tree(const CarrierPlan& plan, const Felling& felling, const Tree& tree,
-                                 double time_s);
+[[nodiscard]] HeldTree held_tree(const CarrierPlan& plan, const Felling& felling,
+                                 const GrownTree& tree, double time_s);
 
 // Works out where the logs and branches of the plan's fellings come to lie.
 void lay_out_logs(CarrierPlan& plan, const Stand& stand, const Terrain& terrain);

@@ -24,9 +24,9 @@ SiteConfig site() {
   return load_site("lieksa1", kShort);
 }
 
-const Tree& tree_of(const SimulatedWorld& world, int id) {
+const GrownTree& tree_of(const SimulatedWorld& world, int id) {
   return *std::find_if(world.stand.trees.begin(), world.stand.trees.end(),
-                       [&](const Tree& tree) { return tree.id == id; });
+                       [&](const GrownTree& tree) { return tree.id == id; });
 }
 
 // Straight at a place from 1.5 m to its east.
@@ -52,7 +52,7 @@ TEST(Harvest, TreesAreInReachStandApartAndAreWorkedOnOneByOne) {
     EXPECT_LT(felling.feed_s, felling.drop_s);
     last = felling.drop_s;
     const auto tree = std::find_if(stand.trees.begin(), stand.trees.end(),
-                                   [&](const Tree& t) { return t.id == felling.tree; });
+                                   [&](const GrownTree& t) { return t.id == felling.tree; });
     ASSERT_NE(tree, stand.trees.end());
     // The head is at the stem that it grips; the ground tilts the machine by a few degrees.
     const Eigen::Vector3d head =
@@ -67,7 +67,7 @@ TEST(Harvest, ATreeIsGoneOnceItIsCutAndItsStumpAndLogsStay) {
   ASSERT_FALSE(world.plan.harvest.fellings.empty());
   const Felling& felling = world.plan.harvest.fellings.front();
   ASSERT_LT(felling.drop_s, 109.0);
-  const Tree& tree = tree_of(world, felling.tree);
+  const GrownTree& tree = tree_of(world, felling.tree);
   const Eigen::Vector3d stem = tree.centre(2.0);
   const FallenLog& log = world.plan.harvest.logs.front();
   const Eigen::Vector3d middle = 0.5 * (log.lying.from + log.lying.to);
@@ -101,7 +101,7 @@ TEST(Harvest, ATreeIsGoneOnceItIsCutAndItsStumpAndLogsStay) {
 TEST(Harvest, TheTreeIsHeldWhereItGrewThenFallsAndIsFedAndShortens) {
   SimulatedWorld world(site());
   const Felling& felling = world.plan.harvest.fellings.front();
-  const Tree& tree = tree_of(world, felling.tree);
+  const GrownTree& tree = tree_of(world, felling.tree);
   const auto at = [&](double time) { return held_tree(world.plan, felling, tree, time); };
   const HeldTree first = at(felling.grab_s);
   EXPECT_LT((first.world_from_tree.translation() - tree.foot).norm(), 1e-9);

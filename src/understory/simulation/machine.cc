@@ -67,7 +67,7 @@ Machine::Machine(const CarrierConfig& config, const CarrierPlan& plan, const Sta
     : present_(config.kind == "harvester"), plan_(plan) {
   for (const Felling& felling : plan.harvest.fellings) {
     const auto tree = std::find_if(stand.trees.begin(), stand.trees.end(),
-                                   [&](const Tree& t) { return t.id == felling.tree; });
+                                   [&](const GrownTree& t) { return t.id == felling.tree; });
     UNDERSTORY_CHECK(tree != stand.trees.end());
     trees_.push_back(&*tree);
   }

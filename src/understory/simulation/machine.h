@@ -40,7 +40,7 @@ class Machine {
  private:
   bool present_ = false;
   const CarrierPlan& plan_;
-  std::vector<const Tree*> trees_;  // of the plan's fellings
+  std::vector<const GrownTree*> trees_;  // of the plan's fellings
 };
 
 }  // namespace understory

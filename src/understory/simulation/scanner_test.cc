@@ -49,12 +49,12 @@ SiteConfig quiet_site() {
 }
 
 // Distance of a point from a stem, with sign: from the spheres that roll along each of its cones.
-double off_bark(const Tree& tree, const Eigen::Vector3d& point) {
+double off_bark(const GrownTree& tree, const Eigen::Vector3d& point) {
   const std::vector<double> heights = tree.joints();
   double nearest = 1e9;
   for (std::size_t i = 0; i + 1 < heights.size(); ++i) {
-    const Tree::Joint low = tree.joint(heights[i]);
-    const Tree::Joint high = tree.joint(heights[i + 1]);
+    const GrownTree::Joint low = tree.joint(heights[i]);
+    const GrownTree::Joint high = tree.joint(heights[i + 1]);
     if (point.z() < low.centre.z() - 1.0 || point.z() > high.centre.z() + 1.0) continue;
     const auto distance = [&](double u) {
       return (point - low.centre - u * (high.centre - low.centre)).norm() - low.radius_m -
@@ -72,10 +72,10 @@ double off_bark(const Tree& tree, const Eigen::Vector3d& point) {
   return nearest;
 }
 
-const Tree* nearest_tree(const Stand& stand, const Eigen::Vector3d& point) {
-  const Tree* best = nullptr;
+const GrownTree* nearest_tree(const Stand& stand, const Eigen::Vector3d& point) {
+  const GrownTree* best = nullptr;
   double nearest = 1e9;
-  for (const Tree& tree : stand.trees) {
+  for (const GrownTree& tree : stand.trees) {
     if ((tree.centre(point.z() - tree.foot.z()) - point).head<2>().norm() > 0.4) continue;
     const double distance = std::abs(off_bark(tree, point));
     if (distance < nearest) {
@@ -150,7 +150,7 @@ TEST(Scanner, PointsAtTheirOwnTimesLieOnTheSurfaces) {
         ++ground;
         continue;
       }
-      const Tree* tree = nearest_tree(world.stand, place);
+      const GrownTree* tree = nearest_tree(world.stand, place);
       ASSERT_NE(tree, nullptr);
       EXPECT_NEAR(off_bark(*tree, place), 0.0, 1e-3);
       ++bark;
@@ -160,9 +160,9 @@ TEST(Scanner, PointsAtTheirOwnTimesLieOnTheSurfaces) {
   EXPECT_GT(bark, 3000U);
 }
 
-TEST(Tree, StemHasItsDiameterAtBreastHeight) {
+TEST(GrownTree, StemHasItsDiameterAtBreastHeight) {
   World world(quiet_site());
-  for (const Tree& tree : world.stand.trees) {
+  for (const GrownTree& tree : world.stand.trees) {
     EXPECT_NEAR(2.0 * tree.joint(1.3).radius_m, tree.dbh_m, 1e-12);
     EXPECT_NEAR(tree.centre(0.0).z(), world.terrain.height(tree.foot.x(), tree.foot.y()), 1e-12);
     EXPECT_LT(tree.diameter(tree.height_m * 0.8), tree.dbh_m);

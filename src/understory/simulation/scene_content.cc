@@ -30,13 +30,13 @@ unsigned attach(RTCScene scene, RTCGeometry geometry) {
 struct StemPart {
   struct End {
     double height = 0.0;
-    Tree::Joint joint;
+    GrownTree::Joint joint;
   };
   End low;
   End high;
 };
 
-std::vector<StemPart> stem_parts(const Tree& tree) {
+std::vector<StemPart> stem_parts(const GrownTree& tree) {
   std::vector<StemPart> parts;
   if (!tree.cloud.empty()) return parts;
   const std::vector<double> heights = tree.joints();
@@ -57,7 +57,7 @@ std::vector<StemPart> stem_parts(const Tree& tree) {
 
 void add_part(const StemPart& part, const Eigen::Vector3d& shift, Cones& cones) {
   // Parts that follow each other share a joint.
-  const Tree::Joint& low = part.low.joint;
+  const GrownTree::Joint& low = part.low.joint;
   const Eigen::Vector3f from = (low.centre + shift).cast<float>();
   const bool follows = !cones.points.empty() && cones.points.back().x == from.x() &&
                        cones.points.back().y == from.y() && cones.points.back().z == from.z();
@@ -85,7 +85,7 @@ SceneContent::SceneContent(const StandConfig& config, const Terrain& terrain, co
   GrownShapes grown = grow_shapes(config, seed);
   add_shapes(grown);
   add_static(terrain, stand);
-  for (const Tree& tree : stand.trees)
+  for (const GrownTree& tree : stand.trees)
     add_tree(tree, grown.crowns);
   add_plants(stand);
   if (!swaying_.empty() || !felled_.empty()) still_ = copy_of_instances();
@@ -106,7 +106,7 @@ void SceneContent::add_static(const Terrain& terrain, const Stand& stand) {
   static_ = new_scene();
   UNDERSTORY_CHECK(attach(static_, terrain_geometry(device_, terrain)) == kGroundGeometry);
   Cones stems;
-  for (const Tree& tree : stand.trees) {
+  for (const GrownTree& tree : stand.trees) {
     for (const StemPart& part : stem_parts(tree)) {
       if (!felled_.count(tree.id) && (wind_.still() || part.low.height < stiff_height(tree))) {
         add_part(part, Eigen::Vector3d::Zero(), stems);
@@ -169,7 +169,7 @@ void SceneContent::add_shapes(GrownShapes& grown) {
 }
 
 // What of a tree is not part of the fixed scene: its crown, and of its stem what sways or falls.
-void SceneContent::add_tree(const Tree& tree, const std::vector<GrownCrown>& grown) {
+void SceneContent::add_tree(const GrownTree& tree, const std::vector<GrownCrown>& grown) {
   const auto found = felled_.find(tree.id);
   FelledTree* felled = found == felled_.end() ? nullptr : &found->second;
   std::size_t sway = kStands;
@@ -200,7 +200,7 @@ void SceneContent::add_tree(const Tree& tree, const std::vector<GrownCrown>& gro
   }
 }
 
-void SceneContent::add_cloud(const Tree& tree, std::size_t sway) {
+void SceneContent::add_cloud(const GrownTree& tree, std::size_t sway) {
   auto found = clouds_.find(tree.cloud);
   if (found == clouds_.end()) {
     const TreeCloud cloud = read_tree_cloud(tree.cloud, tree.dbh_m);
@@ -245,7 +245,7 @@ void SceneContent::add_cloud(const Tree& tree, std::size_t sway) {
 
 // The stem's upper part, which sways, or all of it where it will be felled; the feet of those
 // stand still.
-unsigned SceneContent::add_stem(const Tree& tree, bool all, std::size_t sway) {
+unsigned SceneContent::add_stem(const GrownTree& tree, bool all, std::size_t sway) {
   Cones high;
   for (const StemPart& part : stem_parts(tree)) {
     const bool yields = sway != kStands && part.low.height >= stiff_height(tree);
@@ -266,7 +266,8 @@ unsigned SceneContent::add_stem(const Tree& tree, bool all, std::size_t sway) {
 }
 
 // The grown shape, stretched to the tree's height and crown, turned and sheared with its lean.
-std::pair<unsigned, unsigned> SceneContent::add_crown(const Tree& tree, const CrownScene& crown,
+std::pair<unsigned, unsigned> SceneContent::add_crown(const GrownTree& tree,
+                                                      const CrownScene& crown,
                                                       const CrownSize& size, std::size_t sway) {
   const auto cos_yaw = static_cast<float>(std::cos(tree.yaw_rad));
   const auto sin_yaw = static_cast<float>(std::sin(tree.yaw_rad));
@@ -291,11 +292,11 @@ std::pair<unsigned, unsigned> SceneContent::add_crown(const Tree& tree, const Cr
 
 // Stumps, logs and branches that the harvest leaves.
 void SceneContent::add_remains(const Harvest& harvest, const Stand& stand) {
-  for (const Tree& tree : stand.trees) {
+  for (const GrownTree& tree : stand.trees) {
     const auto felled = felled_.find(tree.id);
     if (felled == felled_.end()) continue;
-    const Tree::Joint low = tree.joint(-0.2);
-    const Tree::Joint high = tree.joint(kStumpHeight);
+    const GrownTree::Joint low = tree.joint(-0.2);
+    const GrownTree::Joint high = tree.joint(kStumpHeight);
     add_wood({low.centre, high.centre, low.radius_m, high.radius_m}, felled->second.grab_s);
     changes_.push_back(felled->second.grab_s);
   }

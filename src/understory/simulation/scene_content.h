@@ -106,14 +106,14 @@ class SceneContent {
   void add_solids(const Stand& stand);
   void add_shapes(GrownShapes& grown);
   // What of a tree is not part of the fixed scene: its crown, and of its stem what sways or falls.
-  void add_tree(const Tree& tree, const std::vector<GrownCrown>& grown);
+  void add_tree(const GrownTree& tree, const std::vector<GrownCrown>& grown);
   // A scanned tree: four instances, of stem and crown below and above where it yields.
-  void add_cloud(const Tree& tree, std::size_t sway);
+  void add_cloud(const GrownTree& tree, std::size_t sway);
   // The stem's upper part, which sways, or all of it where it will be felled; the feet of those
   // stand still.
-  unsigned add_stem(const Tree& tree, bool all, std::size_t sway);
+  unsigned add_stem(const GrownTree& tree, bool all, std::size_t sway);
   // The grown shape, stretched to the tree's height and crown, turned and sheared with its lean.
-  std::pair<unsigned, unsigned> add_crown(const Tree& tree, const CrownScene& crown,
+  std::pair<unsigned, unsigned> add_crown(const GrownTree& tree, const CrownScene& crown,
                                           const CrownSize& size, std::size_t sway);
   // Stumps, logs and branches that the harvest leaves.
   void add_remains(const Harvest& harvest, const Stand& stand);

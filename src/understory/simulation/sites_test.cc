@@ -104,7 +104,7 @@ TEST(LieksaSites, StandHasTheFiguresOfThePaper) {
   double volume = 0.0;
   double smallest = 1.0;
   double largest = 0.0;
-  for (const Tree& tree : stand.trees) {
+  for (const GrownTree& tree : stand.trees) {
     const double area = cross_section(tree.dbh_m);
     basal_area += area;
     diameters += area * tree.dbh_m;

@@ -23,7 +23,7 @@ double taper(double height, double top) {
 }
 
 // Growth by an own stream, so that stands without them are what they were.
-void draw_damage(const StandConfig& config, Tree& tree, Random& random) {
+void draw_damage(const StandConfig& config, GrownTree& tree, Random& random) {
   if (!tree.cloud.empty()) return;  // as it was scanned
   if (random.uniform() < config.fork_share) {
     tree.fork_m = std::min(0.6 * tree.height_m, random.uniform(0.8, 6.0));
@@ -111,7 +111,7 @@ double filled_share(const StandConfig& config, const Route& route) {
 
 // Whether the carrier can pass: the bark stays clear of the path at the height of the sensors, and
 // a crown that hangs low does not swallow them.
-bool clear_of_route(const Tree& tree, const Eigen::Vector2d& foot, const StandConfig& config,
+bool clear_of_route(const GrownTree& tree, const Eigen::Vector2d& foot, const StandConfig& config,
                     const CarrierConfig& carrier, const Route& route) {
   const double sensor = std::max(1.5, carrier.height_m);
   if (carrier.kind == "uav" && tree.height_m < sensor - 0.8) return true;  // it flies over it
@@ -146,16 +146,16 @@ StandConfig edge_stand(const StandConfig& config) {
   return edge;
 }
 
-std::vector<Tree> place_trees(const StandConfig& config, const CarrierConfig& carrier,
-                              const Terrain& terrain, const Route& route, Random& random) {
+std::vector<GrownTree> place_trees(const StandConfig& config, const CarrierConfig& carrier,
+                                   const Terrain& terrain, const Route& route, Random& random) {
   const std::size_t drawn = count_of(config.trees_per_ha, config);
   const auto wanted = static_cast<std::size_t>(
       std::lround(static_cast<double>(drawn) * filled_share(config, route)));
   Grid grid(0.5 * config.size_x_m, 0.5 * config.size_y_m, std::max(1.0, config.spacing_m));
-  std::vector<Tree> trees;
+  std::vector<GrownTree> trees;
   const StandConfig edge = edge_stand(config);
   for (std::size_t attempt = 0; attempt < 40 * drawn && trees.size() < wanted; ++attempt) {
-    Tree tree = draw_tree(config, random);
+    GrownTree tree = draw_tree(config, random);
     const Eigen::Vector2d place = draw_place(config, random);
     if (outside(config, route, place)) continue;
     if (on_edge(config, place)) {
@@ -248,7 +248,7 @@ void add_buildings(const StandConfig& config, const CarrierConfig& carrier, cons
       return (foot - house.foot).head<2>().norm() < 7.5;
     };
     stand.trees.erase(std::remove_if(stand.trees.begin(), stand.trees.end(),
-                                     [&](const Tree& tree) { return inside(tree.foot); }),
+                                     [&](const GrownTree& tree) { return inside(tree.foot); }),
                       stand.trees.end());
     stand.plants.erase(std::remove_if(stand.plants.begin(), stand.plants.end(),
                                       [&](const Plant& plant) { return inside(plant.foot); }),
@@ -259,7 +259,7 @@ void add_buildings(const StandConfig& config, const CarrierConfig& carrier, cons
 
 }  // namespace
 
-void draw_crown(const StandConfig& config, Tree& tree, Random& random) {
+void draw_crown(const StandConfig& config, GrownTree& tree, Random& random) {
   const double height = tree.height_m;
   switch (tree.species) {
     case Species::kPine:
@@ -290,8 +290,8 @@ double height_of(double dbh_m, const StandConfig& config) {
   return kBreastHeight + (config.height_mean_m - kBreastHeight) * curve;
 }
 
-Tree draw_tree(const StandConfig& config, Random& random) {
-  Tree tree;
+GrownTree draw_tree(const StandConfig& config, Random& random) {
+  GrownTree tree;
   tree.species = draw_species(config, random);
   do {
     tree.dbh_m = random.normal(config.dbh_mean_m, config.dbh_sd_m);
@@ -318,11 +318,11 @@ std::string species_name(Species species) {
   return "unknown";
 }
 
-double Tree::diameter(double height_above_foot) const {
+double GrownTree::diameter(double height_above_foot) const {
   return dbh_m * taper(height_above_foot, height_m) / taper(kBreastHeight, height_m);
 }
 
-Eigen::Vector3d Tree::centre(double height_above_foot) const {
+Eigen::Vector3d GrownTree::centre(double height_above_foot) const {
   // A bow that begins straight at the foot and comes back at the top.
   const double u = std::clamp(height_above_foot / height_m, 0.0, 1.0);
   const double bow = 0.5 * (1.0 - std::cos(kTau * u));
@@ -330,7 +330,7 @@ Eigen::Vector3d Tree::centre(double height_above_foot) const {
   return foot + Eigen::Vector3d(side.x(), side.y(), height_above_foot);
 }
 
-Tree::Joint Tree::fork_joint(double height_above_foot) const {
+GrownTree::Joint GrownTree::fork_joint(double height_above_foot) const {
   Joint twin = joint(height_above_foot);
   // It leaves at a slant and then grows up beside the first, a little thinner.
   const double above = std::max(0.0, height_above_foot - fork_m);
@@ -340,7 +340,7 @@ Tree::Joint Tree::fork_joint(double height_above_foot) const {
   return twin;
 }
 
-std::vector<double> Tree::joints() const {
+std::vector<double> GrownTree::joints() const {
   std::vector<double> heights = {-0.3, 0.0, 0.12, 0.3, 0.6, 1.0, kBreastHeight};
   const double step = std::max(0.5, (height_m - kBreastHeight) / 26.0);
   for (double h = kBreastHeight + step; h < height_m - 0.2 * step; h += step)
@@ -353,14 +353,14 @@ std::vector<double> Tree::joints() const {
   return heights;
 }
 
-Tree::Joint Tree::joint(double height_above_foot) const {
+GrownTree::Joint GrownTree::joint(double height_above_foot) const {
   const double above = std::max(0.0, height_above_foot);
   Joint joint{centre(above), std::max(0.004, 0.5 * diameter(above))};
   joint.centre.z() = foot.z() + height_above_foot;
   return joint;
 }
 
-double Tree::lean_deg() const {
+double GrownTree::lean_deg() const {
   const Eigen::Vector3d axis = centre(3.0) - centre(0.0);
   return std::atan2(axis.head<2>().norm(), axis.z()) / kDegree;
 }
@@ -373,7 +373,7 @@ Stand grow_stand(const StandConfig& config, const CarrierConfig& carrier, const 
   stand.trees = config.trees.empty() ? place_trees(config, carrier, terrain, route, tree_random)
                                      : read_trees(config.trees, config, terrain, seed);
   Random damage(hash_numbers(seed, stream_of(NoiseStream::kStand), 1));
-  for (Tree& tree : stand.trees)
+  for (GrownTree& tree : stand.trees)
     draw_damage(config, tree, damage);
   add_dead_wood(config, carrier, terrain, route, random, stand.dead_wood);
   add_plants(PlantKind::kSeedling, config.seedlings_per_ha, 0.4, 2.2, 0.8, config, terrain, route,

@@ -14,8 +14,9 @@ namespace understory {
 enum class Species { kPine, kSpruce, kBirch };
 [[nodiscard]] std::string species_name(Species species);
 
-// One standing tree, in the world frame.
-struct Tree {
+// One standing tree, in the world frame. (forest/tree.h has the Tree that is measured; two types of one
+// name in a namespace would share the code of their containers.)
+struct GrownTree {
   int id = 0;                                      // 1, 2, ...
   Eigen::Vector3d foot = Eigen::Vector3d::Zero();  // centre of the stem on the ground
   Species species = Species::kPine;
@@ -74,7 +75,7 @@ struct Building {
 };
 
 struct Stand {
-  std::vector<Tree> trees;
+  std::vector<GrownTree> trees;
   std::vector<Wood> dead_wood;  // stumps and logs
   std::vector<Plant> plants;
   std::vector<Wood> boulders;
@@ -92,7 +93,7 @@ struct Stand {
 // height_m where that is given); others are passed over, z too: trees stand on the terrain. What
 // the list leaves open is drawn as for random trees. Throws InputError with file, line and what was
 // expected.
-[[nodiscard]] std::vector<Tree> read_trees(const std::string& path, const StandConfig& config,
-                                           const Terrain& terrain, std::uint64_t seed);
+[[nodiscard]] std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& config,
+                                                const Terrain& terrain, std::uint64_t seed);
 
 }  // namespace understory

@@ -57,7 +57,8 @@ TEST(Ground, HasSlopesDitchesAndSnowThatHidesThem) {
 }
 
 // A stem seen along a level ray at a height above its foot: the two edges' distance.
-double width_at(const SiteConfig& site, const Tree& tree, double height, double* offset = nullptr) {
+double width_at(const SiteConfig& site, const GrownTree& tree, double height,
+                double* offset = nullptr) {
   const Terrain terrain(site.terrain, 30.0, 30.0, 1);
   Stand stand;
   stand.trees = {tree};
@@ -84,7 +85,7 @@ TEST(Trees, ForkInTwoAndBreakOff) {
   site.terrain.relief_m = site.terrain.hummock_m = site.terrain.slope_deg = 0.0;
   site.terrain.roughness_m = 0.0;
   site.stand.foliage = site.stand.dead_branches = 0.0;
-  Tree tree;
+  GrownTree tree;
   tree.id = 1;
   tree.dbh_m = 0.3;
   tree.height_m = 18.0;
@@ -111,7 +112,7 @@ TEST(Stands, HaveTheSharesOfForksBreaksAndBoulders) {
   const Stand stand = grow_stand(site.stand, site.carrier, terrain, route, 1);
   double forks = 0.0;
   double breaks = 0.0;
-  for (const Tree& tree : stand.trees) {
+  for (const GrownTree& tree : stand.trees) {
     forks += tree.fork_m > 0.0 ? 1.0 : 0.0;
     breaks += tree.broken_m > 0.0 ? 1.0 : 0.0;
   }

@@ -52,7 +52,7 @@ struct Work {
   const Route& route;
   const Terrain& terrain;
   const Stand& stand;
-  std::vector<const Tree*> cut;  // so far
+  std::vector<const GrownTree*> cut;  // so far
 };
 
 // The swing and the boom that bring the head to a tree.
@@ -64,7 +64,7 @@ struct Reach {
 
 constexpr double kGripHeight = kStumpHeight + 0.6;
 
-std::optional<Reach> reach_to(const Work& work, double at_m, const Tree& tree) {
+std::optional<Reach> reach_to(const Work& work, double at_m, const GrownTree& tree) {
   const Eigen::Vector2d place = work.route.place(at_m);
   const Eigen::Vector3d grip = tree.centre(kGripHeight);
   const double distance = (grip.head<2>() - place).norm();
@@ -86,12 +86,12 @@ std::optional<Reach> reach_to(const Work& work, double at_m, const Tree& tree) {
 }
 
 // A grown tree in reach, drawn among those whose neighbours were left standing.
-const Tree* choose_tree(const Work& work, double at_m, Random& random) {
+const GrownTree* choose_tree(const Work& work, double at_m, Random& random) {
   constexpr double kApart = 2.2;  // a thinning leaves trees between those that it takes
-  std::vector<const Tree*> candidates;
-  for (const Tree& tree : work.stand.trees) {
+  std::vector<const GrownTree*> candidates;
+  for (const GrownTree& tree : work.stand.trees) {
     if (!tree.cloud.empty() || !reach_to(work, at_m, tree)) continue;
-    const bool near = std::any_of(work.cut.begin(), work.cut.end(), [&](const Tree* other) {
+    const bool near = std::any_of(work.cut.begin(), work.cut.end(), [&](const GrownTree* other) {
       return (other->foot - tree.foot).head<2>().norm() < kApart;
     });
     if (!near) candidates.push_back(&tree);
@@ -115,7 +115,7 @@ void work_up(const CarrierConfig& c, Shift& shift, Random& random, double side, 
 // fro, drop it. Where none is in reach the operator looks about and goes on.
 void fell_tree(Work& work, Shift& shift, Random& random, double end_s) {
   const CarrierConfig& c = work.carrier;
-  const Tree* tree = choose_tree(work, shift.at_m, random);
+  const GrownTree* tree = choose_tree(work, shift.at_m, random);
   if (tree == nullptr) {
     work_up(c, shift, random, random.chance(0.5) ? 1.0 : -1.0, std::min(end_s, shift.time_s + 6.0));
     shift.time_s = std::max(shift.time_s, end_s);

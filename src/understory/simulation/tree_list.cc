@@ -79,9 +79,9 @@ Species species_of(const Row& row, Species drawn) {
   row.fail("species is \"" + name + "\", expected pine, spruce or birch");
 }
 
-Tree read_tree(const std::string& list, const Row& row, int number, const StandConfig& config,
-               const Terrain& terrain, Random& random) {
-  Tree tree = draw_tree(config, random);
+GrownTree read_tree(const std::string& list, const Row& row, int number, const StandConfig& config,
+                    const Terrain& terrain, Random& random) {
+  GrownTree tree = draw_tree(config, random);
   tree.species = species_of(row, tree.species);
   const double x = row.number("x", -0.5 * config.size_x_m, 0.5 * config.size_x_m);
   const double y = row.number("y", -0.5 * config.size_y_m, 0.5 * config.size_y_m);
@@ -109,9 +109,9 @@ Tree read_tree(const std::string& list, const Row& row, int number, const StandC
 }
 
 // Trees of a cloud take its height, if the list gives none, and its lean.
-void measure_clouds(std::vector<Tree>& trees) {
+void measure_clouds(std::vector<GrownTree>& trees) {
   std::map<std::string, TreeCloud> clouds;
-  for (Tree& tree : trees) {
+  for (GrownTree& tree : trees) {
     if (tree.cloud.empty()) continue;
     auto found = clouds.find(tree.cloud);
     if (found == clouds.end())
@@ -123,8 +123,8 @@ void measure_clouds(std::vector<Tree>& trees) {
 
 }  // namespace
 
-std::vector<Tree> read_trees(const std::string& path, const StandConfig& config,
-                             const Terrain& terrain, std::uint64_t seed) {
+std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& config,
+                                  const Terrain& terrain, std::uint64_t seed) {
   std::ifstream file(path);
   std::string line;
   if (!file || !std::getline(file, line)) {
@@ -140,7 +140,7 @@ std::vector<Tree> read_trees(const std::string& path, const StandConfig& config,
                        fmt::format("no column {}, expected at least x, y, dbh_m", needed));
     }
   }
-  std::vector<Tree> trees;
+  std::vector<GrownTree> trees;
   std::set<int> ids;
   for (std::size_t number = 2; std::getline(file, line); ++number) {
     std::vector<std::string> fields = fields_of(line);

@@ -96,7 +96,7 @@ std::string trees_text(const SimulatedWorld& world, TimeNs start,
   }
   std::string text =
       "id,x,y,z,dbh_m,dbh_sd_m,height_m,lean_deg,observations,x_sd_m,y_sd_m,species,felled_at\n";
-  for (const Tree& tree : world.stand.trees) {
+  for (const GrownTree& tree : world.stand.trees) {
     const auto seen = observations.find(tree.id);
     const auto cut = felled.find(tree.id);
     text += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.4f},0,{:.3f},{:.3f},{},0,0,{},{}\n", tree.id,

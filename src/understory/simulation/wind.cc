@@ -24,7 +24,7 @@ const double kUnit = 1.0 / std::sqrt(1.225 * (0.85 * 0.85 + 0.5 * 0.5) / 2.0 + 0
 
 }  // namespace
 
-Wind::Sway Wind::sway_of(const Tree& tree) const {
+Wind::Sway Wind::sway_of(const GrownTree& tree) const {
   CounterNoise noise(static_cast<std::uint64_t>(tree.id), stream_of(NoiseStream::kShapes), 77);
   Sway sway;
   sway.top_m = sway_m_ * tree.height_m / kReferenceHeight;
@@ -57,7 +57,7 @@ Eigen::Vector2d Wind::top_velocity(const Sway& sway, double time_s) {
   return (top(sway, time_s + kHalf) - top(sway, time_s - kHalf)) / (2.0 * kHalf);
 }
 
-double stiff_height(const Tree& tree) {
+double stiff_height(const GrownTree& tree) {
   if (!tree.cloud.empty()) return kStiffShare * tree.height_m;
   for (const double height : tree.joints()) {
     if (height >= kStiffShare * tree.height_m) return height;

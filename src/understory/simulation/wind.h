@@ -26,7 +26,7 @@ class Wind {
     double lag_s = 0.0;  // gusts come so much later than at the origin
     std::array<double, 4> phases_rad{};
   };
-  [[nodiscard]] Sway sway_of(const Tree& tree) const;
+  [[nodiscard]] Sway sway_of(const GrownTree& tree) const;
 
   // Where the top is, east and north of its place in still air, metres; and its velocity, m/s.
   [[nodiscard]] static Eigen::Vector2d top(const Sway& sway, double time_s);
@@ -39,6 +39,6 @@ class Wind {
 // Height above the foot below which a stem does not yield: a fifth of the height, or the lowest
 // joint from there up. Above it the stem bends over in proportion to the height.
 constexpr double kStiffShare = 0.2;  // of the height
-[[nodiscard]] double stiff_height(const Tree& tree);
+[[nodiscard]] double stiff_height(const GrownTree& tree);
 
 }  // namespace understory

@@ -13,8 +13,8 @@
 namespace understory {
 namespace {
 
-Tree tall_tree(double height_m, double dbh_m) {
-  Tree tree;
+GrownTree tall_tree(double height_m, double dbh_m) {
+  GrownTree tree;
   tree.id = 7;
   tree.foot = {3.0, 0.0, 0.0};
   tree.height_m = height_m;
@@ -88,7 +88,7 @@ struct OneTree {
 
 TEST(Wind, BendsStemsAboveAStiffFoot) {
   OneTree windy(0.3);
-  const Tree& tree = windy.stand.trees[0];
+  const GrownTree& tree = windy.stand.trees[0];
   const double stiff = stiff_height(tree);
   EXPECT_GE(stiff, 0.2 * 16.0);
   EXPECT_LT(stiff, 4.2);
