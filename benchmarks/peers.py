@@ -27,12 +27,13 @@ BEGIN, END = "<!-- peers table: ./run bench peers --write -->", "<!-- end of pee
 # DLIO and LIO-SAM work in threads of their own and are fed at the sensor's rate.
 EVALIO = {"LioSAM": 1.0, "DLIO": 1.0, "LOAM": 0, "KissICP": 0, "GenZICP": 0, "CTICP": 0,
           "MadICP": 0, "FORM": 0}
+# (understory where the site has one)
 WITH_IMU = {"understory", "LioSAM", "DLIO", "RKO-LIO"}
 
 
-def ours(recording, work, cpus, name, settings):
+def ours(recording, work, cpus, name, settings, more=()):
     result = map_recording(recording, work / name, threads=2, cpus=cpus,
-                           settings=["map.enabled=false", *settings])
+                           settings=["map.enabled=false", *settings], more=more)
     scan = result["stages"]["scan"]
     return {"name": name, "version": version().split()[-1], "scans": result["scans"],
             "answered": result["poses"] / max(1, result["scans"]), "cpu_ms": scan["cpu_ms"],
@@ -102,6 +103,13 @@ def measure(site, options, work):
                 ["motion.imu_enabled=false", "loop_closure.enabled=false"])}
     for name in [*EVALIO, "RKO-LIO"]:
         jobs[name] = lambda name=name: peer(name, recording, work, cpus)
+    if "imu:\n  enabled: false" in (truth / "site.yaml").read_text():
+        del jobs["understory, no IMU, no loops"]
+        jobs["understory"] = lambda: ours(recording, work, cpus, "understory", [])
+        jobs["understory, stems alone"] = lambda: ours(
+            recording, work, cpus, "understory, stems alone", [], ["--front-end", "sparse"])
+        jobs = {name: jobs[name] for name in sorted(jobs, key=lambda name: not name.startswith("under"))
+                if name not in WITH_IMU or name == "understory"}
     for name, job in jobs.items():
         if options.only and name not in options.only:
             continue

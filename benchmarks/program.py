@@ -61,9 +61,9 @@ def simulated(site, **keys):
     return f"sim:{site}?" + "&".join(f"{k}={v}" for k, v in keys.items())
 
 
-def map_recording(recording, folder, threads=2, settings=(), cpus=None):
+def map_recording(recording, folder, threads=2, settings=(), cpus=None, more=()):
     """Maps a recording; returns its run.json with the kernel's figures under 'process'."""
-    arguments = ["map", recording, "-o", folder, "--threads", threads, "--overwrite"]
+    arguments = ["map", recording, "-o", folder, "--threads", threads, "--overwrite", *more]
     for setting in settings:
         arguments += ["--set", setting]
     done = understory(*arguments, accept=(DONE, UNTRUSTED), cpus=cpus)

@@ -48,7 +48,11 @@ class Organiser:
         self.rows = 16 if scan.rings.max() < 16 else 32 if scan.rings.max() < 32 else 128
         # A spinning sensor with fixed firing times: a column is a firing of all lasers.
         firing_ns = {16: 55_296, 32: 55_296, 128: period_ns / 1024}[self.rows]
-        self.columns = int(np.ceil(period_ns / firing_ns))
+        # Where not every revolution is recorded, a scan is over long before the next begins.
+        sweep_ns = min(period_ns, 1.02 * scan.offsets_ns.max() + firing_ns)
+        if sweep_ns > 0.9 * period_ns:
+            sweep_ns = period_ns
+        self.columns = int(np.ceil(sweep_ns / firing_ns))
         self.firing_ns = firing_ns
 
     def measurement(self, scan):
