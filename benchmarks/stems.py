@@ -5,6 +5,8 @@
   ./run bench stems --seeds 21-23   fewer
   ./run bench stems --real          Wild-Places V-03 (where the example data is): odometry, loops,
                                     time, memory, and Go-ICP on its neighbouring views
+  ./run bench stems --orders        P0's powers with their pairs in each order, on the same roads
+  ./run bench stems --search        where ICP converges (a picture), and what Go-ICP's search costs
   ./run bench stems --write         puts the tables into docs/sparse.md
 
 The roads are those of tests/stems/strip_roads.py: three, 22.5 m apart. Truth is for the
@@ -26,6 +28,8 @@ sys.path.insert(0, str(TOP / "tests" / "stems"))
 from strip_roads import Roads, write_strip_roads  # noqa: E402
 
 PAGE = TOP / "docs" / "sparse.md"
+PICTURE = TOP / "docs" / "pictures" / "stem_convergence.svg"
+ORDERS = ("small", "medium", "random", "gain")
 METHODS = ("none", "powers", "powers_printed", "lattice", "pose_graph", "expected_gain")
 ODOMETRIES = {"frame": "view to view, P0 (16)", "map": "view to local map"}
 
@@ -48,10 +52,10 @@ def longest_segment(errors):
     return max(errors["segments"], key=lambda s: s["length_m"])["translation_plane_percent"]
 
 
-def measure(site, method, odometry, best):
-    folder = site / f"{odometry}-{method}"
+def measure(site, method, odometry, best, *settings):
+    folder = site / "-".join((odometry, method, *settings))
     told = corrected(site / "stems.csv.gz", folder, f"correction.method={method}",
-                     f"odometry.target={odometry}")
+                     f"odometry.target={odometry}", *settings)
     path = understory_json("evaluate", folder, site / "truth", "--align", "se3")
     ours = understory_json("evaluate", "map", site / "stems.csv.gz", folder)
     quality = told["quality"]
@@ -108,6 +112,93 @@ def measured_rows(seeds, length_m, keep):
                     say(f"seed {seed} {odometry} {method}: e_C {100 * row['e_c']:.1f} cm, path "
                         f"{100 * row['plane_m']:.1f} cm")
     return rows
+
+
+def order_page(seeds, length_m):
+    """P0 table 1 over made-up roads: the paper's odometry and powers, its pairs in each order."""
+    rows = {order: [] for order in ORDERS}
+    for seed in seeds:
+        with tempfile.TemporaryDirectory() as scratch:
+            site = Path(scratch)
+            write_strip_roads(site, seed, Roads(length_m=length_m, step_m=1.0))
+            best = understory_json("evaluate", "map", site / "stems.csv.gz", site / "truth")
+            for order in ORDERS:
+                rows[order].append(measure(site, "powers", "frame", best, f"correction.order={order}"))
+    text = (f"{version()}, seeds {', '.join(map(str, seeds))}; mean and in brackets the worst\n\n"
+            "| order | beta | d | e_C cm | of that with true poses | path, plane cm | corrections % of "
+            "views |\n|---|---|---|---|---|---|---|\n")
+    for order, cell in rows.items():
+        def mean(key, scale=1.0, digits=1):
+            values = [scale * r[key] for r in cell]
+            return f"{statistics.mean(values):.{digits}f} ({max(values):.{digits}f})"
+        text += (f"| {order} | {mean('beta', 1, 4)} | {mean('d', 1, 2)} | {mean('e_c', 100)} | "
+                 f"{mean('e_c_ratio', 1, 2)} | {mean('plane_m', 100)} | {mean('share', 100)} |\n")
+    return text
+
+
+def stem_search(what, stands):
+    done = run(PROGRAM.parent / "benchmarks" / "stem_search", what, stands)
+    if done.code != 0:
+        sys.exit(f"stem_search: {done.stderr.strip()[-200:]}")
+    return json.loads(done.stdout)
+
+
+def convergence_picture(found):
+    """Share of starts from which ICP comes home, over shift and yaw, with the ellipse of P0 (26)."""
+    share, cell, left, top = found["share"], 26, 62, 16
+    steps, size = len(share), 26 * len(share)
+
+    def label(x, y, text, more=""):
+        return f'<text x="{x}" y="{y}" font-size="12" font-family="sans-serif"{more}>{text}</text>'
+
+    marks = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {left + size + 20} '
+             f'{top + size + 52}">', '<rect width="100%" height="100%" fill="white"/>']
+    for a, row in enumerate(share):
+        for b, value in enumerate(row):
+            shade = round(235 * (1 - value))
+            marks.append(f'<rect x="{left + cell * a}" y="{top + size - cell * (b + 1)}" '
+                         f'width="{cell}" height="{cell}" fill="rgb({20 + shade},{110 + shade // 2},'
+                         f'{60 + round(0.75 * shade)})"/>')
+    # Cells stand for their middles: the first for no shift and no yaw.
+    radius = 10 * cell
+    marks.append(f'<path d="M {left + cell / 2 + radius} {top + size - cell / 2} A {radius} {radius} '
+                 f'0 0 0 {left + cell / 2} {top + size - cell / 2 - radius}" fill="none" '
+                 'stroke="black" stroke-width="2"/>')
+    for k in range(0, steps, 2):
+        middle = left + cell * k + cell / 2
+        marks.append(label(middle, top + size + 16, f"{0.1 * k * found['delta0_m']:.1f}",
+                           ' text-anchor="middle"'))
+        marks.append(label(left - 6, top + size - cell * k - 9,
+                           f"{0.1 * k * found['theta0_deg']:.1f}", ' text-anchor="end"'))
+    marks.append(label(left + size / 2, top + size + 38, "shift, m", ' text-anchor="middle"'))
+    marks.append(label(14, top + size / 2, "yaw, °"))
+    return "\n".join(marks) + "\n</svg>\n"
+
+
+def search_page(write):
+    found = stem_search("convergence", 200)
+    inside = [value for a, row in enumerate(found["share"]) for b, value in enumerate(row)
+              if a * a + b * b <= 100]
+    beyond = [value for a, row in enumerate(found["share"]) for b, value in enumerate(row)
+              if a * a + b * b > 144]
+    if write:
+        PICTURE.write_text(convergence_picture(found))
+    text = (f"{version()}, {found['stands']} stands, delta0 {found['delta0_m']:.2f} m, theta0 "
+            f"{found['theta0_deg']:.1f}°: of the starts within (26) {100 * statistics.mean(inside):.1f} % "
+            f"come home (at the worst place of the grid {100 * min(inside):.0f} %), of those beyond 1.2 "
+            f"times its size {100 * statistics.mean(beyond):.0f} %.\n\n"
+            "| search over yaw and ±5 m | cells | boxes looked at | ms | right |\n|---|---|---|---|---|\n")
+    boxes = stem_search("boxes", 40)
+    names = {"general": "any cloud: cubes, ±180°, down to 1.0° and 1.2 m",
+             "uniform": "near-uniform: cubes, ±60°, down to theta0 and delta0",
+             "elongated": "the same, elongated boxes",
+             "certified_cubes": "certified to 2 cm, ±60°, cubes",
+             "certified": "certified to 2 cm, ±60°, elongated boxes"}
+    for key, name in names.items():
+        row = boxes[key]
+        text += (f"| {name} | {row['cells']:,} | {row['nodes']:,} | {row['ms']:.0f} | {row['right']} of "
+                 f"{boxes['stands']} |\n")
+    return text
 
 
 def method_page(rows, length_m):
@@ -210,15 +301,22 @@ def main():
     parser.add_argument("--length-m", type=float, default=100.0, help="of each road")
     parser.add_argument("--real", action="store_true", help="only the real forest")
     parser.add_argument("--methods", action="store_true", help="only the made-up roads")
+    parser.add_argument("--orders", action="store_true", help="only the orders of corrections")
+    parser.add_argument("--search", action="store_true", help="only the searches")
     parser.add_argument("--rows", help="file that keeps what was measured; its seeds are not "
                         "measured again")
     parser.add_argument("--write", action="store_true", help="into docs/sparse.md")
     options = parser.parse_args()
     first, last = map(int, options.seeds.split("-"))
     tables = {}
-    if not options.methods:
+    everything = not (options.methods or options.real or options.orders or options.search)
+    if everything or options.search:
+        tables["searches"] = search_page(options.write)
+    if everything or options.orders:
+        tables["orders of corrections"] = order_page(range(first, last + 1), options.length_m)
+    if everything or options.real:
         tables["real forest"] = bench_real()
-    if not options.real:
+    if everything or options.methods:
         rows = []
         if options.rows and Path(options.rows).exists():
             rows = [json.loads(line) for line in Path(options.rows).read_text().splitlines()]

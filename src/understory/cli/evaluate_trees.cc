@@ -31,6 +31,7 @@ struct TreeOptions {
 struct Comparison {
   TreeErrors all;
   std::optional<VisibleTreeErrors> visible;
+  std::optional<MapAgreement> agreement;
 };
 
 nlohmann::ordered_json to_json(const Comparison& result, const TreeOptions& options) {
@@ -50,6 +51,12 @@ nlohmann::ordered_json to_json(const Comparison& result, const TreeOptions& opti
         {"expected", result.visible->expected}, {"found", result.visible->found},
         {"recall", result.visible->recall},     {"reported", result.visible->reported},
         {"false", result.visible->false_trees}, {"false_share", result.visible->false_share}};
+  }
+  if (result.agreement) {
+    const MapAgreement& m = *result.agreement;
+    json["near_path"] = {{"within_m", options.within_m}, {"trees_a", m.trees_a},
+                         {"trees_b", m.trees_b},         {"paired_a", m.paired_a},
+                         {"paired_b", m.paired_b},       {"agreement", m.agreement}};
   }
   return json;
 }
@@ -74,16 +81,21 @@ std::string to_text(const Comparison& result, const TreeOptions& options) {
         v.found, v.expected, 100.0 * v.recall, v.false_trees, v.reported, 100.0 * v.false_share,
         options.within_m, options.min_returns);
   }
+  if (result.agreement) {
+    const MapAgreement& m = *result.agreement;
+    text += fmt::format(
+        "agreement           {:.2f} % within {:g} m of the path: {} of {} trees of A and {} of {} "
+        "of B are paired\n",
+        100.0 * m.agreement, options.within_m, m.paired_a, m.trees_a, m.paired_b, m.trees_b);
+  }
   return text;
 }
 
 std::optional<VisibleTreeErrors> compare_visible(const TreeOptions& options,
                                                  const std::vector<Tree>& a,
                                                  const std::vector<Tree>& b) {
-  if (options.returns.empty() && options.path.empty()) return std::nullopt;
-  if (options.returns.empty() || options.path.empty()) {
-    throw ConfigError({"--truth-returns and --path belong together"});
-  }
+  if (options.returns.empty()) return std::nullopt;
+  if (options.path.empty()) throw ConfigError({"--truth-returns needs --path"});
   Visibility visibility;
   visibility.returns_by_tree = read_returns(file_in_folder(options.returns, "returns.csv.gz"));
   visibility.path = read_trajectory(file_in_folder(options.path, "trajectory.tum"));
@@ -110,6 +122,10 @@ int evaluate_trees(const TreeOptions& options, CommandContext& context) {
   Comparison result;
   result.all = compare_trees(a, b, options.radius_m);
   result.visible = compare_visible(options, a, b);
+  if (!options.path.empty())
+    result.agreement = compare_maps(a, b, options.radius_m,
+                                    read_trajectory(file_in_folder(options.path, "trajectory.tum")),
+                                    options.within_m);
   const std::string text =
       options.json ? to_json(result, options).dump(2) + "\n" : to_text(result, options);
   std::fputs(text.c_str(), stdout);
@@ -135,7 +151,9 @@ void add_evaluate_trees_command(CLI::App& evaluate, Command& chosen) {
                       "returns.csv.gz of the truth: expect only trees that gave returns");
   command->add_option("--min-returns", options->min_returns, "Returns that make a tree visible")
       ->capture_default_str();
-  command->add_option("--path", options->path, "The scanner's trajectory in B's frame");
+  command->add_option("--path", options->path,
+                      "The scanner's trajectory in B's frame: also the agreement of both maps near "
+                      "it, P1 (10)");
   command->add_option("--within-m", options->within_m, "Trees further from the path do not count")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();

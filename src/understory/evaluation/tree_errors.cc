@@ -159,6 +159,30 @@ VisibleTreeErrors compare_visible_trees(const std::vector<Tree>& a, const std::v
   return errors;
 }
 
+MapAgreement compare_maps(const std::vector<Tree>& a, const std::vector<Tree>& b, double radius_m,
+                          const Trajectory& path, double within_m) {
+  std::vector<bool> paired_a(a.size(), false);
+  std::vector<bool> paired_b(b.size(), false);
+  for (const auto& [i, j] : match_trees(a, b, radius_m))
+    paired_a[i] = paired_b[j] = true;
+  MapAgreement result;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!near_path(a[i], path, within_m)) continue;
+    ++result.trees_a;
+    if (paired_a[i]) ++result.paired_a;
+  }
+  for (std::size_t j = 0; j < b.size(); ++j) {
+    if (!near_path(b[j], path, within_m)) continue;
+    ++result.trees_b;
+    if (paired_b[j]) ++result.paired_b;
+  }
+  const std::size_t all = result.trees_a + result.trees_b;
+  result.agreement =
+      all == 0 ? std::numeric_limits<double>::quiet_NaN()
+               : static_cast<double>(result.paired_a + result.paired_b) / static_cast<double>(all);
+  return result;
+}
+
 std::map<int, long> read_returns(const std::filesystem::path& path) {
   CsvReader table(path, {"tree_id", "returns"});
   std::map<int, long> returns;

@@ -73,6 +73,18 @@ struct Visibility {
                                                       const std::vector<Tree>& b, double radius_m,
                                                       const Visibility& visibility);
 
+// Agreement of two maps of one place near a path, P1 (10): trees of either that are paired one to
+// one, over all trees of both. A pair across the limit counts on the side that is within.
+struct MapAgreement {
+  std::size_t trees_a = 0;  // within the distance of the path
+  std::size_t trees_b = 0;
+  std::size_t paired_a = 0;  // of these, with a partner in the other map
+  std::size_t paired_b = 0;
+  double agreement = 0.0;  // (paired_a + paired_b) / (trees_a + trees_b); NaN if both are empty
+};
+[[nodiscard]] MapAgreement compare_maps(const std::vector<Tree>& a, const std::vector<Tree>& b,
+                                        double radius_m, const Trajectory& path, double within_m);
+
 // Sums the column `returns` per `tree_id` of a truth folder's returns.csv.gz. Throws InputError.
 [[nodiscard]] std::map<int, long> read_returns(const std::filesystem::path& path);
 

@@ -135,6 +135,31 @@ TEST(TreeErrors, FelledTreesAreNeitherMissedNorFalse) {
   EXPECT_EQ(visible.false_trees, 0u);
 }
 
+TEST(TreeErrors, AgreementOfTwoMapsNearAPath) {
+  Trajectory path;
+  for (int k = 0; k <= 10; ++k)
+    path.push_back({k, Pose(Eigen::Quaterniond::Identity(), {10.0 * k, 0.0, 0.0})});
+  // Ten trees beside the path in both maps, two of them missed by B, one false in B; far trees
+  // of A alone do not count; one pair lies across the limit.
+  std::vector<Tree> a;
+  std::vector<Tree> b;
+  for (int k = 0; k < 10; ++k) {
+    a.push_back(tree_at(10.0 * k, 5.0));
+    if (k < 8) b.push_back(tree_at(10.0 * k + 0.2, 5.0));
+    a.push_back(tree_at(10.0 * k, 40.0));
+  }
+  b.push_back(tree_at(55.0, -3.0));
+  a.push_back(tree_at(50.0, 14.9));
+  b.push_back(tree_at(50.0, 15.1));
+  const MapAgreement found = compare_maps(a, b, 0.5, path, 15.0);
+  EXPECT_EQ(found.trees_a, 11U);
+  EXPECT_EQ(found.trees_b, 9U);
+  EXPECT_EQ(found.paired_a, 9U);
+  EXPECT_EQ(found.paired_b, 8U);
+  EXPECT_DOUBLE_EQ(found.agreement, 17.0 / 20.0);
+  EXPECT_TRUE(std::isnan(compare_maps({}, {}, 0.5, path, 15.0).agreement));
+}
+
 TEST(TreeErrors, ReadsTheColumnsByName) {
   const std::string path = ::testing::TempDir() + "understory_tree_errors.csv";
   std::ofstream(path) << "id,x,y,z,dbh_m,height_m,species\n7,1.5,-2,0.1,,21.5,pine\n";

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/graph/gain_queue.h"
 #include "understory/graph/pair_matching.h"
 #include "understory/util/parallel.h"
 
@@ -93,6 +94,19 @@ class PowerChain {
   std::size_t best_length_ = 0;
 };
 
+// First the pair that tells most, then the one that tells most beside it, and so on.
+std::vector<CorrectionPair> by_gain(const CorrectionViews& views, std::vector<CorrectionPair> pairs,
+                                    double match_sd_m) {
+  std::vector<double> noise = match_variances_m2(pairs, match_sd_m);
+  GainQueue queue(std::move(pairs), std::move(noise), plane_variances_m2(views));
+  std::vector<CorrectionPair> result;
+  while (const auto best = queue.best()) {
+    result.push_back(queue.pair(*best));
+    queue.take(*best);
+  }
+  return result;
+}
+
 // P0's pairs, section 2.4.
 std::vector<CorrectionPair> chosen_pairs(const CorrectionViews& views,
                                          const SelfCorrectionConfig& config,
@@ -101,12 +115,29 @@ std::vector<CorrectionPair> chosen_pairs(const CorrectionViews& views,
   const std::vector<CorrectionPair> promising =
       promising_pairs(views.targets, result.world_from_view, views.overlap, config.pairs, seed);
   result.promising = promising.size();
-  return ordered(
-      poisson_disk_choice(promising, std::max(1, correction_budget(views.targets.size(), config))),
-      config.order, seed);
+  std::vector<CorrectionPair> chosen =
+      poisson_disk_choice(promising, std::max(1, correction_budget(views.targets.size(), config)));
+  if (config.order == CorrectionOrder::kGain)
+    return by_gain(views, std::move(chosen), config.gain.match_sd_m);
+  return ordered(std::move(chosen), config.order, seed);
 }
 
 }  // namespace
+
+std::vector<double> plane_variances_m2(const CorrectionViews& views) {
+  const double arm = 0.5 * views.overlap.cone().range_m;
+  std::vector<double> variances;
+  for (const Matrix6d& c : views.problem.step_covariances)
+    variances.push_back(c(3, 3) + c(4, 4) + arm * arm * c(2, 2));
+  return variances;
+}
+
+std::vector<double> match_variances_m2(const std::vector<CorrectionPair>& pairs, double sd_m) {
+  std::vector<double> variances;
+  for (const CorrectionPair& pair : pairs)
+    variances.push_back(sd_m * sd_m / std::max(pair.overlap, 0.05));
+  return variances;
+}
 
 void correct_by_powers(const CorrectionViews& views, const SelfCorrectionConfig& config,
                        SelfCorrectionResult& result) {

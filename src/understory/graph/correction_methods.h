@@ -20,6 +20,13 @@ struct CorrectionViews {
 // Corrections that may be added, of `views` views.
 [[nodiscard]] int correction_budget(std::size_t views, const SelfCorrectionConfig& config);
 
+// Of the odometry's steps, in the plane; a turn counts by what it moves half way to the edge of the
+// view.
+[[nodiscard]] std::vector<double> plane_variances_m2(const CorrectionViews& views);
+// Of a match of the pair, `sd_m` being that of one with full overlap.
+[[nodiscard]] std::vector<double> match_variances_m2(const std::vector<CorrectionPair>& pairs,
+                                                     double sd_m);
+
 // Each fills result.world_from_view, tried, promising, kept and stopped_because; the first poses
 // are in result.world_from_view already.
 void correct_by_powers(const CorrectionViews& views, const SelfCorrectionConfig& config,

@@ -59,7 +59,8 @@ void describe(ConfigTable& table, PairConfig& config);
     const std::vector<CorrectionPair>& pairs, int wanted);
 
 // Order of corrections, P0 section 3 and table 1.
-enum class CorrectionOrder { kSmallGaps, kMediumGaps, kRandom };
+// By gain: not by gaps; see graph/gain_queue.h.
+enum class CorrectionOrder { kSmallGaps, kMediumGaps, kRandom, kGain };
 // Medium first: by the distance of the gap from the median gap.
 [[nodiscard]] std::vector<CorrectionPair> ordered(std::vector<CorrectionPair> pairs,
                                                   CorrectionOrder order, std::uint64_t seed);

@@ -32,7 +32,7 @@ class GainCorrection {
         least_beta_(beta()) {
     chain_.push_back(poses_.front());
     walked_m2_.push_back(0.0);
-    const std::vector<double> variances = step_variances();
+    const std::vector<double> variances = plane_variances_m2(views);
     for (std::size_t k = 1; k < poses_.size(); ++k) {
       chain_.push_back(chain_.back() * views.problem.steps[k]);
       walked_m2_.push_back(walked_m2_.back() + variances[k]);
@@ -84,20 +84,8 @@ class GainCorrection {
         promising_pairs(views_.targets, poses_, views_.overlap, pairs, seed);
     result_.promising = pool.size();
     pool = poisson_disk_choice(pool, config_.gain.pool);
-    std::vector<double> noise;
-    const double sd = config_.gain.match_sd_m;
-    for (const CorrectionPair& pair : pool)
-      noise.push_back(sd * sd / std::max(pair.overlap, 0.05));
-    return {std::move(pool), std::move(noise), step_variances()};
-  }
-
-  // In the plane; a turn counts by what it moves half way to the edge of the view.
-  [[nodiscard]] std::vector<double> step_variances() const {
-    const double arm = 0.5 * views_.overlap.cone().range_m;
-    std::vector<double> variances;
-    for (const Matrix6d& c : views_.problem.step_covariances)
-      variances.push_back(c(3, 3) + c(4, 4) + arm * arm * c(2, 2));
-    return variances;
+    std::vector<double> noise = match_variances_m2(pool, config_.gain.match_sd_m);
+    return {std::move(pool), std::move(noise), plane_variances_m2(views_)};
   }
 
   [[nodiscard]] SparsePoints gathered(int centre) const {

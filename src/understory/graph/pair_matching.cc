@@ -57,7 +57,7 @@ Matrix6d match_covariance(const Matrix6d& information, const SparsePoints& sourc
                           double shift_sd_m) {
   // Heights and tilt hang on feet of stems, which look higher the farther away they are.
   const double tilt = 2.0 * M_PI / 180.0;
-  const double height = 0.15;
+  const double height = 0.5;
   const double yaw = 0.03 * M_PI / 180.0;
   Matrix6d covariance = 4.0 * (information + 1e-6 * Matrix6d::Identity()).inverse();
   const double shift = shift_sd_m * shift_sd_m;

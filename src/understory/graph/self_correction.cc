@@ -68,8 +68,9 @@ void describe(ConfigTable& table, SelfCorrectionConfig& config) {
   table.add_enum("order", config.order,
                  {{"small", CorrectionOrder::kSmallGaps},
                   {"medium", CorrectionOrder::kMediumGaps},
-                  {"random", CorrectionOrder::kRandom}},
-                 "which gaps first, P0 table 1 (powers)");
+                  {"random", CorrectionOrder::kRandom},
+                  {"gain", CorrectionOrder::kGain}},
+                 "which gaps first, P0 table 1, or first what tells most (powers)");
   table.section("pairs", [&] { describe(table, config.pairs); });
   table.section("power", [&] { describe_power(table, config.power); });
   table.section("lattice", [&] {

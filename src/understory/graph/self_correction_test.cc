@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
+#include <vector>
 
 #include "understory/graph/pair_matching.h"
 #include "understory/util/parallel.h"
@@ -112,6 +115,28 @@ TEST(SelfCorrection, TheMapByExpectedGainIsNearlyAsSharpAsWithTruePoses) {
   EXPECT_LT(result.after.noise_mean_m, 1.25 * best.noise_mean_m);
   // The first pose is right and the rest hangs on it: a twentieth of a degree there is 9 cm here.
   EXPECT_LT(error_m(result.world_from_view, seen.truth), 0.15);
+}
+
+// P0 table 1: the order of the same pairs, and with it what is reached.
+TEST(SelfCorrection, PowersTakeTheirPairsInAnyOrderAskedFor) {
+  const Drive seen = drive(5);
+  std::map<CorrectionOrder, std::vector<int>> gaps;
+  for (const CorrectionOrder order : {CorrectionOrder::kSmallGaps, CorrectionOrder::kGain}) {
+    SelfCorrectionConfig config = with(CorrectionMethod::kPowers);
+    config.order = order;
+    config.patience = 100;
+    const SelfCorrectionResult result = self_correct(seen.problem, config);
+    EXPECT_LT(result.after.beta, result.before.beta);
+    for (const TriedCorrection& tried : result.tried)
+      gaps[order].push_back(tried.pair.gap());
+  }
+  const std::vector<int>& small = gaps[CorrectionOrder::kSmallGaps];
+  const std::vector<int>& gain = gaps[CorrectionOrder::kGain];
+  ASSERT_GT(small.size(), 5U);
+  EXPECT_TRUE(std::is_sorted(small.begin(), small.end()));
+  // What lies farthest apart is least certain and tells most; what it tells is not asked again.
+  EXPECT_EQ(gain.front(), *std::max_element(gain.begin(), gain.end()));
+  EXPECT_FALSE(std::is_sorted(gain.rbegin(), gain.rend()));
 }
 
 TEST(SelfCorrection, AMapThatIsRightIsLeftAlone) {

@@ -102,6 +102,8 @@ class Search {
         config_(config),
         bounds_(target, source, guess, config),
         region_(convergence_region(target.l0_m, bounds_.reach_m(), config.outlier_ratio)) {
+    if (config.finest_yaw_deg > 0.0) region_.theta0_rad = config.finest_yaw_deg * M_PI / 180.0;
+    if (config.finest_shift_m > 0.0) region_.delta0_m = config.finest_shift_m;
     icp_.metric = SparseIcpConfig::Metric::kPlane;
     icp_.outlier_ratio = config.outlier_ratio;
     icp_.refine = false;
@@ -169,8 +171,25 @@ class Search {
     result_.plane_optimum = icp.target_from_source;
   }
 
-  // Halves the side that can bring points nearest: the boxes become as long as the bound allows.
   void split(const Box& box) {
+    config_.boxes == GoIcpConfig::Boxes::kCubes ? split_all_sides(box) : split_longest_side(box);
+  }
+
+  void split_all_sides(const Box& box) {
+    Box part = box;
+    part.half_yaw = 0.5 * box.half_yaw;
+    part.half_x = 0.5 * box.half_x;
+    part.half_y = 0.5 * box.half_y;
+    for (int corner = 0; corner < 8; ++corner) {
+      part.yaw = box.yaw + ((corner & 1) != 0 ? part.half_yaw : -part.half_yaw);
+      part.x = box.x + ((corner & 2) != 0 ? part.half_x : -part.half_x);
+      part.y = box.y + ((corner & 4) != 0 ? part.half_y : -part.half_y);
+      open(part);
+    }
+  }
+
+  // Halves the side that can bring points nearest.
+  void split_longest_side(const Box& box) {
     const double turn = box.half_yaw * bounds_.mean_radius_m();
     Box a = box;
     Box b = box;
@@ -239,6 +258,10 @@ void describe(ConfigTable& table, GoIcpConfig& config) {
       "mode", config.mode,
       {{"certified", GoIcpConfig::Mode::kCertified}, {"paper", GoIcpConfig::Mode::kPaper}},
       "certified: until the gap is closed; paper: down to ICP's convergence region");
+  table.add_enum(
+      "boxes", config.boxes,
+      {{"elongated", GoIcpConfig::Boxes::kElongated}, {"cubes", GoIcpConfig::Boxes::kCubes}},
+      "elongated: halved where points move most; cubes: on all sides at once");
   table.add("yaw_range_deg", config.yaw_range_deg, {0.0, 180.0}, "deg", "around the guess");
   table.add("shift_range_m", config.shift_range_m, {0.01, 1000.0}, "m",
             "around the guess, per horizontal axis");
@@ -246,6 +269,10 @@ void describe(ConfigTable& table, GoIcpConfig& config) {
             "share of the source points left out, the worst; P0's gamma");
   table.add("gap_m", config.gap_m, {0.001, 100.0}, "m",
             "certified when no other place can have an error smaller by more than this");
+  table.add("finest_yaw_deg", config.finest_yaw_deg, {0.0, 180.0}, "deg",
+            "half side of the boxes at which the paper's mode stops; 0: theta0, P0 (25)");
+  table.add("finest_shift_m", config.finest_shift_m, {0.0, 1000.0}, "m",
+            "the same of the shift; 0: delta0, P0 (24)");
   table.add("max_nodes", config.max_nodes, {1, 2'000'000'000}, "", "given up beyond");
   table.add("refine", config.refine, "all six degrees of freedom by ICP at the end");
 }

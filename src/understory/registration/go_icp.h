@@ -16,13 +16,21 @@ struct GoIcpConfig {
   // boxes inside the convergence region of ICP, P0 (24-26), and hands over to it.
   enum class Mode { kCertified, kPaper };
 
+  // How a box is halved. Elongated: along the side that can move points most, so that boxes become
+  // as long as the bound allows. Cubes: all three sides at once, as in the original Go-ICP.
+  enum class Boxes { kElongated, kCubes };
+
   Mode mode = Mode::kCertified;
+  Boxes boxes = Boxes::kElongated;
   double yaw_range_deg = 180.0;  // around the guess
   double shift_range_m = 5.0;    // around the guess, per axis
   double outlier_ratio = 0.4;    // P0's gamma
   double gap_m = 0.02;           // of the root mean square error; certified below it
-  int max_nodes = 2'000'000;     // given up beyond
-  bool refine = true;            // all six degrees of freedom by ICP in space at the end
+  // The paper's mode stops at boxes of that size (half sides); 0: by (24) and (25), from L0.
+  double finest_yaw_deg = 0.0;
+  double finest_shift_m = 0.0;
+  int max_nodes = 2'000'000;  // given up beyond
+  bool refine = true;         // all six degrees of freedom by ICP in space at the end
 };
 void describe(ConfigTable& table, GoIcpConfig& config);
 

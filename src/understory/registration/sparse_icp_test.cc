@@ -230,6 +230,38 @@ TEST(GoIcp, FindsAnyTurnWithoutAGuessInBothModes) {
   }
 }
 
+// P0 table 3: the shape of the boxes and where they stop changes the work, not the answer.
+TEST(GoIcp, ElongatedBoxesFindTheSameWithFewerNodes) {
+  std::int64_t elongated_nodes = 0;
+  std::int64_t cube_nodes = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const Pair pair = make_pair(seed, 100, 0.1, 0.3, yaw_pose(0.4, 1.9, -1.2, 0.0));
+    GoIcpConfig config;
+    config.yaw_range_deg = 60.0;
+    const SparseTarget target(pair.target);
+    const GoIcpResult elongated = register_go_icp(target, pair.source, Pose(), config);
+    config.boxes = GoIcpConfig::Boxes::kCubes;
+    const GoIcpResult cubes = register_go_icp(target, pair.source, Pose(), config);
+    ASSERT_EQ(cubes.status, GoIcpStatus::kCertified);
+    EXPECT_NEAR(cubes.error_rms_m, elongated.error_rms_m, config.gap_m);
+    elongated_nodes += elongated.nodes;
+    cube_nodes += cubes.nodes;
+  }
+  EXPECT_LT(3 * elongated_nodes, 2 * cube_nodes);
+}
+
+TEST(GoIcp, CountsTheCellsOfTheFinestSize) {
+  const Pair pair = make_pair(3, 100, 0.1, 0.3, Pose());
+  GoIcpConfig config;
+  config.mode = GoIcpConfig::Mode::kPaper;
+  config.yaw_range_deg = 30.0;
+  config.shift_range_m = 2.0;
+  config.finest_yaw_deg = 2.0;
+  config.finest_shift_m = 0.5;
+  const GoIcpResult fine = register_go_icp(SparseTarget(pair.target), pair.source, Pose(), config);
+  EXPECT_NEAR(fine.cells, 60.0 / 2.0 * 8.0 * 8.0, 1e-6);
+}
+
 TEST(GoIcp, SaysWhenItGivesUp) {
   const Pair pair = make_pair(11, 60, 0.3, 1.2, yaw_pose(0.1, 0.5, 0.5, 0.0));
   GoIcpConfig config;
