@@ -1,0 +1,112 @@
+"""`understory merge` and the agreement of two tree maps: lists bent against each other, in other
+frames, and what is no tree list."""
+
+import csv
+import json
+import math
+import random
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
+from program import Cases, program
+
+cases = Cases()
+HEADER = "id,x,y,z,dbh_m,dbh_sd_m,height_m,lean_deg,observations,x_sd_m,y_sd_m\n"
+
+
+def stand(count=300, side=80.0):
+    draw = random.Random(7)
+    trees = []
+    while len(trees) < count:
+        tree = (draw.uniform(0, side), draw.uniform(0, side))
+        if all(math.dist(tree, other) > 2.2 for other in trees):
+            trees.append(tree)
+    return trees
+
+
+def bent(trees):
+    return [(x + 0.5 * math.sin(0.05 * y) + 0.2, y + 0.4 * math.cos(0.04 * x)) for x, y in trees]
+
+
+def turned(trees, angle=0.7, shift=(30.0, -12.0)):
+    c, s = math.cos(angle), math.sin(angle)
+    return [(c * x - s * y + shift[0], s * x + c * y + shift[1]) for x, y in trees]
+
+
+def write(path, trees):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = "".join(f"{k + 1},{x:.4f},{y:.4f},0,0.25,0.01,,,9,,\n" for k, (x, y) in enumerate(trees))
+    path.write_text(HEADER + rows)
+    return path
+
+
+def places(path):
+    with path.open() as file:
+        return [(float(row["x"]), float(row["y"])) for row in csv.DictReader(file)]
+
+
+@cases.case("two maps bent against each other become one")
+def merged(folder):
+    trees = stand()
+    a = write(folder / "a" / "trees.csv", trees[:260])
+    b = write(folder / "b" / "trees.csv", turned(bent(trees)[40:]))
+    done = program("merge", a.parent, b, "--align", "--weight", 0, "-o", folder / "both", "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["trees_a"] == 260 and told["trees_b"] == 260, told
+    assert 210 <= told["joined"] <= 220, told
+    assert told["trees"] == 520 - told["joined"], told
+    assert told["apart_m"] < 0.15, told
+    both = places(folder / "both" / "trees.csv")
+    near = [min(math.dist(tree, other) for other in both) for tree in trees[:260]]
+    assert max(near) < 0.6 and sum(near) / len(near) < 0.06, max(near)
+    field = (folder / "both" / "deformation.csv").read_text().splitlines()
+    assert len(field) == 261 and field[0].startswith("x,y,dx,dy"), field[0]
+    again = program("merge", a.parent, b, "--align", "--weight", 0, "-o", folder / "again",
+                    "--threads", 1)
+    assert again.returncode == 0, again.stderr
+    for name in ("trees.csv", "deformation.csv"):
+        assert (folder / "both" / name).read_bytes() == (folder / "again" / name).read_bytes()
+
+
+@cases.case("the best weight is that of the map which a reference agrees with")
+def reference(folder):
+    trees = stand()
+    a = write(folder / "a.csv", bent(trees))
+    b = write(folder / "b.csv", trees)
+    truth = write(folder / "truth.csv", trees)
+    done = program("merge", a, b, "-o", folder / "both", "--reference", truth, "--json")
+    assert done.returncode == 0, done.stderr
+    best = json.loads(done.stdout)["best"]
+    assert 0.85 <= best["weight"] <= 1.15 and best["position_rmse_m"] < 0.1, best
+
+
+@cases.case("agreement near a path")
+def agreement(folder):
+    trees = stand()
+    a = write(folder / "a.csv", trees)
+    b = write(folder / "b.csv", [tree for k, tree in enumerate(trees) if k % 5])
+    path = folder / "trajectory.tum"
+    path.write_text("".join(f"{k} {k} 40 0 0 0 0 1\n" for k in range(81)))
+    done = program("evaluate", "trees", a, b, "--path", path, "--within-m", 15, "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)["near_path"]
+    assert told["paired_b"] == told["trees_b"] == told["paired_a"], told
+    expected = 2 * told["paired_a"] / (told["trees_a"] + told["trees_b"])
+    assert abs(told["agreement"] - expected) < 1e-12 and 0.8 < expected < 0.95, told
+
+
+@cases.case("maps that share nothing, and what is no map")
+def nothing(folder):
+    a = write(folder / "a.csv", stand(50))
+    far = write(folder / "far.csv", [(x + 5000, y) for x, y in stand(50)])
+    done = program("merge", a, far, "-o", folder / "both")
+    assert done.returncode == 4 and "--align" in done.stderr, done
+    (folder / "bad.csv").write_text("name\nspruce\n")
+    done = program("merge", a, folder / "bad.csv", "-o", folder / "both")
+    assert done.returncode == 3 and "bad.csv" in done.stderr, done
+    assert program("merge", a, "-o", folder / "both").returncode == 2
+
+
+cases.run()
