@@ -23,13 +23,14 @@ from evalio.types import SE3, SO3, ImuMeasurement, ImuParams, LidarParams, Stamp
 from measure import Meter, cpu_seconds, report
 
 # What deskews by itself is told to; threads are what everybody gets.
+# They take a scan to last until the next one: where it is over long before, they do better without.
 CHANGES = {
-    "KissICP": lambda threads: {"deskew": True, "max_num_threads": threads},
-    "GenZICP": lambda threads: {"deskew": True},
-    "MadICP": lambda threads: {"deskew": True, "num_threads": threads, "realtime": False},
-    "CTICP": lambda threads: {"ls_num_threads": threads},
-    "FORM": lambda threads: {"num_threads": threads},
-    "LioSAM": lambda threads: {"numberOfCores": threads},
+    "KissICP": lambda threads, whole: {"deskew": whole, "max_num_threads": threads},
+    "GenZICP": lambda threads, whole: {"deskew": whole},
+    "MadICP": lambda threads, whole: {"deskew": whole, "num_threads": threads, "realtime": False},
+    "CTICP": lambda threads, whole: {"ls_num_threads": threads},
+    "FORM": lambda threads, whole: {"num_threads": threads},
+    "LioSAM": lambda threads, whole: {"numberOfCores": threads},
 }
 # Work goes on in threads of their own after a scan was handed over.
 CONCURRENT = {"DLIO", "LioSAM"}
@@ -52,6 +53,7 @@ class Organiser:
         sweep_ns = min(period_ns, 1.02 * scan.offsets_ns.max() + firing_ns)
         if sweep_ns > 0.9 * period_ns:
             sweep_ns = period_ns
+        self.whole = bool(sweep_ns > 0.5 * period_ns)
         self.columns = int(np.ceil(sweep_ns / firing_ns))
         self.firing_ns = firing_ns
 
@@ -83,7 +85,7 @@ def started(name, path, organiser, rates, threads):
     pipeline.set_lidar_params(LidarParams(num_rows=organiser.rows, num_columns=organiser.columns,
                                           min_range=0.5, max_range=100.0, rate=rates["lidar"]))
     parameters = dict(pipeline.default_params())
-    parameters.update(CHANGES.get(name, lambda _: {})(threads))
+    parameters.update(CHANGES.get(name, lambda *_: {})(threads, organiser.whole))
     pipeline.set_params(parameters)
     pipeline.initialize()
     return pipeline
