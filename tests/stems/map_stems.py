@@ -197,6 +197,8 @@ def wrong(folder):
     for words in (("--realtime",), ("--profile", "handheld"), ("--set", "stems.reach_m=3")):
         done = sparse(REC, folder / "run", *words)
         assert done.returncode == 2 and words[0] in done.stderr, (words, done.stderr)
+    done = program("map", "--resume", RUN)
+    assert done.returncode == 3 and "by stems alone" in done.stderr, done.stderr
     done = sparse(folder / "none.mcap", folder / "run")
     assert done.returncode == 3 and "none.mcap" in done.stderr, done.stderr
     done = program("map", "--front-end", "sparse", "--print-config")
