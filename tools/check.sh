@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# check.sh [BASE]: what a change has to pass beside the tests: layers, format, and clang-tidy on the
-# .cc files that differ from BASE (default: where this branch left main; on main the last commit).
+# check.sh [BASE]: what a change has to pass beside the tests: layers, names, format, and clang-tidy
+# on the .cc files that differ from BASE (default: where this branch left main; on main the last
+# commit).
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$top"
@@ -19,6 +20,9 @@ default_base() {
 say "layers"
 python3 tools/check_layers.py || failed+=(layers)
 python3 tools/check_layers_test.py || failed+=("the layers script's own test")
+say "names"
+python3 tools/check_names.py || failed+=(names)
+python3 tools/check_names_test.py || failed+=("the names script's own test")
 say "format"
 tools/format.sh --check || failed+=(format)
 say "clang-tidy on changed files"

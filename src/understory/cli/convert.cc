@@ -50,7 +50,7 @@ class TargetOf : public Target {
 void write_las_cloud(const std::string& path, const Scan& scan) {
   LasWriter writer(path, {});
   for (const ScanPoint& point : scan.points) {
-    LasPoint out;
+    LasRecord out;
     out.x = point.x;
     out.y = point.y;
     out.z = point.z;

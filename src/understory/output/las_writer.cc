@@ -141,7 +141,7 @@ std::uint64_t LasWriter::points() const {
   return impl_->count;
 }
 
-void LasWriter::add(const LasPoint& point) {
+void LasWriter::add(const LasRecord& point) {
   Impl& self = *impl_;
   laszip_point& out = *self.point;
   double stored = 0.0;

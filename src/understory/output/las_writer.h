@@ -11,7 +11,7 @@
 namespace understory {
 
 // A point on its way into map.laz.
-struct LasPoint {
+struct LasRecord {
   double x = 0.0;
   double y = 0.0;
   double z = 0.0;
@@ -40,7 +40,7 @@ class LasWriter {
   LasWriter(const LasWriter&) = delete;
   LasWriter& operator=(const LasWriter&) = delete;
 
-  void add(const LasPoint& point);
+  void add(const LasRecord& point);
   void commit();
   [[nodiscard]] std::uint64_t points() const;
 

@@ -214,7 +214,7 @@ TEST_F(OutputTest, LazComesBackToTheMillimetre) {
   const fs::path path = folder_ / "map.laz";
   LasOptions options;
   options.offset = {500'000.0, 6'800'000.0, 0.0};
-  std::vector<LasPoint> points;
+  std::vector<LasRecord> points;
   Random random(3);
   for (int i = 0; i < 70'000; ++i) {  // more than one chunk
     points.push_back({500'000.0 + random.uniform(-80.0, 80.0),
@@ -223,7 +223,7 @@ TEST_F(OutputTest, LazComesBackToTheMillimetre) {
                       static_cast<std::uint8_t>(1 + i % 5)});
   }
   LasWriter writer(path, options);
-  for (const LasPoint& point : points)
+  for (const LasRecord& point : points)
     writer.add(point);
   writer.commit();
 
@@ -242,7 +242,7 @@ TEST_F(OutputTest, LazComesBackToTheMillimetre) {
   EXPECT_NEAR(header->max_z, 130.0, 0.1);
   laszip_point* point = nullptr;
   laszip_get_point_pointer(reader, &point);
-  for (const LasPoint& expected : points) {
+  for (const LasRecord& expected : points) {
     ASSERT_EQ(laszip_read_point(reader), 0);
     double xyz[3];
     laszip_get_coordinates(reader, xyz);

@@ -58,8 +58,6 @@ constexpr std::size_t kMostNeighbours = 100;
 constexpr double kLineRatio = 0.05;  // middle through largest variance
 constexpr double kPoleCosine = 0.7;  // 45 degrees
 
-}  // namespace
-
 // What the neighbourhood of a target point constrains.
 enum class Surface : std::uint8_t {
   kPoint,    // all three directions (point to point)
@@ -67,6 +65,8 @@ enum class Surface : std::uint8_t {
   kPole,     // across the axis
   kNothing,  // the trace of a ring, or foliage
 };
+
+}  // namespace
 
 struct IcpTarget::Tree {
   Points points;

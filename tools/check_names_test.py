@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+"""Tests of check_names.py on small source trees made for the purpose."""
+
+import pathlib
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import check_names  # noqa: E402
+
+
+def findings(files):
+    with tempfile.TemporaryDirectory() as folder:
+        tree = pathlib.Path(folder)
+        for name, text in files.items():
+            path = tree / "src" / "understory" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        return list(check_names.check(tree))
+
+
+def inside(namespace, text):
+    return f"namespace {namespace} {{\n{text}\n}}  // namespace {namespace}\n"
+
+
+class CheckNames(unittest.TestCase):
+    def test_one_name_for_two_types_is_an_error_with_both_places(self):
+        found = findings({"a/one.h": inside("u", "struct Tree {\n};"),
+                          "b/two.h": inside("u", "class Tree final : public Plant {\n};")})
+        self.assertEqual(len(found), 1)
+        self.assertIn("src/understory/b/two.h:2", found[0])
+        self.assertIn("src/understory/a/one.h:2", found[0])
+
+    def test_it_is_one_in_source_files_as_well(self):
+        self.assertEqual(len(findings({"a/one.h": inside("u", "struct Tree {"),
+                                       "b/two.cc": inside("u", "enum class Tree : int {")})), 1)
+
+    def test_other_namespaces_and_unnamed_ones_are_no_clash(self):
+        self.assertEqual(findings({
+            "a/one.h": inside("u", "struct Tree {\n};"),
+            "b/two.h": inside("u::testing", "struct Tree {\n};"),
+            "b/three.cc": "namespace u {\nnamespace {\nstruct Tree {\n};\n}  // namespace\n"
+                          "}  // namespace u\n",
+        }), [])
+
+    def test_after_an_unnamed_namespace_names_count_again(self):
+        self.assertEqual(len(findings({
+            "a/one.h": inside("u", "struct Tree {\n};"),
+            "b/two.cc": "namespace u {\nnamespace {\n}  // namespace\nstruct Tree {\n};\n"
+                        "}  // namespace u\n",
+        })), 1)
+
+    def test_declarations_and_members_are_none(self):
+        self.assertEqual(findings({
+            "a/one.h": inside("u", "struct Tree;\nstruct Tree {\n  struct Tree {\n  };\n};"),
+            "b/two.h": inside("u", "class Tree;\nstruct Wood::Tree {\n};"),
+        }), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
