@@ -54,7 +54,9 @@ std::string write_oval_tree(const std::string& name) {
 class CloudTrees : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = ::testing::TempDir() + "/cloud_trees";
+    // Tests run side by side: to each its own.
+    folder_ = ::testing::TempDir() + "/cloud_trees_" +
+              ::testing::UnitTest::GetInstance()->current_test_info()->name();
     std::filesystem::create_directories(folder_);
     write_oval_tree(folder_ + "/oval.ply");
   }
