@@ -38,7 +38,7 @@ void run(const SiteConfig& site, int threads) {
     casts.push_back({wall.count(), 1e3 * (process_cpu_seconds() - cpu_begin)});
     points += static_cast<std::size_t>(
         std::count_if(readings.beams.begin(), readings.beams.end(),
-                      [](const ScanReadings::Reading& beam) { return beam.range_m > 0.0F; }));
+                      [](const BeamReading& beam) { return beam.range_m > 0.0F; }));
   }
   Cast mean;
   for (const Cast& cast : casts) {

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <tuple>
 
 #include "understory/util/parallel.h"
@@ -64,17 +65,9 @@ struct Scanner::Block {
   std::vector<Hit> hits;
   std::vector<Eigen::Vector3f> direction_in_lidar;  // reported, by beam
   std::vector<Eigen::Vector3f> origin_in_lidar;     // by firing
-  std::vector<ScanReadings::Reading> readings;      // by beam
-  std::vector<ScanReadings::Reading> seconds;       // by beam, if two returns are asked for
+  std::vector<BeamReading> readings;                // by beam
+  std::vector<BeamReading> seconds;                 // by beam, if two returns are asked for
   std::vector<std::uint64_t> stems;                 // tree << 16 | ring of each return from a stem
-};
-
-struct Scanner::Echo {
-  float range_m = 0.0F;
-  float energy = 0.0F;  // reflectivity x cosine x share of the beam
-  float cosine = 1.0F;
-  int tree = 0;
-  Surface surface = Surface::kNone;
 };
 
 Pose mount_pose(const std::vector<double>& place_m, const std::vector<double>& rpy_deg) {
@@ -170,7 +163,7 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
   auto scan = std::make_shared<Scan>();
   scan->stamp = stamp(number);
   scan->ring_count = static_cast<int>(beams);
-  const auto present = [](const ScanReadings::Reading& reading) { return reading.range_m > 0.0F; };
+  const auto present = [](const BeamReading& reading) { return reading.range_m > 0.0F; };
   scan->points.reserve(static_cast<std::size_t>(
       std::count_if(readings.beams.begin(), readings.beams.end(), present)));
   std::size_t i = 0;
@@ -185,7 +178,7 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
         origin =
             (model_.beam_origin_m * Eigen::Vector3d(head.cosine, head.sine, 0.0)).cast<float>();
       }
-      const auto add = [&](const ScanReadings::Reading& reading, std::uint8_t return_index) {
+      const auto add = [&](const BeamReading& reading, std::uint8_t return_index) {
         if (!present(reading)) return;
         const Eigen::Vector3f point =
             origin + reading.range_m * (head * beam_directions_[b]).cast<float>();
@@ -213,19 +206,20 @@ void Scanner::cast_block(std::int64_t first, std::int64_t end, double moment_s,
   if (two) block.seconds.resize(block.readings.size());
   for (std::size_t i = 0; i < block.readings.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;
-    Echo second;
-    Echo echo = strongest(&block.hits[i * rays_per_beam], two ? &second : nullptr);
+    BeamEcho second;
+    BeamEcho echo = strongest_echo(std::span(block.hits).subspan(i * rays_per_beam, rays_per_beam),
+                                   config_.pulse_m, two ? &second : nullptr);
     if (config_.snow_fall_per_m > 0.0 || config_.snow_drop_interval_s > 0.0) {
       const double time = to_seconds(model_.firing_time(static_cast<std::int64_t>(firing)));
-      const Echo behind = echo;
+      const BeamEcho behind = echo;
       meet_snow(CounterNoise(seed_ + 6, firing, i % beams), snow_per_m(time), echo);
       if (two && echo.surface == Surface::kSnow) second = behind;
     }
     if (second.surface != Surface::kNone) {
-      block.seconds[i] = read_beam(CounterNoise(seed_ + 5, firing, i % beams), second);
+      block.seconds[i] = read_echo(second, config_, CounterNoise(seed_ + 5, firing, i % beams));
     }
     if (echo.surface == Surface::kNone) continue;
-    block.readings[i] = read_beam(CounterNoise(seed_, firing, i % beams), echo);
+    block.readings[i] = read_echo(echo, config_, CounterNoise(seed_, firing, i % beams));
     if (echo.tree > 0 && block.readings[i].range_m > 0.0F) {
       block.stems.push_back(static_cast<std::uint64_t>(echo.tree) << 16 |
                             model_.beams[i % beams].ring);
@@ -249,12 +243,12 @@ double Scanner::snow_per_m(double time_s) const {
 
 // A flake in front of what the beam would have met gives the first echo; whether it is strong
 // enough is settled as for any other.
-void Scanner::meet_snow(CounterNoise noise, double per_m, Echo& echo) const {
+void Scanner::meet_snow(CounterNoise noise, double per_m, BeamEcho& echo) const {
   if (per_m <= 0.0) return;
   const double range = config_.min_range_m - std::log(1.0 - noise.uniform()) / per_m;
   const double reach = echo.surface == Surface::kNone ? config_.max_range_m : echo.range_m;
   if (range >= reach) return;
-  Echo flake;
+  BeamEcho flake;
   flake.range_m = static_cast<float>(range);
   flake.energy = kFlakeEnergy * noise.uniform();
   flake.surface = Surface::kSnow;
@@ -267,7 +261,7 @@ void Scanner::meet_snow(CounterNoise noise, double per_m, Echo& echo) const {
 // before and after (within a block), and other sensors' pulses give any range.
 void Scanner::add_ghosts(std::int64_t first, Block& block) const {
   const std::size_t beams = model_.beams.size();
-  const std::vector<ScanReadings::Reading> real = block.readings;
+  const std::vector<BeamReading> real = block.readings;
   const auto step = static_cast<float>(std::max(config_.range_step_m, 1e-4));
   for (std::size_t i = 0; i < real.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;
@@ -393,111 +387,6 @@ void Scanner::meet_machine(std::int64_t first, Block& block) const {
       }
     }
   }
-}
-
-// A beam of one ray.
-Scanner::Echo Scanner::echo_of(const Hit& hit) {
-  Echo echo;
-  if (hit.surface == Surface::kNone) return echo;
-  echo.energy = hit.reflectivity * std::max(0.08F, hit.cosine);
-  echo.range_m = (echo.energy * hit.range_m) / echo.energy;  // as a mean of one
-  if (!(echo.energy / (echo.range_m * echo.range_m) > 0.0F)) return {};
-  echo.tree = hit.tree;
-  echo.surface = hit.surface;
-  echo.cosine = hit.cosine;
-  return echo;
-}
-
-// Hits of one beam that lie within a pulse's length merge into one echo; the strongest is reported,
-// and the one after it where `second` is given.
-Scanner::Echo Scanner::strongest(const Hit* hits, Echo* second) const {
-  struct Piece {
-    float range_m;
-    float energy;
-    const Hit* hit;
-  };
-  const auto count = static_cast<std::size_t>(config_.rays_per_beam);
-  if (count == 1) return echo_of(*hits);
-  Piece pieces[64];
-  std::size_t used = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    if (hits[k].surface == Surface::kNone) continue;
-    const float energy = hits[k].reflectivity * std::max(0.08F, hits[k].cosine);
-    pieces[used++] = {hits[k].range_m, energy / static_cast<float>(count), &hits[k]};
-  }
-  if (used > 1) {
-    std::sort(pieces, pieces + used,
-              [](const Piece& a, const Piece& b) { return a.range_m < b.range_m; });
-  }
-  Echo best;
-  float best_signal = 0.0F;
-  Echo echoes[64];
-  std::size_t echo_count = 0;
-  for (std::size_t k = 0; k < used;) {
-    Echo echo;
-    float strongest_piece = 0.0F;
-    float sum = 0.0F;
-    std::size_t last = k;
-    while (last < used && pieces[last].range_m - pieces[k].range_m <= config_.pulse_m) {
-      const Piece& piece = pieces[last];
-      echo.energy += piece.energy;
-      sum += piece.energy * piece.range_m;
-      if (piece.energy > strongest_piece) {
-        strongest_piece = piece.energy;
-        echo.tree = piece.hit->tree;
-        echo.surface = piece.hit->surface;
-        echo.cosine = piece.hit->cosine;
-      }
-      ++last;
-    }
-    echo.range_m = sum / echo.energy;
-    const float signal = echo.energy / (echo.range_m * echo.range_m);
-    if (signal > best_signal) {
-      best_signal = signal;
-      best = echo;
-    }
-    echoes[echo_count++] = echo;
-    k = last;
-  }
-  if (second == nullptr) return best;
-  float second_signal = 0.0F;
-  for (std::size_t k = 0; k < echo_count; ++k) {
-    const Echo& echo = echoes[k];
-    const float signal = echo.energy / (echo.range_m * echo.range_m);
-    // What lies nearer to the first than a pulse cannot be told apart from it.
-    if (std::abs(echo.range_m - best.range_m) < config_.pulse_m || signal <= second_signal)
-      continue;
-    second_signal = signal;
-    *second = echo;
-  }
-  return best;
-}
-
-ScanReadings::Reading Scanner::read_beam(CounterNoise noise, const Echo& echo) const {
-  // Whether the echo rises above the noise: half of them do at the threshold.
-  const float threshold = static_cast<float>(config_.range_10_percent_m);
-  const float signal = 10.0F * echo.energy * threshold * threshold / (echo.range_m * echo.range_m);
-  const float steep = signal * signal * signal;
-  if (noise.uniform() * (1.0F + steep) > steep) return {};
-  if (noise.uniform() < static_cast<float>(config_.dropout)) return {};
-
-  const float cosine = std::max(0.1F, echo.cosine);
-  const float tangent = std::sqrt(1.0F - cosine * cosine) / cosine;
-  float sd = std::hypot(static_cast<float>(config_.range_sd_m),
-                        static_cast<float>(config_.range_sd_per_m) * echo.range_m) *
-             (1.0F + static_cast<float>(config_.incidence_gain) * std::min(tangent, 4.0F));
-  if (echo.surface == Surface::kStem || echo.surface == Surface::kDeadWood) {
-    sd = std::hypot(sd, static_cast<float>(config_.bark_sd_m));
-  }
-  const CounterNoise::Pair shiver = noise.normal_pair();
-  float range = echo.range_m + sd * shiver.first;
-  if (config_.range_step_m > 0.0) {
-    const auto step = static_cast<float>(config_.range_step_m);
-    range = std::round(range / step) * step;
-  }
-  if (range < config_.min_range_m || range > config_.max_range_m) return {};
-  const float brightness = 255.0F * echo.energy * (1.0F + 0.06F * shiver.second);
-  return {range, std::round(std::clamp(brightness, 0.0F, 255.0F))};
 }
 
 }  // namespace understory

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "understory/sensor/scan.h"
+#include "understory/simulation/beam_echo.h"
 #include "understory/simulation/carrier.h"
 #include "understory/simulation/counter_noise.h"
 #include "understory/simulation/lidar_model.h"
@@ -22,12 +23,9 @@ struct StemReturns {
 
 // What the beams of one scan measured, firing by firing and beam by beam in the order of the model.
 struct ScanReadings {
-  struct Reading {
-    float range_m = 0.0F;    // 0: no return; a multiple of the range step
-    float intensity = 0.0F;  // whole number, 0 to 255
-  };
-  std::vector<Reading> beams;
-  std::vector<Reading> seconds;    // the weaker of two echoes, beam by beam; empty if not asked for
+  std::vector<BeamReading> beams;
+  std::vector<BeamReading>
+      seconds;                     // the weaker of two echoes, beam by beam; empty if not asked for
   std::vector<StemReturns> stems;  // by increasing id
 };
 
@@ -60,16 +58,12 @@ class Scanner {
 
  private:
   struct Block;
-  struct Echo;
   void cast_block(std::int64_t first, std::int64_t end, double moment_s, Block& block) const;
   void make_rays(std::int64_t first, std::int64_t end, double moment_s, Block& block) const;
   void trace(std::size_t firings, Block& block) const;
   void meet_machine(std::int64_t first, Block& block) const;
-  [[nodiscard]] ScanReadings::Reading read_beam(CounterNoise noise, const Echo& echo) const;
-  [[nodiscard]] static Echo echo_of(const Hit& hit);
-  [[nodiscard]] Echo strongest(const Hit* hits, Echo* second) const;
   [[nodiscard]] double snow_per_m(double time_s) const;
-  void meet_snow(CounterNoise noise, double per_m, Echo& echo) const;
+  void meet_snow(CounterNoise noise, double per_m, BeamEcho& echo) const;
   void add_ghosts(std::int64_t first, Block& block) const;
 
   const LidarConfig config_;

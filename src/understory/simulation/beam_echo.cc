@@ -1,0 +1,113 @@
+#include "understory/simulation/beam_echo.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+// A beam of one ray.
+BeamEcho echo_of(const Hit& hit) {
+  BeamEcho echo;
+  if (hit.surface == Surface::kNone) return echo;
+  echo.energy = hit.reflectivity * std::max(0.08F, hit.cosine);
+  echo.range_m = (echo.energy * hit.range_m) / echo.energy;  // as a mean of one
+  if (!(echo.energy / (echo.range_m * echo.range_m) > 0.0F)) return {};
+  echo.tree = hit.tree;
+  echo.surface = hit.surface;
+  echo.cosine = hit.cosine;
+  return echo;
+}
+
+}  // namespace
+
+BeamEcho strongest_echo(std::span<const Hit> hits, double pulse_m, BeamEcho* second) {
+  struct Piece {
+    float range_m;
+    float energy;
+    const Hit* hit;
+  };
+  const std::size_t count = hits.size();
+  if (count == 1) return echo_of(hits[0]);
+  Piece pieces[64];
+  std::size_t used = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (hits[k].surface == Surface::kNone) continue;
+    const float energy = hits[k].reflectivity * std::max(0.08F, hits[k].cosine);
+    pieces[used++] = {hits[k].range_m, energy / static_cast<float>(count), &hits[k]};
+  }
+  if (used > 1) {
+    std::sort(pieces, pieces + used,
+              [](const Piece& a, const Piece& b) { return a.range_m < b.range_m; });
+  }
+  BeamEcho best;
+  float best_signal = 0.0F;
+  BeamEcho echoes[64];
+  std::size_t echo_count = 0;
+  for (std::size_t k = 0; k < used;) {
+    BeamEcho echo;
+    float strongest_piece = 0.0F;
+    float sum = 0.0F;
+    std::size_t last = k;
+    while (last < used && pieces[last].range_m - pieces[k].range_m <= pulse_m) {
+      const Piece& piece = pieces[last];
+      echo.energy += piece.energy;
+      sum += piece.energy * piece.range_m;
+      if (piece.energy > strongest_piece) {
+        strongest_piece = piece.energy;
+        echo.tree = piece.hit->tree;
+        echo.surface = piece.hit->surface;
+        echo.cosine = piece.hit->cosine;
+      }
+      ++last;
+    }
+    echo.range_m = sum / echo.energy;
+    const float signal = echo.energy / (echo.range_m * echo.range_m);
+    if (signal > best_signal) {
+      best_signal = signal;
+      best = echo;
+    }
+    echoes[echo_count++] = echo;
+    k = last;
+  }
+  if (second == nullptr) return best;
+  float second_signal = 0.0F;
+  for (std::size_t k = 0; k < echo_count; ++k) {
+    const BeamEcho& echo = echoes[k];
+    const float signal = echo.energy / (echo.range_m * echo.range_m);
+    // What lies nearer to the first than a pulse cannot be told apart from it.
+    if (std::abs(echo.range_m - best.range_m) < pulse_m || signal <= second_signal) continue;
+    second_signal = signal;
+    *second = echo;
+  }
+  return best;
+}
+
+BeamReading read_echo(const BeamEcho& echo, const LidarConfig& config, CounterNoise noise) {
+  // Whether the echo rises above the noise: half of them do at the threshold.
+  const float threshold = static_cast<float>(config.range_10_percent_m);
+  const float signal = 10.0F * echo.energy * threshold * threshold / (echo.range_m * echo.range_m);
+  const float steep = signal * signal * signal;
+  if (noise.uniform() * (1.0F + steep) > steep) return {};
+  if (noise.uniform() < static_cast<float>(config.dropout)) return {};
+
+  const float cosine = std::max(0.1F, echo.cosine);
+  const float tangent = std::sqrt(1.0F - cosine * cosine) / cosine;
+  float sd = std::hypot(static_cast<float>(config.range_sd_m),
+                        static_cast<float>(config.range_sd_per_m) * echo.range_m) *
+             (1.0F + static_cast<float>(config.incidence_gain) * std::min(tangent, 4.0F));
+  if (echo.surface == Surface::kStem || echo.surface == Surface::kDeadWood) {
+    sd = std::hypot(sd, static_cast<float>(config.bark_sd_m));
+  }
+  const CounterNoise::Pair shiver = noise.normal_pair();
+  float range = echo.range_m + sd * shiver.first;
+  if (config.range_step_m > 0.0) {
+    const auto step = static_cast<float>(config.range_step_m);
+    range = std::round(range / step) * step;
+  }
+  if (range < config.min_range_m || range > config.max_range_m) return {};
+  const float brightness = 255.0F * echo.energy * (1.0F + 0.06F * shiver.second);
+  return {range, std::round(std::clamp(brightness, 0.0F, 255.0F))};
+}
+
+}  // namespace understory
