@@ -137,7 +137,8 @@ TEST_F(CloudTrees, InstancesShareTheirCloud) {
   Stand stand;
   stand.trees = read_trees(list, config, terrain, 1);
   const ForestScene scene(config, terrain, stand, 1);
-  EXPECT_LT(resident_memory_mb() - before, 250.0);  // 2,000 clouds of their own take 10 GB
+  // 120 MB, and 440 under a sanitizer; 2,000 clouds of their own would take 10 GB.
+  EXPECT_LT(resident_memory_mb() - before, 1000.0);
 }
 
 TEST_F(CloudTrees, BadOnesAreRefused) {
