@@ -12,6 +12,7 @@
 namespace understory {
 
 using internal::CellMoments;
+using internal::StoredMoments;
 
 void describe(ConfigTable& table, NdtMapConfig& config) {
   table.add("cell_size_m", config.cell_size_m, {0.05, 20.0}, "m",
@@ -86,6 +87,8 @@ class ChangedBlocks {
 }  // namespace
 
 struct NdtMapBuilder::State {
+  static constexpr std::uint32_t kNone = VoxelIndex::kNone;
+
   struct Located {
     std::array<int, 3> at;
     float from_center[3];
@@ -93,19 +96,24 @@ struct NdtMapBuilder::State {
     std::uint32_t cell;
   };
 
-  struct Gathered {
-    CellMoments moments;  // of all points
-    double due = 0.0;     // so many are taken into the distribution, see NdtMapConfig::growth
+  // Both of a cache line each: points fall into cells that lie scattered in memory.
+  struct alignas(64) Gathered {
+    StoredMoments moments;  // of all points
+    float due = 0.0F;       // so many are taken into the distribution, see NdtMapConfig::growth
+    std::uint32_t in_map = kNone;  // index in `map`, or kNone: too few points so far
   };
+  struct alignas(64) Settled {
+    StoredMoments moments;  // as the distribution takes them
+    std::array<int, 3> at{};
+  };
+  static_assert(sizeof(Gathered) == 64 && sizeof(Settled) == 64);
 
   NdtMapConfig config;
   // Of each cell that has points.
   std::vector<Gathered> gathered;
-  std::vector<CellMoments> settled;  // as its distribution takes them
-  std::vector<std::array<int, 3>> coordinates;
-  std::vector<std::uint8_t> dirty;    // it has changed since the last snapshot
-  std::vector<std::uint8_t> leans;    // its distribution rests on its neighbours too
-  std::vector<std::uint32_t> in_map;  // index in `map`, or kNone: too few points so far
+  std::vector<Settled> settled;
+  std::vector<std::uint8_t> dirty;  // it has changed since the last snapshot
+  std::vector<std::uint8_t> leans;  // its distribution rests on its neighbours too
   VoxelIndex index;
 
   std::shared_ptr<NdtMap> map;       // as of the last snapshot
@@ -114,53 +122,49 @@ struct NdtMapBuilder::State {
   std::vector<Located> located;      // workspace
   std::vector<std::uint32_t> due;    // workspace
 
-  static constexpr std::uint32_t kNone = VoxelIndex::kNone;
-
   std::uint32_t find_or_add(const std::array<int, 3>& at) {
     const std::uint64_t key = key_of(at);
     const std::uint32_t found = index.find(key);
     if (found != kNone) return found;
     const auto cell = static_cast<std::uint32_t>(gathered.size());
     index.set(key, cell);
-    gathered.emplace_back();
-    settled.emplace_back();
-    coordinates.push_back(at);
-    dirty.push_back(1);
+    gathered.emplace_back().due = static_cast<float>(config.min_points);
+    settled.emplace_back().at = at;
+    dirty.push_back(0);
     leans.push_back(0);
-    in_map.push_back(kNone);
     return cell;
   }
 
   // The last cell takes the place of the one removed.
   void remove(std::uint32_t cell) {
-    removed.add(coordinates[cell]);
-    if (in_map[cell] != kNone) remove_from_map(in_map[cell]);
-    index.erase(key_of(coordinates[cell]));
+    const std::array<int, 3> at = settled[cell].at;
+    if (gathered[cell].in_map != kNone) {
+      removed.add(at);
+      remove_from_map(gathered[cell].in_map);
+    }
+    index.erase(key_of(at));
     const auto last = static_cast<std::uint32_t>(gathered.size() - 1);
     if (cell != last) {
       gathered[cell] = gathered[last];
       settled[cell] = settled[last];
-      coordinates[cell] = coordinates[last];
       dirty[cell] = dirty[last];
       leans[cell] = leans[last];
-      in_map[cell] = in_map[last];
-      index.set(key_of(coordinates[cell]), cell);
-      if (in_map[cell] != kNone) owner[in_map[cell]] = cell;
+      index.set(key_of(settled[cell].at), cell);
+      if (gathered[cell].in_map != kNone) owner[gathered[cell].in_map] = cell;
     }
     gathered.pop_back();
     settled.pop_back();
-    coordinates.pop_back();
     dirty.pop_back();
     leans.pop_back();
-    in_map.pop_back();
   }
 
   void add_to_map(std::uint32_t cell) {
-    in_map[cell] = static_cast<std::uint32_t>(owner.size());
+    const auto place = static_cast<std::uint32_t>(owner.size());
+    gathered[cell].in_map = place;
     owner.push_back(cell);
-    map->index_.set(key_of(coordinates[cell]), in_map[cell]);
+    map->index_.set(key_of(settled[cell].at), place);
     map->cells_.emplace_back();
-    map->coordinates_.push_back(coordinates[cell]);
+    map->coordinates_.push_back(settled[cell].at);
   }
 
   void remove_from_map(std::uint32_t place) {
@@ -172,7 +176,7 @@ struct NdtMapBuilder::State {
       map->coordinates_[place] = map->coordinates_[last];
       map->index_.set(key_of(map->coordinates_[place]), place);
       owner[place] = owner[last];
-      in_map[owner[place]] = place;
+      gathered[owner[place]].in_map = place;
     }
     map->cells_.pop_back();
     map->coordinates_.pop_back();
@@ -182,8 +186,9 @@ struct NdtMapBuilder::State {
   // Takes a cell's points into its distribution.
   void settle(std::uint32_t cell) {
     Gathered& points = gathered[cell];
-    settled[cell] = points.moments;
-    points.due = std::max(points.moments.n + 1.0, (1.0 + config.growth) * points.moments.n);
+    settled[cell].moments = points.moments;
+    const float n = points.moments.n;
+    points.due = std::max(n + 1.0F, (1.0F + static_cast<float>(config.growth)) * n);
     dirty[cell] = 1;
   }
 
@@ -199,13 +204,13 @@ struct NdtMapBuilder::State {
 
   [[nodiscard]] CellMoments around(std::size_t cell, int reach) const {
     CellMoments total;
-    const std::array<int, 3>& at = coordinates[cell];
+    const std::array<int, 3>& at = settled[cell].at;
     for (int x = -reach; x <= reach; ++x) {
       for (int y = -reach; y <= reach; ++y) {
         for (int z = -reach; z <= reach; ++z) {
           const std::uint32_t found = index.find(voxel_key(at[0] + x, at[1] + y, at[2] + z));
           if (found != kNone)
-            total.add(settled[found], config.cell_size_m * Eigen::Vector3d(x, y, z));
+            total.add(settled[found].moments.wide(), config.cell_size_m * Eigen::Vector3d(x, y, z));
         }
       }
     }
@@ -268,7 +273,7 @@ void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_
     cell.moments.add(point.from_center[0], point.from_center[1], point.from_center[2]);
     if (rays) cell.moments.add_ray(point.ray.x(), point.ray.y(), point.ray.z());
     if (cell.moments.n < cell.due) continue;
-    cell.due = std::numeric_limits<double>::infinity();  // once is enough
+    cell.due = std::numeric_limits<float>::infinity();  // once is enough
     s.due.push_back(point.cell);
   }
   for (const std::uint32_t cell : s.due)
@@ -280,7 +285,7 @@ void NdtMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m
   State& s = *state_;
   const double size = s.config.cell_size_m;
   for (std::uint32_t c = 0; c < s.gathered.size();) {
-    const std::array<int, 3>& at = s.coordinates[c];
+    const std::array<int, 3>& at = s.settled[c].at;
     const Eigen::Vector3d middle =
         size * (Eigen::Vector3d(at[0], at[1], at[2]) + Eigen::Vector3d::Constant(0.5));
     if ((middle - center).squaredNorm() > radius_m * radius_m) {
@@ -296,24 +301,25 @@ NdtMapPtr NdtMapBuilder::snapshot() {
   s.own_map();
   ChangedBlocks blocks = std::move(s.removed);
   s.removed.clear();
-  for_each_set(s.dirty, [&](std::uint32_t c) { blocks.add(s.coordinates[c]); });
+  for_each_set(s.dirty, [&](std::uint32_t c) { blocks.add(s.settled[c].at); });
   for_each_set(s.leans, [&](std::uint32_t c) {
-    if (s.dirty[c] == 0 && blocks.may_reach(s.coordinates[c])) s.dirty[c] = 1;
+    if (s.dirty[c] == 0 && blocks.may_reach(s.settled[c].at)) s.dirty[c] = 1;
   });
   std::vector<std::uint32_t> changed;
   for_each_set(s.dirty, [&](std::uint32_t c) {
     s.dirty[c] = 0;
-    if (s.settled[c].n < s.config.min_points) return;
     changed.push_back(c);
-    if (s.in_map[c] == State::kNone) s.add_to_map(c);
+    if (s.gathered[c].in_map == State::kNone) s.add_to_map(c);
   });
   parallel_for(changed.size(), 256, [&](std::size_t i) {
     const std::uint32_t c = changed[i];
     s.leans[c] = 0;
-    s.map->cells_[s.in_map[c]] = internal::make_cell(s.settled[c], s.config, [&](int reach) {
+    const auto around = [&](int reach) {
       s.leans[c] = 1;
       return s.around(c, reach);
-    });
+    };
+    s.map->cells_[s.gathered[c].in_map] =
+        internal::make_cell(s.settled[c].moments.wide(), s.config, around);
   });
   return s.map;
 }
