@@ -228,6 +228,13 @@ def inventory(folder):
     path.write_bytes(b"")
     done = program("inventory", path, "-o", folder / "none")
     assert done.returncode == 3 and f"{path}: the file is empty" in done.stderr, done.stderr
+    half = folder / "half" / "work" / "checkpoint.bin"
+    half.parent.mkdir(parents=True)
+    half.write_bytes(b"half")
+    done = program("inventory", folder / "run", "-o", folder / "half")
+    assert done.returncode == 3 and "--overwrite" in done.stderr, done.stderr
+    done = program("inventory", folder / "run", "-o", folder / "half", "--overwrite")
+    assert done.returncode in (0, 4) and (folder / "half" / "trees.csv").exists(), done.stderr
     return "exit 4, trees of the readable part"
 
 

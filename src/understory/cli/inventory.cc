@@ -10,6 +10,7 @@
 #include "understory/forest/inventory.h"
 #include "understory/output/inventory_files.h"
 #include "understory/output/report.h"
+#include "understory/pipeline/run_folder.h"
 #include "understory/recording/cloud_file.h"
 #include "understory/util/error.h"
 #include "understory/util/version.h"
@@ -25,6 +26,7 @@ struct InventoryOptions {
   std::string config_file;
   std::vector<std::string> settings;
   bool print_config = false;
+  bool overwrite = false;
 };
 
 // The cloud itself, or the map of a run.
@@ -112,6 +114,7 @@ int run_inventory(const InventoryOptions& options, CommandContext& context) {
   }
   const fs::path path = cloud_of(options.cloud);
   const fs::path folder(options.folder);
+  if (!options.overwrite) refuse_unfinished_run(folder);
   make_folder(folder);
   StageTimes times;
   PointCloudFile cloud;
@@ -174,6 +177,8 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_option("--config", options->config_file, "YAML file with settings");
   command->add_option("--set", options->settings, "key=value, may be repeated");
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
+  command->add_flag("--overwrite", options->overwrite,
+                    "Even if the folder holds an unfinished mapping run");
   command->footer(
       "Writes trees.csv, trees.gpkg, dtm.tif, chm.tif, report.html and run.json.\n"
       "Example:\n  understory inventory plot.laz -o plot-inventory");
