@@ -197,23 +197,25 @@ std::string map_section(const ReportInput& input) {
   if (input.north_is_up) svg += north_arrow(view);
   svg += "</svg>";
   std::string legend = "<p class=\"legend\">";
+  const auto entry = [&](const std::string& kind, const std::string& style, const char* text) {
+    legend += fmt::format("<span><i{} style=\"{}\"></i>{}</span> ", kind, style, text);
+  };
+  const auto line = [&](const std::string& colour, const char* text) {
+    entry("", "border-color:var(" + colour + ")", text);
+  };
   if (input.picture != nullptr) {
-    legend +=
-        "<i class=\"box\" style=\"background:#9a9a9a\"></i>ground"
-        "<i class=\"box\" style=\"background:#4f9a4a\"></i>vegetation, the lighter the higher";
+    entry(" class=\"box\"", "background:#9a9a9a", "ground");
+    entry(" class=\"box\"", "background:#4f9a4a", "vegetation, the lighter the higher");
   }
   if (trees_of(input) != nullptr) {
-    legend += "<i class=\"dot\" style=\"border-color:#c0392b;background:#fff2c2\"></i>tree";
+    entry(" class=\"dot\"", "border-color:#c0392b;background:#fff2c2", "tree");
   }
-  const auto entry = [&](const char* colour, const char* text) {
-    legend += fmt::format("<i style=\"border-color:{}\"></i>{}", colour, text);
-  };
   if (!input.scans.empty()) {
-    entry("var(--path)", "path");
-    entry("var(--weak)", "path where matching was weak");
-    entry("var(--lost)", "path without a match (predicted)");
+    line("--path", "path");
+    line("--weak", "path where matching was weak");
+    line("--lost", "path without a match (predicted)");
   }
-  if (!input.loops.empty()) entry("var(--loop)", "loop closed");
+  if (!input.loops.empty()) line("--loop", "loop closed");
   return "<section><h2>The map from above</h2>" + svg + legend + "</p></section>\n";
 }
 

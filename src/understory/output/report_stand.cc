@@ -134,7 +134,7 @@ std::string cross_sections(const InventoryResult& inventory) {
   for (const Panel& panel : panels) {
     html += "<figure>" + cross_section(inventory, panel) +
             fmt::format(
-                "<figcaption>x {:.0f}–{:.0f} m, y {:.0f}–{:.0f} m</figcaption></figure>",
+                "<figcaption>x {:.0f} to {:.0f} m, y {:.0f} to {:.0f} m</figcaption></figure>",
                 inventory.origin.x() + panel.x0, inventory.origin.x() + panel.x0 + panel.width,
                 inventory.origin.y() + panel.y0, inventory.origin.y() + panel.y0 + panel.height);
   }
