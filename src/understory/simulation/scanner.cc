@@ -4,22 +4,24 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <tuple>
 
+#include "understory/util/error.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr std::int64_t kBlockFirings = 16;
-constexpr double kSnowDrop = 3.0;       // seconds that a load of snow takes to come down
-constexpr double kSnowDropPerM = 0.03;  // flakes in a metre of beam then
-constexpr float kFlakeEnergy = 0.06F;   // of a large flake, as reflectivity x share of the beam
-constexpr float kGlaring = 130.0F;      // intensity from which an echo blooms
+constexpr std::int64_t kGroupFirings = 16;  // the stand changes between groups only
+constexpr std::size_t kMostBeams = 128;
+constexpr std::int64_t kBlockFirings = 64;  // at most, cast together
+constexpr double kSnowDrop = 3.0;           // seconds that a load of snow takes to come down
+constexpr double kSnowDropPerM = 0.03;      // flakes in a metre of beam then
+constexpr float kFlakeEnergy = 0.06F;       // of a large flake, as reflectivity x share of the beam
+constexpr float kGlaring = 130.0F;          // intensity from which an echo blooms
 
 // A rotation about the sensor's axis.
 struct Turn {
@@ -52,19 +54,32 @@ std::vector<StemReturns> count_stems(std::vector<std::uint64_t> returns) {
 
 }  // namespace
 
+// From where and when beams look out, and how the head is turned.
+struct Scanner::Look {
+  Turn head;
+  Turn shaken;  // by the encoder's jitter
+  Pose world_from_lidar;
+  Eigen::Vector3d origin;  // in the lidar's frame
+  float time_s;            // after the moment of the scene
+};
+
 // The rays of a few firings, in the order in which they are traced, and what came back.
 struct Scanner::Block {
   // All blocks of a scan live at once: what only the casting needed goes back before its end.
   void let_go_of_rays() {
+    std::vector<std::uint32_t>().swap(slots);
     std::vector<Ray>().swap(rays);
     std::vector<Hit>().swap(hits);
     std::vector<Eigen::Vector3f>().swap(direction_in_lidar);
     std::vector<Eigen::Vector3f>().swap(origin_in_lidar);
   }
-  std::vector<Ray> rays;  // beam by beam, rays_per_beam each
+  std::int64_t first = 0;            // firing
+  std::int64_t end = 0;              // of the firings
+  std::vector<std::uint32_t> slots;  // of the beams: where their rays lie
+  std::vector<Ray> rays;             // by slot, rays_per_beam each
   std::vector<Hit> hits;
-  std::vector<Eigen::Vector3f> direction_in_lidar;  // reported, by beam
-  std::vector<Eigen::Vector3f> origin_in_lidar;     // by firing
+  std::vector<Eigen::Vector3f> direction_in_lidar;  // reported, by beam; only beside a machine
+  std::vector<Eigen::Vector3f> origin_in_lidar;     // by firing; only beside a machine
   std::vector<BeamReading> readings;                // by beam
   std::vector<BeamReading> seconds;                 // by beam, if two returns are asked for
   std::vector<std::uint64_t> stems;                 // tree << 16 | ring of each return from a stem
@@ -88,20 +103,58 @@ Scanner::Scanner(const SiteConfig& config, ForestScene& scene, const CarrierPath
       seed_(hash_numbers(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kLidar))),
       model_(make_lidar_model(config.lidar)),
       body_from_lidar_(mount_pose(config.lidar.mount_m, config.lidar.mount_rpy_deg)),
-      neighbours_(model_.beams.size()) {
+      order_(trace_order()) {
+  UNDERSTORY_CHECK(model_.beams.size() <= kMostBeams);
   for (const Beam& beam : model_.beams) {
     const Turn turn(beam.azimuth_offset_rad);
-    beam_directions_.emplace_back(
-        turn * Eigen::Vector3d(std::cos(beam.elevation_rad), 0.0, std::sin(beam.elevation_rad)));
-    beam_sides_.emplace_back(turn * Eigen::Vector3d::UnitY());
+    const Eigen::Vector3d direction =
+        turn * Eigen::Vector3d(std::cos(beam.elevation_rad), 0.0, std::sin(beam.elevation_rad));
+    const Eigen::Vector3d side = turn * Eigen::Vector3d::UnitY();
+    beams_.x.push_back(direction.x());
+    beams_.y.push_back(direction.y());
+    beams_.z.push_back(direction.z());
+    beams_.side_x.push_back(side.x());
+    beams_.side_y.push_back(side.y());
   }
-  std::iota(neighbours_.begin(), neighbours_.end(), std::size_t{0});
-  std::sort(neighbours_.begin(), neighbours_.end(), [&](std::size_t a, std::size_t b) {
-    const Beam& beam_a = model_.beams[a];
-    const Beam& beam_b = model_.beams[b];
-    return std::tie(beam_a.azimuth_offset_rad, beam_a.elevation_rad) <
-           std::tie(beam_b.azimuth_offset_rad, beam_b.elevation_rad);
+}
+
+// Tiles of neighbours in azimuth and elevation, sixteen rays each: strips of a few firings' width,
+// each from the lowest beam up. A beam that looks ahead of its firing has its neighbours in firings
+// before.
+std::vector<std::uint32_t> Scanner::trace_order() const {
+  struct Place {
+    double strip;
+    double elevation_rad;
+    std::uint32_t beam;
+  };
+  const double step = 2.0 * std::numbers::pi * model_.firing_ns / model_.revolution_ns;
+  const double width = config_.rays_per_beam == 1 ? 4.0 : (config_.rays_per_beam < 8 ? 2.0 : 1.0);
+  std::vector<Place> places;
+  places.reserve(static_cast<std::size_t>(kBlockFirings) * model_.beams.size());
+  for (std::int64_t firing = 0; firing < kBlockFirings; ++firing) {
+    for (const Beam& beam : model_.beams) {
+      const double across = static_cast<double>(firing) - beam.azimuth_offset_rad / step;
+      places.push_back({std::floor(across / width), beam.elevation_rad,
+                        static_cast<std::uint32_t>(places.size())});
+    }
+  }
+  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    return std::tie(a.strip, a.elevation_rad, a.beam) < std::tie(b.strip, b.elevation_rad, b.beam);
   });
+  std::vector<std::uint32_t> order;
+  order.reserve(places.size());
+  for (const Place& place : places)
+    order.push_back(place.beam);
+  return order;
+}
+
+void Scanner::find_slots(std::size_t firings, Block& block) const {
+  const std::size_t beams = firings * model_.beams.size();
+  block.slots.resize(beams);
+  std::uint32_t slot = 0;
+  for (const std::uint32_t beam : order_) {
+    if (beam < beams) block.slots[beam] = slot++;
+  }
 }
 
 TimeNs Scanner::stamp(std::int64_t scan) const {
@@ -123,28 +176,25 @@ ScanReadings Scanner::measure(std::int64_t number) {
   const LidarModel::Firings firings = model_.firings(number);
   const double middle =
       0.5 * (to_seconds(stamp(number) - start_) + to_seconds(end(number) - start_));
-  const auto blocks_count =
-      static_cast<std::size_t>((firings.end - firings.first + kBlockFirings - 1) / kBlockFirings);
-  const auto first_of = [&](std::size_t block) {
-    return firings.first + static_cast<std::int64_t>(block) * kBlockFirings;
-  };
-  const auto time_of = [&](std::size_t block) {
-    return to_seconds(model_.firing_time(first_of(block)));
-  };
-  std::vector<Block> blocks(blocks_count);
-  // The stand changes between blocks only.
-  for (std::size_t b = 0; b < blocks_count;) {
+  const auto time_of = [&](std::int64_t firing) { return to_seconds(model_.firing_time(firing)); };
+  std::vector<Block> blocks;
+  for (std::int64_t first = firings.first; first < firings.end;) {
+    // As many groups as the stand stays the same for.
     const std::vector<double>& changes = scene_.changes();
-    const auto change = std::upper_bound(changes.begin(), changes.end(), time_of(b));
-    std::size_t until = b + 1;
-    while (until < blocks_count && (change == changes.end() || time_of(until) < *change))
-      ++until;
-    scene_.arrange(middle, time_of(b));
-    parallel_for(until - b, 1, [&](std::size_t i) {
-      const std::int64_t first = first_of(b + i);
-      cast_block(first, std::min(firings.end, first + kBlockFirings), middle, blocks[b + i]);
-    });
-    b = until;
+    const auto change = std::upper_bound(changes.begin(), changes.end(), time_of(first));
+    const std::size_t begin = blocks.size();
+    scene_.arrange(middle, time_of(first));
+    std::int64_t until = first;
+    do {
+      if (until == first || blocks.back().end - blocks.back().first == kBlockFirings) {
+        blocks.emplace_back().first = until;
+      }
+      until = std::min(firings.end, until + kGroupFirings);
+      blocks.back().end = until;
+    } while (until < firings.end && (change == changes.end() || time_of(until) < *change));
+    parallel_for(blocks.size() - begin, 1,
+                 [&](std::size_t i) { cast_block(middle, blocks[begin + i]); });
+    first = until;
   }
   ScanReadings readings;
   std::vector<std::uint64_t> stems;
@@ -181,7 +231,7 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
       const auto add = [&](const BeamReading& reading, std::uint8_t return_index) {
         if (!present(reading)) return;
         const Eigen::Vector3f point =
-            origin + reading.range_m * (head * beam_directions_[b]).cast<float>();
+            origin + reading.range_m * (head * beams_.direction(b)).cast<float>();
         scan->points.push_back({point.x(), point.y(), point.z(), reading.intensity,
                                 static_cast<std::uint32_t>(start_ + time - scan->stamp),
                                 model_.beams[b].ring, return_index, 0});
@@ -194,21 +244,24 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
   return scan;
 }
 
-void Scanner::cast_block(std::int64_t first, std::int64_t end, double moment_s,
-                         Block& block) const {
-  make_rays(first, end, moment_s, block);
-  trace(static_cast<std::size_t>(end - first), block);
-  if (!machine_.empty()) meet_machine(first, block);
+void Scanner::cast_block(double moment_s, Block& block) const {
+  const std::int64_t first = block.first;
+  make_rays(moment_s, block);
+  block.hits.resize(block.rays.size());
+  scene_.cast(block.rays.data(), block.rays.size(), static_cast<float>(config_.min_range_m),
+              static_cast<float>(config_.max_range_m), block.hits.data());
+  if (!machine_.empty()) meet_machine(block);
   const std::size_t beams = model_.beams.size();
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
-  block.readings.resize(block.direction_in_lidar.size());
+  block.readings.resize(block.slots.size());
   const bool two = config_.returns == 2;
   if (two) block.seconds.resize(block.readings.size());
   for (std::size_t i = 0; i < block.readings.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;
     BeamEcho second;
-    BeamEcho echo = strongest_echo(std::span(block.hits).subspan(i * rays_per_beam, rays_per_beam),
-                                   config_.pulse_m, two ? &second : nullptr);
+    BeamEcho echo =
+        strongest_echo(std::span(block.hits).subspan(block.slots[i] * rays_per_beam, rays_per_beam),
+                       config_.pulse_m, two ? &second : nullptr);
     if (config_.snow_fall_per_m > 0.0 || config_.snow_drop_interval_s > 0.0) {
       const double time = to_seconds(model_.firing_time(static_cast<std::int64_t>(firing)));
       const BeamEcho behind = echo;
@@ -225,7 +278,7 @@ void Scanner::cast_block(std::int64_t first, std::int64_t end, double moment_s,
                             model_.beams[i % beams].ring);
     }
   }
-  if (config_.blooming > 0.0 || config_.crosstalk > 0.0) add_ghosts(first, block);
+  if (config_.blooming > 0.0 || config_.crosstalk > 0.0) add_ghosts(block);
   block.let_go_of_rays();
 }
 
@@ -258,13 +311,14 @@ void Scanner::meet_snow(CounterNoise noise, double per_m, BeamEcho& echo) const 
 }
 
 // Readings that nothing stands for: glaring echoes repeat in the beam's neighbours of the firings
-// before and after (within a block), and other sensors' pulses give any range.
-void Scanner::add_ghosts(std::int64_t first, Block& block) const {
+// before and after (within a group), and other sensors' pulses give any range.
+void Scanner::add_ghosts(Block& block) const {
   const std::size_t beams = model_.beams.size();
+  const std::size_t group = static_cast<std::size_t>(kGroupFirings) * beams;
   const std::vector<BeamReading> real = block.readings;
   const auto step = static_cast<float>(std::max(config_.range_step_m, 1e-4));
   for (std::size_t i = 0; i < real.size(); ++i) {
-    const auto firing = static_cast<std::uint64_t>(first) + i / beams;
+    const auto firing = static_cast<std::uint64_t>(block.first) + i / beams;
     CounterNoise noise(seed_ + 8, firing, i % beams);
     if (noise.uniform() < config_.crosstalk) {
       const double range = config_.min_range_m + noise.uniform() * 0.6 * config_.max_range_m;
@@ -275,7 +329,8 @@ void Scanner::add_ghosts(std::int64_t first, Block& block) const {
     const bool blooms = noise.uniform() < config_.blooming;
     if (!blooms) continue;
     for (const std::size_t other : {i - beams, i + beams}) {  // before the first wraps: too large
-      if (other >= real.size() || real[other].intensity < kGlaring) continue;
+      if (other >= real.size() || other / group != i / group) continue;
+      if (real[other].intensity < kGlaring) continue;
       const bool behind = real[i].range_m <= 0.0F || real[i].range_m > real[other].range_m + 0.3F;
       if (behind)
         block.readings[i] = {real[other].range_m, std::round(0.3F * real[other].intensity)};
@@ -283,105 +338,105 @@ void Scanner::add_ghosts(std::int64_t first, Block& block) const {
   }
 }
 
-// Traces the rays in tiles of neighbours, which the scene casts together: beams of nearly the same
-// azimuth and elevation, of a few firings after each other.
-void Scanner::trace(std::size_t firings, Block& block) const {
-  const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
+void Scanner::make_rays(double moment_s, Block& block) const {
   const std::size_t beams = model_.beams.size();
-  const std::size_t tile_firings = rays_per_beam == 1 ? 4 : (rays_per_beam < 8 ? 2 : 1);
-  const std::size_t tile_beams = rays_per_beam < 4 ? 4 : (rays_per_beam < 16 ? 2 : 1);
-  constexpr std::size_t kTogether = 16;
-  std::array<std::size_t, kTogether> order{};
-  std::array<Ray, kTogether> rays;
-  std::array<Hit, kTogether> hits;
-  block.hits.resize(block.rays.size());
-  std::size_t waiting = 0;
-  const auto cast = [&] {
-    scene_.cast(rays.data(), waiting, static_cast<float>(config_.min_range_m),
-                static_cast<float>(config_.max_range_m), hits.data());
-    for (std::size_t i = 0; i < waiting; ++i)
-      block.hits[order[i]] = hits[i];
-    waiting = 0;
-  };
-  for (std::size_t f = 0; f < firings; f += tile_firings) {
-    for (std::size_t b = 0; b < beams; b += tile_beams) {
-      for (std::size_t i = f; i < std::min(f + tile_firings, firings); ++i) {
-        for (std::size_t j = b; j < std::min(b + tile_beams, beams); ++j) {
-          const std::size_t first = (i * beams + neighbours_[j]) * rays_per_beam;
-          for (std::size_t k = first; k < first + rays_per_beam; ++k) {
-            order[waiting] = k;
-            rays[waiting] = block.rays[k];
-            if (++waiting == kTogether) cast();
-          }
-        }
-      }
-    }
-  }
-  if (waiting > 0) cast();
-}
-
-void Scanner::make_rays(std::int64_t first, std::int64_t end, double moment_s, Block& block) const {
-  const std::size_t beams = model_.beams.size();
-  const auto firings = static_cast<std::size_t>(end - first);
-  const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
-  block.rays.reserve(firings * beams * rays_per_beam);
-  block.direction_in_lidar.reserve(firings * beams);
-  const double spread = 0.25e-3 * config_.divergence_mrad;  // one standard deviation
-  const double exit = 0.25 * config_.beam_exit_m;
+  const auto firings = static_cast<std::size_t>(block.end - block.first);
+  find_slots(firings, block);
+  block.rays.resize(firings * beams * static_cast<std::size_t>(config_.rays_per_beam));
+  // Beams that look out at the same time share a pose.
+  const std::size_t together = model_.beams_at_once ? beams : 1;
   for (std::size_t f = 0; f < firings; ++f) {
-    const std::int64_t firing = first + static_cast<std::int64_t>(f);
+    const std::int64_t firing = block.first + static_cast<std::int64_t>(f);
     const TimeNs firing_time = model_.firing_time(firing);
     CounterNoise jitter(seed_ + 1, static_cast<std::uint64_t>(firing), 0);
-    const double shake = config_.azimuth_jitter_deg * kDegree * jitter.normal();
-    const Turn turn_by_jitter(shake);
-    Eigen::Matrix3d rotation;
-    Eigen::Vector3d place = Eigen::Vector3d::Zero();
-    Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-    Turn head(0.0);
-    for (std::size_t b = 0; b < beams; ++b) {
+    const Turn shaken(config_.azimuth_jitter_deg * kDegree * jitter.normal());
+    for (std::size_t b = 0; b < beams; b += together) {
       const TimeNs time = firing_time + static_cast<TimeNs>(model_.beams[b].delay_ns);
-      if (b == 0 || !model_.beams_at_once) {
-        const Pose world_from_lidar = path_.pose(to_seconds(time)) * body_from_lidar_;
-        rotation = world_from_lidar.rotation_matrix();
-        place = world_from_lidar.translation();
-        head = Turn(model_.azimuth(static_cast<double>(time)));
-        origin = model_.beam_origin_m * Eigen::Vector3d(head.cosine, head.sine, 0.0);
-      }
+      const Turn head(model_.azimuth(static_cast<double>(time)));
+      const Eigen::Vector3d origin =
+          model_.beam_origin_m * Eigen::Vector3d(head.cosine, head.sine, 0.0);
+      Look look{head, shaken, path_.pose(to_seconds(time)) * body_from_lidar_, origin,
+                static_cast<float>(to_seconds(time) - moment_s)};
+      look_out(look, firing, {b, b + together}, &block.slots[f * beams], block.rays);
+      if (machine_.empty()) continue;
       if (b == 0) block.origin_in_lidar.push_back(origin.cast<float>());
-      const Eigen::Vector3d reported = head * beam_directions_[b];
-      block.direction_in_lidar.push_back(reported.cast<float>());
-      const Eigen::Vector3d centre = turn_by_jitter * reported;
-      const Eigen::Vector3d side = head * beam_sides_[b];
-      const Eigen::Vector3d rise = centre.cross(side);
-      CounterNoise footprint(seed_ + 2, static_cast<std::uint64_t>(firing), b);
-      for (std::size_t k = 0; k < rays_per_beam; ++k) {
-        const CounterNoise::Pair uv = footprint.normal_pair();
-        const Eigen::Vector3d offset = uv.first * side + uv.second * rise;
-        const Eigen::Vector3d direction = (centre + spread * offset).normalized();
-        block.rays.push_back({(place + rotation * (origin + exit * offset)).cast<float>(),
-                              (rotation * direction).cast<float>(),
-                              static_cast<float>(to_seconds(time) - moment_s)});
-      }
+      for (std::size_t i = b; i < b + together; ++i)
+        block.direction_in_lidar.push_back((head * beams_.direction(i)).cast<float>());
     }
   }
 }
 
-void Scanner::meet_machine(std::int64_t first, Block& block) const {
+// Rays of the beams [first, end) of a firing, each in a random direction within its footprint, to
+// their slots. Arrays of numbers instead of vectors, as the compiler works through several at once.
+void Scanner::look_out(const Look& look, std::int64_t firing,
+                       std::pair<std::size_t, std::size_t> range, const std::uint32_t* slots,
+                       std::vector<Ray>& rays) const {
+  const double spread = 0.25e-3 * config_.divergence_mrad;  // one standard deviation
+  const double exit = 0.25 * config_.beam_exit_m;
+  const Eigen::Matrix3d r = look.world_from_lidar.rotation_matrix();
+  const Eigen::Vector3d& place = look.world_from_lidar.translation();
+  const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
+  const auto [begin, end] = range;
+  std::array<CounterNoise::Pair, kMostBeams> noise;
+  std::array<Ray, kMostBeams> made;
+  std::vector<CounterNoise> footprints;
+  for (std::size_t b = begin; b < end; ++b)
+    footprints.emplace_back(seed_ + 2, static_cast<std::uint64_t>(firing), b);
+  for (std::size_t k = 0; k < rays_per_beam; ++k) {
+    for (std::size_t b = begin; b < end; ++b)
+      noise[b - begin] = footprints[b - begin].normal_pair();
+    for (std::size_t b = begin; b < end; ++b) {
+      const double u = noise[b - begin].first;
+      const double v = noise[b - begin].second;
+      const double x = look.head.cosine * beams_.x[b] - look.head.sine * beams_.y[b];
+      const double y = look.head.sine * beams_.x[b] + look.head.cosine * beams_.y[b];
+      const double cx = look.shaken.cosine * x - look.shaken.sine * y;
+      const double cy = look.shaken.sine * x + look.shaken.cosine * y;
+      const double cz = beams_.z[b];
+      // To the left of the beam, level, and up from it.
+      const double sx = look.head.cosine * beams_.side_x[b] - look.head.sine * beams_.side_y[b];
+      const double sy = look.head.sine * beams_.side_x[b] + look.head.cosine * beams_.side_y[b];
+      const double ox = u * sx - v * (cz * sy);
+      const double oy = u * sy + v * (cz * sx);
+      const double oz = v * (cx * sy - cy * sx);
+      const double ex = cx + spread * ox;
+      const double ey = cy + spread * oy;
+      const double ez = cz + spread * oz;
+      const double norm = std::sqrt(ex * ex + (ey * ey + ez * ez));
+      const double dx = ex / norm;
+      const double dy = ey / norm;
+      const double dz = ez / norm;
+      const double fx = look.origin.x() + exit * ox;
+      const double fy = look.origin.y() + exit * oy;
+      const double fz = look.origin.z() + exit * oz;
+      Ray& ray = made[b - begin];
+      for (int i = 0; i < 3; ++i) {
+        ray.direction[i] = static_cast<float>(r(i, 0) * dx + r(i, 1) * dy + r(i, 2) * dz);
+        ray.origin[i] = static_cast<float>(place[i] + (r(i, 0) * fx + r(i, 1) * fy + r(i, 2) * fz));
+      }
+      ray.time_s = look.time_s;
+    }
+    for (std::size_t b = begin; b < end; ++b)
+      rays[slots[b] * rays_per_beam + k] = made[b - begin];
+  }
+}
+
+void Scanner::meet_machine(Block& block) const {
   const std::size_t beams = model_.beams.size();
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
-  const std::size_t per_firing = beams * rays_per_beam;
-  for (std::size_t f = 0; f * per_firing < block.rays.size(); ++f) {
-    const double time = to_seconds(model_.firing_time(first + static_cast<std::int64_t>(f)));
+  for (std::size_t f = 0; f * beams < block.slots.size(); ++f) {
+    const double time = to_seconds(model_.firing_time(block.first + static_cast<std::int64_t>(f)));
     const Machine::Parts parts = machine_.at(time);
     const std::optional<HeldTree> held = machine_.held(time);
-    for (std::size_t i = f * per_firing; i < (f + 1) * per_firing; ++i) {
-      const std::size_t beam = i / rays_per_beam;
+    const Eigen::Vector3d origin = body_from_lidar_ * block.origin_in_lidar[f].cast<double>();
+    for (std::size_t beam = f * beams; beam < (f + 1) * beams; ++beam) {
       const Eigen::Vector3d direction =
           body_from_lidar_.rotation() * block.direction_in_lidar[beam].cast<double>();
-      const Eigen::Vector3d origin = body_from_lidar_ * block.origin_in_lidar[f].cast<double>();
-      Machine::cast(parts, origin, direction, config_.min_range_m, config_.max_range_m,
-                    block.hits[i]);
-      if (held) {
+      const std::size_t slot = block.slots[beam] * rays_per_beam;
+      for (std::size_t i = slot; i < slot + rays_per_beam; ++i) {
+        Machine::cast(parts, origin, direction, config_.min_range_m, config_.max_range_m,
+                      block.hits[i]);
+        if (!held) continue;
         scene_.cast_held(*held, block.rays[i], static_cast<float>(config_.min_range_m),
                          static_cast<float>(config_.max_range_m), block.hits[i]);
       }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "understory/sensor/scan.h"
@@ -36,8 +37,8 @@ struct SimulatedScan {
 
 // A spinning lidar carried through the forest. Every firing is cast from the true pose at its own
 // time. A scan is a function of its number alone: any order, any number of threads, same bytes. One
-// scan after another, as wind and harvest move the scene. The stand changes between blocks of 16
-// firings only.
+// scan after another, as wind and harvest move the scene. The stand changes between groups
+// of 16 firings only.
 class Scanner {
  public:
   // All references must outlive the scanner. `start` is the time of the path's zero.
@@ -58,13 +59,17 @@ class Scanner {
 
  private:
   struct Block;
-  void cast_block(std::int64_t first, std::int64_t end, double moment_s, Block& block) const;
-  void make_rays(std::int64_t first, std::int64_t end, double moment_s, Block& block) const;
-  void trace(std::size_t firings, Block& block) const;
-  void meet_machine(std::int64_t first, Block& block) const;
+  struct Look;
+  void cast_block(double moment_s, Block& block) const;
+  void make_rays(double moment_s, Block& block) const;
+  void look_out(const Look& look, std::int64_t firing, std::pair<std::size_t, std::size_t> range,
+                const std::uint32_t* slots, std::vector<Ray>& rays) const;
+  [[nodiscard]] std::vector<std::uint32_t> trace_order() const;
+  void find_slots(std::size_t firings, Block& block) const;
+  void meet_machine(Block& block) const;
   [[nodiscard]] double snow_per_m(double time_s) const;
   void meet_snow(CounterNoise noise, double per_m, BeamEcho& echo) const;
-  void add_ghosts(std::int64_t first, Block& block) const;
+  void add_ghosts(Block& block) const;
 
   const LidarConfig config_;
   ForestScene& scene_;
@@ -74,10 +79,17 @@ class Scanner {
   std::uint64_t seed_;
   LidarModel model_;
   Pose body_from_lidar_;
-  std::vector<Eigen::Vector3d> beam_directions_;  // at azimuth 0 of the head
-  std::vector<Eigen::Vector3d> beam_sides_;       // level, to the left of each beam
-  std::vector<std::size_t>
-      neighbours_;  // beams, those that look in nearly the same direction together
+  // Directions of the beams at azimuth 0 of the head, and level ones to the left of each.
+  struct Directions {
+    [[nodiscard]] Eigen::Vector3d direction(std::size_t beam) const {
+      return {x[beam], y[beam], z[beam]};
+    }
+    std::vector<double> x, y, z, side_x, side_y;
+  };
+  Directions beams_;
+  // The beams of a full block (firing by firing, beam by beam), those together that look in nearly
+  // the same direction.
+  std::vector<std::uint32_t> order_;
 };
 
 // The pose of a sensor from its place and its roll, pitch, yaw in degrees.

@@ -10,6 +10,7 @@
 
 #include "understory/simulation/world.h"
 #include "understory/util/parallel.h"
+#include "understory/util/random.h"
 
 namespace understory {
 namespace {
@@ -271,6 +272,69 @@ TEST(ForestScene, WindMovesCrowns) {
   const std::vector<float> later = ranges(2.0);
   EXPECT_NE(first, later);
   EXPECT_EQ(first, ranges(1.0));
+}
+
+// Sixteen rays go through the scene together, and plants lie in another tree of boxes than crowns.
+TEST(ForestScene, RaysMeetTheSameAloneAndTogether) {
+  SiteConfig site = quiet_site();
+  site.stand.wind_sway_m = 0.3;
+  site.stand.foliage = site.stand.dead_branches = 1.0;
+  site.stand.ground_plants_per_ha = 4000.0;
+  World world(site);
+  world.scene.arrange(3.0, 3.0);
+  Random random(5);
+  std::vector<Ray> rays;
+  for (int i = 0; i < 5000; ++i) {
+    const Eigen::Vector3f towards(static_cast<float>(random.normal()),
+                                  static_cast<float>(random.normal()),
+                                  static_cast<float>(0.5 * random.normal()));
+    rays.push_back({{0.0F, 0.0F, 3.0F}, towards.normalized(), 0.02F});
+  }
+  std::vector<Hit> hits(rays.size());
+  world.scene.cast(rays.data(), rays.size(), 0.1F, 60.0F, hits.data());
+  std::map<Surface, int> seen;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    Hit alone;
+    world.scene.cast(&rays[i], 1, 0.1F, 60.0F, &alone);
+    ASSERT_EQ(alone.range_m, hits[i].range_m);
+    ASSERT_EQ(alone.cosine, hits[i].cosine);
+    ASSERT_EQ(alone.surface, hits[i].surface);
+    ++seen[alone.surface];
+  }
+  for (const Surface surface :
+       {Surface::kGround, Surface::kStem, Surface::kFoliage, Surface::kPlant}) {
+    EXPECT_GT(seen[surface], 20) << static_cast<int>(surface);
+  }
+}
+
+// A firing measures the same in whichever block it is cast: half a view begins its blocks
+// elsewhere.
+TEST(Scanner, HalfAViewIsHalfOfTheWholeView) {
+  SiteConfig site = quiet_site();
+  site.stand.foliage = 1.0;
+  site.lidar.columns = 500;
+  site.lidar.divergence_mrad = 3.0;
+  site.lidar.rays_per_beam = 3;
+  site.lidar.range_sd_m = 0.01;
+  World whole(site);
+  site.lidar.fov_deg = 197.0;
+  World half(site);
+  const std::vector<BeamReading> all = whole.scanner.measure(7).beams;
+  const std::vector<BeamReading> part = half.scanner.measure(7).beams;
+  const LidarModel::Firings all_firings = whole.scanner.model().firings(7);
+  const LidarModel::Firings part_firings = half.scanner.model().firings(7);
+  const std::size_t beams = whole.scanner.model().beams.size();
+  ASSERT_EQ(part.size(), beams * static_cast<std::size_t>(part_firings.end - part_firings.first));
+  ASSERT_NE((part_firings.first - all_firings.first) % 64, 0);
+  const std::size_t ahead =
+      beams * static_cast<std::size_t>(part_firings.first - all_firings.first);
+  std::size_t returns = 0;
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    ASSERT_EQ(part[i].range_m, all[ahead + i].range_m) << i;
+    ASSERT_EQ(part[i].intensity, all[ahead + i].intensity) << i;
+    returns += part[i].range_m > 0.0F ? 1 : 0;
+  }
+  EXPECT_GT(returns, part.size() / 4);
 }
 
 // The edges of stems mix: with a wide beam the points around a stem spread farther than it is wide.

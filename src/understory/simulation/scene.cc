@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "understory/simulation/scene_content.h"
+#include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
 namespace understory {
@@ -36,8 +37,10 @@ class ForestScene::Impl : private SceneContent {
       packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
       packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
-    // First what stands in the way most surely: leaves behind it need not be looked for.
+    // First what stands in the way most surely: leaves behind it need not be looked for. (The flag
+    // for coherent rays would save 5 % here, but lets single rays miss what they graze.)
     embree_intersect16(valid, static_, &packet);
+    embree_intersect16(valid, rooted_, &packet);
     embree_intersect16(valid, top_, &packet);
     for (std::size_t i = 0; i < count; ++i)
       hits[i] = read_hit(packet, i, rays[i]);
@@ -92,7 +95,7 @@ class ForestScene::Impl : private SceneContent {
     ray.tnear = 0.05F;
     ray.tfar = 60.0F;
     ray.mask = 0xffffffffU;
-    embree_occluded1(still_ != nullptr ? still_ : top_, &ray);
+    embree_occluded1(still_, &ray);
     if (ray.tfar >= 0.0F) embree_occluded1(static_, &ray);
     return ray.tfar < 0.0F;
   }
@@ -104,7 +107,8 @@ class ForestScene::Impl : private SceneContent {
       tree.bend = (Wind::top(tree.sway, time_s) / above).cast<float>();
       tree.bend_rate = (Wind::top_velocity(tree.sway, time_s) / above).cast<float>();
     }
-    for (const Swaying& part : swaying_) {
+    parallel_for(swaying_.size(), 64, [&](std::size_t i) {
+      const Swaying& part = swaying_[i];
       const TreeSway& tree = sways_[part.tree];
       Eigen::Matrix<float, 3, 4> world_from_shape = shapes_[part.instance].second;
       // x += bend (z - stiff), z above the foot.
@@ -114,7 +118,7 @@ class ForestScene::Impl : private SceneContent {
       rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR,
                               world_from_shape.data());
       rtcCommitGeometry(geometry);
-    }
+    });
   }
 
   // A part of a felled tree, met in the tree's frame above a height.

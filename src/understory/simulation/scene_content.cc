@@ -80,6 +80,7 @@ SceneContent::SceneContent(const StandConfig& config, const Terrain& terrain, co
   device_ = rtcNewDevice("set_affinity=0");
   UNDERSTORY_CHECK(device_ != nullptr);
   top_ = rtcNewScene(device_);
+  rooted_ = new_scene();
   for (const Felling& felling : harvest.fellings)
     felled_[felling.tree].grab_s = felling.grab_s;
   GrownShapes grown = grow_shapes(config, seed);
@@ -88,14 +89,15 @@ SceneContent::SceneContent(const StandConfig& config, const Terrain& terrain, co
   for (const GrownTree& tree : stand.trees)
     add_tree(tree, grown.crowns);
   add_plants(stand);
-  if (!swaying_.empty() || !felled_.empty()) still_ = copy_of_instances();
+  still_ = copy_of_instances();
   add_remains(harvest, stand);
+  commit_alone(rooted_);
   commit_alone(top_);
   UNDERSTORY_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
 }
 
 SceneContent::~SceneContent() {
-  if (still_ != nullptr) rtcReleaseScene(still_);
+  rtcReleaseScene(still_);
   rtcReleaseScene(top_);
   for (const RTCScene scene : scenes_)
     rtcReleaseScene(scene);
@@ -235,7 +237,7 @@ void SceneContent::add_cloud(const GrownTree& tree, std::size_t sway) {
       Instance instance{surface, cos_yaw, sin_yaw, static_cast<float>(reflectivity)};
       instance.tree = id;
       instance.sway = above ? sway : kStands;
-      const unsigned number = add_instance(scene, world_from_shape, instance);
+      const unsigned number = add_instance(top_, scene, world_from_shape, instance);
       if (instance.sway != kStands) swaying_.push_back({number, sway});
     };
     add(scenes.stem[above ? 1 : 0], Surface::kStem, tree.bark_reflectivity, tree.id);
@@ -260,7 +262,7 @@ unsigned SceneContent::add_stem(const GrownTree& tree, bool all, std::size_t swa
   Instance instance{Surface::kStem, 1.0F, 0.0F, static_cast<float>(tree.bark_reflectivity)};
   instance.tree = tree.id;
   instance.sway = sway;
-  const unsigned number = add_instance(scene, world_from_shape, instance);
+  const unsigned number = add_instance(top_, scene, world_from_shape, instance);
   if (sway != kStands) swaying_.push_back({number, sway});
   return number;
 }
@@ -282,7 +284,7 @@ std::pair<unsigned, unsigned> SceneContent::add_crown(const GrownTree& tree,
   const auto add = [&](RTCScene scene, float reflectivity) {
     Instance instance{Surface::kFoliage, cos_yaw, sin_yaw, reflectivity};
     instance.sway = sway;
-    const unsigned number = add_instance(scene, world_from_shape, instance);
+    const unsigned number = add_instance(top_, scene, world_from_shape, instance);
     if (sway != kStands) swaying_.push_back({number, sway});
     return number;
   };
@@ -304,7 +306,7 @@ void SceneContent::add_remains(const Harvest& harvest, const Stand& stand) {
     add_wood(log.lying, log.lies_s);
   for (std::size_t i = 0; i < harvest.brash.size(); ++i) {
     const auto& [from_s, plant] = harvest.brash[i];
-    time_limit(add_plant(plant, plant_scene(plant.kind, i), 0.0), from_s, kForever);
+    time_limit(add_plant(top_, plant, plant_scene(plant.kind, i), 0.0), from_s, kForever);
   }
   for (const Timed& part : timed_) {
     if (part.from_s > -kForever) changes_.push_back(part.from_s);
@@ -323,8 +325,8 @@ void SceneContent::add_wood(const Wood& wood, double from_s) {
   commit_alone(scene);
   Eigen::Matrix<float, 3, 4> world_from_shape;
   world_from_shape << Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero();
-  time_limit(add_instance(scene, world_from_shape, {Surface::kDeadWood, 1.0F, 0.0F, 0.32F}), from_s,
-             kForever);
+  time_limit(add_instance(top_, scene, world_from_shape, {Surface::kDeadWood, 1.0F, 0.0F, 0.32F}),
+             from_s, kForever);
 }
 
 void SceneContent::time_limit(unsigned instance, double from_s, double until_s) {
@@ -337,7 +339,7 @@ void SceneContent::add_plants(const Stand& stand) {
   for (std::size_t i = 0; i < stand.plants.size(); ++i) {
     const Plant& plant = stand.plants[i];
     if (snowy_ && plant.height_m < snow_m_) continue;  // covered
-    add_plant(plant, plant_scene(plant.kind, i), snowy_ ? snow_m_ : 0.0);
+    add_plant(rooted_, plant, plant_scene(plant.kind, i), snowy_ ? snow_m_ : 0.0);
   }
 }
 
@@ -345,7 +347,8 @@ RTCScene SceneContent::plant_scene(PlantKind kind, std::size_t variant) const {
   return plants_[3 * static_cast<std::size_t>(kind) + variant % 3];
 }
 
-unsigned SceneContent::add_plant(const Plant& plant, RTCScene scene, double sunk_m) {
+unsigned SceneContent::add_plant(RTCScene where, const Plant& plant, RTCScene scene,
+                                 double sunk_m) {
   const auto cos_yaw = static_cast<float>(std::cos(plant.yaw_rad));
   const auto sin_yaw = static_cast<float>(std::sin(plant.yaw_rad));
   const auto high = static_cast<float>(plant.height_m);
@@ -356,7 +359,7 @@ unsigned SceneContent::add_plant(const Plant& plant, RTCScene scene, double sunk
   world_from_shape.col(2) << 0.0F, 0.0F, high;
   world_from_shape.col(3) = plant.foot.cast<float>();
   world_from_shape(2, 3) -= static_cast<float>(sunk_m);
-  return add_instance(scene, world_from_shape, {Surface::kPlant, cos_yaw, sin_yaw, 0.45F});
+  return add_instance(where, scene, world_from_shape, {Surface::kPlant, cos_yaw, sin_yaw, 0.45F});
 }
 
 RTCScene SceneContent::new_scene() {
@@ -377,14 +380,14 @@ RTCScene SceneContent::shape_scene(Shape shape) {
   return scene;
 }
 
-unsigned SceneContent::add_instance(RTCScene scene,
+unsigned SceneContent::add_instance(RTCScene where, RTCScene scene,
                                     const Eigen::Matrix<float, 3, 4>& world_from_shape,
                                     const Instance& instance) {
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
   rtcSetGeometryInstancedScene(geometry, scene);
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, world_from_shape.data());
-  const unsigned id = attach(top_, geometry);
-  UNDERSTORY_CHECK(id == instances_.size());
+  const auto id = static_cast<unsigned>(instances_.size());
+  attach_as(where, geometry, id);
   instances_.push_back(instance);
   shapes_.push_back({scene, world_from_shape});
   present_.push_back(true);

@@ -79,9 +79,10 @@ class SceneContent {
 
   RTCDevice device_ = nullptr;
   RTCScene static_ = nullptr;  // ground, stems as far as they never move, dead wood
-  RTCScene top_ = nullptr;     // instances
+  RTCScene rooted_ = nullptr;  // instances that never move: plants
+  RTCScene top_ = nullptr;     // all other instances; numbers of instances hold for both
   std::vector<RTCScene> scenes_;
-  RTCScene still_ = nullptr;  // the instances at rest, if any of them move
+  RTCScene still_ = nullptr;  // all instances at rest, before the harvest
   std::vector<Instance> instances_;
   std::vector<std::pair<RTCScene, Eigen::Matrix<float, 3, 4>>> shapes_;  // of the instances
   std::vector<bool> present_;                                            // of the instances
@@ -121,10 +122,11 @@ class SceneContent {
   void time_limit(unsigned instance, double from_s, double until_s);
   void add_plants(const Stand& stand);
   [[nodiscard]] RTCScene plant_scene(PlantKind kind, std::size_t variant) const;
-  unsigned add_plant(const Plant& plant, RTCScene scene, double sunk_m);
+  unsigned add_plant(RTCScene where, const Plant& plant, RTCScene scene, double sunk_m);
   RTCScene new_scene();
   RTCScene shape_scene(Shape shape);
-  unsigned add_instance(RTCScene scene, const Eigen::Matrix<float, 3, 4>& world_from_shape,
+  unsigned add_instance(RTCScene where, RTCScene scene,
+                        const Eigen::Matrix<float, 3, 4>& world_from_shape,
                         const Instance& instance);
   // The same crowns and plants once more, to stay where they are.
   RTCScene copy_of_instances();
