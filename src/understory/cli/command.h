@@ -36,6 +36,7 @@ void add_convert_command(CLI::App& app, Command& chosen);
 void add_simulate_command(CLI::App& app, Command& chosen);
 void add_register_command(CLI::App& app, Command& chosen);
 void add_inventory_command(CLI::App& app, Command& chosen);
+void add_georeference_command(CLI::App& app, Command& chosen);
 void add_merge_command(CLI::App& app, Command& chosen);
 void add_evaluate_command(CLI::App& app, Command& chosen);
 

@@ -60,6 +60,7 @@ int run(int argc, char** argv) {
   add_inventory_command(app, chosen);
   add_evaluate_command(app, chosen);
   add_merge_command(app, chosen);
+  add_georeference_command(app, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -58,7 +58,13 @@ std::vector<Tree> read_trees(const std::filesystem::path& path) {
     const double z = table.number("z");
     tree.z = std::isfinite(z) ? z : 0.0;
     tree.dbh_m = table.number("dbh_m");
+    tree.dbh_sd_m = table.number("dbh_sd_m");
     tree.height_m = table.number("height_m");
+    tree.lean_deg = table.number("lean_deg");
+    const double observations = table.number("observations");
+    tree.observations = std::isfinite(observations) ? static_cast<int>(observations) : 0;
+    tree.x_sd_m = table.number("x_sd_m");
+    tree.y_sd_m = table.number("y_sd_m");
     tree.felled = !table.text("felled_at").empty();
     trees.push_back(tree);
   }

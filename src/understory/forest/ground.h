@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "understory/forest/point_blocks.h"
-#include "understory/forest/raster.h"
+#include "understory/geometry/raster.h"
 #include "understory/util/config.h"
 
 namespace understory {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/forest/raster.h"
+#include "understory/geometry/raster.h"
 #include "understory/forest/tree.h"
 
 namespace understory {

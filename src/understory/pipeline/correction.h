@@ -9,6 +9,7 @@
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/stem_correction.h"
 #include "understory/recording/recording.h"
+#include "understory/sensor/gnss_fix.h"
 #include "understory/util/config.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
@@ -29,6 +30,7 @@ struct SparseScans {
   std::vector<StampedPose> path;      // of every scan, chained
   std::vector<SparseStep> steps;      // of the views in the stems' file
   const StageTimes* times = nullptr;  // "scan": all of one scan
+  std::vector<GnssFix> fixes;         // of the recording; compared with, not used
   bool stopped = false;               // before the recording's end
 };
 

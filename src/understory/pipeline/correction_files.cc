@@ -11,6 +11,7 @@
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction_report.h"
+#include "understory/pipeline/gnss_fit.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_truth.h"
 #include "understory/pipeline/scan_path.h"
@@ -108,6 +109,34 @@ double path_length(const std::vector<Pose>& poses) {
   for (std::size_t i = 1; i < poses.size(); ++i)
     length += (poses[i].translation() - poses[i - 1].translation()).norm();
   return length;
+}
+
+// The recording's own GNSS path beside the path: how well they lie on each other, P1 (6), and
+// gnss.csv in the run's frame. The fixes have no say in the path.
+void compare_with_gnss(const CorrectionRequest& request, RunSummary& summary) {
+  if (request.scans == nullptr || request.scans->fixes.empty()) return;
+  const auto antenna = request.scans->source->rig().body_from_gnss;
+  const GnssFit fit =
+      fit_to_gnss(read_trajectory(request.run_folder / "trajectory.tum"),
+                  antenna ? antenna->translation() : Eigen::Vector3d(Eigen::Vector3d::Zero()),
+                  request.scans->fixes, {});
+  summary.quality.merge(figures_of(fit));
+  GnssWriter writer(request.run_folder / "gnss.csv");
+  const Pose world_from_enu = fit.enu_from_world.inverse();
+  for (GnssRow row : fit.rows) {
+    row.position_in_world = world_from_enu * row.position_in_world;
+    row.residual = world_from_enu.rotation() * row.residual;
+    row.used = false;
+    row.reason = "compared with, not used";
+    writer.add(row);
+  }
+  for (std::size_t k = 0; fit.rows.empty() && k < request.scans->fixes.size(); ++k) {
+    GnssRow row;
+    row.fix = request.scans->fixes[k];
+    row.reason = fit.path.reason;
+    writer.add(row);
+  }
+  writer.commit();
 }
 
 // Root mean square distance of a tree's sights from their mean: the noise of the map, without
@@ -265,6 +294,10 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
     write_trees_csv(folder / "trees.csv", trees);
   }
   RunSummary summary = summary_of(request, run, stems, log);
+  {
+    const ScopedTimer timer(run.times, "gnss_fit");
+    compare_with_gnss(request, summary);
+  }
   summary.stages = summarise(run.times);
   if (request.scans != nullptr) summary.stages.merge(summarise(*request.scans->times));
   for (const auto& [name, stage] : summary.stages)

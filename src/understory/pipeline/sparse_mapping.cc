@@ -40,6 +40,7 @@ class SparseRun {
       }
       while (auto ready = orderer_.pop()) {
         if (const auto* scan = std::get_if<ScanPtr>(&*ready)) take(**scan, progress);
+        if (const auto* fix = std::get_if<GnssFix>(&*ready)) fixes_.push_back(*fix);
         if (std::holds_alternative<ImuSample>(*ready) && !told_of_imu_) {
           log_.info("the sparse front end does not use the recording's IMU");
           told_of_imu_ = true;
@@ -61,6 +62,7 @@ class SparseRun {
     scans.steps = std::move(steps_);
     scans.times = &times_;
     scans.stopped = stopped;
+    scans.fixes = std::move(fixes_);
     return scans;
   }
 
@@ -88,6 +90,7 @@ class SparseRun {
   StemFrontEnd front_end_;
   StemsWriter stems_;
   std::vector<StampedPose> path_;  // of every scan
+  std::vector<GnssFix> fixes_;
   StageTimes times_;
   bool told_of_imu_ = false;
   std::vector<SparseStep> steps_;  // of the views that were kept

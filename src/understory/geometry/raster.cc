@@ -1,4 +1,4 @@
-#include "understory/forest/raster.h"
+#include "understory/geometry/raster.h"
 
 #include <algorithm>
 

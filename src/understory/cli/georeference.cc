@@ -1,0 +1,129 @@
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <variant>
+
+#include "understory/cli/command.h"
+#include "understory/pipeline/georeferencing.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+struct GeoreferenceOptions {
+  std::string run;
+  std::string result;
+  std::string method;
+  std::string gnss;
+  std::string terrain_model;
+  std::vector<double> antenna_m;
+  std::vector<double> start;
+  bool plain = false;
+  bool json = false;
+  TerrainFitConfig terrain;
+  std::string coordinate_system;
+};
+
+// Options that belong to one method are errors with the other.
+void check(const GeoreferenceOptions& options) {
+  std::vector<std::string> problems;
+  if (options.run.empty()) problems.emplace_back("RUN is needed: a run folder");
+  if (options.result.empty()) problems.emplace_back("-o is needed: the folder to write");
+  const bool terrain = options.method == "terrain";
+  if (terrain && options.terrain_model.empty())
+    problems.emplace_back("--method terrain needs --dem FILE");
+  if (terrain && !options.gnss.empty()) problems.emplace_back("--gnss belongs to gnss-path");
+  if (terrain && options.plain) problems.emplace_back("--plain belongs to gnss-path");
+  if (terrain && !options.antenna_m.empty())
+    problems.emplace_back("--antenna-m belongs to gnss-path");
+  if (!terrain && !options.terrain_model.empty()) problems.emplace_back("--dem belongs to terrain");
+  if (!terrain && !options.start.empty()) problems.emplace_back("--start belongs to terrain");
+  if (!terrain && (options.terrain.place_sd_m > 0.0 || options.terrain.yaw_sd_deg > 0.0))
+    problems.emplace_back("--place-sd-m and --yaw-sd-deg belong to terrain");
+  if (!problems.empty()) throw ConfigError(problems);
+}
+
+int run_georeference(const GeoreferenceOptions& options, CommandContext& context) {
+  check(options);
+  GeoreferenceRequest request;
+  request.run = options.run;
+  request.result = options.result;
+  request.gnss = options.gnss;
+  request.terrain_model = options.terrain_model;
+  request.terrain = options.terrain;
+  request.path.robust = !options.plain;
+  request.coordinate_system = options.coordinate_system;
+  request.method =
+      options.method == "terrain" ? GeoreferenceMethod::kTerrain : GeoreferenceMethod::kGnssPath;
+  if (!options.antenna_m.empty())
+    request.antenna_in_body = {options.antenna_m[0], options.antenna_m[1], options.antenna_m[2]};
+  if (!options.start.empty())
+    request.start = {options.start[0], options.start[1], options.start[2]};
+  const GeoreferenceOutcome outcome = run_georeferencing(request, context.log);
+  if (options.json) {
+    nlohmann::ordered_json json{{"status", to_string(outcome.status)}, {"method", options.method}};
+    for (const auto& [name, figure] : outcome.figures)
+      std::visit([&, &key = name](const auto& value) { json[key] = value; }, figure);
+    std::printf("%s\n", json.dump(2).c_str());
+  } else {
+    std::printf("%s\n", outcome.summary.c_str());
+  }
+  for (const std::string& reason : outcome.reasons)
+    std::fprintf(stderr, "warning: result %s: %s\n", to_string(outcome.status).c_str(),
+                 reason.c_str());
+  return outcome.status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
+}
+
+}  // namespace
+
+void add_georeference_command(CLI::App& app, Command& chosen) {
+  CLI::App* command =
+      app.add_subcommand("georeference", "Move a finished run onto a GNSS path or a terrain model");
+  const auto options = std::make_shared<GeoreferenceOptions>();
+  command->add_option("RUN", options->run, "Run folder");
+  command->add_option("-o,--output", options->result, "Folder for the moved run");
+  command
+      ->add_option("--method", options->method,
+                   "gnss-path: one motion in the plane between both paths, no common clock needed; "
+                   "terrain: height and tilt from a terrain model")
+      ->required()
+      ->check(CLI::IsMember({"gnss-path", "terrain"}));
+  command->add_option("--gnss", options->gnss,
+                      "Fixes: a recording, an NMEA log or a CSV table (gnss.csv of the run if not "
+                      "given)");
+  command
+      ->add_option("--antenna-m", options->antenna_m,
+                   "Where the GNSS antenna is in the body frame: x y z (the origin if not given)")
+      ->expected(3);
+  command->add_flag("--plain", options->plain,
+                    "Least squares as printed in P1 (6): fixes that ran away count like others");
+  command->add_option("--dem", options->terrain_model,
+                      "Terrain model: GeoTIFF, ESRI ASCII grid, XYZ grid");
+  command
+      ->add_option("--start", options->start,
+                   "Where the run's origin lies on the terrain model and how its x axis is turned "
+                   "from east: x_m y_m yaw_deg")
+      ->expected(3);
+  command
+      ->add_option("--place-sd-m", options->terrain.place_sd_m,
+                   "How far off the place may be: the relief then moves it too (0 keeps it)")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  command
+      ->add_option("--yaw-sd-deg", options->terrain.yaw_sd_deg,
+                   "How far off the heading may be (0 keeps it)")
+      ->check(CLI::Range(0.0, 45.0))
+      ->capture_default_str();
+  command->add_option("--crs", options->coordinate_system,
+                      "Coordinate system of trees.gpkg, for instance EPSG:3067 (the UTM zone if "
+                      "not given)");
+  command->add_flag("--json", options->json, "One JSON object on stdout");
+  command->footer(
+      "Examples:\n  understory georeference forest --method gnss-path --gnss drive.nmea -o placed\n"
+      "  understory georeference placed --method terrain --dem terrain.tif -o levelled");
+  command->callback([&chosen, options] {
+    chosen = [options](CommandContext& context) { return run_georeference(*options, context); };
+  });
+}
+
+}  // namespace understory

@@ -1,0 +1,313 @@
+#include "understory/georeference/path_fit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "understory/registration/plane_grid.h"
+#include "understory/util/median.h"
+
+namespace understory {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kNowhere = 1e9;    // no limit to how far a nearest point may be
+constexpr double kOtherDeg = 20.0;  // motions that differ by more are different answers
+constexpr double kLeastWidthM = 0.2;
+
+struct Motion {
+  double yaw = 0.0;
+  Vector2d shift = Vector2d::Zero();
+
+  [[nodiscard]] Pose pose() const {
+    return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Vector3d::UnitZ())),
+            Vector3d(shift.x(), shift.y(), 0.0)};
+  }
+};
+
+// Points of a path with the number of those that they stand for.
+struct Cloud {
+  SparsePoints points;
+  std::vector<double> weights;  // sum 1
+};
+
+// Who stands still gives thousands of points at one place: those of one small cell become their
+// mean, which counts as often.
+Cloud gathered(const std::vector<Vector3d>& path, double cell_m) {
+  std::map<std::pair<long, long>, std::pair<Vector3d, double>> cells;
+  for (const Vector3d& point : path) {
+    auto& [sum, count] =
+        cells
+            .try_emplace({std::lround(point.x() / cell_m), std::lround(point.y() / cell_m)},
+                         Vector3d::Zero(), 0.0)
+            .first->second;
+    sum += Vector3d(point.x(), point.y(), 0.0);
+    count += 1.0;
+  }
+  Cloud cloud;
+  for (const auto& [key, cell] : cells) {
+    cloud.points.emplace_back(cell.first / cell.second);
+    cloud.weights.push_back(cell.second / static_cast<double>(path.size()));
+  }
+  return cloud;
+}
+
+// Every place alike, however long it was stayed at: for the search of a start.
+Cloud levelled(Cloud cloud) {
+  cloud.weights.assign(cloud.points.size(), 1.0 / static_cast<double>(cloud.points.size()));
+  return cloud;
+}
+
+struct Pairs {
+  std::vector<Vector2d> source;  // in the path's own frame
+  std::vector<Vector2d> target;
+  std::vector<double> weights;
+  std::vector<double> distance_m;
+
+  void add(const Vector3d& s, const Vector3d& t, double weight, double squared) {
+    source.emplace_back(s.head<2>());
+    target.emplace_back(t.head<2>());
+    weights.push_back(weight);
+    distance_m.push_back(std::sqrt(squared));
+  }
+};
+
+class Fitter {
+ public:
+  Fitter(Cloud path, Cloud fixes)
+      : path_(std::move(path)),
+        fixes_(std::move(fixes)),
+        path_grid_(path_.points),
+        fix_grid_(fixes_.points) {}
+
+  // First the fixes with their nearest points of the path, then the other way round.
+  [[nodiscard]] Pairs pairs(const Motion& motion) const {
+    Pairs result;
+    const Pose target_from_source = motion.pose();
+    const Pose source_from_target = target_from_source.inverse();
+    for (std::size_t k = 0; k < fixes_.points.size(); ++k) {
+      const auto found = path_grid_.nearest(source_from_target * fixes_.points[k], kNowhere, 0.0);
+      result.add(path_.points[static_cast<std::size_t>(found.index)], fixes_.points[k],
+                 0.5 * fixes_.weights[k], found.squared_m2);
+    }
+    for (std::size_t k = 0; k < path_.points.size(); ++k) {
+      const auto found = fix_grid_.nearest(target_from_source * path_.points[k], kNowhere, 0.0);
+      result.add(path_.points[k], fixes_.points[static_cast<std::size_t>(found.index)],
+                 0.5 * path_.weights[k], found.squared_m2);
+    }
+    return result;
+  }
+
+  // The centres of both laid on each other.
+  [[nodiscard]] Motion centred(double yaw) const {
+    const auto mean = [](const Cloud& cloud) {
+      Vector2d sum = Vector2d::Zero();
+      for (std::size_t k = 0; k < cloud.points.size(); ++k)
+        sum += cloud.weights[k] * cloud.points[k].head<2>();
+      return sum;
+    };
+    return {yaw, mean(fixes_) - Eigen::Rotation2Dd(yaw) * mean(path_)};
+  }
+
+  // Nearest points and the motion that fits them best, in turn.
+  [[nodiscard]] Motion descend(Motion motion, bool robust, int steps) const;
+  [[nodiscard]] double value(const Motion& motion) const {
+    return value_of(pairs(motion), std::numeric_limits<double>::infinity());
+  }
+  // The width of Tukey's biweight from the pairs themselves.
+  [[nodiscard]] static double width_of(const Pairs& pairs) {
+    std::vector<double> distances = pairs.distance_m;
+    // The median of a Rayleigh distribution is 1.18 standard deviations of a coordinate.
+    return 4.685 * std::max(kLeastWidthM, upper_median(distances) / 1.1774);
+  }
+  // The mean of (6), or of the biweight's loss.
+  [[nodiscard]] static double value_of(const Pairs& pairs, double width_m) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < pairs.weights.size(); ++k)
+      sum += pairs.weights[k] * loss(pairs.distance_m[k], width_m);
+    return sum;
+  }
+
+ private:
+  [[nodiscard]] static double loss(double distance_m, double width_m) {
+    if (!std::isfinite(width_m)) return distance_m * distance_m;
+    const double u = std::min(1.0, std::pow(distance_m / width_m, 2.0));
+    return width_m * width_m / 3.0 * (1.0 - std::pow(1.0 - u, 3.0));
+  }
+
+  Cloud path_;
+  Cloud fixes_;
+  PlaneGrid path_grid_;
+  PlaneGrid fix_grid_;
+};
+
+// Least squares over weighted pairs, closed form.
+Motion best_motion(const Pairs& pairs, double width_m) {
+  std::vector<double> weights = pairs.weights;
+  double total = 0.0;
+  Vector2d source = Vector2d::Zero();
+  Vector2d target = Vector2d::Zero();
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    const double u = pairs.distance_m[k] / width_m;
+    weights[k] *= u < 1.0 ? std::pow(1.0 - u * u, 2.0) : 0.0;
+    total += weights[k];
+    source += weights[k] * pairs.source[k];
+    target += weights[k] * pairs.target[k];
+  }
+  source /= total;
+  target /= total;
+  double along = 0.0;
+  double across = 0.0;
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    const Vector2d s = pairs.source[k] - source;
+    const Vector2d t = pairs.target[k] - target;
+    along += weights[k] * s.dot(t);
+    across += weights[k] * (s.x() * t.y() - s.y() * t.x());
+  }
+  const double yaw = std::atan2(across, along);
+  return {yaw, target - Eigen::Rotation2Dd(yaw) * source};
+}
+
+Motion Fitter::descend(Motion motion, bool robust, int steps) const {
+  for (int step = 0; step < steps; ++step) {
+    const Pairs now = pairs(motion);
+    const Motion next =
+        best_motion(now, robust ? width_of(now) : std::numeric_limits<double>::infinity());
+    const double moved = (next.shift - motion.shift).norm();
+    const double turned = std::abs(std::remainder(next.yaw - motion.yaw, 2.0 * M_PI));
+    motion = next;
+    if (moved < 1e-6 && turned < 1e-9) break;
+  }
+  return motion;
+}
+
+double extent_m(const std::vector<Vector3d>& points) {
+  Vector2d low = points.front().head<2>();
+  Vector2d high = low;
+  for (const Vector3d& point : points) {
+    low = low.cwiseMin(point.head<2>());
+    high = high.cwiseMax(point.head<2>());
+  }
+  return (high - low).norm();
+}
+
+double turn_deg(const Motion& a, const Motion& b) {
+  return std::abs(std::remainder(a.yaw - b.yaw, 2.0 * M_PI)) * 180.0 / M_PI;
+}
+
+// Where the search from every heading ends, the best first.
+std::vector<std::pair<double, Motion>> starts(const std::vector<Vector3d>& path,
+                                              const std::vector<Vector3d>& fixes, int yaws) {
+  const double cell_m = std::max(1.0, std::max(extent_m(path), extent_m(fixes)) / 150.0);
+  const Fitter coarse(levelled(gathered(path, cell_m)), levelled(gathered(fixes, cell_m)));
+  std::vector<std::pair<double, Motion>> ends;
+  for (int k = 0; k < yaws; ++k) {
+    const Motion end = coarse.descend(coarse.centred(2.0 * M_PI * k / yaws), true, 30);
+    const Pairs pairs = coarse.pairs(end);
+    ends.emplace_back(Fitter::value_of(pairs, std::numeric_limits<double>::infinity()), end);
+  }
+  std::stable_sort(ends.begin(), ends.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  return ends;
+}
+
+void tell_fixes(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
+                double width_m, PathFit& fit) {
+  const PlaneGrid grid(gathered(path, 0.02).points);
+  const Pose source_from_target = fit.target_from_source.inverse();
+  double squares = 0.0;
+  double sum = 0.0;
+  for (const Vector3d& fix : fixes) {
+    const double squared = grid.nearest(source_from_target * fix, kNowhere, 0.0).squared_m2;
+    squares += squared;
+    sum += std::sqrt(squared);
+    fit.fix_distance_m.push_back(std::sqrt(squared));
+    fit.fix_used.push_back(std::sqrt(squared) < width_m ? 1 : 0);
+  }
+  const auto count = static_cast<double>(fixes.size());
+  fit.fixes_rms_m = std::sqrt(squares / count);
+  fit.fixes_mean_m = sum / count;
+  std::vector<double> distances = fit.fix_distance_m;
+  fit.fixes_median_m = upper_median(distances);
+}
+
+void tell_path(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
+               PathFit& fit) {
+  const PlaneGrid grid(gathered(fixes, 0.02).points);
+  double squares = 0.0;
+  double sum = 0.0;
+  for (const Vector3d& point : path) {
+    const double squared = grid.nearest(fit.target_from_source * point, kNowhere, 0.0).squared_m2;
+    squares += squared;
+    sum += std::sqrt(squared);
+  }
+  fit.path_rms_m = std::sqrt(squares / static_cast<double>(path.size()));
+  fit.path_mean_m = sum / static_cast<double>(path.size());
+}
+
+}  // namespace
+
+PathFit fit_path(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
+                 const PathFitConfig& config) {
+  PathFit fit;
+  constexpr std::size_t kLeast = 3;
+  constexpr double kLeastExtentM = 5.0;
+  if (path.size() < kLeast || fixes.size() < kLeast || extent_m(path) < kLeastExtentM ||
+      extent_m(fixes) < kLeastExtentM) {
+    fit.reason = fmt::format(
+        "expected two paths of at least {} points and {:g} m; there are {} points and {} fixes",
+        kLeast, kLeastExtentM, path.size(), fixes.size());
+    return fit;
+  }
+  const auto ends = starts(path, fixes, config.yaw_starts);
+  const Fitter fine(gathered(path, 0.02), gathered(fixes, 0.02));
+  // The best three ends that differ, each refined with everything.
+  std::vector<Motion> refined;
+  const auto wanted = [&](const Motion& motion) {
+    return !std::isfinite(config.about_yaw_rad) ||
+           turn_deg(motion, {config.about_yaw_rad, Vector2d::Zero()}) < 90.0;
+  };
+  for (const auto& [value, end] : ends) {
+    if (!wanted(end)) continue;
+    const bool known = std::any_of(refined.begin(), refined.end(), [&, &e = end](const Motion& m) {
+      return turn_deg(m, e) < kOtherDeg;
+    });
+    if (!known) refined.push_back(fine.descend(end, config.robust, 200));
+    if (refined.size() == 3) break;
+  }
+  if (refined.empty()) {
+    fit.reason = "no motion in the direction asked for lays the paths on each other";
+    return fit;
+  }
+  // One width for all, or the worst motion would forgive itself most.
+  double width_m = std::numeric_limits<double>::infinity();
+  for (const Motion& motion : refined) {
+    if (config.robust) width_m = std::min(width_m, Fitter::width_of(fine.pairs(motion)));
+  }
+  const auto best =
+      std::min_element(refined.begin(), refined.end(), [&](const Motion& a, const Motion& b) {
+        return Fitter::value_of(fine.pairs(a), width_m) < Fitter::value_of(fine.pairs(b), width_m);
+      });
+  fit.found = true;
+  fit.target_from_source = best->pose();
+  fit.symmetric_rms_m = std::sqrt(fine.value(*best));
+  fit.turned_rms_m = std::numeric_limits<double>::infinity();
+  for (const Motion& other : refined) {
+    const double rms = std::sqrt(fine.value(other));
+    if (turn_deg(other, *best) < kOtherDeg || rms >= fit.turned_rms_m) continue;
+    fit.turned_rms_m = rms;
+    fit.turned_target_from_source = other.pose();
+  }
+  tell_fixes(path, fixes, width_m, fit);
+  tell_path(path, fixes, fit);
+  return fit;
+}
+
+}  // namespace understory

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+#include "understory/geometry/raster.h"
+
+namespace understory {
+
+// Levelling to a terrain model by one rigid motion, robust least squares over the heights of points
+// on the ground (stem feet, or cells of an own terrain model) above it (P1 section 3, table 1).
+struct TerrainFitConfig {
+  // How far off the place and the heading may be to begin with: 0 keeps them, so that only height
+  // and tilt are fitted. Otherwise the relief moves them, as far as it can tell.
+  double place_sd_m = 0.0;
+  double yaw_sd_deg = 0.0;
+  // Heights of a terrain model err together over that far, so points nearer to each other count as
+  // one when it is judged how much the relief tells.
+  double correlation_m = 5.0;
+};
+
+// A point on the ground; `sd_m` is how well its height is known.
+struct GroundPoint {
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
+  double sd_m = 0.1;
+};
+
+struct TerrainFit {
+  bool found = false;
+  std::string reason;  // if not
+  Pose terrain_from_world;
+  std::size_t points = 0;     // with terrain below them
+  std::size_t used = 0;       // of these, not so far off that they had no say
+  double rms_before_m = 0.0;  // heights above the terrain, of all of them, the mean taken off
+  double mean_before_m = 0.0;
+  double rms_m = 0.0;     // after
+  double median_m = 0.0;  // of the absolute heights after
+  double tilt_deg = 0.0;  // by which up was turned
+  // What is still uncertain after the fit, one standard deviation.
+  double place_sd_m = 0.0;
+  double yaw_sd_deg = 0.0;
+};
+
+// Not found where fewer than ten points, or points on one line, lie on the terrain. Deterministic.
+[[nodiscard]] TerrainFit fit_to_terrain(const std::vector<GroundPoint>& points,
+                                        const Raster& terrain, const TerrainFitConfig& config);
+
+}  // namespace understory

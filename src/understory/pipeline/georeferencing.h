@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/georeference/path_fit.h"
+#include "understory/georeference/terrain_fit.h"
+#include "understory/output/run_summary.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+enum class GeoreferenceMethod {
+  kGnssPath,  // one motion in the plane between two paths, P1 (6)
+  kTerrain    // one rigid motion that lays ground points on a terrain model, P1 table 1
+};
+
+// One call of `understory georeference`.
+struct GeoreferenceRequest {
+  std::filesystem::path run;  // folder with trajectory.tum
+  std::filesystem::path result;
+  GeoreferenceMethod method = GeoreferenceMethod::kGnssPath;
+  std::string gnss;  // file with fixes; empty: gnss.csv of the run
+  Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();
+  PathFitConfig path;
+  std::filesystem::path terrain_model;
+  // Where the run's origin lies on a terrain model without a coordinate system: x, y, metres, and
+  // the direction of its x axis, degrees anticlockwise from east.
+  std::optional<std::array<double, 3>> start;
+  TerrainFitConfig terrain;
+  std::string coordinate_system;  // of trees.gpkg; empty: the UTM zone
+};
+
+struct GeoreferenceOutcome {
+  RunStatus status = RunStatus::kComplete;
+  std::vector<std::string> reasons;
+  std::map<std::string, Figure> figures;
+  std::string summary;  // a few lines for the terminal
+};
+
+// Moves a run by a fit after it was made: reads trajectory.tum and what else can be moved of the
+// run folder and writes all of it, moved, to another one. Throws InputError, OutputError or
+// ConfigError.
+[[nodiscard]] GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& log);
+
+}  // namespace understory
