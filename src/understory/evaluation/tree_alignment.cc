@@ -25,8 +25,11 @@ std::vector<Span> spans(const std::vector<Tree>& trees, bool both_directions) {
   std::vector<Span> result;
   for (std::size_t i = 0; i < trees.size(); ++i) {
     for (std::size_t j = both_directions ? 0 : i + 1; j < trees.size(); ++j) {
-      const double length = std::hypot(trees[i].x - trees[j].x, trees[i].y - trees[j].y);
-      if (i != j && length >= kMinPairM && length <= kMaxPairM) result.push_back({length, i, j});
+      const double x = trees[i].x - trees[j].x;
+      const double y = trees[i].y - trees[j].y;
+      const double square = x * x + y * y;  // most pairs are too long, and roots are slow
+      if (i == j || square > kMaxPairM * kMaxPairM || square < kMinPairM * kMinPairM) continue;
+      result.push_back({std::sqrt(square), i, j});
     }
   }
   return result;
@@ -81,7 +84,9 @@ class TreeGrid {
       for (long c = column(x) - 1; c <= column(x) + 1; ++c) {
         if (r < 0 || c < 0 || r >= rows_ || c >= columns_) continue;
         for (const std::size_t i : cells_[static_cast<std::size_t>(c + columns_ * r)]) {
-          if (std::hypot(trees_[i].x - x, trees_[i].y - y) <= radius_m) return true;
+          const double dx = trees_[i].x - x;
+          const double dy = trees_[i].y - y;
+          if (dx * dx + dy * dy <= radius_m * radius_m) return true;
         }
       }
     }
@@ -105,13 +110,16 @@ class TreeGrid {
   std::vector<std::vector<std::size_t>> cells_;
 };
 
+// How many trees of A fall on one of B; 0 as soon as they can be no more than `to_beat`.
 std::size_t count_near(const std::vector<Tree>& a, const Pose& b_from_a, const TreeGrid& grid,
-                       double radius_m) {
+                       double radius_m, std::size_t to_beat) {
   const double c = b_from_a.rotation_matrix()(0, 0);
   const double s = b_from_a.rotation_matrix()(1, 0);
   const Eigen::Vector3d& t = b_from_a.translation();
   std::size_t count = 0;
+  std::size_t left = a.size();
   for (const Tree& tree : a) {
+    if (count + left-- <= to_beat) return 0;
     const double x = c * tree.x - s * tree.y + t.x();
     const double y = s * tree.x + c * tree.y + t.y();
     count += grid.any_within(x, y, radius_m) ? 1 : 0;
@@ -137,7 +145,7 @@ std::optional<Pose> best_hypothesis(const std::vector<Tree>& a, const std::vecto
     for (; at != spans_b.end() && at->length <= span.length + slack; ++at) {
       if (++tried > kMaxHypotheses) return best;
       const Pose b_from_a = from_spans(a, span, b, *at);
-      const std::size_t count = count_near(a, b_from_a, grid, radius_m);
+      const std::size_t count = count_near(a, b_from_a, grid, radius_m, best_count);
       if (count <= best_count) continue;
       best_count = count;
       best = b_from_a;
