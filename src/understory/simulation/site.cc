@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "understory/simulation/presets.h"
+#include "understory/simulation/stand.h"
 #include "understory/util/error.h"
 #include "understory/util/random.h"
 
@@ -336,9 +337,13 @@ std::uint64_t site_key(const SiteConfig& config) {
   ConfigTable table;
   describe_scanned(table, copy);
   std::string text = table.to_yaml(false);
-  if (!config.stand.trees.empty()) {  // its content counts, not its name alone
-    std::ifstream file(config.stand.trees, std::ios::binary);
-    text.append(std::istreambuf_iterator<char>(file), {});
+  if (!config.stand.trees.empty()) {  // the content of files counts, not their names alone
+    std::vector<std::string> files = tree_cloud_files(config.stand.trees);
+    files.insert(files.begin(), config.stand.trees);
+    for (const std::string& path : files) {
+      std::ifstream file(path, std::ios::binary);
+      text.append(std::istreambuf_iterator<char>(file), {});
+    }
   }
   std::uint64_t key = 0;
   for (const char c : text)

@@ -236,8 +236,8 @@ struct SiteConfig {
 // Binds every key of a site to `config`.
 void describe(ConfigTable& table, SiteConfig& config);
 
-// Names a site with all its settings but those of the total station and the receiver's hold, for
-// the cache of scans.
+// Names a site with all its settings but those of the total station and the receiver's hold, and
+// with the content of its list of trees and of their clouds, for the cache of scans.
 [[nodiscard]] std::uint64_t site_key(const SiteConfig& config);
 
 // A site that the program carries with it.

@@ -95,5 +95,8 @@ struct Stand {
 // expected.
 [[nodiscard]] std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& config,
                                                 const Terrain& terrain, std::uint64_t seed);
+// Paths of the clouds that a list of trees names in its column `cloud`, each once; none if there is
+// no such list.
+[[nodiscard]] std::vector<std::string> tree_cloud_files(const std::string& list);
 
 }  // namespace understory

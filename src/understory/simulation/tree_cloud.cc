@@ -2,11 +2,13 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>
-#include <unordered_map>
+#include <nanoflann.hpp>
 #include <utility>
+#include <vector>
 
 #include "understory/recording/cloud_file.h"
 #include "understory/util/error.h"
@@ -16,84 +18,76 @@ namespace {
 
 constexpr double kSlice = 0.25;    // metres
 constexpr float kThin = 0.007F;    // metres between points
-constexpr float kCell = 0.06F;     // in which neighbours are looked for first
+constexpr float kFarthest = 0.2F;  // metres to a neighbour
 constexpr float kLargest = 0.03F;  // radius of a disc
 constexpr float kSmallest = 0.004F;
 constexpr std::size_t kNeighbours = 10;
 
 using Points = std::vector<Eigen::Vector3f>;
 
-// Points by cubes.
-class Cubes {
- public:
-  explicit Cubes(float cell) : cell_(cell) {}
-  void add(const Eigen::Vector3f& point, std::size_t number) {
-    cubes_[key(index(point))].push_back(static_cast<std::uint32_t>(number));
+struct Adaptor {
+  const Points* points = nullptr;
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points->size(); }
+  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return (*points)[i][static_cast<Eigen::Index>(axis)];
   }
-  // Calls `visit` for each number within `reach` cubes of the point's.
-  template <typename Visit>
-  void near(const Eigen::Vector3f& point, int reach, const Visit& visit) const {
-    const Eigen::Vector3i middle = index(point);
-    for (int x = -reach; x <= reach; ++x) {
-      for (int y = -reach; y <= reach; ++y) {
-        for (int z = -reach; z <= reach; ++z) {
-          const auto found = cubes_.find(key(middle + Eigen::Vector3i(x, y, z)));
-          if (found == cubes_.end()) continue;
-          for (const std::uint32_t number : found->second)
-            visit(number);
-        }
-      }
-    }
+  template <typename Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
   }
+};
+using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Adaptor>,
+                                                   Adaptor, 3, std::uint32_t>;
 
- private:
-  [[nodiscard]] Eigen::Vector3i index(const Eigen::Vector3f& point) const {
-    return (point / cell_).array().floor().cast<int>();
+// Whether any of the points that were kept lies nearer than kThin: a result set of nanoflann.
+struct KeptNearby {
+  using DistanceType = float;
+  using IndexType = std::uint32_t;
+  const std::vector<bool>& kept;
+  bool found = false;
+  bool addPoint(float squared, std::uint32_t i) {
+    found = found || (kept[i] && squared < kThin * kThin);
+    return !found;
   }
-  static std::uint64_t key(const Eigen::Vector3i& i) {
-    const auto part = [](int value) { return static_cast<std::uint64_t>(value + (1 << 20)); };
-    return part(i.x()) << 42 | part(i.y()) << 21 | part(i.z());
-  }
-  float cell_;
-  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cubes_;
+  [[nodiscard]] float worstDist() const { return kThin * kThin; }
+  [[nodiscard]] bool full() const { return true; }
+  [[nodiscard]] bool empty() const { return !found; }
+  [[nodiscard]] std::size_t size() const { return found ? 1 : 0; }
+  void sort() {}
 };
 
 Points thinned(const Points& points) {
-  Cubes cubes(kThin);
+  const Adaptor adaptor{&points};
+  const KdTree tree(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(10));
+  std::vector<bool> is_kept(points.size(), false);
   Points kept;
-  for (const Eigen::Vector3f& point : points) {
-    bool free = true;
-    cubes.near(point, 1, [&](std::size_t other) {
-      free = free && (kept[other] - point).squaredNorm() >= kThin * kThin;
-    });
-    if (!free) continue;
-    cubes.add(point, kept.size());
-    kept.push_back(point);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    KeptNearby nearby{is_kept};
+    tree.findNeighbors(nearby, points[i].data(), {});
+    if (nearby.found) continue;
+    is_kept[i] = true;
+    kept.push_back(points[i]);
   }
   return kept;
 }
 
-TreeCloud::Disc disc_at(const Points& points, const Cubes& cubes, std::size_t i) {
-  std::vector<std::pair<float, std::size_t>> near;
-  for (int reach = 1; reach <= 3 && near.size() <= kNeighbours; ++reach) {
-    near.clear();
-    cubes.near(points[i], reach, [&](std::size_t other) {
-      near.emplace_back((points[other] - points[i]).squaredNorm(), other);
-    });
-  }
-  const std::size_t used = std::min(near.size(), kNeighbours + 1);  // with the point itself
-  std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(used), near.end());
+TreeCloud::Disc disc_at(const Points& points, const KdTree& tree, std::size_t i) {
+  std::array<std::uint32_t, kNeighbours + 1> near{};  // with the point itself
+  std::array<float, kNeighbours + 1> squared{};
+  std::size_t used = tree.knnSearch(points[i].data(), near.size(), near.data(), squared.data());
+  while (used > 1 && squared[used - 1] > kFarthest * kFarthest)
+    --used;
   TreeCloud::Disc disc;
   disc.centre = points[i];
   disc.radius_m =
-      std::clamp(std::sqrt(near[std::min<std::size_t>(4, used - 1)].first), kSmallest, kLargest);
+      std::clamp(std::sqrt(squared[std::min<std::size_t>(4, used - 1)]), kSmallest, kLargest);
   if (used < 4) return disc;
   Eigen::Vector3f mean = Eigen::Vector3f::Zero();
   for (std::size_t k = 0; k < used; ++k)
-    mean += points[near[k].second] / static_cast<float>(used);
+    mean += points[near[k]] / static_cast<float>(used);
   Eigen::Matrix3f scatter = Eigen::Matrix3f::Zero();
   for (std::size_t k = 0; k < used; ++k) {
-    const Eigen::Vector3f off = points[near[k].second] - mean;
+    const Eigen::Vector3f off = points[near[k]] - mean;
     scatter += off * off.transpose();
   }
   disc.normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f>(scatter).eigenvectors().col(0);
@@ -190,11 +184,10 @@ TreeCloud read_tree_cloud(const std::string& path, double dbh_m) {
     tree.lean = ((axis.middle[above] - axis.middle[0]) / (kSlice * static_cast<double>(above)))
                     .cast<double>();
   }
-  Cubes cubes(kCell);
-  for (std::size_t i = 0; i < points.size(); ++i)
-    cubes.add(points[i], i);
+  const Adaptor adaptor{&points};
+  const KdTree kd(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(10));
   for (std::size_t i = 0; i < points.size(); ++i) {
-    TreeCloud::Disc disc = disc_at(points, cubes, i);
+    TreeCloud::Disc disc = disc_at(points, kd, i);
     const std::size_t slice = axis.slice(disc.centre.z());
     const bool stem = (disc.centre.head<2>() - axis.middle[slice]).norm() <= axis.reach_m[slice] &&
                       disc.centre.z() < 0.85F * static_cast<float>(tree.height_m);

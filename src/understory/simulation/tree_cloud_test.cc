@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "understory/simulation/scene.h"
+#include "understory/simulation/site.h"
 #include "understory/simulation/stand.h"
 #include "understory/simulation/terrain.h"
 #include "understory/simulation/tree_cloud.h"
@@ -120,6 +121,34 @@ TEST_F(CloudTrees, StandInTheStandAndAreScannedInTheirOwnShape) {
       EXPECT_NEAR(hit.range_m, 1.0 - radius, 0.006 * stretch);
       EXPECT_GT(hit.cosine, 0.9);
     }
+  }
+}
+
+// The cache of scans once went on with what was cast of the former cloud.
+TEST_F(CloudTrees, AnotherCloudOfTheSameNameMakesAnotherKey) {
+  std::ofstream(folder_ + "/trees.csv") << "x,y,dbh_m,cloud\n2,0,0.24,oval.ply\n";
+  SiteConfig site;
+  site.stand.trees = folder_ + "/trees.csv";
+  const std::uint64_t key = site_key(site);
+  EXPECT_EQ(site_key(site), key);
+  EXPECT_EQ(tree_cloud_files(site.stand.trees),
+            std::vector<std::string>{(std::filesystem::path(folder_) / "oval.ply").string()});
+  std::ofstream(folder_ + "/oval.ply", std::ios::app) << "5 -2 203\n";
+  EXPECT_NE(site_key(site), key);
+}
+
+// Each disc's neighbours are the nearest there are: against a search through all points.
+TEST_F(CloudTrees, DiscsReachToTheFourthNearestPoint) {
+  const TreeCloud tree = read_tree_cloud(folder_ + "/oval.ply", 0.24);
+  std::vector<TreeCloud::Disc> all = tree.stem;
+  all.insert(all.end(), tree.crown.begin(), tree.crown.end());
+  for (std::size_t i = 0; i < all.size(); i += 997) {
+    std::vector<float> distances;
+    for (const TreeCloud::Disc& other : all)
+      distances.push_back((other.centre - all[i].centre).norm());
+    std::partial_sort(distances.begin(), distances.begin() + 5, distances.end());
+    EXPECT_NEAR(all[i].radius_m, std::clamp(distances[4], 0.004F, 0.03F), 1e-5F);
+    EXPECT_GT(distances[1], 0.0069F);  // thinned
   }
 }
 

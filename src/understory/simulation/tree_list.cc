@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -122,6 +123,23 @@ void measure_clouds(std::vector<GrownTree>& trees) {
 }
 
 }  // namespace
+
+std::vector<std::string> tree_cloud_files(const std::string& list) {
+  std::ifstream file(list);
+  std::string line;
+  std::set<std::string> files;
+  if (!std::getline(file, line)) return {};
+  const std::vector<std::string> names = fields_of(line);
+  const auto column = static_cast<std::size_t>(
+      std::distance(names.begin(), std::find(names.begin(), names.end(), "cloud")));
+  while (std::getline(file, line)) {
+    const std::vector<std::string> fields = fields_of(line);
+    if (column < fields.size() && !fields[column].empty()) {
+      files.insert((std::filesystem::path(list).parent_path() / fields[column]).string());
+    }
+  }
+  return {files.begin(), files.end()};
+}
 
 std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& config,
                                   const Terrain& terrain, std::uint64_t seed) {
