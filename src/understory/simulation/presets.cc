@@ -23,7 +23,13 @@ const std::vector<SensorPreset>& gnss_presets() {
        {"gnss.rate_hz=1", "gnss.open_sd_m=1.5", "gnss.canopy_sd_m=2.2", "gnss.correlation_s=600",
         "gnss.multipath_share=0.35", "gnss.white_sd_m=0.02", "gnss.height_factor=1.7",
         "gnss.outage_interval_s=60", "gnss.outage_s=12", "gnss.jump_interval_s=150",
-        "gnss.jump_m=4", "receiver_hold.below_m_s=0.4", "receiver_hold.release_m=3.5"}}};
+        "gnss.jump_m=4", "receiver_hold.below_m_s=0.4", "receiver_hold.release_m=3.5"}},
+      {"phone_wild",
+       {"gnss.rate_hz=1", "gnss.open_sd_m=1", "gnss.canopy_sd_m=1", "gnss.correlation_s=200",
+        "gnss.multipath_share=0.2", "gnss.white_sd_m=0.05", "gnss.height_factor=1.7",
+        "gnss.outage_interval_s=1", "gnss.outage_s=1.8", "gnss.jump_interval_s=3",
+        "gnss.jump_m=5.5", "gnss.burst_interval_s=40", "gnss.burst_m=50", "gnss.burst_s=5",
+        "receiver_hold.below_m_s=0"}}};
   return presets;
 }
 

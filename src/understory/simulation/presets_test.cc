@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <numbers>
+#include <string>
 
 #include "understory/simulation/satellite.h"
 #include "understory/simulation/site.h"
@@ -92,6 +93,36 @@ TEST(Presets, PhoneHoldsItsPositionWhileItStandsAndLetsGoWhenItWalks) {
   EXPECT_GT(still, 95);
   EXPECT_GT(walking, 55);
   EXPECT_TRUE(largest == 0.0 || largest > 3.4) << largest;
+}
+
+// The wild half of the logs in docs/simulation.md: fixes half of the time, 8 m apart, jumps of 20
+// m.
+TEST(Presets, AWildPhoneJumpsAndIsOftenLost) {
+  double squares = 0.0;
+  double largest = 0.0;
+  int fixes = 0;
+  constexpr int kReceivers = 4;
+  for (int seed = 1; seed <= kReceivers; ++seed) {
+    SimulatedWorld world(
+        load_site("handheld", {"seed=" + std::to_string(seed), "gnss_preset=phone_wild",
+                               "carrier.still_s=310", "duration_s=300"}));
+    SatelliteReceiver receiver(world.site, world.plan.path, world.scene, 0);
+    Eigen::Vector3d last = Eigen::Vector3d::Zero();
+    for (int i = 0; i < 300; ++i) {
+      if (!receiver.next()) continue;
+      const Eigen::Vector3d error = receiver.last_error_enu();
+      if (i > 0) largest = std::max(largest, (error - last).head<2>().norm());
+      squares += error.head<2>().squaredNorm();
+      last = error;
+      ++fixes;
+    }
+  }
+  const double share = static_cast<double>(fixes) / (300.0 * kReceivers);
+  EXPECT_GT(share, 0.3);
+  EXPECT_LT(share, 0.7);
+  EXPECT_GT(std::sqrt(squares / fixes), 6.0);
+  EXPECT_LT(std::sqrt(squares / fixes), 12.0);
+  EXPECT_GT(largest, 20.0);
 }
 
 }  // namespace

@@ -329,7 +329,8 @@ void describe(ConfigTable& table, SiteConfig& config) {
   describe_total_station(table, config.total_station);
   table.add("imu_preset", config.imu_preset,
             "measured IMU: site (as the site says), vectornav, xsens");
-  table.add("gnss_preset", config.gnss_preset, "measured receiver: site (as the site says), phone");
+  table.add("gnss_preset", config.gnss_preset,
+            "measured receiver: site (as the site says), phone, phone_wild");
 }
 
 std::uint64_t site_key(const SiteConfig& config) {
