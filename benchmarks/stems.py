@@ -7,6 +7,9 @@
                                     time, memory, and Go-ICP on its neighbouring views
   ./run bench stems --orders        P0's powers with their pairs in each order, on the same roads
   ./run bench stems --search        where ICP converges (a picture), and what Go-ICP's search costs
+  ./run bench stems --table --runs FOLDER [--site-seed N] [--sites lieksa1,lieksa2]
+                                    P1's table 1 over whole simulated sites; runs that are in the
+                                    folder are not made again (each takes minutes)
   ./run bench stems --write         puts the tables into docs/sparse.md
 
 The roads are those of tests/stems/strip_roads.py: three, 22.5 m apart. Truth is for the
@@ -25,6 +28,7 @@ from program import (DONE, PROGRAM, TOP, UNTRUSTED, machine, run, say, understor
                      understory_json, version)
 
 sys.path.insert(0, str(TOP / "tests" / "stems"))
+from strip_road_table import table_page  # noqa: E402
 from strip_roads import Roads, write_strip_roads  # noqa: E402
 
 PAGE = TOP / "docs" / "sparse.md"
@@ -303,13 +307,21 @@ def main():
     parser.add_argument("--methods", action="store_true", help="only the made-up roads")
     parser.add_argument("--orders", action="store_true", help="only the orders of corrections")
     parser.add_argument("--search", action="store_true", help="only the searches")
+    parser.add_argument("--table", action="store_true", help="only P1's table 1")
+    parser.add_argument("--runs", help="folder of the runs of --table")
+    parser.add_argument("--site-seed", type=int, default=22)
+    parser.add_argument("--sites", default="lieksa1,lieksa2,lieksa3")
     parser.add_argument("--rows", help="file that keeps what was measured; its seeds are not "
                         "measured again")
     parser.add_argument("--write", action="store_true", help="into docs/sparse.md")
     options = parser.parse_args()
     first, last = map(int, options.seeds.split("-"))
     tables = {}
-    everything = not (options.methods or options.real or options.orders or options.search)
+    if options.table:
+        with tempfile.TemporaryDirectory() as scratch:
+            tables["strip roads"] = table_page(options.sites.split(","), options.site_seed,
+                                               options.runs or scratch)
+    everything = not (options.table or options.methods or options.real or options.orders or options.search)
     if everything or options.search:
         tables["searches"] = search_page(options.write)
     if everything or options.orders:

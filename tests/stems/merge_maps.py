@@ -97,6 +97,35 @@ def agreement(folder):
     assert abs(told["agreement"] - expected) < 1e-12 and 0.8 < expected < 0.95, told
 
 
+@cases.case("detection over the distance from a path, and two runs compared in parts")
+def rates(folder):
+    trees = stand(900, 160.0)
+    near = [tree for tree in trees if abs(tree[1] - 80) < 12 or (abs(tree[1] - 80) < 30 and tree[0] % 1 < 0.5)]
+    a = write(folder / "a.csv", near)
+    b = write(folder / "b.csv", trees)
+    path, other = folder / "trajectory.tum", folder / "other.tum"
+    path.write_text("".join(f"{k} {k} 80 0 0 0 0 1\n" for k in range(161)))
+    other.write_text("".join(f"{k} {k} 90 0 0 0 0 1\n" for k in range(161)))
+    done = program("evaluate", "trees", a, b, "--path", path, "--bin-m", 6, "--reach-m", 36, "--json")
+    assert done.returncode == 0, done.stderr
+    rings = json.loads(done.stdout)["by_distance"]
+    assert [ring["to_m"] for ring in rings] == [6, 12, 18, 24, 30, 36], rings
+    assert rings[0]["recall"] == rings[1]["recall"] == 1 and rings[5]["recall"] == 0, rings
+    assert all(0.3 < ring["recall"] < 0.7 for ring in rings[2:5]), rings
+    assert all(ring["right"] == ring["reported"] for ring in rings), rings
+    turning = [(x, y + 0.6 * (x / 160) ** 2) for x, y in trees]
+    c = write(folder / "c.csv", turning)
+    done = program("evaluate", "trees", b, c, "--path", path, "--other-path", other, "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)["consistency"]
+    assert told["parts"] == 3 and told["trees_a"] > 100, told
+    assert told["as_placed"] < 0.8 < 0.95 < told["in_parts"], told
+    assert program("evaluate", "trees", b, c, "--other-path", other).returncode == 2
+    assert program("evaluate", "trees", b, c, "--bin-m", 5).returncode == 2
+    done = program("evaluate", "trees", b, c, "--path", path, "--other-path", folder / "none.tum")
+    assert done.returncode == 3 and "none.tum" in done.stderr, done
+
+
 @cases.case("maps that share nothing, and what is no map")
 def nothing(folder):
     a = write(folder / "a.csv", stand(50))

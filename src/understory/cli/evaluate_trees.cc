@@ -9,6 +9,7 @@
 
 #include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/tree_errors.h"
+#include "understory/evaluation/tree_rates.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -24,7 +25,11 @@ struct TreeOptions {
   std::string returns;
   long min_returns = 30;
   std::string path;
+  std::string other_path;
   double within_m = 15.0;
+  double bin_m = 0.0;
+  double reach_m = 40.0;
+  MapConsistencyConfig consistency;
   bool json = false;
 };
 
@@ -32,6 +37,8 @@ struct Comparison {
   TreeErrors all;
   std::optional<VisibleTreeErrors> visible;
   std::optional<MapAgreement> agreement;
+  std::vector<DistanceRate> by_distance;
+  std::optional<MapConsistency> consistency;
 };
 
 nlohmann::ordered_json to_json(const Comparison& result, const TreeOptions& options) {
@@ -57,6 +64,26 @@ nlohmann::ordered_json to_json(const Comparison& result, const TreeOptions& opti
     json["near_path"] = {{"within_m", options.within_m}, {"trees_a", m.trees_a},
                          {"trees_b", m.trees_b},         {"paired_a", m.paired_a},
                          {"paired_b", m.paired_b},       {"agreement", m.agreement}};
+  }
+  for (const DistanceRate& rate : result.by_distance)
+    json["by_distance"].push_back({{"from_m", rate.from_m},
+                                   {"to_m", rate.to_m},
+                                   {"expected", rate.expected},
+                                   {"found", rate.found},
+                                   {"recall", rate.recall},
+                                   {"reported", rate.reported},
+                                   {"right", rate.right},
+                                   {"precision", rate.precision}});
+  if (result.consistency) {
+    const MapConsistency& c = *result.consistency;
+    json["consistency"] = {{"within_m", options.consistency.within_m},
+                           {"pairing_m", options.consistency.pairing_m},
+                           {"trees_a", c.trees_a},
+                           {"trees_b", c.trees_b},
+                           {"as_placed", c.as_placed},
+                           {"moved", c.moved},
+                           {"parts", c.parts},
+                           {"in_parts", c.in_parts}};
   }
   return json;
 }
@@ -88,7 +115,40 @@ std::string to_text(const Comparison& result, const TreeOptions& options) {
         "of B are paired\n",
         100.0 * m.agreement, options.within_m, m.paired_a, m.trees_a, m.paired_b, m.trees_b);
   }
+  for (const DistanceRate& rate : result.by_distance)
+    text +=
+        fmt::format("{:>3g} to {:>3g} m from the path: {} of {} found ({:.1f} %), {} of {} right\n",
+                    rate.from_m, rate.to_m, rate.found, rate.expected, 100.0 * rate.recall,
+                    rate.right, rate.reported);
+  if (result.consistency) {
+    const MapConsistency& c = *result.consistency;
+    text += fmt::format(
+        "consistency         {:.1f} % of {} and {} trees within {:g} m of both paths are the same; "
+        "{:.1f} % after one motion, {:.1f} % in {} parts\n",
+        100.0 * c.as_placed, c.trees_a, c.trees_b, options.consistency.within_m, 100.0 * c.moved,
+        100.0 * c.in_parts, c.parts);
+  }
   return text;
+}
+
+// Detection over the distance from the path, and the consistency of two runs.
+void compare_along_paths(const TreeOptions& options, const std::vector<Tree>& a,
+                         const std::vector<Tree>& b, Comparison& result) {
+  std::vector<std::string> problems;
+  if (options.bin_m > 0.0 && options.path.empty()) problems.emplace_back("--bin-m needs --path");
+  if (!options.other_path.empty() && options.path.empty())
+    problems.emplace_back("--other-path needs --path");
+  if (!problems.empty()) throw ConfigError(problems);
+  if (options.path.empty()) return;
+  const Trajectory path = read_trajectory(file_in_folder(options.path, "trajectory.tum"));
+  result.agreement = compare_maps(a, b, options.radius_m, path, options.within_m);
+  if (options.bin_m > 0.0)
+    result.by_distance =
+        rates_over_distance(a, b, options.radius_m, path, options.bin_m, options.reach_m);
+  if (!options.other_path.empty())
+    result.consistency = map_consistency(
+        a, b, path, read_trajectory(file_in_folder(options.other_path, "trajectory.tum")),
+        options.consistency);
 }
 
 std::optional<VisibleTreeErrors> compare_visible(const TreeOptions& options,
@@ -122,10 +182,7 @@ int evaluate_trees(const TreeOptions& options, CommandContext& context) {
   Comparison result;
   result.all = compare_trees(a, b, options.radius_m);
   result.visible = compare_visible(options, a, b);
-  if (!options.path.empty())
-    result.agreement = compare_maps(a, b, options.radius_m,
-                                    read_trajectory(file_in_folder(options.path, "trajectory.tum")),
-                                    options.within_m);
+  compare_along_paths(options, a, b, result);
   const std::string text =
       options.json ? to_json(result, options).dump(2) + "\n" : to_text(result, options);
   std::fputs(text.c_str(), stdout);
@@ -156,6 +213,27 @@ void add_evaluate_trees_command(CLI::App& evaluate, Command& chosen) {
                       "it, P1 (10)");
   command->add_option("--within-m", options->within_m, "Trees further from the path do not count")
       ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command
+      ->add_option("--bin-m", options->bin_m,
+                   "Also the detection over the distance from --path, in rings of this width")
+      ->check(CLI::Range(0.1, 1000.0));
+  command->add_option("--reach-m", options->reach_m, "How far these rings reach")
+      ->check(CLI::Range(0.1, 10000.0))
+      ->capture_default_str();
+  command->add_option(
+      "--other-path", options->other_path,
+      "The trajectory of the other map, in B's frame: also the consistency of both, "
+      "P1 (10), over the trees near both paths, whole and in parts of 50 m");
+  command
+      ->add_option("--pairing-m", options->consistency.pairing_m,
+                   "Trees that near count as the same for the consistency")
+      ->check(CLI::Range(0.01, 100.0))
+      ->capture_default_str();
+  command
+      ->add_option("--near-both-m", options->consistency.within_m,
+                   "Trees farther from either path do not count for the consistency")
+      ->check(CLI::Range(0.1, 10000.0))
       ->capture_default_str();
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->footer(

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "understory/evaluation/alignment.h"
 #include "understory/evaluation/tree_errors.h"
+#include "understory/evaluation/tree_rates.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -102,23 +102,6 @@ struct Region {
   }
 };
 
-// Matches after the motion in the plane that lays the one's trees on the other's best, from where
-// they are: wide pairs first.
-std::size_t matches_moved(std::vector<Tree> a, const std::vector<Tree>& b, double pairing_m) {
-  for (const double factor : {4.0, 2.0, 1.0, 1.0}) {
-    const std::vector<TreePair> pairs = match_trees(a, b, factor * pairing_m);
-    if (pairs.size() < 3) break;
-    std::vector<Eigen::Vector3d> source;
-    std::vector<Eigen::Vector3d> target;
-    for (const auto& [i, j] : pairs) {
-      source.emplace_back(a[i].x, a[i].y, 0.0);
-      target.emplace_back(b[j].x, b[j].y, 0.0);
-    }
-    a = moved(a, align_points_yaw(source, target).target_from_source);
-  }
-  return match_trees(a, b, pairing_m).size();
-}
-
 RoadConsistency compare(const std::vector<Tree>& a, const std::vector<Tree>& b,
                         const Region& region, const StripRoadConfig& config) {
   const std::vector<Tree> here = region.inside(a);
@@ -133,7 +116,7 @@ RoadConsistency compare(const std::vector<Tree>& a, const std::vector<Tree>& b,
   result.match_rms_m = std::sqrt(squares / static_cast<double>(pairs.size()));
   result.as_placed = consistency(pairs.size(), here.size(), there.size());
   result.moved =
-      consistency(matches_moved(here, there, config.pairing_m), here.size(), there.size());
+      consistency(matches_after_motion(here, there, config.pairing_m), here.size(), there.size());
   std::size_t matches = 0;
   const double length = region.end_m - region.begin_m;
   const int parts = std::max(1, static_cast<int>(std::lround(length / config.part_m)));
@@ -141,7 +124,7 @@ RoadConsistency compare(const std::vector<Tree>& a, const std::vector<Tree>& b,
     Region slice = region;
     slice.begin_m = region.begin_m + length * part / parts;
     slice.end_m = region.begin_m + length * (part + 1) / parts;
-    matches += matches_moved(slice.inside(a), slice.inside(b), config.pairing_m);
+    matches += matches_after_motion(slice.inside(a), slice.inside(b), config.pairing_m);
   }
   result.in_parts = consistency(matches, here.size(), there.size());
   return result;
@@ -170,10 +153,6 @@ std::vector<StripRoad> find_strip_roads(const std::vector<Pose>& world_from_body
     sum = i < at.size() ? heading[i] : Vector2d::Zero();
   }
   return roads;
-}
-
-double consistency(std::size_t matches, std::size_t trees_a, std::size_t trees_b) {
-  return static_cast<double>(matches) / (0.5 * static_cast<double>(trees_a + trees_b));
 }
 
 std::vector<RoadConsistency> road_consistencies(const std::vector<StemView>& views,

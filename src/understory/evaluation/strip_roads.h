@@ -32,9 +32,6 @@ struct StripRoad {
 [[nodiscard]] std::vector<StripRoad> find_strip_roads(const std::vector<Pose>& world_from_body,
                                                       const StripRoadConfig& config);
 
-// c of P1 (10): matches over the mean number of trees. NaN if both are empty.
-[[nodiscard]] double consistency(std::size_t matches, std::size_t trees_a, std::size_t trees_b);
-
 struct RoadConsistency {
   std::size_t road = 0;  // numbers of the two roads, in the order of the path
   std::size_t other = 0;

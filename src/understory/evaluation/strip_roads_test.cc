@@ -5,6 +5,8 @@
 #include <cmath>
 #include <random>
 
+#include "understory/evaluation/tree_rates.h"
+
 namespace understory {
 namespace {
 
