@@ -65,6 +65,7 @@ nlohmann::ordered_json to_json(const Placed& placed, const MapSharpness& map,
   json["registration_noise_m"] = map.noise_m;
   json["registration_noise_mean_m"] = map.noise_mean_m;
   json["trees"] = map.trees;
+  json["joined_trees"] = map.joined;
   json["all_stems"] = {{"beta", all.beta},
                        {"box_dimension", all.dimension},
                        {"registration_noise_m", all.noise_m},

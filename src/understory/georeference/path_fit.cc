@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -198,6 +199,17 @@ double extent_m(const std::vector<Vector3d>& points) {
   return (high - low).norm();
 }
 
+// The direction in which the fixes reach farthest.
+Vector2d main_direction(const std::vector<Vector3d>& points) {
+  Vector2d mean = Vector2d::Zero();
+  for (const Vector3d& point : points)
+    mean += point.head<2>() / static_cast<double>(points.size());
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  for (const Vector3d& point : points)
+    scatter += (point.head<2>() - mean) * (point.head<2>() - mean).transpose();
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(scatter).eigenvectors().col(1);
+}
+
 double turn_deg(const Motion& a, const Motion& b) {
   return std::abs(std::remainder(a.yaw - b.yaw, 2.0 * M_PI)) * 180.0 / M_PI;
 }
@@ -216,6 +228,29 @@ std::vector<std::pair<double, Motion>> starts(const std::vector<Vector3d>& path,
   std::stable_sort(ends.begin(), ends.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   return ends;
+}
+
+// Along a road that is nearly straight nearest points hardly pull, and the descent ends early:
+// begun again from places before and behind, until none is better.
+Motion slid(const Fitter& fitter, Motion best, const Vector2d& along, bool robust) {
+  const auto width = [&](const Motion& motion) {
+    return robust ? Fitter::width_of(fitter.pairs(motion))
+                  : std::numeric_limits<double>::infinity();
+  };
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    Motion better = best;
+    for (const double shift_m : {-16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0}) {
+      const Motion end = fitter.descend({best.yaw, best.shift + shift_m * along}, robust, 100);
+      const double width_m = std::min(width(better), width(end));
+      if (Fitter::value_of(fitter.pairs(end), width_m) <
+          0.999 * Fitter::value_of(fitter.pairs(better), width_m))
+        better = end;
+    }
+    if ((better.shift - best.shift).norm() == 0.0) break;
+    best = better;
+  }
+  return best;
 }
 
 void tell_fixes(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
@@ -269,6 +304,7 @@ PathFit fit_path(const std::vector<Vector3d>& path, const std::vector<Vector3d>&
   const auto ends = starts(path, fixes, config.yaw_starts);
   const Fitter fine(gathered(path, 0.02), gathered(fixes, 0.02));
   // The best three ends that differ, each refined with everything.
+  const Vector2d along = main_direction(fixes);
   std::vector<Motion> refined;
   const auto wanted = [&](const Motion& motion) {
     return !std::isfinite(config.about_yaw_rad) ||
@@ -279,7 +315,8 @@ PathFit fit_path(const std::vector<Vector3d>& path, const std::vector<Vector3d>&
     const bool known = std::any_of(refined.begin(), refined.end(), [&, &e = end](const Motion& m) {
       return turn_deg(m, e) < kOtherDeg;
     });
-    if (!known) refined.push_back(fine.descend(end, config.robust, 200));
+    if (known) continue;
+    refined.push_back(slid(fine, fine.descend(end, config.robust, 200), along, config.robust));
     if (refined.size() == 3) break;
   }
   if (refined.empty()) {

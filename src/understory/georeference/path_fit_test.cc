@@ -136,6 +136,29 @@ TEST(PathFit, RunawaysHaveNoSay) {
   EXPECT_EQ(std::count(plain.fix_used.begin(), plain.fix_used.end(), 0), 0);
 }
 
+TEST(PathFit, ANearlyStraightWayIsNotLeftHalfWay) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0.0, 1.0);
+    std::vector<Vector3d> path;
+    std::vector<Vector3d> fixes;
+    Vector3d slow = Vector3d::Zero();
+    for (int k = 0; k < 700; ++k) {
+      path.emplace_back(0.25 * k, 0.6 * std::sin(0.25 * k / 12.0), 0.0);
+      slow = 0.98 * slow + 0.12 * Vector3d(noise(random), noise(random), 0.0);
+      fixes.emplace_back(motion() * path.back() + slow);
+    }
+    // The path goes on behind the last fix, so that the middles of both do not fit.
+    for (int k = 0; k < 60; ++k)
+      path.emplace_back(175.0 + 0.25 * k, 0.0, 0.0);
+    PathFitConfig config;
+    config.robust = false;
+    const PathFit fit = fit_path(path, fixes, config);
+    ASSERT_TRUE(fit.found);
+    EXPECT_LE(fit.symmetric_rms_m, 1.02 * std::sqrt(printed_value(path, fixes, motion()))) << seed;
+  }
+}
+
 TEST(PathFit, AStraightWayFitsTheOtherWayRoundAsWell) {
   std::vector<Vector3d> path;
   for (int k = 0; k <= 400; ++k)

@@ -64,6 +64,12 @@ struct Cluster {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   int count = 0;
   double squares = 0.0;
+  int views = 0;
+  std::size_t last_view = SIZE_MAX;
+
+  [[nodiscard]] bool is_tree(int min_points) const {
+    return count >= min_points && 5 * count <= 6 * views;
+  }
 };
 
 }  // namespace
@@ -116,11 +122,17 @@ RegistrationNoise registration_noise(const std::vector<SparsePoints>& views,
   const auto most = std::max_element(cluster_of.begin(), cluster_of.end());
   const int count = cluster_of.empty() ? 0 : *most + 1;
   std::vector<Cluster> clusters(static_cast<std::size_t>(count));
-  for (std::size_t i = 0; i < flat.size(); ++i) {
-    if (cluster_of[i] < 0) continue;
-    Cluster& cluster = clusters[static_cast<std::size_t>(cluster_of[i])];
-    cluster.sum += flat[i];
-    ++cluster.count;
+  std::size_t place = 0;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (!use.empty() && use[v] == 0) continue;
+    for (std::size_t k = 0; k < views[v].size(); ++k, ++place) {
+      if (cluster_of[place] < 0) continue;
+      Cluster& cluster = clusters[static_cast<std::size_t>(cluster_of[place])];
+      cluster.sum += flat[place];
+      ++cluster.count;
+      cluster.views += cluster.last_view != v ? 1 : 0;
+      cluster.last_view = v;
+    }
   }
   RegistrationNoise noise;
   noise.squares_m2.assign(views.size(), 0.0);
@@ -132,7 +144,7 @@ RegistrationNoise registration_noise(const std::vector<SparsePoints>& views,
     for (std::size_t k = 0; k < views[v].size(); ++k, ++at) {
       if (cluster_of[at] < 0) continue;
       Cluster& cluster = clusters[static_cast<std::size_t>(cluster_of[at])];
-      if (cluster.count < config.min_points) continue;
+      if (!cluster.is_tree(config.min_points)) continue;
       const double squared = (flat[at] - cluster.sum / cluster.count).squaredNorm();
       cluster.squares += squared;
       squares += squared;
@@ -143,7 +155,10 @@ RegistrationNoise registration_noise(const std::vector<SparsePoints>& views,
   }
   double means = 0.0;
   for (const Cluster& cluster : clusters) {
-    if (cluster.count < config.min_points) continue;
+    if (!cluster.is_tree(config.min_points)) {
+      noise.joined += cluster.count >= config.min_points ? 1 : 0;
+      continue;
+    }
     ++noise.trees;
     means += std::sqrt(cluster.squares / cluster.count);
   }
@@ -166,6 +181,7 @@ MapSharpness map_sharpness(const std::vector<SparsePoints>& views,
   result.noise_m = noise.pooled_m;
   result.noise_mean_m = noise.mean_m;
   result.trees = noise.trees;
+  result.joined = noise.joined;
   return result;
 }
 

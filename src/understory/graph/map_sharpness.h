@@ -38,13 +38,16 @@ struct SharpnessConfig {
                                    bool in_space);
 
 // Tree registration noise, P0 section 2.5 and (33): distances of sights from the mean of their
-// cluster, seen from above.
+// cluster, seen from above. A cluster of which a view in five or more has two sights is several
+// trees side by side, whose sights have run together: its width is no noise, so it is left out. (On
+// a simulated site one such pair among 596 trees took e_C from 4.9 to 7.4 cm.)
 struct RegistrationNoise {
   // e_C by (33): root mean square over all sights of trees, metres. NaN without a tree.
   double pooled_m = std::numeric_limits<double>::quiet_NaN();
   // Mean over the trees of each one's root mean square: the figure of P0's table 1.
   double mean_m = std::numeric_limits<double>::quiet_NaN();
   std::size_t trees = 0;
+  std::size_t joined = 0;  // clusters left out as several trees
   std::size_t sights = 0;
   // Of each view: sum of the squared distances of its sights, and their number. The share w_i of
   // (33) is squares / sights of the whole map.
@@ -65,6 +68,7 @@ struct MapSharpness {
   double noise_m = 0.0;       // e_C by (33)
   double noise_mean_m = 0.0;  // by table 1
   std::size_t trees = 0;
+  std::size_t joined = 0;  // clusters of several trees, which have no part in e_C
 };
 [[nodiscard]] MapSharpness map_sharpness(const std::vector<SparsePoints>& views,
                                          const std::vector<Pose>& map_from_view,

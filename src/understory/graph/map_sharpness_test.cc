@@ -81,6 +81,26 @@ TEST(MapSharpness, RegistrationNoiseIsTheNoiseOfTheSights) {
   EXPECT_TRUE(std::isnan(registration_noise(few.views, few.poses, {}, {}).pooled_m));
 }
 
+TEST(MapSharpness, TwoTreesSideBySideAreNoNoise) {
+  Stand seen = stand(80, 0.05, 4);
+  const RegistrationNoise alone = registration_noise(seen.views, seen.poses, {}, {});
+  // A neighbour 0.7 m beside the first tree: their sights run together.
+  for (std::size_t v = 0; v < seen.views.size(); ++v)
+    seen.views[v].push_back(seen.views[v].front() + Eigen::Vector3d(0.7, 0.0, 0.0));
+  const RegistrationNoise noise = registration_noise(seen.views, seen.poses, {}, {});
+  EXPECT_EQ(alone.joined, 0U);
+  EXPECT_EQ(noise.joined, 1U);
+  EXPECT_EQ(noise.trees, alone.trees - 1);
+  EXPECT_NEAR(noise.pooled_m, alone.pooled_m, 0.002);
+  // A tree that is seen where it is not, in half of the views, does count.
+  Stand bent = stand(80, 0.05, 4);
+  for (std::size_t v = 0; v < 40; ++v)
+    bent.poses[v] = Pose(Eigen::Quaterniond::Identity(), {0.4, 0.0, 0.0}) * bent.poses[v];
+  const RegistrationNoise blurred = registration_noise(bent.views, bent.poses, {}, {});
+  EXPECT_EQ(blurred.joined, 0U);
+  EXPECT_GT(blurred.pooled_m, 2.5 * alone.pooled_m);
+}
+
 TEST(MapSharpness, ViewsThatHurtAreFoundAndLeftOut) {
   Stand seen = stand(60, 0.03, 2);
   for (const std::size_t bad : {7U, 31U})
