@@ -65,6 +65,18 @@ def way(folder):
     return f"{100 * errors['ape_plane_rmse_m']:.1f} cm over {errors['length_m']:.0f} m"
 
 
+@cases.case("the recording's own fixes are compared with and not used")
+def fixes(folder):
+    rows = list(csv.DictReader((RUN / "gnss.csv").open()))
+    assert len(rows) > 30 and {row["used"] for row in rows} == {"0"}, len(rows)
+    quality = json.loads((RUN / "run.json").read_text())["quality"]
+    if "gnss_fit_rms_m" not in quality:  # 40 s are too short a way to fit
+        assert all("expected two paths" in row["reason"] for row in rows), rows[0]
+        return rows[0]["reason"]
+    assert 0 < quality["gnss_fit_rms_m"] < 10, quality
+    return f"fit {quality['gnss_fit_rms_m']:.2f} m"
+
+
 @cases.case("trees, against the truth")
 def trees(folder):
     errors = evaluated("trees", RUN / "trees.csv", TRUTH / "trees.csv", "--align", "se3")
