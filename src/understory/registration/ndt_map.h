@@ -35,7 +35,7 @@ void describe(ConfigTable& table, NdtMapConfig& config);
 // Directions in which the cell says nothing have no row: along a surface or a stem, where the
 // spread of the points is that of the cell's box, not of the world; and along the ground for what
 // one or two rings of the lidar left on it.
-struct NdtCell {
+struct alignas(64) NdtCell {           // a cache line
   Eigen::Vector3f mean;                // from the centre of the cell, metres
   std::uint32_t count = 0;             // points
   int rows = 0;                        // 0 to 3; 0: the cell matches but does not constrain
