@@ -218,7 +218,7 @@ std::vector<Tree> moved_trees(const std::vector<Tree>& trees, const Pose& motion
 // The trees in a coordinate system that maps know; returns its name.
 std::string write_trees_map(const GeoreferenceRequest& request, const std::vector<Tree>& trees,
                             const GeodeticPlace& origin) {
-  const std::string name =
+  std::string name =
       request.coordinate_system.empty() ? utm_zone(origin) : request.coordinate_system;
   const CoordinateSystem system(name);
   const EastNorthUp frame(origin);
