@@ -89,7 +89,9 @@ std::vector<DistanceRate> rates_over_distance(const std::vector<Tree>& a,
   const PlaneGrid grid = grid_of(path);
   const auto bin = [&](const Tree& tree) {
     const double d = distance_m(tree, grid, reach_m);
-    return d < reach_m ? &rates[static_cast<std::size_t>(d / bin_m)] : nullptr;
+    if (!(d < reach_m)) return static_cast<DistanceRate*>(nullptr);
+    // Just below the reach a quotient may round up to the number of rings.
+    return &rates[std::min(rates.size() - 1, static_cast<std::size_t>(d / bin_m))];
   };
   for (std::size_t j = 0; j < b.size(); ++j) {
     DistanceRate* rate = b[j].felled ? nullptr : bin(b[j]);

@@ -73,6 +73,18 @@ TEST(TreeRates, FelledTreesAreNeitherMissedNorFalse) {
   EXPECT_DOUBLE_EQ(rates[0].precision, 1.0);
 }
 
+TEST(TreeRates, TheLastRingEndsAtTheReach) {
+  // 17 * 0.1 is a little more than 1.7, and 1.7 / 0.1 is 17.
+  std::vector<Tree> trees(1);
+  trees[0].x = 0.0;
+  trees[0].y = 1.7;
+  const Trajectory path = {{0, Pose()},
+                           {1, Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d::UnitX())}};
+  const auto rates = rates_over_distance(trees, trees, 0.3, path, 0.1, 17 * 0.1);
+  ASSERT_EQ(rates.size(), 17U);
+  EXPECT_EQ(rates.back().found, 1U);
+}
+
 TEST(TreeRates, ABentMapIsConsistentInParts) {
   const std::vector<Tree> a = stand();
   std::vector<Tree> b = a;
