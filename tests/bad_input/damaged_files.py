@@ -228,6 +228,10 @@ def inventory(folder):
     path.write_bytes(b"")
     done = program("inventory", path, "-o", folder / "none")
     assert done.returncode == 3 and f"{path}: the file is empty" in done.stderr, done.stderr
+    before = (folder / "run" / "run.json").read_bytes()
+    done = program("inventory", folder / "run", "-o", folder / "run")
+    assert done.returncode == 2 and "folder of its own" in done.stderr, done.stderr
+    assert (folder / "run" / "run.json").read_bytes() == before
     half = folder / "half" / "work" / "checkpoint.bin"
     half.parent.mkdir(parents=True)
     half.write_bytes(b"half")

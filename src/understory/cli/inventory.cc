@@ -114,6 +114,10 @@ int run_inventory(const InventoryOptions& options, CommandContext& context) {
   }
   const fs::path path = cloud_of(options.cloud);
   const fs::path folder(options.folder);
+  std::error_code ignored;  // what does not exist yet is not the run
+  if (fs::equivalent(path.parent_path(), folder, ignored) && fs::exists(folder / "run.json"))
+    throw ConfigError({"the inventory needs a folder of its own: " + folder.string() +
+                       " holds the run that made the cloud"});
   if (!options.overwrite) refuse_unfinished_run(folder);
   make_folder(folder);
   StageTimes times;
