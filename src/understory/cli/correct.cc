@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "understory/cli/command.h"
+#include "understory/cli/outcome.h"
 #include "understory/pipeline/correction.h"
 #include "understory/util/error.h"
 
@@ -33,13 +34,8 @@ int run_correct(const CorrectOptions& options, CommandContext& context) {
   request.run_folder = options.run_folder;
   request.overwrite = options.overwrite;
   request.config_yaml = table.to_yaml(false);
-  const CorrectionOutcome outcome =
-      run_correction(request, context.log, context.progress, context.stop_requested);
-  std::printf("%s\n", outcome.summary.c_str());
-  for (const std::string& reason : outcome.reasons)
-    std::fprintf(stderr, "warning: result %s: %s\n", to_string(outcome.status).c_str(),
-                 reason.c_str());
-  return outcome.status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
+  return report_outcome(
+      run_correction(request, context.log, context.progress, context.stop_requested));
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <variant>
 
 #include "understory/cli/command.h"
+#include "understory/cli/outcome.h"
 #include "understory/pipeline/georeferencing.h"
 #include "understory/util/error.h"
 
@@ -60,18 +60,11 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
   if (!options.start.empty())
     request.start = {options.start[0], options.start[1], options.start[2]};
   const GeoreferenceOutcome outcome = run_georeferencing(request, context.log);
-  if (options.json) {
-    nlohmann::ordered_json json{{"status", to_string(outcome.status)}, {"method", options.method}};
-    for (const auto& [name, figure] : outcome.figures)
-      std::visit([&, &key = name](const auto& value) { json[key] = value; }, figure);
-    std::printf("%s\n", json.dump(2).c_str());
-  } else {
-    std::printf("%s\n", outcome.summary.c_str());
-  }
-  for (const std::string& reason : outcome.reasons)
-    std::fprintf(stderr, "warning: result %s: %s\n", to_string(outcome.status).c_str(),
-                 reason.c_str());
-  return outcome.status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
+  if (!options.json) return report_outcome(outcome);
+  nlohmann::ordered_json json{{"status", to_string(outcome.status)}, {"method", options.method}};
+  for (const auto& [name, figure] : outcome.figures)
+    std::visit([&, &key = name](const auto& value) { json[key] = value; }, figure);
+  return report_outcome(json.dump(2), outcome.status, outcome.reasons);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "understory/cli/outcome.h"
 #include "understory/pipeline/sparse_mapping.h"
 #include "understory/util/error.h"
 
@@ -23,13 +24,8 @@ int run_sparse_map(const SparseMapOptions& options, CommandContext& context) {
   request.config_yaml = table.to_yaml(false);
   request.open = options.open;
   request.overwrite = options.overwrite;
-  const CorrectionOutcome outcome =
-      run_sparse_mapping(request, context.log, context.progress, context.stop_requested);
-  std::printf("%s\n", outcome.summary.c_str());
-  for (const std::string& reason : outcome.reasons)
-    std::fprintf(stderr, "warning: result %s: %s\n", to_string(outcome.status).c_str(),
-                 reason.c_str());
-  return outcome.status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
+  return report_outcome(
+      run_sparse_mapping(request, context.log, context.progress, context.stop_requested));
 }
 
 }  // namespace understory

@@ -2,14 +2,16 @@
 
 #include <cstdio>
 
+#include "understory/cli/command.h"
+
 namespace understory {
 
-int report_outcome(const MappingOutcome& outcome) {
-  std::printf("%s\n", outcome.summary.c_str());
-  for (const std::string& reason : outcome.reasons)
-    std::fprintf(stderr, "warning: result %s: %s\n", to_string(outcome.status).c_str(),
-                 reason.c_str());
-  return outcome.status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
+int report_outcome(const std::string& summary, RunStatus status,
+                   const std::vector<std::string>& reasons) {
+  std::printf("%s\n", summary.c_str());
+  for (const std::string& reason : reasons)
+    std::fprintf(stderr, "warning: result %s: %s\n", to_string(status).c_str(), reason.c_str());
+  return status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
 }
 
 }  // namespace understory

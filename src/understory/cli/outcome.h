@@ -1,12 +1,18 @@
 #pragma once
 
-#include "understory/cli/command.h"
-#include "understory/cli/open_options.h"
-#include "understory/pipeline/mapping.h"
+#include <string>
+#include <vector>
+
+#include "understory/output/run_summary.h"
 
 namespace understory {
 
-// Prints what a mapping run came to on stdout; returns its exit code.
-[[nodiscard]] int report_outcome(const MappingOutcome& outcome);
+// Prints what a run came to on stdout, and what to distrust of it on stderr; returns its exit code.
+[[nodiscard]] int report_outcome(const std::string& summary, RunStatus status,
+                                 const std::vector<std::string>& reasons);
+template <typename Outcome>
+[[nodiscard]] int report_outcome(const Outcome& outcome) {
+  return report_outcome(outcome.summary, outcome.status, outcome.reasons);
+}
 
 }  // namespace understory
