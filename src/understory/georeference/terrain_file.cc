@@ -8,9 +8,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <string>
 
+#include "understory/geometry/quiet_gdal.h"
 #include "understory/georeference/coordinate_system.h"
 #include "understory/util/error.h"
 
@@ -19,19 +19,6 @@ namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 constexpr double kMostCells = 1e8;  // a region larger than any run
-
-class QuietGdal {
- public:
-  QuietGdal() {
-    static std::once_flag registered;
-    std::call_once(registered, [] { GDALAllRegister(); });
-    CPLPushErrorHandler(CPLQuietErrorHandler);
-    CPLErrorReset();
-  }
-  ~QuietGdal() { CPLPopErrorHandler(); }
-  QuietGdal(const QuietGdal&) = delete;
-  QuietGdal& operator=(const QuietGdal&) = delete;
-};
 
 // An opened raster: cells of `width` times `height` (north up), in its own coordinates.
 class TerrainFile {

@@ -11,10 +11,10 @@
 #include <cstring>
 #include <limits>
 #include <memory>
-#include <mutex>
 #include <system_error>
 #include <utility>
 
+#include "understory/geometry/quiet_gdal.h"
 #include "understory/output/atomic_file.h"
 #include "understory/util/error.h"
 
@@ -22,21 +22,6 @@ namespace understory {
 namespace {
 
 constexpr float kNoData = -9999.0F;
-
-// Keeps GDAL's messages off the terminal; the last one goes into the exception.
-class QuietGdal {
- public:
-  QuietGdal() {
-    static std::once_flag registered;
-    std::call_once(registered, [] { GDALAllRegister(); });
-    CPLPushErrorHandler(CPLQuietErrorHandler);
-    CPLErrorReset();
-    errno = 0;
-  }
-  ~QuietGdal() { CPLPopErrorHandler(); }
-  QuietGdal(const QuietGdal&) = delete;
-  QuietGdal& operator=(const QuietGdal&) = delete;
-};
 
 [[noreturn]] void fail(const std::filesystem::path& path) {
   const int code = errno;

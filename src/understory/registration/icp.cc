@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <nanoflann.hpp>
 
+#include "understory/geometry/kd_tree.h"
 #include "understory/registration/conclude.h"
 #include "understory/util/parallel.h"
 
@@ -41,19 +41,6 @@ void describe(ConfigTable& table, IcpConfig& config) {
 
 namespace {
 
-struct Adaptor {
-  const Points* points = nullptr;
-  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points->size(); }
-  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return (*points)[i][static_cast<Eigen::Index>(axis)];
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Adaptor>,
-                                                   Adaptor, 3, std::uint32_t>;
 constexpr std::size_t kMostNeighbours = 100;
 constexpr double kLineRatio = 0.05;  // middle through largest variance
 constexpr double kPoleCosine = 0.7;  // 45 degrees
@@ -72,7 +59,7 @@ struct IcpTarget::Tree {
   Points points;
   Points directions;  // normal or axis
   std::vector<Surface> surfaces;
-  Adaptor adaptor;
+  KdTreePoints adaptor;
   std::unique_ptr<KdTree> kd;
 
   // Index and squared distance of the nearest point within the radius; false if none.

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
-#include <nanoflann.hpp>
 #include <utility>
 #include <vector>
 
+#include "understory/geometry/kd_tree.h"
 #include "understory/recording/cloud_file.h"
 #include "understory/util/error.h"
 
@@ -22,22 +22,6 @@ constexpr float kFarthest = 0.2F;  // metres to a neighbour
 constexpr float kLargest = 0.03F;  // radius of a disc
 constexpr float kSmallest = 0.004F;
 constexpr std::size_t kNeighbours = 10;
-
-using Points = std::vector<Eigen::Vector3f>;
-
-struct Adaptor {
-  const Points* points = nullptr;
-  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points->size(); }
-  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return (*points)[i][static_cast<Eigen::Index>(axis)];
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Adaptor>,
-                                                   Adaptor, 3, std::uint32_t>;
 
 // Whether any of the points that were kept lies nearer than kThin: a result set of nanoflann.
 struct KeptNearby {
@@ -57,7 +41,7 @@ struct KeptNearby {
 };
 
 Points thinned(const Points& points) {
-  const Adaptor adaptor{&points};
+  const KdTreePoints adaptor{&points};
   const KdTree tree(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(10));
   std::vector<bool> is_kept(points.size(), false);
   Points kept;
@@ -184,7 +168,7 @@ TreeCloud read_tree_cloud(const std::string& path, double dbh_m) {
     tree.lean = ((axis.middle[above] - axis.middle[0]) / (kSlice * static_cast<double>(above)))
                     .cast<double>();
   }
-  const Adaptor adaptor{&points};
+  const KdTreePoints adaptor{&points};
   const KdTree kd(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(10));
   for (std::size_t i = 0; i < points.size(); ++i) {
     TreeCloud::Disc disc = disc_at(points, kd, i);
