@@ -65,6 +65,34 @@ def way(folder):
     return f"{100 * errors['ape_plane_rmse_m']:.1f} cm over {errors['length_m']:.0f} m"
 
 
+@cases.case("the rate of positioning follows the motion")
+def pace(folder):
+    told = json.loads((RUN / "run.json").read_text())
+    positioned = told["counts"]["scans_positioned"]
+    assert 0.1 * told["scans"] < positioned < 0.8 * told["scans"], (positioned, told["scans"])
+    done = sparse(REC, folder / "all", "--set", "stems.pace.longest_gap_s=0")
+    assert done.returncode == 0, done.stderr
+    every = json.loads((folder / "all" / "run.json").read_text())
+    assert every["counts"]["scans_positioned"] == every["scans"] == told["scans"], every["counts"]
+    errors = [evaluated(run, TRUTH, "--align", "se3")["ape_plane_rmse_m"]
+              for run in (folder / "all", RUN)]
+    assert errors[1] < errors[0] + 0.01, errors
+    for rule in ("overlap", "region"):
+        done = sparse(REC, folder / rule, "--set", f"stems.keep.rule={rule}")
+        assert done.returncode == 0, done.stderr
+        counts = json.loads((folder / rule / "run.json").read_text())["counts"]
+        assert counts["views"] != told["counts"]["views"], counts
+    return f"{positioned} of {told['scans']} scans, {100 * errors[1]:.1f} cm (each: {100 * errors[0]:.1f})"
+
+
+@cases.case("figures of the papers in the report")
+def report(folder):
+    page = (RUN / "report.html").read_text()
+    for figure in ("P0, figure 9", "P0, figure 10", "P0, figure 11", "P1, figure 5", "P1, figure 8"):
+        assert figure in page, figure
+    assert page.count("data:image/png;base64,") == 7, page.count("data:image/png;base64,")
+
+
 @cases.case("the recording's own fixes are compared with and not used")
 def fixes(folder):
     rows = list(csv.DictReader((RUN / "gnss.csv").open()))
@@ -206,15 +234,16 @@ def real_map(folder):
 
 @cases.case("wrong use")
 def wrong(folder):
-    for words in (("--realtime",), ("--profile", "handheld"), ("--set", "stems.reach_m=3")):
+    for words in (("--realtime",), ("--profile", "handheld"), ("--set", "stems.reach_m=3"),
+                  ("--set", "stems.keep.rule=never"), ("--set", "stems.pace.longest_gap_s=-1")):
         done = sparse(REC, folder / "run", *words)
-        assert done.returncode == 2 and words[0] in done.stderr, (words, done.stderr)
+        assert done.returncode == 2 and words[0].lstrip('-') in done.stderr, (words, done.stderr)
     done = program("map", "--resume", RUN)
     assert done.returncode == 3 and "by stems alone" in done.stderr, done.stderr
     done = sparse(folder / "none.mcap", folder / "run")
     assert done.returncode == 3 and "none.mcap" in done.stderr, done.stderr
     done = program("map", "--front-end", "sparse", "--print-config")
-    assert done.returncode == 0 and "keep_distance_m" in done.stdout, done.stderr
+    assert done.returncode == 0 and "distance_m" in done.stdout, done.stderr
 
 
 @cases.case("scans without rings")

@@ -74,12 +74,21 @@ SparseTarget SparseOdometry::target() const {
   return SparseTarget(points, std::move(sds));
 }
 
-// In the world's axes with the origin at the last position.
-SparseOdometry::Match SparseOdometry::match(const Source& source) const {
+// Of the view's level frame, in the world's axes with the origin at the last position.
+Pose SparseOdometry::guess(const Pose& level_from_body,
+                           const std::optional<Pose>& expected_step) const {
+  const Eigen::Quaterniond last = upright(world_from_level_).rotation();
+  if (!expected_step) return Pose(last, last * last_shift_in_level_);
+  const Pose expected = world_from_body_ * *expected_step * level_from_body.inverse();
+  return Pose(upright(expected).rotation(),
+              expected.translation() - world_from_body_.translation());
+}
+
+SparseOdometry::Match SparseOdometry::match(const Source& source, const Pose& guess) const {
   const SparseTarget target = this->target();
   const Pose last = Pose(upright(world_from_level_).rotation(), Eigen::Vector3d::Zero());
-  const Pose guess(last.rotation(), last * last_shift_in_level_);
   Match match;
+  match.l0_m = target.l0_m;
   match.icp = register_sparse_icp(target, source.points, guess, config_.icp, source.height_sd_m);
   if (match.icp.overlap >= config_.min_overlap) return match;
   match.searched = true;
@@ -130,7 +139,7 @@ void SparseOdometry::take_up_last() {
   ++count_;
 }
 
-SparseStep SparseOdometry::track(const StemView& view) {
+SparseStep SparseOdometry::track(const StemView& view, const std::optional<Pose>& expected_step) {
   const StemUp up = stem_up(view);
   const Pose level_from_body(understory::level_from_body(up), Eigen::Vector3d::Zero());
   Source source{stem_points(view, level_from_body.rotation()), height_sds(view)};
@@ -139,13 +148,14 @@ SparseStep SparseOdometry::track(const StemView& view) {
     // The first body frame's x axis, laid level, is the world's.
     world_from_body_ = upright(level_from_body).inverse() * level_from_body;
   } else {
-    const Match found = match(source);
+    const Match found = match(source, guess(level_from_body, expected_step));
     step.status = found.icp.status == SparseIcpStatus::kTooFewPoints ? SparseStepStatus::kUnmatched
                   : found.icp.overlap < config_.min_overlap          ? SparseStepStatus::kWeak
                   : found.searched                                   ? SparseStepStatus::kSearched
                                                                      : SparseStepStatus::kTracked;
     step.overlap = found.icp.overlap;
     step.error_m = found.icp.error_m;
+    step.spacing_m = found.l0_m;
     step.covariance =
         compose_covariance(step_covariance(found.icp), level_from_body, Matrix6d::Zero());
     const Pose origin(Eigen::Quaterniond::Identity(), world_from_body_.translation());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,7 @@ struct SparseStep {
   Matrix6d covariance = Matrix6d::Identity();  // of the step, right perturbation
   double overlap = 0.0;                        // P0's lambda, measured
   double error_m = 0.0;                        // P0's e
+  double spacing_m = 0.0;                      // P0's L0 of what the view was matched to, (23)
 };
 
 // Odometry from stems alone: one view after another to a local map of stems, tilt held by the axes
@@ -56,9 +58,12 @@ class SparseOdometry {
   SparseStep add(const StemView& view);
   // Positions a view against the local map and leaves the map as it is. Views that are close
   // together should not all enter the map: each adds the error of its own match to those after it.
-  SparseStep track(const StemView& view);
+  // `expected_step` is previous_from_body as it is expected; without one the last shift goes on.
+  SparseStep track(const StemView& view, const std::optional<Pose>& expected_step = {});
   // Takes up the stems of the view that was positioned last.
   void take_up_last();
+  // Of the local map: bounded by what the last `map_frames` views have seen.
+  [[nodiscard]] std::size_t stems_in_memory() const { return landmarks_.size(); }
 
  private:
   struct Landmark {
@@ -68,6 +73,7 @@ class SparseOdometry {
   };
   struct Match {
     SparseIcpResult icp;
+    double l0_m = 0.0;
     bool searched = false;
   };
 
@@ -78,7 +84,9 @@ class SparseOdometry {
   };
 
   [[nodiscard]] SparseTarget target() const;
-  [[nodiscard]] Match match(const Source& source) const;
+  [[nodiscard]] Match match(const Source& source, const Pose& guess) const;
+  [[nodiscard]] Pose guess(const Pose& level_from_body,
+                           const std::optional<Pose>& expected_step) const;
   void take_up(const Source& source, const Pose& world_from_level);
 
   SparseOdometryConfig config_;

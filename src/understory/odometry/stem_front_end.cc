@@ -1,5 +1,6 @@
 #include "understory/odometry/stem_front_end.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -9,22 +10,49 @@ namespace {
 // A pause of the recording: what moved before it says nothing about now.
 constexpr double kLongestStep = 2.0;
 
+double reach_of(const StemView& view) {
+  std::vector<double> ranges;
+  for (const Stem& stem : view.stems)
+    ranges.push_back(static_cast<double>(stem.point.head<2>().norm()));
+  if (ranges.empty()) return 0.0;
+  const auto at = ranges.begin() + static_cast<std::ptrdiff_t>(9 * (ranges.size() - 1) / 10);
+  std::nth_element(ranges.begin(), at, ranges.end());
+  return *at;
+}
+
 }  // namespace
+
+void describe(ConfigTable& table, ViewChoiceConfig& config) {
+  table.add_enum("rule", config.rule,
+                 {{"fixed", ViewChoiceConfig::Rule::kFixed},
+                  {"overlap", ViewChoiceConfig::Rule::kOverlap},
+                  {"region", ViewChoiceConfig::Rule::kRegion}},
+                 "when a positioned scan is kept as a view for the map");
+  table.add("distance_m", config.distance_m, {0.0, 20.0}, "m",
+            "fixed: when the body has moved that far since the last one ...");
+  table.add("turn_deg", config.turn_deg, {0.0, 180.0}, "deg", "... or turned that much");
+  table.add("overlap", config.overlap, {0.0, 1.0}, "",
+            "overlap: when its overlap with the map of the views before has sunk to that share of "
+            "what it was after the last one");
+  table.add("region", config.region, {0.0, 10.0}, "",
+            "region: when the motion since the last one leaves that share of the region where "
+            "matching converges, P0 (26)");
+}
 
 void describe(ConfigTable& table, StemFrontEndConfig& config) {
   table.add("min_score", config.min_score, {0.0, 1.0}, "",
             "probability from which on a segment counts as a stem");
   table.add("max_range_m", config.max_range_m, {5.0, 200.0}, "m", "reach of the stem detection");
-  table.add("keep_distance_m", config.keep_distance_m, {0.0, 20.0}, "m",
-            "a view is kept for the map when the body has moved that far ...");
-  table.add("keep_turn_deg", config.keep_turn_deg, {0.0, 180.0}, "deg", "... or turned that much");
+  table.add("predict_turn", config.predict_turn,
+            "a match begins where turning on as before would lead; else with the last heading");
+  table.section("keep", [&] { describe(table, config.keep); });
   table.section("odometry", [&] { describe(table, config.odometry); });
 }
 
-StemView StemFrontEnd::view_of(const Scan& scan, const Rig& rig, const StemSegments& found,
-                               const Vector6d& motion_per_s) const {
+StemView StemFrontEnd::view_of(const Scan& scan, int frame, const Rig& rig,
+                               const StemSegments& found, const Vector6d& motion_per_s) const {
   StemView view;
-  view.frame = count_;
+  view.frame = frame;
   view.stamp = scan.stamp;
   view.stems.reserve(found.stems.size());
   for (const StemSegment& segment : found.stems) {
@@ -35,18 +63,33 @@ StemView StemFrontEnd::view_of(const Scan& scan, const Rig& rig, const StemSegme
   return view;
 }
 
-bool StemFrontEnd::to_be_kept(const Pose& world_from_body) {
-  if (last_kept_) {
-    const Pose moved = last_kept_->inverse() * world_from_body;
-    const double turn_deg = moved.angle() * 180.0 / std::numbers::pi;
-    if (moved.translation().norm() < config_.keep_distance_m && turn_deg < config_.keep_turn_deg)
-      return false;
-  }
-  last_kept_ = world_from_body;
+bool StemFrontEnd::to_be_kept(const StemScan& result) {
+  const auto due = [&] {
+    const Pose moved = last_kept_->inverse() * result.step.world_from_body;
+    const double shift_m = moved.translation().norm();
+    switch (config_.keep.rule) {
+      case ViewChoiceConfig::Rule::kFixed:
+        return shift_m >= config_.keep.distance_m ||
+               moved.angle() * 180.0 / std::numbers::pi >= config_.keep.turn_deg;
+      case ViewChoiceConfig::Rule::kOverlap:
+        best_overlap_ = std::max(best_overlap_, result.step.overlap);
+        return result.step.overlap <= config_.keep.overlap * best_overlap_;
+      case ViewChoiceConfig::Rule::kRegion: {
+        const ConvergenceRegion region = convergence_region(
+            result.step.spacing_m, std::max(result.reach_m, 1.0), 1.0 - result.step.overlap);
+        const double share = std::max(config_.keep.region, 1e-6);
+        return !region.contains(shift_m / share, moved.angle() / share, 0.0);
+      }
+    }
+    return true;
+  };
+  if (last_kept_ && !due()) return false;
+  last_kept_ = result.step.world_from_body;
+  best_overlap_ = 0.0;
   return true;
 }
 
-StemScan StemFrontEnd::add(const Scan& scan, const Rig& rig) {
+StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig) {
   StemSegmentConfig segments;
   segments.min_score = config_.min_score;
   segments.max_range_m = config_.max_range_m;
@@ -61,27 +104,35 @@ StemScan StemFrontEnd::add(const Scan& scan, const Rig& rig) {
   const double since = last_ ? to_seconds(scan.stamp - last_->stamp) : 0.0;
   const bool follows = last_ && since > 0.0 && since < kLongestStep;
   Vector6d motion = follows ? motion_per_s_ : Vector6d::Zero();
+  std::optional<Pose> step_guess;
+  if (follows) {
+    const Pose expected_step = Pose::exp(since * motion_per_s_);
+    result.expected = last_->world_from_body * expected_step;
+    if (config_.predict_turn) step_guess = expected_step;
+  }
   if (follows && scan.has_point_times) {
     // The step of a first try says how the body moved up to this scan; the scan itself lies half a
     // step later than the middle of that. Where scans follow each other without a pause, what is
     // taken out wrongly would come back larger by such an outlook, so there is none.
     const bool pauses = to_seconds(scan.end() - scan.stamp) < 0.4 * since;
     SparseOdometry trial = odometry_;
-    const SparseStep step = trial.track(view_of(scan, rig, found, motion));
+    const SparseStep step = trial.track(view_of(scan, frame, rig, found, motion), step_guess);
     const Vector6d latest = (last_->world_from_body.inverse() * step.world_from_body).log() / since;
-    if (step.status == SparseStepStatus::kTracked || step.status == SparseStepStatus::kSearched)
+    if (step.status == SparseStepStatus::kTracked || step.status == SparseStepStatus::kSearched) {
       motion = pauses ? Vector6d(1.5 * latest - 0.5 * motion_per_s_) : latest;
+      if (config_.predict_turn) step_guess = Pose::exp(since * latest);
+    }
   }
-  result.view = view_of(scan, rig, found, motion);
+  result.view = view_of(scan, frame, rig, found, motion);
+  result.reach_m = reach_of(result.view);
   result.motion_rad_s = motion.head<3>().norm();
-  result.step = odometry_.track(result.view);
+  result.step = odometry_.track(result.view, step_guess);
   motion_per_s_.setZero();
   if (follows)
     motion_per_s_ = (last_->world_from_body.inverse() * result.step.world_from_body).log() / since;
   last_ = StampedPose{scan.stamp, result.step.world_from_body};
-  result.keep = !result.view.stems.empty() && to_be_kept(result.step.world_from_body);
+  result.keep = !result.view.stems.empty() && to_be_kept(result);
   if (result.keep) odometry_.take_up_last();
-  ++count_;
   return result;
 }
 

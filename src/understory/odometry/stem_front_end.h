@@ -13,22 +13,40 @@
 
 namespace understory {
 
+// Which positioned scans are kept as views for the map.
+struct ViewChoiceConfig {
+  enum class Rule {
+    kFixed,    // moved or turned by a fixed amount
+    kOverlap,  // P0: what looks much like the views before is skipped
+    kRegion,   // left a share of ICP's convergence region, P0 (26), about the last one
+  };
+  Rule rule = Rule::kFixed;
+  double distance_m = 0.5;
+  double turn_deg = 12.0;
+  double overlap = 0.95;
+  double region = 0.25;
+};
+void describe(ConfigTable& table, ViewChoiceConfig& config);
+
 struct StemFrontEndConfig {
   double min_score = 0.5;     // of a stem to be used
   double max_range_m = 42.0;  // of a stem's returns
-  // A view is kept for the map when the body has moved or turned that much since the last one.
-  double keep_distance_m = 0.5;
-  double keep_turn_deg = 12.0;
+  bool predict_turn = true;   // the guess of a match goes on turning as before
+  ViewChoiceConfig keep;
   SparseOdometryConfig odometry;
 };
 void describe(ConfigTable& table, StemFrontEndConfig& config);
 
 // What became of one scan.
 struct StemScan {
+  bool positioned = true;
   StemView view;    // body frame as it stood at the scan's stamp
   SparseStep step;  // world_from_body at the scan's stamp
   bool keep = false;
   double motion_rad_s = 0.0;  // rate of turn that was taken out of the scan
+  // Where constant motion since the scan before would have led it; empty without one.
+  std::optional<Pose> expected;
+  double reach_m = 0.0;  // nine of ten stems are nearer
 };
 
 // Raw scans to positions from their stems alone: stems of each scan (features/stem_segments.h),
@@ -40,19 +58,21 @@ class StemFrontEnd {
   explicit StemFrontEnd(const StemFrontEndConfig& config)
       : config_(config), odometry_(config.odometry) {}
 
-  [[nodiscard]] StemScan add(const Scan& scan, const Rig& rig);
+  // `frame` is the number of the scan in the recording; scans may be left out.
+  [[nodiscard]] StemScan add(const Scan& scan, int frame, const Rig& rig);
+  [[nodiscard]] const SparseOdometry& odometry() const { return odometry_; }
 
  private:
-  [[nodiscard]] StemView view_of(const Scan& scan, const Rig& rig, const StemSegments& found,
-                                 const Vector6d& motion_per_s) const;
-  [[nodiscard]] bool to_be_kept(const Pose& world_from_body);
+  [[nodiscard]] StemView view_of(const Scan& scan, int frame, const Rig& rig,
+                                 const StemSegments& found, const Vector6d& motion_per_s) const;
+  [[nodiscard]] bool to_be_kept(const StemScan& result);
 
   StemFrontEndConfig config_;
   SparseOdometry odometry_;
-  int count_ = 0;
   std::optional<Eigen::Vector3d> up_in_lidar_;
   std::optional<StampedPose> last_;
   std::optional<Pose> last_kept_;
+  double best_overlap_ = 0.0;                 // with the local map, since a view was kept
   Vector6d motion_per_s_ = Vector6d::Zero();  // of the body, right perturbation
 };
 

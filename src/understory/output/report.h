@@ -47,6 +47,24 @@ struct ReportTruth {
   std::vector<std::pair<std::string, std::string>> more;  // name, value with unit
 };
 
+// Two views as the odometry placed them (P0 figures 9 and 10).
+struct ReportPair {
+  int later = 0;
+  int earlier = 0;
+  double overlap = 0.0;  // of the sectors that they see
+  double error_m = 0.0;  // of their stems that lie in both
+  bool acceptable = false;
+};
+
+// All pairs of views, as many as fit (P1 figure 5): a row per earlier view, a column per later one.
+// NaN: nothing in common.
+struct ReportViewMatrix {
+  int views = 0;
+  int side = 0;
+  std::vector<float> overlap;
+  std::vector<float> error_m;
+};
+
 // How a map of stems corrected itself (graph/self_correction.h).
 struct ReportCorrection {
   struct Figure {
@@ -60,6 +78,17 @@ struct ReportCorrection {
   Pairs kept;
   Pairs tried;  // and not kept
   std::string ended;
+  std::vector<ReportPair> pairs;  // drawn at random; empty: not drawn
+  double acceptable_m = 0.3;      // P0 (27)
+  double acceptable_per_overlap_m = 0.5;
+  double least_overlap = 0.4;
+  ReportViewMatrix matrix_before;
+  ReportViewMatrix matrix_after;
+  std::vector<Eigen::Vector2f> sights_before;  // of all views, world frame
+  std::vector<Eigen::Vector2f> sights_after;
+  Eigen::Vector2f most_moved = Eigen::Vector2f::Zero();
+  double ring_m = 5.0;
+  std::vector<double> trees_per_ha;  // in rings about the way
 };
 
 // All that the report shows. What is empty is left out of the page.

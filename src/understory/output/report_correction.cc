@@ -29,7 +29,9 @@ std::string correction_section(const ReportInput& input) {
         escape_html(figure.name), figure.before, figure.digits, figure.after, figure.digits);
   }
   html += "</tbody></table>";
-  if (correction.kept.empty() && correction.tried.empty()) return html + "</section>\n";
+  html += correction_figures(correction);
+  if (correction.pairs.empty() && correction.kept.empty() && correction.tried.empty())
+    return html + "</section>\n";
   Plot plot;
   plot.x_label = "later view";
   plot.y_label = "earlier view";
@@ -39,9 +41,15 @@ std::string correction_section(const ReportInput& input) {
     std::sort(pairs.begin(), pairs.end());
     if (!pairs.empty()) plot.series.push_back({name, colour, std::move(pairs), true});
   };
-  dots("tried", "var(--soft)", correction.tried);
+  ReportCorrection::Pairs promising;
+  for (const ReportPair& pair : correction.pairs) {
+    if (pair.acceptable) promising.emplace_back(pair.later, pair.earlier);
+  }
+  dots("promising, of those drawn for the report", "var(--rule)", promising);
+  dots("tried", "var(--bad)", correction.tried);
   dots("in the map", "var(--line)", correction.kept);
-  return html + "<h3>Which views were matched again</h3>" + svg_plot(plot) + "</section>\n";
+  return html + "<h3>Which views were matched again (P0, figure 10)</h3>" + svg_plot(plot) +
+         "</section>\n";
 }
 
 }  // namespace understory

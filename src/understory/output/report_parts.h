@@ -17,6 +17,8 @@ namespace understory {
 [[nodiscard]] std::string matching_section(const ReportInput& input);
 [[nodiscard]] std::string loops_section(const ReportInput& input);
 [[nodiscard]] std::string correction_section(const ReportInput& input);
+// Its figures: pairs of views, sights before and after, trees over the distance from the way.
+[[nodiscard]] std::string correction_figures(const ReportCorrection& correction);
 [[nodiscard]] std::string truth_section(const ReportInput& input);
 [[nodiscard]] std::string time_section(const ReportInput& input);
 [[nodiscard]] std::string made_section(const ReportInput& input);

@@ -33,7 +33,7 @@ svg.plot{max-width:1100px}svg.plot text{fill:var(--soft);font-size:12px}
 .two{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:16px;align-items:start}
 .two figure{max-width:620px}.panels{display:grid;grid-template-columns:repeat(auto-fit,minmax(430px,1fr));gap:14px}
 .panels.one{grid-template-columns:minmax(0,900px)}
-.trees{display:flex;flex-wrap:wrap;gap:14px}.trees figure{width:165px}
+.trees{display:flex;flex-wrap:wrap;gap:14px}.trees figure{width:165px}.trees.matrices figure{width:350px;max-width:100%}
 figure{margin:0}figcaption{font-size:.85rem;color:var(--soft);margin-top:4px}
 .legend{font-size:.88rem;color:var(--soft);margin:.5rem 0 0}.legend span{white-space:nowrap;
 margin-right:12px}.legend i{display:inline-block;width:22px;height:0;border-top:4px solid;margin:0 5px 3px 0}

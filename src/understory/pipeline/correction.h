@@ -28,6 +28,7 @@ struct SparseScans {
   std::string recording;  // as the user named it
   const Recording* source = nullptr;
   std::vector<StampedPose> path;      // of every scan, chained
+  std::size_t positioned = 0;         // of these; the others lie on the way between
   std::vector<SparseStep> steps;      // of the views in the stems' file
   const StageTimes* times = nullptr;  // "scan": all of one scan
   std::vector<GnssFix> fixes;         // of the recording; compared with, not used

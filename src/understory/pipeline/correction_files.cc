@@ -263,6 +263,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
     summary.inputs = hash_inputs(scans.recording);
     summary.scans = summary.poses = scans.path.size();
     summary.counts["views"] = static_cast<std::int64_t>(run.views.size());
+    summary.counts["scans_positioned"] = static_cast<std::int64_t>(scans.positioned);
     if (!scans.path.empty())
       summary.recording_s = to_seconds(scans.path.back().stamp - scans.path.front().stamp);
   }

@@ -9,6 +9,7 @@
 #include "understory/map/stem_map.h"
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/correction_figures.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_truth.h"
 #include "understory/pipeline/scan_path.h"
@@ -55,7 +56,10 @@ ReportInput correction_report(const CorrectionRequest& request, const Correction
                               const RunSummary& summary, const std::vector<Tree>& trees) {
   ReportInput report;
   report.trees = &trees;
-  if (!run.stopped) report.correction = correction_of(run.correction.self);
+  if (!run.stopped) {
+    report.correction = correction_of(run.correction.self);
+    add_correction_figures(run, request.config.stems, trees, *report.correction);
+  }
   report.title = request.stems.filename().string();
   report.made_from = fmt::format("stems of {} views", run.views.size());
   if (request.scans != nullptr) {

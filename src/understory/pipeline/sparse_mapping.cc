@@ -23,7 +23,7 @@ class SparseRun {
         log_(log),
         orderer_(request.config.time_repair, log),
         source_(open_source(request.recording, request.open, log)),
-        front_end_(request.config.front_end),
+        pacer_(request.config.pace, request.config.front_end),
         stems_(request.run_folder / "stems.csv.gz") {}
 
   // True if it was stopped.
@@ -39,7 +39,7 @@ class SparseRun {
         orderer_.finish();
       }
       while (auto ready = orderer_.pop()) {
-        if (const auto* scan = std::get_if<ScanPtr>(&*ready)) take(**scan, progress);
+        if (const auto* scan = std::get_if<ScanPtr>(&*ready)) take(*scan, progress);
         if (const auto* fix = std::get_if<GnssFix>(&*ready)) fixes_.push_back(*fix);
         if (std::holds_alternative<ImuSample>(*ready) && !told_of_imu_) {
           log_.info("the sparse front end does not use the recording's IMU");
@@ -47,6 +47,7 @@ class SparseRun {
         }
       }
     }
+    record(pacer_.finish(source_->rig()));
     if (kept() > 0) stems_.commit();
     return stopped;
   }
@@ -61,35 +62,47 @@ class SparseRun {
     scans.path = std::move(path_);
     scans.steps = std::move(steps_);
     scans.times = &times_;
+    scans.positioned = positioned_;
     scans.stopped = stopped;
     scans.fixes = std::move(fixes_);
     return scans;
   }
 
  private:
-  void take(const Scan& scan, const ProgressSink& progress) {
+  void take(const ScanPtr& scan, const ProgressSink& progress) {
     const ScopedTimer timer(times_, "scan");
-    const StemScan result = front_end_.add(scan, source_->rig());
-    path_.push_back({scan.stamp, result.step.world_from_body});
-    if (result.keep) {
+    ++taken_;
+    record(pacer_.add(scan, source_->rig()));
+    if (!progress) return;
+    const double share = source_->progress();
+    const auto done = static_cast<double>(taken_);
+    progress({"stems", done, share > 0.0 ? done / share : 0.0, "scans",
+              fmt::format("{} stems", last_stems_)});
+  }
+
+  void record(const std::vector<StemScan>& results) {
+    for (const StemScan& result : results) {
+      path_.push_back({result.view.stamp, result.step.world_from_body});
+      if (!result.positioned) continue;
+      ++positioned_;
+      last_stems_ = result.view.stems.size();
+      if (!result.keep) continue;
       for (const Stem& stem : result.view.stems)
         stems_.add(result.view.frame, result.view.stamp, stem);
       steps_.push_back(result.step);
     }
-    if (!progress) return;
-    const double share = source_->progress();
-    const auto done = static_cast<double>(path_.size());
-    progress({"stems", done, share > 0.0 ? done / share : 0.0, "scans",
-              fmt::format("{} stems", result.view.stems.size())});
   }
 
   const SparseMappingRequest& request_;
   Log& log_;
   EventOrderer orderer_;
   std::unique_ptr<Recording> source_;
-  StemFrontEnd front_end_;
+  StemPacer pacer_;
   StemsWriter stems_;
   std::vector<StampedPose> path_;  // of every scan
+  std::size_t taken_ = 0;          // scans, of which the last may still wait
+  std::size_t positioned_ = 0;
+  std::size_t last_stems_ = 0;
   std::vector<GnssFix> fixes_;
   StageTimes times_;
   bool told_of_imu_ = false;
@@ -101,7 +114,10 @@ class SparseRun {
 ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
   ConfigTable table;
   table.section("time_repair", [&] { EventOrderer::describe(table, config.time_repair); });
-  table.section("stems", [&] { describe(table, config.front_end); });
+  table.section("stems", [&] {
+    describe(table, config.front_end);
+    table.section("pace", [&] { describe(table, config.pace); });
+  });
   describe(table, config.correction);
   return table;
 }

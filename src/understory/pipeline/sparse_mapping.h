@@ -4,6 +4,7 @@
 #include <string>
 
 #include "understory/odometry/stem_front_end.h"
+#include "understory/odometry/stem_pacer.h"
 #include "understory/pipeline/correction.h"
 #include "understory/preprocess/event_orderer.h"
 #include "understory/recording/recording.h"
@@ -13,6 +14,7 @@ namespace understory {
 struct SparseMappingConfig {
   EventOrderer::Config time_repair;
   StemFrontEndConfig front_end;
+  StemPaceConfig pace;
   CorrectionConfig correction;
 };
 [[nodiscard]] ConfigTable sparse_mapping_table(SparseMappingConfig& config);
