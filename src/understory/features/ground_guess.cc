@@ -76,45 +76,63 @@ std::optional<GroundGuess::Height> GroundGuess::at(const Eigen::Vector2d& place)
 
 // A plane that what stands on the ground does not lift: what lies above it counts ever less.
 GroundGuess::Plane GroundGuess::fit(const Eigen::Vector2d& middle) const {
-  std::vector<Eigen::Vector3d> near;
+  struct Low {
+    double x, y, z;
+    double sharpness;  // 1 / spread
+  };
+  std::vector<Low> near;
+  near.reserve(static_cast<std::size_t>((2 * kReach + 1) * (2 * kReach + 1)));
+  double lowest = std::numeric_limits<double>::max();
   const int middle_column = cell(middle.x()) - column0_;
   const int middle_row = cell(middle.y()) - row0_;
   for (int row = std::max(0, middle_row - kReach); row <= std::min(rows_ - 1, middle_row + kReach);
        ++row) {
     for (int column = std::max(0, middle_column - kReach);
          column <= std::min(columns_ - 1, middle_column + kReach); ++column) {
-      const Eigen::Vector3f& lowest = lowest_[static_cast<std::size_t>(row * columns_ + column)];
-      if (std::isnan(lowest.z())) continue;
-      near.emplace_back(lowest.cast<double>());
-      near.back().head<2>() -= middle;
+      const Eigen::Vector3f& point = lowest_[static_cast<std::size_t>(row * columns_ + column)];
+      if (std::isnan(point.z())) continue;
+      Low low{static_cast<double>(point.x()) - middle.x(),
+              static_cast<double>(point.y()) - middle.y(), static_cast<double>(point.z()), 0.0};
+      low.sharpness = 1.0 / (kRelief + 0.05 * std::sqrt(low.x * low.x + low.y * low.y));
+      lowest = std::min(lowest, low.z);
+      near.push_back(low);
     }
   }
   if (near.size() < 3) return {};
   Plane plane;
   plane.known = true;
-  plane.height_and_slope.x() =
-      std::min_element(near.begin(), near.end(), [](const auto& a, const auto& b) {
-        return a.z() < b.z();
-      })->z();
+  plane.height_and_slope.x() = lowest;
   for (int round = 0; round < 4; ++round) {
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-    information(1, 1) = information(2, 2) = 1.0 / (kSlopeSd * kSlopeSd);
+    const Eigen::Vector3d p = plane.height_and_slope;
+    double n = 0.0, sx = 0.0, sy = 0.0, sz = 0.0;
+    double xx = 0.0, xy = 0.0, yy = 0.0, xz = 0.0, yz = 0.0;
     double squares = 0.0;
     double weights = 0.0;
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (const Eigen::Vector3d& low : near) {
-      const Eigen::Vector3d row(1.0, low.x(), low.y());
-      const double spread = kRelief + 0.05 * low.head<2>().norm();
-      const double ratio = (low.z() - row.dot(plane.height_and_slope)) / spread;
-      double weight = 1.0 / (spread * spread);
-      if (ratio > 0.0) weight /= (1.0 + ratio * ratio) * (1.0 + ratio * ratio);
-      squares += weight * spread * spread * ratio * ratio;
-      weights += weight * spread * spread;
-      information += weight * row * row.transpose();
-      right += weight * low.z() * row;
+    for (const Low& low : near) {
+      const double ratio = (low.z - p.x() - p.y() * low.x - p.z() * low.y) * low.sharpness;
+      double trust = ratio > 0.0 ? 1.0 / (1.0 + ratio * ratio) : 1.0;
+      trust *= trust;
+      squares += trust * ratio * ratio;
+      weights += trust;
+      const double weight = trust * low.sharpness * low.sharpness;
+      const double wx = weight * low.x;
+      const double wy = weight * low.y;
+      n += weight;
+      sx += wx;
+      sy += wy;
+      sz += weight * low.z;
+      xx += wx * low.x;
+      xy += wx * low.y;
+      yy += wy * low.y;
+      xz += wx * low.z;
+      yz += wy * low.z;
     }
+    constexpr double kSlopeKnown = 1.0 / (kSlopeSd * kSlopeSd);
+    Eigen::Matrix3d information;
+    information << n, sx, sy, sx, xx + kSlopeKnown, xy, sy, xy, yy + kSlopeKnown;
     const Eigen::LDLT<Eigen::Matrix3d> solved = information.ldlt();
-    plane.height_and_slope = solved.solve(right);
+    plane.height_and_slope = solved.solve(Eigen::Vector3d(sz, xz, yz));
+    if (round < 3) continue;
     plane.covariance = std::max(1.0, squares / std::max(weights, 1e-9)) *
                        solved.solve(Eigen::Matrix3d::Identity());
   }

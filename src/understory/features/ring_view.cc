@@ -58,8 +58,14 @@ void RingView::gather(const Scan& scan) {
     const auto by_azimuth = [](const Return& a, const Return& b) {
       return a.azimuth != b.azimuth ? a.azimuth < b.azimuth : a.point < b.point;
     };
-    if (!std::is_sorted(ring.returns.begin(), ring.returns.end(), by_azimuth))
-      std::sort(ring.returns.begin(), ring.returns.end(), by_azimuth);
+    // A ring comes in the order of its turning, one way or the other, begun anywhere.
+    std::vector<Return>& returns = ring.returns;
+    if (returns[returns.size() / 2].azimuth < returns[returns.size() / 2 - 1].azimuth)
+      std::reverse(returns.begin(), returns.end());
+    const auto lowest = std::min_element(returns.begin(), returns.end(), by_azimuth);
+    std::rotate(returns.begin(), lowest, returns.end());
+    if (!std::is_sorted(returns.begin(), returns.end(), by_azimuth))
+      std::sort(returns.begin(), returns.end(), by_azimuth);
     rings_.push_back(std::move(ring));
   }
   std::sort(rings_.begin(), rings_.end(),

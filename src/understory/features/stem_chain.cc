@@ -62,11 +62,18 @@ Observation observation(double above_base) {
   return h;
 }
 
+// A section of a level by its place, for the search.
+struct Spot {
+  double x = 0.0;
+  double y = 0.0;
+  int section = 0;
+};
+
 // The growing of one chain from its first section.
 class Grower {
  public:
   Grower(const SectionView& view, const StemChainConfig& config,
-         const std::vector<std::vector<int>>& by_x, std::vector<char>& used)
+         const std::vector<std::vector<Spot>>& by_x, std::vector<char>& used)
       : view_(view), config_(config), sections_(view.sections()), by_x_(by_x), used_(used) {
     centres_.reserve(sections_.size());
     for (const StemSection& section : sections_)
@@ -110,7 +117,7 @@ class Grower {
       const double height = view_.height_at(level, place);
       if (std::abs(height - last_height) > kLongestGap) return;
       place = chain_.line.at(height);
-      const int next = best_in(level, place);
+      const int next = best_in(level, place, height);
       if (next >= 0) {
         take(next);
         last_height = at(next).height_m;
@@ -131,29 +138,29 @@ class Grower {
   }
 
   // The unused section of a level that lies best on the line.
-  [[nodiscard]] int best_in(int level, const Eigen::Vector2d& place) const {
+  [[nodiscard]] int best_in(int level, const Eigen::Vector2d& place, double height_m) const {
     // Far enough for the gate, given how well the line is known and how badly a section can be.
     constexpr double kWorstSection = 0.06;
-    const Eigen::Matrix2d known = chain_.line.covariance_at(view_.height_at(level, place));
+    const Eigen::Matrix2d known = chain_.line.covariance_at(height_m);
     const double reach =
         std::sqrt(kGate * (known.diagonal().maxCoeff() + kWorstSection * kWorstSection)) +
         kMeanDepth * config_.usual_radius_m;
-    const std::vector<int>& row = by_x_[static_cast<std::size_t>(level)];
+    const std::vector<Spot>& row = by_x_[static_cast<std::size_t>(level)];
     auto it = std::lower_bound(row.begin(), row.end(), place.x() - reach,
-                               [&](int i, double x) { return at(i).surface.x() < x; });
+                               [](const Spot& spot, double x) { return spot.x < x; });
     int best = -1;
     double least = kGate;
-    for (; it != row.end() && at(*it).surface.x() <= place.x() + reach; ++it) {
-      if (used_[static_cast<std::size_t>(*it)] != 0) continue;
-      if (std::abs(at(*it).surface.y() - place.y()) > reach) continue;
-      const Centre& centre = centre_at(*it);
-      const double height = at(*it).height_m;
+    for (; it != row.end() && it->x <= place.x() + reach; ++it) {
+      if (std::abs(it->y - place.y()) > reach) continue;
+      if (used_[static_cast<std::size_t>(it->section)] != 0) continue;
+      const Centre& centre = centre_at(it->section);
+      const double height = at(it->section).height_m;
       const Eigen::Vector2d off = centre.place - chain_.line.at(height);
       const Eigen::Matrix2d spread = centre.covariance + chain_.line.covariance_at(height);
       const double distance = off.dot(spread.inverse() * off);
       if (distance >= least) continue;
       least = distance;
-      best = *it;
+      best = it->section;
     }
     return best;
   }
@@ -173,7 +180,7 @@ class Grower {
   const StemChainConfig& config_;
   const std::vector<StemSection>& sections_;
   std::vector<Centre> centres_;
-  const std::vector<std::vector<int>>& by_x_;
+  const std::vector<std::vector<Spot>>& by_x_;
   std::vector<char>& used_;
   StemChain chain_;
 };
@@ -229,8 +236,10 @@ void count_between(const SectionView& view, StemChain& chain) {
 }  // namespace
 
 Eigen::Matrix2d StemLine::covariance_at(double height_m) const {
-  const Observation h = observation(height_m - base_m);
-  return h * covariance * h.transpose();
+  const double above = height_m - base_m;
+  return covariance.topLeftCorner<2, 2>() +
+         above * (covariance.topRightCorner<2, 2>() + covariance.bottomLeftCorner<2, 2>()) +
+         above * above * covariance.bottomRightCorner<2, 2>();
 }
 
 OwnRadius own_radius(const SectionView& view, const StemChain& chain, double from_m, double to_m) {
@@ -326,14 +335,14 @@ void fit_chain(const SectionView& view, const StemChainConfig& config, StemChain
 
 std::vector<StemChain> chain_sections(const SectionView& view, const StemChainConfig& config) {
   const auto& sections = view.sections();
-  std::vector<std::vector<int>> by_x(static_cast<std::size_t>(view.levels()));
-  for (std::size_t i = 0; i < sections.size(); ++i)
-    by_x[static_cast<std::size_t>(sections[i].level)].push_back(static_cast<int>(i));
-  for (std::vector<int>& row : by_x) {
-    std::sort(row.begin(), row.end(), [&](int a, int b) {
-      const double xa = sections[static_cast<std::size_t>(a)].surface.x();
-      const double xb = sections[static_cast<std::size_t>(b)].surface.x();
-      return xa != xb ? xa < xb : a < b;
+  std::vector<std::vector<Spot>> by_x(static_cast<std::size_t>(view.levels()));
+  for (std::size_t i = 0; i < sections.size(); ++i) {
+    by_x[static_cast<std::size_t>(sections[i].level)].push_back(
+        {sections[i].surface.x(), sections[i].surface.y(), static_cast<int>(i)});
+  }
+  for (std::vector<Spot>& row : by_x) {
+    std::sort(row.begin(), row.end(), [](const Spot& a, const Spot& b) {
+      return a.x != b.x ? a.x < b.x : a.section < b.section;
     });
   }
   std::vector<char> used(sections.size(), 0);

@@ -62,31 +62,31 @@ void describe(ConfigTable& table, SparseOdometryConfig& config) {
   table.section("search", [&] { describe(table, config.search); });
 }
 
-SparseTarget SparseOdometry::target() const {
+std::shared_ptr<const SparseTarget> SparseOdometry::target() const {
   SparsePoints points;
   std::vector<double> sds;
   points.reserve(landmarks_.size());
   for (const Landmark& landmark : landmarks_) {
-    points.push_back(landmark.point_in_world - world_from_body_.translation());
+    points.push_back(landmark.point_in_world - origin_);
     if (landmark.height_sd_m > 0.0) sds.push_back(landmark.height_sd_m);
   }
   if (sds.size() < points.size()) sds.clear();
-  return SparseTarget(points, std::move(sds));
+  return std::make_shared<const SparseTarget>(points, std::move(sds));
 }
 
-// Of the view's level frame, in the world's axes with the origin at the last position.
+// Of the view's level frame, in the world's axes with the local map's origin.
 Pose SparseOdometry::guess(const Pose& level_from_body,
                            const std::optional<Pose>& expected_step) const {
   const Eigen::Quaterniond last = upright(world_from_level_).rotation();
-  if (!expected_step) return Pose(last, last * last_shift_in_level_);
+  const Eigen::Vector3d at = world_from_body_.translation() - origin_;
+  if (!expected_step) return Pose(last, at + last * last_shift_in_level_);
   const Pose expected = world_from_body_ * *expected_step * level_from_body.inverse();
-  return Pose(upright(expected).rotation(),
-              expected.translation() - world_from_body_.translation());
+  return Pose(upright(expected).rotation(), expected.translation() - origin_);
 }
 
 SparseOdometry::Match SparseOdometry::match(const Source& source, const Pose& guess) const {
-  const SparseTarget target = this->target();
-  const Pose last = Pose(upright(world_from_level_).rotation(), Eigen::Vector3d::Zero());
+  const SparseTarget& target = *target_;
+  const Pose last(upright(world_from_level_).rotation(), world_from_body_.translation() - origin_);
   Match match;
   match.l0_m = target.l0_m;
   match.icp = register_sparse_icp(target, source.points, guess, config_.icp, source.height_sd_m);
@@ -137,6 +137,8 @@ SparseStep SparseOdometry::add(const StemView& view) {
 void SparseOdometry::take_up_last() {
   take_up(last_source_, world_from_level_);
   ++count_;
+  origin_ = world_from_body_.translation();
+  target_ = target();
 }
 
 SparseStep SparseOdometry::track(const StemView& view, const std::optional<Pose>& expected_step) {
@@ -158,7 +160,7 @@ SparseStep SparseOdometry::track(const StemView& view, const std::optional<Pose>
     step.spacing_m = found.l0_m;
     step.covariance =
         compose_covariance(step_covariance(found.icp), level_from_body, Matrix6d::Zero());
-    const Pose origin(Eigen::Quaterniond::Identity(), world_from_body_.translation());
+    const Pose origin(Eigen::Quaterniond::Identity(), origin_);
     const Pose matched = origin * found.icp.target_from_source;
     step.previous_from_body = world_from_body_.inverse() * matched * level_from_body;
     world_from_body_ =

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -83,7 +84,7 @@ class SparseOdometry {
     std::vector<double> height_sd_m;
   };
 
-  [[nodiscard]] SparseTarget target() const;
+  [[nodiscard]] std::shared_ptr<const SparseTarget> target() const;
   [[nodiscard]] Match match(const Source& source, const Pose& guess) const;
   [[nodiscard]] Pose guess(const Pose& level_from_body,
                            const std::optional<Pose>& expected_step) const;
@@ -91,6 +92,10 @@ class SparseOdometry {
 
   SparseOdometryConfig config_;
   std::vector<Landmark> landmarks_;
+  // Of the landmarks, with the origin where the view stood that was taken up last; as long as none
+  // is taken up it stays.
+  std::shared_ptr<const SparseTarget> target_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   Source last_source_;
   int count_ = 0;  // views in the map
   Pose world_from_body_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "understory/graph/correction_pairs.h"
 #include "understory/graph/view_cone.h"
@@ -54,15 +55,17 @@ std::vector<ReportPair> drawn_pairs(const Placed& placed, const SelfCorrectionCo
     pair.later =
         static_cast<int>(earlier + 1 + random.below(std::min(longest, views - 1 - earlier)));
   }
+  std::vector<std::optional<SparseTarget>> targets(placed.points.size());
+  parallel_for(targets.size(), 16, [&](std::size_t i) { targets[i].emplace(placed.points[i]); });
   parallel_for(pairs.size(), 32, [&](std::size_t k) {
     ReportPair& pair = pairs[k];
     const auto j = static_cast<std::size_t>(pair.earlier);
     const auto i = static_cast<std::size_t>(pair.later);
     pair.overlap = overlap(placed.before[i], placed.before[j]);
     if (pair.overlap <= 0.0) return;
-    pair.error_m = placed_error(SparseTarget(placed.points[j]), placed.points[i],
-                                placed.before[j].inverse() * placed.before[i], overlap,
-                                config.pairs.outlier_ratio);
+    pair.error_m =
+        placed_error(*targets[j], placed.points[i], placed.before[j].inverse() * placed.before[i],
+                     overlap, config.pairs.outlier_ratio);
     pair.acceptable = pair.overlap > config.pairs.least_overlap &&
                       acceptable(pair.error_m, pair.overlap, config.pairs);
   });
