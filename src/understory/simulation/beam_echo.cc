@@ -6,6 +6,11 @@
 namespace understory {
 namespace {
 
+// std::hypot guards against overflow, which nothing here comes near.
+float length_of(float a, float b) {
+  return std::sqrt(a * a + b * b);
+}
+
 // A beam of one ray.
 BeamEcho echo_of(const Hit& hit) {
   BeamEcho echo;
@@ -84,30 +89,30 @@ BeamEcho strongest_echo(std::span<const Hit> hits, double pulse_m, BeamEcho* sec
 }
 
 BeamReading read_echo(const BeamEcho& echo, const LidarConfig& config, CounterNoise noise) {
-  // Whether the echo rises above the noise: half of them do at the threshold.
-  const float threshold = static_cast<float>(config.range_10_percent_m);
+  // Whether the echo rises above the noise (half of them do at the threshold) and is not lost.
+  const auto threshold = static_cast<float>(config.range_10_percent_m);
   const float signal = 10.0F * echo.energy * threshold * threshold / (echo.range_m * echo.range_m);
   const float steep = signal * signal * signal;
-  if (noise.uniform() * (1.0F + steep) > steep) return {};
-  if (noise.uniform() < static_cast<float>(config.dropout)) return {};
+  const float kept = 1.0F - static_cast<float>(config.dropout);
+  if (noise.uniform() * (1.0F + steep) > kept * steep) return {};
 
   const float cosine = std::max(0.1F, echo.cosine);
   const float tangent = std::sqrt(1.0F - cosine * cosine) / cosine;
-  float sd = std::hypot(static_cast<float>(config.range_sd_m),
-                        static_cast<float>(config.range_sd_per_m) * echo.range_m) *
+  float sd = length_of(static_cast<float>(config.range_sd_m),
+                       static_cast<float>(config.range_sd_per_m) * echo.range_m) *
              (1.0F + static_cast<float>(config.incidence_gain) * std::min(tangent, 4.0F));
   if (echo.surface == Surface::kStem || echo.surface == Surface::kDeadWood) {
-    sd = std::hypot(sd, static_cast<float>(config.bark_sd_m));
+    sd = length_of(sd, static_cast<float>(config.bark_sd_m));
   }
   const CounterNoise::Pair shiver = noise.normal_pair();
   float range = echo.range_m + sd * shiver.first;
   if (config.range_step_m > 0.0) {
     const auto step = static_cast<float>(config.range_step_m);
-    range = std::round(range / step) * step;
+    range = std::nearbyint(range / step) * step;
   }
   if (range < config.min_range_m || range > config.max_range_m) return {};
   const float brightness = 255.0F * echo.energy * (1.0F + 0.06F * shiver.second);
-  return {range, std::round(std::clamp(brightness, 0.0F, 255.0F))};
+  return {range, std::nearbyint(std::clamp(brightness, 0.0F, 255.0F))};
 }
 
 }  // namespace understory

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -12,6 +14,7 @@ namespace understory {
 // whichever thread casts it and in whatever order. Cheap to make, a value type.
 class CounterNoise {
  public:
+  CounterNoise() = default;
   CounterNoise(std::uint64_t seed, std::uint64_t a, std::uint64_t b)
       : state_(hash_numbers(seed, a, b)) {}
 
@@ -23,21 +26,39 @@ class CounterNoise {
     const float v = uniform();
     return std::sqrt(-2.0F * std::log(u)) * std::cos(2.0F * std::numbers::pi_v<float> * v);
   }
-  // Two independent normal numbers for the price of one.
+  // Two independent normal numbers for the price of one (Box-Muller by polynomials, errors below
+  // 1e-6): a loop over many streams works through several at once.
   struct Pair {
     float first;
     float second;
   };
-  Pair normal_pair() {
-    const std::uint64_t bits = next();
-    const float u = 1.0F - static_cast<float>(bits >> 40) * 0x1.0p-24F;
-    const float v = static_cast<float>(bits & 0xffffffU) * 0x1.0p-24F;
-    const float radius = std::sqrt(-2.0F * std::log(u));
-    const float angle = 2.0F * std::numbers::pi_v<float> * v;
-    return {radius * std::cos(angle), radius * std::sin(angle)};
+  Pair normal_pair() { return normal_pair_of(next()); }
+  // The pair that 64 random bits stand for.
+  static Pair normal_pair_of(std::uint64_t bits) {
+    return normal_pair_of(static_cast<std::uint32_t>(bits >> 40),
+                          static_cast<std::uint32_t>(bits & 0xffffffU));
+  }
+  // From 24 random bits each.
+  static Pair normal_pair_of(std::uint32_t far, std::uint32_t around) {
+    const float u = 1.0F - static_cast<float>(static_cast<std::int32_t>(far)) * 0x1.0p-24F;
+    const float radius = std::sqrt(-2.0F * log_of(u));
+    // Eighths of a turn to the nearest quarter, and the rest by series.
+    const float quarters = static_cast<float>(static_cast<std::int32_t>(around)) * 0x1.0p-22F;
+    const auto whole = static_cast<std::int32_t>(quarters + 0.5F);
+    const float x = 0.5F * std::numbers::pi_v<float> * (quarters - static_cast<float>(whole));
+    const float xx = x * x;
+    const float sine =
+        x * (1.0F - xx * (1.0F / 6.0F - xx * (1.0F / 120.0F - xx * (1.0F / 5040.0F))));
+    const float cosine =
+        1.0F - xx * (0.5F - xx * (1.0F / 24.0F - xx * (1.0F / 720.0F - xx * (1.0F / 40320.0F))));
+    const bool odd = (whole & 1) != 0;
+    const float along = odd ? sine : cosine;
+    const float up = odd ? cosine : sine;
+    return {radius * (((whole + 1) & 2) != 0 ? -along : along),
+            radius * ((whole & 2) != 0 ? -up : up)};
   }
 
- private:
+  // 64 random bits.
   std::uint64_t next() {
     state_ += 0x9e3779b97f4a7c15ULL;
     std::uint64_t z = state_;
@@ -46,7 +67,37 @@ class CounterNoise {
     return z ^ (z >> 31);
   }
 
-  std::uint64_t state_;
+ private:
+  friend class NoiseRow;
+  explicit CounterNoise(std::uint64_t state) : state_(state) {}
+
+  // Natural logarithm of a number in (0, 1].
+  static float log_of(float u) {
+    const auto bits = std::bit_cast<std::int32_t>(u);
+    const std::int32_t exponent = (bits - 0x3f3504f3) >> 23;  // to a mantissa in [0.71, 1.41)
+    const auto mantissa = std::bit_cast<float>(bits - (exponent << 23));
+    const float t = (mantissa - 1.0F) / (mantissa + 1.0F);
+    const float tt = t * t;
+    const float series =
+        2.0F * t *
+        (1.0F + tt * (1.0F / 3.0F + tt * (1.0F / 5.0F + tt * (1.0F / 7.0F + tt / 9.0F))));
+    return std::min(0.0F, static_cast<float>(exponent) * std::numbers::ln2_v<float> + series);
+  }
+
+  std::uint64_t state_ = 0;
+};
+
+// The streams (seed, a, 0), (seed, a, 1), ... of one purpose, each of them cheaper to make than a
+// CounterNoise by itself.
+class NoiseRow {
+ public:
+  NoiseRow(std::uint64_t seed, std::uint64_t a) : base_(hash_numbers(seed, a)) {}
+  [[nodiscard]] CounterNoise at(std::uint64_t b) const {
+    return CounterNoise(base_ + b * 0xd1342543de82ef95ULL);
+  }
+
+ private:
+  std::uint64_t base_;
 };
 
 // Number streams of one seed, one per purpose, so that a change in one leaves the others alone.

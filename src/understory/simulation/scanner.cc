@@ -29,6 +29,11 @@ struct Turn {
   Eigen::Vector3d operator*(const Eigen::Vector3d& v) const {
     return {cosine * v.x() - sine * v.y(), sine * v.x() + cosine * v.y(), v.z()};
   }
+  [[nodiscard]] Eigen::Matrix3d matrix() const {
+    Eigen::Matrix3d m;
+    m << cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0;
+    return m;
+  }
   double cosine;
   double sine;
 };
@@ -56,12 +61,20 @@ std::vector<StemReturns> count_stems(std::vector<std::uint64_t> returns) {
 
 // From where and when beams look out, and how the head is turned.
 struct Scanner::Look {
-  Turn head;
   Turn shaken;  // by the encoder's jitter
-  Pose world_from_lidar;
-  Eigen::Vector3d origin;  // in the lidar's frame
-  float time_s;            // after the moment of the scene
+  Eigen::Matrix3f world_from_head;
+  Eigen::Vector3f place;  // of the sensor in the world
+  float time_s;           // after the moment of the scene
 };
+
+namespace {
+
+// Directions and origins of the rays of a firing, number by number.
+struct Made {
+  std::array<float, kMostBeams> x, y, z, from_x, from_y, from_z;
+};
+
+}  // namespace
 
 // The rays of a few firings, in the order in which they are traced, and what came back.
 struct Scanner::Block {
@@ -113,8 +126,11 @@ Scanner::Scanner(const SiteConfig& config, ForestScene& scene, const CarrierPath
     beams_.x.push_back(direction.x());
     beams_.y.push_back(direction.y());
     beams_.z.push_back(direction.z());
-    beams_.side_x.push_back(side.x());
-    beams_.side_y.push_back(side.y());
+    beams_.near_x.push_back(static_cast<float>(direction.x()));
+    beams_.near_y.push_back(static_cast<float>(direction.y()));
+    beams_.near_z.push_back(static_cast<float>(direction.z()));
+    beams_.near_side_x.push_back(static_cast<float>(side.x()));
+    beams_.near_side_y.push_back(static_cast<float>(side.y()));
   }
 }
 
@@ -256,8 +272,10 @@ void Scanner::cast_block(double moment_s, Block& block) const {
   block.readings.resize(block.slots.size());
   const bool two = config_.returns == 2;
   if (two) block.seconds.resize(block.readings.size());
+  NoiseRow row(seed_, 0);
   for (std::size_t i = 0; i < block.readings.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;
+    if (i % beams == 0) row = NoiseRow(seed_, firing);
     BeamEcho second;
     BeamEcho echo =
         strongest_echo(std::span(block.hits).subspan(block.slots[i] * rays_per_beam, rays_per_beam),
@@ -272,7 +290,7 @@ void Scanner::cast_block(double moment_s, Block& block) const {
       block.seconds[i] = read_echo(second, config_, CounterNoise(seed_ + 5, firing, i % beams));
     }
     if (echo.surface == Surface::kNone) continue;
-    block.readings[i] = read_echo(echo, config_, CounterNoise(seed_, firing, i % beams));
+    block.readings[i] = read_echo(echo, config_, row.at(i % beams));
     if (echo.tree > 0 && block.readings[i].range_m > 0.0F) {
       block.stems.push_back(static_cast<std::uint64_t>(echo.tree) << 16 |
                             model_.beams[i % beams].ring);
@@ -355,8 +373,10 @@ void Scanner::make_rays(double moment_s, Block& block) const {
       const Turn head(model_.azimuth(static_cast<double>(time)));
       const Eigen::Vector3d origin =
           model_.beam_origin_m * Eigen::Vector3d(head.cosine, head.sine, 0.0);
-      Look look{head, shaken, path_.pose(to_seconds(time)) * body_from_lidar_, origin,
-                static_cast<float>(to_seconds(time) - moment_s)};
+      const Pose world_from_lidar = path_.pose(to_seconds(time)) * body_from_lidar_;
+      const Look look{shaken, (world_from_lidar.rotation_matrix() * head.matrix()).cast<float>(),
+                      world_from_lidar.translation().cast<float>(),
+                      static_cast<float>(to_seconds(time) - moment_s)};
       look_out(look, firing, {b, b + together}, &block.slots[f * beams], block.rays);
       if (machine_.empty()) continue;
       if (b == 0) block.origin_in_lidar.push_back(origin.cast<float>());
@@ -367,57 +387,67 @@ void Scanner::make_rays(double moment_s, Block& block) const {
 }
 
 // Rays of the beams [first, end) of a firing, each in a random direction within its footprint, to
-// their slots. Arrays of numbers instead of vectors, as the compiler works through several at once.
+// their slots. Arrays of numbers instead of vectors, as the compiler works through several at once;
+// in the frame that turns with the head.
 void Scanner::look_out(const Look& look, std::int64_t firing,
                        std::pair<std::size_t, std::size_t> range, const std::uint32_t* slots,
                        std::vector<Ray>& rays) const {
-  const double spread = 0.25e-3 * config_.divergence_mrad;  // one standard deviation
-  const double exit = 0.25 * config_.beam_exit_m;
-  const Eigen::Matrix3d r = look.world_from_lidar.rotation_matrix();
-  const Eigen::Vector3d& place = look.world_from_lidar.translation();
+  const auto spread = static_cast<float>(0.25e-3 * config_.divergence_mrad);  // one sd
+  const auto exit = static_cast<float>(0.25 * config_.beam_exit_m);
+  const auto sine = static_cast<float>(look.shaken.sine);
+  const auto cosine = static_cast<float>(look.shaken.cosine);
+  const auto off_axis = static_cast<float>(model_.beam_origin_m);
+  const Eigen::Matrix3f r = look.world_from_head;
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
-  const auto [begin, end] = range;
-  std::array<CounterNoise::Pair, kMostBeams> noise;
-  std::array<Ray, kMostBeams> made;
-  std::vector<CounterNoise> footprints;
-  for (std::size_t b = begin; b < end; ++b)
-    footprints.emplace_back(seed_ + 2, static_cast<std::uint64_t>(firing), b);
+  const std::size_t begin = range.first;
+  const std::size_t count = range.second - begin;
+  const NoiseRow row(seed_ + 2, static_cast<std::uint64_t>(firing));
+  std::array<CounterNoise, kMostBeams> noise;
+  for (std::size_t i = 0; i < count; ++i)
+    noise[i] = row.at(begin + i);
+  std::array<std::uint32_t, kMostBeams> far;
+  std::array<std::uint32_t, kMostBeams> around;
+  Made made;
+  const float* bx = &beams_.near_x[begin];
+  const float* by = &beams_.near_y[begin];
+  const float* bz = &beams_.near_z[begin];
+  const float* side_x = &beams_.near_side_x[begin];
+  const float* side_y = &beams_.near_side_y[begin];
   for (std::size_t k = 0; k < rays_per_beam; ++k) {
-    for (std::size_t b = begin; b < end; ++b)
-      noise[b - begin] = footprints[b - begin].normal_pair();
-    for (std::size_t b = begin; b < end; ++b) {
-      const double u = noise[b - begin].first;
-      const double v = noise[b - begin].second;
-      const double x = look.head.cosine * beams_.x[b] - look.head.sine * beams_.y[b];
-      const double y = look.head.sine * beams_.x[b] + look.head.cosine * beams_.y[b];
-      const double cx = look.shaken.cosine * x - look.shaken.sine * y;
-      const double cy = look.shaken.sine * x + look.shaken.cosine * y;
-      const double cz = beams_.z[b];
-      // To the left of the beam, level, and up from it.
-      const double sx = look.head.cosine * beams_.side_x[b] - look.head.sine * beams_.side_y[b];
-      const double sy = look.head.sine * beams_.side_x[b] + look.head.cosine * beams_.side_y[b];
-      const double ox = u * sx - v * (cz * sy);
-      const double oy = u * sy + v * (cz * sx);
-      const double oz = v * (cx * sy - cy * sx);
-      const double ex = cx + spread * ox;
-      const double ey = cy + spread * oy;
-      const double ez = cz + spread * oz;
-      const double norm = std::sqrt(ex * ex + (ey * ey + ez * ez));
-      const double dx = ex / norm;
-      const double dy = ey / norm;
-      const double dz = ez / norm;
-      const double fx = look.origin.x() + exit * ox;
-      const double fy = look.origin.y() + exit * oy;
-      const double fz = look.origin.z() + exit * oz;
-      Ray& ray = made[b - begin];
-      for (int i = 0; i < 3; ++i) {
-        ray.direction[i] = static_cast<float>(r(i, 0) * dx + r(i, 1) * dy + r(i, 2) * dz);
-        ray.origin[i] = static_cast<float>(place[i] + (r(i, 0) * fx + r(i, 1) * fy + r(i, 2) * fz));
-      }
-      ray.time_s = look.time_s;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint64_t bits = noise[i].next();
+      far[i] = static_cast<std::uint32_t>(bits >> 40);
+      around[i] = static_cast<std::uint32_t>(bits) & 0xffffffU;
     }
-    for (std::size_t b = begin; b < end; ++b)
-      rays[slots[b] * rays_per_beam + k] = made[b - begin];
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto [u, v] = CounterNoise::normal_pair_of(far[i], around[i]);
+      const float cx = cosine * bx[i] - sine * by[i];
+      const float cy = sine * bx[i] + cosine * by[i];
+      const float cz = bz[i];
+      // To the left of the beam, level, and up from it.
+      const float ox = u * side_x[i] - v * (cz * side_y[i]);
+      const float oy = u * side_y[i] + v * (cz * side_x[i]);
+      const float oz = v * (cx * side_y[i] - cy * side_x[i]);
+      const float ex = cx + spread * ox;
+      const float ey = cy + spread * oy;
+      const float ez = cz + spread * oz;
+      const float scale = 1.0F / std::sqrt(ex * ex + ey * ey + ez * ez);
+      const float fx = off_axis + exit * ox;
+      const float fy = exit * oy;
+      const float fz = exit * oz;
+      made.x[i] = scale * (r(0, 0) * ex + r(0, 1) * ey + r(0, 2) * ez);
+      made.y[i] = scale * (r(1, 0) * ex + r(1, 1) * ey + r(1, 2) * ez);
+      made.z[i] = scale * (r(2, 0) * ex + r(2, 1) * ey + r(2, 2) * ez);
+      made.from_x[i] = look.place.x() + (r(0, 0) * fx + r(0, 1) * fy + r(0, 2) * fz);
+      made.from_y[i] = look.place.y() + (r(1, 0) * fx + r(1, 1) * fy + r(1, 2) * fz);
+      made.from_z[i] = look.place.z() + (r(2, 0) * fx + r(2, 1) * fy + r(2, 2) * fz);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      rays[slots[begin + i] * rays_per_beam + k] = {
+          {made.from_x[i], made.from_y[i], made.from_z[i]},
+          {made.x[i], made.y[i], made.z[i]},
+          look.time_s};
+    }
   }
 }
 

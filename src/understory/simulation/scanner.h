@@ -84,7 +84,8 @@ class Scanner {
     [[nodiscard]] Eigen::Vector3d direction(std::size_t beam) const {
       return {x[beam], y[beam], z[beam]};
     }
-    std::vector<double> x, y, z, side_x, side_y;
+    std::vector<double> x, y, z;
+    std::vector<float> near_x, near_y, near_z, near_side_x, near_side_y;  // for casting
   };
   Directions beams_;
   // The beams of a full block (firing by firing, beam by beam), those together that look in nearly

@@ -41,6 +41,7 @@ SiteConfig quiet_site() {
   site.stand.seedlings_per_ha = site.stand.shrubs_per_ha = 0.0;
   site.stand.ground_plants_per_ha = 0.0;
   site.stand.stumps_per_ha = site.stand.logs_per_ha = 0.0;
+  site.stand.ovality = site.stand.bark_relief_m = site.stand.whorl_swelling_m = 0.0;
   site.lidar.columns = 512;
   site.lidar.divergence_mrad = site.lidar.azimuth_jitter_deg = 0.0;
   site.lidar.range_sd_m = site.lidar.range_sd_per_m = site.lidar.bark_sd_m = 0.0;

@@ -12,6 +12,12 @@
 #include "understory/util/random.h"
 
 namespace understory {
+namespace {
+
+constexpr float kSlant = 0.3F;  // cosine below which a surface's own way counts as at this one
+
+}  // namespace
+
 class ForestScene::Impl : private SceneContent {
  public:
   using SceneContent::SceneContent;
@@ -172,10 +178,25 @@ class ForestScene::Impl : private SceneContent {
     hit.reflectivity = instance.reflectivity;
     hit.tree = instance.tree;
     if (is_static) read_static(packet, i, hit);
+    if (hit.surface == Surface::kStem && length > 0.0F) emboss(turned / length, ray, hit);
     if (instance.sway != kStands && ray.time_s != 0.0F) {
       move_on(sways_[instance.sway], turned / std::max(length, 1e-20F), ray, hit);
     }
     return hit;
+  }
+
+  // A stem's bark lies beside the round stem that was hit, and so does the hit, along the ray and
+  // to first order: the outline stays round.
+  void emboss(const Eigen::Vector3f& normal, const Ray& ray, Hit& hit) const {
+    const auto id = static_cast<std::size_t>(hit.tree);
+    const StemSurface& surface = surfaces_[id];
+    const float flat = normal.head<2>().norm();
+    if (surface.round() || flat < 1e-3F) return;
+    const float facing = normal.dot(ray.direction);
+    const float outwards = (facing < 0.0F ? 1.0F : -1.0F) / flat;
+    const float height = ray.origin.z() + hit.range_m * ray.direction.z() - foot_z_[id];
+    const float offset = surface.offset(outwards * normal.x(), outwards * normal.y(), height);
+    hit.range_m -= offset / std::max(kSlant, std::abs(facing));
   }
 
   // What was hit moves with the wind until the ray's own time: its plane does, along the ray.
@@ -186,8 +207,16 @@ class ForestScene::Impl : private SceneContent {
     const Eigen::Vector2f way = ray.time_s * above * tree.bend_rate;
     const float facing = normal.dot(ray.direction);
     // Seen at a slant a plane's own way along the ray is without bounds: leaves end before.
-    const float sure = std::copysign(std::max(0.3F, std::abs(facing)), facing);
+    const float sure = std::copysign(std::max(kSlant, std::abs(facing)), facing);
     hit.range_m += way.dot(normal.head<2>()) / sure;
+  }
+
+  // A random number in [0, 1) of a triangle of the ground.
+  static float patch(unsigned primitive) {
+    std::uint32_t x = primitive * 0x9e3779b1U;
+    x = (x ^ (x >> 16)) * 0x85ebca6bU;
+    x = (x ^ (x >> 13)) * 0xc2b2ae35U;
+    return static_cast<float>(x >> 8) * 0x1p-24F;
   }
 
   void read_static(const RTCRayHit16& packet, std::size_t i, Hit& hit) const {
@@ -206,12 +235,10 @@ class ForestScene::Impl : private SceneContent {
       hit.surface = Surface::kBuilding;
       hit.reflectivity = 0.55F;
     } else if (snowy_) {
-      hit.reflectivity =
-          0.72F + 0.14F * static_cast<float>(hash_numbers(primitive) >> 40) * 0x1p-24F;
+      hit.reflectivity = 0.72F + 0.14F * patch(primitive);
     } else {
       // Litter, moss and soil in patches.
-      hit.reflectivity =
-          0.22F + 0.18F * static_cast<float>(hash_numbers(primitive) >> 40) * 0x1p-24F;
+      hit.reflectivity = 0.22F + 0.18F * patch(primitive);
     }
   }
 

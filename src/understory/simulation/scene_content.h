@@ -11,6 +11,7 @@
 #include "understory/simulation/embree.h"
 #include "understory/simulation/harvest.h"
 #include "understory/simulation/scene.h"
+#include "understory/simulation/stem_surface.h"
 #include "understory/simulation/wind.h"
 
 namespace understory {
@@ -96,6 +97,9 @@ class SceneContent {
   Wind wind_;
   std::vector<int> cone_tree_;  // id of the tree of each cone
   std::vector<float> bark_;     // reflectivity by id
+  // What is not round of each stem, by id, and its foot's height.
+  std::vector<StemSurface> surfaces_;
+  std::vector<float> foot_z_;
 
  private:
   // A crown that trees are instances of.
@@ -104,6 +108,7 @@ class SceneContent {
     RTCScene dead;
   };
   void add_static(const Terrain& terrain, const Stand& stand);
+  void add_bark(const StandConfig& config, const Stand& stand, std::uint64_t seed);
   void add_solids(const Stand& stand);
   void add_shapes(GrownShapes& grown);
   // What of a tree is not part of the fixed scene: its crown, and of its stem what sways or falls.

@@ -42,7 +42,7 @@ void add_branch(Shape& shape, const Vector& from, const Vector& to, double radiu
   side.normalize();
   const Vector up = axis.cross(side);
   // Cut in pieces so that the boxes around slanting branches stay small.
-  const int pieces = std::max(1, static_cast<int>((to - from).norm() / 0.4));
+  const int pieces = std::max(1, static_cast<int>((to - from).norm() / 0.2));
   for (const Vector& blade : {side, up}) {
     for (int i = 0; i < pieces; ++i) {
       const double u = static_cast<double>(i) / pieces;

@@ -74,6 +74,12 @@ void describe_stand(ConfigTable& table, StandConfig& c) {
     table.add("spruce_share", c.spruce_share, {0.0, 1.0}, "", "of the trees; the rest is birch");
     table.add("lean_sd_deg", c.lean_sd_deg, {0.0, 20.0}, "deg", "lean in each direction");
     table.add("sweep_m", c.sweep_m, {0.0, 1.0}, "m", "bow of a stem");
+    table.add("ovality", c.ovality, {0.0, 0.3}, "",
+              "mean of (largest - smallest) / mean diameter of a stem; sections are lobed too");
+    table.add("bark_relief_m", c.bark_relief_m, {0.0, 0.03}, "m",
+              "relief of bark, standard deviation at the foot of a pine of 25 cm");
+    table.add("whorl_swelling_m", c.whorl_swelling_m, {0.0, 0.05}, "m",
+              "by which a pine's stem is thicker where branches leave");
     table.add("dead_branches", c.dead_branches, {0.0, 5.0}, "", "density below the crown");
     table.add("foliage", c.foliage, {0.0, 5.0}, "", "density of leaves and needles");
     table.add("seedlings_per_ha", c.seedlings_per_ha, {0.0, 50000.0}, "1/ha", "small trees");
@@ -157,7 +163,8 @@ void describe_lidar(ConfigTable& table, LidarConfig& c) {
     table.add("pulse_m", c.pulse_m, {0.0, 3.0}, "m", "returns closer than this merge into one");
     table.add("range_sd_m", c.range_sd_m, {0.0, 1.0}, "m", "range noise at close range");
     table.add("range_sd_per_m", c.range_sd_per_m, {0.0, 0.1}, "", "its growth with range");
-    table.add("bark_sd_m", c.bark_sd_m, {0.0, 0.1}, "m", "roughness of bark");
+    table.add("bark_sd_m", c.bark_sd_m, {0.0, 0.1}, "m",
+              "roughness of bark finer than the stand's relief");
     table.add("incidence_gain", c.incidence_gain, {0.0, 5.0}, "",
               "growth of the noise with the tangent of incidence");
     table.add("range_step_m", c.range_step_m, {0.0, 0.1}, "m", "resolution of ranges, 0 = none");

@@ -47,9 +47,12 @@ struct StandConfig {
   double pine_share = 0.5;
   double spruce_share = 0.3;  // the rest is birch
   double lean_sd_deg = 1.6;
-  double sweep_m = 0.08;       // standard deviation of the bow of a stem
-  double dead_branches = 1.0;  // density of dead branches below the crown, 1 = usual
-  double foliage = 1.0;        // density of leaves and needles, 1 = usual
+  double sweep_m = 0.08;            // standard deviation of the bow of a stem
+  double ovality = 0.04;            // mean of (largest - smallest diameter) / mean of a stem
+  double bark_relief_m = 0.003;     // standard deviation at the foot of a pine of 25 cm
+  double whorl_swelling_m = 0.004;  // of the radius where a pine's branches leave
+  double dead_branches = 1.0;       // density of dead branches below the crown, 1 = usual
+  double foliage = 1.0;             // density of leaves and needles, 1 = usual
   double seedlings_per_ha = 400.0;
   double shrubs_per_ha = 500.0;
   double ground_plants_per_ha = 2500.0;
@@ -115,7 +118,7 @@ struct LidarConfig {
   double pulse_m = 0.25;         // returns of one beam closer than this merge into one
   double range_sd_m = 0.012;
   double range_sd_per_m = 0.0004;
-  double bark_sd_m = 0.003;      // roughness of bark
+  double bark_sd_m = 0.002;      // roughness of bark finer than the stand's relief
   double incidence_gain = 0.35;  // growth of the range noise with the tangent of incidence
   double range_step_m = 0.001;
   double min_range_m = 0.5;
