@@ -15,7 +15,7 @@ CrownSize size_class(Species species, double height_m, double crown_base_share) 
   const double dbh = 0.0115 * height_m;
   switch (species) {
     case Species::kPine:
-      size.crown_base_m = 0.57 * height_m;
+      size.crown_base_m = 0.42 * height_m;
       size.crown_radius_m = 0.55 + 4.6 * dbh;
       break;
     case Species::kSpruce:
@@ -40,9 +40,10 @@ GrownShapes grow_shapes(const StandConfig& config, std::uint64_t seed) {
   const std::uint64_t stream = hash_numbers(seed, stream_of(NoiseStream::kShapes));
   for (const Species species : {Species::kPine, Species::kSpruce, Species::kBirch}) {
     for (const double height : kHeights) {
-      for (int variant = 0; variant < 2; ++variant) {
+      for (const double lower : {0.78, 0.93, 1.07, 1.22}) {
         Random random(stream, ++number);
         CrownSize size = size_class(species, height, config.crown_base_share);
+        size.crown_base_m *= lower;
         size.foliage = config.foliage;
         size.dead_branches = config.dead_branches;
         Shape living = grow_crown(species, size, random);
@@ -65,8 +66,11 @@ std::size_t nearest_crown(const std::vector<GrownCrown>& crowns, const GrownTree
   double nearest = 1e9;
   for (std::size_t i = 0; i < crowns.size(); ++i) {
     if (crowns[i].species != tree.species) continue;
-    const double distance = std::abs(crowns[i].size.height_m - tree.height_m) +
-                            ((static_cast<int>(i) ^ tree.id) & 1 ? 1e-3 : 0.0);
+    const CrownSize& size = crowns[i].size;
+    // First of like height, of these the one whose branches begin where the tree's do.
+    const double distance =
+        10.0 * std::abs(size.height_m - tree.height_m) +
+        std::abs(size.crown_base_m / size.height_m - tree.crown_base_m / tree.height_m);
     if (distance < nearest) {
       nearest = distance;
       best = i;

@@ -16,15 +16,15 @@ struct GrownCrown {
   Shape dead;  // branches below the crown: a slim thing, looked into far less often
 };
 
-// What the trees and plants of a stand are instances of: for each species five heights of crown in
-// two variants; three variants of each kind of plant, kind by kind.
+// What the trees and plants of a stand are instances of: for each species five heights of crown
+// that begin at four heights each; three variants of each kind of plant, kind by kind.
 struct GrownShapes {
   std::vector<GrownCrown> crowns;
   std::vector<Shape> plants;
 };
 [[nodiscard]] GrownShapes grow_shapes(const StandConfig& config, std::uint64_t seed);
 
-// The crown that resembles a tree's most; trees of odd and even ids take different variants.
+// The crown that resembles a tree's most: in height, then in where it begins.
 [[nodiscard]] std::size_t nearest_crown(const std::vector<GrownCrown>& crowns,
                                         const GrownTree& tree);
 

@@ -157,6 +157,10 @@ class ForestScene::Impl : private SceneContent {
     hit.reflectivity = instances_[instance].reflectivity;
     hit.tree = 0;
     hit.surface = instances_[instance].surface;
+    if (hit.surface == Surface::kStem) {
+      const auto id = static_cast<std::size_t>(instances_[instance].tree);
+      emboss(id, 0.0F, normal, origin, direction, hit);
+    }
   }
 
   [[nodiscard]] Hit read_hit(const RTCRayHit16& packet, std::size_t i, const Ray& ray) const {
@@ -178,7 +182,10 @@ class ForestScene::Impl : private SceneContent {
     hit.reflectivity = instance.reflectivity;
     hit.tree = instance.tree;
     if (is_static) read_static(packet, i, hit);
-    if (hit.surface == Surface::kStem && length > 0.0F) emboss(turned / length, ray, hit);
+    if (hit.surface == Surface::kStem && length > 0.0F) {
+      const auto id = static_cast<std::size_t>(hit.tree);
+      emboss(id, foot_z_[id], turned / length, ray.origin, ray.direction, hit);
+    }
     if (instance.sway != kStands && ray.time_s != 0.0F) {
       move_on(sways_[instance.sway], turned / std::max(length, 1e-20F), ray, hit);
     }
@@ -186,15 +193,15 @@ class ForestScene::Impl : private SceneContent {
   }
 
   // A stem's bark lies beside the round stem that was hit, and so does the hit, along the ray and
-  // to first order: the outline stays round.
-  void emboss(const Eigen::Vector3f& normal, const Ray& ray, Hit& hit) const {
-    const auto id = static_cast<std::size_t>(hit.tree);
-    const StemSurface& surface = surfaces_[id];
+  // to first order: the outline stays round. Normal and ray in a frame whose z axis is the tree's.
+  void emboss(std::size_t tree, float foot_z, const Eigen::Vector3f& normal,
+              const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, Hit& hit) const {
+    const StemSurface& surface = surfaces_[tree];
     const float flat = normal.head<2>().norm();
     if (surface.round() || flat < 1e-3F) return;
-    const float facing = normal.dot(ray.direction);
+    const float facing = normal.dot(direction);
     const float outwards = (facing < 0.0F ? 1.0F : -1.0F) / flat;
-    const float height = ray.origin.z() + hit.range_m * ray.direction.z() - foot_z_[id];
+    const float height = origin.z() + hit.range_m * direction.z() - foot_z;
     const float offset = surface.offset(outwards * normal.x(), outwards * normal.y(), height);
     hit.range_m -= offset / std::max(kSlant, std::abs(facing));
   }

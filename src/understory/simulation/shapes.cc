@@ -69,11 +69,11 @@ struct Habit {
 Habit habit_of(Species species) {
   switch (species) {
     case Species::kPine:
-      return {0.42, 5, 0.8, 0.1, 0.13, 0.075, 34.0, 0.16};
+      return {0.42, 5, 0.8, -0.1, 0.175, 0.10, 19.0, 0.16};
     case Species::kSpruce:
-      return {0.30, 6, 0.5, -0.35, 0.11, 0.06, 30.0, 0.09};
+      return {0.30, 6, 0.5, -0.35, 0.145, 0.08, 17.0, 0.09};
     case Species::kBirch:
-      return {0.30, 3, 1.1, 0.6, 0.065, 0.05, 42.0, 0.22};
+      return {0.30, 3, 1.1, 0.6, 0.09, 0.07, 21.0, 0.22};
   }
   return {};
 }
@@ -82,13 +82,21 @@ Habit habit_of(Species species) {
 double crown_profile(Species species, double u) {
   switch (species) {
     case Species::kPine:
-      return std::sqrt(std::max(0.0, 1.0 - std::pow(1.25 * u - 0.25, 2.0)));
+      return u < 0.35 ? 0.75 + 0.71 * u : std::sqrt(1.0 - std::pow((u - 0.35) / 0.65, 2.0));
     case Species::kSpruce:
       return 1.0 - 0.93 * u;
     case Species::kBirch:
       return std::pow(std::sin(std::numbers::pi * (0.14 + 0.82 * u)), 0.7);
   }
   return 1.0;
+}
+
+// Share of their needles that the branches of a pine keep: those in the shade of the crown above
+// are long and thin, and many of them bare.
+double lit_share(Species species, double u, Random& random) {
+  if (species != Species::kPine) return 1.0;
+  const double light = std::clamp(0.45 + 1.6 * u, 0.0, 1.0);
+  return light * random.uniform(1.6 * light - 0.6, 1.0 + 0.6 * (1.0 - light));
 }
 
 void add_living_branch(Shape& shape, const Habit& habit, const Vector& root, double azimuth,
@@ -126,7 +134,8 @@ Shape grow_crown(Species species, const CrownSize& size, Random& random) {
           size.crown_radius_m * crown_profile(species, u) * random.uniform(0.65, 1.1);
       const double reach = std::max(0.12, radius / std::max(0.5, std::cos(slope)));
       add_living_branch(shape, habit, Vector(0.0, 0.0, size.crown_base_m + z), azimuth, slope,
-                        std::min(reach, 0.8 * (length - z) + 0.3), size.foliage, random);
+                        std::min(reach, 0.8 * (length - z) + 0.3),
+                        size.foliage * std::max(0.0, lit_share(species, u, random)), random);
     }
   }
   return shape;
@@ -135,11 +144,11 @@ Shape grow_crown(Species species, const CrownSize& size, Random& random) {
 Shape grow_dead_branches(Species species, const CrownSize& size, Random& random) {
   Shape shape;
   const double lowest = species == Species::kSpruce ? 0.4 : 1.6;
-  const double per_m = (species == Species::kBirch ? 1.0 : 4.5) * size.dead_branches;
+  const double per_m = (species == Species::kBirch ? 1.0 : 7.0) * size.dead_branches;
   const double span = std::max(0.0, size.crown_base_m - lowest);
   const int count = static_cast<int>(per_m * span + random.uniform());
   for (int i = 0; i < count; ++i) {
-    const double share = std::sqrt(random.uniform());  // more of them towards the crown
+    const double share = std::pow(random.uniform(), 0.65);  // more of them towards the crown
     const double z = lowest + share * span;
     const double azimuth = random.uniform(0.0, kTau);
     const double length = random.uniform(0.15, 0.75) * size.crown_radius_m * (0.35 + 0.65 * share);
@@ -149,7 +158,7 @@ Shape grow_dead_branches(Species species, const CrownSize& size, Random& random)
                      std::sin(slope));
     const Vector tip = root + length * out;
     add_branch(shape, root, tip, 0.007);
-    const int twigs = static_cast<int>(random.below(3));
+    const int twigs = static_cast<int>(random.below(4));
     for (int k = 0; k < twigs; ++k) {
       const Vector fork = root + random.uniform(0.3, 0.9) * (tip - root);
       add_branch(shape, fork, fork + 0.4 * length * (0.6 * out + 0.5 * any_direction(random)),
@@ -181,11 +190,11 @@ Shape grow_plant(PlantKind kind, Random& random) {
       }
     }
   } else {
-    for (int i = 0; i < 220; ++i) {
+    for (int i = 0; i < 110; ++i) {
       const double r = 0.7 * std::sqrt(random.uniform());
       const double angle = random.uniform(0.0, kTau);
-      add_leaf(shape, {r * std::cos(angle), r * std::sin(angle), random.uniform(0.1, 1.0)}, 0.06,
-               0.03, random);
+      add_leaf(shape, {r * std::cos(angle), r * std::sin(angle), random.uniform(0.1, 1.0)}, 0.085,
+               0.042, random);
     }
   }
   return shape;

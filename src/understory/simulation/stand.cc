@@ -263,7 +263,7 @@ void draw_crown(const StandConfig& config, GrownTree& tree, Random& random) {
   const double height = tree.height_m;
   switch (tree.species) {
     case Species::kPine:
-      tree.crown_base_m = height * random.uniform(0.48, 0.66);
+      tree.crown_base_m = height * random.uniform(0.31, 0.55);
       tree.crown_radius_m = 0.55 + 4.6 * tree.dbh_m * random.uniform(0.8, 1.2);
       tree.bark_reflectivity = random.uniform(0.28, 0.45);
       break;
