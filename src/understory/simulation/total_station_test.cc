@@ -55,9 +55,10 @@ TEST(TotalStation, ErrorsHaveTheirSizeAndALevelledLinkLeavesTheBody) {
 }
 
 TEST(TotalStation, LosesThePrismBehindTreesAndNeedsAWhile) {
-  // Far down the road, and a walker's path through the stand, where nobody cleared the view.
+  // A walker's path through an open stand, where nobody cleared the view.
   SimulatedWorld world(
-      load_site("handheld", {"seed=31", "total_station.enabled=true", "total_station.rate_hz=5"}));
+      load_site("handheld", {"seed=31", "stand.trees_per_ha=250", "total_station.enabled=true",
+                             "total_station.rate_hz=5"}));
   const auto samples = track_prism(world, 0, 150.0);
   EXPECT_LT(samples.size(), 0.8 * 150.0 * 5.0);
   EXPECT_GT(samples.size(), 20U);
