@@ -188,14 +188,20 @@ def rows_of(path):
     return list(csv.DictReader(gzip.open(path, "rt")))
 
 
-@cases.case("a walk with 128 rings")
-def walk(folder):
-    """Scans without a pause between them: what is taken out of one wrongly must not grow."""
-    done = sparse("sim:handheld?seed=5&duration_s=9", folder / "run")
-    assert done.returncode == 0, done.stderr
-    errors = evaluated(folder / "run", folder / "run.truth", "--align", "se3")
-    assert errors["length_m"] > 5 and errors["ape_plane_rmse_m"] < 0.1, errors
-    return f"{100 * errors['ape_plane_rmse_m']:.1f} cm over {errors['length_m']:.0f} m"
+@cases.case("a walk with an IMU and without")
+def with_imu(folder):
+    """Quick turns within scans of 128 rings, without a pause between them: the gyroscope knows them,
+    steps from scan to scan guess them, and what is taken out wrongly must not grow."""
+    errors = []
+    for use in ("false", "true"):
+        done = sparse("sim:handheld?seed=5&duration_s=9", folder / use, "--set", f"stems.imu.use={use}")
+        assert done.returncode == 0, done.stderr
+        errors.append(evaluated(folder / use, folder / f"{use}.truth", "--align", "se3"))
+    plane = [e["ape_plane_rmse_m"] for e in errors]
+    turn = [e["ape_rotation_rmse_deg"] for e in errors]
+    assert errors[0]["length_m"] > 5 and plane[0] < 0.1, errors[0]
+    assert plane[1] < 0.03 and plane[1] < 0.7 * plane[0] and turn[1] < 0.6 * turn[0], (plane, turn)
+    return f"{100 * plane[0]:.1f} cm, {turn[0]:.1f} degrees without, {100 * plane[1]:.1f}, {turn[1]:.1f} with"
 
 
 @cases.case("stems without positions")
@@ -235,7 +241,8 @@ def real_map(folder):
 @cases.case("wrong use")
 def wrong(folder):
     for words in (("--realtime",), ("--profile", "handheld"), ("--set", "stems.reach_m=3"),
-                  ("--set", "stems.keep.rule=never"), ("--set", "stems.pace.longest_gap_s=-1")):
+                  ("--set", "stems.keep.rule=never"), ("--set", "stems.pace.longest_gap_s=-1"),
+                  ("--set", "stems.imu.gravity_sd_deg=0")):
         done = sparse(REC, folder / "run", *words)
         assert done.returncode == 2 and words[0].lstrip('-') in done.stderr, (words, done.stderr)
     done = program("map", "--resume", RUN)

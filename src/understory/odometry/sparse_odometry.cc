@@ -141,11 +141,13 @@ void SparseOdometry::take_up_last() {
   target_ = target();
 }
 
-SparseStep SparseOdometry::track(const StemView& view, const std::optional<Pose>& expected_step) {
-  const StemUp up = stem_up(view);
+SparseStep SparseOdometry::track(const StemView& view, const std::optional<Pose>& expected_step,
+                                 const std::optional<StemUp>& known_up) {
+  const StemUp up = known_up ? *known_up : stem_up(view);
   const Pose level_from_body(understory::level_from_body(up), Eigen::Vector3d::Zero());
   Source source{stem_points(view, level_from_body.rotation()), height_sds(view)};
   SparseStep step;
+  step.up = up;
   if (count_ == 0) {
     // The first body frame's x axis, laid level, is the world's.
     world_from_body_ = upright(level_from_body).inverse() * level_from_body;

@@ -45,6 +45,7 @@ struct SparseStep {
   Matrix6d covariance = Matrix6d::Identity();  // of the step, right perturbation
   double overlap = 0.0;                        // P0's lambda, measured
   double error_m = 0.0;                        // P0's e
+  StemUp up;                                   // by which the view was levelled
   double spacing_m = 0.0;                      // P0's L0 of what the view was matched to, (23)
 };
 
@@ -60,7 +61,9 @@ class SparseOdometry {
   // Positions a view against the local map and leaves the map as it is. Views that are close
   // together should not all enter the map: each adds the error of its own match to those after it.
   // `expected_step` is previous_from_body as it is expected; without one the last shift goes on.
-  SparseStep track(const StemView& view, const std::optional<Pose>& expected_step = {});
+  // `up` is up as it is known from elsewhere too, in place of what the stems alone say.
+  SparseStep track(const StemView& view, const std::optional<Pose>& expected_step = {},
+                   const std::optional<StemUp>& up = {});
   // Takes up the stems of the view that was positioned last.
   void take_up_last();
   // Of the local map: bounded by what the last `map_frames` views have seen.

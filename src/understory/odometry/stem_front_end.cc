@@ -46,6 +46,7 @@ void describe(ConfigTable& table, StemFrontEndConfig& config) {
   table.add("predict_turn", config.predict_turn,
             "a match begins where turning on as before would lead; else with the last heading");
   table.section("keep", [&] { describe(table, config.keep); });
+  table.section("imu", [&] { describe(table, config.imu); });
   table.section("odometry", [&] { describe(table, config.odometry); });
 }
 
@@ -89,7 +90,38 @@ bool StemFrontEnd::to_be_kept(const StemScan& result) {
   return true;
 }
 
-StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig) {
+StemFrontEnd::Guess StemFrontEnd::guess(const Scan& scan, int frame, const Rig& rig,
+                                        const StemSegments& found, const ImuBuffer* samples,
+                                        double since) const {
+  Guess guess;
+  guess.motion_per_s = motion_per_s_;
+  if (config_.predict_turn) guess.step = Pose::exp(since * motion_per_s_);
+  if (samples != nullptr && config_.imu.use && rig.body_from_imu)
+    guess.by_imu = imu_.motion(*samples, last_->stamp, scan, *rig.body_from_imu);
+  if (guess.by_imu) {
+    Vector6d step = since * motion_per_s_;
+    step.head<3>() = so3_log(guess.by_imu->previous_from_now);
+    guess.step = Pose::exp(step);
+    guess.motion_per_s.head<3>() = guess.by_imu->rate_in_scan;
+  }
+  if (!scan.has_point_times) return guess;
+  // The step of a first try says how the body moved up to this scan; the scan itself lies half a
+  // step later than the middle of that. Where scans follow each other without a pause, what is
+  // taken out wrongly would come back larger by such an outlook, so there is none.
+  const bool pauses = to_seconds(scan.end() - scan.stamp) < 0.4 * since;
+  SparseOdometry trial = odometry_;
+  const SparseStep step =
+      trial.track(view_of(scan, frame, rig, found, guess.motion_per_s), guess.step);
+  const Vector6d latest = (last_->world_from_body.inverse() * step.world_from_body).log() / since;
+  if (step.status != SparseStepStatus::kTracked && step.status != SparseStepStatus::kSearched)
+    return guess;
+  guess.motion_per_s = pauses ? Vector6d(1.5 * latest - 0.5 * motion_per_s_) : latest;
+  if (guess.by_imu) guess.motion_per_s.head<3>() = guess.by_imu->rate_in_scan;
+  if (config_.predict_turn || guess.by_imu) guess.step = Pose::exp(since * latest);
+  return guess;
+}
+
+StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const ImuBuffer* samples) {
   StemSegmentConfig segments;
   segments.min_score = config_.min_score;
   segments.max_range_m = config_.max_range_m;
@@ -103,33 +135,29 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig) {
   StemScan result;
   const double since = last_ ? to_seconds(scan.stamp - last_->stamp) : 0.0;
   const bool follows = last_ && since > 0.0 && since < kLongestStep;
-  Vector6d motion = follows ? motion_per_s_ : Vector6d::Zero();
-  std::optional<Pose> step_guess;
+  Guess guess;
   if (follows) {
-    const Pose expected_step = Pose::exp(since * motion_per_s_);
-    result.expected = last_->world_from_body * expected_step;
-    if (config_.predict_turn) step_guess = expected_step;
+    result.expected = last_->world_from_body * Pose::exp(since * motion_per_s_);
+    guess = this->guess(scan, frame, rig, found, samples, since);
   }
-  if (follows && scan.has_point_times) {
-    // The step of a first try says how the body moved up to this scan; the scan itself lies half a
-    // step later than the middle of that. Where scans follow each other without a pause, what is
-    // taken out wrongly would come back larger by such an outlook, so there is none.
-    const bool pauses = to_seconds(scan.end() - scan.stamp) < 0.4 * since;
-    SparseOdometry trial = odometry_;
-    const SparseStep step = trial.track(view_of(scan, frame, rig, found, motion), step_guess);
-    const Vector6d latest = (last_->world_from_body.inverse() * step.world_from_body).log() / since;
-    if (step.status == SparseStepStatus::kTracked || step.status == SparseStepStatus::kSearched) {
-      motion = pauses ? Vector6d(1.5 * latest - 0.5 * motion_per_s_) : latest;
-      if (config_.predict_turn) step_guess = Pose::exp(since * latest);
-    }
-  }
-  result.view = view_of(scan, frame, rig, found, motion);
+  result.view = view_of(scan, frame, rig, found, guess.motion_per_s);
   result.reach_m = reach_of(result.view);
-  result.motion_rad_s = motion.head<3>().norm();
-  result.step = odometry_.track(result.view, step_guess);
+  result.motion_rad_s = guess.motion_per_s.head<3>().norm();
+  std::optional<StemUp> up;
+  if (guess.by_imu) up = imu_.up(stem_up(result.view), *guess.by_imu);
+  result.step = odometry_.track(result.view, guess.step, up);
   motion_per_s_.setZero();
-  if (follows)
-    motion_per_s_ = (last_->world_from_body.inverse() * result.step.world_from_body).log() / since;
+  std::optional<Eigen::Quaterniond> matched;
+  if (follows) {
+    const Pose moved = last_->world_from_body.inverse() * result.step.world_from_body;
+    motion_per_s_ = moved.log() / since;
+    if (result.step.status == SparseStepStatus::kTracked) matched = moved.rotation();
+  }
+  if (guess.by_imu) {
+    imu_.take(*guess.by_imu, matched);
+  } else {
+    imu_.forget();
+  }
   last_ = StampedPose{scan.stamp, result.step.world_from_body};
   result.keep = !result.view.stems.empty() && to_be_kept(result);
   if (result.keep) odometry_.take_up_last();

@@ -6,6 +6,7 @@
 #include "understory/features/stem_segments.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/odometry/sparse_odometry.h"
+#include "understory/odometry/stem_imu.h"
 #include "understory/sensor/rig.h"
 #include "understory/sensor/scan.h"
 #include "understory/sensor/stem_view.h"
@@ -33,6 +34,7 @@ struct StemFrontEndConfig {
   double max_range_m = 42.0;  // of a stem's returns
   bool predict_turn = true;   // the guess of a match goes on turning as before
   ViewChoiceConfig keep;
+  StemImuConfig imu;
   SparseOdometryConfig odometry;
 };
 void describe(ConfigTable& table, StemFrontEndConfig& config);
@@ -52,23 +54,35 @@ struct StemScan {
 // Raw scans to positions from their stems alone: stems of each scan (features/stem_segments.h),
 // each moved to the scan's stamp by the motion at its own time, then matched to those before. The
 // motion within a scan is first guessed from the steps before it and, once the scan has been
-// matched, taken from its own step. No IMU. Not thread-safe; deterministic.
+// matched, taken from its own step. An IMU, where
+// there is one, tells turns and helps to hold the tilt. Not thread-safe; deterministic.
 class StemFrontEnd {
  public:
   explicit StemFrontEnd(const StemFrontEndConfig& config)
-      : config_(config), odometry_(config.odometry) {}
+      : config_(config), odometry_(config.odometry), imu_(config.imu) {}
 
-  // `frame` is the number of the scan in the recording; scans may be left out.
-  [[nodiscard]] StemScan add(const Scan& scan, int frame, const Rig& rig);
+  // `frame` is the number of the scan in the recording; scans may be left out. `samples` of the IMU
+  // reach from the scan before to this one's end, as far as there are any; may be null.
+  [[nodiscard]] StemScan add(const Scan& scan, int frame, const Rig& rig,
+                             const ImuBuffer* samples = nullptr);
   [[nodiscard]] const SparseOdometry& odometry() const { return odometry_; }
 
  private:
   [[nodiscard]] StemView view_of(const Scan& scan, int frame, const Rig& rig,
                                  const StemSegments& found, const Vector6d& motion_per_s) const;
+  // What takes the scan from the one before to now: how the body moves within it, and where.
+  struct Guess {
+    Vector6d motion_per_s = Vector6d::Zero();
+    std::optional<Pose> step;
+    std::optional<StemImu::Motion> by_imu;
+  };
+  [[nodiscard]] Guess guess(const Scan& scan, int frame, const Rig& rig, const StemSegments& found,
+                            const ImuBuffer* samples, double since) const;
   [[nodiscard]] bool to_be_kept(const StemScan& result);
 
   StemFrontEndConfig config_;
   SparseOdometry odometry_;
+  StemImu imu_;
   std::optional<Eigen::Vector3d> up_in_lidar_;
   std::optional<StampedPose> last_;
   std::optional<Pose> last_kept_;

@@ -13,6 +13,7 @@ struct StemUp {
   Eigen::Vector3d up_in_body = Eigen::Vector3d::UnitZ();
   double spread_rad = 0.0;  // lean of the trees against it, per axis, robust
   int stems = 0;            // with a known axis; 0: up_in_body is the z axis of the body
+  double sd_rad = 0.0;      // of up_in_body, where more than the stems knows of it; else 0
 };
 [[nodiscard]] StemUp stem_up(const StemView& view);
 

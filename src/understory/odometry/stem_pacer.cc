@@ -60,7 +60,7 @@ std::vector<StemScan> StemPacer::settle(const Rig& rig) {
   bool whole = waiting_.size() == 1;
   if (!whole) {
     StemFrontEnd trial = front_end_;
-    StemScan ahead = trial.add(*waiting_.back(), last_frame, rig);
+    StemScan ahead = trial.add(*waiting_.back(), last_frame, rig, &samples_);
     whole = even(ahead);
     if (whole) {
       for (std::size_t i = 0; i + 1 < waiting_.size(); ++i)
@@ -71,7 +71,8 @@ std::vector<StemScan> StemPacer::settle(const Rig& rig) {
   }
   if (results.empty()) {
     for (std::size_t i = 0; i < waiting_.size(); ++i)
-      results.push_back(front_end_.add(*waiting_[i], first_frame_ + static_cast<int>(i), rig));
+      results.push_back(
+          front_end_.add(*waiting_[i], first_frame_ + static_cast<int>(i), rig, &samples_));
   }
   const StemScan& last = results.back();
   wait_ = whole && even(last) ? 2 * wait_ : 1;
@@ -82,6 +83,7 @@ std::vector<StemScan> StemPacer::settle(const Rig& rig) {
   const auto most = period_s_ > 0.0 ? config_.longest_gap_s / period_s_ : 1.0;
   wait_ = std::clamp(wait_, 1, std::max(1, static_cast<int>(std::min(most, 1000.0))));
   last_ = StampedPose{last.view.stamp, last.step.world_from_body};
+  samples_.forget_before(last_->stamp);
   first_frame_ = last_frame + 1;
   waiting_.clear();
   return results;

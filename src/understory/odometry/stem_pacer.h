@@ -22,8 +22,11 @@ void describe(ConfigTable& table, StemPaceConfig& config);
 // Not thread-safe; deterministic.
 class StemPacer {
  public:
-  StemPacer(const StemPaceConfig& config, const StemFrontEndConfig& front_end)
-      : config_(config), front_end_(front_end) {}
+  StemPacer(const StemPaceConfig& config, const StemFrontEndConfig& front_end, Log* log = nullptr)
+      : config_(config), front_end_(front_end), samples_({}, log) {}
+
+  // Of the recording's IMU, in order, up to the end of the scan that is added next.
+  void add(const ImuSample& sample) { samples_.add(sample); }
 
   // What became of the scans up to this one that are settled by now, in order; empty while they
   // wait. `positioned` of a scan between others is false: it has a pose and nothing else.
@@ -39,6 +42,7 @@ class StemPacer {
 
   StemPaceConfig config_;
   StemFrontEnd front_end_;
+  ImuBuffer samples_;
   std::vector<ScanPtr> waiting_;
   int first_frame_ = 0;  // of those that wait
   int wait_ = 1;         // scans from one that is positioned to the next

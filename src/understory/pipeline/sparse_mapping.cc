@@ -23,7 +23,7 @@ class SparseRun {
         log_(log),
         orderer_(request.config.time_repair, log),
         source_(open_source(request.recording, request.open, log)),
-        pacer_(request.config.pace, request.config.front_end),
+        pacer_(request.config.pace, request.config.front_end, &log),
         stems_(request.run_folder / "stems.csv.gz") {}
 
   // True if it was stopped.
@@ -41,10 +41,7 @@ class SparseRun {
       while (auto ready = orderer_.pop()) {
         if (const auto* scan = std::get_if<ScanPtr>(&*ready)) take(*scan, progress);
         if (const auto* fix = std::get_if<GnssFix>(&*ready)) fixes_.push_back(*fix);
-        if (std::holds_alternative<ImuSample>(*ready) && !told_of_imu_) {
-          log_.info("the sparse front end does not use the recording's IMU");
-          told_of_imu_ = true;
-        }
+        if (const auto* sample = std::get_if<ImuSample>(&*ready)) take(*sample);
       }
     }
     record(pacer_.finish(source_->rig()));
@@ -78,6 +75,15 @@ class SparseRun {
     const auto done = static_cast<double>(taken_);
     progress({"stems", done, share > 0.0 ? done / share : 0.0, "scans",
               fmt::format("{} stems", last_stems_)});
+  }
+
+  void take(const ImuSample& sample) {
+    if (source_->rig().body_from_imu) {
+      pacer_.add(sample);
+    } else if (!told_of_imu_) {
+      log_.warn("imu.place", "the place of the IMU is not known (body_from_imu): it is not used");
+      told_of_imu_ = true;
+    }
   }
 
   void record(const std::vector<StemScan>& results) {

@@ -27,7 +27,8 @@ LevelViews level(const std::vector<StemView>& views, const std::vector<SparseSte
   result.world_from_level.resize(views.size());
   result.ups.resize(views.size());
   parallel_for(views.size(), 16, [&](std::size_t i) {
-    result.ups[i] = stem_up(views[i]);
+    // The front end may have known more of up than the stems.
+    result.ups[i] = steps[i].up.sd_rad > 0.0 ? steps[i].up : stem_up(views[i]);
     const Eigen::Quaterniond turn = understory::level_from_body(result.ups[i]);
     result.points[i] = stem_points(views[i], turn);
     result.level_from_body[i] = Pose(turn, Eigen::Vector3d::Zero());
@@ -79,7 +80,8 @@ std::vector<TiltPrior> tilts_of(const LevelViews& level) {
   for (std::size_t i = 0; i < level.ups.size(); ++i) {
     const StemUp& up = level.ups[i];
     if (up.stems == 0) continue;
-    const double one = std::hypot(kStandLeans, up.spread_rad / std::sqrt(up.stems));
+    const double one =
+        up.sd_rad > 0.0 ? up.sd_rad : std::hypot(kStandLeans, up.spread_rad / std::sqrt(up.stems));
     tilts.push_back({static_cast<int>(i), Eigen::Vector3d::UnitZ(), one * std::sqrt(sharing[i])});
   }
   return tilts;
