@@ -4,7 +4,8 @@
     realism.py [--data FOLDER] [--out PICTURE]
 
 Real: a pine stand by mobile and by airborne laser (spanner_mls_uas_als), a pine plot by terrestrial
-laser (treels), one scan of a VLP-16 in a park (evalio_botanic). Simulated: a pine stand as
+laser (treels), one scan of a VLP-16 in a park (evalio_botanic), scans of a VLP-16 and an OS1-128 in
+streets (drivers). Simulated: a pine stand as
 `understory map` maps it, and scans of a VLP-16. The same code judges real and simulated clouds;
 nothing of it knows the truth. Needs numpy, scipy, laspy and
 matplotlib. Only curves and figures leave the script, never the data's points."""
@@ -195,6 +196,56 @@ def returns_by_range(points):
     return 0.5 * (edges[1:] + edges[:-1]), counts / max(1, len(r))
 
 
+# ---- single ranges ---------------------------------------------------------------------------
+
+def scans_of(recording, *options):
+    """Scans of a recording as read_pcd gives them, the first eight."""
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([PROGRAM, "convert", recording, folder, "--format", "pcd", *options], check=True,
+                       capture_output=True)
+        return [read_pcd(f) for f in sorted(pathlib.Path(folder).glob("*.pcd"))[:8]]
+
+
+def read_pcd(path):
+    """Fields by name of a binary PCD."""
+    raw = pathlib.Path(path).read_bytes()
+    end = raw.index(b"DATA binary\n") + len(b"DATA binary\n")
+    head = dict(line.split(" ", 1) for line in raw[:end].decode().splitlines() if not line.startswith("#"))
+    kinds = {"F4": "<f4", "F8": "<f8", "U1": "u1", "U2": "<u2", "U4": "<u4", "I4": "<i4", "U8": "<u8"}
+    fields = [(name, kinds[kind + size]) for name, kind, size
+              in zip(head["FIELDS"].split(), head["TYPE"].split(), head["SIZE"].split())]
+    return np.frombuffer(raw, np.dtype(fields), int(head["POINTS"]), end)
+
+
+def range_noise(clouds):
+    """Spread of single ranges on smooth surfaces, by range: from the second differences of neighbours in a
+    ring, where seven in a row lie within 15 cm of a straight course. Rows of (from, to, sd, count)."""
+    ranges, noises = [], []
+    for cloud in clouds:
+        xyz = np.stack([cloud["x"], cloud["y"], cloud["z"]], axis=1).astype(float)
+        r = np.linalg.norm(xyz, axis=1)
+        azimuth = np.arctan2(xyz[:, 1], xyz[:, 0])
+        for ring in np.unique(cloud["ring"]):
+            mine = np.flatnonzero((cloud["ring"] == ring) & (r > 1.5))
+            if len(mine) < 50:
+                continue
+            mine = mine[np.argsort(azimuth[mine])]
+            step = np.diff(azimuth[mine])
+            usual = np.median(step)
+            second = r[mine][:-2] - 2 * r[mine][1:-1] + r[mine][2:]
+            even = (step[:-1] < 1.5 * usual) & (step[1:] < 1.5 * usual) & (np.abs(second) < 0.15)
+            smooth = np.convolve(even, np.ones(5), "same") > 4.5
+            noises.append(second[smooth] / math.sqrt(6.0))
+            ranges.append(r[mine][1:-1][smooth])
+    ranges, noises = np.concatenate(ranges), np.concatenate(noises)
+    rows = []
+    for low, high in ((2, 5), (5, 10), (10, 20), (20, 40)):
+        mine = noises[(ranges >= low) & (ranges < high)]
+        if len(mine) > 200:
+            rows.append((low, high, 1.4826 * np.median(np.abs(mine)), len(mine)))
+    return rows
+
+
 # ---- the page --------------------------------------------------------------------------------
 
 def read_las(path):
@@ -263,6 +314,21 @@ def main():
               f"{len(stems) / len(clouds):7.1f}{1e3 * np.nanmedian(stems[:, 3]):11.1f}"
               f"{np.median(stems[:, 1] * stems[:, 0]):17.0f}{np.median(stems[:, 2] * stems[:, 0]):15.0f}",
               flush=True)
+    # Between buildings, without plants: mostly bare ground.
+    plain = ("duration_s=1.5&stand.trees_per_ha=0&stand.buildings=2&stand.shrubs_per_ha=0&"
+             "stand.seedlings_per_ha=0&stand.ground_plants_per_ha=0&terrain.roughness_m=0&"
+             "terrain.hummock_m=0&lidar.max_range_m=100&lidar.range_10_percent_m=60&seed=31")
+    drivers = data / "drivers"
+    ouster = drivers / "OS-1-128_v2.3.0_1024x10"
+    noises = {"real VLP-16": scans_of(drivers / "sample_velodyne_vlp16_gps.pcap"),
+              "real OS1-128": scans_of(f"{ouster}_lb_n3.pcap", "--metadata", f"{ouster}.json"),
+              "simulated VLP-16": scans_of("sim:demo?lidar.model=VLP-16&lidar.divergence_mrad=3.0&"
+                                           "lidar.range_sd_per_m=0.0002&lidar.range_step_m=0.002&" + plain),
+              "simulated OS1-128": scans_of("sim:demo?lidar.model=OS1-128&" + plain)}
+    print("\nnoise of single ranges on smooth surfaces, mm (by range)")
+    for name, clouds in noises.items():
+        print(f"{name:20}" + "  ".join(f"{low}-{high} m: {1e3 * sd:.1f} ({count})"
+                                       for low, high, sd, count in range_noise(clouds)), flush=True)
     titles = ["height of returns above a tenth (one in 8 cm)", "spread of bark about a circle at 1.3 m",
               "ground, stem, foliage by shape", "returns of a stem in one scan",
               "spread of range across a stem, ring by ring", "returns by range"]
