@@ -197,6 +197,9 @@ def robust(folder):
     run = json.loads((PLACED / "run.json").read_text())
     assert run["command"] == "georeference" and run["status"] == "complete", run
     assert abs(run["quality"]["origin_latitude_deg"] - LATITUDE) < 1e-3, run["quality"]
+    page = (PLACED / "report.html").read_text()
+    drawn = page[page.index('class="fixes"'):].split("</g>")[0].count("<circle")
+    assert 500 < drawn <= 2000 and 'opacity="0.35"' in page, drawn
     rows = list(csv.DictReader((PLACED / "gnss.csv").open()))
     assert len(rows) == 680 and {row["used"] for row in rows} == {"0", "1"}
     assert (PLACED / "trees.gpkg").stat().st_size > 10000

@@ -36,6 +36,12 @@ struct ReportLoop {
   std::string reason;         // why rejected
 };
 
+// A fix of the receiver's antenna (world frame).
+struct ReportFix {
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();
+  bool used = false;  // had a say in where the path lies
+};
+
 // Errors against a known truth (simulated or surveyed). Series may be empty.
 struct ReportTruth {
   std::string alignment;  // "none (the first pose as recorded)", "SE(3)" ...
@@ -100,6 +106,7 @@ struct ReportInput {
   const InventoryResult* inventory = nullptr;  // not owned
   const std::vector<Tree>* trees = nullptr;    // not owned; without an inventory
   std::vector<ReportScan> scans;
+  std::vector<ReportFix> fixes;
   double sensor_period_ms = 0.0;  // 0: unknown
   std::vector<ReportLoop> loops;
   bool loop_closure_enabled = true;

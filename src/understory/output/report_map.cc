@@ -147,6 +147,19 @@ std::string trees_svg(const std::vector<Tree>& trees, const View& view) {
   return svg;
 }
 
+// The receiver's path, at most 2,000 fixes of it, those that had no say paler.
+std::string fixes_svg(const std::vector<ReportFix>& fixes, const View& view) {
+  const std::size_t step = fixes.size() / 2000 + 1;
+  std::string svg = "<g class=\"fixes\" fill=\"#d98200\">";
+  for (std::size_t i = 0; i < fixes.size(); i += step) {
+    svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2\" opacity=\"{}\"/>",
+                       view.x(static_cast<double>(fixes[i].position.x())),
+                       view.y(static_cast<double>(fixes[i].position.y())),
+                       fixes[i].used ? "0.9" : "0.35");
+  }
+  return svg + "</g>";
+}
+
 std::string scale_bar(const View& view) {
   const std::vector<double> ticks = round_ticks(0.0, view.width_m, 6);
   const double length = ticks.size() > 1 ? ticks[1] : 1.0;
@@ -188,6 +201,7 @@ std::string map_section(const ReportInput& input) {
   }
   if (const std::vector<Tree>* trees = trees_of(input)) svg += trees_svg(*trees, view);
   svg += loops_svg(input.loops, view);
+  if (!input.fixes.empty()) svg += fixes_svg(input.fixes, view);
   svg += path_svg(input.scans, view);
   if (!input.scans.empty()) {
     svg += marker(input.scans.back().position, view, "end");
@@ -215,6 +229,8 @@ std::string map_section(const ReportInput& input) {
     line("--weak", "path where matching was weak");
     line("--lost", "path without a match (predicted)");
   }
+  if (!input.fixes.empty())
+    entry(" class=\"dot\"", "border-color:#d98200", "GNSS fix (pale: without a say)");
   if (!input.loops.empty()) line("--loop", "loop closed");
   return "<section><h2>The map from above</h2>" + svg + legend + "</p></section>\n";
 }

@@ -113,8 +113,9 @@ double path_length(const std::vector<Pose>& poses) {
 
 // The recording's own GNSS path beside the path: how well they lie on each other, P1 (6), and
 // gnss.csv in the run's frame. The fixes have no say in the path.
-void compare_with_gnss(const CorrectionRequest& request, RunSummary& summary) {
-  if (request.scans == nullptr || request.scans->fixes.empty()) return;
+std::vector<ReportFix> compare_with_gnss(const CorrectionRequest& request, RunSummary& summary) {
+  std::vector<ReportFix> drawn;
+  if (request.scans == nullptr || request.scans->fixes.empty()) return drawn;
   const auto antenna = request.scans->source->rig().body_from_gnss;
   const GnssFit fit =
       fit_to_gnss(read_trajectory(request.run_folder / "trajectory.tum"),
@@ -126,6 +127,7 @@ void compare_with_gnss(const CorrectionRequest& request, RunSummary& summary) {
   for (GnssRow row : fit.rows) {
     row.position_in_world = world_from_enu * row.position_in_world;
     row.residual = world_from_enu.rotation() * row.residual;
+    drawn.push_back({row.position_in_world.cast<float>(), row.used});
     row.used = false;
     row.reason = "compared with, not used";
     writer.add(row);
@@ -137,6 +139,7 @@ void compare_with_gnss(const CorrectionRequest& request, RunSummary& summary) {
     writer.add(row);
   }
   writer.commit();
+  return drawn;
 }
 
 // Root mean square distance of a tree's sights from their mean: the noise of the map, without
@@ -295,9 +298,10 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
     write_trees_csv(folder / "trees.csv", trees);
   }
   RunSummary summary = summary_of(request, run, stems, log);
+  std::vector<ReportFix> fixes;
   {
     const ScopedTimer timer(run.times, "gnss_fit");
-    compare_with_gnss(request, summary);
+    fixes = compare_with_gnss(request, summary);
   }
   summary.stages = summarise(run.times);
   if (request.scans != nullptr) summary.stages.merge(summarise(*request.scans->times));
@@ -305,7 +309,9 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
     summary.wall_s += stage.total_wall_s;
   summary.cpu_s = process_cpu_seconds();
   summary.peak_memory_mb = peak_memory_mb();
-  write_report(folder / "report.html", correction_report(request, run, summary, trees));
+  ReportInput report = correction_report(request, run, summary, trees);
+  report.fixes = std::move(fixes);
+  write_report(folder / "report.html", report);
   write_run_json(folder / "run.json", summary);
   CorrectionOutcome outcome;
   outcome.status = summary.status;

@@ -16,6 +16,7 @@
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/gnss_fit.h"
+#include "understory/pipeline/moved_map.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/util/error.h"
 #include "understory/util/version.h"
@@ -245,6 +246,13 @@ void copy_unmoved(const fs::path& from, const fs::path& to) {
   }
 }
 
+std::vector<ReportFix> fixes_of(const std::vector<GnssRow>& rows) {
+  std::vector<ReportFix> fixes;
+  for (const GnssRow& row : rows)
+    fixes.push_back({row.position_in_world.cast<float>(), row.used});
+  return fixes;
+}
+
 void write_summary(const GeoreferenceRequest& request, const Run& run, const Motion& motion,
                    const std::vector<Tree>& trees, const std::string& system, const Log& log) {
   RunSummary summary;
@@ -274,6 +282,7 @@ void write_summary(const GeoreferenceRequest& request, const Run& run, const Mot
     scan.position = (motion.target_from_world * pose.world_from_body).translation().cast<float>();
     report.scans.push_back(scan);
   }
+  report.fixes = fixes_of(motion.gnss);
   write_report(request.result / "report.html", report);
   write_run_json(request.result / "run.json", summary);
 }
@@ -292,6 +301,7 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& 
   if (error) throw OutputError(request.result.string(), "cannot be made: " + error.message());
   refuse_unfinished_run(request.result);
   remove_old_results(request.result);
+  write_moved_map(request.run, request.result, motion.target_from_world, log);
   if (motion.origin) {
     motion.outcome.figures["origin_latitude_deg"] = motion.origin->latitude_deg;
     motion.outcome.figures["origin_longitude_deg"] = motion.origin->longitude_deg;
@@ -312,9 +322,6 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& 
       writer.add(row);
     writer.commit();
   }
-  if (fs::exists(request.run / "map.laz"))
-    log.warn("georeference.map",
-             "map.laz, dtm.tif and chm.tif are not moved and stay with " + request.run.string());
   write_summary(request, run, motion, trees, system, log);
   return motion.outcome;
 }
