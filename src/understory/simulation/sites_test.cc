@@ -104,6 +104,7 @@ TEST(LieksaSites, StandHasTheFiguresOfThePaper) {
   double volume = 0.0;
   double smallest = 1.0;
   double largest = 0.0;
+  double usual_base = 0.0;  // trees whose branches begin at 3 to 6 m
   for (const GrownTree& tree : stand.trees) {
     const double area = cross_section(tree.dbh_m);
     basal_area += area;
@@ -113,10 +114,12 @@ TEST(LieksaSites, StandHasTheFiguresOfThePaper) {
     largest = std::max(largest, tree.dbh_m);
     EXPECT_EQ(tree.species, Species::kPine);
     EXPECT_GT(tree.crown_base_m, 1.2);
+    usual_base += tree.crown_base_m > 3.0 && tree.crown_base_m < 6.0 ? 1.0 : 0.0;
     for (double h = 0.05; h < tree.height_m; h += 0.1)
       volume += 0.1 * cross_section(tree.diameter(h));
   }
   EXPECT_NEAR(static_cast<double>(stand.trees.size()) / hectares, 770.0, 8.0);
+  EXPECT_GT(usual_base / static_cast<double>(stand.trees.size()), 0.8);
   EXPECT_NEAR(basal_area / hectares, 16.0, 0.05 * 16.0);
   EXPECT_NEAR(diameters / basal_area, 0.18, 0.008);
   EXPECT_NEAR(heights / basal_area, 15.0, 0.5);

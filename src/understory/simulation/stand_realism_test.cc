@@ -1,13 +1,18 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
+#include "understory/simulation/crown_shapes.h"
 #include "understory/simulation/scene.h"
 #include "understory/simulation/simulator.h"
 #include "understory/simulation/stand.h"
+#include "understory/simulation/stand_drawing.h"
 #include "understory/simulation/terrain.h"
+#include "understory/util/random.h"
 
 namespace understory {
 namespace {
@@ -101,6 +106,45 @@ TEST(Trees, ForkInTwoAndBreakOff) {
   tree.broken_m = 5.0;
   EXPECT_GT(width_at(site, tree, 4.5), 0.2);
   EXPECT_EQ(width_at(site, tree, 6.0), 0.0);
+}
+
+// Pines of one height differ in where their branches begin, and the shape that stands for a tree's
+// crown begins there too; the lowest branches are thinner than those above.
+TEST(Trees, CrownsBeginAtTheirHeightsAndFrayOut) {
+  StandConfig config;
+  const GrownShapes grown = grow_shapes(config, 1);
+  config.pine_share = 1.0;
+  config.spruce_share = 0.0;
+  Random random(4);
+  std::vector<double> shares;
+  double apart = 0.0;
+  for (int id = 1; id <= 300; ++id) {
+    GrownTree tree = draw_tree(config, random);
+    tree.id = id;
+    const GrownCrown& crown = grown.crowns[nearest_crown(grown.crowns, tree)];
+    ASSERT_EQ(crown.species, Species::kPine);
+    shares.push_back(tree.crown_base_m / tree.height_m);
+    apart += std::abs(crown.size.crown_base_m / crown.size.height_m - shares.back()) / 300.0;
+  }
+  std::sort(shares.begin(), shares.end());
+  EXPECT_LT(shares[30], 0.36);
+  EXPECT_GT(shares[270], 0.50);
+  EXPECT_LT(apart, 0.04);
+  const GrownCrown& tall = grown.crowns[8];  // a pine of 14 m
+  ASSERT_EQ(tall.size.height_m, 14.0);
+  const double length = tall.size.height_m - tall.size.crown_base_m;
+  double area[4] = {0.0, 0.0, 0.0, 0.0};  // by quarters of the crown
+  for (const Eigen::Vector3i& triangle : tall.living.triangles) {
+    const Eigen::Vector3f& a = tall.living.vertices[static_cast<std::size_t>(triangle.x())];
+    const Eigen::Vector3f& b = tall.living.vertices[static_cast<std::size_t>(triangle.y())];
+    const Eigen::Vector3f& c = tall.living.vertices[static_cast<std::size_t>(triangle.z())];
+    const double up = (static_cast<double>(a.z()) - tall.size.crown_base_m) / length;
+    area[std::clamp(static_cast<int>(4.0 * up), 0, 3)] +=
+        0.5 * static_cast<double>((b - a).cross(c - a).norm());
+  }
+  EXPECT_GT(area[0], 0.1 * area[1]);
+  EXPECT_LT(area[0], area[1]);
+  EXPECT_LT(area[0], area[2]);
 }
 
 TEST(Stands, HaveTheSharesOfForksBreaksAndBoulders) {
