@@ -159,6 +159,30 @@ TEST(PathFit, ANearlyStraightWayIsNotLeftHalfWay) {
   }
 }
 
+// A road that winds every 8 m: laid one bend too far along it fits as well nearly everywhere, and
+// the search from the middles, which do not fit, ends there. One bend is different.
+TEST(PathFit, AWindingWayIsNotLeftABendTooFar) {
+  const auto at = [](double s) {
+    const double bend = 1.5 * std::exp(-std::pow((s - 110.0) / 4.0, 2.0));
+    return Vector3d(s, 0.8 * std::sin(2.0 * M_PI * s / 8.0) + bend, 0.0);
+  };
+  for (const double further_m : {24.0, 33.0, 48.0}) {
+    std::vector<Vector3d> path;
+    std::vector<Vector3d> fixes;
+    for (double s = 0.0; s < 175.0 + further_m; s += 0.25) {
+      path.push_back(at(s));
+      if (s < 175.0) fixes.emplace_back(motion() * path.back());
+    }
+    PathFitConfig config;
+    config.about_yaw_rad = 2.2;
+    const PathFit fit = fit_path(path, fixes, config);
+    ASSERT_TRUE(fit.found);
+    const Vector3d middle(85.0, 0.0, 0.0);
+    EXPECT_LT((fit.target_from_source * middle - motion() * middle).head<2>().norm(), 1.5)
+        << further_m;
+  }
+}
+
 TEST(PathFit, AStraightWayFitsTheOtherWayRoundAsWell) {
   std::vector<Vector3d> path;
   for (int k = 0; k <= 400; ++k)
