@@ -77,13 +77,9 @@ class SparseRun {
               fmt::format("{} stems", last_stems_)});
   }
 
+  // The recording has said so where it does not know the IMU's place.
   void take(const ImuSample& sample) {
-    if (source_->rig().body_from_imu) {
-      pacer_.add(sample);
-    } else if (!told_of_imu_) {
-      log_.warn("imu.place", "the place of the IMU is not known (body_from_imu): it is not used");
-      told_of_imu_ = true;
-    }
+    if (source_->rig().body_from_imu) pacer_.add(sample);
   }
 
   void record(const std::vector<StemScan>& results) {
@@ -111,7 +107,6 @@ class SparseRun {
   std::size_t last_stems_ = 0;
   std::vector<GnssFix> fixes_;
   StageTimes times_;
-  bool told_of_imu_ = false;
   std::vector<SparseStep> steps_;  // of the views that were kept
 };
 
