@@ -111,6 +111,13 @@ double path_length(const std::vector<Pose>& poses) {
   return length;
 }
 
+// By a motion in the plane; a height that is not known stays so, and alone.
+Eigen::Vector3d moved(const Pose& motion, const Eigen::Vector3d& point) {
+  Eigen::Vector3d result = motion * Eigen::Vector3d(point.x(), point.y(), 0.0);
+  result.z() += point.z();
+  return result;
+}
+
 // The recording's own GNSS path beside the path: how well they lie on each other, P1 (6), and
 // gnss.csv in the run's frame. The fixes have no say in the path.
 std::vector<ReportFix> compare_with_gnss(const CorrectionRequest& request, RunSummary& summary) {
@@ -125,8 +132,8 @@ std::vector<ReportFix> compare_with_gnss(const CorrectionRequest& request, RunSu
   GnssWriter writer(request.run_folder / "gnss.csv");
   const Pose world_from_enu = fit.enu_from_world.inverse();
   for (GnssRow row : fit.rows) {
-    row.position_in_world = world_from_enu * row.position_in_world;
-    row.residual = world_from_enu.rotation() * row.residual;
+    row.position_in_world = moved(world_from_enu, row.position_in_world);
+    row.residual = moved(Pose(world_from_enu.rotation(), Eigen::Vector3d::Zero()), row.residual);
     drawn.push_back({row.position_in_world.cast<float>(), row.used});
     row.used = false;
     row.reason = "compared with, not used";
