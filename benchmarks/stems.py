@@ -6,6 +6,7 @@
   ./run bench stems --real          Wild-Places V-03 (where the example data is): odometry, loops,
                                     time, memory, and Go-ICP on its neighbouring views
   ./run bench stems --orders        P0's powers with their pairs in each order, on the same roads
+  ./run bench stems --rules         P0's pairs or those chosen by Delaunay stars, the same roads
   ./run bench stems --search        where ICP converges (a picture), and what Go-ICP's search costs
   ./run bench stems --table --runs FOLDER [--site-seed N] [--sites lieksa1,lieksa2]
                                     P1's table 1 over whole simulated sites; runs that are in the
@@ -34,7 +35,8 @@ from strip_roads import Roads, write_strip_roads  # noqa: E402
 PAGE = TOP / "docs" / "sparse.md"
 PICTURE = TOP / "docs" / "pictures" / "stem_convergence.svg"
 ORDERS = ("small", "medium", "random", "gain")
-METHODS = ("none", "powers", "powers_printed", "lattice", "pose_graph", "expected_gain")
+METHODS = ("none", "powers", "powers_printed", "lattice", "pose_graph", "gaussian_process",
+           "expected_gain")
 ODOMETRIES = {"frame": "view to view, P0 (16)", "map": "view to local map"}
 
 
@@ -118,26 +120,43 @@ def measured_rows(seeds, length_m, keep):
     return rows
 
 
-def order_page(seeds, length_m):
-    """P0 table 1 over made-up roads: the paper's odometry and powers, its pairs in each order."""
-    rows = {order: [] for order in ORDERS}
+def compared(seeds, length_m, title, choices):
+    """A table of choices, each a name with a method, an odometry and settings."""
+    rows = {name: [] for name in choices}
     for seed in seeds:
         with tempfile.TemporaryDirectory() as scratch:
             site = Path(scratch)
             write_strip_roads(site, seed, Roads(length_m=length_m, step_m=1.0))
             best = understory_json("evaluate", "map", site / "stems.csv.gz", site / "truth")
-            for order in ORDERS:
-                rows[order].append(measure(site, "powers", "frame", best, f"correction.order={order}"))
+            for name, (method, odometry, *settings) in choices.items():
+                rows[name].append(measure(site, method, odometry, best, *settings))
+                say(f"seed {seed} {name}: path {100 * rows[name][-1]['plane_m']:.1f} cm")
     text = (f"{version()}, seeds {', '.join(map(str, seeds))}; mean and in brackets the worst\n\n"
-            "| order | beta | d | e_C cm | of that with true poses | path, plane cm | corrections % of "
+            f"| {title} | beta | d | e_C cm | of that with true poses | path, plane cm | corrections % of "
             "views |\n|---|---|---|---|---|---|---|\n")
-    for order, cell in rows.items():
+    for name, cell in rows.items():
         def mean(key, scale=1.0, digits=1):
             values = [scale * r[key] for r in cell]
             return f"{statistics.mean(values):.{digits}f} ({max(values):.{digits}f})"
-        text += (f"| {order} | {mean('beta', 1, 4)} | {mean('d', 1, 2)} | {mean('e_c', 100)} | "
+        text += (f"| {name} | {mean('beta', 1, 4)} | {mean('d', 1, 2)} | {mean('e_c', 100)} | "
                  f"{mean('e_c_ratio', 1, 2)} | {mean('plane_m', 100)} | {mean('share', 100)} |\n")
     return text
+
+
+def order_page(seeds, length_m):
+    """P0 table 1 over made-up roads: the paper's odometry and powers, its pairs in each order."""
+    return compared(seeds, length_m, "order",
+                    {order: ("powers", "frame", f"correction.order={order}") for order in ORDERS})
+
+
+def rule_page(seeds, length_m):
+    """Pairs spread like Poisson disks, P0 (28, 29), or by the association of Delaunay stars."""
+    return compared(seeds, length_m, "odometry, correction, choice of pairs",
+                    {f"{ODOMETRIES[odometry]}, {method}, {rule}":
+                     (method, odometry, f"correction.pairs.rule={rule}")
+                     for odometry in ODOMETRIES
+                     for method in ("powers", "pose_graph", "gaussian_process")
+                     for rule in ("poisson_disks", "delaunay_stars")})
 
 
 def stem_search(what, stands):
@@ -306,6 +325,7 @@ def main():
     parser.add_argument("--real", action="store_true", help="only the real forest")
     parser.add_argument("--methods", action="store_true", help="only the made-up roads")
     parser.add_argument("--orders", action="store_true", help="only the orders of corrections")
+    parser.add_argument("--rules", action="store_true", help="only the choices of pairs")
     parser.add_argument("--search", action="store_true", help="only the searches")
     parser.add_argument("--table", action="store_true", help="only P1's table 1")
     parser.add_argument("--runs", help="folder of the runs of --table")
@@ -321,11 +341,14 @@ def main():
         with tempfile.TemporaryDirectory() as scratch:
             tables["strip roads"] = table_page(options.sites.split(","), options.site_seed,
                                                options.runs or scratch)
-    everything = not (options.table or options.methods or options.real or options.orders or options.search)
+    everything = not (options.table or options.methods or options.real or options.orders
+                      or options.rules or options.search)
     if everything or options.search:
         tables["searches"] = search_page(options.write)
     if everything or options.orders:
         tables["orders of corrections"] = order_page(range(first, last + 1), options.length_m)
+    if everything or options.rules:
+        tables["choices of pairs"] = rule_page(range(first, last + 1), options.length_m)
     if everything or options.real:
         tables["real forest"] = bench_real()
     if everything or options.methods:

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <optional>
 
 #include "understory/graph/gain_queue.h"
 #include "understory/graph/pair_matching.h"
+#include "understory/graph/star_association.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -12,26 +15,6 @@ namespace {
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
-}
-
-double beta_of(const CorrectionViews& views, const std::vector<Pose>& poses,
-               const SelfCorrectionConfig& config) {
-  return blur_ratio(map_points(views.problem.map_views, poses, {}), config.sharpness);
-}
-
-TriedCorrection told(const CorrectionPair& pair, const PairMatch& match,
-                     const std::vector<Pose>& poses) {
-  TriedCorrection tried;
-  tried.pair = pair;
-  tried.error_before_m = match.error_before_m;
-  tried.error_after_m = match.error_m;
-  tried.overlap_after = match.overlap;
-  tried.by_go_icp = match.by_go_icp;
-  tried.accepted = match.accepted;
-  tried.reason = match.reason;
-  const Pose before = poses[at(pair.j)].inverse() * poses[at(pair.i)];
-  tried.moved_m = (match.j_from_i.translation() - before.translation()).head<2>().norm();
-  return tried;
 }
 
 // Applies one correction after the other and ends with the sharpest map on the way: the stop rule
@@ -53,7 +36,7 @@ class PowerChain {
     const PairMatch match =
         match_views(views_.targets[at(pair.j)], views_.problem.views[at(pair.i)],
                     poses_[at(pair.j)].inverse() * poses_[at(pair.i)], views_.overlap, config_);
-    TriedCorrection tried = told(pair, match, poses_);
+    TriedCorrection tried = told_match(pair, match, poses_);
     if (match.accepted) {
       apply_power_correction(poses_, views_.problem.step_errors, pair.j, pair.i, match.j_from_i,
                              power_);
@@ -94,35 +77,93 @@ class PowerChain {
   std::size_t best_length_ = 0;
 };
 
-// First the pair that tells most, then the one that tells most beside it, and so on.
+// As many as `most` pairs: first the one that tells most, then the one that tells most beside it,
+// and so on.
 std::vector<CorrectionPair> by_gain(const CorrectionViews& views, std::vector<CorrectionPair> pairs,
-                                    double match_sd_m) {
-  std::vector<double> noise = match_variances_m2(pairs, match_sd_m);
+                                    std::vector<double> noise, std::size_t most) {
   GainQueue queue(std::move(pairs), std::move(noise), plane_variances_m2(views));
   std::vector<CorrectionPair> result;
-  while (const auto best = queue.best()) {
+  while (const auto best = result.size() < most ? queue.best() : std::nullopt) {
     result.push_back(queue.pair(*best));
     queue.take(*best);
   }
   return result;
 }
 
-// P0's pairs, section 2.4.
+// Pairs whose sectors overlap, by what the association of their stems' stars lets expect. (27) is
+// not asked of them: pairs that do not fit yet tell most.
+std::vector<CorrectionPair> by_stars(const CorrectionViews& views,
+                                     const SelfCorrectionConfig& config,
+                                     SelfCorrectionResult& result) {
+  PairConfig drawn = config.pairs;
+  drawn.error_m = 1e9;
+  const std::vector<Pose>& poses = result.world_from_view;
+  std::vector<CorrectionPair> pool = promising_pairs(views.targets, poses, views.overlap, drawn,
+                                                     static_cast<std::uint64_t>(config.seed));
+  result.promising = pool.size();
+  pool = poisson_disk_choice(pool, config.gain.pool);
+  std::vector<StarView> stars(poses.size());
+  parallel_for(stars.size(), 16,
+               [&](std::size_t k) { stars[k] = stars_of(views.problem.views[k]); });
+  const std::vector<double> variances = plane_variances_m2(views);
+  std::vector<double> walked(variances.size(), 0.0);
+  std::partial_sum(variances.begin(), variances.end(), walked.begin());
+  std::vector<double> noise(pool.size());
+  const StarNoise stem;
+  parallel_for(pool.size(), 16, [&](std::size_t k) {
+    const CorrectionPair& pair = pool[k];
+    const double known = associated_stems(stars[at(pair.j)], stars[at(pair.i)],
+                                          poses[at(pair.j)].inverse() * poses[at(pair.i)],
+                                          0.5 * (walked[at(pair.i)] - walked[at(pair.j)]), stem);
+    // A match has three unknowns in the plane; where hardly any partner is known it tells nothing.
+    const double spare = std::max(known - 3.0, 1e-3);
+    noise[k] = config.gain.match_sd_m * config.gain.match_sd_m +
+               4.0 * stem.stem_sd_m * stem.stem_sd_m / spare;
+  });
+  const auto most =
+      static_cast<std::size_t>(std::max(1, correction_budget(views.targets.size(), config)));
+  return by_gain(views, std::move(pool), std::move(noise), most);
+}
+
+}  // namespace
+
+double beta_of(const CorrectionViews& views, const std::vector<Pose>& poses,
+               const SelfCorrectionConfig& config) {
+  return blur_ratio(map_points(views.problem.map_views, poses, {}), config.sharpness);
+}
+
+TriedCorrection told_match(const CorrectionPair& pair, const PairMatch& match,
+                           const std::vector<Pose>& poses) {
+  TriedCorrection tried;
+  tried.pair = pair;
+  tried.error_before_m = match.error_before_m;
+  tried.error_after_m = match.error_m;
+  tried.overlap_after = match.overlap;
+  tried.by_go_icp = match.by_go_icp;
+  tried.accepted = match.accepted;
+  tried.reason = match.reason;
+  const Pose before = poses[at(pair.j)].inverse() * poses[at(pair.i)];
+  tried.moved_m = (match.j_from_i.translation() - before.translation()).head<2>().norm();
+  return tried;
+}
+
 std::vector<CorrectionPair> chosen_pairs(const CorrectionViews& views,
                                          const SelfCorrectionConfig& config,
                                          SelfCorrectionResult& result) {
   const auto seed = static_cast<std::uint64_t>(config.seed);
+  if (config.pairs.rule == PairRule::kDelaunayStars) return by_stars(views, config, result);
   const std::vector<CorrectionPair> promising =
       promising_pairs(views.targets, result.world_from_view, views.overlap, config.pairs, seed);
   result.promising = promising.size();
   std::vector<CorrectionPair> chosen =
       poisson_disk_choice(promising, std::max(1, correction_budget(views.targets.size(), config)));
-  if (config.order == CorrectionOrder::kGain)
-    return by_gain(views, std::move(chosen), config.gain.match_sd_m);
+  if (config.order == CorrectionOrder::kGain) {
+    std::vector<double> noise = match_variances_m2(chosen, config.gain.match_sd_m);
+    const std::size_t all = chosen.size();
+    return by_gain(views, std::move(chosen), std::move(noise), all);
+  }
   return ordered(std::move(chosen), config.order, seed);
 }
-
-}  // namespace
 
 std::vector<double> plane_variances_m2(const CorrectionViews& views) {
   const double arm = 0.5 * views.overlap.cone().range_m;
@@ -186,7 +227,7 @@ void correct_by_pose_graph(const CorrectionViews& views, const SelfCorrectionCon
   graph.loops = views.problem.loops;
   std::vector<std::size_t> rows;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    result.tried.push_back(told(pairs[k], matches[k], poses));
+    result.tried.push_back(told_match(pairs[k], matches[k], poses));
     if (!matches[k].accepted) continue;
     rows.push_back(k);
     graph.loops.push_back({pairs[k].j, pairs[k].i, matches[k].j_from_i, matches[k].covariance});

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "understory/graph/pair_matching.h"
 #include "understory/graph/self_correction.h"
 #include "understory/graph/view_cone.h"
 
@@ -27,6 +28,19 @@ struct CorrectionViews {
 [[nodiscard]] std::vector<double> match_variances_m2(const std::vector<CorrectionPair>& pairs,
                                                      double sd_m);
 
+// Of the map that the poses make.
+[[nodiscard]] double beta_of(const CorrectionViews& views, const std::vector<Pose>& poses,
+                             const SelfCorrectionConfig& config);
+
+// Pairs as the config asks for them, in its order; tells result.promising.
+[[nodiscard]] std::vector<CorrectionPair> chosen_pairs(const CorrectionViews& views,
+                                                       const SelfCorrectionConfig& config,
+                                                       SelfCorrectionResult& result);
+
+// What a match says, beside the poses that it began from.
+[[nodiscard]] TriedCorrection told_match(const CorrectionPair& pair, const PairMatch& match,
+                                         const std::vector<Pose>& poses);
+
 // Each fills result.world_from_view, tried, promising, kept and stopped_because; the first poses
 // are in result.world_from_view already.
 void correct_by_powers(const CorrectionViews& views, const SelfCorrectionConfig& config,
@@ -35,6 +49,8 @@ void correct_by_lattice(const CorrectionViews& views, const SelfCorrectionConfig
                         SelfCorrectionResult& result);
 void correct_by_pose_graph(const CorrectionViews& views, const SelfCorrectionConfig& config,
                            SelfCorrectionResult& result);
+void correct_by_gaussian_process(const CorrectionViews& views, const SelfCorrectionConfig& config,
+                                 SelfCorrectionResult& result);
 void correct_by_expected_gain(const CorrectionViews& views, const SelfCorrectionConfig& config,
                               SelfCorrectionResult& result);
 

@@ -37,6 +37,11 @@ std::vector<std::pair<int, int>> drawn_pairs(int views, const PairConfig& config
 }  // namespace
 
 void describe(ConfigTable& table, PairConfig& config) {
+  table.add_enum(
+      "rule", config.rule,
+      {{"poisson_disks", PairRule::kPoissonDisks}, {"delaunay_stars", PairRule::kDelaunayStars}},
+      "how pairs are chosen: P0 (28, 29), or (P0 section 3) by the association of "
+      "Delaunay stars, which gives the order too");
   table.add("tested", config.tested, {1, 100'000'000}, "", "pairs of views drawn at random");
   table.add("shortest_gap", config.shortest_gap, {1, 1'000'000}, "", "views from one to the other");
   table.add("longest_gap", config.longest_gap, {0, 100'000'000}, "", "the same; 0: any");

@@ -21,7 +21,16 @@ struct CorrectionPair {
   [[nodiscard]] int gap() const { return i - j; }
 };
 
+// Which of the promising pairs are matched.
+enum class PairRule {
+  kPoissonDisks,  // P0 (28, 29)
+  // What P0's section 3 proposes: choice and order by the association of Delaunay stars; the pair
+  // that is expected to tell most, then the one that tells most beside it.
+  kDelaunayStars
+};
+
 struct PairConfig {
+  PairRule rule = PairRule::kPoissonDisks;
   int tested = 100'000;    // pairs of views drawn at random
   int shortest_gap = 2;    // views
   int longest_gap = 1000;  // views; 0: any

@@ -62,8 +62,10 @@ void describe(ConfigTable& table, SelfCorrectionConfig& config) {
                   {"powers_printed", CorrectionMethod::kPowersPrinted},
                   {"lattice", CorrectionMethod::kLattice},
                   {"pose_graph", CorrectionMethod::kPoseGraph},
+                  {"gaussian_process", CorrectionMethod::kGaussianProcess},
                   {"expected_gain", CorrectionMethod::kExpectedGain}},
-                 "powers: P0 section 2; lattice: P1 section 2.3; the others are described in "
+                 "powers: P0 section 2; lattice: P1 section 2.3; gaussian_process: P1 section 5; "
+                 "the others are described in "
                  "docs/sparse.md");
   table.add_enum("order", config.order,
                  {{"small", CorrectionOrder::kSmallGaps},
@@ -149,6 +151,9 @@ SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
       break;
     case CorrectionMethod::kPoseGraph:
       correct_by_pose_graph(views, config, result);
+      break;
+    case CorrectionMethod::kGaussianProcess:
+      correct_by_gaussian_process(views, config, result);
       break;
     case CorrectionMethod::kExpectedGain:
       correct_by_expected_gain(views, config, result);

@@ -20,11 +20,12 @@ namespace understory {
 enum class CorrectionMethod {
   kNone,
   kPowers,  // P0 section 2: powers of the correction, acting in the frame of the earlier view
-  kPowersPrinted,  // the same with (19) as printed, acting in each view's own frame
-  kLattice,        // P1 section 2.3: a lattice of pairs, powers by match errors
-  kPoseGraph,      // P0's pairs, all matched first, then solved at once with robust kernels
-  kExpectedGain    // pairs by what they are expected to tell, matched as gathered views, solved at
-                   // once, matched again from the better poses
+  kPowersPrinted,    // the same with (19) as printed, acting in each view's own frame
+  kLattice,          // P1 section 2.3: a lattice of pairs, powers by match errors
+  kPoseGraph,        // P0's pairs, all matched first, then solved at once with robust kernels
+  kGaussianProcess,  // P0's pairs, all matched first, regressed over the path (P1 section 5)
+  kExpectedGain  // pairs by what they are expected to tell, matched as gathered views, solved at
+                 // once, matched again from the better poses
 };
 
 struct LatticeConfig {

@@ -88,7 +88,8 @@ TEST(SelfCorrection, EveryMethodSharpensTheMapAndNoneBlursIt) {
   const Drive seen = drive(5);
   const double before = error_m(seen.problem.world_from_view, seen.truth);
   for (const CorrectionMethod method :
-       {CorrectionMethod::kPowers, CorrectionMethod::kPoseGraph, CorrectionMethod::kExpectedGain}) {
+       {CorrectionMethod::kPowers, CorrectionMethod::kPoseGraph, CorrectionMethod::kGaussianProcess,
+        CorrectionMethod::kExpectedGain}) {
     const SelfCorrectionResult result = self_correct(seen.problem, with(method));
     EXPECT_LT(result.after.beta, result.before.beta) << static_cast<int>(method);
     EXPECT_LT(result.after.noise_mean_m, 0.9 * result.before.noise_mean_m);
@@ -139,6 +140,30 @@ TEST(SelfCorrection, PowersTakeTheirPairsInAnyOrderAskedFor) {
   EXPECT_FALSE(std::is_sorted(gain.rbegin(), gain.rend()));
 }
 
+// P0 section 3 proposes to choose and order the pairs by the association of Delaunay stars.
+TEST(SelfCorrection, PairsChosenByTheirStarsMendTheMap) {
+  const Drive seen = drive(5);
+  const double before = error_m(seen.problem.world_from_view, seen.truth);
+  SelfCorrectionConfig config = with(CorrectionMethod::kPoseGraph);
+  const SelfCorrectionResult disks = self_correct(seen.problem, config);
+  config.pairs.rule = PairRule::kDelaunayStars;
+  const SelfCorrectionResult stars = self_correct(seen.problem, config);
+  EXPECT_LT(stars.after.beta, stars.before.beta);
+  EXPECT_LT(error_m(stars.world_from_view, seen.truth), 0.7 * before);
+  ASSERT_EQ(stars.tried.size(), 20U);
+  const auto mean_gap = [](const SelfCorrectionResult& result) {
+    double sum = 0.0;
+    for (const TriedCorrection& tried : result.tried)
+      sum += tried.pair.gap();
+    return sum / static_cast<double>(result.tried.size());
+  };
+  // Those that tell most are far apart on the way, there and back, and can be told nevertheless.
+  EXPECT_GT(mean_gap(stars), mean_gap(disks));
+  EXPECT_GT(std::count_if(stars.tried.begin(), stars.tried.end(),
+                          [](const auto& tried) { return tried.accepted; }),
+            15);
+}
+
 TEST(SelfCorrection, AMapThatIsRightIsLeftAlone) {
   Drive seen = drive(7);
   seen.problem.world_from_view = seen.truth;
@@ -146,7 +171,8 @@ TEST(SelfCorrection, AMapThatIsRightIsLeftAlone) {
     seen.problem.steps[k] = seen.truth[k - 1].inverse() * seen.truth[k];
   for (const CorrectionMethod method :
        {CorrectionMethod::kPowers, CorrectionMethod::kPowersPrinted, CorrectionMethod::kLattice,
-        CorrectionMethod::kPoseGraph, CorrectionMethod::kExpectedGain}) {
+        CorrectionMethod::kPoseGraph, CorrectionMethod::kGaussianProcess,
+        CorrectionMethod::kExpectedGain}) {
     const SelfCorrectionResult result = self_correct(seen.problem, with(method));
     EXPECT_LE(result.after.beta, result.before.beta);
     EXPECT_LT(error_m(result.world_from_view, seen.truth), 0.05) << static_cast<int>(method);
@@ -156,7 +182,8 @@ TEST(SelfCorrection, AMapThatIsRightIsLeftAlone) {
 TEST(SelfCorrection, SameForAnyNumberOfThreads) {
   const Drive seen = drive(8);
   for (const CorrectionMethod method :
-       {CorrectionMethod::kPowers, CorrectionMethod::kPoseGraph, CorrectionMethod::kExpectedGain}) {
+       {CorrectionMethod::kPowers, CorrectionMethod::kPoseGraph, CorrectionMethod::kGaussianProcess,
+        CorrectionMethod::kExpectedGain}) {
     SelfCorrectionResult one;
     SelfCorrectionResult two;
     with_threads(1, [&] { one = self_correct(seen.problem, with(method)); });
@@ -170,7 +197,8 @@ TEST(SelfCorrection, SameForAnyNumberOfThreads) {
 TEST(SelfCorrection, TooLittleToWorkWithIsNoError) {
   for (const CorrectionMethod method :
        {CorrectionMethod::kNone, CorrectionMethod::kPowers, CorrectionMethod::kLattice,
-        CorrectionMethod::kPoseGraph, CorrectionMethod::kExpectedGain}) {
+        CorrectionMethod::kPoseGraph, CorrectionMethod::kGaussianProcess,
+        CorrectionMethod::kExpectedGain}) {
     for (const std::size_t views : {0U, 1U, 40U}) {
       SelfCorrectionProblem problem;
       problem.views.assign(views, SparsePoints{{1.0, 2.0, 0.0}});
