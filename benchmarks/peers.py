@@ -4,7 +4,7 @@
   ./run bench peers                               60 s of handheld and harvester, seed 21
   ./run bench peers --sites handheld --duration-s 180 --seed 22
   ./run bench peers --only DLIO KissICP           some of them
-  ./run bench peers --write                       puts the tables into docs/results.md
+  ./run bench peers --write                       puts each table into docs/results.md when it is done
 
 From PyPI, into an environment of their own: evalio (LIO-SAM, DLIO, LOAM, KISS-ICP, GenZ-ICP, CT-ICP,
 MAD-ICP, FORM) and RKO-LIO. One after another, two threads, pinned to the same two processors. Errors
@@ -13,6 +13,7 @@ are against the recording's truth; CPU and wall time a scan are without reading.
 
 import argparse
 import json
+import re
 import sys
 import tempfile
 import time
@@ -20,6 +21,7 @@ from pathlib import Path
 
 from program import (Failed, TOP, machine, map_recording, own_cpus, run, say, understory,
                      understory_json, version)
+from sites import SITES
 
 PEERS = TOP / "benchmarks" / "peers"
 RESULTS = TOP / "docs" / "results.md"
@@ -122,14 +124,32 @@ def measure(site, options, work):
     return render(results, what)
 
 
-def write_results(text):
-    page = RESULTS.read_text()
-    if BEGIN not in page:
-        page += f"\n## Peers\n{BEGIN}\n{END}\n"
-    head, rest = page.split(BEGIN, 1)
-    _, tail = rest.split(END, 1)
-    RESULTS.write_text(f"{head}{BEGIN}\n{text}{END}{tail}")
-    say(f"written into {RESULTS}")
+def parts_of(text):
+    """The tables of a record by what they are of: site, seed and length."""
+    starts = [m.start() for m in re.finditer(r"^\*\*", text, re.MULTILINE)] + [len(text)]
+    parts = {}
+    for begin, end in zip(starts, starts[1:]):
+        part = text[begin:end].strip()
+        parts[part[2:part.index("**", 2)]] = part + "\n"
+    return parts
+
+
+def place_of(what):
+    """Where a table belongs: sites as listed, others after them, then by seed and length."""
+    site, seed, length = what.split(", ")
+    order = ["handheld", "harvester", *SITES]
+    return (order.index(site) if site in order else len(order), site, int(seed.split()[1]),
+            float(length.split()[0]))
+
+
+def write_results(text, page=RESULTS):
+    """Puts tables into the record in place of those of the same site, seed and length."""
+    head, rest = page.read_text().split(BEGIN, 1)
+    old, tail = rest.split(END, 1)
+    parts = {**parts_of(old), **parts_of(text)}
+    tables = "\n".join(parts[what] for what in sorted(parts, key=place_of))
+    page.write_text(f"{head}{BEGIN}\n{tables}{END}{tail}")
+    say(f"written into {page}")
 
 
 def main():
@@ -142,10 +162,11 @@ def main():
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="understory-peers-") as scratch:
-        text = "\n".join(measure(site, options, Path(scratch)) for site in options.sites)
-    print(text)
-    if options.write:
-        write_results(text)
+        for site in options.sites:
+            text = measure(site, options, Path(scratch))
+            print(text, flush=True)
+            if options.write:
+                write_results(text)
     return 0
 
 

@@ -13,6 +13,7 @@ constexpr double kBendShare = 1.0 / 3.0;
 void describe(ConfigTable& table, DenseOdometryConfig& config) {
   table.section("preprocess", [&] {
     table.section("voxel", [&] { describe(table, config.voxel); });
+    table.section("isolated", [&] { describe(table, config.isolated); });
     table.add("machine_boxes_file", config.machine_boxes_file,
               "YAML of boxes around the machine whose points are dropped; empty: none");
   });
@@ -84,6 +85,7 @@ void DenseOdometry::preprocess(const Scan& scan, const std::vector<StampedPose>&
   const ScopedTimer timer(times_, "preprocess");
   keep_.clear();
   if (!boxes_.empty()) keep_ = outside_machine(scan, rig_, boxes_);
+  drop_isolated(scan, config_.isolated, keep_);
   estimate.cloud = deskew(scan, rig_, path, keep_, config_.deskew).cloud;
   estimate.thinned = filter_.filter(estimate.cloud, config_.voxel);
 }

@@ -10,6 +10,7 @@
 #include "understory/preprocess/body_cloud.h"
 #include "understory/preprocess/deskew.h"
 #include "understory/preprocess/machine_boxes.h"
+#include "understory/preprocess/isolated_points.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/registration/ndt.h"
 #include "understory/sensor/rig.h"
@@ -25,6 +26,7 @@ using LocalMapSnapshot = std::vector<NdtMapPtr>;
 
 struct DenseOdometryConfig {
   VoxelFilterConfig voxel;  // thins a scan before matching
+  IsolatedPointsConfig isolated;
   NdtConfig ndt;
   DeskewConfig deskew;
   MotionConfig motion;
