@@ -142,13 +142,38 @@ def place_of(what):
             float(length.split()[0]))
 
 
+def rows_of(part):
+    """The cells of a table's rows that have an error, by name without version."""
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in part.splitlines()
+            if line.startswith("| ") and not line.startswith("| |")]
+    return {row[0].split(" (")[0]: row for row in rows if row[2].strip("0123456789.") == ""}
+
+
+def summary(parts):
+    """One line a table: this program beside the best of the others, as far as they ran."""
+    lines = ["| site | this: APE cm | best other: APE cm | this: CPU ms a scan "
+             "| least of the others with IMU: CPU ms |", "|---|---|---|---|---|"]
+    for what in sorted(parts, key=place_of):
+        rows = rows_of(parts[what])
+        own = rows.get("understory")
+        others = {name: row for name, row in rows.items() if not name.startswith("understory")}
+        if own is None or not others:
+            continue
+        best = min(others, key=lambda name: float(others[name][2]))
+        inertial = {n: float(row[6]) for n, row in others.items() if n in WITH_IMU and row[6]}
+        least = min(inertial, key=inertial.get, default=None)
+        cheapest = f"{inertial[least]:.0f} ({least})" if least else ""
+        lines.append(f"| {what} | {own[2]} | {others[best][2]} ({best}) | {own[6]} | {cheapest} |")
+    return "\n".join(lines) + "\n"
+
+
 def write_results(text, page=RESULTS):
     """Puts tables into the record in place of those of the same site, seed and length."""
     head, rest = page.read_text().split(BEGIN, 1)
     old, tail = rest.split(END, 1)
     parts = {**parts_of(old), **parts_of(text)}
     tables = "\n".join(parts[what] for what in sorted(parts, key=place_of))
-    page.write_text(f"{head}{BEGIN}\n{tables}{END}{tail}")
+    page.write_text(f"{head}{BEGIN}\n{summary(parts)}\n{tables}{END}{tail}")
     say(f"written into {page}")
 
 
