@@ -47,6 +47,7 @@ struct Path {
     map.cell_sizes_m = {1.0};
     map.cells.volume_weight = 1.0;
     map.cells.viewpoint_in_source = Eigen::Vector3d::Zero();
+    map.cells.few_rings = true;
     return refine_beginning(
         keyframes, [&](std::size_t i) { return points[i]; }, map, NdtConfig(), config);
   }

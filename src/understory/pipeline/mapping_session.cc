@@ -17,7 +17,7 @@ constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
 constexpr std::size_t kFewPoints = 100;
 constexpr double kMostSpeedMS = 100.0;
-constexpr double kSparseCellM = 1.0;
+constexpr double kSparseVoxelM = 0.2;
 constexpr double kSparseKeyframeM = 0.3;
 constexpr double kSparseVolumeWeight = 1.0;
 // Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
@@ -148,27 +148,24 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
   opening_.reset();
 }
 
-// A sparse scan is not thinned away, its keyframes lie closer, the map's cells are as large as the
-// gaps between its rings ask for, and all of them count: there are not enough surfaces. Without an
-// IMU predictions are often off by more than the finest cells bridge, and the coarsest are too
-// coarse to lead to them: a map in between helps.
+// A sparse scan is thinned less, its keyframes lie closer, and all cells of the map count: there
+// are not enough surfaces. Without an IMU predictions are often off by more than the finest cells
+// bridge, and the coarsest are too coarse to lead to them: a map in between helps.
 void MappingSession::adapt_to(std::size_t scan_points) {
   sparse_ = scan_points < static_cast<std::size_t>(config_.sparse_scan_points) ? 1 : 0;
   const bool alone = !config_.odometry.imu_enabled || !rig_.body_from_imu || imu_doubted_;
-  if (sparse_ == 0 && !alone) return;
   LocalMapConfig& local = config_.keyframe_map.local_map;
+  local.cells.viewpoint_in_source = rig_.body_from_lidar.translation();
   std::vector<double>& cells = local.cell_sizes_m;
   if (sparse_ != 0) {
     VoxelFilterConfig& voxel = config_.odometry.voxel;
-    voxel.voxel_size_m = std::min(voxel.voxel_size_m, 0.1);
+    voxel.voxel_size_m = std::min(voxel.voxel_size_m, kSparseVoxelM);
     local.cells.min_points = std::min(local.cells.min_points, 4);
-    local.cells.viewpoint_in_source = rig_.body_from_lidar.translation();
-    for (double& size : cells)
-      size = std::max(size, kSparseCellM);
+    local.cells.few_rings = true;
     local.cells.volume_weight = std::max(local.cells.volume_weight, kSparseVolumeWeight);
     double& distance = config_.keyframe_map.keyframe.distance_m;
     distance = std::min(distance, kSparseKeyframeM);
-  } else if (cells.size() == 2) {
+  } else if (alone && cells.size() == 2) {
     cells.insert(cells.begin() + 1, std::sqrt(cells[0] * cells[1]));
   }
   map_ = std::make_unique<KeyframeMap>(config_.keyframe_map, folder_, times_, log_);

@@ -53,13 +53,13 @@ void add_row(NdtCell& cell, const Eigen::Vector3d& direction, double information
 
 // A line that is no stem: what surrounds it may show the surface on which it lies.
 void add_row_of_surroundings(NdtCell& cell, const Eigen::Matrix3d& covariance, double floor,
-                             const MomentsAround& around) {
+                             bool few_rings, const MomentsAround& around) {
   for (int reach = 1; reach <= kSurroundings; ++reach) {
     const CellMoments moments = around(reach);
     const Shape shape = shape_of(moments.covariance());
     if (is_line(shape, floor)) continue;
     const Eigen::Vector3d normal = shape.axes.col(0);
-    if (!is_plane(shape, floor) || is_edge_on(moments, normal)) return;
+    if (!is_plane(shape, floor) || (few_rings && is_edge_on(moments, normal))) return;
     const double own = normal.dot(covariance * normal);
     add_row(cell, normal, 1.0 / (std::max(own, shape.variance[0]) + floor));
     return;
@@ -109,21 +109,27 @@ NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
   const bool line = is_line(shape, floor);
   if (line) {
     if (std::abs(shape.axes.col(2).z()) < kPoleCosine) {
-      add_row_of_surroundings(cell, covariance, floor, around);
+      add_row_of_surroundings(cell, covariance, floor, config.few_rings, around);
       return cell;
     }
   } else if (is_plane(shape, floor)) {
-    if (is_edge_on(moments, shape.axes.col(0))) {
-      add_row_of_surroundings(cell, covariance, floor, around);
+    if (config.few_rings && is_edge_on(moments, shape.axes.col(0))) {
+      add_row_of_surroundings(cell, covariance, floor, config.few_rings, around);
       return cell;
     }
     add_row(cell, shape.axes.col(0), 1.0 / (shape.variance[0] + floor) - 1.0 / box);
     return cell;
   }
+  if (config.viewpoint_in_source) {
+    const double depth = config.near_side * std::sqrt(shape.variance[1]);
+    const Eigen::Vector3d rays(moments.ray_x, moments.ray_y, moments.ray_z);
+    cell.near_side_m = static_cast<float>(depth);
+    cell.mean_near_side = (depth / moments.n * rays).cast<float>();
+  }
   const double longest = std::min(shape.variance[2] + floor, box);
-  // What is neither surface nor line is seen from one side only, and that side goes with the lidar:
-  // such cells hold the estimate back (docs/registration.md). The same goes for the second
-  // direction, along which a cell ends where the lidar could no longer see it.
+  // What is neither surface nor line is seen from one side only, and that side goes with the lidar
+  // (docs/registration.md); what NdtCell::near_side_m leaves of that counts little. The same goes
+  // for the second direction, along which a cell ends where the lidar could no longer see it.
   const double share = line ? 1.0 : config.volume_weight;
   for (int i = 0; i < 2; ++i) {
     const double weight = share * (i == 0 ? 1.0 : config.second_axis_weight);

@@ -39,16 +39,18 @@ struct LocalPose {
   std::array<int, 3> base;
   Eigen::Matrix3f rotation;
   Eigen::Vector3f translation;  // metres from the corner of the base cell
+  Eigen::Vector3f viewpoint;    // from the source's origin, axes of the target
   float cell;
   float per_cell;
 };
 
-LocalPose localise(const Pose& pose, double cell_size) {
+LocalPose localise(const Pose& pose, double cell_size, const Eigen::Vector3d& viewpoint) {
   const Eigen::Vector3d origin = (pose.translation() / cell_size).array().floor();
   return {
       {static_cast<int>(origin.x()), static_cast<int>(origin.y()), static_cast<int>(origin.z())},
       pose.rotation_matrix().cast<float>(),
       (pose.translation() - cell_size * origin).cast<float>(),
+      (pose.rotation_matrix() * viewpoint).cast<float>(),
       static_cast<float>(cell_size),
       static_cast<float>(1.0 / cell_size)};
 }
@@ -137,7 +139,7 @@ class Accumulator {
               double widening)
       : target_(target),
         source_(source),
-        local_(localise(pose, target.cell_size())),
+        local_(localise(pose, target.cell_size(), target.viewpoint_in_source())),
         exact_(config.hessian == NdtConfig::Hessian::kNewton),
         trilinear_(config.search == NdtConfig::Search::k8) {
     const MixtureConstants mixture =
@@ -204,9 +206,13 @@ class Accumulator {
           local_.cell * (placed.fraction[0] - 0.5F - static_cast<float>(step.dx)),
           local_.cell * (placed.fraction[1] - 0.5F - static_cast<float>(step.dy)),
           local_.cell * (placed.fraction[2] - 0.5F - static_cast<float>(step.dz)));
-      const Eigen::Vector3f offset = from_center - cell->mean;
+      Eigen::Vector3f offset = from_center - cell->mean;
       nearest = std::min(nearest, offset.squaredNorm());
       if (cell->rows == 0) continue;
+      if (cell->near_side_m > 0.0F) {
+        const Eigen::Vector3f ray = placed.lever - local_.viewpoint;
+        offset += cell->near_side_m / std::max(ray.norm(), 1e-3F) * ray - cell->mean_near_side;
+      }
       if (batch.full()) batch.flush(d2_, pull_, sums);
       batch.add(*cell, offset, placed.lever, step.weight);
       if (exact_) add_exact_terms(*cell, offset, placed.lever, d2_, pull_ * step.weight, sums);

@@ -27,6 +27,9 @@ void describe(ConfigTable& table, NdtMapConfig& config) {
             "weight of a cell's second thinnest direction");
   table.add("volume_weight", config.volume_weight, {0.0, 1.0}, "",
             "weight of cells that are neither surface nor line");
+  table.add("near_side", config.near_side, {0.0, 2.0}, "",
+            "what a cell that is no surface shows lies before its middle by this share of its "
+            "spread; 0: in its middle");
 }
 
 Eigen::Vector3d NdtMap::mean(std::size_t index) const {
@@ -233,6 +236,7 @@ void NdtMapBuilder::clear() {
   state_->config = config;
   state_->map = std::make_shared<NdtMap>();
   state_->map->cell_size_ = config.cell_size_m;
+  if (config.viewpoint_in_source) state_->map->viewpoint_in_source_ = *config.viewpoint_in_source;
 }
 
 void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_source) {

@@ -24,9 +24,16 @@ struct NdtMapConfig {
   double sigma_floor_m = 0.03;  // a surface is never taken to be thinner: sensor and pose noise
   double second_axis_weight = 0.25;  // of a cell's second thinnest direction, 0..1
   double volume_weight = 0.03;       // of cells that are neither surface nor line, 0..1
-  // Where the lidar is in the frames of the sources, if known: then what looks like a surface and
-  // was seen exactly edge-on is taken for what it is, the trace of one ring. For few rings.
+  // Where the lidar is in the frames of the sources, if known; those matched to the map have it in
+  // the same place.
   std::optional<Eigen::Vector3d> viewpoint_in_source = std::nullopt;
+  // With a viewpoint: what a cell that is no surface shows lies before its middle by this share of
+  // the spread along its second axis, towards wherever it is seen from, 0..2. See
+  // NdtCell::near_side_m.
+  double near_side = 0.25;
+  // With a viewpoint: what looks like a surface and was seen exactly edge-on is taken for what it
+  // is, the trace of one ring.
+  bool few_rings = false;
 };
 void describe(ConfigTable& table, NdtMapConfig& config);
 
@@ -38,8 +45,14 @@ void describe(ConfigTable& table, NdtMapConfig& config);
 struct alignas(64) NdtCell {           // a cache line
   Eigen::Vector3f mean;                // from the centre of the cell, metres
   std::uint32_t count = 0;             // points
-  int rows = 0;                        // 0 to 3; 0: the cell matches but does not constrain
-  std::array<Eigen::Vector3f, 3> row;  // 1/m, most certain first
+  int rows = 0;                        // 0 to 2; 0: the cell matches but does not constrain
+  std::array<Eigen::Vector3f, 2> row;  // 1/m, most certain first
+  // A lidar sees the near side of a stem or a crown, and the near side goes along with it: seen
+  // along the unit ray u, the points are expected around mean + mean_near_side - near_side_m * u,
+  // where mean_near_side is near_side_m times the mean ray of the cell's own points (map axes). 0
+  // for surfaces, and where the viewpoint is unknown.
+  float near_side_m = 0.0F;
+  Eigen::Vector3f mean_near_side = Eigen::Vector3f::Zero();
 };
 
 // Target of NDT: a grid of normal distributions. Immutable for all who hold it, and shared between
@@ -47,6 +60,8 @@ struct alignas(64) NdtCell {           // a cache line
 class NdtMap {
  public:
   [[nodiscard]] double cell_size() const { return cell_size_; }
+  // NdtMapConfig::viewpoint_in_source, or the source's origin.
+  [[nodiscard]] const Eigen::Vector3d& viewpoint_in_source() const { return viewpoint_in_source_; }
   [[nodiscard]] std::size_t size() const { return cells_.size(); }
   [[nodiscard]] bool empty() const { return cells_.empty(); }
   // The cell at integer coordinates, or null.
@@ -65,6 +80,7 @@ class NdtMap {
  private:
   friend class NdtMapBuilder;
   double cell_size_ = 1.0;
+  Eigen::Vector3d viewpoint_in_source_ = Eigen::Vector3d::Zero();
   std::vector<NdtCell> cells_;
   std::vector<std::array<int, 3>> coordinates_;
   VoxelIndex index_;

@@ -376,5 +376,45 @@ TEST(Ndt, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(results[0].fitness_m2, results[1].fitness_m2);
 }
 
+// How far a match falls back along the way, in the mean of some places of some stands: the map is
+// made of scans at true poses behind the one that is matched, from its true pose.
+double fallen_back_mm(double near_side) {
+  double sum_mm = 0.0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const Stand stand = make_stand({.half_width_m = 25.0}, seed);
+    NdtMapConfig config;
+    config.cell_size_m = 0.5;
+    config.min_points = 4;
+    config.sigma_floor_m = 0.01;
+    config.volume_weight = 1.0;
+    config.viewpoint_in_source = Eigen::Vector3d::Zero();
+    config.near_side = near_side;
+    NdtMapBuilder builder(config);
+    for (int step = 0; step < 26; ++step) {
+      const Pose pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.4 * step - 6.0, 0.0, 2.0));
+      const Points points =
+          scan_stand(stand, pose, testing::vlp16(), 100 * seed + static_cast<std::uint64_t>(step));
+      if (step >= 16) {
+        const RegistrationResult match = register_ndt(*builder.snapshot(), points, pose, {}, {});
+        EXPECT_TRUE(match.usable()) << match.reason;
+        sum_mm += 1e3 * (pose.translation().x() - match.target_from_source.translation().x());
+        ++count;
+      }
+      builder.insert(points, pose);
+    }
+  }
+  return sum_mm / count;
+}
+
+// The near sides of stems and crowns go along with the lidar and hold matches back, unless the map
+// reckons with it.
+TEST(Ndt, TheNearSideThatGoesAlongDoesNotHoldMatchesBack) {
+  const double held = fallen_back_mm(0.0);
+  const double free = fallen_back_mm(NdtMapConfig().near_side);
+  EXPECT_GT(held, 2.0);
+  EXPECT_LT(std::abs(free), 0.7 * held) << free << " mm; without " << held;
+}
+
 }  // namespace
 }  // namespace understory
