@@ -26,9 +26,12 @@ void describe(ConfigTable& table, LocalMapConfig& config) {
             "weight of a cell's second thinnest direction");
   table.add("volume_weight", config.cells.volume_weight, {0.0, 1.0}, "",
             "weight of cells that are neither surface nor line");
-  table.add("near_side", config.cells.near_side, {0.0, 2.0}, "",
-            "what a cell that is no surface shows lies before its middle by this share of its "
-            "spread; 0: in its middle");
+  table.add(
+      "near_side_line", config.cells.near_side_line, {0.0, 2.0}, "",
+      "the side of a stem that is seen lies before the middle of its cell by this share of the "
+      "spread; 0: in its middle");
+  table.add("near_side_volume", config.cells.near_side_volume, {0.0, 2.0}, "",
+            "the same of cells that are neither surface nor line");
   table.add("radius_m", config.radius_m, {10.0, 1000.0}, "m", "accumulate: reach of the map");
   table.add("recent_keyframes", config.recent_keyframes, {1, 10000}, "", "recent: how many");
   table.add("recent_spacing_m", config.recent_spacing_m, {0.0, 100.0}, "m",

@@ -17,9 +17,10 @@ constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
 constexpr std::size_t kFewPoints = 100;
 constexpr double kMostSpeedMS = 100.0;
-constexpr double kSparseVoxelM = 0.2;
+constexpr double kSparseVoxelM = 0.1;
 constexpr double kSparseKeyframeM = 0.3;
 constexpr double kSparseVolumeWeight = 1.0;
+constexpr double kSparseInlierRatio = 0.05;  // few of the map's small cells have enough points yet
 // Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
 // and the sigma of a prediction that is no better than staying where one was.
 constexpr double kOutageS = 1.0;
@@ -162,10 +163,13 @@ void MappingSession::adapt_to(std::size_t scan_points) {
     voxel.voxel_size_m = std::min(voxel.voxel_size_m, kSparseVoxelM);
     local.cells.min_points = std::min(local.cells.min_points, 4);
     local.cells.few_rings = true;
+    double& inliers = config_.odometry.min_inlier_ratio;
+    inliers = std::min(inliers, kSparseInlierRatio);
     local.cells.volume_weight = std::max(local.cells.volume_weight, kSparseVolumeWeight);
     double& distance = config_.keyframe_map.keyframe.distance_m;
     distance = std::min(distance, kSparseKeyframeM);
-  } else if (alone && cells.size() == 2) {
+  }
+  if (alone && cells.size() == 2) {
     cells.insert(cells.begin() + 1, std::sqrt(cells[0] * cells[1]));
   }
   map_ = std::make_unique<KeyframeMap>(config_.keyframe_map, folder_, times_, log_);

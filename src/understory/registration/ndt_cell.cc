@@ -121,7 +121,8 @@ NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
     return cell;
   }
   if (config.viewpoint_in_source) {
-    const double depth = config.near_side * std::sqrt(shape.variance[1]);
+    const double depth =
+        (line ? config.near_side_line : config.near_side_volume) * std::sqrt(shape.variance[1]);
     const Eigen::Vector3d rays(moments.ray_x, moments.ray_y, moments.ray_z);
     cell.near_side_m = static_cast<float>(depth);
     cell.mean_near_side = (depth / moments.n * rays).cast<float>();

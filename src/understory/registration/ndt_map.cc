@@ -27,9 +27,12 @@ void describe(ConfigTable& table, NdtMapConfig& config) {
             "weight of a cell's second thinnest direction");
   table.add("volume_weight", config.volume_weight, {0.0, 1.0}, "",
             "weight of cells that are neither surface nor line");
-  table.add("near_side", config.near_side, {0.0, 2.0}, "",
-            "what a cell that is no surface shows lies before its middle by this share of its "
-            "spread; 0: in its middle");
+  table.add(
+      "near_side_line", config.near_side_line, {0.0, 2.0}, "",
+      "the side of a stem that is seen lies before the middle of its cell by this share of the "
+      "spread; 0: in its middle");
+  table.add("near_side_volume", config.near_side_volume, {0.0, 2.0}, "",
+            "the same of cells that are neither surface nor line");
 }
 
 Eigen::Vector3d NdtMap::mean(std::size_t index) const {

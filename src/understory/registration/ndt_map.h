@@ -27,10 +27,12 @@ struct NdtMapConfig {
   // Where the lidar is in the frames of the sources, if known; those matched to the map have it in
   // the same place.
   std::optional<Eigen::Vector3d> viewpoint_in_source = std::nullopt;
-  // With a viewpoint: what a cell that is no surface shows lies before its middle by this share of
-  // the spread along its second axis, towards wherever it is seen from, 0..2. See
+  // With a viewpoint: what a cell shows lies before its middle, towards wherever it is seen from,
+  // by this share of the spread along its second axis, 0..2; of a stem (a single view of a cylinder
+  // would give 1.36, and cells hold many views), and of what is neither surface nor line. See
   // NdtCell::near_side_m.
-  double near_side = 0.25;
+  double near_side_line = 1.0;
+  double near_side_volume = 0.25;
   // With a viewpoint: what looks like a surface and was seen exactly edge-on is taken for what it
   // is, the trace of one ring.
   bool few_rings = false;
