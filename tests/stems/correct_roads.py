@@ -78,7 +78,8 @@ def methods(folder):
     """From plain frame-to-frame odometry, on a small site: none leaves the map worse."""
     views = write_strip_roads(folder, seed=5, roads=Roads(length_m=120.0))
     said = []
-    for method in ("none", "powers", "powers_printed", "lattice", "pose_graph", "expected_gain"):
+    for method in ("none", "powers", "powers_printed", "lattice", "pose_graph",
+                   "gaussian_process", "expected_gain"):
         run = folder / method
         done = correct(folder / "stems.csv.gz", run, "--set", f"correction.method={method}",
                        "--set", "odometry.target=frame")
@@ -95,6 +96,7 @@ def methods(folder):
     errors = dict(said)
     assert errors["expected_gain"] < 0.5 * errors["none"], errors
     assert errors["powers"] < errors["none"], errors
+    assert errors["gaussian_process"] < 0.8 * errors["none"], errors
     return ", ".join(f"{method} {100 * error:.0f} cm" for method, error in said)
 
 

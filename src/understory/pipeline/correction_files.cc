@@ -7,6 +7,7 @@
 #include <numeric>
 #include <system_error>
 
+#include "understory/map/felled_trees.h"
 #include "understory/map/stem_map.h"
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
@@ -63,6 +64,22 @@ void write_loops(const fs::path& path, const CorrectionRun& run) {
 }
 
 // A row per pair of views that was matched again to correct the map.
+// Trees of trees.csv that stood at first and were gone later, and between which views they fell.
+void write_felled(const fs::path& path, const CorrectionRun& run, const std::vector<Tree>& trees,
+                  const std::vector<FelledTree>& felled) {
+  AtomicTextFile file(path);
+  file.write("id,x,y,seen_until,gone_since,missed\n");
+  for (const FelledTree& fell : felled) {
+    const Tree& tree = trees[fell.tree];
+    const auto stamp = [&](int view) {
+      return format_seconds(run.views[static_cast<std::size_t>(view)].stamp);
+    };
+    file.write(fmt::format("{},{:.3f},{:.3f},{},{},{}\n", tree.id, tree.x, tree.y,
+                           stamp(fell.last_seen), stamp(fell.first_missed), fell.missed));
+  }
+  file.commit();
+}
+
 void write_corrections(const fs::path& path, const CorrectionRun& run) {
   AtomicTextFile file(path);
   file.write(
@@ -297,12 +314,15 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
     stems = build_stem_map(run.views, run.correction.world_from_body, tree_list_config());
   }
   const std::vector<Tree> trees = trees_of(stems);
+  const std::vector<FelledTree> felled =
+      felled_trees(run.views, run.correction.world_from_body, stems, {});
   {
     const ScopedTimer timer(run.times, "writing");
     write_paths(request, run);
     write_loops(folder / "loops.csv", run);
     write_corrections(folder / "corrections.csv", run);
     write_trees_csv(folder / "trees.csv", trees);
+    write_felled(folder / "felled.csv", run, trees, felled);
   }
   RunSummary summary = summary_of(request, run, stems, log);
   std::vector<ReportFix> fixes;

@@ -1,0 +1,105 @@
+#include "understory/map/felled_trees.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "understory/graph/view_cone.h"
+#include "understory/registration/plane_grid.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+// What one view says of one tree.
+struct Sight {
+  int view;
+  bool seen;
+  bool tells;  // near, in the sector and nothing before it
+};
+
+SparsePoints points_of(const StemView& view) {
+  SparsePoints points;
+  for (const Stem& stem : view.stems)
+    points.push_back(stem.point.cast<double>());
+  return points;
+}
+
+// Whether a stem of the view stands before the place, near the line of sight. Level enough: seen
+// from above in the body frame.
+bool hidden(const SparsePoints& stems, const Eigen::Vector3d& place, double clearance_m) {
+  const Eigen::Vector2d line = place.head<2>();
+  const double distance = line.norm();
+  const Eigen::Vector2d along = line / distance;
+  for (const Eigen::Vector3d& stem : stems) {
+    const double before = along.dot(stem.head<2>());
+    if (before <= 0.0 || before > distance - 0.5) continue;
+    if ((stem.head<2>() - before * along).norm() < clearance_m) return true;
+  }
+  return false;
+}
+
+std::optional<FelledTree> judged(std::size_t tree, const std::vector<Sight>& sights,
+                                 const FelledConfig& config) {
+  FelledTree felled;
+  felled.tree = tree;
+  felled.last_seen = -1;
+  for (const Sight& sight : sights) {
+    if (sight.seen) felled.last_seen = sight.view;
+  }
+  int seen = 0;
+  int missed_before = 0;
+  for (const Sight& sight : sights) {
+    if (!sight.tells) continue;
+    if (sight.view <= felled.last_seen) {
+      ++(sight.seen ? seen : missed_before);
+    } else if (felled.missed++ == 0) {
+      felled.first_missed = sight.view;
+    }
+  }
+  if (seen < config.min_seen || felled.missed < config.min_missed) return std::nullopt;
+  const double miss = (missed_before + 1.0) / (seen + missed_before + 2.0);
+  if (std::pow(miss, felled.missed) > config.chance) return std::nullopt;
+  return felled;
+}
+
+}  // namespace
+
+std::vector<FelledTree> felled_trees(const std::vector<StemView>& views,
+                                     const std::vector<Pose>& world_from_body,
+                                     const std::vector<MappedStem>& trees,
+                                     const FelledConfig& config) {
+  UNDERSTORY_CHECK(views.size() == world_from_body.size());
+  constexpr double kSameTreeM = 0.6;
+  std::vector<SparsePoints> points;
+  for (const StemView& view : views)
+    points.push_back(points_of(view));
+  SparsePoints places;
+  for (const MappedStem& tree : trees)
+    places.push_back(tree.point_in_world);
+  const ConeOverlap sector(estimate_view_cone(points));
+  const PlaneGrid grid(places);
+  std::vector<std::vector<Sight>> sights(trees.size());
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    std::vector<char> seen(trees.size(), 0);
+    for (const Eigen::Vector3d& point : points[v]) {
+      const auto found = grid.nearest(world_from_body[v] * point, kSameTreeM, 0.0);
+      if (found.index >= 0) seen[static_cast<std::size_t>(found.index)] = 1;
+    }
+    const Pose body_from_world = world_from_body[v].inverse();
+    for (std::size_t t = 0; t < trees.size(); ++t) {
+      const Eigen::Vector3d place = body_from_world * places[t];
+      const double distance = place.head<2>().norm();
+      const bool tells = distance > config.nearest_m && distance < config.reach_m &&
+                         sector.holds(place) && !hidden(points[v], place, config.clearance_m);
+      if (tells || seen[t] != 0) sights[t].push_back({static_cast<int>(v), seen[t] != 0, tells});
+    }
+  }
+  std::vector<FelledTree> result;
+  for (std::size_t t = 0; t < trees.size(); ++t) {
+    if (const auto felled = judged(t, sights[t], config)) result.push_back(*felled);
+  }
+  return result;
+}
+
+}  // namespace understory

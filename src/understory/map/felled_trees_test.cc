@@ -1,0 +1,81 @@
+#include "understory/map/felled_trees.h"
+
+#include <gtest/gtest.h>
+
+namespace understory {
+namespace {
+
+struct Walk {
+  std::vector<StemView> views;
+  std::vector<Pose> poses;
+  std::vector<MappedStem> trees;
+};
+
+// 60 views all around along 12 m; `sees(view, tree)` says what each sees.
+template <typename Sees>
+Walk walk(const std::vector<Eigen::Vector3d>& trees, const Sees& sees) {
+  Walk result;
+  for (const Eigen::Vector3d& place : trees) {
+    result.trees.emplace_back();
+    result.trees.back().point_in_world = place;
+  }
+  for (int i = 0; i < 60; ++i) {
+    const Pose pose(Eigen::Quaterniond::Identity(), {0.2 * i, 0.0, 0.0});
+    StemView view;
+    for (std::size_t t = 0; t < trees.size(); ++t) {
+      if (!sees(i, t)) continue;
+      Stem stem;
+      stem.point = (pose.inverse() * trees[t]).cast<float>();
+      view.stems.push_back(stem);
+    }
+    result.views.push_back(view);
+    result.poses.push_back(pose);
+  }
+  return result;
+}
+
+std::vector<Eigen::Vector3d> stand() {
+  std::vector<Eigen::Vector3d> trees;
+  for (int k = 0; k < 40; ++k)
+    trees.emplace_back(-12.0 + 4.1 * (k % 10), -13.0 + 8.7 * (k / 10), 0.0);
+  return trees;
+}
+
+TEST(FelledTrees, TellsWhichTreeFellAndWhen) {
+  const auto trees = stand();
+  // Tree 14 is cut at view 33; each is missed now and then, tree 25 more often than seen.
+  const Walk seen = walk(trees, [](int i, std::size_t t) {
+    if (t == 14) return i < 33 && i % 5 != 2;
+    if (t == 25) return i % 4 == 0 && i < 44;
+    return (i + static_cast<int>(t)) % 6 != 0;
+  });
+  const auto felled = felled_trees(seen.views, seen.poses, seen.trees, {});
+  ASSERT_EQ(felled.size(), 1U);
+  EXPECT_EQ(felled[0].tree, 14U);
+  EXPECT_EQ(felled[0].last_seen, 31);
+  EXPECT_GE(felled[0].first_missed, 32);
+  EXPECT_LE(felled[0].first_missed, 36);
+  EXPECT_GT(felled[0].missed, 10);
+}
+
+TEST(FelledTrees, WhatIsHiddenOrOutOfReachIsNotFelled) {
+  auto trees = stand();
+  // A new stem, the one that the machine holds, comes before tree 14 and goes along with it.
+  const Eigen::Vector3d hidden = trees[14];
+  Walk seen = walk(trees, [](int i, std::size_t t) { return t != 14 || i < 30; });
+  EXPECT_EQ(felled_trees(seen.views, seen.poses, seen.trees, {}).size(), 1U);
+  for (std::size_t i = 30; i < 60; ++i) {
+    Stem held;
+    held.point = (0.5 * (seen.poses[i].inverse() * hidden)).cast<float>();
+    seen.views[i].stems.push_back(held);
+  }
+  EXPECT_TRUE(felled_trees(seen.views, seen.poses, seen.trees, {}).empty());
+  FelledConfig near;
+  near.reach_m = 2.0;
+  const Walk far = walk(trees, [](int i, std::size_t t) { return t != 14 || i < 30; });
+  EXPECT_TRUE(felled_trees(far.views, far.poses, far.trees, near).empty());
+  EXPECT_TRUE(felled_trees({}, {}, {}, {}).empty());
+}
+
+}  // namespace
+}  // namespace understory
