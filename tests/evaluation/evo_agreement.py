@@ -5,6 +5,7 @@ estimate, and a second, shorter truth with wheel odometry. Both are compared as 
 first pose aligned, and aligned by SE(3); RPE over several path lengths.
 """
 
+import copy
 import csv
 import json
 import os
@@ -39,11 +40,12 @@ def figures_of_evo(estimate_file, truth_file, alignment):
     truth = file_interface.read_tum_trajectory_file(str(truth_file))
     estimate = file_interface.read_tum_trajectory_file(str(estimate_file))
     truth, estimate = sync.associate_trajectories(truth, estimate, max_diff=TOLERANCE_S)
+    scale = copy.deepcopy(estimate).align(truth, correct_scale=True)[2]
     if alignment == "se3":
         estimate.align(truth)
     elif alignment == "first":
         estimate.align_origin(truth)
-    figures = {"pairs": estimate.num_poses}
+    figures = {"pairs": estimate.num_poses, "scale_percent": 100.0 * (1.0 / scale - 1.0)}
     ape = metrics.APE(PoseRelation.translation_part)
     ape.process_data((truth, estimate))
     for name in ("rmse", "mean", "median", "max"):

@@ -59,6 +59,7 @@ Json to_json(const TrajectoryErrors& errors, const std::optional<Eigen::Vector3d
   json["drift_end_m"] = errors.drift_end_m;
   json["drift_plane_m"] = errors.drift_plane_m;
   json["drift_percent"] = errors.drift_percent;
+  json["scale_percent"] = errors.scale_percent;
   json["rpe"] = Json::array();
   for (const RelativeError& rpe : errors.rpe) {
     json["rpe"].push_back({{"delta_m", rpe.delta_m},
@@ -88,11 +89,13 @@ std::string to_text(const TrajectoryErrors& e, const std::optional<Eigen::Vector
       "{:.4f} m, rotation rmse {:.4f} deg\n"
       "drift at the end    {:.4f} m = {:.4f} % (first pose aligned; x {:+.4f}, y {:+.4f}, z "
       "{:+.4f} "
-      "m; in the plane {:.4f} m)\n",
+      "m; in the plane {:.4f} m)\n"
+      "scale of the path   {:+.4f} %\n",
       to_string(e.alignment), e.alignment == Alignment::kNone ? " (positions as they are)" : "",
       e.pairs, tolerance_s, 100.0 * e.covered, e.length_m, e.ape_rmse_m, e.ape_plane_rmse_m,
       e.ape_mean_m, e.ape_median_m, e.ape_max_m, e.ape_rotation_rmse_deg, e.drift_end_m,
-      e.drift_percent, e.drift_end.x(), e.drift_end.y(), e.drift_end.z(), e.drift_plane_m);
+      e.drift_percent, e.drift_end.x(), e.drift_end.y(), e.drift_end.z(), e.drift_plane_m,
+      e.scale_percent);
   for (const RelativeError& rpe : e.rpe) {
     text += rpe.pairs == 0
                 ? fmt::format("RPE over {:g} m       no pair: the estimate's path is shorter\n",

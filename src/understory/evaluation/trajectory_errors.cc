@@ -36,19 +36,41 @@ double median_of(std::vector<double> values) {
           upper);
 }
 
+std::vector<Eigen::Vector3d> places_of(const std::vector<Pose>& poses) {
+  std::vector<Eigen::Vector3d> places;
+  for (const Pose& pose : poses)
+    places.push_back(pose.translation());
+  return places;
+}
+
 AlignmentResult align(const Paired& paired, Alignment alignment) {
   if (alignment == Alignment::kNone) return {Pose(), true};
   if (alignment == Alignment::kFirst) {
     return {paired.truth.front() * paired.estimate.front().inverse(), true};
   }
-  std::vector<Eigen::Vector3d> source;
-  std::vector<Eigen::Vector3d> target;
-  for (std::size_t i = 0; i < paired.truth.size(); ++i) {
-    source.push_back(paired.estimate[i].translation());
-    target.push_back(paired.truth[i].translation());
-  }
+  const std::vector<Eigen::Vector3d> source = places_of(paired.estimate);
+  const std::vector<Eigen::Vector3d> target = places_of(paired.truth);
   return alignment == Alignment::kYaw ? align_points_yaw(source, target)
                                       : align_points_se3(source, target);
+}
+
+// The rotation of a fit with a free scale is that of the fit without.
+void add_scale(const Paired& paired, TrajectoryErrors& errors) {
+  const std::vector<Eigen::Vector3d> source = places_of(paired.estimate);
+  const std::vector<Eigen::Vector3d> target = places_of(paired.truth);
+  const Pose fit = align_points_se3(source, target).target_from_source;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& place : source)
+    middle += place / static_cast<double>(source.size());
+  const Eigen::Vector3d middle_in_truth = fit * middle;
+  double along = 0.0;
+  double own = 0.0;
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    const Eigen::Vector3d from_middle = fit.rotation() * (source[i] - middle);
+    along += from_middle.dot(target[i] - middle_in_truth);
+    own += from_middle.squaredNorm();
+  }
+  errors.scale_percent = along > 0.0 ? 100.0 * (own / along - 1.0) : kNan;
 }
 
 void add_absolute(const Paired& paired, TrajectoryErrors& errors) {
@@ -198,6 +220,7 @@ std::optional<TrajectoryErrors> evaluate_trajectory(const Trajectory& estimate,
   errors.covered = duration > 0 ? to_seconds(common) / to_seconds(duration) : 1.0;
   add_absolute(paired, errors);
   add_drift(paired, errors);
+  add_scale(paired, errors);
   for (const double delta : options.rpe_deltas_m) {
     UNDERSTORY_CHECK(delta > 0.0);
     errors.rpe.push_back(relative_error(paired, delta));

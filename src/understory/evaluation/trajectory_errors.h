@@ -63,6 +63,11 @@ struct TrajectoryErrors {
   double ape_max_m = 0.0;
   double ape_rotation_rmse_deg = 0.0;
 
+  // By how much the estimate's path is too large (+) or too small (-): what a least-squares fit
+  // with a free scale (Umeyama 1991, eq. 42) would undo, whatever `alignment` says. No error above
+  // has it taken out. NaN where the estimate stands still.
+  double scale_percent = 0.0;
+
   // P4 T3 and T4: the last pair's error after aligning the first, whatever `alignment` says.
   Eigen::Vector3d drift_end = Eigen::Vector3d::Zero();  // truth's world frame, metres
   double drift_end_m = 0.0;

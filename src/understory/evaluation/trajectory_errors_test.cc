@@ -143,6 +143,24 @@ TEST(TrajectoryErrors, DriftAndSegmentsOfAScaleErrorAreItsSize) {
   EXPECT_EQ(errors.segments.back().length_m, 100.0);
 }
 
+// However the estimate lies, and whatever alignment is asked for.
+TEST(TrajectoryErrors, ScaleOfThePathIsToldWhateverTheAlignment) {
+  const Trajectory truth = walk(300, 0.1);
+  Trajectory small = truth;
+  for (StampedPose& pose : small)
+    pose.world_from_body =
+        Pose(pose.world_from_body.rotation(), 0.998 * pose.world_from_body.translation());
+  small = transformed(small, Pose(so3_exp({0.1, 0.2, 2.0}), Eigen::Vector3d(30, -4, 12)));
+  for (const Alignment alignment : {Alignment::kNone, Alignment::kSe3}) {
+    EXPECT_NEAR(errors_of(small, truth, alignment).scale_percent, -0.2, 1e-6);
+    EXPECT_NEAR(errors_of(truth, truth, alignment).scale_percent, 0.0, 1e-6);
+  }
+  Trajectory still = truth;
+  for (StampedPose& pose : still)
+    pose.world_from_body = Pose();
+  EXPECT_TRUE(std::isnan(errors_of(still, truth, Alignment::kNone).scale_percent));
+}
+
 TEST(TrajectoryErrors, LongRunsHaveKittisLengths) {
   const TrajectoryErrors errors = errors_of(walk(1000, 1.0), walk(1000, 1.0), Alignment::kNone);
   ASSERT_EQ(errors.segments.size(), 8u);

@@ -14,27 +14,6 @@ namespace understory {
 using internal::CellMoments;
 using internal::StoredMoments;
 
-void describe(ConfigTable& table, NdtMapConfig& config) {
-  table.add("cell_size_m", config.cell_size_m, {0.05, 20.0}, "m",
-            "edge of the cells of the normal distributions");
-  table.add("min_points", config.min_points, {3, 1000}, "",
-            "cells with fewer points are not matched");
-  table.add("growth", config.growth, {0.0, 1.0}, "",
-            "share of new points at which a cell's distribution is worked out again");
-  table.add("sigma_floor_m", config.sigma_floor_m, {0.001, 1.0}, "m",
-            "no surface is taken to be thinner; noise of the lidar and of the map's poses");
-  table.add("second_axis_weight", config.second_axis_weight, {0.0, 1.0}, "",
-            "weight of a cell's second thinnest direction");
-  table.add("volume_weight", config.volume_weight, {0.0, 1.0}, "",
-            "weight of cells that are neither surface nor line");
-  table.add(
-      "near_side_line", config.near_side_line, {0.0, 2.0}, "",
-      "the side of a stem that is seen lies before the middle of its cell by this share of the "
-      "spread; 0: in its middle");
-  table.add("near_side_volume", config.near_side_volume, {0.0, 2.0}, "",
-            "the same of cells that are neither surface nor line");
-}
-
 Eigen::Vector3d NdtMap::mean(std::size_t index) const {
   const std::array<int, 3>& at = coordinates_[index];
   return cell_size_ * (Eigen::Vector3d(at[0], at[1], at[2]) + Eigen::Vector3d::Constant(0.5)) +

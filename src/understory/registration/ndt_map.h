@@ -10,7 +10,6 @@
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
 #include "understory/geometry/voxel_index.h"
-#include "understory/util/config.h"
 
 namespace understory {
 
@@ -37,7 +36,6 @@ struct NdtMapConfig {
   // is, the trace of one ring.
   bool few_rings = false;
 };
-void describe(ConfigTable& table, NdtMapConfig& config);
 
 // What a cell tells about a point in it. The information of its normal distribution (P4 (40)) is
 // kept as rows: information = sum over rows of row * row^T, where row = eigenvector / sigma.
