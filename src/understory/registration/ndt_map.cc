@@ -5,12 +5,14 @@
 #include <cstring>
 #include <limits>
 
+#include "understory/registration/cell_blocks.h"
 #include "understory/registration/ndt_cell.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 
+using internal::CellBlocks;
 using internal::CellMoments;
 using internal::StoredMoments;
 
@@ -39,35 +41,6 @@ void for_each_set(const std::vector<std::uint8_t>& flags, const Act& act) {
     }
   }
 }
-
-// Which parts of a grid have changed, in blocks of cells.
-class ChangedBlocks {
- public:
-  void add(const std::array<int, 3>& cell) {
-    const std::uint64_t key = voxel_key(cell[0] >> kShift, cell[1] >> kShift, cell[2] >> kShift);
-    if (key == last_) return;
-    blocks_.set(key, 0);
-    last_ = key;
-  }
-  void clear() { *this = ChangedBlocks(); }
-  // Whether something changed up to kReach cells away; sometimes true if it is a little farther.
-  [[nodiscard]] bool may_reach(const std::array<int, 3>& cell) const {
-    for (int corner = 0; corner < 8; ++corner) {
-      const auto block = [&](std::size_t axis) {
-        return (cell[axis] + ((corner >> axis) % 2 == 0 ? -kReach : kReach)) >> kShift;
-      };
-      if (blocks_.find(voxel_key(block(0), block(1), block(2))) != VoxelIndex::kNone) return true;
-    }
-    return false;
-  }
-
- private:
-  static constexpr int kReach = internal::kSurroundings;
-  static constexpr int kShift = 2;
-  static_assert(2 * kReach <= (1 << kShift), "what is in reach lies in the corners' blocks");
-  VoxelIndex blocks_;
-  std::uint64_t last_ = UINT64_MAX;
-};
 
 }  // namespace
 
@@ -98,12 +71,12 @@ struct NdtMapBuilder::State {
   std::vector<Gathered> gathered;
   std::vector<Settled> settled;
   std::vector<std::uint8_t> dirty;  // it has changed since the last snapshot
-  std::vector<std::uint8_t> leans;  // its distribution rests on its neighbours too
+  std::vector<std::uint8_t> leans;  // so far, in cells, its distribution rests on its neighbours
   VoxelIndex index;
+  CellBlocks blocks;  // of those with a distribution; changed since the last snapshot
 
   std::shared_ptr<NdtMap> map;       // as of the last snapshot
   std::vector<std::uint32_t> owner;  // of each of its cells, the cell here
-  ChangedBlocks removed;             // since the last snapshot
   std::vector<Located> located;      // workspace
   std::vector<std::uint32_t> due;    // workspace
 
@@ -124,9 +97,10 @@ struct NdtMapBuilder::State {
   void remove(std::uint32_t cell) {
     const std::array<int, 3> at = settled[cell].at;
     if (gathered[cell].in_map != kNone) {
-      removed.add(at);
+      blocks.mark_changed(at);
       remove_from_map(gathered[cell].in_map);
     }
+    if (settled[cell].moments.n > 0.0F) blocks.erase(at);
     index.erase(key_of(at));
     const auto last = static_cast<std::uint32_t>(gathered.size() - 1);
     if (cell != last) {
@@ -135,6 +109,7 @@ struct NdtMapBuilder::State {
       dirty[cell] = dirty[last];
       leans[cell] = leans[last];
       index.set(key_of(settled[cell].at), cell);
+      if (settled[cell].moments.n > 0.0F) blocks.set(settled[cell].at, cell);
       if (gathered[cell].in_map != kNone) owner[gathered[cell].in_map] = cell;
     }
     gathered.pop_back();
@@ -171,6 +146,8 @@ struct NdtMapBuilder::State {
   // Takes a cell's points into its distribution.
   void settle(std::uint32_t cell) {
     Gathered& points = gathered[cell];
+    if (settled[cell].moments.n == 0.0F) blocks.set(settled[cell].at, cell);
+    blocks.mark_changed(settled[cell].at);
     settled[cell].moments = points.moments;
     const float n = points.moments.n;
     points.due = std::max(n + 1.0F, (1.0F + static_cast<float>(config.growth)) * n);
@@ -189,16 +166,9 @@ struct NdtMapBuilder::State {
 
   [[nodiscard]] CellMoments around(std::size_t cell, int reach) const {
     CellMoments total;
-    const std::array<int, 3>& at = settled[cell].at;
-    for (int x = -reach; x <= reach; ++x) {
-      for (int y = -reach; y <= reach; ++y) {
-        for (int z = -reach; z <= reach; ++z) {
-          const std::uint32_t found = index.find(voxel_key(at[0] + x, at[1] + y, at[2] + z));
-          if (found != kNone)
-            total.add(settled[found].moments.wide(), config.cell_size_m * Eigen::Vector3d(x, y, z));
-        }
-      }
-    }
+    blocks.for_each_near(settled[cell].at, reach, [&](std::uint32_t near, int x, int y, int z) {
+      total.add(settled[near].moments.wide(), config.cell_size_m * Eigen::Vector3d(x, y, z));
+    });
     return total;
   }
 };
@@ -285,12 +255,9 @@ void NdtMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m
 NdtMapPtr NdtMapBuilder::snapshot() {
   State& s = *state_;
   s.own_map();
-  ChangedBlocks blocks = std::move(s.removed);
-  s.removed.clear();
-  for_each_set(s.dirty, [&](std::uint32_t c) { blocks.add(s.settled[c].at); });
-  for_each_set(s.leans, [&](std::uint32_t c) {
-    if (s.dirty[c] == 0 && blocks.may_reach(s.settled[c].at)) s.dirty[c] = 1;
-  });
+  s.blocks.for_each_affected([&](std::uint32_t c) { return static_cast<int>(s.leans[c]); },
+                             [&](std::uint32_t c) { s.dirty[c] = 1; });
+  s.blocks.forget_changes();
   std::vector<std::uint32_t> changed;
   for_each_set(s.dirty, [&](std::uint32_t c) {
     s.dirty[c] = 0;
@@ -301,7 +268,7 @@ NdtMapPtr NdtMapBuilder::snapshot() {
     const std::uint32_t c = changed[i];
     s.leans[c] = 0;
     const auto around = [&](int reach) {
-      s.leans[c] = 1;
+      s.leans[c] = static_cast<std::uint8_t>(reach);
       return s.around(c, reach);
     };
     s.map->cells_[s.gathered[c].in_map] =
