@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -6,9 +5,9 @@
 #include <vector>
 
 #include "understory/cli/command.h"
+#include "understory/cli/register_stems.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/recording/cloud_file.h"
-#include "understory/registration/go_icp.h"
 #include "understory/registration/icp.h"
 #include "understory/registration/ndt.h"
 #include "understory/util/error.h"
@@ -23,6 +22,7 @@ struct RegisterConfig {
   NdtMapConfig map;
   NdtConfig ndt;
   IcpConfig icp;
+  SparseIcpConfig stem_icp;
   GoIcpConfig go_icp;
 };
 
@@ -40,6 +40,7 @@ void describe(ConfigTable& table, RegisterConfig& config) {
     describe(table, config.ndt);
   });
   table.section("icp", [&] { describe(table, config.icp); });
+  table.section("stem_icp", [&] { describe(table, config.stem_icp); });
   table.section("go_icp", [&] { describe(table, config.go_icp); });
 }
 
@@ -179,53 +180,6 @@ void print_text(const RegistrationResult& result, const Pose& a_from_b) {
   }
 }
 
-SparsePoints sparse(const Points& points) {
-  SparsePoints result;
-  result.reserve(points.size());
-  for (const Eigen::Vector3f& point : points)
-    result.emplace_back(point.cast<double>());
-  return result;
-}
-
-// Sparse clouds as they are: a few hundred stems, z up. `shift` takes the target's frame back to
-// that of the file.
-int run_go_icp(const RegisterOptions& options, const RegisterConfig& config, const Points& target,
-               const Points& source, const Pose& guess, const Pose& shift,
-               CommandContext& context) {
-  constexpr std::size_t kMost = 5000;
-  if (std::max(target.size(), source.size()) > kMost)
-    throw InputError(target.size() > kMost ? options.target : options.source, "",
-                     "expected a sparse cloud of at most 5000 points (stems) for go-icp");
-  const GoIcpResult result =
-      register_go_icp(SparseTarget(sparse(target)), sparse(source), guess, config.go_icp);
-  const Eigen::Matrix4d a_from_b = (shift * result.target_from_source * shift.inverse()).matrix();
-  nlohmann::json out;
-  out["a_from_b"] = numbers_of(a_from_b);
-  out["status"] = to_string(result.status);
-  out["reason"] = result.reason;
-  out["gap_m"] = result.gap_m;
-  out["error_rms_m"] = result.error_rms_m;
-  out["overlap"] = result.overlap;
-  out["cells"] = result.cells;
-  out["nodes"] = result.nodes;
-  out["icp_runs"] = result.icp_runs;
-  if (options.json) {
-    std::printf("%s\n", out.dump(2).c_str());
-  } else {
-    std::printf("a_from_b\n");
-    for (int r = 0; r < 4; ++r)
-      std::printf("%.9f %.9f %.9f %.9f\n", a_from_b(r, 0), a_from_b(r, 1), a_from_b(r, 2),
-                  a_from_b(r, 3));
-    std::printf("status %s\ngap_m %.4f\nerror_rms_m %.4f\noverlap %.3f\nnodes %lld\n",
-                to_string(result.status).c_str(), result.gap_m, result.error_rms_m, result.overlap,
-                static_cast<long long>(result.nodes));
-  }
-  const bool trusted =
-      result.status == GoIcpStatus::kCertified || result.status == GoIcpStatus::kConverged;
-  if (!trusted) context.log.warn("register.untrusted", result.reason);
-  return trusted ? kExitDone : kExitUntrusted;
-}
-
 int run_register(const RegisterOptions& options, CommandContext& context) {
   RegisterConfig config;
   ConfigTable table;
@@ -248,8 +202,12 @@ int run_register(const RegisterOptions& options, CommandContext& context) {
   const Loaded source = load(options.source, &target.shift, context.log);
   const Pose shift(Eigen::Quaterniond::Identity(), target.shift);
   const Pose guess = shift.inverse() * parse_guess(options.guess) * shift;
-  if (options.method == "go-icp")
-    return run_go_icp(options, config, target.points, source.points, guess, shift, context);
+  if (options.method == "go-icp" || options.method == "stem-icp") {
+    const StemClouds clouds{options.target, options.source, target.points, source.points,
+                            guess,          shift,          options.json};
+    return options.method == "go-icp" ? register_by_go_icp(clouds, config.go_icp, context)
+                                      : register_by_stem_icp(clouds, config.stem_icp, context);
+  }
   const RegistrationResult result = match(options, config, target.points, source.points, guess);
   const Pose a_from_b = shift * result.target_from_source * shift.inverse();
   if (options.json)
@@ -273,8 +231,9 @@ void add_register_command(CLI::App& app, Command& chosen) {
   command->add_option("B", options->source, "Source cloud");
   command
       ->add_option("--method", options->method,
-                   "ndt, icp, or go-icp (sparse clouds of stems, z up)")
-      ->check(CLI::IsMember({"ndt", "icp", "go-icp"}));
+                   "ndt, icp; for sparse clouds of stems, z up: stem-icp (trimmed, from the guess) "
+                   "or go-icp (searches)")
+      ->check(CLI::IsMember({"ndt", "icp", "stem-icp", "go-icp"}));
   command
       ->add_option("--guess", options->guess,
                    "a_from_b to start from: x,y,z or x,y,z,qx,qy,qz,qw or 16 numbers row by row")
