@@ -73,6 +73,8 @@ def write_run(folder, timed=True):
         true.append((x, y))
         rows.append(f"{k + 1},{u:.4f},{v:.4f},{w:.4f},0.21,0.01,,2.5,14,0.02,0.01")
     (folder / "trees.csv").write_text("\n".join(rows) + "\n")
+    (folder / "felled.csv").write_text("id,x,y,seen_until,gone_since,missed\n"
+                                       "5,0,0,1500000100.000000001,1500000130.000000000,12\n")
     return folder, true
 
 
@@ -205,6 +207,11 @@ def robust(folder):
     assert (PLACED / "trees.gpkg").stat().st_size > 10000
     trees = list(csv.DictReader((PLACED / "trees.csv").open()))
     assert len(trees) == 700 and trees[0]["observations"] == "14" and trees[0]["lean_deg"] == "2.50"
+    fall = next(csv.DictReader((PLACED / "felled.csv").open()))
+    tree = next(row for row in trees if row["id"] == "5")
+    assert (fall["x"], fall["y"]) == (tree["x"], tree["y"]) and fall["x"] != "0.000", (fall, tree)
+    assert fall["seen_until"] == "1500000100.000000001" and fall["missed"] == "12", fall
+    assert run["counts"]["trees_felled"] == 1 and 'class="falls"' in page, run["counts"]
     return f"{offset:.2f} m off, bent by {spread:.2f} m; as printed {worse:.2f} m off"
 
 

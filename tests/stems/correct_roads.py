@@ -111,6 +111,78 @@ def threads(folder):
     return ", ".join(sorted(names - TIMED))
 
 
+@cases.case("views that hurt the map are left out of it")
+def eliminated(folder):
+    """One view in ten is put 0.35 m beside its place among the scans of a run."""
+    site, run = folder / "site", folder / "run"
+    views = write_strip_roads(site, seed=7, roads=Roads(roads=1, length_m=60.0))
+    run.mkdir()
+    (run / "stems.csv.gz").write_bytes((site / "stems.csv.gz").read_bytes())
+    lines = [line.split() for line in (site / "truth" / "trajectory.tum").read_text().splitlines()
+             if line[0] != "#"]
+    hurt = len([k for k in range(views) if k % 10 == 5])
+    (run / "trajectory.tum").write_text("\n".join(
+        " ".join([row[0], row[1], str(float(row[2]) + (0.35 if k % 10 == 5 else 0.0)), *row[3:]])
+        for k, row in enumerate(lines)) + "\n")
+    sights, noise = [], []
+    for factor in (0, 4):
+        done = correct(run, folder / str(factor), "--set", "correction.method=none", "--set",
+                       "close_loops=false", "--set", f"correction.eliminate_factor={factor}",
+                       "--set", "correction.eliminate_share=0.2")
+        assert done.returncode == 0, done.stderr
+        told = json.loads((folder / str(factor) / "run.json").read_text())
+        assert told["counts"]["views_eliminated"] == (hurt if factor else 0), told["counts"]
+        rows = (folder / str(factor) / "trees.csv").read_text().splitlines()[1:]
+        sights.append(sum(int(row.split(",")[8]) for row in rows))
+        noise.append(told["quality"]["sight_noise_m"])
+        assert len((folder / str(factor) / "trajectory.tum").read_text().splitlines()) == views
+    assert noise[1] < 0.8 * noise[0], (sights, noise)
+    return f"{hurt} of {views} views, sights {100 * noise[0]:.0f} to {100 * noise[1]:.0f} cm from their trees"
+
+
+@cases.case("a run is corrected from its own trajectory on")
+def run_again(folder):
+    """The start is what the run says, here the truth with a bend; every pose of it is corrected."""
+    site, run = folder / "site", folder / "run"
+    views = write_strip_roads(site, seed=6, roads=Roads(roads=1, length_m=60.0))
+    run.mkdir()
+    (run / "stems.csv.gz").write_bytes((site / "stems.csv.gz").read_bytes())
+    true = [list(map(float, line.split())) for line in
+            (site / "truth" / "trajectory.tum").read_text().splitlines() if line[0] != "#"]
+    bend = [0.6 * (k / views) ** 2 for k in range(views)]
+    rows, between = [], 0
+    for k, row in enumerate(true):
+        rows.append([row[0], row[1], row[2] + bend[k], *row[3:]])
+        if k + 1 < views:  # scans that were not kept as views
+            rows.append([0.5 * (row[0] + true[k + 1][0]), 0.5 * (row[1] + true[k + 1][1]),
+                         0.5 * (row[2] + true[k + 1][2] + bend[k] + bend[k + 1]), *row[3:]])
+            between += 1
+    (run / "trajectory.tum").write_text(
+        "\n".join(f"{row[0]:.9f} " + " ".join(f"{v:.6f}" for v in row[1:]) for row in rows) + "\n")
+    for name in ("none", "expected_gain"):
+        done = correct(run, folder / name, "--set", f"correction.method={name}", "--set",
+                       "close_loops=false")
+        assert done.returncode == 0, done.stderr
+    assert len((folder / "none" / "trajectory.tum").read_text().splitlines()) == views + between
+    begun = evaluated(folder / "none", run / "trajectory.tum")
+    assert begun["pairs"] == views + between and begun["ape_max_m"] < 1e-4, begun
+    told = json.loads((folder / "none" / "run.json").read_text())
+    assert told["poses"] == views + between, told["poses"]
+    assert {Path(i["file"]).name for i in told["inputs"]} == {"stems.csv.gz", "trajectory.tum"}, told["inputs"]
+    errors = [evaluated(folder / name / "trajectory.tum", site / "truth", "--align", "se3")
+              ["ape_plane_rmse_m"] for name in ("none", "expected_gain")]
+    assert errors[1] < 0.7 * errors[0], errors
+    # Into its own folder, too: it is read before it is replaced.
+    assert correct(run, run).returncode == 0
+    (run / "trajectory.tum").write_text("1 0 0 0 0 0 0 1\n")
+    done = correct(run, folder / "late")
+    assert done.returncode == 3 and "trajectory.tum" in done.stderr and "view 0" in done.stderr, done
+    (run / "stems.csv.gz").unlink()
+    done = correct(run, folder / "empty")
+    assert done.returncode == 3 and "--front-end sparse" in done.stderr, done.stderr
+    return f"{100 * errors[0]:.1f} to {100 * errors[1]:.1f} cm in the plane"
+
+
 def refused(path, run, *words):
     done = correct(path, run)
     assert done.returncode == 3 and done.stderr.startswith(f"error: {path}"), done.stderr
@@ -174,6 +246,16 @@ def not_a_number(folder):
 def empty(folder):
     return refused(spoilt(folder, lambda lines: lines.__delitem__(slice(1, None))), folder / "run",
                    "at least one row")
+
+
+@cases.case("a single view is no map")
+def one_view(folder):
+    last = max(i for i, line in enumerate(LINES) if line.startswith("0,"))
+    path = folder / "stems.csv"
+    path.write_text("\n".join(LINES[:last + 1]) + "\n")
+    done = correct(path, folder / "run")
+    assert done.returncode == 4 and "1 views" in done.stderr, (done.returncode, done.stderr)
+    assert len((folder / "run" / "trajectory.tum").read_text().splitlines()) == 1
 
 
 @cases.case("no such file")

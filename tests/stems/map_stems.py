@@ -7,6 +7,7 @@ import json
 import math
 import os
 import sys
+import time
 from array import array
 from collections import defaultdict
 from pathlib import Path
@@ -245,9 +246,49 @@ def real_map(folder):
     return f"{both} of {len(stems)} segments among the inventory's {len(trees)} trees"
 
 
+@cases.case("what stands on the machine is no stem")
+def machine(folder):
+    """A box around a stem that is in sight of the standing body: it is no longer seen, those behind
+    and beside it are."""
+    first = [r for r in rows_of(RUN / "stems.csv.gz") if r["frame"] == "0"]
+    post = min(first, key=lambda r: math.hypot(float(r["x"]), float(r["y"])))
+    x, y = float(post["x"]), float(post["y"])
+    boxes = folder / "boxes.yaml"
+    boxes.write_text("boxes:\n  - name: post\n    frame: body\n"
+                     f"    center_m: [{x}, {y}, 2]\n    size_m: [1, 1, 8]\n")
+    done = sparse("sim:lieksa2?seed=5&duration_s=3", folder / "run", "--profile", "harvester",
+                  "--set", f"preprocess.machine_boxes_file={boxes}", "--set", "stems.keep.distance_m=0")
+    assert done.returncode == 0, done.stderr
+    views = rows_of(folder / "run" / "stems.csv.gz")
+    near = [r for r in views if math.hypot(float(r["x"]) - x, float(r["y"]) - y) < 0.5]
+    assert views and not near, len(near)
+    others = [r for r in views if r["frame"] == "0"]
+    assert len(others) > 0.9 * len(first) - 2, (len(others), len(first))
+    assert "machine_boxes_file" in (folder / "run" / "run.json").read_text()
+    done = sparse(REC, folder / "bad", "--set", f"preprocess.machine_boxes_file={folder / 'none.yaml'}")
+    assert done.returncode in (2, 3) and "none.yaml" in done.stderr, (done.returncode, done.stderr)
+    assert not (folder / "bad").exists()
+    return f"{len(others)} of {len(first)} stems stay"
+
+
+@cases.case("at the speed of the sensor")
+def realtime(folder):
+    began = time.monotonic()
+    done = sparse("sim:lieksa2?seed=5&duration_s=8", folder / "run", "--realtime", "--set",
+                  "stems.keep.distance_m=0")
+    assert done.returncode == 0, done.stderr
+    assert time.monotonic() - began > 7.0
+    told = json.loads((folder / "run" / "run.json").read_text())
+    counts, quality = told["counts"], told["quality"]
+    assert counts["scans_positioned"] == told["scans"], counts  # none waits
+    assert told["scans"] + counts["scans_dropped"] == len(poses(folder / "run.truth" / "trajectory.tum"))
+    assert 0 < quality["latency_ms_mean"] <= quality["latency_ms_p99"] <= quality["latency_ms_max"], quality
+    return f"{quality['latency_ms_mean']:.0f} ms from a scan's end to its pose"
+
+
 @cases.case("wrong use")
 def wrong(folder):
-    for words in (("--realtime",), ("--profile", "handheld"), ("--set", "stems.reach_m=3"),
+    for words in (("--profile", "boat"), ("--resume", RUN), ("--set", "stems.reach_m=3"),
                   ("--set", "stems.keep.rule=never"), ("--set", "stems.pace.longest_gap_s=-1"),
                   ("--set", "stems.imu.gravity_sd_deg=0")):
         done = sparse(REC, folder / "run", *words)

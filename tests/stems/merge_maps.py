@@ -82,6 +82,31 @@ def reference(folder):
     assert 0.85 <= best["weight"] <= 1.15 and best["position_rmse_m"] < 0.1, best
 
 
+@cases.case("felled trees keep their places and times")
+def felled(folder):
+    trees = stand(120)
+    a = write(folder / "a" / "trees.csv", trees[:100]).parent
+    b = write(folder / "b" / "trees.csv", [(x + 0.2, y) for x, y in trees[20:]]).parent
+    head = "id,x,y,seen_until,gone_since,missed\n"
+    # By number: 30 and 90 of A; of B the same tree as 30 of A (11), and one that A does not list (95).
+    (a / "felled.csv").write_text(head + "30,0,0,1500000010.000000001,1500000030.000000000,9\n"
+                                  "90,0,0,1500000100.000000000,1500000130.000000000,8\n")
+    (b / "felled.csv").write_text(head + "10,0,0,1500000020.000000002,1500000050.000000000,7\n"
+                                  "95,0,0,1500000200.000000000,1500000220.000000000,12\n")
+    done = program("merge", a, b, "--weight", 0, "-o", folder / "both", "--json")
+    assert done.returncode == 0 and json.loads(done.stdout)["felled"] == 3, done
+    rows = {row["id"]: row for row in csv.DictReader((folder / "both" / "felled.csv").open())}
+    listed = {row["id"]: row for row in csv.DictReader((folder / "both" / "trees.csv").open())}
+    assert set(rows) == {"30", "90", "115"}, rows
+    assert all((rows[k]["x"], rows[k]["y"]) == (listed[k]["x"], listed[k]["y"]) for k in rows), rows
+    assert rows["30"]["seen_until"] == "1500000020.000000002", rows["30"]
+    assert rows["30"]["gone_since"] == "1500000030.000000000" and rows["30"]["missed"] == "16", rows
+    assert math.dist((float(rows["115"]["x"]), float(rows["115"]["y"])), trees[114]) < 0.3, rows
+    (b / "felled.csv").write_text(head + "10,0,0,noon,1500000050,7\n")
+    done = program("merge", a, b, "-o", folder / "bad")
+    assert done.returncode == 3 and "felled.csv" in done.stderr and "line 2" in done.stderr, done
+
+
 @cases.case("agreement near a path")
 def agreement(folder):
     trees = stand()

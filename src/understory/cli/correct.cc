@@ -29,7 +29,7 @@ int run_correct(const CorrectOptions& options, CommandContext& context) {
     return kExitDone;
   }
   if (options.stems.empty() || options.run_folder.empty())
-    throw ConfigError({"understory correct needs STEMS.csv.gz and -o RUN"});
+    throw ConfigError({"understory correct needs STEMS.csv.gz or a run, and -o RUN"});
   request.stems = options.stems;
   request.run_folder = options.run_folder;
   request.overwrite = options.overwrite;
@@ -44,7 +44,9 @@ void add_correct_command(CLI::App& app, Command& chosen) {
   auto* command =
       app.add_subcommand("correct", "Trajectory and tree map from the stems of a recording alone");
   const auto options = std::make_shared<CorrectOptions>();
-  command->add_option("STEMS", options->stems, "Stems of the views (stems.csv.gz)");
+  command->add_option("STEMS", options->stems,
+                      "Stems of the views (stems.csv.gz), or a run folder that holds them: its "
+                      "trajectory is then where the correction begins");
   command->add_option("-o,--output", options->run_folder, "Run folder to write");
   command->add_option("--config", options->config_file, "YAML file of settings");
   command->add_option("--set", options->settings, "One setting, key=value (may be repeated)")
@@ -55,7 +57,9 @@ void add_correct_command(CLI::App& app, Command& chosen) {
                     "Even if the folder holds an unfinished mapping run");
   command->add_flag("--print-config", options->print_config,
                     "Print every setting with default, unit, range and meaning");
-  command->footer("Example:\n  understory correct stems.csv.gz -o forest");
+  command->footer(
+      "Examples:\n  understory correct stems.csv.gz -o forest\n"
+      "  understory correct forest -o sharper --set correction.method=pose_graph");
   command->callback([&chosen, options] {
     chosen = [options](CommandContext& context) { return run_correct(*options, context); };
   });

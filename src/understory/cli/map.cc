@@ -44,25 +44,29 @@ int with_advice(const std::string& run_folder, const std::function<int()>& work)
   }
 }
 
+// The settings as given, after those that a run at the speed of its sensors begins with.
+std::vector<std::string> live(const MapOptions& options, std::vector<std::string> settings) {
+  if (!options.realtime) settings.clear();
+  settings.insert(settings.end(), options.settings.begin(), options.settings.end());
+  return settings;
+}
+
 MappingConfig resolved(const MapOptions& options) {
-  std::vector<std::string> settings = options.settings;
   // Live, each sensor is in order, and nothing is gained by waiting for the others.
-  if (options.realtime) settings.insert(settings.begin(), "time_repair.window_s=0");
-  return read_mapping_config(options.profile, options.config_file, settings);
+  return read_mapping_config(options.profile, options.config_file,
+                             live(options, {"time_repair.window_s=0"}));
 }
 
 int run_sparse(const MapOptions& options, CommandContext& context) {
-  std::vector<std::string> problems;
-  const auto refuse = [&](bool given, const std::string& option) {
-    if (given) problems.push_back("--front-end sparse: " + option + " is for the dense front end");
-  };
-  refuse(!options.resume.empty(), "--resume");
-  refuse(!options.profile.empty(), "--profile");
-  refuse(options.realtime, "--realtime");
-  if (!problems.empty()) throw ConfigError(problems);
-  return run_sparse_map({options.recording, options.run_folder, options.config_file,
-                         options.settings, options.overwrite, options.print_config, options.open},
-                        context);
+  if (!options.resume.empty())
+    throw ConfigError(
+        {"--resume: a run by stems alone keeps no checkpoints; map it anew (Ctrl-C "
+         "ends it with what there is so far)"});
+  return run_sparse_map(
+      {options.recording, options.run_folder, options.profile, options.config_file,
+       live(options, {"time_repair.window_s=0", "stems.pace.longest_gap_s=0"}), options.realtime,
+       options.overwrite, options.print_config, options.open},
+      context);
 }
 
 int run_map(const MapOptions& options, CommandContext& context) {
@@ -116,7 +120,7 @@ void add_map_command(CLI::App& app, Command& chosen) {
       ->check(CLI::IsMember({"dense", "sparse"}));
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "
-                    "(sets time_repair.window_s=0)");
+                    "(sets time_repair.window_s=0, of stems also stems.pace.longest_gap_s=0)");
   command->add_flag("--overwrite", options->overwrite,
                     "Start anew although the run folder holds an unfinished run");
   command->add_flag("--print-config", options->print_config,

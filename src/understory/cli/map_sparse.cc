@@ -10,9 +10,9 @@ namespace understory {
 
 int run_sparse_map(const SparseMapOptions& options, CommandContext& context) {
   SparseMappingRequest request;
-  ConfigTable table = sparse_mapping_table(request.config);
-  if (!options.config_file.empty()) table.read_file(options.config_file);
-  table.set(options.settings);
+  request.config = read_sparse_mapping_config(options.profile, options.config_file,
+                                              options.settings, context.log);
+  const ConfigTable table = sparse_mapping_table(request.config);
   if (options.print_config) {
     std::fputs(table.to_yaml(true).c_str(), stdout);
     return kExitDone;
@@ -23,6 +23,7 @@ int run_sparse_map(const SparseMapOptions& options, CommandContext& context) {
   request.run_folder = options.run_folder;
   request.config_yaml = table.to_yaml(false);
   request.open = options.open;
+  request.realtime = options.realtime;
   request.overwrite = options.overwrite;
   return report_outcome(
       run_sparse_mapping(request, context.log, context.progress, context.stop_requested));

@@ -12,8 +12,10 @@ namespace understory {
 struct SparseMapOptions {
   std::string recording;
   std::string run_folder;
+  std::string profile;
   std::string config_file;
   std::vector<std::string> settings;
+  bool realtime = false;
   bool overwrite = false;
   bool print_config = false;
   OpenOptions open;

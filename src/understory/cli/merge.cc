@@ -10,6 +10,7 @@
 #include "understory/cli/command.h"
 #include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/tree_errors.h"
+#include "understory/evaluation/tree_falls.h"
 #include "understory/evaluation/tree_merge.h"
 #include "understory/output/atomic_file.h"
 #include "understory/output/run_tables.h"
@@ -72,11 +73,19 @@ std::vector<Tree> beside(const std::string& file, const std::vector<Tree>& a,
   return moved(trees, *a_from_these);
 }
 
+// What a map knows of felled trees; nothing where only a tree list is given.
+std::vector<TreeFall> falls_in(const std::string& map) {
+  const fs::path file = fs::path(map) / "felled.csv";
+  return fs::exists(file) ? read_tree_falls(file) : std::vector<TreeFall>();
+}
+
 int merge(const MergeOptions& options, CommandContext& context) {
   const std::vector<Tree> s = read_trees(file_in_folder(options.s, "trees.csv"));
   const std::vector<Tree> l = beside(options.l, s, options);
   const DeformationField field = deformation_field(l, s, options.merge);
   const MergedTrees merged = merge_trees(s, l, options.weight, options.merge);
+  const std::vector<TreeFall> falls =
+      merged_falls(merged, s, falls_in(options.s), l, falls_in(options.l));
   std::optional<BestWeight> best;
   if (!options.reference.empty())
     best = best_weight(s, l, beside(options.reference, s, options), options.merge);
@@ -88,11 +97,12 @@ int merge(const MergeOptions& options, CommandContext& context) {
   fs::create_directories(options.folder, error);
   if (error) throw OutputError(options.folder, "cannot be made: " + error.message());
   write_trees_csv(fs::path(options.folder) / "trees.csv", merged.trees);
+  write_tree_falls(fs::path(options.folder) / "felled.csv", falls);
   write_field(fs::path(options.folder) / "deformation.csv", l, field);
   nlohmann::ordered_json json{{"trees_a", s.size()},          {"trees_b", l.size()},
                               {"trees", merged.trees.size()}, {"joined", merged.joined},
                               {"apart_m", merged.apart_m},    {"deformation_m", field.mean_m},
-                              {"weight", options.weight}};
+                              {"felled", falls.size()},       {"weight", options.weight}};
   if (best) json["best"] = {{"weight", best->weight}, {"position_rmse_m", best->rmse_m}};
   std::string text = fmt::format(
       "{} trees of {} and {}, {} seen in both ({:.3f} m apart once moved; {:.3f} m before)\n",
@@ -112,7 +122,9 @@ void add_merge_command(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<MergeOptions>();
   command->add_option("A", options->s, "Run folder or trees.csv")->required();
   command->add_option("B", options->l, "Run folder or trees.csv")->required();
-  command->add_option("-o,--output", options->folder, "Folder for trees.csv and deformation.csv")
+  command
+      ->add_option("-o,--output", options->folder,
+                   "Folder for trees.csv, felled.csv and deformation.csv")
       ->required();
   command
       ->add_option("--weight", options->weight,

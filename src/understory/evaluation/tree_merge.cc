@@ -120,9 +120,14 @@ MergedTrees merge_trees(const std::vector<Tree>& s, const std::vector<Tree>& l, 
   for (std::size_t i = 0; i < a.size(); ++i) {
     const int partner = partner_of_a[i];
     result.trees.push_back(partner < 0 ? a[i] : joined(a[i], b[static_cast<std::size_t>(partner)]));
+    result.index_in_s.push_back(static_cast<int>(i));
+    result.index_in_l.push_back(partner);
   }
   for (std::size_t j = 0; j < b.size(); ++j) {
-    if (taken[j] == 0) result.trees.push_back(b[j]);
+    if (taken[j] != 0) continue;
+    result.trees.push_back(b[j]);
+    result.index_in_s.push_back(-1);
+    result.index_in_l.push_back(static_cast<int>(j));
   }
   for (std::size_t k = 0; k < result.trees.size(); ++k)
     result.trees[k].id = static_cast<int>(k) + 1;

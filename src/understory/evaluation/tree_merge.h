@@ -34,6 +34,8 @@ struct DeformationField {
 // what the surer of both knows. Q(0) holds S where it is, Q(1) L. Numbered anew, S first.
 struct MergedTrees {
   std::vector<Tree> trees;
+  std::vector<int> index_in_s;  // per tree: where it comes from, -1 if not in that list
+  std::vector<int> index_in_l;
   std::size_t joined = 0;  // pairs that became one
   double apart_m = 0.0;    // root mean square distance of these before they were joined
 };

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/util/error.h"
+
 namespace understory {
 namespace {
 
@@ -23,9 +25,10 @@ double median_of(std::vector<double>& values, double share = 0.5) {
 
 }  // namespace
 
-RingView::RingView(const Scan& scan, const Eigen::Matrix3d& level_from_lidar, double max_range_m)
+RingView::RingView(const Scan& scan, const Eigen::Matrix3d& level_from_lidar, double max_range_m,
+                   const std::vector<std::uint8_t>& use)
     : level_from_lidar_(level_from_lidar), covered_(360, 0) {
-  gather(scan);
+  gather(scan, use);
   if (rings_.size() < 2) return;
   calibrate();
   if (step_rad_ <= 0.0) return;
@@ -33,22 +36,26 @@ RingView::RingView(const Scan& scan, const Eigen::Matrix3d& level_from_lidar, do
     cut(level, max_range_m);
 }
 
-void RingView::gather(const Scan& scan) {
+void RingView::gather(const Scan& scan, const std::vector<std::uint8_t>& use) {
+  UNDERSTORY_CHECK(use.empty() || use.size() == scan.points.size());
   std::uint16_t most = 0;
   for (const ScanPoint& point : scan.points)
     most = std::max(most, point.ring);
   std::vector<Ring> rings(static_cast<std::size_t>(most) + 1);
   const Eigen::Matrix3f turn = level_from_lidar_.cast<float>();
   points_.reserve(scan.points.size());
-  for (const ScanPoint& point : scan.points) {
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const ScanPoint& point = scan.points[i];
     if (point.return_index != 0) continue;
     const float range = std::hypot(point.x, point.y);
     if (!(range > 0.0F)) continue;
     const float azimuth = std::atan2(point.y, point.x);
-    rings[point.ring].returns.push_back({azimuth, range, static_cast<std::uint32_t>(points_.size()),
-                                         static_cast<float>(point.t_ns)});
+    const bool used = use.empty() || use[i] != 0;
+    rings[point.ring].returns.push_back(
+        {azimuth, range, used ? static_cast<std::uint32_t>(points_.size()) : kOnlyHides,
+         static_cast<float>(point.t_ns)});
     rings[point.ring].slope += static_cast<double>(point.z / range);
-    points_.emplace_back(turn * Eigen::Vector3f(point.x, point.y, point.z));
+    if (used) points_.emplace_back(turn * Eigen::Vector3f(point.x, point.y, point.z));
     const int degree = static_cast<int>(std::floor(azimuth * (180.0F / static_cast<float>(kPi))));
     covered_[static_cast<std::size_t>((degree + 360) % 360)] = 1;
   }
@@ -104,6 +111,7 @@ void RingView::calibrate() {
 // Whether two returns of a ring that follow each other may lie on one stem: its depth falls by up
 // to its radius from its middle to its edge, the faster the wider the step.
 bool RingView::linked(const Return& a, const Return& b) const {
+  if (a.only_hides() || b.only_hides()) return false;
   const auto step = static_cast<float>(step_rad_);
   if (b.azimuth - a.azimuth > kBridged * step) return false;
   const float spacing = step * std::min(a.range, b.range);
@@ -117,7 +125,8 @@ void RingView::cut(int level, double max_range_m) {
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= returns.size(); ++i) {
     if (i < returns.size() && linked(returns[i - 1], returns[i])) continue;
-    if (static_cast<double>(returns[begin].range) <= max_range_m) add_section(level, begin, i);
+    if (!returns[begin].only_hides() && static_cast<double>(returns[begin].range) <= max_range_m)
+      add_section(level, begin, i);
     begin = i;
   }
 }
@@ -200,7 +209,7 @@ Sight RingView::look(int level, const Eigen::Vector2d& place, double half_width_
   auto to = from;
   for (; to != ring.returns.end() && static_cast<double>(to->azimuth) <= azimuth + half; ++to) {
     const double depth = static_cast<double>(to->range) - range;
-    if (std::abs(depth) <= kDepthMargin) return Sight::kHit;
+    if (std::abs(depth) <= kDepthMargin && !to->only_hides()) return Sight::kHit;
     (depth < 0.0 ? hidden : passed) = true;
   }
   if (hidden) return Sight::kHidden;

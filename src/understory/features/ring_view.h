@@ -13,8 +13,10 @@ namespace understory {
 class RingView : public SectionView {
  public:
   // `level_from_lidar` turns z up. Returns farther than `max_range_m` are passed over (they still
-  // show that a place is free).
-  RingView(const Scan& scan, const Eigen::Matrix3d& level_from_lidar, double max_range_m);
+  // show that a place is free). A point whose entry of `use` is 0 hides what lies behind it and is
+  // nothing else; empty: all are used.
+  RingView(const Scan& scan, const Eigen::Matrix3d& level_from_lidar, double max_range_m,
+           const std::vector<std::uint8_t>& use = {});
 
   [[nodiscard]] const std::vector<StemSection>& sections() const override { return sections_; }
   [[nodiscard]] int levels() const override { return static_cast<int>(rings_.size()); }
@@ -23,22 +25,24 @@ class RingView : public SectionView {
                            double half_width_m) const override;
   [[nodiscard]] double range_sd_m() const override { return range_sd_m_; }
   [[nodiscard]] double step_rad() const { return step_rad_; }
-  // All returns, level frame.
+  // All returns that are used, level frame.
   [[nodiscard]] const std::vector<Eigen::Vector3f>& points() const { return points_; }
 
  private:
+  static constexpr std::uint32_t kOnlyHides = 0xffffffffU;
   struct Return {
     float azimuth = 0.0F;     // in the lidar's frame, radians
     float range = 0.0F;       // level in the lidar's frame: from the axis of rotation
-    std::uint32_t point = 0;  // of points_
+    std::uint32_t point = 0;  // of points_, or kOnlyHides
     float t_ns = 0.0F;
+    [[nodiscard]] bool only_hides() const { return point == kOnlyHides; }
   };
   struct Ring {
     double slope = 0.0;           // tangent of its elevation
     std::vector<Return> returns;  // by azimuth
   };
 
-  void gather(const Scan& scan);
+  void gather(const Scan& scan, const std::vector<std::uint8_t>& use);
   void calibrate();
   void cut(int level, double max_range_m);
   void add_section(int level, std::size_t begin, std::size_t end);

@@ -231,12 +231,13 @@ Stem stem_of(const StemSegment& segment, const Pose& body_from_points,
   return stem;
 }
 
-StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config) {
+StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config,
+                                const std::vector<std::uint8_t>& use) {
   StemSegments result;
   result.up = config.up.normalized();
   for (int round = 0;; ++round) {
     const Eigen::Matrix3d level = level_from(result.up);
-    const RingView view(scan, level, config.max_range_m);
+    const RingView view(scan, level, config.max_range_m, use);
     result.levels = view.levels();
     result.step = view.step_rad();
     result.range_sd_m = view.range_sd_m();

@@ -69,8 +69,12 @@ struct StemSegments {
 // stopped them. The surface that the beams hit lies in front of the centre by pi/4 of the radius in
 // the mean over the width (P1 figure 11); the radius comes from the widths of all runs together.
 //
+// `use` has an entry a point of the scan, 0 for what is on the machine that carries the lidar (it
+// hides what lies behind and is never a stem); empty: all are used.
+//
 // Empty for a frame without rings. Deterministic; thread-safe. P1 section 2.3 and figure 11.
-[[nodiscard]] StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config);
+[[nodiscard]] StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config,
+                                              const std::vector<std::uint8_t>& use = {});
 
 // The same in a map: points from all sides, z up, in level slices of 25 cm in place of rings. Times
 // are 0, the step is in metres. Stems come by increasing x.

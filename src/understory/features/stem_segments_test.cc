@@ -118,6 +118,29 @@ TEST(StemSegments, AreEmptyWithoutRingsOrPoints) {
   EXPECT_TRUE(find_stem_segments(flat, {}).stems.empty());
 }
 
+// What is on the machine is no stem, and what it hides does not count against stems behind it.
+TEST(StemSegments, AreNotFoundOnTheMachine) {
+  std::vector<Cylinder> cylinders = ring_of_cylinders();
+  const std::size_t stems = cylinders.size();
+  const Eigen::Vector2d post = 1.6 * cylinders[5].centre.normalized();
+  cylinders.push_back({post, 0.05});
+  const Scan scan = scan_cylinders(cylinders);
+  std::vector<std::uint8_t> use;
+  for (const ScanPoint& point : scan.points)
+    use.push_back((Eigen::Vector2d(point.x, point.y) - post).norm() < 0.3 ? 0 : 1);
+  const auto at_post = [&](const StemSegments& found) {
+    for (const StemSegment& stem : found.stems) {
+      if ((stem.foot.head<2>() - post).norm() < 0.3) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(at_post(find_stem_segments(scan, {})));
+  const StemSegments found = find_stem_segments(scan, {}, use);
+  EXPECT_FALSE(at_post(found));
+  // The post hides one of them wholly.
+  EXPECT_EQ(found.stems.size(), stems - 1);
+}
+
 TEST(StemSegments, EachIsTimedWhereTheHeadLookedAtIt) {
   const StemSegments found = find_stem_segments(scan_cylinders(ring_of_cylinders()), {});
   ASSERT_FALSE(found.stems.empty());

@@ -122,22 +122,10 @@ PoseGraphProblem chain_problem(const SelfCorrectionProblem& problem,
   return graph;
 }
 
-SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
-                                  const SelfCorrectionConfig& config) {
-  UNDERSTORY_CHECK(problem.views.size() == problem.world_from_view.size());
-  UNDERSTORY_CHECK(problem.views.size() == problem.map_views.size());
-  UNDERSTORY_CHECK(problem.views.size() == problem.steps.size());
-  UNDERSTORY_CHECK(problem.views.size() == problem.step_errors.size());
-  UNDERSTORY_CHECK(problem.views.size() == problem.step_covariances.size());
-  SelfCorrectionResult result;
-  result.world_from_view = problem.world_from_view;
-  result.use.assign(problem.views.size(), 1);
-  result.before = map_sharpness(problem.map_views, problem.world_from_view, {}, config.sharpness);
-  result.after = result.before;
-  if (config.method == CorrectionMethod::kNone || problem.views.size() < 3) {
-    result.stopped_because = "not asked for, or too few views";
-    return result;
-  }
+namespace {
+
+void correct_by_method(const SelfCorrectionProblem& problem, const SelfCorrectionConfig& config,
+                       SelfCorrectionResult& result) {
   const CorrectionViews views(problem);
   switch (config.method) {
     case CorrectionMethod::kNone:
@@ -163,13 +151,36 @@ SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
                                                [](const auto& t) { return t.kept; }));
   result.go_icp_calls = static_cast<int>(std::count_if(result.tried.begin(), result.tried.end(),
                                                        [](const auto& t) { return t.by_go_icp; }));
+}
+
+}  // namespace
+
+SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
+                                  const SelfCorrectionConfig& config) {
+  UNDERSTORY_CHECK(problem.views.size() == problem.world_from_view.size());
+  UNDERSTORY_CHECK(problem.views.size() == problem.map_views.size());
+  UNDERSTORY_CHECK(problem.views.size() == problem.steps.size());
+  UNDERSTORY_CHECK(problem.views.size() == problem.step_errors.size());
+  UNDERSTORY_CHECK(problem.views.size() == problem.step_covariances.size());
+  SelfCorrectionResult result;
+  result.world_from_view = problem.world_from_view;
+  result.use.assign(problem.views.size(), 1);
+  result.before = map_sharpness(problem.map_views, problem.world_from_view, {}, config.sharpness);
+  result.after = result.before;
+  const bool corrected = config.method != CorrectionMethod::kNone && problem.views.size() >= 3;
+  if (corrected) {
+    correct_by_method(problem, config, result);
+  } else {
+    result.stopped_because = "not asked for, or too few views";
+  }
   if (config.eliminate_factor > 0.0) {
     const RegistrationNoise noise =
         registration_noise(problem.map_views, result.world_from_view, {}, config.sharpness);
     result.use = views_worth_keeping(noise, config.eliminate_factor, config.eliminate_share);
   }
-  result.after =
-      map_sharpness(problem.map_views, result.world_from_view, result.use, config.sharpness);
+  if (corrected || config.eliminate_factor > 0.0)
+    result.after =
+        map_sharpness(problem.map_views, result.world_from_view, result.use, config.sharpness);
   return result;
 }
 

@@ -129,7 +129,9 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const Im
       up_in_lidar_
           ? *up_in_lidar_
           : Eigen::Vector3d(rig.body_from_lidar.rotation().inverse() * Eigen::Vector3d::UnitZ());
-  const StemSegments found = find_stem_segments(scan, segments);
+  std::vector<std::uint8_t> use;
+  if (config_.machine_boxes) use = outside_machine(scan, rig, *config_.machine_boxes);
+  const StemSegments found = find_stem_segments(scan, segments, use);
   if (!found.stems.empty()) up_in_lidar_ = found.up;
 
   StemScan result;

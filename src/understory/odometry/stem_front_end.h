@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -7,6 +8,7 @@
 #include "understory/geometry/stamped_pose.h"
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/odometry/stem_imu.h"
+#include "understory/preprocess/machine_boxes.h"
 #include "understory/sensor/rig.h"
 #include "understory/sensor/scan.h"
 #include "understory/sensor/stem_view.h"
@@ -36,6 +38,9 @@ struct StemFrontEndConfig {
   ViewChoiceConfig keep;
   StemImuConfig imu;
   SparseOdometryConfig odometry;
+  // Around parts of the machine: what lies in them is no stem, and hides what lies behind. Not in
+  // the table of keys: who reads the configuration reads the file that holds them. Null: none.
+  std::shared_ptr<const std::vector<MachineBox>> machine_boxes;
 };
 void describe(ConfigTable& table, StemFrontEndConfig& config);
 

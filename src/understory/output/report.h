@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "understory/forest/inventory.h"
+#include "understory/forest/tree_fall.h"
 #include "understory/output/map_picture.h"
 #include "understory/output/run_summary.h"
 #include "understory/util/time.h"
@@ -105,6 +106,7 @@ struct ReportInput {
   const MapPicture* picture = nullptr;         // not owned
   const InventoryResult* inventory = nullptr;  // not owned
   const std::vector<Tree>* trees = nullptr;    // not owned; without an inventory
+  std::vector<TreeFall> falls;                 // of these trees
   std::vector<ReportScan> scans;
   std::vector<ReportFix> fixes;
   double sensor_period_ms = 0.0;  // 0: unknown

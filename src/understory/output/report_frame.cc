@@ -144,6 +144,8 @@ std::string figures_section(const ReportInput& input) {
   } else if (input.trees != nullptr) {
     html += tile(count_text(input.trees->size()), "trees");
   }
+  if (!input.falls.empty())
+    html += tile(count_text(input.falls.size()), "of them felled while they were looked at");
   const auto scan = input.summary.stages.find("scan");
   if (scan != input.summary.stages.end()) {
     html +=

@@ -147,6 +147,16 @@ std::string trees_svg(const std::vector<Tree>& trees, const View& view) {
   return svg;
 }
 
+// Where trees stood that are gone.
+std::string falls_svg(const std::vector<TreeFall>& falls, const View& view) {
+  std::string svg = "<g class=\"falls\" stroke=\"#1b1b1b\" stroke-width=\"2\">";
+  for (const TreeFall& fall : falls)
+    svg += fmt::format(
+        "<path d=\"M{:.1f} {:.1f}m-5-5l10 10m0-10l-10 10\"><title>tree {}: felled</title></path>",
+        view.x(fall.x), view.y(fall.y), fall.tree_id);
+  return svg + "</g>";
+}
+
 // The receiver's path, at most 2,000 fixes of it, those that had no say paler.
 std::string fixes_svg(const std::vector<ReportFix>& fixes, const View& view) {
   const std::size_t step = fixes.size() / 2000 + 1;
@@ -200,6 +210,7 @@ std::string map_section(const ReportInput& input) {
         p.height_m() * view.scale, base64(p.png()));
   }
   if (const std::vector<Tree>* trees = trees_of(input)) svg += trees_svg(*trees, view);
+  if (!input.falls.empty()) svg += falls_svg(input.falls, view);
   svg += loops_svg(input.loops, view);
   if (!input.fixes.empty()) svg += fixes_svg(input.fixes, view);
   svg += path_svg(input.scans, view);
@@ -224,6 +235,7 @@ std::string map_section(const ReportInput& input) {
   if (trees_of(input) != nullptr) {
     entry(" class=\"dot\"", "border-color:#c0392b;background:#fff2c2", "tree");
   }
+  if (!input.falls.empty()) legend += "<span><b>×</b> felled meanwhile</span> ";
   if (!input.scans.empty()) {
     line("--path", "path");
     line("--weak", "path where matching was weak");

@@ -282,18 +282,42 @@ std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit
   return html;
 }
 
-std::string section_of_views(const std::vector<Tree>& trees) {
+// `start`: of the recording.
+std::string fall_table(const std::vector<TreeFall>& falls, TimeNs start) {
+  if (falls.empty()) return "";
+  std::string html =
+      "<h3>Felled trees</h3><p>Trees that stood at first and were gone later, though they would "
+      "have been in view: crosses on the map.</p><div class=\"scroll\"><table "
+      "class=\"sort\"><thead><tr><th class=\"n\">no.</th><th class=\"n\">x, m</th><th "
+      "class=\"n\">y, m</th><th class=\"n\">seen until, s</th><th class=\"n\">gone since, "
+      "s</th><th class=\"n\">views without it</th></tr></thead><tbody>";
+  for (const TreeFall& fall : falls) {
+    html += "<tr>";
+    for (const std::string& cell :
+         {std::to_string(fall.tree_id), metres(fall.x, 2), metres(fall.y, 2),
+          metres(to_seconds(fall.seen_until - start), 0),
+          metres(to_seconds(fall.gone_since - start), 0), std::to_string(fall.missed)})
+      html += fmt::format("<td class=\"n\">{}</td>", cell);
+    html += "</tr>";
+  }
+  return html + "</tbody></table></div>";
+}
+
+std::string section_of_views(const ReportInput& input) {
+  const std::vector<Tree>& trees = *input.trees;
+  const TimeNs start = input.scans.empty() ? 0 : input.scans.front().stamp;
   return "<section><h2>Trees</h2><p>A tree is listed where many of the views that could see it saw "
          "a stem. Its place is the mean of these sights, the diameter's ± is what they leave "
          "uncertain; heights are not measured.</p><div class=\"two\">" +
-         diameters(trees) + "</div>" + tree_table(trees, nullptr) + "</section>\n";
+         diameters(trees) + "</div>" + fall_table(input.falls, start) + tree_table(trees, nullptr) +
+         "</section>\n";
 }
 
 }  // namespace
 
 std::string stand_section(const ReportInput& input) {
   if (input.inventory == nullptr)
-    return input.trees == nullptr || input.trees->empty() ? "" : section_of_views(*input.trees);
+    return input.trees == nullptr || input.trees->empty() ? "" : section_of_views(input);
   const InventoryResult& inventory = *input.inventory;
   std::string html = "<section><h2>Trees</h2>";
   if (inventory.trees.empty()) {

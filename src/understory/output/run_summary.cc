@@ -109,6 +109,13 @@ std::map<std::string, StageSummary> summarise(const StageTimes& times) {
   return result;
 }
 
+void add_latency(const Distribution& latency_ms, RunSummary& summary) {
+  summary.quality["latency_ms_mean"] = latency_ms.mean;
+  summary.quality["latency_ms_p50"] = latency_ms.p50;
+  summary.quality["latency_ms_p99"] = latency_ms.p99;
+  summary.quality["latency_ms_max"] = latency_ms.max;
+}
+
 std::string run_json(const RunSummary& summary) {
   Json json;
   json["status"] = to_string(summary.status);

@@ -58,6 +58,10 @@ struct RunSummary {
   std::string crs_wkt;                    // empty = local frame
 };
 
+// Of a run at the speed of its sensors: milliseconds from the end of a scan to its pose, as the
+// figures latency_ms_mean, _p50, _p99 and _max.
+void add_latency(const Distribution& latency_ms, RunSummary& summary);
+
 // Writes run.json (keys of docs/outputs.md); NaN becomes null.
 void write_run_json(const std::filesystem::path& path, const RunSummary& summary);
 [[nodiscard]] std::string run_json(const RunSummary& summary);

@@ -135,6 +135,16 @@ void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>&
   file.commit();
 }
 
+void write_tree_falls(const std::filesystem::path& path, const std::vector<TreeFall>& falls) {
+  AtomicTextFile file(path);
+  file.write("id,x,y,seen_until,gone_since,missed\n");
+  for (const TreeFall& fall : falls)
+    file.write(fmt::format("{},{:.3f},{:.3f},{},{},{}\n", fall.tree_id, fall.x, fall.y,
+                           format_seconds(fall.seen_until), format_seconds(fall.gone_since),
+                           fall.missed));
+  file.commit();
+}
+
 StemsWriter::StemsWriter(const std::filesystem::path& path) : file_(path) {
   file_.write(
       "frame,timestamp,x,y,z,axis_x,axis_y,axis_z,length_m,dbh_m,score,radius_m,radius_sd_m,xx,xy,"

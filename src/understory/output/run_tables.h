@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "understory/forest/tree.h"
+#include "understory/forest/tree_fall.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/output/atomic_file.h"
 #include "understory/sensor/gnss_fix.h"
@@ -90,6 +91,9 @@ void write_g2o(const std::filesystem::path& path, const std::vector<GraphVertex>
 
 // trees.csv with the columns of docs/outputs.md; empty where unknown.
 void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>& trees);
+
+// felled.csv: `id,x,y,seen_until,gone_since,missed`.
+void write_tree_falls(const std::filesystem::path& path, const std::vector<TreeFall>& falls);
 
 // One stem seen in one frame, for stems.csv.gz: body frame; NaN is written as empty.
 class StemsWriter {

@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
+#include <algorithm>
 
+#include "understory/evaluation/trajectory.h"
 #include "understory/pipeline/correction_files.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/recording/stems_file.h"
@@ -29,6 +30,37 @@ std::vector<SparseStep> position(const std::vector<StemView>& views,
   return steps;
 }
 
+// A run's trajectory in place of the chained odometry: what matching tells of the steps stays.
+void begin_from(const std::filesystem::path& trajectory, CorrectionRun& run) {
+  constexpr TimeNs kSame = 1'000'000;
+  run.path = read_trajectory(trajectory);
+  run.inputs.push_back(hash_input(trajectory));
+  for (std::size_t i = 0; i < run.steps.size(); ++i) {
+    const TimeNs stamp = run.views[i].stamp;
+    const auto at =
+        std::lower_bound(run.path.begin(), run.path.end(), stamp - kSame,
+                         [](const StampedPose& pose, TimeNs time) { return pose.stamp < time; });
+    if (at == run.path.end() || at->stamp > stamp + kSame)
+      throw InputError(trajectory.string(), "",
+                       fmt::format("expected a pose at {}, when view {} of the stems was taken",
+                                   format_seconds(stamp), run.views[i].frame));
+    run.steps[i].world_from_body = at->world_from_body;
+    if (i > 0)
+      run.steps[i].previous_from_body =
+          run.steps[i - 1].world_from_body.inverse() * at->world_from_body;
+  }
+}
+
+// A run folder stands for the stems that it holds.
+std::filesystem::path stems_of(const CorrectionRequest& request) {
+  if (!std::filesystem::is_directory(request.stems)) return request.stems;
+  const std::filesystem::path stems = request.stems / "stems.csv.gz";
+  if (std::filesystem::exists(stems)) return stems;
+  throw InputError(request.stems.string(), "",
+                   "expected a run folder that holds stems.csv.gz: a run of `understory map "
+                   "--front-end sparse`");
+}
+
 }  // namespace
 
 void describe(ConfigTable& table, CorrectionConfig& config) {
@@ -43,13 +75,18 @@ CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
   CorrectionRun run;
   {
     const ScopedTimer timer(run.times, "reading");
-    run.views = read_stem_views(request.stems, log);
+    const std::filesystem::path stems = stems_of(request);
+    run.views = read_stem_views(stems, log);
+    run.inputs.push_back(hash_input(stems));
   }
   // The front end has positioned the views already, with the scans between them.
   run.steps = request.scans != nullptr ? request.scans->steps
                                        : position(run.views, request.config.odometry, progress,
                                                   stop_requested, run.times);
   UNDERSTORY_CHECK(run.steps.size() <= run.views.size());
+  if (request.scans != nullptr) run.path = request.scans->path;
+  if (std::filesystem::is_directory(request.stems))
+    begin_from(request.stems / "trajectory.tum", run);
   run.stopped = run.steps.size() < run.views.size();
   run.views.resize(run.steps.size());
   if (run.stopped) {

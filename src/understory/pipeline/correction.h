@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +25,12 @@ struct CorrectionConfig {
 };
 void describe(ConfigTable& table, CorrectionConfig& config);
 
+// What a run at the speed of its sensors has to say of its own.
+struct RealtimeFacts {
+  std::uint64_t dropped_scans = 0;
+  Distribution latency_ms;  // from the end of a scan to its pose
+};
+
 // The recording that the stems come from, where `understory map` has just read it.
 struct SparseScans {
   std::string recording;  // as the user named it
@@ -33,11 +41,14 @@ struct SparseScans {
   const StageTimes* times = nullptr;  // "scan": all of one scan
   std::vector<GnssFix> fixes;         // of the recording; compared with, not used
   bool stopped = false;               // before the recording's end
+  std::optional<RealtimeFacts> realtime;
 };
 
 // One call of `understory correct`.
 struct CorrectionRequest {
-  std::filesystem::path stems;  // stems.csv.gz
+  // stems.csv.gz, or a run folder that holds one: then its trajectory.tum is where the correction
+  // begins, and what is made of it has a row for each of its poses.
+  std::filesystem::path stems;
   std::filesystem::path run_folder;
   bool overwrite = false;  // also a mapping run that is not finished
   CorrectionConfig config;

@@ -41,8 +41,8 @@ void write_paths(const CorrectionRequest& request, const CorrectionRun& run) {
     corrected.push_back({run.views[i].stamp, run.correction.world_from_body[i]});
     chained.push_back({run.views[i].stamp, run.steps[i].world_from_body});
   }
-  if (request.scans != nullptr) {
-    chained = request.scans->path;
+  if (!run.path.empty()) {
+    chained = run.path;
     corrected = spread_corrections(chained, corrected);
   }
   write_tum(request.run_folder / "odometry.tum", chained);
@@ -63,23 +63,36 @@ void write_loops(const fs::path& path, const CorrectionRun& run) {
   file.commit();
 }
 
-// A row per pair of views that was matched again to correct the map.
-// Trees of trees.csv that stood at first and were gone later, and between which views they fell.
-void write_felled(const fs::path& path, const CorrectionRun& run, const std::vector<Tree>& trees,
-                  const std::vector<FelledTree>& felled) {
-  AtomicTextFile file(path);
-  file.write("id,x,y,seen_until,gone_since,missed\n");
-  for (const FelledTree& fell : felled) {
-    const Tree& tree = trees[fell.tree];
-    const auto stamp = [&](int view) {
-      return format_seconds(run.views[static_cast<std::size_t>(view)].stamp);
-    };
-    file.write(fmt::format("{},{:.3f},{:.3f},{},{},{}\n", tree.id, tree.x, tree.y,
-                           stamp(fell.last_seen), stamp(fell.first_missed), fell.missed));
+// The views that make the map: those that hurt it may be left out, P0 (33).
+struct MapViews {
+  std::vector<StemView> views;
+  std::vector<Pose> world_from_body;
+};
+MapViews map_views(const CorrectionRun& run) {
+  const std::vector<char>& use = run.correction.self.use;
+  MapViews kept;
+  for (std::size_t i = 0; i < run.views.size(); ++i) {
+    if (!use.empty() && use[i] == 0) continue;
+    kept.views.push_back(run.views[i]);
+    kept.world_from_body.push_back(run.correction.world_from_body[i]);
   }
-  file.commit();
+  return kept;
 }
 
+// Trees of trees.csv that stood at first and were gone later, and between which views they fell.
+std::vector<TreeFall> falls_of(const MapViews& map, const std::vector<MappedStem>& stems,
+                               const std::vector<Tree>& trees) {
+  std::vector<TreeFall> falls;
+  for (const FelledTree& fell : felled_trees(map.views, map.world_from_body, stems, {})) {
+    const Tree& tree = trees[fell.tree];
+    falls.push_back({tree.id, tree.x, tree.y,
+                     map.views[static_cast<std::size_t>(fell.last_seen)].stamp,
+                     map.views[static_cast<std::size_t>(fell.first_missed)].stamp, fell.missed});
+  }
+  return falls;
+}
+
+// A row per pair of views that was matched again to correct the map.
 void write_corrections(const fs::path& path, const CorrectionRun& run) {
   AtomicTextFile file(path);
   file.write(
@@ -219,7 +232,8 @@ std::size_t doubtful_steps(const CorrectionRun& run) {
   return doubtful;
 }
 
-void judge(const CorrectionRequest& request, const CorrectionRun& run, RunSummary& summary) {
+void judge(const CorrectionRequest& request, const CorrectionRun& run, std::size_t trees,
+           RunSummary& summary) {
   const auto lower = [&](RunStatus status, const std::string& reason) {
     summary.status = status;
     summary.reasons.push_back(reason);
@@ -228,6 +242,10 @@ void judge(const CorrectionRequest& request, const CorrectionRun& run, RunSummar
     lower(RunStatus::kPartial, "stopped before the end of the recording");
   if (!run.correction.converged)
     lower(RunStatus::kUntrusted, "the loops were not solved: " + run.correction.reason);
+  if (trees == 0)
+    lower(RunStatus::kUntrusted,
+          fmt::format("no stem was seen often enough in {} views to be listed as a tree",
+                      run.steps.size()));
   const std::size_t doubtful = doubtful_steps(run);
   if (doubtful == 0) return;
   lower(RunStatus::kUntrusted,
@@ -268,10 +286,10 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   summary.command = "correct";
   summary.version = kVersion;
   summary.config_yaml = request.config_yaml;
-  summary.inputs.push_back(hash_input(request.stems));
+  summary.inputs = run.inputs;
   summary.warnings = log.warnings();
-  summary.scans = run.views.size();
-  summary.poses = run.correction.world_from_body.size();
+  summary.scans = run.path.empty() ? run.views.size() : run.path.size();
+  summary.poses = run.path.empty() ? run.correction.world_from_body.size() : run.path.size();
   summary.counts["trees"] = static_cast<std::int64_t>(stems.size());
   summary.counts["steps_searched"] =
       static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kSearched));
@@ -288,13 +306,16 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
     const SparseScans& scans = *request.scans;
     summary.command = "map";
     summary.inputs = hash_inputs(scans.recording);
-    summary.scans = summary.poses = scans.path.size();
     summary.counts["views"] = static_cast<std::int64_t>(run.views.size());
     summary.counts["scans_positioned"] = static_cast<std::int64_t>(scans.positioned);
     if (!scans.path.empty())
       summary.recording_s = to_seconds(scans.path.back().stamp - scans.path.front().stamp);
+    if (scans.realtime) {
+      summary.counts["scans_dropped"] = static_cast<std::int64_t>(scans.realtime->dropped_scans);
+      add_latency(scans.realtime->latency_ms, summary);
+    }
   }
-  judge(request, run, summary);
+  judge(request, run, stems.size(), summary);
   return summary;
 }
 
@@ -308,23 +329,24 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   if (error) throw OutputError(folder.string(), "cannot be made: " + error.message());
   fs::remove(checkpoint_of(folder), error);
   remove_old_results(folder);
+  const MapViews map = map_views(run);
   std::vector<MappedStem> stems;
   {
     const ScopedTimer timer(run.times, "tree_map");
-    stems = build_stem_map(run.views, run.correction.world_from_body, tree_list_config());
+    stems = build_stem_map(map.views, map.world_from_body, tree_list_config());
   }
   const std::vector<Tree> trees = trees_of(stems);
-  const std::vector<FelledTree> felled =
-      felled_trees(run.views, run.correction.world_from_body, stems, {});
+  std::vector<TreeFall> falls = falls_of(map, stems, trees);
   {
     const ScopedTimer timer(run.times, "writing");
     write_paths(request, run);
     write_loops(folder / "loops.csv", run);
     write_corrections(folder / "corrections.csv", run);
     write_trees_csv(folder / "trees.csv", trees);
-    write_felled(folder / "felled.csv", run, trees, felled);
+    write_tree_falls(folder / "felled.csv", falls);
   }
   RunSummary summary = summary_of(request, run, stems, log);
+  summary.counts["trees_felled"] = static_cast<std::int64_t>(falls.size());
   std::vector<ReportFix> fixes;
   {
     const ScopedTimer timer(run.times, "gnss_fit");
@@ -338,6 +360,7 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   summary.peak_memory_mb = peak_memory_mb();
   ReportInput report = correction_report(request, run, summary, trees);
   report.fixes = std::move(fixes);
+  report.falls = std::move(falls);
   write_report(folder / "report.html", report);
   write_run_json(folder / "run.json", summary);
   CorrectionOutcome outcome;

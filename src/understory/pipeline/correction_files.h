@@ -13,8 +13,11 @@ namespace understory {
 struct CorrectionRun {
   std::vector<StemView> views;
   std::vector<SparseStep> steps;  // the chained odometry
-  StemCorrection correction;      // the answer
+  // Of every scan, before any correction; empty: the views are all there is.
+  std::vector<StampedPose> path;
+  StemCorrection correction;  // the answer
   bool stopped = false;
+  std::vector<InputHash> inputs;
   StageTimes times;
 };
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "understory/evaluation/tree_errors.h"
+#include "understory/evaluation/tree_falls.h"
 #include "understory/georeference/coordinate_system.h"
 #include "understory/georeference/terrain_file.h"
 #include "understory/output/geo_files.h"
@@ -32,6 +33,8 @@ struct Run {
   Trajectory trajectory;
   std::vector<Tree> trees;
   bool has_trees = false;
+  std::vector<TreeFall> falls;
+  bool has_falls = false;
   std::optional<GeodeticPlace> origin;  // of its frame east, north, up
 };
 
@@ -61,6 +64,8 @@ Run read_run(const fs::path& folder) {
   run.trajectory = read_trajectory(folder / "trajectory.tum");
   run.has_trees = fs::exists(folder / "trees.csv");
   if (run.has_trees) run.trees = read_trees(folder / "trees.csv");
+  run.has_falls = run.has_trees && fs::exists(folder / "felled.csv");
+  if (run.has_falls) run.falls = read_tree_falls(folder / "felled.csv");
   run.origin = origin_of(folder);
   return run;
 }
@@ -276,6 +281,9 @@ void write_summary(const GeoreferenceRequest& request, const Run& run, const Mot
   report.summary = summary;
   report.north_is_up = motion.origin.has_value();
   if (run.has_trees) report.trees = &trees;
+  report.falls = placed(run.falls, trees);
+  if (run.has_falls)
+    report.summary.counts["trees_felled"] = static_cast<std::int64_t>(report.falls.size());
   for (const StampedPose& pose : run.trajectory) {
     ReportScan scan;
     scan.stamp = pose.stamp;
@@ -284,7 +292,7 @@ void write_summary(const GeoreferenceRequest& request, const Run& run, const Mot
   }
   report.fixes = fixes_of(motion.gnss);
   write_report(request.result / "report.html", report);
-  write_run_json(request.result / "run.json", summary);
+  write_run_json(request.result / "run.json", report.summary);
 }
 
 }  // namespace
@@ -314,6 +322,7 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& 
   std::string system;
   if (run.has_trees) {
     write_trees_csv(request.result / "trees.csv", trees);
+    if (run.has_falls) write_tree_falls(request.result / "felled.csv", placed(run.falls, trees));
     if (motion.origin) system = write_trees_map(request, trees, *motion.origin);
   }
   if (!motion.gnss.empty()) {

@@ -251,11 +251,7 @@ void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const 
   summary.quality["weak_scans_percent"] =
       100.0 * static_cast<double>(trajectory.weak) / static_cast<double>(trajectory.scans.size());
   if (!facts.realtime) return;
-  const Distribution latency = distribution_of(facts.latencies_ms);
-  summary.quality["latency_ms_mean"] = latency.mean;
-  summary.quality["latency_ms_p50"] = latency.p50;
-  summary.quality["latency_ms_p99"] = latency.p99;
-  summary.quality["latency_ms_max"] = latency.max;
+  add_latency(distribution_of(facts.latencies_ms), summary);
 }
 
 RunSummary summarise_run(const MappingRequest& request, MappingSession& session,

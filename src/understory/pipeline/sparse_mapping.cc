@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <deque>
 #include <memory>
 #include <system_error>
 
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/realtime_player.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
@@ -24,7 +26,13 @@ class SparseRun {
         orderer_(request.config.time_repair, log),
         source_(open_source(request.recording, request.open, log)),
         pacer_(request.config.pace, request.config.front_end, &log),
-        stems_(request.run_folder / "stems.csv.gz") {}
+        stems_(request.run_folder / "stems.csv.gz") {
+    if (!request.realtime) return;
+    auto player = std::make_unique<RealtimePlayer>(
+        std::move(source_), static_cast<std::size_t>(request.config.realtime_queue_scans));
+    player_ = player.get();
+    source_ = std::move(player);
+  }
 
   // True if it was stopped.
   bool run(const ProgressSink& progress, const StopRequested& stop_requested) {
@@ -46,6 +54,10 @@ class SparseRun {
     }
     record(pacer_.finish(source_->rig()));
     if (kept() > 0) stems_.commit();
+    if (player_ != nullptr) {
+      player_->stop();
+      warn_of_dropped();
+    }
     return stopped;
   }
 
@@ -55,13 +67,15 @@ class SparseRun {
   [[nodiscard]] SparseScans scans(bool stopped) {
     SparseScans scans;
     scans.recording = request_.recording;
-    scans.source = source_.get();
+    scans.source = player_ != nullptr ? &player_->played() : source_.get();
     scans.path = std::move(path_);
     scans.steps = std::move(steps_);
     scans.times = &times_;
     scans.positioned = positioned_;
     scans.stopped = stopped;
     scans.fixes = std::move(fixes_);
+    if (player_ != nullptr)
+      scans.realtime = {player_->dropped_scans(), distribution_of(std::move(latencies_ms_))};
     return scans;
   }
 
@@ -69,6 +83,7 @@ class SparseRun {
   void take(const ScanPtr& scan, const ProgressSink& progress) {
     const ScopedTimer timer(times_, "scan");
     ++taken_;
+    waiting_ends_.push_back(scan->end());
     record(pacer_.add(scan, source_->rig()));
     if (!progress) return;
     const double share = source_->progress();
@@ -82,8 +97,18 @@ class SparseRun {
     if (source_->rig().body_from_imu) pacer_.add(sample);
   }
 
+  void warn_of_dropped() {
+    const std::uint64_t dropped = player_->dropped_scans();
+    if (dropped == 0) return;
+    log_.warn("realtime.dropped",
+              fmt::format("{} of {} scans were dropped, because the machine could not keep up",
+                          dropped, dropped + taken_));
+  }
+
   void record(const std::vector<StemScan>& results) {
     for (const StemScan& result : results) {
+      if (player_ != nullptr) latencies_ms_.push_back(player_->latency_ms(waiting_ends_.front()));
+      waiting_ends_.pop_front();
       path_.push_back({result.view.stamp, result.step.world_from_body});
       if (!result.positioned) continue;
       ++positioned_;
@@ -106,22 +131,14 @@ class SparseRun {
   std::size_t positioned_ = 0;
   std::size_t last_stems_ = 0;
   std::vector<GnssFix> fixes_;
+  RealtimePlayer* player_ = nullptr;  // source_, if it is one
+  std::deque<TimeNs> waiting_ends_;   // of scans that have no pose yet
+  std::vector<double> latencies_ms_;
   StageTimes times_;
   std::vector<SparseStep> steps_;  // of the views that were kept
 };
 
 }  // namespace
-
-ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
-  ConfigTable table;
-  table.section("time_repair", [&] { EventOrderer::describe(table, config.time_repair); });
-  table.section("stems", [&] {
-    describe(table, config.front_end);
-    table.section("pace", [&] { describe(table, config.pace); });
-  });
-  describe(table, config.correction);
-  return table;
-}
 
 CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& log,
                                      const ProgressSink& progress,

@@ -3,21 +3,11 @@
 #include <filesystem>
 #include <string>
 
-#include "understory/odometry/stem_front_end.h"
-#include "understory/odometry/stem_pacer.h"
 #include "understory/pipeline/correction.h"
-#include "understory/preprocess/event_orderer.h"
+#include "understory/pipeline/sparse_mapping_config.h"
 #include "understory/recording/recording.h"
 
 namespace understory {
-
-struct SparseMappingConfig {
-  EventOrderer::Config time_repair;
-  StemFrontEndConfig front_end;
-  StemPaceConfig pace;
-  CorrectionConfig correction;
-};
-[[nodiscard]] ConfigTable sparse_mapping_table(SparseMappingConfig& config);
 
 // One call of `understory map --front-end sparse`.
 struct SparseMappingRequest {
@@ -26,6 +16,7 @@ struct SparseMappingRequest {
   SparseMappingConfig config;
   std::string config_yaml;
   OpenOptions open;
+  bool realtime = false;  // played at the speed of its sensors; late scans are dropped
   bool overwrite = false;
 };
 

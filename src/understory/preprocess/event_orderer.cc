@@ -249,6 +249,8 @@ bool EventOrderer::safe(const Pending& pending) const {
 bool EventOrderer::covered(const Pending& scan) {
   const Clock& imu = clocks_[kImu];
   if (imu.any_released && imu.released >= scan.time) return true;
+  // The first scan has waited for an IMU that there is none of so far: the others need not.
+  if (!imu.seen && clocks_[kLidar].any_released) return true;
   if (finished_ || newest_ - scan.time > ns(config_.imu_silence_s)) {
     if (imu.seen) ++report_.scans_without_imu;
     return true;

@@ -129,6 +129,27 @@ TEST(EventOrderer, NothingLagsBehindWithoutWindow) {
   EXPECT_EQ(orderer.pop()->index(), EventOrderer::kLidar);
 }
 
+// Where there is no IMU, only the first scan waits for it.
+TEST(EventOrderer, NothingLagsBehindWithoutImu) {
+  EventOrderer::Config config;
+  config.window_s = 0.0;
+  Log log;
+  EventOrderer orderer(config, log);
+  orderer.push(scan(kEpoch));
+  orderer.push(scan(kEpoch + 200 * kMs));
+  EXPECT_FALSE(orderer.pop().has_value());
+  orderer.push(scan(kEpoch + 400 * kMs));
+  for (int k = 0; k < 3; ++k)
+    EXPECT_TRUE(orderer.pop().has_value());
+  orderer.push(scan(kEpoch + 600 * kMs));
+  EXPECT_TRUE(orderer.pop().has_value());
+  // One that shows up later is waited for again.
+  orderer.push(imu(kEpoch + 700 * kMs));
+  EXPECT_TRUE(orderer.pop().has_value());
+  orderer.push(scan(kEpoch + 800 * kMs));
+  EXPECT_FALSE(orderer.pop().has_value());
+}
+
 TEST(EventOrderer, PutsShuffledMessagesInOrderAndDropsDuplicates) {
   const std::vector<Event> clean = recording(6.0);
   std::vector<Event> events = clean;

@@ -68,8 +68,8 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 // Walks a YAML document and gathers what is wrong with it.
 class ConfigReader {
  public:
-  ConfigReader(ConfigTable& table, std::string origin)
-      : table_(table), origin_(std::move(origin)) {}
+  ConfigReader(ConfigTable& table, std::string origin, std::vector<std::string>* passed_over)
+      : table_(table), origin_(std::move(origin)), passed_over_(passed_over) {}
 
   void read(const YAML::Node& node, const std::string& path) {
     for (const auto& entry : node) {
@@ -90,7 +90,9 @@ class ConfigReader {
   void assign(const std::string& key, const YAML::Node& node, int line) {
     ConfigTable::Field* field = table_.find(key);
     std::string problem;
-    if (field == nullptr) {
+    if (field == nullptr && passed_over_ != nullptr) {
+      passed_over_->push_back(key);
+    } else if (field == nullptr) {
       problem = table_.unknown(key);
     } else if (node.IsSequence()) {
       problem = assign_list(*field, node);
@@ -116,6 +118,7 @@ class ConfigReader {
 
   ConfigTable& table_;
   std::string origin_;
+  std::vector<std::string>* passed_over_;
 };
 
 void ConfigTable::section(const std::string& name, const std::function<void()>& fields) {
@@ -248,8 +251,9 @@ std::string ConfigTable::unknown(const std::string& key) const {
   return "unknown key" + (nearest != nullptr ? " (did you mean " + nearest->key + "?)" : "");
 }
 
-void ConfigTable::read_yaml(const std::string& text, const std::string& origin) {
-  ConfigReader reader(*this, origin);
+void ConfigTable::read_yaml(const std::string& text, const std::string& origin,
+                            std::vector<std::string>* passed_over) {
+  ConfigReader reader(*this, origin, passed_over);
   try {
     const YAML::Node root = YAML::Load(text);
     if (!root.IsNull() && !root.IsMap()) {

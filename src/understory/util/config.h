@@ -56,8 +56,10 @@ class ConfigTable {
 
   // Reads YAML text or a file into the bound variables. Unknown keys (with the nearest known one as
   // a hint), wrong types and values out of range are all gathered into one ConfigError; `origin`
-  // (file name) is put before each.
-  void read_yaml(const std::string& text, const std::string& origin);
+  // (file name) is put before each. With `passed_over` unknown keys are no problem and are told
+  // there.
+  void read_yaml(const std::string& text, const std::string& origin,
+                 std::vector<std::string>* passed_over = nullptr);
   void read_file(const std::string& path);
   // Applies "key=value" settings; all problems in one ConfigError.
   void set(const std::vector<std::string>& settings);

@@ -64,6 +64,17 @@ TEST(Config, ReportsAllProblemsAtOnceWithTheirLines) {
   }
 }
 
+// A shipped profile serves several tables.
+TEST(Config, PassesOverUnknownKeysOnRequest) {
+  Sample sample;
+  ConfigTable table = table_of(sample);
+  std::vector<std::string> passed_over;
+  table.read_yaml("map:\n  colour: red\n  count: 7\nother: {depth_m: 1}\n", "x.yaml", &passed_over);
+  EXPECT_EQ(passed_over, (std::vector<std::string>{"map.colour", "other.depth_m"}));
+  EXPECT_EQ(sample.count, 7);
+  EXPECT_THROW(table.read_yaml("map:\n  count: none\n", "x.yaml", &passed_over), ConfigError);
+}
+
 TEST(Config, RefusesValuesOutOfRange) {
   Sample sample;
   ConfigTable table = table_of(sample);

@@ -1,0 +1,71 @@
+#include "understory/pipeline/sparse_mapping_config.h"
+
+#include <memory>
+
+#include "understory/pipeline/mapping_config.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+std::string joined(const std::vector<std::string>& keys) {
+  std::string text;
+  for (const std::string& key : keys)
+    text += (text.empty() ? "" : ", ") + key;
+  return text;
+}
+
+}  // namespace
+
+ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
+  ConfigTable table;
+  table.section("time_repair", [&] { EventOrderer::describe(table, config.time_repair); });
+  table.section("preprocess", [&] {
+    table.add("machine_boxes_file", config.machine_boxes_file,
+              "YAML of boxes around the machine: what lies in them is no stem; empty: none");
+  });
+  table.section("stems", [&] {
+    describe(table, config.front_end);
+    table.section("pace", [&] { describe(table, config.pace); });
+  });
+  describe(table, config.correction);
+  table.section("run", [&] {
+    table.add("realtime_queue_scans", config.realtime_queue_scans, {1, 1000}, "scans",
+              "--realtime: scans that may wait; older ones are dropped");
+  });
+  return table;
+}
+
+SparseMappingConfig read_sparse_mapping_config(const std::string& profile, const std::string& file,
+                                               const std::vector<std::string>& settings, Log& log) {
+  SparseMappingConfig config;
+  ConfigTable table = sparse_mapping_table(config);
+  std::vector<std::string> problems;
+  const auto gather = [&](const auto& read) {
+    try {
+      read();
+    } catch (const ConfigError& error) {
+      problems.insert(problems.end(), error.problems().begin(), error.problems().end());
+    }
+  };
+  gather([&] {
+    if (profile.empty()) return;
+    std::vector<std::string> passed_over;
+    table.read_yaml(profile_text(profile), "profile " + profile, &passed_over);
+    if (!passed_over.empty())
+      log.info("profile " + profile + ": not for stems and passed over: " + joined(passed_over));
+  });
+  gather([&] {
+    if (!file.empty()) table.read_file(file);
+  });
+  gather([&] { table.set(settings); });
+  gather([&] {
+    if (config.machine_boxes_file.empty()) return;
+    config.front_end.machine_boxes = std::make_shared<const std::vector<MachineBox>>(
+        read_machine_boxes(config.machine_boxes_file));
+  });
+  if (!problems.empty()) throw ConfigError(problems);
+  return config;
+}
+
+}  // namespace understory

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "understory/odometry/stem_front_end.h"
+#include "understory/odometry/stem_pacer.h"
+#include "understory/pipeline/correction.h"
+#include "understory/preprocess/event_orderer.h"
+#include "understory/util/config.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// Everything that can be set for `understory map --front-end sparse`.
+struct SparseMappingConfig {
+  EventOrderer::Config time_repair;
+  std::string machine_boxes_file;  // YAML, the same as for the dense front end; empty: none
+  StemFrontEndConfig front_end;
+  StemPaceConfig pace;
+  CorrectionConfig correction;
+  int realtime_queue_scans = 3;
+};
+
+// The table of all keys, bound to `config`.
+[[nodiscard]] ConfigTable sparse_mapping_table(SparseMappingConfig& config);
+
+// Defaults, then the profile, then the file, then the settings ("key=value"). Empty = none. Keys of
+// a profile that are not about stems are passed over, which is noted; all other problems are in one
+// ConfigError. The machine's boxes are read, too.
+[[nodiscard]] SparseMappingConfig read_sparse_mapping_config(
+    const std::string& profile, const std::string& file, const std::vector<std::string>& settings,
+    Log& log);
+
+}  // namespace understory
