@@ -169,11 +169,14 @@ StemBand within_15_m(TestFrames& site, int every) {
 // Seeds that the score was not fitted to.
 TEST(StemSegments, AreFoundInFramesOfSixteenRings) {
   TestFrames site(load_site("lieksa2", {"seed=5"}));
-  const StemBand near = within_15_m(site, 2800);
-  EXPECT_GT(near.clear, 150);
-  EXPECT_GT(near.recall(), 0.97);
-  EXPECT_GT(near.precision(), 0.97);
-  EXPECT_LT(near.centre_rmse_m(), 0.033);
+  // 2.3 cm in 31 frames. Neither oval sections nor bark add to it (round stems give the same),
+  // crowns do: what looks like a stem in one, up to 40 cm from its tree, counts as right. One such
+  // segment makes 3.1 cm of 2.0 in 13 frames.
+  const StemBand near = within_15_m(site, 1120);
+  EXPECT_GT(near.clear, 500);
+  EXPECT_GT(near.recall(), 0.98);
+  EXPECT_GT(near.precision(), 0.98);
+  EXPECT_LT(near.centre_rmse_m(), 0.027);
   EXPECT_LT(std::abs(near.along / near.right), 0.005);
 }
 
