@@ -54,7 +54,7 @@ class ProgressLine {
   [[nodiscard]] std::string text(const ProgressReport& report, double elapsed) const {
     std::string line = report.stage;
     if (report.total > 0.0) line += fmt::format(" {:3.0f} %", 100.0 * report.done / report.total);
-    line += fmt::format("  {:.0f} {}", report.done, report.unit);
+    line += report.unit.empty() ? " ..." : fmt::format("  {:.0f} {}", report.done, report.unit);
     const double rate = elapsed > 0.5 ? (report.done - start_done_) / elapsed : 0.0;
     if (rate > 0.0) {
       line += fmt::format("  {:.1f}/s", rate);

@@ -20,7 +20,7 @@ struct FelledConfig {
   double reach_m = 15.0;     // farther sights and misses tell nothing
   double nearest_m = 1.5;    // nor do those that the machine itself may hide
   int min_seen = 3;          // within reach, before it was gone
-  int min_missed = 7;        // within reach, from then on: misses in a row are not independent
+  int min_missed = 9;        // within reach, from then on: misses in a row are not independent
   double chance = 1e-4;      // that a standing tree is missed as often in a row
   double clearance_m = 0.3;  // a stem that near to the line of sight may hide it
 };
