@@ -120,6 +120,33 @@ TEST(Ground, AStrayPointDeepBelowDoesNotPullItDown) {
   EXPECT_EQ(model.las_class(model.height_above({5.0, 5.0, 101.5})), 4);
 }
 
+// A tilted lidar with crosstalk over many scans: ghosts below every cell, spread over the depth.
+TEST(Ground, GhostsBelowEveryCellDoNotPullItDown) {
+  Plot plot(4);
+  plot.slope_x = 0.5;
+  plot.add_ground(20.0, 1500);
+  Random random(5);
+  for (int i = 0; i < 2000; ++i) {
+    const double x = random.uniform(0.0, 20.0);
+    const double y = random.uniform(0.0, 20.0);
+    plot.cloud.emplace_back(x, y, plot.ground(x, y) - random.uniform(0.5, 40.0));
+  }
+  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
+  double squares = 0.0;
+  double worst = 0.0;
+  int count = 0;
+  for (double x = 1.0; x < 19.0; x += 0.5) {
+    for (double y = 1.0; y < 19.0; y += 0.5) {
+      const double error = model.terrain.interpolate(x, y) - plot.ground(x, y);
+      squares += error * error;
+      worst = std::max(worst, std::abs(error));
+      ++count;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / count), 0.03);
+  EXPECT_LT(worst, 0.4);  // a ghost just below its cell may stay
+}
+
 TEST(Ground, NothingIsInventedFarFromTheGround) {
   Plot plot(3);
   plot.add_ground(10.0, 40);

@@ -7,6 +7,7 @@
 
 #include "understory/forest/cell_grid.h"
 #include "understory/forest/cloth.h"
+#include "understory/forest/low_noise.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -18,8 +19,7 @@ constexpr std::uint64_t kStray = 20;
 
 // The lowest heights in a cell, in ascending order.
 struct LowCell {
-  static constexpr int kKept = 3;
-  std::array<float, kKept> z = {kNan, kNan, kNan};
+  std::array<float, 4> z = {kNan, kNan, kNan, kNan};
   void add(float height) {
     for (float& kept : z) {
       if (!(kept <= height)) std::swap(kept, height);
@@ -33,10 +33,21 @@ struct MeanCell {
   std::uint32_t count = 0;
 };
 
-// The lowest height of each cell that is no stray point below the ground: one far under all of its
-// neighbours, with nothing near it in its own cell, gives way to the next.
+// The lowest point of a cell that another one lies near above; the lowest if there is none.
+float supported_height(const LowCell& cell) {
+  constexpr float kNear = 0.4F;
+  for (std::size_t i = 0; i + 1 < cell.z.size(); ++i) {
+    if (cell.z[i + 1] - cell.z[i] <= kNear) return cell.z[i];
+  }
+  return cell.z[0];
+}
+
+// The lowest height of each cell that is no stray point below the ground: one far under its
+// neighbours gives way to the next.
 std::vector<float> floor_heights(const Raster& grid, const std::vector<LowCell>& low) {
   constexpr float kStrayDepth = 0.8F;
+  std::vector<float> supported(low.size());
+  std::transform(low.begin(), low.end(), supported.begin(), supported_height);
   std::vector<float> result(low.size(), kNan);
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
@@ -44,22 +55,23 @@ std::vector<float> floor_heights(const Raster& grid, const std::vector<LowCell>&
       for (int j = -2; j <= 2; ++j) {
         for (int i = -2; i <= 2; ++i) {
           if ((i == 0 && j == 0) || !grid.contains(column + i, row + j)) continue;
-          const float z = low[grid.index(column + i, row + j)].z[0];
+          const float z = supported[grid.index(column + i, row + j)];
           if (std::isfinite(z)) around.push_back(z);
         }
       }
-      const LowCell& cell = low[grid.index(column, row)];
-      float chosen = cell.z[0];
+      const std::size_t here = grid.index(column, row);
+      float chosen = supported[here];
       if (around.size() >= 4) {
         // The third lowest around: a slope has lower neighbours, a stray point has none.
         std::nth_element(around.begin(), around.begin() + 2, around.end());
         const float floor = around[2] - kStrayDepth;
-        for (const float z : cell.z) {
+        for (const float z : low[here].z) {
+          if (z < supported[here]) continue;
           chosen = z;
           if (std::isnan(z) || z >= floor) break;
         }
       }
-      result[grid.index(column, row)] = chosen;
+      result[here] = chosen;
     }
   }
   return result;
@@ -136,14 +148,16 @@ void drop_bumps(Raster& grid, float most) {
   });
 }
 
-// Pass 1: the lowest points on the grid of the cloth, which is also that of the terrain.
+// Passes 1 and 2: the lowest points on the grid of the cloth, which is also that of the terrain.
 std::vector<LowCell> lowest_points(const PointBlocks& cloud, double cell_m, Raster& grid) {
+  const LowNoise noise(cloud);
   CellGrid<LowCell> cells(cell_m);
   bool first = true;
   cloud([&](std::span<const Eigen::Vector3d> points) {
     for (const Eigen::Vector3d& point : points) {
       if (first) grid.z0 = std::floor(point.z());
       first = false;
+      if (noise.holds(point)) continue;
       cells.at(point.x(), point.y()).add(static_cast<float>(point.z() - grid.z0));
     }
   });
@@ -171,7 +185,7 @@ void heights_over(const Raster& terrain, std::span<const Eigen::Vector3d> points
   });
 }
 
-// Pass 2: the mean of the points in a thin layer around the provisional terrain. The lowest point
+// Pass 3: the mean of the points in a thin layer around the provisional terrain. The lowest point
 // of a cell lies below the ground by the noise of the ranges; the mean does not.
 double refine(const PointBlocks& cloud, const GroundConfig& config, Raster& terrain) {
   std::vector<MeanCell> cells(terrain.values.size());

@@ -1,18 +1,31 @@
 #include "understory/map/keyframe_clouds.h"
 
+#include <array>
+
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
-constexpr std::uint32_t kMark = 0x4b464331;  // "KFC1"
+constexpr std::uint32_t kMark = 0x4b464332;  // "KFC2"
 
 struct RecordHeader {
   std::uint32_t mark = kMark;
   std::int32_t id = 0;
   std::int64_t stamp = 0;
   std::uint64_t count = 0;
+  std::array<double, 7> keyframe_from_body = {0, 0, 0, 0, 0, 0, 1};  // x y z, qx qy qz qw
 };
+
+std::array<double, 7> to_numbers(const Pose& pose) {
+  const Eigen::Vector3d& t = pose.translation();
+  const Eigen::Quaterniond& q = pose.rotation();
+  return {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
+}
+
+Pose to_pose(const std::array<double, 7>& n) {
+  return {Eigen::Quaterniond(n[6], n[3], n[4], n[5]), Eigen::Vector3d(n[0], n[1], n[2])};
+}
 
 }  // namespace
 
@@ -39,7 +52,7 @@ void KeyframeClouds::index_existing(std::size_t keep) {
     if (!file || header.mark != kMark ||
         header.count > (left - sizeof(header)) / sizeof(KeyframePoint)) {
       throw InputError(path_.string(), "at byte " + std::to_string(end_),
-                       "expected the cloud of keyframe " + std::to_string(offsets_.size()));
+                       "expected cloud " + std::to_string(offsets_.size()));
     }
     offsets_.push_back(end_);
     end_ += sizeof(header) + header.count * sizeof(KeyframePoint);
@@ -49,7 +62,8 @@ void KeyframeClouds::index_existing(std::size_t keep) {
 }
 
 void KeyframeClouds::append(const KeyframeCloud& cloud) {
-  const RecordHeader header{kMark, cloud.id, cloud.stamp, cloud.points.size()};
+  const RecordHeader header{kMark, cloud.id, cloud.stamp, cloud.points.size(),
+                            to_numbers(cloud.keyframe_from_body)};
   file_.seekp(static_cast<std::streamoff>(end_));
   file_.write(reinterpret_cast<const char*>(&header), sizeof(header));
   const std::size_t bytes = cloud.points.size() * sizeof(KeyframePoint);
@@ -73,13 +87,14 @@ KeyframeCloud KeyframeClouds::read(std::size_t i) const {
   const bool sound = file_ && header.mark == kMark;
   KeyframeCloud cloud;
   if (sound) {
-    cloud = {header.id, header.stamp, std::vector<KeyframePoint>(header.count)};
+    cloud = {header.id, header.stamp, std::vector<KeyframePoint>(header.count),
+             to_pose(header.keyframe_from_body)};
     file_.read(reinterpret_cast<char*>(cloud.points.data()),
                static_cast<std::streamsize>(header.count * sizeof(KeyframePoint)));
   }
   if (!sound || !file_) {
     throw InputError(path_.string(), "at byte " + std::to_string(offsets_[i]),
-                     "expected the cloud of keyframe " + std::to_string(i));
+                     "expected cloud " + std::to_string(i));
   }
   return cloud;
 }

@@ -6,27 +6,29 @@
 #include <string>
 #include <vector>
 
+#include "understory/geometry/pose.h"
 #include "understory/util/time.h"
 
 namespace understory {
 
-// One point of a keyframe's cloud, in the body frame at the keyframe's stamp, metres.
+// One point of a cloud, in the body frame at the cloud's stamp, metres.
 struct KeyframePoint {
   float x = 0.0F;
   float y = 0.0F;
   float z = 0.0F;
   std::uint16_t intensity = 0;
-  std::uint16_t t_10us = 0;  // since the keyframe's stamp, in steps of 10 microseconds
+  std::uint16_t t_10us = 0;  // since the cloud's stamp, in steps of 10 microseconds
 };
 
 struct KeyframeCloud {
-  std::int32_t id = 0;
+  std::int32_t id = 0;  // of a keyframe, which takes the cloud along when it is moved
   TimeNs stamp = 0;
   std::vector<KeyframePoint> points;
+  Pose keyframe_from_body;  // at the stamp; identity for the keyframe's own cloud
 };
 
-// The keyframes' full clouds on disk, appended one after another, so that memory does not grow with
-// the length of a run. What was appended before `flush` survives a crash of the program.
+// Clouds that belong to keyframes, on disk, appended one after another, so that memory does not
+// grow with the length of a run. What was appended before `flush` survives a crash of the program.
 // Not thread-safe. Throws OutputError where the disk is full, InputError where the file is damaged.
 class KeyframeClouds {
  public:

@@ -10,7 +10,7 @@ KeyframePoints::KeyframePoints(const std::filesystem::path& file, std::size_t ke
 
 void KeyframePoints::append(TimeNs stamp, const Points& points) {
   const std::lock_guard lock(mutex_);
-  KeyframeCloud cloud{static_cast<std::int32_t>(clouds_.size()), stamp, {}};
+  KeyframeCloud cloud{static_cast<std::int32_t>(clouds_.size()), stamp, {}, {}};
   cloud.points.reserve(points.size());
   for (const Eigen::Vector3f& p : points)
     cloud.points.push_back({p.x(), p.y(), p.z(), 0, 0});

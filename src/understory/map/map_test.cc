@@ -20,7 +20,7 @@ std::filesystem::path scratch(const std::string& name) {
 }
 
 KeyframeCloud cloud_of(int id, std::size_t points) {
-  KeyframeCloud cloud{id, 100 * id, {}};
+  KeyframeCloud cloud{id, 100 * id, {}, Pose(so3_exp({0.0, 0.1, 0.2}), {1.0, 2.0, 1.0 * id})};
   for (std::size_t i = 0; i < points; ++i) {
     cloud.points.push_back(
         {static_cast<float>(id), static_cast<float>(i), 0.5F, static_cast<std::uint16_t>(i), 7});
@@ -37,6 +37,7 @@ TEST(KeyframeClouds, ReadsBackInAnyOrder) {
     EXPECT_EQ(cloud.id, static_cast<int>(i));
     EXPECT_EQ(cloud.stamp, static_cast<TimeNs>(100 * i));
     ASSERT_EQ(cloud.points.size(), 10 * i);
+    EXPECT_EQ(cloud.keyframe_from_body.matrix(), cloud_of(cloud.id, 0).keyframe_from_body.matrix());
     if (i > 0) {
       EXPECT_EQ(cloud.points.back().y, static_cast<float>(10 * i - 1));
     }

@@ -14,7 +14,7 @@
 namespace understory {
 namespace {
 
-constexpr char kMark[] = "UNDERSTORY CHECKPOINT 2\n";
+constexpr char kMark[] = "UNDERSTORY CHECKPOINT 3\n";
 
 std::string checksum(const std::string& bytes) {
   const uLong crc =

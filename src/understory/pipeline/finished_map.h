@@ -11,7 +11,7 @@
 
 namespace understory {
 
-// All keyframes' clouds at their finished poses, sorted into tiles in `folder`.
+// All clouds at their keyframes' finished poses, sorted into tiles in `folder`.
 [[nodiscard]] std::unique_ptr<MapTiles> make_finished_map(const KeyframeClouds& clouds,
                                                           const std::vector<Keyframe>& keyframes,
                                                           const MapTiles::Config& config,

@@ -19,12 +19,12 @@ struct MappingConfig {
   DenseOdometryConfig odometry;
   KeyframeMap::Config keyframe_map;
   MapTiles::Config map;
-  double keyframe_thin_m = 0.02;  // thins a keyframe's cloud before it is stored
+  double keyframe_thin_m = 0.02;  // thins a scan's cloud before it is stored for the map
   double map_range_max_m = 60.0;  // farther returns do not enter the finished map
   bool map_enabled = true;        // write map.laz and what is made from it
   InventoryConfig inventory;
   double checkpoint_interval_s = 4.0;  // of recording; at most 5 s are processed again
-  double cloud_distance_m = 1.0;  // weighted distance (37) between keyframes whose clouds are kept
+  double cloud_distance_m = 1.0;       // weighted distance (37) between scans whose clouds are kept
   // Scans with fewer points than this (16 beams) are matched and mapped as they are: thinned like a
   // dense scan, too few points would be left in a cell.
   int sparse_scan_points = 60000;

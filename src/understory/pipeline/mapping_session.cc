@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "understory/geometry/pose_io.h"
 #include "understory/sensor/sensor_io.h"
@@ -19,6 +20,7 @@ constexpr std::size_t kFewPoints = 100;
 constexpr double kMostSpeedMS = 100.0;
 constexpr double kSparseVoxelM = 0.1;
 constexpr double kSparseKeyframeM = 0.3;
+constexpr double kSparseCloudM = 0.1;  // between scans of the finished map
 constexpr double kSparseVolumeWeight = 1.0;
 constexpr double kSparseInlierRatio = 0.05;  // few of the map's small cells have enough points yet
 // Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
@@ -168,6 +170,7 @@ void MappingSession::adapt_to(std::size_t scan_points) {
     local.cells.volume_weight = std::max(local.cells.volume_weight, kSparseVolumeWeight);
     double& distance = config_.keyframe_map.keyframe.distance_m;
     distance = std::min(distance, kSparseKeyframeM);
+    config_.cloud_distance_m = std::min(config_.cloud_distance_m, kSparseCloudM);
   }
   if (alone && cells.size() == 2) {
     cells.insert(cells.begin() + 1, std::sqrt(cells[0] * cells[1]));
@@ -304,15 +307,20 @@ void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& recor
   const bool first = map_->keyframes().empty();
   const Pose reference = first ? state.world_from_body : map_->keyframes().back().world_from_body;
   record.keyframe = first ? 0 : static_cast<std::int32_t>(map_->keyframes().size()) - 1;
-  record.set_pose(reference.inverse() * state.world_from_body);
+  const Pose keyframe_from_body = reference.inverse() * state.world_from_body;
+  record.set_pose(keyframe_from_body);
   const Eigen::Quaterniond keyframe_from_world = reference.rotation().conjugate();
   Eigen::Map<Eigen::Vector3d>(record.velocity.data()) =
       keyframe_from_world * state.velocity_in_world;
   Eigen::Map<Eigen::Vector3d>(record.gyro_bias.data()) = state.gyro_bias;
   Eigen::Map<Eigen::Vector3d>(record.accel_bias.data()) = state.accel_bias;
-  if (!wanted) return;
+  if (!wanted) {
+    const auto keyframe = static_cast<std::size_t>(record.keyframe);
+    if (good && !first) store_cloud(estimate, keyframe, keyframe_from_body);
+    return;
+  }
   record.becomes_keyframe = 1;
-  store_cloud(estimate);
+  store_cloud(estimate, map_->keyframes().size(), Pose());
   const auto moved = map_->add(record.stamp, state.world_from_body, map_points(estimate));
   if (moved) odometry_->move_world(*moved);
 }
@@ -325,34 +333,37 @@ Points MappingSession::map_points(const DenseEstimate& estimate) {
   return cloud_filter_.filter(estimate.cloud, voxel).points;
 }
 
-void MappingSession::store_cloud(const DenseEstimate& estimate) {
-  const ScopedTimer timer(times_, "store");
-  const BodyCloud& cloud = estimate.cloud;
-  KeyframeCloud stored{static_cast<std::int32_t>(map_->keyframes().size()), cloud.stamp, {}};
+// Keeps what a scan adds to the finished map.
+void MappingSession::store_cloud(const DenseEstimate& estimate, std::size_t keyframe,
+                                 const Pose& keyframe_from_body) {
+  if (!config_.map_enabled) return;
   const auto& keyframes = map_->keyframes();
-  const bool due =
-      keyframes.empty() ||
-      keyframe_distance(keyframes[last_cloud_].world_from_body, estimate.state.world_from_body,
-                        config_.keyframe_map.keyframe) >= config_.cloud_distance_m;
-  if (config_.map_enabled && due) {
-    last_cloud_ = keyframes.size();
-    std::vector<std::uint32_t> kept;
-    if (config_.keyframe_thin_m > 0.0) {
-      kept = cloud_filter_.keep(cloud.points, config_.keyframe_thin_m);
-    } else {
-      kept.resize(cloud.size());
-      for (std::uint32_t i = 0; i < kept.size(); ++i)
-        kept[i] = i;
-    }
-    const auto nearest = static_cast<float>(config_.odometry.voxel.range_min_m);
-    const auto farthest = static_cast<float>(config_.map_range_max_m);
-    stored.points.reserve(kept.size());
-    for (const std::uint32_t i : kept) {
-      if (cloud.range[i] < nearest || cloud.range[i] > farthest) continue;
-      const Eigen::Vector3f& p = cloud.points[i];
-      stored.points.push_back({p.x(), p.y(), p.z(), clamp_to_u16(cloud.intensity[i]),
-                               clamp_to_u16(static_cast<double>(cloud.t_ns[i]) * 1e-4)});
-    }
+  if (clouds_->size() > 0) {
+    const Pose world_from_last = keyframes[last_cloud_].world_from_body * keyframe_from_last_cloud_;
+    if (keyframe_distance(world_from_last, estimate.state.world_from_body,
+                          config_.keyframe_map.keyframe) < config_.cloud_distance_m)
+      return;
+  }
+  const ScopedTimer timer(times_, "store");
+  last_cloud_ = keyframe;
+  keyframe_from_last_cloud_ = keyframe_from_body;
+  const BodyCloud& cloud = estimate.cloud;
+  KeyframeCloud stored{static_cast<std::int32_t>(keyframe), cloud.stamp, {}, keyframe_from_body};
+  std::vector<std::uint32_t> kept;
+  if (config_.keyframe_thin_m > 0.0) {
+    kept = cloud_filter_.keep(cloud.points, config_.keyframe_thin_m);
+  } else {
+    kept.resize(cloud.size());
+    std::iota(kept.begin(), kept.end(), 0U);
+  }
+  const auto nearest = static_cast<float>(config_.odometry.voxel.range_min_m);
+  const auto farthest = static_cast<float>(config_.map_range_max_m);
+  stored.points.reserve(kept.size());
+  for (const std::uint32_t i : kept) {
+    if (cloud.range[i] < nearest || cloud.range[i] > farthest) continue;
+    const Eigen::Vector3f& p = cloud.points[i];
+    stored.points.push_back({p.x(), p.y(), p.z(), clamp_to_u16(cloud.intensity[i]),
+                             clamp_to_u16(static_cast<double>(cloud.t_ns[i]) * 1e-4)});
   }
   clouds_->append(stored);
 }
@@ -375,6 +386,7 @@ void MappingSession::save(BinaryWriter& writer) const {
   writer.put(last_scan_end_);
   writer.put(sparse_);
   writer.put(last_cloud_);
+  put_pose(writer, keyframe_from_last_cloud_);
   put_pose(writer, last_good_);
   writer.put(last_good_inliers_);
   writer.put_doubles(last_good_velocity_.data(), 3);
@@ -401,6 +413,7 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   last_scan_end_ = reader.get<TimeNs>();
   const bool sparse = reader.get<std::uint8_t>() != 0;
   last_cloud_ = reader.get<std::uint64_t>();
+  keyframe_from_last_cloud_ = get_pose(reader);
   last_good_ = get_pose(reader);
   last_good_inliers_ = reader.get<double>();
   reader.get_doubles(last_good_velocity_.data(), 3);

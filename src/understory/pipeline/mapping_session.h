@@ -106,7 +106,8 @@ class MappingSession {
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
   [[nodiscard]] bool lost(const DenseEstimate& estimate) const;
   [[nodiscard]] Points map_points(const DenseEstimate& estimate);
-  void store_cloud(const DenseEstimate& estimate);
+  void store_cloud(const DenseEstimate& estimate, std::size_t keyframe,
+                   const Pose& keyframe_from_body);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
 
   MappingConfig config_;
@@ -129,8 +130,9 @@ class MappingSession {
   std::string imu_refused_;
   bool imu_doubted_ = false;
   std::uint8_t sparse_ = 0;       // the first scan was
-  std::uint64_t last_cloud_ = 0;  // keyframe whose cloud was kept last
-  Pose last_good_;                // of the last scan that was matched
+  std::uint64_t last_cloud_ = 0;  // keyframe that the cloud kept last belongs to
+  Pose keyframe_from_last_cloud_;
+  Pose last_good_;  // of the last scan that was matched
   bool at_once_ = false;
   std::unique_ptr<Opening> opening_;  // until the first scans are settled
 };

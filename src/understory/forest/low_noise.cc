@@ -1,0 +1,83 @@
+#include "understory/forest/low_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "understory/forest/cell_grid.h"
+
+namespace understory {
+namespace {
+
+constexpr double kCell = 2.0;
+constexpr double kStep = 0.5;          // half a layer
+constexpr std::uint32_t kLeast = 4;    // points that make a layer
+constexpr double kLeastShare = 0.004;  // of the points of its cell
+constexpr std::uint64_t kMostCells = 24'000'000;
+constexpr std::uint64_t kStray = 20;
+
+// How many points a cell has by height, in steps, ascending.
+struct Column {
+  std::vector<std::pair<int, std::uint32_t>> counts;
+
+  void add(int step) {
+    auto at = std::lower_bound(counts.begin(), counts.end(), std::pair(step, std::uint32_t{0}));
+    if (at == counts.end() || at->first != step) at = counts.insert(at, {step, 0});
+    ++at->second;
+  }
+  // The step at which the lowest layer begins; nothing below any other if there is none.
+  [[nodiscard]] float lowest_layer() const {
+    std::uint64_t all = 0;
+    for (const auto& [step, count] : counts)
+      all += count;
+    const double wanted = std::max<double>(kLeast, kLeastShare * static_cast<double>(all));
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      std::uint32_t within = counts[i].second;
+      if (i + 1 < counts.size() && counts[i + 1].first == counts[i].first + 1)
+        within += counts[i + 1].second;
+      if (within >= wanted) return static_cast<float>(counts[i].first);
+    }
+    return std::numeric_limits<float>::quiet_NaN();
+  }
+};
+
+}  // namespace
+
+LowNoise::LowNoise(const PointBlocks& cloud) {
+  CellGrid<Column> columns(kCell);
+  bool first = true;
+  cloud([&](std::span<const Eigen::Vector3d> points) {
+    for (const Eigen::Vector3d& point : points) {
+      if (first) lowest_.z0 = std::floor(point.z());
+      first = false;
+      const double step = std::floor((point.z() - lowest_.z0) / kStep);
+      if (std::abs(step) > 1e6) continue;
+      columns.at(point.x(), point.y()).add(static_cast<int>(step));
+    }
+  });
+  const auto bounds = columns.bounds(kMostCells, kStray);
+  lowest_.cell_m = kCell;
+  lowest_.x0 = bounds.column0 * kCell;
+  lowest_.y0 = bounds.row0 * kCell;
+  lowest_.columns = bounds.columns;
+  lowest_.rows = bounds.rows;
+  lowest_.values.assign(
+      static_cast<std::size_t>(bounds.columns) * static_cast<std::size_t>(bounds.rows),
+      std::numeric_limits<float>::quiet_NaN());
+  columns.for_each([&](int column, int row, const Column& cell) {
+    const int c = column - bounds.column0;
+    const int r = row - bounds.row0;
+    if (lowest_.contains(c, r))
+      lowest_.values[lowest_.index(c, r)] = static_cast<float>(kStep) * cell.lowest_layer();
+  });
+}
+
+bool LowNoise::holds(const Eigen::Vector3d& point) const {
+  constexpr double kMargin = 0.5;
+  return point.z() < lowest_.cell_value(point.x(), point.y()) - kMargin;  // false for NaN
+}
+
+}  // namespace understory

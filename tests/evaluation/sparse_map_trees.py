@@ -1,0 +1,34 @@
+"""A harvester's 16 rings that mostly stand still: every scan of a swing adds to the map, and the trees near the
+way are found in it."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
+
+
+def run(*words):
+    done = subprocess.run([PROGRAM, "--quiet", *map(str, words)], capture_output=True, text=True)
+    assert done.returncode == 0, f"{words} ended with {done.returncode}: {done.stderr}"
+    return done.stdout
+
+
+def main():
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "run"
+        run("map", "sim:lieksa2?seed=7&duration_s=60", "-o", folder)
+        truth = Path(f"{folder}.truth")
+        seen = json.loads(run("evaluate", "trees", folder, truth, "--align", "yaw", "--truth-returns", truth,
+                              "--path", truth, "--within-m", 15, "--min-returns", 30, "--json"))["visible"]
+    said = f"{100 * seen['recall']:.0f} % of {seen['expected']} trees, {100 * seen['false_share']:.0f} % false"
+    print(said)
+    if not (seen["expected"] > 20 and seen["recall"] > 0.75 and seen["false_share"] < 0.05):
+        sys.exit("sparse_map_trees: " + said)
+
+
+if __name__ == "__main__":
+    main()
