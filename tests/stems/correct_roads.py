@@ -111,6 +111,32 @@ def threads(folder):
     return ", ".join(sorted(names - TIMED))
 
 
+@cases.case("odometry from view to view by branch and bound in a small box")
+def go_icp(folder):
+    """P1's sSLAM beside P0's ICP; each step says how well it fits."""
+    views = write_strip_roads(folder, seed=8, roads=Roads(roads=1, length_m=60.0))
+    plane, searched = [], []
+    for matcher in ("icp", "go_icp"):
+        run = folder / matcher
+        done = correct(folder / "stems.csv.gz", run, "--set", f"odometry.matcher={matcher}", "--set",
+                       "odometry.target=frame", "--set", "correction.method=none", "--set", "close_loops=false")
+        assert done.returncode in (0, 4), done.stderr
+        head, *rows = (line.split(",") for line in (run / "steps.csv").read_text().splitlines())
+        rows = [dict(zip(head, row)) for row in rows]
+        assert len(rows) == views and rows[0]["status"] == "first" and not rows[0]["error_m"], rows[0]
+        for row in rows[1:]:
+            assert abs(float(row["overlap"]) + float(row["outlier_ratio"]) - 1.0) < 2e-3, row
+            assert 0.0 < float(row["error_m"]) < 2.0 and row["status"] in ("tracked", "searched", "weak"), row
+        quality = json.loads((run / "run.json").read_text())["quality"]
+        mean = sum(float(row["error_m"]) for row in rows[1:]) / (views - 1)
+        assert abs(quality["match_error_mean_m"] - mean) < 1e-4, (quality["match_error_mean_m"], mean)
+        searched.append(sum(row["status"] == "searched" for row in rows))
+        plane.append(evaluated(run, folder / "truth", "--align", "se3")["ape_plane_rmse_m"])
+    assert plane[1] < plane[0] + 0.05 and searched[1] < searched[0], (plane, searched)
+    return (f"ICP {100 * plane[0]:.1f} cm and {searched[0]} searches, Go-ICP {100 * plane[1]:.1f} cm "
+            f"and {searched[1]}, of {views} views")
+
+
 @cases.case("views that hurt the map are left out of it")
 def eliminated(folder):
     """One view in ten is put 0.35 m beside its place among the scans of a run."""

@@ -45,11 +45,23 @@ Matrix6d step_covariance(const SparseIcpResult& icp) {
 
 }  // namespace
 
+GoIcpConfig SparseOdometryConfig::small_box() {
+  GoIcpConfig config;
+  config.yaw_range_deg = 15.0;
+  config.shift_range_m = 1.5;
+  return config;
+}
+
 void describe(ConfigTable& table, SparseOdometryConfig& config) {
   table.add_enum("target", config.target,
                  {{"frame", SparseOdometryConfig::Target::kFrame},
                   {"map", SparseOdometryConfig::Target::kMap}},
                  "what a view is matched to: the one before, or a local map of stems");
+  table.add_enum("matcher", config.matcher,
+                 {{"icp", SparseOdometryConfig::Matcher::kIcp},
+                  {"go_icp", SparseOdometryConfig::Matcher::kGoIcp}},
+                 "trimmed ICP from the prediction, or branch and bound in a small box around it "
+                 "before (P1)");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
             "share of a view's stems that must be found again; below it a search is made");
   table.add("map_forgetting", config.map_forgetting, {0.01, 1.0}, "",
@@ -59,7 +71,24 @@ void describe(ConfigTable& table, SparseOdometryConfig& config) {
   table.add("tilt_gain", config.tilt_gain, {0.0, 1.0}, "",
             "share of the tilt from the stems' axes taken over at each view");
   table.section("icp", [&] { describe(table, config.icp); });
+  table.section("go_icp", [&] { describe(table, config.go_icp); });
   table.section("search", [&] { describe(table, config.search); });
+}
+
+const char* to_string(SparseStepStatus status) {
+  switch (status) {
+    case SparseStepStatus::kFirst:
+      return "first";
+    case SparseStepStatus::kTracked:
+      return "tracked";
+    case SparseStepStatus::kSearched:
+      return "searched";
+    case SparseStepStatus::kWeak:
+      return "weak";
+    case SparseStepStatus::kUnmatched:
+      break;
+  }
+  return "unmatched";
 }
 
 std::shared_ptr<const SparseTarget> SparseOdometry::target() const {
@@ -89,7 +118,12 @@ SparseOdometry::Match SparseOdometry::match(const Source& source, const Pose& gu
   const Pose last(upright(world_from_level_).rotation(), world_from_body_.translation() - origin_);
   Match match;
   match.l0_m = target.l0_m;
-  match.icp = register_sparse_icp(target, source.points, guess, config_.icp, source.height_sd_m);
+  Pose start = guess;
+  if (config_.matcher == SparseOdometryConfig::Matcher::kGoIcp) {
+    const GoIcpResult found = register_go_icp(target, source.points, guess, config_.go_icp);
+    if (found.status != GoIcpStatus::kTooFewPoints) start = found.target_from_source;
+  }
+  match.icp = register_sparse_icp(target, source.points, start, config_.icp, source.height_sd_m);
   if (match.icp.overlap >= config_.min_overlap) return match;
   match.searched = true;
   for (const YawVoteCandidate& candidate : vote_yaw(target, source.points, last, config_.search)) {

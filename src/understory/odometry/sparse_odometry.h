@@ -8,6 +8,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/odometry/stem_levelling.h"
+#include "understory/registration/go_icp.h"
 #include "understory/registration/sparse_icp.h"
 #include "understory/registration/yaw_vote.h"
 #include "understory/sensor/stem_view.h"
@@ -19,7 +20,12 @@ struct SparseOdometryConfig {
   // Frame: each view to the one before, P0 (16). Map: to the stems of the views before, gathered.
   enum class Target { kFrame, kMap };
   Target target = Target::kMap;
+  // How: trimmed ICP from the prediction, or branch and bound in a small box around it before (P1's
+  // sSLAM). Where either finds too little, a search over every yaw follows.
+  enum class Matcher { kIcp, kGoIcp };
+  Matcher matcher = Matcher::kIcp;
   SparseIcpConfig icp;
+  GoIcpConfig go_icp = small_box();
   YawVoteConfig search;
   double min_overlap = 0.5;  // below it the guess was wrong: search; if still below: weak
   // A stem of the local map moves by this share of the difference to where it is seen. Averaging
@@ -27,6 +33,8 @@ struct SparseOdometryConfig {
   double map_forgetting = 1.0;
   int map_frames = 12;     // stems not seen for longer leave the local map
   double tilt_gain = 0.2;  // share of the tilt from the stems' axes taken over at each view
+
+  [[nodiscard]] static GoIcpConfig small_box();
 };
 void describe(ConfigTable& table, SparseOdometryConfig& config);
 
@@ -37,6 +45,8 @@ enum class SparseStepStatus {
   kWeak,      // little overlap even after the search: the best match, not to be trusted
   kUnmatched  // too few stems: the pose is the prediction
 };
+
+[[nodiscard]] const char* to_string(SparseStepStatus status);
 
 struct SparseStep {
   SparseStepStatus status = SparseStepStatus::kFirst;

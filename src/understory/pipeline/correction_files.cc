@@ -12,10 +12,10 @@
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction_report.h"
+#include "understory/pipeline/correction_tables.h"
 #include "understory/pipeline/gnss_fit.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_truth.h"
-#include "understory/pipeline/scan_path.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
 #include "understory/util/version.h"
@@ -24,44 +24,6 @@ namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
-
-void write_tum(const fs::path& path, const std::vector<StampedPose>& poses) {
-  TumWriter writer(path);
-  for (const StampedPose& pose : poses)
-    writer.add(pose);
-  writer.commit();
-}
-
-// The chained odometry and the corrected path: of every scan where they are known, else of the
-// views.
-void write_paths(const CorrectionRequest& request, const CorrectionRun& run) {
-  std::vector<StampedPose> corrected;
-  std::vector<StampedPose> chained;
-  for (std::size_t i = 0; i < run.views.size(); ++i) {
-    corrected.push_back({run.views[i].stamp, run.correction.world_from_body[i]});
-    chained.push_back({run.views[i].stamp, run.steps[i].world_from_body});
-  }
-  if (!run.path.empty()) {
-    chained = run.path;
-    corrected = spread_corrections(chained, corrected);
-  }
-  write_tum(request.run_folder / "odometry.tum", chained);
-  write_tum(request.run_folder / "trajectory.tum", corrected);
-}
-
-// A row per view for which an earlier place was found, by the views' frame numbers.
-void write_loops(const fs::path& path, const CorrectionRun& run) {
-  AtomicTextFile file(path);
-  file.write("query,match,score,accepted\n");
-  for (std::size_t k = 0; k < run.correction.loops.size(); ++k) {
-    const StemLoop& loop = run.correction.loops[k];
-    file.write(fmt::format("{},{},{:.4f},{}\n",
-                           run.views[static_cast<std::size_t>(loop.query)].frame,
-                           run.views[static_cast<std::size_t>(loop.match)].frame, loop.score,
-                           run.correction.accepted[k] != 0 ? 1 : 0));
-  }
-  file.commit();
-}
 
 // The views that make the map: those that hurt it may be left out, P0 (33).
 struct MapViews {
@@ -90,24 +52,6 @@ std::vector<TreeFall> falls_of(const MapViews& map, const std::vector<MappedStem
                      map.views[static_cast<std::size_t>(fell.first_missed)].stamp, fell.missed});
   }
   return falls;
-}
-
-// A row per pair of views that was matched again to correct the map.
-void write_corrections(const fs::path& path, const CorrectionRun& run) {
-  AtomicTextFile file(path);
-  file.write(
-      "earlier,later,overlap,expected_gain,error_before_m,error_after_m,overlap_after,moved_m,"
-      "go_icp,accepted,kept,beta,reason\n");
-  for (const TriedCorrection& tried : run.correction.self.tried) {
-    file.write(fmt::format("{},{},{:.3f},{:.4f},{:.4f},{:.4f},{:.3f},{:.4f},{},{},{},{:.5f},{}\n",
-                           run.views[static_cast<std::size_t>(tried.pair.j)].frame,
-                           run.views[static_cast<std::size_t>(tried.pair.i)].frame,
-                           tried.pair.overlap, tried.expected_gain, tried.error_before_m,
-                           tried.error_after_m, tried.overlap_after, tried.moved_m,
-                           tried.by_go_icp ? 1 : 0, tried.accepted ? 1 : 0, tried.kept ? 1 : 0,
-                           tried.beta, tried.reason));
-  }
-  file.commit();
 }
 
 std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
@@ -280,6 +224,23 @@ void add_self_correction(const CorrectionRun& run, RunSummary& summary) {
   summary.quality["correction_ended"] = self.stopped_because;
 }
 
+// Means over the steps that found a match, P1 table 1's way of telling how well views fit.
+void add_matching(const CorrectionRun& run, RunSummary& summary) {
+  double error = 0.0;
+  double overlap = 0.0;
+  double steps = 0.0;
+  for (const SparseStep& step : run.steps) {
+    if (step.status == SparseStepStatus::kFirst || step.status == SparseStepStatus::kUnmatched)
+      continue;
+    error += step.error_m;
+    overlap += step.overlap;
+    ++steps;
+  }
+  if (steps == 0.0) return;
+  summary.quality["match_error_mean_m"] = error / steps;
+  summary.quality["match_outlier_ratio_mean"] = 1.0 - overlap / steps;
+}
+
 RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run,
                       const std::vector<MappedStem>& stems, const Log& log) {
   RunSummary summary;
@@ -299,6 +260,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   summary.counts["loops_accepted"] = static_cast<std::int64_t>(
       std::count(run.correction.accepted.begin(), run.correction.accepted.end(), 1));
   summary.quality["path_length_m"] = path_length(run.correction.world_from_body);
+  add_matching(run, summary);
   summary.quality["sight_noise_m"] = sight_noise_m(stems);
   summary.quality["axis_noise_deg"] = axis_noise_deg(stems);
   add_self_correction(run, summary);
@@ -339,9 +301,7 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   std::vector<TreeFall> falls = falls_of(map, stems, trees);
   {
     const ScopedTimer timer(run.times, "writing");
-    write_paths(request, run);
-    write_loops(folder / "loops.csv", run);
-    write_corrections(folder / "corrections.csv", run);
+    write_correction_tables(request, run);
     write_trees_csv(folder / "trees.csv", trees);
     write_tree_falls(folder / "felled.csv", falls);
   }

@@ -243,7 +243,7 @@ std::string write_trees_map(const GeoreferenceRequest& request, const std::vecto
 }
 
 void copy_unmoved(const fs::path& from, const fs::path& to) {
-  for (const char* name : {"stems.csv.gz", "loops.csv", "corrections.csv"}) {
+  for (const char* name : {"stems.csv.gz", "steps.csv", "loops.csv", "corrections.csv"}) {
     if (!fs::exists(from / name)) continue;
     std::error_code error;
     fs::copy_file(from / name, to / name, fs::copy_options::overwrite_existing, error);

@@ -22,8 +22,8 @@ void refuse_unfinished_run(const fs::path& run_folder) {
 void remove_old_results(const fs::path& run_folder) {
   for (const char* name :
        {"trajectory.tum", "odometry.tum", "keyframes.tum", "states.csv.gz", "graph.g2o", "gnss.csv",
-        "loops.csv", "corrections.csv", "map.laz", "trees.csv", "felled.csv", "trees.gpkg",
-        "dtm.tif", "chm.tif", "run.json", "report.html"}) {
+        "steps.csv", "loops.csv", "corrections.csv", "map.laz", "trees.csv", "felled.csv",
+        "trees.gpkg", "dtm.tif", "chm.tif", "run.json", "report.html"}) {
     std::error_code ignored;  // what cannot be removed cannot be replaced, which is then said
     fs::remove(run_folder / name, ignored);
   }
