@@ -7,6 +7,7 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "understory/geometry/alpha_shape.h"
 #include "understory/graph/view_cone.h"
 #include "understory/registration/plane_grid.h"
 #include "understory/util/error.h"
@@ -50,6 +51,28 @@ void merge(Gathered& tree, const Gathered& other) {
   std::set_union(tree.views.begin(), tree.views.end(), other.views.begin(), other.views.end(),
                  std::back_inserter(views));
   tree.views = std::move(views);
+}
+
+// One more sight.
+void update(Gathered& tree, const Eigen::Vector3d& point, const Eigen::Vector3d& axis, double dbh_m,
+            int view) {
+  MappedStem& stem = tree.stem;
+  ++stem.sights;
+  stem.last_view = view;
+  if (tree.views.empty() || tree.views.back() != view) tree.views.push_back(view);
+  const Eigen::Vector3d d = point - stem.point_in_world;
+  stem.point_in_world += d / stem.sights;
+  tree.squares += d.head<2>().cwiseProduct((point - stem.point_in_world).head<2>());
+  if (axis.allFinite()) {
+    tree.axes += axis.z() < 0.0 ? Eigen::Vector3d(-axis) : axis;
+    ++stem.axis_sights;
+  }
+  if (!std::isfinite(dbh_m)) return;
+  if (stem.dbh_sights == 0) stem.dbh_m = 0.0;
+  ++stem.dbh_sights;
+  const double e = dbh_m - stem.dbh_m;
+  stem.dbh_m += e / stem.dbh_sights;
+  tree.dbh_squares += e * (dbh_m - stem.dbh_m);
 }
 
 class Gatherer {
@@ -102,27 +125,6 @@ class Gatherer {
     return best;
   }
 
-  static void update(Gathered& tree, const Eigen::Vector3d& point, const Eigen::Vector3d& axis,
-                     double dbh_m, int view) {
-    MappedStem& stem = tree.stem;
-    ++stem.sights;
-    stem.last_view = view;
-    if (tree.views.empty() || tree.views.back() != view) tree.views.push_back(view);
-    const Eigen::Vector3d d = point - stem.point_in_world;
-    stem.point_in_world += d / stem.sights;
-    tree.squares += d.head<2>().cwiseProduct((point - stem.point_in_world).head<2>());
-    if (axis.allFinite()) {
-      tree.axes += axis.z() < 0.0 ? Eigen::Vector3d(-axis) : axis;
-      ++stem.axis_sights;
-    }
-    if (!std::isfinite(dbh_m)) return;
-    if (stem.dbh_sights == 0) stem.dbh_m = 0.0;
-    ++stem.dbh_sights;
-    const double e = dbh_m - stem.dbh_m;
-    stem.dbh_m += e / stem.dbh_sights;
-    tree.dbh_squares += e * (dbh_m - stem.dbh_m);
-  }
-
   void move(int tree, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     const std::uint64_t before = key(from.x(), from.y(), 0, 0);
     const std::uint64_t after = key(to.x(), to.y(), 0, 0);
@@ -136,6 +138,53 @@ class Gatherer {
   std::vector<Gathered> trees_;
   std::unordered_map<std::uint64_t, std::vector<int>> cells_;
 };
+
+// visit(point, axis, dbh_m, view) of every sight, in the world, in the order of the views.
+template <typename Visit>
+void for_each_sight(const std::vector<StemView>& views, const std::vector<Pose>& world_from_body,
+                    const Visit& visit) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Eigen::Matrix3d rotation = world_from_body[i].rotation_matrix();
+    for (const Stem& stem : views[i].stems) {
+      visit(rotation * stem.point.cast<double>() + world_from_body[i].translation(),
+            rotation * stem.axis.cast<double>(), static_cast<double>(stem.dbh_m),
+            static_cast<int>(i));
+    }
+  }
+}
+
+std::vector<Gathered> gathered(const std::vector<StemView>& views,
+                               const std::vector<Pose>& world_from_body, double merge_m) {
+  Gatherer gatherer(merge_m);
+  for_each_sight(views, world_from_body,
+                 [&](const Eigen::Vector3d& point, const Eigen::Vector3d& axis, double dbh_m,
+                     int view) { gatherer.add(point, axis, dbh_m, view); });
+  return std::move(gatherer).trees();
+}
+
+// A tree per cluster, in the order of the views; what lies outside every shape is of no tree.
+std::vector<Gathered> gathered_by_shape(const std::vector<StemView>& views,
+                                        const std::vector<Pose>& world_from_body, double radius_m) {
+  std::vector<Eigen::Vector2d> places;
+  for_each_sight(views, world_from_body,
+                 [&](const Eigen::Vector3d& point, const Eigen::Vector3d&, double, int) {
+                   places.emplace_back(point.head<2>());
+                 });
+  const std::vector<int> cluster_of = alpha_clusters(places, radius_m);
+  std::vector<Gathered> trees;
+  std::size_t sight = 0;
+  for_each_sight(
+      views, world_from_body,
+      [&](const Eigen::Vector3d& point, const Eigen::Vector3d& axis, double dbh_m, int view) {
+        const int cluster = cluster_of[sight++];
+        if (cluster < 0) return;
+        const auto c = static_cast<std::size_t>(cluster);
+        if (c >= trees.size()) trees.resize(c + 1);
+        if (trees[c].stem.sights == 0) trees[c].stem.first_view = view;
+        update(trees[c], point, axis, dbh_m, view);
+      });
+  return trees;
+}
 
 SparsePoints places_of(const std::vector<Gathered>& trees) {
   SparsePoints places;
@@ -228,6 +277,17 @@ MappedStem finished(const Gathered& tree) {
 
 }  // namespace
 
+void describe(ConfigTable& table, StemMapConfig& config) {
+  table.add(
+      "alpha_radius_m", config.alpha_radius_m, {0.0, 5.0}, "m",
+      "trees are the alpha shapes of all sights with that radius, P1 section 2.3 (there 0.5); "
+      "0: sights gathered about their mean");
+  table.add("min_sights", config.min_sights, {1, 100'000}, "",
+            "trees seen less often are not listed");
+  table.add("min_presence", config.min_presence, {0.0, 1.0}, "",
+            "nor those seen in a smaller share of the views in whose sector they lie");
+}
+
 StemMapConfig tree_list_config() {
   StemMapConfig config;
   config.min_presence = 0.12;
@@ -239,16 +299,9 @@ std::vector<MappedStem> build_stem_map(const std::vector<StemView>& views,
                                        const std::vector<Pose>& world_from_body,
                                        const StemMapConfig& config) {
   UNDERSTORY_CHECK(views.size() == world_from_body.size());
-  Gatherer gatherer(config.merge_m);
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const Eigen::Matrix3d rotation = world_from_body[i].rotation_matrix();
-    for (const Stem& stem : views[i].stems) {
-      gatherer.add(rotation * stem.point.cast<double>() + world_from_body[i].translation(),
-                   rotation * stem.axis.cast<double>(), static_cast<double>(stem.dbh_m),
-                   static_cast<int>(i));
-    }
-  }
-  std::vector<Gathered> trees = std::move(gatherer).trees();
+  std::vector<Gathered> trees =
+      config.alpha_radius_m > 0.0 ? gathered_by_shape(views, world_from_body, config.alpha_radius_m)
+                                  : gathered(views, world_from_body, config.merge_m);
   std::erase_if(trees, [&](const Gathered& t) { return t.stem.sights < config.min_sights; });
   std::vector<int> chance(trees.size(), 0);
   if (config.min_presence > 0.0 || config.duplicate_m > 0.0)

@@ -6,6 +6,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/sensor/stem_view.h"
+#include "understory/util/config.h"
 
 namespace understory {
 
@@ -29,14 +30,18 @@ struct MappedStem {
 };
 
 struct StemMapConfig {
-  double merge_m = 0.6;  // sights nearer than this in the plane are of one tree
-  int min_sights = 3;    // trees seen less often are left out
+  double merge_m = 0.6;  // sights nearer than this to a tree's mean in the plane are of that tree
+  // Above 0: trees are the alpha shapes of all sights with that radius instead (P1 section 2.3;
+  // 0.5).
+  double alpha_radius_m = 0.0;
+  int min_sights = 3;  // trees seen less often are left out
   // And those seen in a smaller share of the views in whose sector they lie; 0: not asked for.
   double min_presence = 0.0;
   // Trees nearer than this that were never seen together, though they should have been some times,
   // are one; 0: not asked for.
   double duplicate_m = 0.0;
 };
+void describe(ConfigTable& table, StemMapConfig& config);
 // What a tree list asks for.
 [[nodiscard]] StemMapConfig tree_list_config();
 

@@ -51,6 +51,17 @@ TEST(StemMap, GathersEachTreeOnce) {
     EXPECT_EQ(map[i].first_view, 0);
     EXPECT_EQ(map[i].last_view, 19);
   }
+  // The same by alpha shapes, P1 section 2.3; a radius that reaches from tree to tree joins them.
+  StemMapConfig shapes;
+  shapes.alpha_radius_m = 0.5;
+  const auto by_shape = build_stem_map(views, poses, shapes);
+  ASSERT_EQ(by_shape.size(), trees.size());
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    EXPECT_LT((by_shape[i].point_in_world - map[i].point_in_world).norm(), 1e-9);
+    EXPECT_EQ(by_shape[i].sights, map[i].sights);
+  }
+  shapes.alpha_radius_m = 5.0;
+  EXPECT_EQ(build_stem_map(views, poses, shapes).size(), 1U);
 }
 
 // P1's vertical angular noise: sights lean to and fro about their tree by a known angle.

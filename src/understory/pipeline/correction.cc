@@ -66,6 +66,7 @@ std::filesystem::path stems_of(const CorrectionRequest& request) {
 void describe(ConfigTable& table, CorrectionConfig& config) {
   table.section("odometry", [&] { describe(table, config.odometry); });
   describe(table, config.stems);
+  table.section("tree_list", [&] { describe(table, config.tree_list); });
 }
 
 CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "understory/geometry/stamped_pose.h"
+#include "understory/map/stem_map.h"
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/stem_correction.h"
@@ -22,6 +23,7 @@ namespace understory {
 struct CorrectionConfig {
   SparseOdometryConfig odometry;
   StemCorrectionConfig stems;
+  StemMapConfig tree_list = tree_list_config();
 };
 void describe(ConfigTable& table, CorrectionConfig& config);
 

@@ -295,7 +295,7 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   std::vector<MappedStem> stems;
   {
     const ScopedTimer timer(run.times, "tree_map");
-    stems = build_stem_map(map.views, map.world_from_body, tree_list_config());
+    stems = build_stem_map(map.views, map.world_from_body, request.config.tree_list);
   }
   const std::vector<Tree> trees = trees_of(stems);
   std::vector<TreeFall> falls = falls_of(map, stems, trees);
