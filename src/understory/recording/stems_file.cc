@@ -160,9 +160,26 @@ class Row {
   }
 
   // NaN where unknown.
+  [[nodiscard]] float finite(Column column) const {
+    const double value = number(column);
+    if (std::isinf(value))
+      lines_.fail("expected a finite number in column '" + std::string(kNames[column]) + "'");
+    return static_cast<float>(value);
+  }
+
+  // Of a tree or its error, NaN where unknown.
+  [[nodiscard]] float size(Column column) const {
+    constexpr double kTallest = 200.0;
+    const double value = number(column);
+    if (value < 0.0 || value > kTallest)
+      lines_.fail("expected 0 to 200 m in column '" + std::string(kNames[column]) + "'");
+    return static_cast<float>(value);
+  }
+
+  // NaN where unknown.
   [[nodiscard]] float variance(Column column) const {
     const double value = number(column);
-    if (value <= 0.0)
+    if (value <= 0.0 || std::isinf(value))
       lines_.fail("expected a variance above 0 in column '" + std::string(kNames[column]) + "'");
     return static_cast<float>(value);
   }
@@ -211,13 +228,13 @@ Stem stem_of(const Row& row, const GzipLines& lines) {
   Stem stem;
   stem.point = {row.position(kX), row.position(kY), row.position(kZ)};
   stem.axis = axis_of(row, lines);
-  stem.length_m = static_cast<float>(row.number(kLength));
-  stem.dbh_m = static_cast<float>(row.number(kDbh));
-  stem.score = static_cast<float>(row.number(kScore));
-  stem.radius_m = static_cast<float>(row.number(kRadius));
-  stem.radius_sd_m = static_cast<float>(row.number(kRadiusSd));
+  stem.length_m = row.size(kLength);
+  stem.dbh_m = row.size(kDbh);
+  stem.score = row.finite(kScore);
+  stem.radius_m = row.size(kRadius);
+  stem.radius_sd_m = row.size(kRadiusSd);
   stem.xx = row.variance(kXx);
-  stem.xy = static_cast<float>(row.number(kXy));
+  stem.xy = row.finite(kXy);
   stem.yy = row.variance(kYy);
   stem.zz = row.variance(kZz);
   return stem;

@@ -16,8 +16,8 @@ namespace understory {
 // brought to unit length.
 //
 // Throws InputError with the line where a cell is no number, a position is missing or absurd, an
-// axis is no direction, a variance is not positive, order is broken, the gzip stream is damaged,
-// and if there is no row at all.
+// axis is no direction, a size is negative, a variance not positive, order is broken, the gzip
+// stream is damaged, and if there is no row at all.
 [[nodiscard]] std::vector<StemView> read_stem_views(const std::filesystem::path& path, Log& log);
 
 }  // namespace understory
