@@ -86,9 +86,9 @@ TEST_F(StemsFile, ReadsRadiusAndCovariance) {
   EXPECT_TRUE(said.empty());
   EXPECT_NE(complaint("frame,x,y,z,zz\n0,1,2,3,0\n").find("a variance above 0 in column 'zz'"),
             std::string::npos);
-  for (const char* bad : {"radius_sd_m\n0,1,2,3,-0.1\n", "dbh_m\n0,1,2,3,-0.3\n",
-                          "length_m\n0,1,2,3,inf\n", "score\n0,1,2,3,inf\n",
-                          "xx\n0,1,2,3,inf\n", "xy\n0,1,2,3,-inf\n"})
+  for (const char* bad :
+       {"radius_sd_m\n0,1,2,3,-0.1\n", "dbh_m\n0,1,2,3,-0.3\n", "length_m\n0,1,2,3,inf\n",
+        "score\n0,1,2,3,inf\n", "xx\n0,1,2,3,inf\n", "xy\n0,1,2,3,-inf\n"})
     EXPECT_NE(complaint(std::string("frame,x,y,z,") + bad).find("in column '"), std::string::npos)
         << bad;
 }
