@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "understory/cli/command.h"
+#include "understory/cli/register_output.h"
 #include "understory/cli/register_stems.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/recording/cloud_file.h"
@@ -54,22 +55,6 @@ struct RegisterOptions {
   bool json = false;
   bool print_config = false;
 };
-
-const char* name_of(RegistrationStatus status) {
-  switch (status) {
-    case RegistrationStatus::kConverged:
-      return "converged";
-    case RegistrationStatus::kIterationLimit:
-      return "iteration_limit";
-    case RegistrationStatus::kDegenerate:
-      return "degenerate";
-    case RegistrationStatus::kTooFewPoints:
-      return "too_few_points";
-    case RegistrationStatus::kTooFewMatches:
-      return "too_few_matches";
-  }
-  return "?";
-}
 
 // The guess as given: nothing, x y z, x y z qx qy qz qw, or 16 numbers row by row.
 Pose parse_guess(const std::vector<double>& numbers) {
@@ -133,19 +118,10 @@ RegistrationResult match(const RegisterOptions& options, const RegisterConfig& c
   return register_ndt(maps, thinned, guess, std::nullopt, config.ndt);
 }
 
-nlohmann::json numbers_of(const Eigen::MatrixXd& matrix) {
-  nlohmann::json rows = nlohmann::json::array();
-  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
-    for (Eigen::Index c = 0; c < matrix.cols(); ++c)
-      rows.push_back(matrix(r, c));
-  }
-  return rows;
-}
-
 void print_json(const RegistrationResult& result, const Pose& a_from_b) {
   nlohmann::json out;
   out["a_from_b"] = numbers_of(a_from_b.matrix());
-  out["status"] = name_of(result.status);
+  out["status"] = to_string(result.status);
   out["reason"] = result.reason;
   out["fitness_m2"] = result.fitness_m2;
   out["surface_residual_m2"] = result.surface_residual_m2;
@@ -159,12 +135,9 @@ void print_json(const RegistrationResult& result, const Pose& a_from_b) {
 }
 
 void print_text(const RegistrationResult& result, const Pose& a_from_b) {
-  const Eigen::Matrix4d matrix = a_from_b.matrix();
-  std::printf("a_from_b\n");
-  for (int r = 0; r < 4; ++r)
-    std::printf("%.9f %.9f %.9f %.9f\n", matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3));
-  std::printf("status %s%s%s\n", name_of(result.status), result.reason.empty() ? "" : ": ",
-              result.reason.c_str());
+  print_motion(a_from_b);
+  std::printf("status %s%s%s\n", to_string(result.status).c_str(),
+              result.reason.empty() ? "" : ": ", result.reason.c_str());
   std::printf("fitness_m2 %.6f\nsurface_residual_m2 %.6f\ninlier_ratio %.4f\niterations %d\n",
               result.fitness_m2, result.surface_residual_m2, result.inlier_ratio,
               result.iterations);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "understory/cli/register_output.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -23,41 +24,45 @@ SparsePoints sparse(const Points& points, const std::string& file) {
   return result;
 }
 
-Json rows_of(const Eigen::MatrixXd& matrix) {
-  Json numbers = Json::array();
-  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
-    for (Eigen::Index c = 0; c < matrix.cols(); ++c)
-      numbers.push_back(matrix(r, c));
-  }
-  return numbers;
+struct SparsePair {
+  SparseTarget target;
+  SparsePoints source;
+};
+
+SparsePair sparse_pair(const StemClouds& clouds) {
+  return {SparseTarget(sparse(clouds.target, clouds.target_file)),
+          sparse(clouds.source, clouds.source_file)};
 }
 
-// One object, or the same as lines of a name and a value.
-void print(const Json& figures, const Eigen::Matrix4d& a_from_b, bool as_json) {
-  if (as_json) {
-    Json out{{"a_from_b", rows_of(a_from_b)}};
+void print_line(const std::string& name, const Json& value) {
+  if (value.is_array() || value == "") return;
+  if (value.is_number_float()) {
+    std::printf("%s %.4f\n", name.c_str(), value.get<double>());
+  } else {
+    std::printf("%s %s\n", name.c_str(),
+                value.is_string() ? value.get<std::string>().c_str() : value.dump().c_str());
+  }
+}
+
+// One object, or the same as lines of a name and a value; the method's own figures come last.
+template <typename Result>
+void print(const StemClouds& clouds, const Result& result, const Json& own) {
+  const Pose a_from_b =
+      clouds.file_from_target * result.target_from_source * clouds.file_from_target.inverse();
+  Json figures{{"status", to_string(result.status)},
+               {"reason", result.reason},
+               {"error_rms_m", result.error_rms_m},
+               {"overlap", result.overlap}};
+  figures.update(own);
+  if (clouds.json) {
+    Json out{{"a_from_b", numbers_of(a_from_b.matrix())}};
     out.update(figures);
     std::printf("%s\n", out.dump(2).c_str());
     return;
   }
-  std::printf("a_from_b\n");
-  for (int r = 0; r < 4; ++r)
-    std::printf("%.9f %.9f %.9f %.9f\n", a_from_b(r, 0), a_from_b(r, 1), a_from_b(r, 2),
-                a_from_b(r, 3));
-  for (const auto& [name, value] : figures.items()) {
-    if (value.is_array() || value == "") continue;
-    if (value.is_number_float()) {
-      std::printf("%s %.4f\n", name.c_str(), value.get<double>());
-    } else {
-      std::printf("%s %s\n", name.c_str(),
-                  value.is_string() ? value.get<std::string>().c_str() : value.dump().c_str());
-    }
-  }
-}
-
-Eigen::Matrix4d in_files(const StemClouds& clouds, const Pose& target_from_source) {
-  return (clouds.file_from_target * target_from_source * clouds.file_from_target.inverse())
-      .matrix();
+  print_motion(a_from_b);
+  for (const auto& [name, value] : figures.items())
+    print_line(name, value);
 }
 
 int trusted_or(bool trusted, const std::string& reason, CommandContext& context) {
@@ -65,34 +70,17 @@ int trusted_or(bool trusted, const std::string& reason, CommandContext& context)
   return trusted ? kExitDone : kExitUntrusted;
 }
 
-const char* name_of(SparseIcpStatus status) {
-  switch (status) {
-    case SparseIcpStatus::kConverged:
-      return "converged";
-    case SparseIcpStatus::kIterationLimit:
-      return "iteration_limit";
-    case SparseIcpStatus::kTooFewPoints:
-      return "too_few_points";
-  }
-  return "?";
-}
-
 }  // namespace
 
 int register_by_go_icp(const StemClouds& clouds, const GoIcpConfig& config,
                        CommandContext& context) {
-  const SparseTarget target(sparse(clouds.target, clouds.target_file));
-  const GoIcpResult result =
-      register_go_icp(target, sparse(clouds.source, clouds.source_file), clouds.guess, config);
-  print({{"status", to_string(result.status)},
-         {"reason", result.reason},
-         {"gap_m", result.gap_m},
-         {"error_rms_m", result.error_rms_m},
-         {"overlap", result.overlap},
+  const auto [target, source] = sparse_pair(clouds);
+  const GoIcpResult result = register_go_icp(target, source, clouds.guess, config);
+  print(clouds, result,
+        {{"gap_m", result.gap_m},
          {"cells", result.cells},
          {"nodes", result.nodes},
-         {"icp_runs", result.icp_runs}},
-        in_files(clouds, result.target_from_source), clouds.json);
+         {"icp_runs", result.icp_runs}});
   return trusted_or(
       result.status == GoIcpStatus::kCertified || result.status == GoIcpStatus::kConverged,
       result.reason, context);
@@ -100,19 +88,14 @@ int register_by_go_icp(const StemClouds& clouds, const GoIcpConfig& config,
 
 int register_by_stem_icp(const StemClouds& clouds, const SparseIcpConfig& config,
                          CommandContext& context) {
-  const SparseTarget target(sparse(clouds.target, clouds.target_file));
-  const SparseIcpResult result =
-      register_sparse_icp(target, sparse(clouds.source, clouds.source_file), clouds.guess, config);
-  print({{"status", name_of(result.status)},
-         {"reason", result.reason},
-         {"error_m", result.error_m},
-         {"error_rms_m", result.error_rms_m},
-         {"overlap", result.overlap},
+  const auto [target, source] = sparse_pair(clouds);
+  const SparseIcpResult result = register_sparse_icp(target, source, clouds.guess, config);
+  print(clouds, result,
+        {{"error_m", result.error_m},
          {"outlier_ratio", result.outlier_ratio},
          {"mean_neighbour_m", target.l0_m},
          {"iterations", result.iterations},
-         {"information", rows_of(result.information)}},
-        in_files(clouds, result.target_from_source), clouds.json);
+         {"information", numbers_of(result.information)}});
   // P0 (26): ICP that has not come home leaves pairs about half a neighbour's distance apart.
   constexpr double kLeastOverlap = 0.4;
   if (result.status != SparseIcpStatus::kConverged)

@@ -4,10 +4,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <utility>
 #include <vector>
+
+#include "understory/geometry/raster.h"
 
 namespace understory {
 
@@ -91,5 +94,29 @@ class CellGrid {
   Block* last_ = nullptr;
   std::pair<int, int> last_key_{};
 };
+
+// A raster over the cells' bounds: (x0, y0) is where the grid's origin lies in the raster's frame,
+// metres. All NaN at first; `visit(raster, index, cell)` may put a value at `index` for each cell.
+template <typename Cell, typename Visit>
+Raster raster_over(const CellGrid<Cell>& cells, double x0, double y0, const Visit& visit) {
+  constexpr std::uint64_t kMostCells = 24'000'000;  // 96 MB of heights; 15 km² in cells of 0.8 m
+  constexpr std::uint64_t kStray = 20;              // points of a block that may be left out
+  const auto bounds = cells.bounds(kMostCells, kStray);
+  Raster raster;
+  raster.cell_m = cells.cell_m();
+  raster.x0 = x0 + bounds.column0 * raster.cell_m;
+  raster.y0 = y0 + bounds.row0 * raster.cell_m;
+  raster.columns = bounds.columns;
+  raster.rows = bounds.rows;
+  raster.values.assign(
+      static_cast<std::size_t>(raster.columns) * static_cast<std::size_t>(raster.rows),
+      std::numeric_limits<float>::quiet_NaN());
+  cells.for_each([&](int column, int row, const Cell& cell) {
+    const int c = column - bounds.column0;
+    const int r = row - bounds.row0;
+    if (raster.contains(c, r)) visit(raster, raster.index(c, r), cell);
+  });
+  return raster;
+}
 
 }  // namespace understory

@@ -14,8 +14,6 @@ namespace understory {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr std::uint64_t kMostCells = 24'000'000;
-constexpr std::uint64_t kStray = 20;
 
 // The lowest heights in a cell, in ascending order.
 struct LowCell {
@@ -153,27 +151,22 @@ std::vector<LowCell> lowest_points(const PointBlocks& cloud, double cell_m, Rast
   const LowNoise noise(cloud);
   CellGrid<LowCell> cells(cell_m);
   bool first = true;
+  double z0 = 0.0;
   cloud([&](std::span<const Eigen::Vector3d> points) {
     for (const Eigen::Vector3d& point : points) {
-      if (first) grid.z0 = std::floor(point.z());
+      if (first) z0 = std::floor(point.z());
       first = false;
       if (noise.holds(point)) continue;
-      cells.at(point.x(), point.y()).add(static_cast<float>(point.z() - grid.z0));
+      cells.at(point.x(), point.y()).add(static_cast<float>(point.z() - z0));
     }
   });
-  const auto bounds = cells.bounds(kMostCells, kStray);
-  grid.cell_m = cell_m;
-  grid.x0 = bounds.column0 * cell_m;
-  grid.y0 = bounds.row0 * cell_m;
-  grid.columns = bounds.columns;
-  grid.rows = bounds.rows;
-  std::vector<LowCell> low(static_cast<std::size_t>(grid.columns) *
-                           static_cast<std::size_t>(grid.rows));
-  cells.for_each([&](int column, int row, const LowCell& cell) {
-    const int c = column - bounds.column0;
-    const int r = row - bounds.row0;
-    if (grid.contains(c, r)) low[grid.index(c, r)] = cell;
-  });
+  std::vector<LowCell> low;
+  grid =
+      raster_over(cells, 0.0, 0.0, [&](const Raster& raster, std::size_t at, const LowCell& cell) {
+        low.resize(raster.values.size());
+        low[at] = cell;
+      });
+  grid.z0 = z0;
   return low;
 }
 

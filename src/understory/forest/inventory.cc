@@ -14,8 +14,6 @@
 namespace understory {
 namespace {
 
-constexpr std::uint64_t kMostCells = 24'000'000;
-constexpr std::uint64_t kStray = 20;
 constexpr double kAreaCell = 2.0;
 
 // What the third run through the cloud gathers.
@@ -50,24 +48,10 @@ void gather(const PointBlocks& cloud, const InventoryConfig& config, const Inven
 }
 
 Raster canopy_of(const CellGrid<ColumnCell>& columns, const Eigen::Vector3d& origin) {
-  Raster canopy;
-  const auto bounds = columns.bounds(kMostCells, kStray);
-  canopy.cell_m = columns.cell_m();
-  canopy.x0 = origin.x() + bounds.column0 * canopy.cell_m;
-  canopy.y0 = origin.y() + bounds.row0 * canopy.cell_m;
-  canopy.columns = bounds.columns;
-  canopy.rows = bounds.rows;
-  canopy.values.assign(
-      static_cast<std::size_t>(canopy.columns) * static_cast<std::size_t>(canopy.rows),
-      std::numeric_limits<float>::quiet_NaN());
-  columns.for_each([&](int column, int row, const ColumnCell& cell) {
-    const int c = column - bounds.column0;
-    const int r = row - bounds.row0;
-    if (cell.occupied != 0 && canopy.contains(c, r)) {
-      canopy.values[canopy.index(c, r)] = cell.highest_m;
-    }
-  });
-  return canopy;
+  return raster_over(columns, origin.x(), origin.y(),
+                     [](Raster& canopy, std::size_t at, const ColumnCell& cell) {
+                       if (cell.occupied != 0) canopy.values[at] = cell.highest_m;
+                     });
 }
 
 // Area in which stems could be seen: squares of 2 m with points near breast height or on the

@@ -16,8 +16,6 @@ constexpr double kCell = 2.0;
 constexpr double kStep = 0.5;          // half a layer
 constexpr std::uint32_t kLeast = 4;    // points that make a layer
 constexpr double kLeastShare = 0.004;  // of the points of its cell
-constexpr std::uint64_t kMostCells = 24'000'000;
-constexpr std::uint64_t kStray = 20;
 
 // How many points a cell has by height, in steps, ascending.
 struct Column {
@@ -49,30 +47,20 @@ struct Column {
 LowNoise::LowNoise(const PointBlocks& cloud) {
   CellGrid<Column> columns(kCell);
   bool first = true;
+  double z0 = 0.0;
   cloud([&](std::span<const Eigen::Vector3d> points) {
     for (const Eigen::Vector3d& point : points) {
-      if (first) lowest_.z0 = std::floor(point.z());
+      if (first) z0 = std::floor(point.z());
       first = false;
-      const double step = std::floor((point.z() - lowest_.z0) / kStep);
+      const double step = std::floor((point.z() - z0) / kStep);
       if (std::abs(step) > 1e6) continue;
       columns.at(point.x(), point.y()).add(static_cast<int>(step));
     }
   });
-  const auto bounds = columns.bounds(kMostCells, kStray);
-  lowest_.cell_m = kCell;
-  lowest_.x0 = bounds.column0 * kCell;
-  lowest_.y0 = bounds.row0 * kCell;
-  lowest_.columns = bounds.columns;
-  lowest_.rows = bounds.rows;
-  lowest_.values.assign(
-      static_cast<std::size_t>(bounds.columns) * static_cast<std::size_t>(bounds.rows),
-      std::numeric_limits<float>::quiet_NaN());
-  columns.for_each([&](int column, int row, const Column& cell) {
-    const int c = column - bounds.column0;
-    const int r = row - bounds.row0;
-    if (lowest_.contains(c, r))
-      lowest_.values[lowest_.index(c, r)] = static_cast<float>(kStep) * cell.lowest_layer();
+  lowest_ = raster_over(columns, 0.0, 0.0, [](Raster& raster, std::size_t at, const Column& cell) {
+    raster.values[at] = static_cast<float>(kStep) * cell.lowest_layer();
   });
+  lowest_.z0 = z0;
 }
 
 bool LowNoise::holds(const Eigen::Vector3d& point) const {

@@ -61,22 +61,15 @@ MappingConfig read_mapping_config(const std::string& profile, const std::string&
                                   const std::vector<std::string>& settings) {
   MappingConfig config;
   ConfigTable table = mapping_table(config);
-  std::vector<std::string> problems;
-  const auto gather = [&](const auto& read) {
-    try {
-      read();
-    } catch (const ConfigError& error) {
-      problems.insert(problems.end(), error.problems().begin(), error.problems().end());
-    }
-  };
-  gather([&] {
+  ConfigProblems problems;
+  problems.gather([&] {
     if (!profile.empty()) table.read_yaml(profile_text(profile), "profile " + profile);
   });
-  gather([&] {
+  problems.gather([&] {
     if (!file.empty()) table.read_file(file);
   });
-  gather([&] { table.set(settings); });
-  if (!problems.empty()) throw ConfigError(problems);
+  problems.gather([&] { table.set(settings); });
+  problems.throw_if_any();
   return config;
 }
 

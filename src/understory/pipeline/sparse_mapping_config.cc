@@ -40,31 +40,24 @@ SparseMappingConfig read_sparse_mapping_config(const std::string& profile, const
                                                const std::vector<std::string>& settings, Log& log) {
   SparseMappingConfig config;
   ConfigTable table = sparse_mapping_table(config);
-  std::vector<std::string> problems;
-  const auto gather = [&](const auto& read) {
-    try {
-      read();
-    } catch (const ConfigError& error) {
-      problems.insert(problems.end(), error.problems().begin(), error.problems().end());
-    }
-  };
-  gather([&] {
+  ConfigProblems problems;
+  problems.gather([&] {
     if (profile.empty()) return;
     std::vector<std::string> passed_over;
     table.read_yaml(profile_text(profile), "profile " + profile, &passed_over);
     if (!passed_over.empty())
       log.info("profile " + profile + ": not for stems and passed over: " + joined(passed_over));
   });
-  gather([&] {
+  problems.gather([&] {
     if (!file.empty()) table.read_file(file);
   });
-  gather([&] { table.set(settings); });
-  gather([&] {
+  problems.gather([&] { table.set(settings); });
+  problems.gather([&] {
     if (config.machine_boxes_file.empty()) return;
     config.front_end.machine_boxes = std::make_shared<const std::vector<MachineBox>>(
         read_machine_boxes(config.machine_boxes_file));
   });
-  if (!problems.empty()) throw ConfigError(problems);
+  problems.throw_if_any();
   return config;
 }
 

@@ -3,7 +3,25 @@
 #include <algorithm>
 #include <utility>
 
-namespace understory::internal {
+namespace understory {
+
+std::string to_string(RegistrationStatus status) {
+  switch (status) {
+    case RegistrationStatus::kConverged:
+      return "converged";
+    case RegistrationStatus::kIterationLimit:
+      return "iteration_limit";
+    case RegistrationStatus::kDegenerate:
+      return "degenerate";
+    case RegistrationStatus::kTooFewPoints:
+      return "too_few_points";
+    case RegistrationStatus::kTooFewMatches:
+      break;
+  }
+  return "too_few_matches";
+}
+
+namespace internal {
 namespace {
 
 // The Hessian promises what independent points with exactly modelled residuals would give; the
@@ -53,4 +71,5 @@ RegistrationResult conclude(const Minimum& minimum, const MatchSums& at, const P
   return result;
 }
 
-}  // namespace understory::internal
+}  // namespace internal
+}  // namespace understory

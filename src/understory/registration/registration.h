@@ -21,6 +21,7 @@ enum class RegistrationStatus {
   kTooFewPoints,    // source or target too small to match; pose = guess
   kTooFewMatches,   // hardly any source point near the target; pose = guess
 };
+[[nodiscard]] std::string to_string(RegistrationStatus status);
 
 // The answer of every matcher.
 struct RegistrationResult {

@@ -267,6 +267,18 @@ std::string too_few_stems() {
   return "fewer than " + std::to_string(kFewestStems) + " stems, or all on one line";
 }
 
+std::string to_string(SparseIcpStatus status) {
+  switch (status) {
+    case SparseIcpStatus::kConverged:
+      return "converged";
+    case SparseIcpStatus::kIterationLimit:
+      return "iteration_limit";
+    case SparseIcpStatus::kTooFewPoints:
+      break;
+  }
+  return "too_few_points";
+}
+
 SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoints& source,
                                     const Pose& guess, const SparseIcpConfig& config,
                                     const std::vector<double>& source_height_sd_m) {

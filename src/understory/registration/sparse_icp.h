@@ -30,6 +30,7 @@ struct SparseIcpConfig {
 void describe(ConfigTable& table, SparseIcpConfig& config);
 
 enum class SparseIcpStatus { kConverged, kIterationLimit, kTooFewPoints };
+[[nodiscard]] std::string to_string(SparseIcpStatus status);
 
 struct [[nodiscard]] SparseIcpResult {
   SparseIcpStatus status = SparseIcpStatus::kTooFewPoints;

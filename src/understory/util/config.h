@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "understory/util/error.h"
+
 namespace understory {
 
 // The table of a configuration's fields: one entry per key, bound to the variable that holds its
@@ -80,6 +82,28 @@ class ConfigTable {
 
   std::string prefix_;
   std::vector<Field> fields_;
+};
+
+// The problems of several readings of one configuration (profile, file, settings), so that the user
+// sees all of them at once. Not thread-safe.
+class ConfigProblems {
+ public:
+  // Runs `read` and keeps what its ConfigError tells; any other exception passes.
+  template <typename Read>
+  void gather(const Read& read) {
+    try {
+      read();
+    } catch (const ConfigError& error) {
+      all_.insert(all_.end(), error.problems().begin(), error.problems().end());
+    }
+  }
+  // One ConfigError of everything gathered, in its order; nothing where there is nothing.
+  void throw_if_any() const {
+    if (!all_.empty()) throw ConfigError(all_);
+  }
+
+ private:
+  std::vector<std::string> all_;
 };
 
 template <typename Enum>

@@ -102,6 +102,25 @@ TEST(Config, WhatItPrintsItReads) {
   EXPECT_EQ(other_table.to_yaml(false), table.to_yaml(false));
 }
 
+TEST(Config, ProblemsOfSeveralReadingsAreToldAtOnce) {
+  Sample sample;
+  ConfigTable table = table_of(sample);
+  ConfigProblems problems;
+  problems.gather([&] { table.read_yaml("map:\n  unheard_of: 1\n", "a.yaml"); });
+  problems.gather([&] { table.set({"map.voxel_size_m=0.05"}); });
+  problems.gather([&] { table.set({"map.voxel_size_m=-1"}); });
+  EXPECT_EQ(sample.voxel_size_m, 0.05);
+  try {
+    problems.throw_if_any();
+    FAIL() << "expected a ConfigError";
+  } catch (const ConfigError& error) {
+    ASSERT_EQ(error.problems().size(), 2U);
+    EXPECT_EQ(error.problems()[0].rfind("a.yaml:2:", 0), 0U) << error.problems()[0];
+  }
+  EXPECT_NO_THROW(ConfigProblems().throw_if_any());
+  EXPECT_THROW(problems.gather([] { throw InputError("f", "", "expected a file"); }), InputError);
+}
+
 TEST(Config, BrokenYamlNamesTheLine) {
   Sample sample;
   ConfigTable table = table_of(sample);
