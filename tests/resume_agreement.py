@@ -11,7 +11,7 @@ import time
 
 # Recording, and the size of a checkpoint that holds more than the request alone.
 CASES = {"harvester": ("sim:harvester?seed=21&duration_s=16", 100_000),
-         "sparse_scans": ("sim:lieksa2?seed=21&duration_s=60", 30_000)}
+         "sparse_scans": ("sim:lieksa2?seed=21&duration_s=60", 300_000)}
 FILES = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "gnss.csv", "map.laz", "trees.csv"]
 program = os.environ["UNDERSTORY_PROGRAM"]
 recording, checkpoint_bytes = CASES[sys.argv[1]]
