@@ -265,7 +265,8 @@ void Scanner::cast_block(double moment_s, Block& block) const {
   make_rays(moment_s, block);
   block.hits.resize(block.rays.size());
   scene_.cast(block.rays.data(), block.rays.size(), static_cast<float>(config_.min_range_m),
-              static_cast<float>(config_.max_range_m), block.hits.data());
+              static_cast<float>(config_.max_range_m), block.hits.data(),
+              static_cast<std::size_t>(config_.rays_per_beam));
   if (!machine_.empty()) meet_machine(block);
   const std::size_t beams = model_.beams.size();
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);

@@ -196,12 +196,16 @@ TEST(Scanner, CountsOfStemReturnsAgreeWithABruteCount) {
   }
 }
 
-TEST(Scanner, SameBytesForAnyNumberOfThreadsAndAnyOrder) {
+// Both ways of casting.
+class ScannerOfRays : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Scanner, ScannerOfRays, testing::Values(3, 8));
+
+TEST_P(ScannerOfRays, SameBytesForAnyNumberOfThreadsAndAnyOrder) {
   SiteConfig site = quiet_site();
   site.stand.foliage = 1.0;
   site.lidar.range_sd_m = 0.02;
   site.lidar.divergence_mrad = 6.0;
-  site.lidar.rays_per_beam = 3;
+  site.lidar.rays_per_beam = GetParam();
   site.lidar.range_10_percent_m = 17.0;
   World one(site);
   World two(site);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -49,8 +50,26 @@ class ForestScene::Impl : private SceneContent {
     embree_intersect16(valid, rooted_, &packet);
     embree_intersect16(valid, top_, &packet);
     for (std::size_t i = 0; i < count; ++i)
-      hits[i] = read_hit(packet, i, rays[i]);
+      hits[i] = read_hit(met_by(packet, i), rays[i]);
   }
+
+  // Beams of rays_per_beam, each in as few bundles as it takes.
+  void cast_beams(const Ray* rays, std::size_t count, std::size_t rays_per_beam, float near_m,
+                  float far_m, Hit* hits) const {
+    const std::size_t bundles = (rays_per_beam + kLanes - 1) / kLanes;
+    for (std::size_t beam = 0; beam < count; beam += rays_per_beam) {
+      for (std::size_t k = 0; k < bundles; ++k) {
+        const std::size_t begin = beam + k * rays_per_beam / bundles;
+        const std::size_t size = beam + (k + 1) * rays_per_beam / bundles - begin;
+        std::array<Met, kLanes> met;
+        bundles_->cast(rays + begin, size, near_m, far_m, met.data());
+        for (std::size_t i = 0; i < size; ++i)
+          hits[begin + i] = read_hit(met[i], rays[begin + i]);
+      }
+    }
+  }
+
+  [[nodiscard]] bool by_beams() const { return bundles_ != nullptr; }
 
   void arrange(double wind_s, double stand_s) {
     bool moved = false;
@@ -60,11 +79,16 @@ class ForestScene::Impl : private SceneContent {
       present_[part.instance] = present;
       RTCGeometry geometry = rtcGetGeometry(top_, part.instance);
       present ? rtcEnableGeometry(geometry) : rtcDisableGeometry(geometry);
+      if (bundles_) bundles_->field().show(part.instance, present);
       moved = true;
     }
     const bool swayed = !sways_.empty() && wind_s != wind_s_;
     if (swayed) sway(wind_s);
-    if (moved || swayed) commit_alone(top_);
+    if (bundles_) {
+      if (swayed) bundles_->field().commit();
+    } else if (moved || swayed) {
+      commit_alone(top_);
+    }
     wind_s_ = wind_s;
   }
 
@@ -120,6 +144,10 @@ class ForestScene::Impl : private SceneContent {
       // x += bend (z - stiff), z above the foot.
       world_from_shape.col(2).head<2>() += world_from_shape(2, 2) * tree.bend;
       world_from_shape.col(3).head<2>() -= static_cast<float>(tree.stiff_m) * tree.bend;
+      if (bundles_) {
+        bundles_->field().move(part.instance, world_from_shape);
+        return;
+      }
       RTCGeometry geometry = rtcGetGeometry(top_, part.instance);
       rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR,
                               world_from_shape.data());
@@ -163,25 +191,33 @@ class ForestScene::Impl : private SceneContent {
     }
   }
 
-  [[nodiscard]] Hit read_hit(const RTCRayHit16& packet, std::size_t i, const Ray& ray) const {
+  static Met met_by(const RTCRayHit16& packet, std::size_t i) {
+    return {packet.ray.tfar[i],
+            {packet.hit.Ng_x[i], packet.hit.Ng_y[i], packet.hit.Ng_z[i]},
+            packet.hit.instID[0][i],
+            packet.hit.geomID[i],
+            packet.hit.primID[i]};
+  }
+
+  [[nodiscard]] Hit read_hit(const Met& met, const Ray& ray) const {
     Hit hit;
-    if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return hit;
-    const unsigned number = packet.hit.instID[0][i];
-    const bool is_static = number == RTC_INVALID_GEOMETRY_ID;
+    if (met.geometry == Met::kNothing) return hit;
+    const unsigned number = met.instance;
+    const bool is_static = number == Met::kNothing;
     const Instance instance =
         is_static ? Instance{Surface::kGround, 1.0F, 0.0F, 0.3F} : instances_[number];
-    const Eigen::Vector3f normal(packet.hit.Ng_x[i], packet.hit.Ng_y[i], packet.hit.Ng_z[i]);
+    const Eigen::Vector3f& normal = met.normal;
     const Eigen::Vector3f turned(instance.cos_yaw * normal.x() - instance.sin_yaw * normal.y(),
                                  instance.sin_yaw * normal.x() + instance.cos_yaw * normal.y(),
                                  normal.z());
-    hit.range_m = packet.ray.tfar[i];
+    hit.range_m = met.range_m;
     const float length = turned.norm();
     hit.cosine =
         length > 0.0F ? std::min(1.0F, std::abs(turned.dot(ray.direction)) / length) : 0.5F;
     hit.surface = instance.surface;
     hit.reflectivity = instance.reflectivity;
     hit.tree = instance.tree;
-    if (is_static) read_static(packet, i, hit);
+    if (is_static) read_static(met, hit);
     if (hit.surface == Surface::kStem && length > 0.0F) {
       const auto id = static_cast<std::size_t>(hit.tree);
       emboss(id, foot_z_[id], turned / length, ray.origin, ray.direction, hit);
@@ -226,19 +262,19 @@ class ForestScene::Impl : private SceneContent {
     return static_cast<float>(x >> 8) * 0x1p-24F;
   }
 
-  void read_static(const RTCRayHit16& packet, std::size_t i, Hit& hit) const {
-    const unsigned primitive = packet.hit.primID[i];
-    if (packet.hit.geomID[i] == kStemGeometry) {
+  void read_static(const Met& met, Hit& hit) const {
+    const unsigned primitive = met.primitive;
+    if (met.geometry == kStemGeometry) {
       hit.surface = Surface::kStem;
       hit.tree = cone_tree_[primitive];
       hit.reflectivity = bark_[static_cast<std::size_t>(hit.tree)];
-    } else if (packet.hit.geomID[i] == kWoodGeometry) {
+    } else if (met.geometry == kWoodGeometry) {
       hit.surface = Surface::kDeadWood;
       hit.reflectivity = 0.32F;
-    } else if (packet.hit.geomID[i] == kBoulderGeometry) {
+    } else if (met.geometry == kBoulderGeometry) {
       hit.surface = Surface::kBoulder;
       hit.reflectivity = 0.28F;
-    } else if (packet.hit.geomID[i] == kBuildingGeometry) {
+    } else if (met.geometry == kBuildingGeometry) {
       hit.surface = Surface::kBuilding;
       hit.reflectivity = 0.55F;
     } else if (snowy_) {
@@ -253,8 +289,8 @@ class ForestScene::Impl : private SceneContent {
 };
 
 ForestScene::ForestScene(const StandConfig& config, const Terrain& terrain, const Stand& stand,
-                         std::uint64_t seed, double snow_m, const Harvest& harvest)
-    : impl_(std::make_unique<Impl>(config, terrain, stand, seed, snow_m, harvest)) {}
+                         std::uint64_t seed, double snow_m, const Harvest& harvest, Casting casting)
+    : impl_(std::make_unique<Impl>(config, terrain, stand, seed, snow_m, harvest, casting)) {}
 ForestScene::~ForestScene() = default;
 
 void ForestScene::arrange(double wind_s, double stand_s) {
@@ -270,8 +306,12 @@ void ForestScene::cast_held(const HeldTree& held, const Ray& ray, float near_m, 
   impl_->cast_held(held, ray, near_m, far_m, hit);
 }
 
-void ForestScene::cast(const Ray* rays, std::size_t count, float near_m, float far_m,
-                       Hit* hits) const {
+void ForestScene::cast(const Ray* rays, std::size_t count, float near_m, float far_m, Hit* hits,
+                       std::size_t rays_per_beam) const {
+  if (impl_->by_beams()) {
+    impl_->cast_beams(rays, count, rays_per_beam, near_m, far_m, hits);
+    return;
+  }
   for (std::size_t i = 0; i < count; i += 16) {
     impl_->cast16(rays + i, std::min<std::size_t>(16, count - i), near_m, far_m, hits + i);
   }

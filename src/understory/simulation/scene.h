@@ -25,6 +25,10 @@ enum class Surface : std::uint8_t {
   kSnow
 };
 
+// How a scene is cast: ray by ray, or in bundles of rays that belong to one beam. What the two say
+// of one ray in a thousand differs: of those that graze what they meet.
+enum class Casting : std::uint8_t { kRays, kBundles };
+
 struct Ray {
   Eigen::Vector3f origin = Eigen::Vector3f::Zero();     // world frame
   Eigen::Vector3f direction = Eigen::Vector3f::Zero();  // unit length
@@ -46,7 +50,8 @@ class ForestScene {
  public:
   // With snow_m above zero the ground is bright. A harvest takes trees away and leaves logs.
   ForestScene(const StandConfig& config, const Terrain& terrain, const Stand& stand,
-              std::uint64_t seed, double snow_m = 0.0, const Harvest& harvest = {});
+              std::uint64_t seed, double snow_m = 0.0, const Harvest& harvest = {},
+              Casting casting = Casting::kRays);
   ~ForestScene();
   ForestScene(const ForestScene&) = delete;
   ForestScene& operator=(const ForestScene&) = delete;
@@ -60,10 +65,12 @@ class ForestScene {
   [[nodiscard]] const std::vector<double>& changes() const;
 
   // The first thing each ray meets within [near_m, far_m]. Neighbouring rays should lie beside each
-  // other: sixteen at a time go through the scene together. Between the moment of the scene and its
+  // other: sixteen at a time go through the scene together; in a scene for bundles, those of a beam
+  // do, of which each has `rays_per_beam`. Between the moment of the scene and its
   // own a ray sees what it hits moved on by the wind, to first order: surfaces move along the beam
   // and across it, their outlines stay.
-  void cast(const Ray* rays, std::size_t count, float near_m, float far_m, Hit* hits) const;
+  void cast(const Ray* rays, std::size_t count, float near_m, float far_m, Hit* hits,
+            std::size_t rays_per_beam = 1) const;
 
   // Replaces `hit` where a ray meets a cut tree before it; the stem's hits have no tree.
   void cast_held(const HeldTree& held, const Ray& ray, float near_m, float far_m, Hit& hit) const;

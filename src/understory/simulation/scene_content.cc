@@ -84,9 +84,28 @@ void commit_alone(RTCScene scene) {
   in_arena(1, [&] { rtcJoinCommitScene(scene); });
 }
 
+template <class Content>
+RTCScene SceneContent::scene_of(RTCGeometry geometry, const Content& content) {
+  RTCScene scene = new_scene();
+  attach(scene, geometry);
+  commit_alone(scene);
+  if (bundles_) bundles_->add_shape(scene, RayShape(content));
+  return scene;
+}
+
+template <class Content>
+void SceneContent::add_fixed(unsigned number, RTCGeometry geometry, const Content& content) {
+  attach_as(static_, geometry, number);
+  if (bundles_) bundles_->add_part(number, content);
+}
+
 SceneContent::SceneContent(const StandConfig& config, const Terrain& terrain, const Stand& stand,
-                           std::uint64_t seed, double snow_m, const Harvest& harvest)
-    : snowy_(snow_m > 0.0), snow_m_(snow_m), wind_(config.wind_sway_m) {
+                           std::uint64_t seed, double snow_m, const Harvest& harvest,
+                           Casting casting)
+    : bundles_(casting == Casting::kBundles ? std::make_unique<SceneBundles>() : nullptr),
+      snowy_(snow_m > 0.0),
+      snow_m_(snow_m),
+      wind_(config.wind_sway_m) {
   // No number of threads here: the library would hold the whole process to it.
   device_ = rtcNewDevice("set_affinity=0");
   UNDERSTORY_CHECK(device_ != nullptr);
@@ -105,6 +124,7 @@ SceneContent::SceneContent(const StandConfig& config, const Terrain& terrain, co
   add_remains(harvest, stand);
   commit_alone(rooted_);
   commit_alone(top_);
+  if (bundles_) bundles_->finish();
   UNDERSTORY_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
 }
 
@@ -118,7 +138,8 @@ SceneContent::~SceneContent() {
 
 void SceneContent::add_static(const Terrain& terrain, const Stand& stand) {
   static_ = new_scene();
-  UNDERSTORY_CHECK(attach(static_, terrain_geometry(device_, terrain)) == kGroundGeometry);
+  const Shape ground = terrain_shape(terrain);
+  add_fixed(kGroundGeometry, shape_geometry(device_, ground), ground);
   Cones stems;
   for (const GrownTree& tree : stand.trees) {
     for (const StemPart& part : stem_parts(tree)) {
@@ -128,6 +149,7 @@ void SceneContent::add_static(const Terrain& terrain, const Stand& stand) {
       }
     }
   }
+  if (bundles_) bundles_->add_part(kStemGeometry, stems);
   // Always present, so that geometry numbers stay what they are: a cone below the ground.
   stems.add({0.0, 0.0, -1000.0}, 0.01);
   stems.join();
@@ -141,7 +163,7 @@ void SceneContent::add_static(const Terrain& terrain, const Stand& stand) {
     wood.add(piece.to, piece.radius_to_m);
   }
   if (!wood.first.empty()) {
-    UNDERSTORY_CHECK(attach(static_, cone_geometry(device_, wood)) == kWoodGeometry);
+    add_fixed(kWoodGeometry, cone_geometry(device_, wood), wood);
   }
   add_solids(stand);
   commit_alone(static_);
@@ -170,7 +192,7 @@ void SceneContent::add_solids(const Stand& stand) {
     boulders.add(boulder.to, boulder.radius_to_m);
   }
   if (!boulders.first.empty()) {
-    attach_as(static_, cone_geometry(device_, boulders), kBoulderGeometry);
+    add_fixed(kBoulderGeometry, cone_geometry(device_, boulders), boulders);
   }
   Shape houses;
   for (const Building& building : stand.buildings) {
@@ -181,7 +203,7 @@ void SceneContent::add_solids(const Stand& stand) {
       houses.triangles.push_back(triangle + Eigen::Vector3i::Constant(first));
   }
   if (!houses.triangles.empty()) {
-    attach_as(static_, shape_geometry(device_, houses), kBuildingGeometry);
+    add_fixed(kBuildingGeometry, shape_geometry(device_, houses), houses);
   }
 }
 
@@ -230,19 +252,16 @@ void SceneContent::add_cloud(const GrownTree& tree, std::size_t sway) {
   auto found = clouds_.find(tree.cloud);
   if (found == clouds_.end()) {
     const TreeCloud cloud = read_tree_cloud(tree.cloud, tree.dbh_m);
-    const auto scene_of = [&](const std::vector<TreeCloud::Disc>& discs, bool above) -> RTCScene {
+    const auto part_of = [&](const std::vector<TreeCloud::Disc>& discs, bool above) -> RTCScene {
       std::vector<TreeCloud::Disc> part;
       std::copy_if(discs.begin(), discs.end(), std::back_inserter(part), [&](const auto& disc) {
         return (disc.centre.z() >= kStiffShare * cloud.height_m) == above;
       });
       if (part.empty()) return nullptr;
-      RTCScene scene = new_scene();
-      attach(scene, disc_geometry(device_, part));
-      commit_alone(scene);
-      return scene;
+      return scene_of(disc_geometry(device_, part), part);
     };
-    const CloudScenes scenes{{scene_of(cloud.stem, false), scene_of(cloud.stem, true)},
-                             {scene_of(cloud.crown, false), scene_of(cloud.crown, true)},
+    const CloudScenes scenes{{part_of(cloud.stem, false), part_of(cloud.stem, true)},
+                             {part_of(cloud.crown, false), part_of(cloud.crown, true)},
                              cloud.height_m};
     found = clouds_.emplace(tree.cloud, scenes).first;
   }
@@ -278,9 +297,7 @@ unsigned SceneContent::add_stem(const GrownTree& tree, bool all, std::size_t swa
     if (all || yields) add_part(part, -tree.foot, high);
   }
   if (high.first.empty()) return kNone;
-  RTCScene scene = new_scene();
-  attach(scene, cone_geometry(device_, high));
-  commit_alone(scene);
+  const RTCScene scene = scene_of(cone_geometry(device_, high), high);
   Eigen::Matrix<float, 3, 4> world_from_shape;
   world_from_shape << Eigen::Matrix3f::Identity(), tree.foot.cast<float>();
   Instance instance{Surface::kStem, 1.0F, 0.0F, static_cast<float>(tree.bark_reflectivity)};
@@ -343,9 +360,7 @@ void SceneContent::add_wood(const Wood& wood, double from_s) {
   cone.add(wood.from, wood.radius_from_m);
   cone.join();
   cone.add(wood.to, wood.radius_to_m);
-  RTCScene scene = new_scene();
-  attach(scene, cone_geometry(device_, cone));
-  commit_alone(scene);
+  const RTCScene scene = scene_of(cone_geometry(device_, cone), cone);
   Eigen::Matrix<float, 3, 4> world_from_shape;
   world_from_shape << Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero();
   time_limit(add_instance(top_, scene, world_from_shape, {Surface::kDeadWood, 1.0F, 0.0F, 0.32F}),
@@ -355,7 +370,9 @@ void SceneContent::add_wood(const Wood& wood, double from_s) {
 void SceneContent::time_limit(unsigned instance, double from_s, double until_s) {
   timed_.push_back({instance, from_s, until_s});
   present_[instance] = from_s <= -kForever;
-  if (!present_[instance]) rtcDisableGeometry(rtcGetGeometry(top_, instance));
+  if (present_[instance]) return;
+  rtcDisableGeometry(rtcGetGeometry(top_, instance));
+  if (bundles_) bundles_->field().show(instance, false);
 }
 
 void SceneContent::add_plants(const Stand& stand) {
@@ -396,10 +413,7 @@ RTCScene SceneContent::shape_scene(Shape shape) {
     shape.vertices.assign(3, Eigen::Vector3f::Zero());
     shape.triangles.emplace_back(0, 1, 2);
   }
-  RTCScene scene = new_scene();
-  attach(scene, shape_geometry(device_, shape));
-  commit_alone(scene);
-  return scene;
+  return scene_of(shape_geometry(device_, shape), shape);
 }
 
 unsigned SceneContent::add_instance(RTCScene where, RTCScene scene,
@@ -410,6 +424,7 @@ unsigned SceneContent::add_instance(RTCScene where, RTCScene scene,
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, world_from_shape.data());
   const auto id = static_cast<unsigned>(instances_.size());
   attach_as(where, geometry, id);
+  if (bundles_) bundles_->add_instance(id, scene, world_from_shape);
   instances_.push_back(instance);
   shapes_.push_back({scene, world_from_shape});
   present_.push_back(true);

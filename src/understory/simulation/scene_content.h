@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "understory/simulation/embree.h"
 #include "understory/simulation/harvest.h"
 #include "understory/simulation/scene.h"
+#include "understory/simulation/scene_bundles.h"
 #include "understory/simulation/stem_surface.h"
 #include "understory/simulation/wind.h"
 
@@ -24,7 +26,7 @@ void commit_alone(RTCScene scene);
 class SceneContent {
  public:
   SceneContent(const StandConfig& config, const Terrain& terrain, const Stand& stand,
-               std::uint64_t seed, double snow_m, const Harvest& harvest);
+               std::uint64_t seed, double snow_m, const Harvest& harvest, Casting casting);
   ~SceneContent();
   SceneContent(const SceneContent&) = delete;
   SceneContent& operator=(const SceneContent&) = delete;
@@ -78,6 +80,7 @@ class SceneContent {
     unsigned dead = kNone;
   };
 
+  std::unique_ptr<SceneBundles> bundles_;  // the same once more, where beams are cast whole
   RTCDevice device_ = nullptr;
   RTCScene static_ = nullptr;  // ground, stems as far as they never move, dead wood
   RTCScene rooted_ = nullptr;  // instances that never move: plants
@@ -129,6 +132,11 @@ class SceneContent {
   [[nodiscard]] RTCScene plant_scene(PlantKind kind, std::size_t variant) const;
   unsigned add_plant(RTCScene where, const Plant& plant, RTCScene scene, double sunk_m);
   RTCScene new_scene();
+  // A scene of one geometry that instances can be made of, and its counterpart for bundles.
+  template <class Content>
+  RTCScene scene_of(RTCGeometry geometry, const Content& content);
+  template <class Content>
+  void add_fixed(unsigned number, RTCGeometry geometry, const Content& content);
   RTCScene shape_scene(Shape shape);
   unsigned add_instance(RTCScene where, RTCScene scene,
                         const Eigen::Matrix<float, 3, 4>& world_from_shape,

@@ -18,30 +18,6 @@ T* buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_
 
 }  // namespace
 
-RTCGeometry terrain_geometry(RTCDevice device, const Terrain& terrain) {
-  const int columns = terrain.columns();
-  const int rows = terrain.rows();
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices =
-      buffer<Eigen::Vector3f>(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3,
-                              static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column)
-      *vertices++ = terrain.vertex(column, row).cast<float>();
-  }
-  auto* triangles = buffer<Eigen::Vector3i>(
-      geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
-      2 * static_cast<std::size_t>(columns - 1) * static_cast<std::size_t>(rows - 1));
-  for (int row = 0; row + 1 < rows; ++row) {
-    for (int column = 0; column + 1 < columns; ++column) {
-      const int sw = row * columns + column;
-      *triangles++ = {sw, sw + 1, sw + columns + 1};
-      *triangles++ = {sw, sw + columns + 1, sw + columns};
-    }
-  }
-  return geometry;
-}
-
 RTCGeometry cone_geometry(RTCDevice device, const Cones& cones) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
   std::copy(
@@ -74,6 +50,26 @@ RTCGeometry disc_geometry(RTCDevice device, const std::vector<TreeCloud::Disc>& 
     *normals++ = disc.normal;
   }
   return geometry;
+}
+
+Shape terrain_shape(const Terrain& terrain) {
+  const int columns = terrain.columns();
+  const int rows = terrain.rows();
+  Shape shape;
+  shape.vertices.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column)
+      shape.vertices.push_back(terrain.vertex(column, row).cast<float>());
+  }
+  shape.triangles.reserve(2 * shape.vertices.size());
+  for (int row = 0; row + 1 < rows; ++row) {
+    for (int column = 0; column + 1 < columns; ++column) {
+      const int sw = row * columns + column;
+      shape.triangles.emplace_back(sw, sw + 1, sw + columns + 1);
+      shape.triangles.emplace_back(sw, sw + columns + 1, sw + columns);
+    }
+  }
+  return shape;
 }
 
 Shape building_shape(const Building& house) {

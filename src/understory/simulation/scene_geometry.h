@@ -28,11 +28,13 @@ struct Cones {
   void join() { first.push_back(static_cast<unsigned>(points.size()) - 1); }  // to the next point
 };
 
-[[nodiscard]] RTCGeometry terrain_geometry(RTCDevice device, const Terrain& terrain);
 [[nodiscard]] RTCGeometry cone_geometry(RTCDevice device, const Cones& cones);
 [[nodiscard]] RTCGeometry shape_geometry(RTCDevice device, const Shape& shape);
 [[nodiscard]] RTCGeometry disc_geometry(RTCDevice device,
                                         const std::vector<TreeCloud::Disc>& discs);
+
+// The ground, two triangles a cell of its grid, in the world frame.
+[[nodiscard]] Shape terrain_shape(const Terrain& terrain);
 
 // Walls and a pitched roof in the world frame.
 [[nodiscard]] Shape building_shape(const Building& house);

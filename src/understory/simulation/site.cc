@@ -345,7 +345,8 @@ std::uint64_t site_key(const SiteConfig& config) {
   ConfigTable table;
   describe_scanned(table, copy);
   // The number counts what the program itself makes otherwise of the same settings.
-  std::string text = "2\n" + table.to_yaml(false);
+  const bool bundles = config.lidar.rays_per_beam >= kBundleRays;
+  std::string text = (bundles ? "3\n" : "2\n") + table.to_yaml(false);
   if (!config.stand.trees.empty()) {  // the content of files counts, not their names alone
     std::vector<std::string> files = tree_cloud_files(config.stand.trees);
     files.insert(files.begin(), config.stand.trees);

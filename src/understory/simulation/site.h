@@ -105,6 +105,10 @@ struct CarrierConfig {
   double tumble_deg = 30.0;
 };
 
+// Rays a beam from which on they are cast together: another way, which sees some grazing rays
+// otherwise (scene.h).
+constexpr int kBundleRays = 4;
+
 struct LidarConfig {
   std::string model = "OS0-128";
   double rate_hz = 10.0;

@@ -15,7 +15,8 @@ SimulatedWorld::SimulatedWorld(const SiteConfig& config)
               0.5 * config.stand.size_y_m + kTerrainMargin, seed, &route),
       stand(grow_stand(config.stand, config.carrier, terrain, route, seed)),
       plan(plan_carrier(config, route, terrain, stand)),
-      scene(config.stand, terrain, stand, seed, config.terrain.snow_m, plan.harvest),
+      scene(config.stand, terrain, stand, seed, config.terrain.snow_m, plan.harvest,
+            config.lidar.rays_per_beam >= kBundleRays ? Casting::kBundles : Casting::kRays),
       machine(config.carrier, plan, stand) {}
 
 }  // namespace understory

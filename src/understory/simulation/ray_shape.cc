@@ -1,0 +1,77 @@
+#include "understory/simulation/ray_shape.h"
+
+namespace understory {
+
+template <class Kind>
+void RayShape::plant_tree(std::vector<Kind> primitives) {
+  std::vector<Eigen::AlignedBox3f> boxes;
+  boxes.reserve(primitives.size());
+  for (const Kind& primitive : primitives)
+    boxes.push_back(primitive.box());
+  tree_ = BoxTree(boxes);
+  std::vector<Kind> ordered;
+  ordered.reserve(primitives.size());
+  places_.resize(primitives.size());
+  for (const std::uint32_t number : tree_.order()) {
+    places_[number] = static_cast<std::uint32_t>(ordered.size());
+    ordered.push_back(primitives[number]);
+  }
+  primitives_ = std::move(ordered);
+}
+
+RayShape::RayShape(const Shape& triangles) {
+  std::vector<Triangle> primitives;
+  primitives.reserve(triangles.triangles.size());
+  for (const Eigen::Vector3i& corners : triangles.triangles) {
+    const auto corner = [&](int i) {
+      return triangles.vertices[static_cast<std::size_t>(corners[i])];
+    };
+    primitives.push_back({corner(0), corner(1) - corner(0), corner(2) - corner(0)});
+  }
+  plant_tree(std::move(primitives));
+}
+
+RayShape::RayShape(const Cones& cones) {
+  std::vector<RoundCone> primitives;
+  primitives.reserve(cones.first.size());
+  for (const unsigned first : cones.first) {
+    const Vertex4& low = cones.points[first];
+    const Vertex4& high = cones.points[first + 1];
+    primitives.emplace_back(Eigen::Vector3f(low.x, low.y, low.z), low.radius,
+                            Eigen::Vector3f(high.x, high.y, high.z), high.radius);
+  }
+  plant_tree(std::move(primitives));
+}
+
+RayShape::RayShape(const std::vector<TreeCloud::Disc>& discs) {
+  std::vector<Disc> primitives;
+  primitives.reserve(discs.size());
+  for (const TreeCloud::Disc& disc : discs)
+    primitives.push_back({disc.centre, disc.normal, disc.radius_m});
+  plant_tree(std::move(primitives));
+}
+
+void RayShape::cast(const RayLanes& rays, LaneMask active, float near, Struck& struck) const {
+  const FatRay beam(rays, active, tree_.frame());
+  std::visit(
+      [&](const auto& primitives) {
+        const std::vector<std::uint32_t>& order = tree_.order();
+        float far = largest(select(active, struck.range, Lanes(0.0F)));
+        walk(tree_, beam, near, far, [&](std::uint32_t place, float) {
+          if (primitives[place].meet(rays, near, order[place], struck)) {
+            far = largest(select(active, struck.range, Lanes(0.0F)));
+          }
+        });
+      },
+      primitives_);
+}
+
+Eigen::Vector3f RayShape::normal(std::uint32_t primitive, const Eigen::Vector3f& place) const {
+  return std::visit(
+      [&](const auto& primitives) -> Eigen::Vector3f {
+        return primitives[places_[primitive]].normal(place);
+      },
+      primitives_);
+}
+
+}  // namespace understory
