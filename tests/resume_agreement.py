@@ -1,5 +1,5 @@
 """A run killed at work and resumed on another number of threads gives the bytes of an undisturbed one:
-of a harvester's scans with an IMU, and of sparse scans without one."""
+of a harvester's scans with an IMU, of sparse scans without one, and by stems alone with either."""
 
 import os
 import pathlib
@@ -9,16 +9,26 @@ import sys
 import tempfile
 import time
 
-# Recording, and the size of a checkpoint that holds more than the request alone.
-CASES = {"harvester": ("sim:harvester?seed=21&duration_s=16", 100_000),
-         "sparse_scans": ("sim:lieksa2?seed=21&duration_s=60", 300_000)}
-FILES = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "gnss.csv", "map.laz", "trees.csv"]
+DENSE = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "gnss.csv", "map.laz", "trees.csv"]
+STEMS = ["stems.csv.gz", "trajectory.tum", "odometry.tum", "steps.csv", "gnss.csv", "corrections.csv", "loops.csv",
+         "trees.csv", "felled.csv"]
+# Recording, a file that shows how far the run is, its least size then, options, files to compare. A
+# checkpoint of the dense front end holds the request alone at first; one by stems is of one size, but
+# the views before it are beside it.
+CASES = {
+    "harvester": ("sim:harvester?seed=21&duration_s=16", "checkpoint.bin", 100_000, [], DENSE),
+    "sparse_scans": ("sim:lieksa2?seed=21&duration_s=60", "checkpoint.bin", 300_000, [], DENSE),
+    "stems": ("sim:lieksa2?seed=21&duration_s=120", "views.bin", 200_000,
+              ["--front-end", "sparse", "--set", "run.checkpoint_interval_s=2"], STEMS),
+    "stems_imu": ("sim:harvester?seed=21&duration_s=30", "views.bin", 100_000,
+                  ["--front-end", "sparse", "--set", "run.checkpoint_interval_s=2"], STEMS),
+}
 program = os.environ["UNDERSTORY_PROGRAM"]
-recording, checkpoint_bytes = CASES[sys.argv[1]]
+recording, growing, least_bytes, options, files = CASES[sys.argv[1]]
 
 
 def start(folder, threads):
-    command = [program, "map", recording, "-o", str(folder), "--threads", str(threads), "--quiet"]
+    command = [program, "map", recording, "-o", str(folder), "--threads", str(threads), "--quiet", *options]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL)
 
 
@@ -26,16 +36,22 @@ with tempfile.TemporaryDirectory() as scratch:
     whole, killed = pathlib.Path(scratch) / "whole", pathlib.Path(scratch) / "killed"
     assert start(whole, 2).wait() in (0, 4)
     run = start(killed, 2)
-    checkpoint = killed / "work" / "checkpoint.bin"
+    grows = killed / "work" / growing
     for _ in range(6000):
-        if checkpoint.exists() and checkpoint.stat().st_size > checkpoint_bytes:
+        if grows.exists() and grows.stat().st_size > least_bytes:
             break
         time.sleep(0.01)
-    run.send_signal(signal.SIGKILL)
-    assert run.wait() == -signal.SIGKILL, "the run had ended before it could be killed"
-    assert not (killed / "trajectory.tum").exists()
+    if sys.argv[-1] == "interrupted":  # by Ctrl-C: leaves what there is so far
+        run.send_signal(signal.SIGINT)
+        assert run.wait() == 4 and (killed / "trajectory.tum").exists()
+        assert (killed / files[0]).read_bytes() != (whole / files[0]).read_bytes(), "the run had ended"
+    else:
+        run.send_signal(signal.SIGKILL)
+        assert run.wait() == -signal.SIGKILL, "the run had ended before it could be killed"
+        assert not (killed / "trajectory.tum").exists()
     command = [program, "map", "--resume", str(killed), "--threads", "1", "--quiet"]
     assert subprocess.run(command, stdout=subprocess.DEVNULL).returncode in (0, 4)
-    different = [f for f in FILES if (whole / f).read_bytes() != (killed / f).read_bytes()]
+    different = [f for f in files if (whole / f).read_bytes() != (killed / f).read_bytes()]
     assert not different, f"{different} differ"
-    print(f"{len(FILES)} files have the same bytes")
+    assert not (killed / "work").exists()
+    print(f"{len(files)} files have the same bytes")

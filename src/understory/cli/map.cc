@@ -8,6 +8,8 @@
 #include "understory/cli/open_options.h"
 #include "understory/cli/outcome.h"
 #include "understory/pipeline/mapping.h"
+#include "understory/pipeline/run_state.h"
+#include "understory/pipeline/sparse_mapping.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -58,29 +60,35 @@ MappingConfig resolved(const MapOptions& options) {
 }
 
 int run_sparse(const MapOptions& options, CommandContext& context) {
-  if (!options.resume.empty())
-    throw ConfigError(
-        {"--resume: a run by stems alone keeps no checkpoints; map it anew (Ctrl-C "
-         "ends it with what there is so far)"});
-  return run_sparse_map(
-      {options.recording, options.run_folder, options.profile, options.config_file,
-       live(options, {"time_repair.window_s=0", "stems.pace.longest_gap_s=0"}), options.realtime,
-       options.overwrite, options.print_config, options.open},
-      context);
+  return with_advice(options.run_folder, [&] {
+    return run_sparse_map(
+        {options.recording, options.run_folder, options.profile, options.config_file,
+         live(options, {"time_repair.window_s=0", "stems.pace.longest_gap_s=0"}), options.realtime,
+         options.overwrite, options.print_config, options.open},
+        context);
+  });
+}
+
+// By the front end that the run was begun with.
+int resume(const MapOptions& options, CommandContext& context) {
+  return with_advice(options.resume, [&] {
+    RunRequest request;
+    if (RunState::reopen(options.resume, request).front_end() == kSparseFrontEnd) {
+      return report_outcome(resume_sparse_mapping(options.resume, context.log, context.progress,
+                                                  context.stop_requested));
+    }
+    return report_outcome(
+        resume_mapping(options.resume, context.log, context.progress, context.stop_requested));
+  });
 }
 
 int run_map(const MapOptions& options, CommandContext& context) {
+  if (!options.resume.empty() && !options.print_config) return resume(options, context);
   if (options.front_end == "sparse") return run_sparse(options, context);
   if (options.print_config) {
     MappingConfig config = resolved(options);
     std::fputs(mapping_table(config).to_yaml(true).c_str(), stdout);
     return kExitDone;
-  }
-  if (!options.resume.empty()) {
-    return with_advice(options.resume, [&] {
-      return report_outcome(
-          resume_mapping(options.resume, context.log, context.progress, context.stop_requested));
-    });
   }
   if (options.recording.empty() || options.run_folder.empty()) {
     throw ConfigError({"understory map needs a RECORDING and -o RUN (or --resume RUN)"});

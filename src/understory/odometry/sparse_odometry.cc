@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/geometry/pose_io.h"
+
 namespace understory {
 namespace {
 
@@ -208,6 +210,44 @@ SparseStep SparseOdometry::track(const StemView& view, const std::optional<Pose>
   world_from_level_ = world_from_body_ * level_from_body.inverse();
   last_source_ = std::move(source);
   return step;
+}
+
+void SparseOdometry::save(BinaryWriter& writer) const {
+  writer.put(static_cast<std::uint64_t>(landmarks_.size()));
+  for (const Landmark& landmark : landmarks_) {
+    writer.put_doubles(landmark.point_in_world.data(), 3);
+    writer.put(landmark.height_sd_m);
+    writer.put(landmark.last_seen);
+  }
+  writer.put(static_cast<std::uint64_t>(last_source_.points.size()));
+  for (const Eigen::Vector3d& point : last_source_.points)
+    writer.put_doubles(point.data(), 3);
+  writer.put(last_source_.height_sd_m);
+  writer.put_doubles(origin_.data(), 3);
+  writer.put(count_);
+  put_pose(writer, world_from_body_);
+  put_pose(writer, world_from_level_);
+  writer.put_doubles(last_shift_in_level_.data(), 3);
+}
+
+void SparseOdometry::load(BinaryReader& reader) {
+  landmarks_.clear();
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    Landmark& landmark = landmarks_.emplace_back();
+    reader.get_doubles(landmark.point_in_world.data(), 3);
+    landmark.height_sd_m = reader.get<double>();
+    landmark.last_seen = reader.get<int>();
+  }
+  last_source_.points.clear();
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left)
+    reader.get_doubles(last_source_.points.emplace_back().data(), 3);
+  last_source_.height_sd_m = reader.get_vector<double>();
+  reader.get_doubles(origin_.data(), 3);
+  count_ = reader.get<int>();
+  world_from_body_ = get_pose(reader);
+  world_from_level_ = get_pose(reader);
+  reader.get_doubles(last_shift_in_level_.data(), 3);
+  target_ = count_ > 0 ? target() : nullptr;
 }
 
 }  // namespace understory

@@ -12,6 +12,7 @@
 #include "understory/registration/sparse_icp.h"
 #include "understory/registration/yaw_vote.h"
 #include "understory/sensor/stem_view.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/config.h"
 
 namespace understory {
@@ -78,6 +79,10 @@ class SparseOdometry {
   void take_up_last();
   // Of the local map: bounded by what the last `map_frames` views have seen.
   [[nodiscard]] std::size_t stems_in_memory() const { return landmarks_.size(); }
+
+  // The whole state, bit for bit; `load` in place of the views so far, same configuration.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
  private:
   struct Landmark {

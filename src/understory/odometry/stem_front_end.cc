@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/geometry/pose_io.h"
+
 namespace understory {
 namespace {
 
@@ -164,6 +166,31 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const Im
   result.keep = !result.view.stems.empty() && to_be_kept(result);
   if (result.keep) odometry_.take_up_last();
   return result;
+}
+
+void StemFrontEnd::save(BinaryWriter& writer) const {
+  odometry_.save(writer);
+  imu_.save(writer);
+  put_optional(writer, up_in_lidar_,
+               [](BinaryWriter& out, const Eigen::Vector3d& up) { out.put_doubles(up.data(), 3); });
+  put_optional(writer, last_, put_stamped_pose);
+  put_optional(writer, last_kept_, put_pose);
+  writer.put(best_overlap_);
+  writer.put_doubles(motion_per_s_.data(), 6);
+}
+
+void StemFrontEnd::load(BinaryReader& reader) {
+  odometry_.load(reader);
+  imu_.load(reader);
+  up_in_lidar_ = get_optional(reader, [](BinaryReader& in) {
+    Eigen::Vector3d up;
+    in.get_doubles(up.data(), 3);
+    return up;
+  });
+  last_ = get_optional(reader, get_stamped_pose);
+  last_kept_ = get_optional(reader, get_pose);
+  best_overlap_ = reader.get<double>();
+  reader.get_doubles(motion_per_s_.data(), 6);
 }
 
 }  // namespace understory

@@ -72,6 +72,10 @@ class StemFrontEnd {
                              const ImuBuffer* samples = nullptr);
   [[nodiscard]] const SparseOdometry& odometry() const { return odometry_; }
 
+  // The whole state, bit for bit; `load` in place of the scans so far, same configuration.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
  private:
   [[nodiscard]] StemView view_of(const Scan& scan, int frame, const Rig& rig,
                                  const StemSegments& found, const Vector6d& motion_per_s) const;

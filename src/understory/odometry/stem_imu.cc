@@ -82,4 +82,18 @@ StemUp StemImu::up(const StemUp& by_stems, const Motion& motion) const {
   return result;
 }
 
+void StemImu::save(BinaryWriter& writer) const {
+  writer.put_doubles(gyro_bias_.data(), 3);
+  writer.put_doubles(force_.data(), 3);
+  writer.put(force_seconds_);
+  writer.put(bias_seconds_);
+}
+
+void StemImu::load(BinaryReader& reader) {
+  reader.get_doubles(gyro_bias_.data(), 3);
+  reader.get_doubles(force_.data(), 3);
+  force_seconds_ = reader.get<double>();
+  bias_seconds_ = reader.get<double>();
+}
+
 }  // namespace understory

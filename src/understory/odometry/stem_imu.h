@@ -6,6 +6,7 @@
 #include "understory/odometry/imu_buffer.h"
 #include "understory/odometry/stem_levelling.h"
 #include "understory/sensor/scan.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/config.h"
 
 namespace understory {
@@ -42,6 +43,10 @@ class StemImu {
   // Up by the stems and by gravity as it would be after that motion, each by what it is worth.
   [[nodiscard]] StemUp up(const StemUp& by_stems, const Motion& motion) const;
   [[nodiscard]] const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }
+
+  // The whole state, bit for bit.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
  private:
   // Mean specific force once that motion has been taken, axes of the body at its end.

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/geometry/pose_io.h"
+#include "understory/util/error.h"
+
 namespace understory {
 namespace {
 
@@ -87,6 +90,25 @@ std::vector<StemScan> StemPacer::settle(const Rig& rig) {
   first_frame_ = last_frame + 1;
   waiting_.clear();
   return results;
+}
+
+void StemPacer::save(BinaryWriter& writer) const {
+  UNDERSTORY_CHECK(waiting_.empty());
+  front_end_.save(writer);
+  samples_.save(writer);
+  writer.put(first_frame_);
+  writer.put(wait_);
+  put_optional(writer, last_, put_stamped_pose);
+  writer.put(period_s_);
+}
+
+void StemPacer::load(BinaryReader& reader) {
+  front_end_.load(reader);
+  samples_.load(reader);
+  first_frame_ = reader.get<int>();
+  wait_ = reader.get<int>();
+  last_ = get_optional(reader, get_stamped_pose);
+  period_s_ = reader.get<double>();
 }
 
 }  // namespace understory

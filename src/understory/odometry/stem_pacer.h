@@ -35,6 +35,11 @@ class StemPacer {
   [[nodiscard]] std::vector<StemScan> finish(const Rig& rig);
   [[nodiscard]] std::size_t scans_in_memory() const { return waiting_.size(); }
 
+  // The whole state, bit for bit, between gaps only: no scan may wait. `load` in place of what was
+  // added so far, same configuration.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
  private:
   [[nodiscard]] std::vector<StemScan> settle(const Rig& rig);
   [[nodiscard]] bool even(const StemScan& last) const;

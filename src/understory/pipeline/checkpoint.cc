@@ -14,7 +14,7 @@
 namespace understory {
 namespace {
 
-constexpr char kMark[] = "UNDERSTORY CHECKPOINT 3\n";
+constexpr char kMark[] = "UNDERSTORY CHECKPOINT 4\n";
 
 std::string checksum(const std::string& bytes) {
   const uLong crc =
@@ -54,13 +54,7 @@ void write_checkpoint(const std::filesystem::path& path, const std::string& byte
 
 std::string read_checkpoint(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    const bool by_stems =
-        std::filesystem::exists(path.parent_path().parent_path() / "stems.csv.gz");
-    throw InputError(path.string(), "",
-                     by_stems ? "a run by stems alone keeps no checkpoint: it has to be made anew"
-                              : "there is no checkpoint to go on from");
-  }
+  if (!file) throw InputError(path.string(), "", "there is no checkpoint to go on from");
   std::ostringstream content;
   content << file.rdbuf();
   const std::string text = content.str();

@@ -182,8 +182,11 @@ void judge(const CorrectionRequest& request, const CorrectionRun& run, std::size
     summary.status = status;
     summary.reasons.push_back(reason);
   };
-  if (run.stopped || (request.scans != nullptr && request.scans->stopped))
-    lower(RunStatus::kPartial, "stopped before the end of the recording");
+  const bool recording = request.scans != nullptr;
+  if (run.stopped || (recording && request.scans->stopped)) {
+    lower(RunStatus::kPartial, std::string("stopped before the end of the recording") +
+                                   (recording ? "; go on with `understory map --resume`" : ""));
+  }
   if (!run.correction.converged)
     lower(RunStatus::kUntrusted, "the loops were not solved: " + run.correction.reason);
   if (trees == 0)
@@ -289,7 +292,8 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw OutputError(folder.string(), "cannot be made: " + error.message());
-  fs::remove(checkpoint_of(folder), error);
+  // Of a run that this one replaces; the run that calls this keeps its own until it is done.
+  if (request.scans == nullptr) fs::remove(checkpoint_of(folder), error);
   remove_old_results(folder);
   const MapViews map = map_views(run);
   std::vector<MappedStem> stems;

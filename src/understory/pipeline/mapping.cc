@@ -190,13 +190,16 @@ class MappingRun {
 
 MappingOutcome run_mapping(const MappingRequest& request, Log& log, const ProgressSink& progress,
                            const StopRequested& stop_requested) {
-  return MappingRun(request, RunState::create(request), log, progress, stop_requested).run();
+  return MappingRun(request, RunState::create(request, kDenseFrontEnd), log, progress,
+                    stop_requested)
+      .run();
 }
 
 MappingOutcome resume_mapping(const std::filesystem::path& run_folder, Log& log,
                               const ProgressSink& progress, const StopRequested& stop_requested) {
   MappingRequest request;
   RunState state = RunState::reopen(run_folder, request);
+  mapping_table(request.config).read_yaml(request.config_yaml, run_folder.string());
   return MappingRun(request, std::move(state), log, progress, stop_requested).run();
 }
 

@@ -6,21 +6,15 @@
 
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/mapping_config.h"
-#include "understory/recording/recording.h"
+#include "understory/pipeline/run_request.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
 
 namespace understory {
 
 // One call of `understory map`.
-struct MappingRequest {
-  std::string recording;  // file, folder or sim:SITE
-  std::filesystem::path run_folder;
+struct MappingRequest : RunRequest {
   MappingConfig config;
-  std::string config_yaml;  // resolved, every key, for run.json and for resuming
-  OpenOptions open;
-  bool realtime = false;
-  bool overwrite = false;  // start anew although the folder holds an unfinished run
 };
 
 struct MappingOutcome {

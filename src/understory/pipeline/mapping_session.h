@@ -13,6 +13,7 @@
 #include "understory/odometry/dense_odometry.h"
 #include "understory/pipeline/journal.h"
 #include "understory/pipeline/mapping_config.h"
+#include "understory/pipeline/resumable.h"
 #include "understory/preprocess/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/sensor/gnss_fix.h"
@@ -37,7 +38,7 @@ struct MappingCounts {
 // The moving part of a mapping run: takes events in order of time and keeps positioning (first
 // graph), keyframes and local map (second graph) and the journal going. Its whole state can be
 // saved; the files in `folder` belong to it. Not thread-safe.
-class MappingSession {
+class MappingSession : public Resumable {
  public:
   MappingSession(const MappingConfig& config, std::filesystem::path folder, Log& log);
 
@@ -56,10 +57,10 @@ class MappingSession {
   void handle(const Event& event, const Rig& rig);
 
   // State to go on from; `flush` has made the files safe to the same point.
-  void flush();
-  void save(BinaryWriter& writer) const;
+  void flush() override;
+  void save(BinaryWriter& writer) const override;
   // Instead of `handle`ing from the start.
-  void load(BinaryReader& reader, const Rig& rig);
+  void load(BinaryReader& reader, const Rig& rig) override;
 
   [[nodiscard]] bool started() const { return odometry_ != nullptr; }
   // False during the first scans, which may be done again; no state can be saved then.
@@ -79,7 +80,7 @@ class MappingSession {
   }
   [[nodiscard]] StageTimes& times() { return times_; }
   // Set after each scan, for progress and latency.
-  [[nodiscard]] TimeNs last_scan_end() const { return last_scan_end_; }
+  [[nodiscard]] TimeNs last_scan_end() const override { return last_scan_end_; }
   // Of the IMU; nothing if there has been no sample.
   [[nodiscard]] std::optional<TimeNs> last_imu() const;
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kCheckpoint = "checkpoint.bin";
 
-void put_request(BinaryWriter& writer, const MappingRequest& request) {
+void put_request(BinaryWriter& writer, const RunRequest& request) {
   const OpenOptions& open = request.open;
   for (const std::string& text :
        {std::string(kVersion), request.recording, request.config_yaml, open.metadata_file,
@@ -21,7 +21,7 @@ void put_request(BinaryWriter& writer, const MappingRequest& request) {
   writer.put(request.realtime);
 }
 
-void get_request(BinaryReader& reader, const std::filesystem::path& path, MappingRequest& request) {
+void get_request(BinaryReader& reader, const std::filesystem::path& path, RunRequest& request) {
   const std::string version = reader.get_string();
   if (version != kVersion) {
     throw InputError(
@@ -37,35 +37,34 @@ void get_request(BinaryReader& reader, const std::filesystem::path& path, Mappin
   }
   open.rate_hz = reader.get<double>();
   request.realtime = reader.get<bool>();
-  mapping_table(request.config).read_yaml(request.config_yaml, path.string());
 }
 
 }  // namespace
 
-RunState RunState::create(const MappingRequest& request) {
+RunState RunState::create(const RunRequest& request, const std::string& front_end) {
   const std::filesystem::path work = request.run_folder / "work";
   if (!request.overwrite) refuse_unfinished_run(request.run_folder);
   std::error_code error;
   std::filesystem::remove_all(work, error);
   std::filesystem::create_directories(work, error);
   if (error) throw OutputError(work.string(), "cannot be created: " + error.message());
-  return RunState(work);
+  return {work, front_end};
 }
 
-RunState RunState::reopen(const std::filesystem::path& run_folder, MappingRequest& request) {
-  RunState state(run_folder / "work");
+RunState RunState::reopen(const std::filesystem::path& run_folder, RunRequest& request) {
+  RunState state(run_folder / "work", "");
   const std::filesystem::path path = state.work_ / kCheckpoint;
   BinaryReader reader(read_checkpoint(path), path.string());
   request.run_folder = run_folder;
   get_request(reader, path, request);
+  state.front_end_ = reader.get_string();
   state.events_ = reader.get<std::uint64_t>();
   state.last_checkpoint_ = reader.get<TimeNs>();
   state.state_ = reader.get_string();
   return state;
 }
 
-void RunState::restore(MappingSession& session, EventOrderer& orderer, Log& log,
-                       const Rig& rig) const {
+void RunState::restore(Resumable& session, EventOrderer& orderer, Log& log, const Rig& rig) const {
   if (events_ == 0) return;
   BinaryReader reader(state_, (work_ / kCheckpoint).string());
   std::vector<Log::Warning> warnings(reader.get<std::uint64_t>());
@@ -79,8 +78,8 @@ void RunState::restore(MappingSession& session, EventOrderer& orderer, Log& log,
   log.restore(warnings);
 }
 
-void RunState::save(const MappingRequest& request, MappingSession& session,
-                    const EventOrderer& orderer, const Log& log, std::uint64_t events) {
+void RunState::save(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
+                    const Log& log, std::uint64_t events) {
   session.flush();
   BinaryWriter state;
   const auto warnings = log.warnings();
@@ -95,6 +94,7 @@ void RunState::save(const MappingRequest& request, MappingSession& session,
   last_checkpoint_ = session.last_scan_end();
   BinaryWriter writer;
   put_request(writer, request);
+  writer.put(front_end_);
   writer.put(events);
   writer.put(last_checkpoint_);
   writer.put(state.bytes());

@@ -2,14 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <deque>
 #include <memory>
-#include <system_error>
+#include <utility>
 
-#include "understory/output/run_tables.h"
 #include "understory/pipeline/realtime_player.h"
-#include "understory/pipeline/run_folder.h"
+#include "understory/pipeline/run_state.h"
 #include "understory/pipeline/source.h"
+#include "understory/pipeline/sparse_session.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -20,18 +19,22 @@ namespace fs = std::filesystem;
 // The scans of a recording in order of time, one after another through the front end.
 class SparseRun {
  public:
-  SparseRun(const SparseMappingRequest& request, Log& log)
+  SparseRun(const SparseMappingRequest& request, RunState state, Log& log)
       : request_(request),
         log_(log),
+        state_(std::move(state)),
         orderer_(request.config.time_repair, log),
         source_(open_source(request.recording, request.open, log)),
-        pacer_(request.config.pace, request.config.front_end, &log),
-        stems_(request.run_folder / "stems.csv.gz") {
-    if (!request.realtime) return;
-    auto player = std::make_unique<RealtimePlayer>(
-        std::move(source_), static_cast<std::size_t>(request.config.realtime_queue_scans));
-    player_ = player.get();
-    source_ = std::move(player);
+        session_(request.config, request.run_folder / "stems.csv.gz", state_.work(), log) {
+    if (state_.events() > 0) {
+      source_->skip(state_.events());
+      state_.restore(session_, orderer_, log_, source_->rig());
+      events_ = state_.events();
+    } else {
+      // Makes the run resumable from the start.
+      state_.save(request_, session_, orderer_, log_, 0);
+    }
+    if (request.realtime) play_at_sensor_speed();
   }
 
   // True if it was stopped.
@@ -42,18 +45,15 @@ class SparseRun {
       std::optional<Event> event = source_->next();
       ended = !event;
       if (event) {
+        ++events_;
         orderer_.push(std::move(*event));
       } else {
         orderer_.finish();
       }
-      while (auto ready = orderer_.pop()) {
-        if (const auto* scan = std::get_if<ScanPtr>(&*ready)) take(*scan, progress);
-        if (const auto* fix = std::get_if<GnssFix>(&*ready)) fixes_.push_back(*fix);
-        if (const auto* sample = std::get_if<ImuSample>(&*ready)) take(*sample);
-      }
+      while (auto ready = orderer_.pop())
+        handle(*ready, ended, progress);
     }
-    record(pacer_.finish(source_->rig()));
-    if (kept() > 0) stems_.commit();
+    session_.finish(source_->rig());
     if (player_ != nullptr) {
       player_->stop();
       warn_of_dropped();
@@ -61,40 +61,48 @@ class SparseRun {
     return stopped;
   }
 
-  [[nodiscard]] std::size_t count() const { return path_.size(); }
-  [[nodiscard]] std::size_t kept() const { return steps_.size(); }
+  [[nodiscard]] std::size_t count() { return session_.path().size(); }
+  [[nodiscard]] std::size_t kept() { return session_.steps().size(); }
+  void forget_state() { state_.remove(); }
   // What the correction needs to know of the recording; lives as long as this.
   [[nodiscard]] SparseScans scans(bool stopped) {
     SparseScans scans;
     scans.recording = request_.recording;
     scans.source = player_ != nullptr ? &player_->played() : source_.get();
-    scans.path = std::move(path_);
-    scans.steps = std::move(steps_);
-    scans.times = &times_;
-    scans.positioned = positioned_;
+    scans.path = std::move(session_.path());
+    scans.steps = std::move(session_.steps());
+    scans.times = &session_.times();
+    scans.positioned = session_.positioned();
     scans.stopped = stopped;
-    scans.fixes = std::move(fixes_);
+    scans.fixes = std::move(session_.fixes());
     if (player_ != nullptr)
       scans.realtime = {player_->dropped_scans(), distribution_of(std::move(latencies_ms_))};
     return scans;
   }
 
  private:
-  void take(const ScanPtr& scan, const ProgressSink& progress) {
-    const ScopedTimer timer(times_, "scan");
-    ++taken_;
-    waiting_ends_.push_back(scan->end());
-    record(pacer_.add(scan, source_->rig()));
-    if (!progress) return;
-    const double share = source_->progress();
-    const auto done = static_cast<double>(taken_);
-    progress({"stems", done, share > 0.0 ? done / share : 0.0, "scans",
-              fmt::format("{} stems", last_stems_)});
+  void play_at_sensor_speed() {
+    auto player = std::make_unique<RealtimePlayer>(
+        std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans));
+    player_ = player.get();
+    source_ = std::move(player);
+    session_.on_settled(
+        [this](TimeNs scan_end) { latencies_ms_.push_back(player_->latency_ms(scan_end)); });
   }
 
-  // The recording has said so where it does not know the IMU's place.
-  void take(const ImuSample& sample) {
-    if (source_->rig().body_from_imu) pacer_.add(sample);
+  void handle(const Event& event, bool ended, const ProgressSink& progress) {
+    session_.handle(event, source_->rig());
+    if (!std::holds_alternative<ScanPtr>(event)) return;
+    // Between gaps only, and not once the orderer has been told that nothing comes any more.
+    const TimeNs due =
+        state_.last_checkpoint() + from_seconds(request_.config.checkpoint_interval_s);
+    if (!ended && session_.settled() && session_.last_scan_end() >= due)
+      state_.save(request_, session_, orderer_, log_, events_);
+    if (!progress) return;
+    const double share = source_->progress();
+    const auto done = static_cast<double>(session_.scans());
+    progress({"stems", done, share > 0.0 ? done / share : 0.0, "scans",
+              fmt::format("{} stems", session_.last_stems())});
   }
 
   void warn_of_dropped() {
@@ -102,54 +110,26 @@ class SparseRun {
     if (dropped == 0) return;
     log_.warn("realtime.dropped",
               fmt::format("{} of {} scans were dropped, because the machine could not keep up",
-                          dropped, dropped + taken_));
-  }
-
-  void record(const std::vector<StemScan>& results) {
-    for (const StemScan& result : results) {
-      if (player_ != nullptr) latencies_ms_.push_back(player_->latency_ms(waiting_ends_.front()));
-      waiting_ends_.pop_front();
-      path_.push_back({result.view.stamp, result.step.world_from_body});
-      if (!result.positioned) continue;
-      ++positioned_;
-      last_stems_ = result.view.stems.size();
-      if (!result.keep) continue;
-      for (const Stem& stem : result.view.stems)
-        stems_.add(result.view.frame, result.view.stamp, stem);
-      steps_.push_back(result.step);
-    }
+                          dropped, dropped + session_.scans()));
   }
 
   const SparseMappingRequest& request_;
   Log& log_;
+  RunState state_;
   EventOrderer orderer_;
   std::unique_ptr<Recording> source_;
-  StemPacer pacer_;
-  StemsWriter stems_;
-  std::vector<StampedPose> path_;  // of every scan
-  std::size_t taken_ = 0;          // scans, of which the last may still wait
-  std::size_t positioned_ = 0;
-  std::size_t last_stems_ = 0;
-  std::vector<GnssFix> fixes_;
+  SparseSession session_;
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
-  std::deque<TimeNs> waiting_ends_;   // of scans that have no pose yet
+  std::uint64_t events_ = 0;
   std::vector<double> latencies_ms_;
-  StageTimes times_;
-  std::vector<SparseStep> steps_;  // of the views that were kept
 };
 
-}  // namespace
-
-CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& log,
-                                     const ProgressSink& progress,
-                                     const StopRequested& stop_requested) {
-  if (!request.overwrite) refuse_unfinished_run(request.run_folder);
-  std::error_code error;
-  fs::create_directories(request.run_folder, error);
-  if (error) throw OutputError(request.run_folder.string(), "cannot be made: " + error.message());
-  SparseRun run(request, log);
+CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, Log& log,
+                           const ProgressSink& progress, const StopRequested& stop_requested) {
+  SparseRun run(request, std::move(state), log);
   const bool stopped = run.run(progress, stop_requested);
   if (run.kept() == 0) {
+    run.forget_state();
     throw InputError(request.recording, "",
                      fmt::format("no stems in any of its {} scans: expected upright stems in scans "
                                  "with ring numbers",
@@ -164,7 +144,29 @@ CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& l
   correction.config_yaml = request.config_yaml;
   correction.scans = &scans;
   // What was seen until the user stopped it is still corrected.
-  return run_correction(correction, log, progress, stopped ? StopRequested() : stop_requested);
+  CorrectionOutcome outcome =
+      run_correction(correction, log, progress, stopped ? StopRequested() : stop_requested);
+  // A correction that was broken off is done again by `--resume`, too.
+  if (!stop_requested || !stop_requested()) run.forget_state();
+  return outcome;
+}
+
+}  // namespace
+
+CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& log,
+                                     const ProgressSink& progress,
+                                     const StopRequested& stop_requested) {
+  return run_from(request, RunState::create(request, kSparseFrontEnd), log, progress,
+                  stop_requested);
+}
+
+CorrectionOutcome resume_sparse_mapping(const fs::path& run_folder, Log& log,
+                                        const ProgressSink& progress,
+                                        const StopRequested& stop_requested) {
+  SparseMappingRequest request;
+  RunState state = RunState::reopen(run_folder, request);
+  reread(request.config, request.config_yaml, run_folder.string());
+  return run_from(request, std::move(state), log, progress, stop_requested);
 }
 
 }  // namespace understory

@@ -15,6 +15,12 @@ std::string joined(const std::vector<std::string>& keys) {
   return text;
 }
 
+void read_boxes(SparseMappingConfig& config) {
+  if (config.machine_boxes_file.empty()) return;
+  config.front_end.machine_boxes = std::make_shared<const std::vector<MachineBox>>(
+      read_machine_boxes(config.machine_boxes_file));
+}
+
 }  // namespace
 
 ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
@@ -30,6 +36,8 @@ ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
   });
   describe(table, config.correction);
   table.section("run", [&] {
+    table.add("checkpoint_interval_s", config.checkpoint_interval_s, {0.1, 60.0}, "s",
+              "of recording between checkpoints");
     table.add("realtime_queue_scans", config.realtime_queue_scans, {1, 1000}, "scans",
               "--realtime: scans that may wait; older ones are dropped");
   });
@@ -52,13 +60,14 @@ SparseMappingConfig read_sparse_mapping_config(const std::string& profile, const
     if (!file.empty()) table.read_file(file);
   });
   problems.gather([&] { table.set(settings); });
-  problems.gather([&] {
-    if (config.machine_boxes_file.empty()) return;
-    config.front_end.machine_boxes = std::make_shared<const std::vector<MachineBox>>(
-        read_machine_boxes(config.machine_boxes_file));
-  });
+  problems.gather([&] { read_boxes(config); });
   problems.throw_if_any();
   return config;
+}
+
+void reread(SparseMappingConfig& config, const std::string& yaml, const std::string& origin) {
+  sparse_mapping_table(config).read_yaml(yaml, origin);
+  read_boxes(config);
 }
 
 }  // namespace understory

@@ -19,6 +19,7 @@ struct SparseMappingConfig {
   StemFrontEndConfig front_end;
   StemPaceConfig pace;
   CorrectionConfig correction;
+  double checkpoint_interval_s = 10.0;
   int realtime_queue_scans = 3;
 };
 
@@ -31,5 +32,8 @@ struct SparseMappingConfig {
 [[nodiscard]] SparseMappingConfig read_sparse_mapping_config(
     const std::string& profile, const std::string& file, const std::vector<std::string>& settings,
     Log& log);
+
+// A configuration as `to_yaml` of its table wrote it, with the boxes. Throws ConfigError.
+void reread(SparseMappingConfig& config, const std::string& yaml, const std::string& origin);
 
 }  // namespace understory

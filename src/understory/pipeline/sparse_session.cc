@@ -1,0 +1,90 @@
+#include "understory/pipeline/sparse_session.h"
+
+#include <utility>
+
+#include "understory/util/timing.h"
+
+namespace understory {
+
+SparseSession::SparseSession(const SparseMappingConfig& config,
+                             const std::filesystem::path& stems_file, std::filesystem::path folder,
+                             Log& log)
+    : journal_file_(std::move(folder) / "views.bin"),
+      pacer_(config.pace, config.front_end, &log),
+      stems_(stems_file) {}
+
+void SparseSession::handle(const Event& event, const Rig& rig) {
+  if (journal_ == nullptr) journal_ = std::make_unique<ViewJournal>(journal_file_);
+  if (const auto* scan = std::get_if<ScanPtr>(&event)) on_scan(*scan, rig);
+  if (const auto* fix = std::get_if<GnssFix>(&event)) {
+    journal_->on_fix(*fix);
+    on_fix(*fix);
+  }
+  // The recording has said so where it does not know the IMU's place.
+  const auto* sample = std::get_if<ImuSample>(&event);
+  if (sample != nullptr && rig.body_from_imu) pacer_.add(*sample);
+}
+
+void SparseSession::on_scan(const ScanPtr& scan, const Rig& rig) {
+  const ScopedTimer timer(times_, "scan");
+  ++scans_;
+  last_scan_end_ = scan->end();
+  waiting_ends_.push_back(last_scan_end_);
+  record(pacer_.add(scan, rig));
+}
+
+void SparseSession::record(const std::vector<StemScan>& results) {
+  for (const StemScan& result : results) {
+    if (tell_settled_) tell_settled_(waiting_ends_.front());
+    waiting_ends_.pop_front();
+    const StampedPose pose{result.view.stamp, result.step.world_from_body};
+    journal_->on_pose(pose, result.positioned);
+    on_pose(pose, result.positioned);
+    if (!result.positioned) continue;
+    last_stems_ = result.view.stems.size();
+    if (!result.keep) continue;
+    journal_->on_view(result.view, result.step);
+    on_view(result.view, result.step);
+  }
+}
+
+void SparseSession::on_pose(const StampedPose& pose, bool positioned) {
+  path_.push_back(pose);
+  positioned_ += positioned ? 1 : 0;
+}
+
+void SparseSession::on_view(const StemView& view, const SparseStep& step) {
+  for (const Stem& stem : view.stems)
+    stems_.add(view.frame, view.stamp, stem);
+  steps_.push_back(step);
+}
+
+void SparseSession::on_fix(const GnssFix& fix) {
+  fixes_.push_back(fix);
+}
+
+void SparseSession::finish(const Rig& rig) {
+  record(pacer_.finish(rig));
+  if (!steps_.empty()) stems_.commit();
+}
+
+void SparseSession::flush() {
+  if (journal_ != nullptr) journal_->flush();
+}
+
+void SparseSession::save(BinaryWriter& writer) const {
+  writer.put(journal_ != nullptr ? journal_->bytes() : std::uint64_t{0});
+  writer.put(last_scan_end_);
+  pacer_.save(writer);
+}
+
+void SparseSession::load(BinaryReader& reader, const Rig& /*rig*/) {
+  const auto bytes = reader.get<std::uint64_t>();
+  ViewSink& again = *this;
+  journal_ = std::make_unique<ViewJournal>(journal_file_, bytes, again);
+  scans_ = path_.size();
+  last_scan_end_ = reader.get<TimeNs>();
+  pacer_.load(reader);
+}
+
+}  // namespace understory

@@ -1,0 +1,98 @@
+#include "understory/pipeline/view_journal.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <vector>
+
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What a sink was told, as numbers that can be compared.
+class Told : public ViewSink {
+ public:
+  void on_pose(const StampedPose& pose, bool positioned) override {
+    numbers.insert(numbers.end(), {1.0, static_cast<double>(pose.stamp), positioned ? 1.0 : 0.0,
+                                   pose.world_from_body.translation().x()});
+  }
+  void on_view(const StemView& view, const SparseStep& step) override {
+    numbers.insert(numbers.end(),
+                   {2.0, static_cast<double>(view.frame), static_cast<double>(view.stamp),
+                    static_cast<double>(view.stems.back().zz), step.up.up_in_body.z(),
+                    step.covariance(5, 2), static_cast<double>(step.up.stems)});
+  }
+  void on_fix(const GnssFix& fix) override { numbers.insert(numbers.end(), {3.0, fix.hdop}); }
+  std::vector<double> numbers;
+};
+
+void tell(ViewSink& sink, int round) {
+  sink.on_pose({1000 + round, Pose(Eigen::Quaterniond::Identity(), {0.1 * round, 2.0, 3.0})},
+               round % 2 == 0);
+  StemView view;
+  view.frame = round;
+  view.stamp = 5 + round;
+  view.stems.resize(3);
+  view.stems.back().zz = 0.25F * static_cast<float>(round);
+  SparseStep step;
+  step.up.up_in_body.z() = 0.9;
+  step.up.stems = 7;
+  step.covariance(5, 2) = 0.1 * round;
+  sink.on_view(view, step);
+  GnssFix fix;
+  fix.hdop = 1.5 + round;
+  sink.on_fix(fix);
+}
+
+class ViewJournalTest : public testing::Test {
+ protected:
+  void TearDown() override { fs::remove(path_); }
+  fs::path path_ = fs::path(testing::TempDir()) / "view_journal_test.bin";
+};
+
+TEST_F(ViewJournalTest, HandsBackWhatTheCheckpointKnowsAndGoesOn) {
+  std::uint64_t known = 0;
+  {
+    ViewJournal journal(path_);
+    tell(journal, 1);
+    journal.flush();
+    known = journal.bytes();
+    tell(journal, 2);  // after the checkpoint
+    journal.flush();
+  }
+  Told expected;
+  tell(expected, 1);
+  Told told;
+  {
+    ViewJournal journal(path_, known, told);
+    EXPECT_EQ(told.numbers, expected.numbers);
+    tell(journal, 3);
+    journal.flush();
+    known = journal.bytes();
+  }
+  tell(expected, 3);
+  Told again;
+  const ViewJournal journal(path_, known, again);
+  EXPECT_EQ(again.numbers, expected.numbers);
+}
+
+TEST_F(ViewJournalTest, WhatIsMissingOrDamagedIsAnInputError) {
+  std::uint64_t known = 0;
+  {
+    ViewJournal journal(path_);
+    tell(journal, 1);
+    journal.flush();
+    known = journal.bytes();
+  }
+  Told told;
+  EXPECT_THROW(ViewJournal(path_, known + 1, told), InputError);
+  EXPECT_THROW(ViewJournal(path_, known - 1, told), InputError);  // in the middle of a record
+  std::fstream(path_, std::ios::binary | std::ios::in | std::ios::out).put('x');
+  EXPECT_THROW(ViewJournal(path_, known, told), InputError);
+}
+
+}  // namespace
+}  // namespace understory
