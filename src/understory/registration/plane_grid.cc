@@ -81,4 +81,29 @@ PlaneGrid::Neighbour PlaneGrid::nearest(const Eigen::Vector3d& at, double limit_
   return best;
 }
 
+PlaneGrid::Lone PlaneGrid::nearest_and_others(const Eigen::Vector3d& at,
+                                              double height_weight) const {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  if (points_.empty()) return {{}, kNone};
+  // The far corner of the grid from here: a square that large holds every point.
+  const double all = 2.0 * cell_m_ * (columns_ + rows_) + (at.head<2>() - low_).norm();
+  for (double radius = 0.75 * cell_m_;; radius *= 2.0) {
+    Neighbour best{-1, kNone};
+    double second = kNone;
+    around(at, radius, [&](int i) {
+      const Eigen::Vector3d d = points_[static_cast<std::size_t>(i)] - at;
+      const double squared = d.x() * d.x() + d.y() * d.y() + height_weight * d.z() * d.z();
+      if (squared < best.squared_m2 || (squared == best.squared_m2 && i < best.index)) {
+        second = best.squared_m2;
+        best = {i, squared};
+      } else {
+        second = std::min(second, squared);
+      }
+    });
+    const bool whole = radius > all;
+    if (whole || (best.index >= 0 && best.squared_m2 <= radius * radius))
+      return {best, std::sqrt(whole ? second : std::min(second, radius * radius))};
+  }
+}
+
 }  // namespace understory

@@ -16,6 +16,11 @@ class PlaneGrid {
     int index = -1;  // -1: none within the limit
     double squared_m2 = 0.0;
   };
+  // The nearest of all, and what no other point lies nearer than.
+  struct Lone {
+    Neighbour nearest;
+    double others_m = 0.0;
+  };
 
   explicit PlaneGrid(const SparsePoints& points);
 
@@ -24,6 +29,8 @@ class PlaneGrid {
   // (1); the squared distance is dx^2 + dy^2 + height_weight dz^2. Of equal ones the first.
   [[nodiscard]] Neighbour nearest(const Eigen::Vector3d& at, double limit_m,
                                   double height_weight) const;
+  // The same without a limit; its distances are those of that metric.
+  [[nodiscard]] Lone nearest_and_others(const Eigen::Vector3d& at, double height_weight) const;
   // Calls visit(index) for every point within `radius_m` in the plane, and some beyond.
   template <typename Visit>
   void around(const Eigen::Vector3d& at, double radius_m, const Visit& visit) const {

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "understory/geometry/delaunay.h"
+#include "understory/registration/nearest_pairs.h"
 #include "understory/util/error.h"
 #include "understory/util/median.h"
 
@@ -45,15 +46,16 @@ double height_weight(const SparseIcpConfig& config, const Heights& heights) {
   return heights.known ? kUnsure : 1.0;
 }
 
-// Each source point with its nearest target point.
-std::vector<Pair> match(const PlaneGrid& grid, const SparsePoints& source, const Pose& pose,
-                        double limit_m, double weight) {
+// Each source point with its nearest target point, where that is nearer than the limit.
+std::vector<Pair> match(NearestPairs& nearest, const SparsePoints& source, const Pose& pose,
+                        double limit_m) {
   std::vector<Pair> pairs;
   pairs.reserve(source.size());
   const Eigen::Matrix3d rotation = pose.rotation_matrix();
   for (std::size_t i = 0; i < source.size(); ++i) {
-    const auto found = grid.nearest(rotation * source[i] + pose.translation(), limit_m, weight);
-    if (found.index >= 0) pairs.push_back({static_cast<int>(i), found.index, found.squared_m2});
+    const auto found = nearest.of(i, rotation * source[i] + pose.translation());
+    if (found.index >= 0 && found.squared_m2 < limit_m * limit_m)
+      pairs.push_back({static_cast<int>(i), found.index, found.squared_m2});
   }
   return pairs;
 }
@@ -188,7 +190,7 @@ double median_variance(const std::vector<Pair>& pairs, const Heights& heights) {
 }
 
 void refine(const SparseTarget& target, const SparsePoints& source, const Heights& heights,
-            const SparseIcpConfig& config, SparseIcpResult& result) {
+            const SparseIcpConfig& config, NearestPairs& nearest, SparseIcpResult& result) {
   const bool plane = config.metric == SparseIcpConfig::Metric::kPlane;
   const double limit_m = 0.25 * target.l0_m;  // half of delta0: beyond it is another stem
   Refinement state;
@@ -197,7 +199,7 @@ void refine(const SparseTarget& target, const SparsePoints& source, const Height
   state.variance_height = heights.known ? 1.0 : state.variance_plane;
   Pose& pose = result.target_from_source;
   for (int i = 0; i < config.max_iterations; ++i) {
-    state.pairs = match(target.grid, source, pose, limit_m, height_weight(config, heights));
+    state.pairs = match(nearest, source, pose, limit_m);
     if (state.pairs.size() < kFewestStems) return;
     weigh(target.grid.points(), source, heights, pose, plane, state);
     const Vector6d step =
@@ -210,10 +212,9 @@ void refine(const SparseTarget& target, const SparsePoints& source, const Height
   result.sigma_height_m = std::sqrt(state.variance_height * median_variance(state.pairs, heights));
 }
 
-void measure(const SparseTarget& target, const SparsePoints& source, const Heights& heights,
-             const SparseIcpConfig& config, std::size_t keep, SparseIcpResult& result) {
-  std::vector<Pair> pairs = match(target.grid, source, result.target_from_source, kNoLimit,
-                                  height_weight(config, heights));
+void measure(const SparseTarget& target, const SparsePoints& source, const SparseIcpConfig& config,
+             std::size_t keep, NearestPairs& nearest, SparseIcpResult& result) {
+  std::vector<Pair> pairs = match(nearest, source, result.target_from_source, kNoLimit);
   const double near = config.overlap_distance_ratio * target.l0_m;
   std::size_t overlapping = 0;
   for (const Pair& pair : pairs)
@@ -295,10 +296,10 @@ SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoin
   const std::size_t keep = trimmed_count(source.size(), config.outlier_ratio);
   result.status = SparseIcpStatus::kIterationLimit;
   result.reason = "the steps had not become small";
+  NearestPairs nearest(target.grid, source.size(), height_weight(config, heights));
   Pose& pose = result.target_from_source;
   for (; result.iterations < config.max_iterations; ++result.iterations) {
-    std::vector<Pair> pairs =
-        match(target.grid, source, pose, kNoLimit, height_weight(config, heights));
+    std::vector<Pair> pairs = match(nearest, source, pose, kNoLimit);
     trim(pairs, keep);
     // Heights that are known each in its own way wait for the weights.
     const bool flat = plane || (heights.known && config.refine);
@@ -310,10 +311,10 @@ SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoin
     result.reason.clear();
     break;
   }
-  measure(target, source, heights, config, keep, result);
+  measure(target, source, config, keep, nearest, result);
   if (config.refine) {
-    refine(target, source, heights, config, result);
-    measure(target, source, heights, config, keep, result);
+    refine(target, source, heights, config, nearest, result);
+    measure(target, source, config, keep, nearest, result);
   }
   return result;
 }

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "understory/registration/go_icp.h"
+#include "understory/registration/nearest_pairs.h"
 #include "understory/registration/nearest_table.h"
 #include "understory/registration/tilt_about.h"
 #include "understory/registration/yaw_vote.h"
@@ -41,6 +42,29 @@ Pair make_pair(unsigned seed, int stems, double noise_m, double lost, const Pose
 
 Pose yaw_pose(double yaw, double x, double y, double z) {
   return Pose(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), {x, y, z});
+}
+
+// What is not searched again is what a search would find, wherever the source goes.
+TEST(NearestPairs, AreThoseOfASearchWhileTheSourceMoves) {
+  for (const double weight : {0.0, 0.05, 1.0}) {
+    const Pair pair = make_pair(11, 130, 0.1, 0.3, Pose());
+    const PlaneGrid grid(pair.target);
+    NearestPairs nearest(grid, pair.source.size(), weight);
+    Vector6d step;
+    step << 0.002, -0.003, 0.01, 0.08, -0.05, 0.01;
+    Pose pose;
+    for (int round = 0; round < 60; ++round) {
+      for (std::size_t i = 0; i < pair.source.size(); ++i) {
+        const Eigen::Vector3d at = pose * pair.source[i];
+        const auto expected = grid.nearest(at, 1e9, weight);
+        const auto found = nearest.of(i, at);
+        ASSERT_EQ(found.index, expected.index) << "round " << round << ", weight " << weight;
+        ASSERT_DOUBLE_EQ(found.squared_m2, expected.squared_m2);
+      }
+      pose = pose * Pose::exp(step * (round % 3 == 0 ? 3.0 : round % 7 == 0 ? -1.5 : 0.2));
+    }
+  }
+  EXPECT_EQ(NearestPairs(PlaneGrid({}), 1, 1.0).of(0, Eigen::Vector3d::Zero()).index, -1);
 }
 
 TEST(PlaneGrid, NearestIsThatOfAllPoints) {
