@@ -156,14 +156,13 @@ void StemsWriter::add(int frame, TimeNs stamp, const Stem& stem) {
   const auto add_cell = [&](float value, int decimals) {
     line += "," + cell(static_cast<double>(value), decimals);
   };
+  // A sight errs by centimetres and by a degree; further digits are noise that does not compress.
   for (int i = 0; i < 3; ++i)
-    add_cell(stem.point[i], 4);
+    add_cell(stem.point[i], 3);
   for (int i = 0; i < 3; ++i)
-    add_cell(stem.axis[i], 6);
-  add_cell(stem.length_m, 3);
-  for (const float value : {stem.dbh_m, stem.score})
-    add_cell(value, 4);
-  for (const float value : {stem.radius_m, stem.radius_sd_m})
+    add_cell(stem.axis[i], 4);
+  add_cell(stem.length_m, 2);
+  for (const float value : {stem.dbh_m, stem.score, stem.radius_m, stem.radius_sd_m})
     add_cell(value, 3);
   // Two figures tell a spread.
   for (const float value : {stem.xx, stem.xy, stem.yy, stem.zz})
