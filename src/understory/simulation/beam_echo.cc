@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace understory {
 namespace {
@@ -24,6 +25,34 @@ BeamEcho echo_of(const Hit& hit) {
   return echo;
 }
 
+// Beams that are cast whole: all hits within a pulse's length, as most beams have them, make one
+// echo. Sums in the order of the hits; without any hit, or with farther ones, nothing.
+bool echo_of_all(std::span<const Hit> hits, float pulse_m, BeamEcho& echo) {
+  float near = std::numeric_limits<float>::infinity();
+  float far = 0.0F;
+  float sum = 0.0F;
+  float strongest_piece = 0.0F;
+  const Hit* strongest = nullptr;
+  for (const Hit& hit : hits) {
+    if (hit.surface == Surface::kNone) continue;
+    near = std::min(near, hit.range_m);
+    far = std::max(far, hit.range_m);
+    const float energy = hit.reflectivity * std::max(0.08F, hit.cosine);
+    echo.energy += energy;
+    sum += energy * hit.range_m;
+    if (energy <= strongest_piece) continue;
+    strongest_piece = energy;
+    strongest = &hit;
+  }
+  if (strongest == nullptr || !(far - near <= pulse_m)) return false;
+  echo.range_m = sum / echo.energy;
+  echo.energy /= static_cast<float>(hits.size());
+  echo.tree = strongest->tree;
+  echo.surface = strongest->surface;
+  echo.cosine = strongest->cosine;
+  return echo.energy / (echo.range_m * echo.range_m) > 0.0F;
+}
+
 }  // namespace
 
 BeamEcho strongest_echo(std::span<const Hit> hits, double pulse_m, BeamEcho* second) {
@@ -34,6 +63,8 @@ BeamEcho strongest_echo(std::span<const Hit> hits, double pulse_m, BeamEcho* sec
   };
   const std::size_t count = hits.size();
   if (count == 1) return echo_of(hits[0]);
+  BeamEcho whole;
+  if (count >= kBundleRays && echo_of_all(hits, static_cast<float>(pulse_m), whole)) return whole;
   Piece pieces[64];
   std::size_t used = 0;
   for (std::size_t k = 0; k < count; ++k) {

@@ -27,10 +27,10 @@ class BoxTree {
   };
   static_assert(sizeof(Node) == 128);
 
-  // Where the planes lie: base + number * step, axis by axis.
+  // Where the planes lie: base + number * step of x, y, z, 0, and once more.
   struct Frame {
-    Eigen::Vector3f base = Eigen::Vector3f::Zero();
-    Eigen::Vector3f step = Eigen::Vector3f::Ones();
+    std::array<float, kLanes> base{};
+    std::array<float, kLanes> step{};
   };
 
   BoxTree() = default;
@@ -43,6 +43,11 @@ class BoxTree {
   // The numbers of the boxes in the order of the leaves.
   [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }
   [[nodiscard]] const Node& node(std::uint32_t number) const { return nodes_[number]; }
+  // Brings a node near the processor.
+  void fetch(std::uint32_t number) const {
+    __builtin_prefetch(&nodes_[number]);
+    __builtin_prefetch(&nodes_[number].child);
+  }
   [[nodiscard]] const Frame& frame() const { return frame_; }
   // Around all boxes, and around those below each child of the root.
   [[nodiscard]] const Eigen::AlignedBox3f& box() const { return box_; }

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "understory/simulation/box_tree.h"
 #include "understory/simulation/lanes.h"
@@ -15,6 +15,7 @@ namespace understory {
 struct RayLanes {
   Lanes3 origin;
   Lanes3 direction;
+  bool one_origin = false;  // all begin at the same place
 };
 
 // All rays of a beam at once, for one tree of boxes: at each range they are within a box whose
@@ -25,28 +26,28 @@ class FatRay {
   // Only the rays of `active` count; at least one.
   FatRay(const RayLanes& rays, LaneMask active, const BoxTree::Frame& frame) {
     constexpr float kFar = std::numeric_limits<float>::infinity();
-    const Lanes* directions = &rays.direction.x;
-    const Lanes* origins = &rays.origin.x;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<Eigen::Index>(axis);
-      const float slow = smallest(select(active, directions[axis], kFar));
-      const float fast = largest(select(active, directions[axis], -kFar));
-      const float low = smallest(select(active, origins[axis], kFar));
-      const float high = largest(select(active, origins[axis], -kFar));
-      const Plane lower(axis, fast, high, frame.base[a], frame.step[a]);
-      const Plane upper(axis + 3, slow, low, frame.base[a], frame.step[a]);
+    const auto& [d, o] = std::tie(rays.direction, rays.origin);
+    // Along x, y, z: of the first ray to pass a lower plane and of the last, for upper planes.
+    const Lanes speed = extremes(d.x, d.y, d.z, active);
+    const Lanes start =
+        rays.one_origin ? first_lanes(o.x, o.y, o.z) : extremes(o.x, o.y, o.z, active);
+    const Lanes per = Lanes(1.0F) / away_from_zero(speed);
+    std::array<float, kLanes> slope;
+    std::array<float, kLanes> shift;
+    (Lanes::load(frame.step.data()) * per).store(slope.data());
+    ((Lanes::load(frame.base.data()) - start) * per).store(shift.data());
+    const unsigned down = (speed < Lanes(0.0F)).bits();
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      const Plane lower = {axis, slope[axis], shift[axis]};
+      const Plane upper = {axis + 3, slope[axis + 4], shift[axis + 4]};
+      const bool all_down = (down >> axis & 1U) != 0;
+      const bool some_down = (down >> (axis + 4) & 1U) != 0;
       // Rays pass the lower planes on their way up: before, they are not in the box.
-      if (slow > 0.0F) {
-        near_[axis] = lower;
-        far_[axis] = upper;
-      } else if (fast < 0.0F) {
-        near_[axis] = upper;
-        far_[axis] = lower;
-      } else {  // some go up, some down: they enter through both
-        near_[axis] = lower;
-        far_[axis] = {axis, 0.0F, kFar};
-        also_near_[spread_++] = upper;
-      }
+      near_[axis] = all_down ? upper : lower;
+      far_[axis] = all_down ? lower : upper;
+      if (all_down == some_down) continue;
+      far_[axis] = {axis, 0.0F, kFar};  // some go up, some down: they enter through both
+      also_near_[spread_++] = upper;
     }
   }
 
@@ -61,22 +62,18 @@ class FatRay {
  private:
   // Range at which a side of the beam passes a plane: number * slope + shift.
   struct Plane {
-    Plane() = default;
-    Plane(std::size_t plane, float multiply, float add)
-        : number(plane), slope(multiply), shift(add) {}
-    Plane(std::size_t plane, float speed, float origin, float base, float step) : number(plane) {
-      constexpr float kSlowest = 1e-12F;  // keeps what follows finite
-      const float per =
-          1.0F / (std::abs(speed) < kSlowest ? std::copysign(kSlowest, speed) : speed);
-      slope = step * per;
-      shift = (base - origin) * per;
-    }
-    std::size_t number;
+    unsigned row;  // of the planes of a node
     float slope;
     float shift;
   };
   static Lanes at(const Plane& plane, const BoxTree::Node& node) {
-    return lanes_of(node.planes[plane.number].data()) * plane.slope + plane.shift;
+    return lanes_of(node.planes[plane.row].data()) * plane.slope + plane.shift;
+  }
+
+  static Lanes away_from_zero(Lanes speed) {
+    const Lanes least(1e-12F);  // keeps what follows finite
+    const Lanes none(0.0F);
+    return select(none <= speed, max(speed, least), min(speed, none - least));
   }
 
   Plane near_[3];
@@ -85,10 +82,12 @@ class FatRay {
   std::size_t spread_ = 0;  // axes along which rays go both ways
 };
 
-// Goes through a tree along a beam, the nearer boxes first, and calls leaf(place in order()) for
-// those that it meets between `near` and `far`; leaf may lower `far`.
-template <class Leaf>
-void walk(const BoxTree& tree, const FatRay& beam, float near, const float& far, Leaf&& leaf) {
+// Goes through a tree along a beam, the nearer boxes first, and calls leaf(place in order(), range
+// from which on it is met) for those that it meets between `near` and `far`; leaf may lower `far`.
+// fetch(place) comes some time before and may bring near what leaf will need.
+template <class Fetch, class Leaf>
+void walk(const BoxTree& tree, const FatRay& beam, float near, const float& far, Fetch&& fetch,
+          Leaf&& leaf) {
   struct Waiting {
     std::uint32_t node;
     float from;
@@ -108,10 +107,8 @@ void walk(const BoxTree& tree, const FatRay& beam, float near, const float& far,
     met ^= leaves;
     alignas(32) std::array<float, kLanes> ranges;
     from.store(ranges.data());
-    for (unsigned rest = leaves; rest != 0; rest &= rest - 1) {
-      const auto i = static_cast<std::size_t>(std::countr_zero(rest));
-      leaf(node.child[i] & ~BoxTree::kLeaf, ranges[i]);
-    }
+    for (unsigned rest = leaves; rest != 0; rest &= rest - 1)
+      fetch(node.child[static_cast<std::size_t>(std::countr_zero(rest))] & ~BoxTree::kLeaf);
     // Those that wait, the nearest last.
     const std::size_t before = count;
     for (unsigned rest = met; rest != 0; rest &= rest - 1) {
@@ -120,6 +117,11 @@ void walk(const BoxTree& tree, const FatRay& beam, float near, const float& far,
       for (; place > before && waiting[place - 1].from < ranges[i]; --place)
         waiting[place] = waiting[place - 1];
       waiting[place] = {node.child[i], ranges[i]};
+      tree.fetch(node.child[i]);
+    }
+    for (unsigned rest = leaves; rest != 0; rest &= rest - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+      leaf(node.child[i] & ~BoxTree::kLeaf, ranges[i]);
     }
     while (count > 0 && waiting[count - 1].from > far)
       --count;

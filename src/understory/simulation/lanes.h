@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #ifdef __AVX2__
 #include <immintrin.h>
@@ -88,15 +89,35 @@ inline Lanes sqrt(Lanes a) {
 inline Lanes select(LaneMask where, Lanes a, Lanes b) {
   return Lanes(_mm256_blendv_ps(b.v, a.v, where.v));
 }
-inline float smallest(Lanes a) {
-  const __m128 four = _mm_min_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
-  const __m128 two = _mm_min_ps(four, _mm_movehl_ps(four, four));
-  return _mm_cvtss_f32(_mm_min_ss(two, _mm_movehdup_ps(two)));
-}
 inline float largest(Lanes a) {
   const __m128 four = _mm_max_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
   const __m128 two = _mm_max_ps(four, _mm_movehl_ps(four, four));
   return _mm_cvtss_f32(_mm_max_ss(two, _mm_movehdup_ps(two)));
+}
+// The most of x, y and z over the lanes of a mask, any number, their least, any number.
+inline Lanes extremes(Lanes x, Lanes y, Lanes z, LaneMask where) {
+  // Halves of each, then quarters of x and y beside each other, then all.
+  const auto join = [](__m128 xs, __m128 ys, __m128 zs, const auto& pick) {
+    const __m128 xy = pick(_mm_unpacklo_ps(xs, ys), _mm_unpackhi_ps(xs, ys));
+    const __m128 zz = pick(zs, _mm_movehl_ps(zs, zs));
+    return pick(_mm_movelh_ps(xy, zz), _mm_shuffle_ps(xy, zz, _MM_SHUFFLE(1, 1, 3, 2)));
+  };
+  const auto more = [](__m128 a, __m128 b) { return _mm_max_ps(a, b); };
+  const auto less = [](__m128 a, __m128 b) { return _mm_min_ps(a, b); };
+  const auto fold = [&](Lanes a, float others, const auto& pick) {
+    const __m256 counted = select(where, a, Lanes(others)).v;
+    return pick(_mm256_castps256_ps128(counted), _mm256_extractf128_ps(counted, 1));
+  };
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  const __m128 most = join(fold(x, -kFar, more), fold(y, -kFar, more), fold(z, -kFar, more), more);
+  const __m128 least = join(fold(x, kFar, less), fold(y, kFar, less), fold(z, kFar, less), less);
+  return Lanes(_mm256_set_m128(least, most));
+}
+// The first lanes of x, y and z, any number, the same again.
+inline Lanes first_lanes(Lanes x, Lanes y, Lanes z) {
+  const __m128 xy = _mm_unpacklo_ps(_mm256_castps256_ps128(x.v), _mm256_castps256_ps128(y.v));
+  const __m128 xyz = _mm_movelh_ps(xy, _mm256_castps256_ps128(z.v));
+  return Lanes(_mm256_set_m128(xyz, xyz));
 }
 // Of eight whole numbers, at a multiple of 16 bytes.
 inline Lanes lanes_of(const std::uint16_t* numbers) {
@@ -187,17 +208,25 @@ inline Lanes select(LaneMask where, const Lanes& a, const Lanes& b) {
     result.v[i] = (where.v >> i & 1U) != 0 ? a.v[i] : b.v[i];
   return result;
 }
-inline float smallest(const Lanes& a) {
-  float least = a.v[0];
-  for (const float value : a.v)
-    least = value < least ? value : least;
-  return least;
-}
 inline float largest(const Lanes& a) {
   float most = a.v[0];
   for (const float value : a.v)
     most = value > most ? value : most;
   return most;
+}
+inline Lanes extremes(const Lanes& x, const Lanes& y, const Lanes& z, LaneMask where) {
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  const Lanes none(0.0F);
+  Lanes result(0.0F);
+  const Lanes* all[] = {&x, &y, &z};
+  for (std::size_t k = 0; k < 3; ++k) {
+    result.v[k] = largest(select(where, *all[k], Lanes(-kFar)));
+    result.v[k + 4] = -largest(select(where, none - *all[k], Lanes(-kFar)));
+  }
+  return result;
+}
+inline Lanes first_lanes(const Lanes& x, const Lanes& y, const Lanes& z) {
+  return Lanes({x.v[0], y.v[0], z.v[0], 0.0F, x.v[0], y.v[0], z.v[0], 0.0F});
 }
 inline Lanes lanes_of(const std::uint16_t* numbers) {
   Lanes result;

@@ -54,20 +54,23 @@ void ObjectField::cast(const RayLanes& rays, LaneMask active, float near, Struck
   const std::vector<std::uint32_t>& order = tree_.order();
   const Lanes none(0.0F);
   float far = largest(select(active, struck.range, none));
-  walk(tree_, beam, near, far, [&](std::uint32_t place, float from) {
-    const Object& object = objects_[order[place]];
-    if (!object.present) return;
-    const LaneMask reaching = active & (Lanes(from) < struck.range);
-    if (reaching.bits() == 0) return;
-    const RayLanes inside = {moved(object.shape_from_world, rays.origin),
-                             turned(object.shape_from_world, rays.direction)};
-    const Lanes before = struck.range;
-    object.shape->cast(inside, reaching, near, struck);
-    const LaneMask nearer = struck.range < before;
-    if (nearer.bits() == 0) return;
-    struck.object = select(nearer, Lanes(std::bit_cast<float>(order[place])), struck.object);
-    far = largest(select(active, struck.range, none));
-  });
+  walk(
+      tree_, beam, near, far,
+      [&](std::uint32_t place) { __builtin_prefetch(&objects_[order[place]]); },
+      [&](std::uint32_t place, float from) {
+        const Object& object = objects_[order[place]];
+        if (!object.present) return;
+        const LaneMask reaching = active & (Lanes(from) < struck.range);
+        if (reaching.bits() == 0) return;
+        const RayLanes inside = {moved(object.shape_from_world, rays.origin),
+                                 turned(object.shape_from_world, rays.direction), rays.one_origin};
+        const Lanes before = struck.range;
+        object.shape->cast(inside, reaching, near, struck);
+        const LaneMask nearer = struck.range < before;
+        if (nearer.bits() == 0) return;
+        struck.object = select(nearer, Lanes(std::bit_cast<float>(order[place])), struck.object);
+        far = largest(select(active, struck.range, none));
+      });
 }
 
 Eigen::Vector3f ObjectField::normal(std::uint32_t object, std::uint32_t primitive,

@@ -28,37 +28,48 @@ struct Struck {
   }
 };
 
+// As the map that takes its corners to (0,0,0), (1,0,0), (0,1,0), after Baldwin and Weber, Fast
+// ray-triangle intersections by coordinate transformation (2016).
 struct Triangle {
-  Eigen::Vector3f corner;
-  Eigen::Vector3f first;  // edges from the corner
-  Eigen::Vector3f second;
-
-  [[nodiscard]] Eigen::Vector3f normal(const Eigen::Vector3f&) const { return first.cross(second); }
-  [[nodiscard]] Eigen::AlignedBox3f box() const {
-    Eigen::AlignedBox3f box(corner);
-    box.extend(corner + first);
-    return box.extend(corner + second);
+  Triangle(const Eigen::Vector3f& corner, const Eigen::Vector3f& second,
+           const Eigen::Vector3f& third) {
+    const Eigen::Vector3d from = corner.cast<double>();
+    const Eigen::Vector3d e = second.cast<double>() - from;
+    const Eigen::Vector3d f = third.cast<double>() - from;
+    const Eigen::Vector3d n = e.cross(f);
+    const double per = 1.0 / n.squaredNorm();  // without area all is infinite: never met
+    rows << row(n, from), row(per * f.cross(n), from), row(per * n.cross(e), from);
   }
 
-  // Moeller and Trumbore, Fast, minimum storage ray/triangle intersection (1997).
+  [[nodiscard]] Eigen::Vector3f normal(const Eigen::Vector3f&) const {
+    return rows.row(0).head<3>();
+  }
+
   bool meet(const RayLanes& rays, float near, std::uint32_t number, Struck& struck) const {
+    constexpr float kSeam = 1e-5F;  // of an edge: what lies side by side leaves no gap
     const Lanes3& d = rays.direction;
-    const Lanes3 p = {d.y * second.z() - d.z * second.y(), d.z * second.x() - d.x * second.z(),
-                      d.x * second.y() - d.y * second.x()};
-    const Lanes volume = p.x * first.x() + p.y * first.y() + p.z * first.z();
-    const Lanes per = Lanes(1.0F) / volume;
-    const Lanes3 from = {rays.origin.x - corner.x(), rays.origin.y - corner.y(),
-                         rays.origin.z - corner.z()};
-    const Lanes u = dot(from, p) * per;
-    const Lanes3 q = {from.y * first.z() - from.z * first.y(),
-                      from.z * first.x() - from.x * first.z(),
-                      from.x * first.y() - from.y * first.x()};
-    const Lanes v = dot(d, q) * per;
-    const Lanes at = (q.x * second.x() + q.y * second.y() + q.z * second.z()) * per;
-    const Lanes none(0.0F);
-    return struck.take((none <= u) & (none <= v) & (u + v <= Lanes(1.0F)) & (Lanes(near) <= at) &
-                           (at < struck.range),
+    const Lanes3& o = rays.origin;
+    const auto along = [&](int r) {
+      return d.x * rows(r, 0) + d.y * rows(r, 1) + d.z * rows(r, 2);
+    };
+    const auto start = [&](int r) {
+      return o.x * rows(r, 0) + o.y * rows(r, 1) + o.z * rows(r, 2) + rows(r, 3);
+    };
+    const Lanes at = (Lanes(0.0F) - start(0)) / along(0);
+    const Lanes u = start(1) + at * along(1);
+    const Lanes v = start(2) + at * along(2);
+    const Lanes least(-kSeam);
+    return struck.take((least <= u) & (least <= v) & (u + v <= Lanes(1.0F + kSeam)) &
+                           (Lanes(near) <= at) & (at < struck.range),
                        at, number);
+  }
+
+  // Height above its plane, and shares of its two edges, of (x, y, z, 1).
+  Eigen::Matrix<float, 3, 4, Eigen::RowMajor | Eigen::DontAlign> rows;
+
+ private:
+  static Eigen::RowVector4f row(const Eigen::Vector3d& v, const Eigen::Vector3d& from) {
+    return Eigen::RowVector4d(v.x(), v.y(), v.z(), -v.dot(from)).cast<float>();
   }
 };
 

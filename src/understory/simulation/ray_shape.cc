@@ -3,11 +3,8 @@
 namespace understory {
 
 template <class Kind>
-void RayShape::plant_tree(std::vector<Kind> primitives) {
-  std::vector<Eigen::AlignedBox3f> boxes;
-  boxes.reserve(primitives.size());
-  for (const Kind& primitive : primitives)
-    boxes.push_back(primitive.box());
+void RayShape::plant_tree(const std::vector<Kind>& primitives,
+                          const std::vector<Eigen::AlignedBox3f>& boxes) {
   tree_ = BoxTree(boxes);
   std::vector<Kind> ordered;
   ordered.reserve(primitives.size());
@@ -21,34 +18,39 @@ void RayShape::plant_tree(std::vector<Kind> primitives) {
 
 RayShape::RayShape(const Shape& triangles) {
   std::vector<Triangle> primitives;
-  primitives.reserve(triangles.triangles.size());
+  std::vector<Eigen::AlignedBox3f> boxes;
   for (const Eigen::Vector3i& corners : triangles.triangles) {
     const auto corner = [&](int i) {
       return triangles.vertices[static_cast<std::size_t>(corners[i])];
     };
-    primitives.push_back({corner(0), corner(1) - corner(0), corner(2) - corner(0)});
+    primitives.emplace_back(corner(0), corner(1), corner(2));
+    boxes.emplace_back(corner(0));
+    boxes.back().extend(corner(1)).extend(corner(2));
   }
-  plant_tree(std::move(primitives));
+  plant_tree(primitives, boxes);
 }
 
 RayShape::RayShape(const Cones& cones) {
   std::vector<RoundCone> primitives;
-  primitives.reserve(cones.first.size());
+  std::vector<Eigen::AlignedBox3f> boxes;
   for (const unsigned first : cones.first) {
     const Vertex4& low = cones.points[first];
     const Vertex4& high = cones.points[first + 1];
     primitives.emplace_back(Eigen::Vector3f(low.x, low.y, low.z), low.radius,
                             Eigen::Vector3f(high.x, high.y, high.z), high.radius);
+    boxes.push_back(primitives.back().box());
   }
-  plant_tree(std::move(primitives));
+  plant_tree(primitives, boxes);
 }
 
 RayShape::RayShape(const std::vector<TreeCloud::Disc>& discs) {
   std::vector<Disc> primitives;
-  primitives.reserve(discs.size());
-  for (const TreeCloud::Disc& disc : discs)
+  std::vector<Eigen::AlignedBox3f> boxes;
+  for (const TreeCloud::Disc& disc : discs) {
     primitives.push_back({disc.centre, disc.normal, disc.radius_m});
-  plant_tree(std::move(primitives));
+    boxes.push_back(primitives.back().box());
+  }
+  plant_tree(primitives, boxes);
 }
 
 void RayShape::cast(const RayLanes& rays, LaneMask active, float near, Struck& struck) const {
@@ -57,11 +59,14 @@ void RayShape::cast(const RayLanes& rays, LaneMask active, float near, Struck& s
       [&](const auto& primitives) {
         const std::vector<std::uint32_t>& order = tree_.order();
         float far = largest(select(active, struck.range, Lanes(0.0F)));
-        walk(tree_, beam, near, far, [&](std::uint32_t place, float) {
-          if (primitives[place].meet(rays, near, order[place], struck)) {
-            far = largest(select(active, struck.range, Lanes(0.0F)));
-          }
-        });
+        walk(
+            tree_, beam, near, far,
+            [&](std::uint32_t place) { __builtin_prefetch(&primitives[place]); },
+            [&](std::uint32_t place, float) {
+              if (primitives[place].meet(rays, near, order[place], struck)) {
+                far = largest(select(active, struck.range, Lanes(0.0F)));
+              }
+            });
       },
       primitives_);
 }

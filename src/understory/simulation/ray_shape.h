@@ -30,7 +30,8 @@ class RayShape {
 
  private:
   template <class Kind>
-  void plant_tree(std::vector<Kind> primitives);
+  void plant_tree(const std::vector<Kind>& primitives,
+                  const std::vector<Eigen::AlignedBox3f>& boxes);
 
   BoxTree tree_;
   // In the order of the tree's leaves.

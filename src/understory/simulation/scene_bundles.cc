@@ -28,10 +28,10 @@ RayLanes lanes_of(const Ray* rays, std::size_t count) {
       values[k + 3][i] = ray.direction[static_cast<Eigen::Index>(k)];
     }
   }
-  return {
-      {Lanes::load(values[0].data()), Lanes::load(values[1].data()), Lanes::load(values[2].data())},
-      {Lanes::load(values[3].data()), Lanes::load(values[4].data()),
-       Lanes::load(values[5].data())}};
+  const auto of = [&](std::size_t k) { return Lanes::load(values[k].data()); };
+  const bool one_origin =
+      std::all_of(rays, rays + count, [&](const Ray& ray) { return ray.origin == rays->origin; });
+  return {{of(0), of(1), of(2)}, {of(3), of(4), of(5)}, one_origin};
 }
 
 }  // namespace
