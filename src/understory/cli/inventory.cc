@@ -10,6 +10,7 @@
 #include "understory/forest/inventory.h"
 #include "understory/output/inventory_files.h"
 #include "understory/output/report.h"
+#include "understory/pipeline/lidar_view.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/recording/cloud_file.h"
 #include "understory/util/error.h"
@@ -130,7 +131,9 @@ int run_inventory(const InventoryOptions& options, CommandContext& context) {
   InventoryResult inventory;
   {
     const ScopedTimer timer(times, "inventory");
-    inventory = take_inventory(blocks, config, context.progress);
+    const SeenTest in_view =
+        path == fs::path(options.cloud) ? SeenTest() : seen_in_run(options.cloud);
+    inventory = take_inventory(blocks, config, context.progress, in_view);
   }
   MapPicture picture;
   {

@@ -39,8 +39,16 @@ class CellGrid {
       last_key_ = key;
     }
     ++last_->points;
-    return last_->cells[static_cast<std::size_t>((row - key.first * kBlock) * kBlock + column -
-                                                 key.second * kBlock)];
+    return last_->cells[index_in(key, column, row)];
+  }
+
+  // Null where nothing has been.
+  [[nodiscard]] const Cell* find(double x, double y) const {
+    const auto column = static_cast<int>(std::floor(x / cell_m_));
+    const auto row = static_cast<int>(std::floor(y / cell_m_));
+    const auto block = blocks_.find({floor_div(row), floor_div(column)});
+    if (block == blocks_.end()) return nullptr;
+    return &block->second->cells[index_in(block->first, column, row)];
   }
 
   // The blocks' bounds in cells. A few stray points far away must not make the area huge: where it
@@ -71,6 +79,10 @@ class CellGrid {
   };
   static int floor_div(int value) {
     return value >= 0 ? value / kBlock : -((kBlock - 1 - value) / kBlock);
+  }
+  static std::size_t index_in(const std::pair<int, int>& block, int column, int row) {
+    return static_cast<std::size_t>((row - block.first * kBlock) * kBlock + column -
+                                    block.second * kBlock);
   }
   [[nodiscard]] Bounds bounds_of(std::uint64_t few) const {
     bool first = true;

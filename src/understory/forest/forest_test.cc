@@ -247,6 +247,60 @@ TEST(Inventory, AHeightDoesNotReachOverAGapOfSky) {
   EXPECT_NEAR(loose_top->height_m, 18.0, 0.3);
 }
 
+// Defect: ghosts of other pulses over a path where a sleigh had stood made trees 14 m too high.
+TEST(Inventory, GhostsInTheSkyAreNoTops) {
+  Plot plot(17);
+  plot.add_ground(20.0, 40);
+  plot.add_stem({6.0, 6.0, 0.3});
+  plot.add_stem({14.0, 14.0, 0.3});
+  Random random(18);
+  for (int i = 0; i < 2000; ++i) {
+    const double side = i % 2 == 0 ? 6.0 : 14.0;
+    plot.cloud.emplace_back(side + random.normal(0.0, 0.6), side + random.normal(0.0, 0.6),
+                            100.0 + random.uniform(4.0, 15.0));
+  }
+  for (int i = 0; i < 3000; ++i) {  // denser near the ground, as near a scanner
+    const double up = 40.0 * random.uniform(0.0, 1.0) * random.uniform(0.0, 1.0);
+    plot.cloud.emplace_back(random.uniform(0.0, 20.0), random.uniform(0.0, 20.0), 100.0 + up);
+  }
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  ASSERT_EQ(result.trees.size(), 2U);
+  for (const Tree& tree : result.trees)
+    EXPECT_NEAR(tree.height_m, 15.0, 1.2);
+  // Of the canopy the same: open ground stays open.
+  EXPECT_NEAR(result.canopy.cell_value(6.2, 6.2), 14.0, 2.0);
+  int above = 0;
+  int cells = 0;
+  for (double x = 9.0; x < 12.0; x += 0.5) {
+    for (double y = 1.0; y < 19.0; y += 0.5) {
+      ++cells;
+      above += result.canopy.cell_value(x, y) > 2.0 ? 1 : 0;
+    }
+  }
+  EXPECT_LT(above, cells / 10);
+}
+
+TEST(Inventory, ATreeThatMayGoOnAboveTheViewHasNoHeight) {
+  Plot plot(19);
+  plot.add_ground(20.0, 40);
+  plot.add_stem({6.0, 6.0, 0.3});
+  plot.add_stem({14.0, 14.0, 0.3});
+  // To the left of x = 10 the scanner saw no higher than 15.5 m.
+  const SeenTest in_view = [&](const Eigen::Vector3d& place) {
+    return place.x() > 10.0 || place.z() < plot.ground(place.x(), place.y()) + 15.5;
+  };
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {}, {}, in_view);
+  const Tree* cut = nearest(result.trees, 6.0, 6.0);
+  const Tree* seen = nearest(result.trees, 14.0, 14.0);
+  ASSERT_NE(cut, nullptr);
+  ASSERT_NE(seen, nullptr);
+  EXPECT_TRUE(std::isnan(cut->height_m)) << cut->height_m;
+  EXPECT_NEAR(seen->height_m, 15.0, 0.3);
+  ASSERT_FALSE(result.remarks.empty());
+  EXPECT_NE(result.remarks.back().find("1 of 2 trees have no height"), std::string::npos)
+      << result.remarks.back();
+}
+
 TEST(Inventory, AStemHiddenAroundBreastHeightIsNotMeasured) {
   Plot plot(15);
   plot.add_ground(12.0, 40);

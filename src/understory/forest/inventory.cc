@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "understory/forest/canopy.h"
 #include "understory/forest/cell_grid.h"
 #include "understory/forest/slice_thinner.h"
 #include "understory/forest/stem_fit.h"
@@ -15,11 +16,12 @@ namespace understory {
 namespace {
 
 constexpr double kAreaCell = 2.0;
+constexpr double kHighest = 120.0;  // metres above the ground: no tree
 
 // What the third run through the cloud gathers.
 struct Gathered {
   SliceThinner slices;
-  CellGrid<ColumnCell> columns;
+  CanopyCeiling ceiling;
   std::uint64_t points = 0;
   std::uint64_t without_ground = 0;
 };
@@ -30,28 +32,36 @@ void gather(const PointBlocks& cloud, const InventoryConfig& config, const Inven
   cloud([&](std::span<const Eigen::Vector3d> points) {
     result.ground.heights_above(points, heights);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const Eigen::Vector3d& point = points[i];
       ++gathered.points;
       const double height = heights[i];
       if (std::isnan(height)) {
         ++gathered.without_ground;
         continue;
       }
-      if (height < -1.0 || height > 120.0) continue;
-      const Eigen::Vector3d local = point - result.origin;
-      gathered.columns.at(local.x(), local.y()).add(height);
+      if (!(height >= 0.0 && height <= kHighest)) continue;
+      const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
+      gathered.ceiling.count(place, height);
       if (height >= config.stems.lowest_m && height < config.stems.highest_m) {
-        gathered.slices.add(local.x(), local.y(), height);
+        gathered.slices.add(place.x(), place.y(), height);
       }
     }
   });
+  gathered.ceiling.settle();
 }
 
-Raster canopy_of(const CellGrid<ColumnCell>& columns, const Eigen::Vector3d& origin) {
-  return raster_over(columns, origin.x(), origin.y(),
-                     [](Raster& canopy, std::size_t at, const ColumnCell& cell) {
-                       if (cell.occupied != 0) canopy.values[at] = cell.highest_m;
-                     });
+// The fourth: canopy and tops of trees.
+void look_up(const PointBlocks& cloud, const InventoryResult& result, const CanopyCeiling& ceiling,
+             CanopyGrid& canopy, TreeColumns& trees) {
+  std::vector<double> heights;
+  cloud([&](std::span<const Eigen::Vector3d> points) {
+    result.ground.heights_above(points, heights);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!(heights[i] >= 0.0 && heights[i] <= kHighest)) continue;
+      const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
+      if (ceiling.holds(place, heights[i])) canopy.add(place, heights[i]);
+      trees.add(place, heights[i]);
+    }
+  });
 }
 
 // Area in which stems could be seen: squares of 2 m with points near breast height or on the
@@ -92,6 +102,24 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
   return trees;
 }
 
+// NaN where the tree may go on above the scanner's view.
+std::vector<double> heights_in_view(const InventoryResult& result, const TreeColumns& columns,
+                                    double slices_end_m, const SeenTest& in_view) {
+  constexpr double kMargin = 1.0;  // metres over a top that have to be seen empty
+  std::vector<double> heights;
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    double height = columns.top(i, slices_end_m);
+    if (in_view && std::isfinite(height)) {
+      const Eigen::Vector2d place = stem_place_at(result.stems[i], height);
+      Eigen::Vector3d above(result.origin.x() + place.x(), result.origin.y() + place.y(), 0.0);
+      above.z() = result.ground.terrain.interpolate(above.x(), above.y()) + height + kMargin;
+      if (!in_view(above)) height = std::numeric_limits<double>::quiet_NaN();
+    }
+    heights.push_back(height);
+  }
+  return heights;
+}
+
 void remark(const Gathered& gathered, const InventoryConfig& config, InventoryResult& result) {
   const double per_m2 = static_cast<double>(gathered.points) / std::max(1.0, result.area_m2);
   std::uint64_t returns = 0;
@@ -127,9 +155,8 @@ void remark(const Gathered& gathered, const InventoryConfig& config, InventoryRe
   for (const Tree& tree : result.trees)
     no_top += std::isnan(tree.height_m) ? 1 : 0;
   if (no_top > 0) {
-    result.remarks.push_back(
-        fmt::format("{} of {} trees have no height: nothing was seen above their stems.", no_top,
-                    result.trees.size()));
+    result.remarks.push_back(fmt::format("{} of {} trees have no height: their tops were not seen.",
+                                         no_top, result.trees.size()));
   }
 }
 
@@ -143,9 +170,9 @@ void describe(ConfigTable& table, InventoryConfig& config) {
 }
 
 InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& config,
-                               const ProgressSink& progress) {
+                               const ProgressSink& progress, const SeenTest& in_view) {
   const auto tell = [&](const char* stage, double done) {
-    if (progress) progress({stage, done, 5.0, "passes", ""});
+    if (progress) progress({stage, done, 6.0, "passes", ""});
   };
   InventoryResult result;
   tell("ground", 0.0);
@@ -157,21 +184,25 @@ InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& 
   const Raster& terrain = result.ground.terrain;
   result.origin = {std::round(terrain.x0), std::round(terrain.y0), terrain.z0};
   tell("heights", 2.0);
-  Gathered gathered{SliceThinner(config.stems.thin_m), CellGrid<ColumnCell>(config.canopy_cell_m)};
+  Gathered gathered{SliceThinner(config.stems.thin_m), CanopyCeiling()};
   gather(cloud, config, result, gathered);
   result.points = gathered.points;
   result.slices = gathered.slices.take();
-  result.canopy = canopy_of(gathered.columns, result.origin);
-  result.area_m2 = area_of(result.canopy);
   tell("stems", 3.0);
   result.stems = detect_stems(result.slices, config.stems);
+  tell("tops", 4.0);
+  CanopyGrid canopy(config.canopy_cell_m);
+  TreeColumns columns(result.stems);
+  look_up(cloud, result, gathered.ceiling, canopy, columns);
+  result.canopy = canopy.raster(result.origin.x(), result.origin.y());
+  result.area_m2 = area_of(result.canopy);
   result.trees =
-      trees_of(result, tree_heights(gathered.columns, result.stems, config.stems.highest_m));
+      trees_of(result, heights_in_view(result, columns, config.stems.highest_m, in_view));
   remark(gathered, config, result);
-  tell("segments", 4.0);
+  tell("segments", 5.0);
   constexpr double kReach = 1.5;
   result.segments = collect_segments(cloud, result.ground, result.trees, config.segments, kReach);
-  tell("segments", 5.0);
+  tell("segments", 6.0);
   return result;
 }
 

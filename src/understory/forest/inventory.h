@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -37,10 +38,14 @@ struct InventoryResult {
   std::vector<std::string> remarks;
 };
 
-// Ground, canopy, trees of a whole cloud: four runs through it. Deterministic for any number of
-// threads.
+// Whether a place (world frame) was in the scanner's view, so that a tree's top there would show.
+using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
+
+// Ground, canopy, trees of a whole cloud: seven runs through it. With a test of what was in view,
+// trees that may go on above it have no height. Deterministic for any number of threads.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,
-                                             const ProgressSink& progress = {});
+                                             const ProgressSink& progress = {},
+                                             const SeenTest& in_view = {});
 
 }  // namespace understory

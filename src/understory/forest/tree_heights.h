@@ -1,30 +1,39 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <unordered_map>
 #include <vector>
 
-#include "understory/forest/cell_grid.h"
+#include "understory/forest/height_column.h"
 #include "understory/forest/stem_detector.h"
 
 namespace understory {
 
-// What stands above each place: which metres over the ground hold points, and the highest one.
-struct ColumnCell {
-  std::uint64_t occupied = 0;  // bit i: points between i and i + 1 m above the ground (63: above)
-  float highest_m = 0.0F;
-  void add(double height_m) {
-    if (!(height_m >= 0.0)) return;
-    const int metre = height_m < 63.0 ? static_cast<int>(height_m) : 63;
-    occupied |= 1ULL << metre;
-    if (static_cast<float>(height_m) > highest_m) highest_m = static_cast<float>(height_m);
-  }
-};
+// Place of a stem at a height; the lean near the ground is not carried far up, trees straighten.
+[[nodiscard]] Eigen::Vector2d stem_place_at(const StemFit& stem, double height_m);
 
-// Height of each tree: the highest point that hangs together with its stem (gaps of at most
-// 3 m) and is nearer to it than to any other stem. NaN where nothing is seen above the stem's
-// slice, or where the points end as if cut off just above it: that is no tree top.
-[[nodiscard]] std::vector<double> tree_heights(const CellGrid<ColumnCell>& columns,
-                                               const std::vector<StemFit>& stems,
-                                               double slices_end_m);
+// What a cloud holds around each stem, nearer to it than to any other, by metres above the ground.
+class TreeColumns {
+ public:
+  // `stems` outlive this; their frame is that of `add`.
+  explicit TreeColumns(const std::vector<StemFit>& stems);
+  void add(const Eigen::Vector2d& place, double height_m);  // height >= 0
+
+  // Height of a tree's top above the ground: the highest point that hangs together with its stem
+  // (gaps of at most 3 m) and is nearer to it than to any other stem, ghosts of other pulses aside
+  // (see HeightColumn). NaN where nothing is seen above the stem's slices, or where the points end
+  // as if cut off just above them: that is no tree top.
+  [[nodiscard]] double top(std::size_t stem, double slices_end_m) const;
+
+ private:
+  struct Column : HeightColumn {
+    std::array<float, kMetres> highest_m{};  // within each metre
+  };
+  const std::vector<StemFit>& stems_;
+  // Stems by the squares that they or their reach come to at any height.
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> near_;
+  std::vector<Column> columns_;
+};
 
 }  // namespace understory

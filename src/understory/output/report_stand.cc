@@ -327,7 +327,8 @@ std::string stand_section(const ReportInput& input) {
         "<p>A stem is listed where points show its surface at several heights around 1.3 m. "
         "The diameter's ± is one standard deviation of the fit; it does not contain the "
         "widening by the laser's beam. A height is given only where points were seen above the "
-        "stem, and it is a lower bound where the top was hidden.</p><div class=\"two\">" +
+        "stem and the lidar looked higher still; it is a lower bound where foliage hid the "
+        "top.</p><div class=\"two\">" +
         diameters(inventory.trees) + "</div>";
   }
   html += cross_sections(inventory);

@@ -67,6 +67,13 @@ Json to_json(const YAML::Node& node) {
   return node.IsScalar() ? scalar_to_json(node) : Json(nullptr);
 }
 
+Json numbers(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (const double value : values)
+    list.push_back(number(value));
+  return list;
+}
+
 std::vector<double> means_by_tenth(const std::vector<double>& values) {
   const std::size_t share = values.size() / 10;
   if (share < 10) return {};
@@ -140,13 +147,15 @@ std::string run_json(const RunSummary& summary) {
                             {"runs", stage.wall_ms.count},
                             {"total_wall_s", number(stage.total_wall_s)}};
     if (!stage.cpu_ms_by_tenth.empty()) {
-      Json& tenths = json["stages"][name]["cpu_ms_by_tenth"];
-      for (const double ms : stage.cpu_ms_by_tenth)
-        tenths.push_back(number(ms));
+      json["stages"][name]["cpu_ms_by_tenth"] = numbers(stage.cpu_ms_by_tenth);
     }
   }
   json["counts"] = to_json(summary.counts);
   json["quality"] = to_json(summary.quality);
+  if (!summary.lidar_view.highest_deg.empty()) {
+    json["lidar_view"] = {{"body_from_lidar", numbers(summary.lidar_view.body_from_lidar)},
+                          {"highest_deg", numbers(summary.lidar_view.highest_deg)}};
+  }
   json["coordinate_system"] = summary.crs_wkt.empty() ? Json(nullptr) : Json(summary.crs_wkt);
   json["inputs"] = Json::array();
   for (const InputHash& input : summary.inputs) {

@@ -37,6 +37,12 @@ struct StageSummary {
 
 using Figure = std::variant<std::int64_t, double, std::string, bool>;
 
+// How high the lidar looked: what tells which tops of trees it cannot have seen.
+struct LidarViewFigures {
+  std::vector<double> body_from_lidar;  // 4 x 4, row by row
+  std::vector<double> highest_deg;      // by azimuth in the lidar frame from -180 degrees on; NaN
+};
+
 // What run.json says. Warnings are one per kind.
 struct RunSummary {
   std::string command;  // "map", "inventory", "correct"
@@ -56,6 +62,7 @@ struct RunSummary {
   std::map<std::string, Figure> counts;   // keyframes, loops_accepted, map_points, trees ...
   std::map<std::string, Figure> quality;  // inlier_ratio_mean, ape_rmse_m ...
   std::string crs_wkt;                    // empty = local frame
+  LidarViewFigures lidar_view;            // empty = unknown
 };
 
 // Of a run at the speed of its sensors: milliseconds from the end of a scan to its pose, as the

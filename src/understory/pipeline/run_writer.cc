@@ -14,6 +14,7 @@
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/finished_map.h"
 #include "understory/pipeline/finished_trajectory.h"
+#include "understory/pipeline/lidar_view.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_judgement.h"
 #include "understory/pipeline/run_truth.h"
@@ -175,6 +176,13 @@ PointBlocks blocks_of(MapTiles& tiles) {
   };
 }
 
+std::vector<Pose> poses_of(const std::vector<Keyframe>& keyframes) {
+  std::vector<Pose> poses;
+  for (const Keyframe& keyframe : keyframes)
+    poses.push_back(keyframe.world_from_body);
+  return poses;
+}
+
 std::uint64_t write_map(const std::filesystem::path& folder, MapTiles& tiles,
                         const GroundModel& ground, MapPicture& picture,
                         const ProgressSink& progress) {
@@ -318,7 +326,10 @@ MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
     }
     {
       const ScopedTimer timer(times, "finish_inventory");
-      inventory = take_inventory(blocks_of(*tiles), request.config.inventory, progress);
+      const LidarView view = learn_view(session.clouds(), session.rig().body_from_lidar);
+      inventory = take_inventory(blocks_of(*tiles), request.config.inventory, progress,
+                                 seen_from(view, poses_of(session.map().keyframes())));
+      summary.lidar_view = figures_of(view);
     }
     const ScopedTimer timer(times, "finish_write_map");
     summary.counts["map_points"] =

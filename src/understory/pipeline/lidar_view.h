@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <vector>
+
+#include "understory/forest/inventory.h"
+#include "understory/geometry/pose.h"
+#include "understory/map/keyframe_clouds.h"
+#include "understory/output/run_summary.h"
+
+namespace understory {
+
+// How high a lidar looks in each direction, learnt from its returns: a height is none where nobody
+// looked at the top.
+struct LidarView {
+  static constexpr int kSectors = 36;
+  Pose body_from_lidar;
+  // Elevation of the highest return by azimuth, lidar frame, degrees; NaN where there is none.
+  std::array<double, kSectors> highest_deg = no_returns();
+
+  // Points in the body frame.
+  void add(const std::vector<KeyframePoint>& points);
+  // Whether a point in the lidar's frame is in view, or below it.
+  [[nodiscard]] bool covers(const Eigen::Vector3d& point_in_lidar) const;
+
+ private:
+  [[nodiscard]] static std::array<double, kSectors> no_returns();
+};
+
+// From some of the clouds, evenly chosen.
+[[nodiscard]] LidarView learn_view(const KeyframeClouds& clouds, const Pose& body_from_lidar);
+
+// Whether a place (world frame) was in view from within 60 m, from where the lidar was at any of
+// the poses; occlusion is not looked at.
+[[nodiscard]] SeenTest seen_from(const LidarView& view, const std::vector<Pose>& world_from_body);
+
+// For run.json, and back with the keyframes of the run: whether a place was in view of the
+// recording of a run folder. Empty where the folder does not tell.
+[[nodiscard]] LidarViewFigures figures_of(const LidarView& view);
+[[nodiscard]] SeenTest seen_in_run(const std::filesystem::path& run);
+
+}  // namespace understory
