@@ -125,7 +125,7 @@ def check_stand(page, folder):
         assert row[0] == tree["id"]
         assert abs(float(row[1]) - float(tree["x"])) < 0.0051, (row, tree)
         assert abs(float(row[4]) - 100 * float(tree["dbh_m"])) < 0.051, (row, tree)
-        assert (row[6] == "") == (tree["height_m"] == ""), (row, tree)
+        assert (row[7] == "") == (tree["height_m"] == ""), (row, tree)
     hectares = number(page.tiles["area with points (not a plot's border)"])
     per_hectare = number(page.tiles["stems per hectare seen"])
     assert abs(per_hectare * hectares - len(trees)) < 0.006 / hectares * len(trees) + hectares
