@@ -285,8 +285,8 @@ void BoxTree::refit(std::span<const Box> boxes) {
   }
 }
 
-std::vector<Box> BoxTree::first_boxes() const {
-  std::vector<Box> boxes;
+std::array<Box, kLanes> BoxTree::first_boxes() const {
+  std::array<Box, kLanes> boxes;
   if (nodes_.empty()) return boxes;
   const Node& root = nodes_.front();
   for (std::size_t k = 0; k < kLanes; ++k) {
@@ -298,7 +298,7 @@ std::vector<Box> BoxTree::first_boxes() const {
       low[axis] = frame_.base[a] + frame_.step[a] * root.planes[a][k];
       high[axis] = frame_.base[a] + frame_.step[a] * root.planes[a + 3][k];
     }
-    boxes.emplace_back(low, high);
+    boxes[k] = Box(low, high);
   }
   return boxes;
 }

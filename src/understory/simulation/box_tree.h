@@ -49,9 +49,9 @@ class BoxTree {
     __builtin_prefetch(&nodes_[number].child);
   }
   [[nodiscard]] const Frame& frame() const { return frame_; }
-  // Around all boxes, and around those below each child of the root.
+  // Around all boxes, and around those below each child of the root (empty: a free slot).
   [[nodiscard]] const Eigen::AlignedBox3f& box() const { return box_; }
-  [[nodiscard]] std::vector<Eigen::AlignedBox3f> first_boxes() const;
+  [[nodiscard]] std::array<Eigen::AlignedBox3f, kLanes> first_boxes() const;
 
  private:
   std::vector<Node> nodes_;  // parents before their children

@@ -51,12 +51,16 @@ class FatRay {
     }
   }
 
-  // Ranges at which the children's boxes are entered and left; met where from <= to.
-  void meet(const BoxTree::Node& node, Lanes& from, Lanes& to) const {
-    from = max(max(at(near_[0], node), at(near_[1], node)), at(near_[2], node));
-    to = min(min(at(far_[0], node), at(far_[1], node)), at(far_[2], node));
+  // Which boxes of a node are met in [near, far], as bits, and from which ranges on.
+  template <class Node>
+  unsigned meet(const Node& node, float near, float far, std::array<float, kLanes>& ranges) const {
+    Lanes from = max(max(at(near_[0], node), at(near_[1], node)), at(near_[2], node));
+    const Lanes to = min(min(at(far_[0], node), at(far_[1], node)), at(far_[2], node));
     for (std::size_t i = 0; i < spread_; ++i)
       from = max(from, at(also_near_[i], node));
+    from = max(from, near);
+    from.store(ranges.data());
+    return (from <= min(to, far)).bits();
   }
 
  private:
@@ -66,7 +70,8 @@ class FatRay {
     float slope;
     float shift;
   };
-  static Lanes at(const Plane& plane, const BoxTree::Node& node) {
+  template <class Node>
+  static Lanes at(const Plane& plane, const Node& node) {
     return lanes_of(node.planes[plane.row].data()) * plane.slope + plane.shift;
   }
 
@@ -82,12 +87,19 @@ class FatRay {
   std::size_t spread_ = 0;  // axes along which rays go both ways
 };
 
+// The children of a root that a beam meets, as bits, and from which ranges on.
+struct Entered {
+  unsigned children = 0;
+  std::array<float, kLanes> ranges;
+};
+
 // Goes through a tree along a beam, the nearer boxes first, and calls leaf(place in order(), range
 // from which on it is met) for those that it meets between `near` and `far`; leaf may lower `far`.
 // fetch(place) comes some time before and may bring near what leaf will need.
+// What of the root is met may be known before.
 template <class Fetch, class Leaf>
 void walk(const BoxTree& tree, const FatRay& beam, float near, const float& far, Fetch&& fetch,
-          Leaf&& leaf) {
+          Leaf&& leaf, const Entered* entered = nullptr) {
   struct Waiting {
     std::uint32_t node;
     float from;
@@ -98,15 +110,18 @@ void walk(const BoxTree& tree, const FatRay& beam, float near, const float& far,
   std::uint32_t number = 0;
   for (;;) {
     const BoxTree::Node& node = tree.node(number);
-    Lanes from;
-    Lanes to;
-    beam.meet(node, from, to);
-    from = max(from, near);
-    unsigned met = (from <= min(to, far)).bits() & taken(node.child.data());
+    alignas(32) std::array<float, kLanes> ranges;
+    unsigned met;
+    if (entered != nullptr) {
+      met = entered->children;
+      ranges = entered->ranges;
+      entered = nullptr;
+    } else {
+      met = beam.meet(node, near, far, ranges);
+    }
+    met &= taken(node.child.data());
     const unsigned leaves = met & marked(node.child.data());
     met ^= leaves;
-    alignas(32) std::array<float, kLanes> ranges;
-    from.store(ranges.data());
     for (unsigned rest = leaves; rest != 0; rest &= rest - 1)
       fetch(node.child[static_cast<std::size_t>(std::countr_zero(rest))] & ~BoxTree::kLeaf);
     // Those that wait, the nearest last.

@@ -124,6 +124,9 @@ inline Lanes lanes_of(const std::uint16_t* numbers) {
   const __m128i narrow = _mm_load_si128(reinterpret_cast<const __m128i*>(numbers));
   return Lanes(_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(narrow)));
 }
+inline Lanes lanes_of(const float* numbers) {
+  return Lanes(_mm256_loadu_ps(numbers));
+}
 // Which of eight numbers have their highest bit set, and which are not all ones; at a multiple of
 // 32 bytes.
 inline unsigned marked(const std::uint32_t* numbers) {
@@ -233,6 +236,9 @@ inline Lanes lanes_of(const std::uint16_t* numbers) {
   for (std::size_t i = 0; i < kLanes; ++i)
     result.v[i] = static_cast<float>(numbers[i]);
   return result;
+}
+inline Lanes lanes_of(const float* numbers) {
+  return Lanes::load(numbers);
 }
 inline unsigned marked(const std::uint32_t* numbers) {
   unsigned bits = 0;

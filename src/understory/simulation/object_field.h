@@ -36,7 +36,14 @@ class ObjectField {
     bool present;
   };
 
+  // The boxes of the first parts of an object's tree in the world, as those of a node: what meets
+  // none of them need not be turned into the shape's frame.
+  struct Parts {
+    std::array<std::array<float, kLanes>, 6> planes;
+  };
+
   std::vector<Object> objects_;
+  std::vector<Parts> parts_;
   std::vector<Eigen::AlignedBox3f> boxes_;
   BoxTree tree_;
 };

@@ -53,7 +53,8 @@ RayShape::RayShape(const std::vector<TreeCloud::Disc>& discs) {
   plant_tree(primitives, boxes);
 }
 
-void RayShape::cast(const RayLanes& rays, LaneMask active, float near, Struck& struck) const {
+void RayShape::cast(const RayLanes& rays, LaneMask active, float near, Struck& struck,
+                    const Entered* entered) const {
   const FatRay beam(rays, active, tree_.frame());
   std::visit(
       [&](const auto& primitives) {
@@ -66,7 +67,8 @@ void RayShape::cast(const RayLanes& rays, LaneMask active, float near, Struck& s
               if (primitives[place].meet(rays, near, order[place], struck)) {
                 far = largest(select(active, struck.range, Lanes(0.0F)));
               }
-            });
+            },
+            entered);
       },
       primitives_);
 }

@@ -21,7 +21,9 @@ class RayShape {
 
   // Lowers struck.range where the rays of `active` meet something between `near` and it;
   // struck.primitive is then its number in the shape that this was made of.
-  void cast(const RayLanes& rays, LaneMask active, float near, Struck& struck) const;
+  // What is known of the root of tree() may be given.
+  void cast(const RayLanes& rays, LaneMask active, float near, Struck& struck,
+            const Entered* entered = nullptr) const;
 
   // Of any length; `place` is on the primitive.
   [[nodiscard]] Eigen::Vector3f normal(std::uint32_t primitive, const Eigen::Vector3f& place) const;

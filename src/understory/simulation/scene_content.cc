@@ -122,9 +122,12 @@ SceneContent::SceneContent(const StandConfig& config, const Terrain& terrain, co
   add_plants(stand);
   still_ = copy_of_instances();
   add_remains(harvest, stand);
-  commit_alone(rooted_);
-  commit_alone(top_);
-  if (bundles_) bundles_->finish();
+  if (bundles_) {
+    bundles_->finish();
+  } else {
+    commit_alone(rooted_);
+    commit_alone(top_);
+  }
   UNDERSTORY_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
 }
 
