@@ -2,55 +2,53 @@
 
 namespace understory {
 
-template <class Kind>
-void RayShape::plant_tree(const std::vector<Kind>& primitives,
-                          const std::vector<Eigen::AlignedBox3f>& boxes) {
+// The primitives come after the tree, in its order: while it is built there is nothing but boxes.
+template <class Make>
+void RayShape::plant_tree(const std::vector<Eigen::AlignedBox3f>& boxes, const Make& make) {
   tree_ = BoxTree(boxes);
-  std::vector<Kind> ordered;
-  ordered.reserve(primitives.size());
-  places_.resize(primitives.size());
+  std::vector<decltype(make(0U))> ordered;
+  ordered.reserve(boxes.size());
+  places_.resize(boxes.size());
   for (const std::uint32_t number : tree_.order()) {
     places_[number] = static_cast<std::uint32_t>(ordered.size());
-    ordered.push_back(primitives[number]);
+    ordered.push_back(make(number));
   }
   primitives_ = std::move(ordered);
 }
 
 RayShape::RayShape(const Shape& triangles) {
-  std::vector<Triangle> primitives;
-  std::vector<Eigen::AlignedBox3f> boxes;
-  for (const Eigen::Vector3i& corners : triangles.triangles) {
-    const auto corner = [&](int i) {
-      return triangles.vertices[static_cast<std::size_t>(corners[i])];
-    };
-    primitives.emplace_back(corner(0), corner(1), corner(2));
-    boxes.emplace_back(corner(0));
-    boxes.back().extend(corner(1)).extend(corner(2));
-  }
-  plant_tree(primitives, boxes);
+  const auto corner = [&](std::size_t number, int i) {
+    return triangles.vertices[static_cast<std::size_t>(triangles.triangles[number][i])];
+  };
+  std::vector<Eigen::AlignedBox3f> boxes(triangles.triangles.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    boxes[i].extend(corner(i, 0)).extend(corner(i, 1)).extend(corner(i, 2));
+  plant_tree(boxes, [&](std::uint32_t number) {
+    return Triangle(corner(number, 0), corner(number, 1), corner(number, 2));
+  });
 }
 
 RayShape::RayShape(const Cones& cones) {
-  std::vector<RoundCone> primitives;
-  std::vector<Eigen::AlignedBox3f> boxes;
-  for (const unsigned first : cones.first) {
-    const Vertex4& low = cones.points[first];
-    const Vertex4& high = cones.points[first + 1];
-    primitives.emplace_back(Eigen::Vector3f(low.x, low.y, low.z), low.radius,
-                            Eigen::Vector3f(high.x, high.y, high.z), high.radius);
-    boxes.push_back(primitives.back().box());
-  }
-  plant_tree(primitives, boxes);
+  const auto make = [&](std::uint32_t number) {
+    const Vertex4& low = cones.points[cones.first[number]];
+    const Vertex4& high = cones.points[cones.first[number] + 1];
+    return RoundCone(Eigen::Vector3f(low.x, low.y, low.z), low.radius,
+                     Eigen::Vector3f(high.x, high.y, high.z), high.radius);
+  };
+  std::vector<Eigen::AlignedBox3f> boxes(cones.first.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    boxes[i] = make(static_cast<std::uint32_t>(i)).box();
+  plant_tree(boxes, make);
 }
 
 RayShape::RayShape(const std::vector<TreeCloud::Disc>& discs) {
-  std::vector<Disc> primitives;
-  std::vector<Eigen::AlignedBox3f> boxes;
-  for (const TreeCloud::Disc& disc : discs) {
-    primitives.push_back({disc.centre, disc.normal, disc.radius_m});
-    boxes.push_back(primitives.back().box());
-  }
-  plant_tree(primitives, boxes);
+  const auto make = [&](std::uint32_t number) {
+    return Disc{discs[number].centre, discs[number].normal, discs[number].radius_m};
+  };
+  std::vector<Eigen::AlignedBox3f> boxes(discs.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    boxes[i] = make(static_cast<std::uint32_t>(i)).box();
+  plant_tree(boxes, make);
 }
 
 void RayShape::cast(const RayLanes& rays, LaneMask active, float near, Struck& struck,

@@ -31,9 +31,9 @@ class RayShape {
   [[nodiscard]] const BoxTree& tree() const { return tree_; }
 
  private:
-  template <class Kind>
-  void plant_tree(const std::vector<Kind>& primitives,
-                  const std::vector<Eigen::AlignedBox3f>& boxes);
+  // make(number) gives a primitive.
+  template <class Make>
+  void plant_tree(const std::vector<Eigen::AlignedBox3f>& boxes, const Make& make);
 
   BoxTree tree_;
   // In the order of the tree's leaves.

@@ -26,7 +26,7 @@ enum class Surface : std::uint8_t {
 };
 
 // How a scene is cast: ray by ray, or in bundles of rays that belong to one beam. What the two say
-// of one ray in a thousand differs: of those that graze what they meet.
+// of up to three rays in ten thousand differs: of those that graze what they meet.
 enum class Casting : std::uint8_t { kRays, kBundles };
 
 struct Ray {

@@ -66,8 +66,8 @@ void SceneBundles::add_instance(unsigned instance, const void* key,
 
 void SceneBundles::finish() {
   surfaces_ = std::make_unique<RayShape>(triangles_);
-  rods_ = std::make_unique<RayShape>(cones_);
   triangles_ = {};
+  rods_ = std::make_unique<RayShape>(cones_);
   cones_ = {};
   field_.commit();
 }
