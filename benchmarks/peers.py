@@ -74,12 +74,17 @@ def cell(value, decimals):
     return "" if value is None else f"{value:.{decimals}f}"
 
 
-def render(results, what):
+def has_imu(site_yaml):
+    """Whether the site whose settings these are has an IMU."""
+    return not re.search(r"^imu:\n(?:  .*\n)*?  enabled: false$", site_yaml, re.MULTILINE)
+
+
+def render(results, what, inertial=True):
     lines = [f"**{what}** ({version()}, {time.strftime('%Y-%m-%d')}, {machine()})", "",
              "| | IMU | APE SE(3) cm | drift % | segments % | scans answered % | CPU ms a scan "
              "| wall ms mean | p99 | memory MB |", "|---|---|---|---|---|---|---|---|---|---|"]
     for r in results:
-        imu = "yes" if r["name"] in WITH_IMU else "no"
+        imu = "yes" if inertial and r["name"] in WITH_IMU else "no"
         if "failed" in r:
             lines.append(f"| {r['name']} | {imu} | failed: {r['failed']} | | | | | | | |")
             continue
@@ -105,9 +110,9 @@ def measure(site, options, work):
                 ["motion.imu_enabled=false", "loop_closure.enabled=false"])}
     for name in [*EVALIO, "RKO-LIO"]:
         jobs[name] = lambda name=name: peer(name, recording, work, cpus)
-    if "imu:\n  enabled: false" in (truth / "site.yaml").read_text():
+    inertial = has_imu((truth / "site.yaml").read_text())
+    if not inertial:
         del jobs["understory, no IMU, no loops"]
-        jobs["understory"] = lambda: ours(recording, work, cpus, "understory", [])
         jobs["understory, stems alone"] = lambda: ours(
             recording, work, cpus, "understory, stems alone", [], ["--front-end", "sparse"])
         jobs = {name: jobs[name] for name in sorted(jobs, key=lambda name: not name.startswith("under"))
@@ -121,7 +126,7 @@ def measure(site, options, work):
                                for k, v in results[-1].items()
                                if k in ("failed", "ape_cm", "drift", "answered")))
     recording.unlink()
-    return render(results, what)
+    return render(results, what, inertial)
 
 
 def parts_of(text):

@@ -33,6 +33,9 @@ def main():
                                       result("RKO-LIO", 0.9, 10.0)], "evo1, seed 21, 60 s"), page)
     lake[0]["ape_cm"] = 5.5
     peers.write_results(peers.render(lake, "lake, seed 21, 60 s"), page)
+    harvester = "lidar:\n  returns: 1\nimu:\n  rate_hz: 200\n  enabled: {}\ngnss:\n  enabled: false\n"
+    check(peers.has_imu(harvester.format("true")) and not peers.has_imu(harvester.format("false")),
+          "a site without an IMU is known by its settings")
     text = page.read_text()
     check(text.startswith("before\n") and text.endswith("\nafter\n"), "the rest of the page stays")
     record = text.split(peers.BEGIN)[1].split(peers.END)[0]
