@@ -110,7 +110,7 @@ class Simulator::Impl : public SimulatedWorld {
   TimeNs now = 0;
   Rig rig;
   std::vector<TopicReport> reports;
-  std::vector<ScanTruth> truths;
+  TruthLog truths;
   std::unique_ptr<ScanCache> cache;
   // Biases at the stamps of scans that are not finished yet.
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> biases;
@@ -145,6 +145,7 @@ class Simulator::Impl : public SimulatedWorld {
 
   void take_scan(bool wanted, std::optional<Event>& event) {
     ScanTruth truth;
+    std::vector<StemReturns> stems;
     const std::int64_t number = number_of(scan_number);
     truth.stamp = scanner.stamp(number);
     const CarrierState state = plan.path.state(to_seconds(truth.stamp - start));
@@ -161,10 +162,10 @@ class Simulator::Impl : public SimulatedWorld {
       ScanReadings readings = measure(number);
       ScanPtr scan = scanner.assemble(number, readings);
       reports[0].points += scan->points.size();
-      truth.stems = std::move(readings.stems);
+      stems = std::move(readings.stems);
       event = std::move(scan);
     }
-    truths.push_back(std::move(truth));
+    truths.add(truth, stems);
     ++scan_number;
   }
 
@@ -277,8 +278,8 @@ double Simulator::duration_s() const {
 
 void Simulator::write_truth(const std::string& folder) const {
   // As far as scans were read; casting brings the scene to its own moments anyway.
-  const double until_s =
-      impl_->truths.empty() ? 0.0 : to_seconds(impl_->truths.back().stamp - impl_->start);
+  const std::vector<ScanTruth>& scans = impl_->truths.scans();
+  const double until_s = scans.empty() ? 0.0 : to_seconds(scans.back().stamp - impl_->start);
   write_truth_folder(folder, *impl_, impl_->start, impl_->truths,
                      track_prism(*impl_, impl_->start, until_s));
 }

@@ -23,19 +23,33 @@ void write_text(const std::string& path, const std::string& text) {
   if (!file) throw OutputError(path, "cannot be written");
 }
 
-void write_gzip(const std::string& path, const std::string& text) {
-  gzFile file = gzopen(path.c_str(), "wb6");
-  if (file == nullptr) throw OutputError(path, "cannot be opened for writing");
-  std::size_t written = 0;
-  bool good = true;
-  while (good && written < text.size()) {
-    const auto piece = static_cast<unsigned>(std::min<std::size_t>(text.size() - written, 1 << 20));
-    good = gzwrite(file, text.data() + written, piece) == static_cast<int>(piece);
-    written += piece;
+// A gzip file, filled piece by piece.
+class GzipFile {
+ public:
+  explicit GzipFile(const std::string& path) : path_(path), file_(gzopen(path.c_str(), "wb6")) {
+    if (file_ == nullptr) throw OutputError(path, "cannot be opened for writing");
   }
-  good = gzclose(file) == Z_OK && good;
-  if (!good) throw OutputError(path, "cannot be written");
-}
+  ~GzipFile() {
+    if (file_ != nullptr) gzclose(file_);
+  }
+  GzipFile(const GzipFile&) = delete;
+  GzipFile& operator=(const GzipFile&) = delete;
+
+  void write(const std::string& text) {
+    good_ = good_ &&
+            (text.empty() || gzwrite(file_, text.data(), static_cast<unsigned>(text.size())) > 0);
+  }
+  void close() {
+    good_ = gzclose(file_) == Z_OK && good_;
+    file_ = nullptr;
+    if (!good_) throw OutputError(path_, "cannot be written");
+  }
+
+ private:
+  std::string path_;
+  gzFile file_;
+  bool good_ = true;
+};
 
 std::string trajectory_text(const std::vector<ScanTruth>& scans) {
   std::string text;
@@ -69,24 +83,28 @@ std::string bias_text(const std::vector<ScanTruth>& scans) {
   return text;
 }
 
-std::string returns_text(const std::vector<ScanTruth>& scans) {
-  std::string text = "timestamp,tree_id,rings,rings_with_3,returns\n";
-  for (const ScanTruth& scan : scans) {
-    const std::string stamp = format_seconds(scan.stamp);
-    for (const StemReturns& stem : scan.stems) {
+void write_returns(const std::string& path, const TruthLog& log) {
+  GzipFile file(path);
+  file.write("timestamp,tree_id,rings,rings_with_3,returns\n");
+  std::string text;
+  for (std::size_t i = 0; i < log.scans().size(); ++i) {
+    const std::string stamp = format_seconds(log.scans()[i].stamp);
+    text.clear();
+    for (const StemReturns& stem : log.stems(i)) {
       text += fmt::format("{},{},{},{},{}\n", stamp, stem.tree, stem.rings, stem.rings_with_3,
                           stem.returns);
     }
+    file.write(text);
   }
-  return text;
+  file.close();
 }
 
 // Trees that were felled while the recording ran say when, by its clock.
-std::string trees_text(const SimulatedWorld& world, TimeNs start,
-                       const std::vector<ScanTruth>& scans) {
+std::string trees_text(const SimulatedWorld& world, TimeNs start, const TruthLog& log) {
+  const std::vector<ScanTruth>& scans = log.scans();
   std::map<int, int> observations;
-  for (const ScanTruth& scan : scans) {
-    for (const StemReturns& stem : scan.stems)
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    for (const StemReturns& stem : log.stems(i))
       ++observations[stem.tree];
   }
   std::map<int, std::string> felled;
@@ -150,17 +168,27 @@ void write_terrain(const std::string& path, const Terrain& terrain) {
 
 }  // namespace
 
+void TruthLog::add(const ScanTruth& scan, const std::vector<StemReturns>& stems) {
+  scans_.push_back(scan);
+  stems_.insert(stems_.end(), stems.begin(), stems.end());
+  stems_end_.push_back(stems_.size());
+}
+
+std::span<const StemReturns> TruthLog::stems(std::size_t i) const {
+  const std::size_t begin = i == 0 ? 0 : stems_end_[i - 1];
+  return std::span(stems_).subspan(begin, stems_end_[i] - begin);
+}
+
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
-                        const std::vector<ScanTruth>& scans,
-                        const std::vector<PrismSample>& prism) {
+                        const TruthLog& log, const std::vector<PrismSample>& prism) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw OutputError(folder, "cannot be made: " + error.message());
-  write_text(folder + "/trajectory.tum", trajectory_text(scans));
-  write_text(folder + "/velocity.csv", velocity_text(scans));
-  write_text(folder + "/imu_bias.csv", bias_text(scans));
-  write_gzip(folder + "/returns.csv.gz", returns_text(scans));
-  write_text(folder + "/trees.csv", trees_text(world, start, scans));
+  write_text(folder + "/trajectory.tum", trajectory_text(log.scans()));
+  write_text(folder + "/velocity.csv", velocity_text(log.scans()));
+  write_text(folder + "/imu_bias.csv", bias_text(log.scans()));
+  write_returns(folder + "/returns.csv.gz", log);
+  write_text(folder + "/trees.csv", trees_text(world, start, log));
   if (!prism.empty()) write_text(folder + "/total_station.csv", prism_text(prism));
   write_terrain(folder + "/dtm.tif", world.terrain);
   SiteConfig copy = world.site;

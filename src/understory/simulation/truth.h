@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,12 +20,27 @@ struct ScanTruth {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // world
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
-  std::vector<StemReturns> stems;
+};
+
+// What a recording's truth has come to, scan by scan.
+class TruthLog {
+ public:
+  void add(const ScanTruth& scan, const std::vector<StemReturns>& stems);
+  [[nodiscard]] const std::vector<ScanTruth>& scans() const { return scans_; }
+  // Returns of stems in the i-th scan.
+  [[nodiscard]] std::span<const StemReturns> stems(std::size_t i) const;
+
+ private:
+  std::vector<ScanTruth> scans_;
+  // Of all scans, one after another: a small vector a scan, kept among large ones that come and go,
+  // made the heap of a long run grow by 60 kB a scan.
+  std::vector<StemReturns> stems_;
+  std::vector<std::size_t> stems_end_;  // of each scan
 };
 
 // Writes the truth folder (docs/simulation.md); that of the total station only where it measured.
 // Throws OutputError.
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
-                        const std::vector<ScanTruth>& scans, const std::vector<PrismSample>& prism);
+                        const TruthLog& log, const std::vector<PrismSample>& prism);
 
 }  // namespace understory
