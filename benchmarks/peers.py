@@ -34,8 +34,10 @@ WITH_IMU = {"understory", "LioSAM", "DLIO", "RKO-LIO"}
 
 
 def ours(recording, work, cpus, name, settings, more=()):
-    result = map_recording(recording, work / name, threads=2, cpus=cpus,
-                           settings=["map.enabled=false", *settings], more=more)
+    if "sparse" not in more:
+        settings = ["map.enabled=false", *settings]
+    result = map_recording(recording, work / name, threads=2, cpus=cpus, settings=settings,
+                           more=more)
     scan = result["stages"]["scan"]
     return {"name": name, "version": version().split()[-1], "scans": result["scans"],
             "answered": result["poses"] / max(1, result["scans"]), "cpu_ms": scan["cpu_ms"],

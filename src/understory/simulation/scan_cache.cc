@@ -5,6 +5,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -116,16 +117,34 @@ void ScanCache::read_index() {
   while (::pread(file_, &head, sizeof(head), end_) == static_cast<ssize_t>(sizeof(head))) {
     const std::int64_t next = end_ + static_cast<std::int64_t>(sizeof(head)) + head.size;
     if (head.magic != kMagic || next > length) break;
-    places_[head.scan] = {end_ + static_cast<std::int64_t>(sizeof(head)), head.size, head.checksum};
+    add(head.scan, end_ + static_cast<std::int64_t>(sizeof(head)), head.size, head.checksum);
     end_ = next;
   }
   if (writable_ && end_ < length && ::ftruncate(file_, end_) != 0) writable_ = false;
 }
 
+std::vector<ScanCache::Place>::const_iterator ScanCache::place_of(std::int64_t scan) const {
+  return std::lower_bound(
+      places_.begin(), places_.end(), scan,
+      [](const Place& place, std::int64_t wanted) { return place.scan < wanted; });
+}
+
+// Of a scan that is there already the later one counts.
+void ScanCache::add(std::int64_t scan, std::int64_t offset, std::uint32_t size,
+                    std::uint64_t checksum) {
+  const Place place{scan, offset, size, checksum};
+  const auto at = places_.begin() + (place_of(scan) - places_.cbegin());
+  if (at != places_.end() && at->scan == scan) {
+    *at = place;
+  } else {
+    places_.insert(at, place);
+  }
+}
+
 std::optional<ScanReadings> ScanCache::find(std::int64_t scan) const {
-  const auto found = places_.find(scan);
-  if (found == places_.end()) return std::nullopt;
-  const Place& place = found->second;
+  const auto found = place_of(scan);
+  if (found == places_.end() || found->scan != scan) return std::nullopt;
+  const Place& place = *found;
   std::vector<std::uint8_t> packed(place.size);
   if (::pread(file_, packed.data(), packed.size(), place.offset) !=
       static_cast<ssize_t>(packed.size())) {
@@ -138,7 +157,8 @@ std::optional<ScanReadings> ScanCache::find(std::int64_t scan) const {
 }
 
 void ScanCache::store(std::int64_t scan, const ScanReadings& readings) {
-  if (!writable_ || places_.count(scan) != 0) return;
+  if (!writable_) return;
+  if (const auto kept = place_of(scan); kept != places_.end() && kept->scan == scan) return;
   const std::vector<std::uint8_t> packed = compress(flatten(readings, step_m_), "zstd", 1);
   RecordHead head;
   head.scan = scan;
@@ -151,13 +171,13 @@ void ScanCache::store(std::int64_t scan, const ScanReadings& readings) {
     writable_ = false;  // full disk: what is torn lies behind the end and is cut off next time
     return;
   }
-  places_[scan] = {end_ + static_cast<std::int64_t>(sizeof(head)), head.size, head.checksum};
+  add(scan, end_ + static_cast<std::int64_t>(sizeof(head)), head.size, head.checksum);
   end_ += static_cast<std::int64_t>(record.size());
 }
 
 std::optional<std::pair<std::int64_t, std::int64_t>> ScanCache::span() const {
   if (places_.empty()) return std::nullopt;
-  return std::pair(places_.begin()->first, places_.rbegin()->first);
+  return std::pair(places_.front().scan, places_.back().scan);
 }
 
 void ScanCache::clear() {

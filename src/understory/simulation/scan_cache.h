@@ -1,10 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "understory/simulation/scanner.h"
 
@@ -41,18 +42,22 @@ class ScanCache {
 
  private:
   void read_index();
+  void add(std::int64_t scan, std::int64_t offset, std::uint32_t size, std::uint64_t checksum);
 
   struct Place {
+    std::int64_t scan = 0;
     std::int64_t offset = 0;  // of the packed bytes
     std::uint32_t size = 0;
     std::uint64_t checksum = 0;
   };
+  [[nodiscard]] std::vector<Place>::const_iterator place_of(std::int64_t scan) const;
   std::string path_;
   float step_m_;
   int file_ = -1;
   bool writable_ = false;
   std::int64_t end_ = 0;  // of the last whole record
-  std::map<std::int64_t, Place> places_;
+  // By scan. No map: its small nodes, kept among large buffers that come and go, tear the heap.
+  std::vector<Place> places_;
 };
 
 }  // namespace understory
