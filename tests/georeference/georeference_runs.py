@@ -339,7 +339,13 @@ def bad(folder):
     refused(3, "trajectory.tum", folder, "--method", "gnss-path", "--gnss", FIXES)
     refused(2, "coordinate system", RUN, "--method", "gnss-path", "--gnss", FIXES, "--crs", "EPSG:1")
     # A national model under a run that does not know where on the earth it is.
-    refused(3, "of the place", RUN, "--method", "terrain", "--dem", DEM)
+    refused(3, "--start", RUN, "--method", "terrain", "--dem", DEM)
+    # A model around zero lies under it by chance: nothing says that it lies there.
+    refused(3, "--start", RUN, "--method", "terrain", "--dem", LOCAL)
+    refused(3, "of the place", RUN, "--method", "terrain", "--dem", DEM, "--start", 0, 0, 0)
+    refused(2, "no finite number", RUN, "--method", "terrain", "--dem", LOCAL, "--start", 0, 0, "nan")
+    refused(2, "no finite number", RUN, "--method", "gnss-path", "--gnss", FIXES, "--antenna-m", 0,
+            "inf", 0)
     (folder / "cut.asc").write_text("ncols 160\nnrows 160\nxllcorner -160\nyllcorner -160\n"
                                     "cellsize 2\n1 2 3\n")
     refused(3, "cut.asc", RUN, "--method", "terrain", "--dem", folder / "cut.asc", "--start", 0, 0, 0)

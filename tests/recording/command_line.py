@@ -68,6 +68,20 @@ def check_refusals(folder):
     code, _, errors = run("info", sample, "--lidar-topic", "/nothing")
     assert code == 3 and "/points" in errors, errors
     assert run("convert", sample)[0] == 2
+    for name in ("x.stems.csv", "x.pcap", "x.laz"):
+        code, _, errors = run("convert", sample, folder / name)
+        assert code == 2 and ".csv.gz" in errors and not (folder / name).exists(), (code, errors)
+        code, _, errors = run("simulate", "demo", "--duration-s", 1, "-o", folder / name.replace("pcap", "bag"))
+        assert code == 2 and ".mcap" in errors, (code, errors)
+    trees = folder / "trees.csv"
+    bare = ("--set", f"stand.trees={trees}", "--set", "duration_s=1", "--set", "stand.size_x_m=60",
+            "--set", "stand.size_y_m=60")
+    for text, word in ((None, "opened"), ("x,y,dbh_m\n1,2,0.3\n3,4", "line 3: holds 2 of 3"),
+                       ("x,y,dbh_m\n1,nan,0.3\n", "line 2: y")):
+        if text is not None:
+            trees.write_text(text)
+        code, _, errors = run("simulate", "demo", "-o", folder / "trees.mcap", *bare)
+        assert code == 3 and word in errors, (code, errors)
     assert run("info", sample, "--turn")[0] == 2
 
 

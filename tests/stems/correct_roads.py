@@ -198,8 +198,15 @@ def run_again(folder):
     errors = [evaluated(folder / name / "trajectory.tum", site / "truth", "--align", "se3")
               ["ape_plane_rmse_m"] for name in ("none", "expected_gain")]
     assert errors[1] < 0.7 * errors[0], errors
-    # Into its own folder, too: it is read before it is replaced.
-    assert correct(run, run).returncode == 0
+    # Into its own folder, too: it is read before it is replaced. But nothing of a mapped run is lost.
+    assert correct(run, run).returncode == 0 and correct(run, run).returncode == 0
+    mapped = json.loads((run / "run.json").read_text()) | {"command": "map"}
+    (run / "run.json").write_text(json.dumps(mapped))
+    before = (run / "trajectory.tum").read_bytes()
+    for stems in (run, run / "stems.csv.gz"):
+        done = correct(stems, run)
+        assert done.returncode == 2 and "folder of its own" in done.stderr, done.stderr
+    assert (run / "trajectory.tum").read_bytes() == before
     (run / "trajectory.tum").write_text("1 0 0 0 0 0 0 1\n")
     done = correct(run, folder / "late")
     assert done.returncode == 3 and "trajectory.tum" in done.stderr and "view 0" in done.stderr, done

@@ -271,6 +271,20 @@ def machine(folder):
     return f"{len(others)} of {len(first)} stems stay"
 
 
+@cases.case("what cannot be told is not printed as a number")
+def untold(folder):
+    done = program("evaluate", "trees", RUN, TRUTH, "--align", "yaw")
+    assert done.returncode == 0 and "diameter" in done.stdout, done.stderr
+    assert "nan" not in done.stdout and "height" not in done.stdout, done.stdout
+    done = program("evaluate", "map", RUN, RUN)
+    assert done.returncode == 0 and "over all sights" in done.stdout, done
+    first = folder / "first.tum"
+    first.write_text((RUN / "trajectory.tum").read_text().splitlines()[0] + "\n")
+    done = program("evaluate", "map", RUN, first)
+    assert done.returncode == 4 and "have no pose" in done.stderr, done
+    assert "nan" not in done.stdout and "unknown" in done.stdout, done.stdout
+
+
 @cases.case("at the speed of the sensor")
 def realtime(folder):
     began = time.monotonic()

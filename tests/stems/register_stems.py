@@ -101,6 +101,9 @@ def wrong(folder):
         done = program("register", A, few, "--method", method)
         assert done.returncode == 4 and "stems" in done.stderr, done
     assert program("register", A, B, "--method", "stem-icp", "--set", "stem_icp.metric=up").returncode == 2
+    for guess in ("1,nan,0", "1,inf,0"):
+        done = program("register", A, B, "--method", "stem-icp", "--guess", guess)
+        assert done.returncode == 2 and "--guess" in done.stderr, done
 
 
 cases.run()

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -83,10 +84,22 @@ void refuse_same_place(const ConvertOptions& options) {
     throw OutputError(options.output, "is the input itself");
 }
 
+// A folder of clouds by the name of a file is a slip: "stems.csv" for "stems.csv.gz".
+void refuse_other_files(const ConvertOptions& options) {
+  constexpr std::array<const char*, 10> kFiles = {".csv", ".gz",  ".bag", ".db3", ".pcap",
+                                                  ".las", ".laz", ".ply", ".pcd", ".bin"};
+  const std::string ending = std::filesystem::path(options.output).extension().string();
+  if (std::find(kFiles.begin(), kFiles.end(), ending) != kFiles.end())
+    throw ConfigError({options.output +
+                       ": expected a name that ends in .mcap or .csv.gz, or that of a folder "
+                       "(its clouds by --format)"});
+}
+
 int run_convert(const ConvertOptions& options, CommandContext& context) {
   refuse_same_place(options);
   if (is_stems_file(options.output))
     return convert_to_stems(options.input, options.output, options.open, context);
+  refuse_other_files(options);
   const std::unique_ptr<Recording> recording =
       open_source(options.input, options.open, context.log);
   const std::unique_ptr<Target> target = make_target(options);

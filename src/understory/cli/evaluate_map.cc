@@ -85,18 +85,22 @@ nlohmann::ordered_json to_json(const Placed& placed, const MapSharpness& map,
   return json;
 }
 
+std::string noise_text(const MapSharpness& map) {
+  if (!std::isfinite(map.noise_m)) return "unknown: no tree was seen often enough";
+  return fmt::format("{:.4f} m over all sights, {:.4f} m mean over trees", map.noise_m,
+                     map.noise_mean_m);
+}
+
 std::string to_text(const Placed& placed, const MapSharpness& map, const MapSharpness& all,
                     const std::vector<RoadConsistency>& roads) {
   std::string text = fmt::format(
       "views               {} placed, {} without a pose\n"
       "blur ratio beta     {:.4f} from above, {:.6f} in space\n"
       "box dimension d     {:.2f} from above, {:.2f} in space\n"
-      "noise e_C           {:.4f} m over all sights, {:.4f} m mean over {} trees\n"
-      "of all stems, also far and doubtful ones: beta {:.4f}, d {:.2f}, e_C {:.4f} m and {:.4f} "
-      "m\n",
+      "noise e_C           {}, of {} trees\n"
+      "of all stems, also far and doubtful ones: beta {:.4f}, d {:.2f}, e_C {}\n",
       placed.views.size(), placed.without, map.beta, map.beta_3d, map.dimension, map.dimension_3d,
-      map.noise_m, map.noise_mean_m, map.trees, all.beta, all.dimension, all.noise_m,
-      all.noise_mean_m);
+      noise_text(map), map.trees, all.beta, all.dimension, noise_text(all));
   for (const RoadConsistency& road : roads) {
     text += fmt::format(
         "roads {} and {}       {} and {} trees, {:.1f} % the same; {:.1f} % after one motion, "
@@ -108,12 +112,17 @@ std::string to_text(const Placed& placed, const MapSharpness& map, const MapShar
 }
 
 int evaluate_map(const MapOptions& options, CommandContext& context) {
-  const Placed placed = place(read_stem_views(options.stems, context.log),
-                              read_trajectory(file_in_folder(options.trajectory, "trajectory.tum")),
-                              options.tolerance_s);
+  const Placed placed = place(
+      read_stem_views(file_in_folder(options.stems, "stems.csv.gz"), context.log),
+      read_trajectory(file_in_folder(options.trajectory, "trajectory.tum")), options.tolerance_s);
   if (placed.views.empty())
     throw InputError(options.trajectory, "",
                      "expected poses at the times of the views in " + options.stems);
+  if (placed.without > placed.views.size())
+    context.log.warn("evaluate.map",
+                     fmt::format("{} of {} views have no pose: the figures are of "
+                                 "the others alone",
+                                 placed.without, placed.without + placed.views.size()));
   const std::vector<StemView> sights = map_sights(placed.views, {});
   const MapSharpness map = stem_sharpness(sights, placed.world_from_body, {});
   const MapSharpness all = stem_sharpness(placed.views, placed.world_from_body, {});
@@ -122,7 +131,7 @@ int evaluate_map(const MapOptions& options, CommandContext& context) {
   const std::string text = options.json ? to_json(placed, map, all, roads).dump(2) + "\n"
                                         : to_text(placed, map, all, roads);
   std::fputs(text.c_str(), stdout);
-  return kExitDone;
+  return placed.without > placed.views.size() ? kExitUntrusted : kExitDone;
 }
 
 }  // namespace
@@ -131,7 +140,10 @@ void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
   auto* command = evaluate.add_subcommand(
       "map", "Sharpness of the map of a recording's stems, placed by any trajectory");
   const auto options = std::make_shared<MapOptions>();
-  command->add_option("STEMS", options->stems, "Stems of the views (stems.csv.gz)")->required();
+  command
+      ->add_option("STEMS", options->stems,
+                   "Stems of the views (stems.csv.gz), or a run folder that holds them")
+      ->required();
   command->add_option("TRAJECTORY", options->trajectory, "Run folder or trajectory (TUM)")
       ->required();
   command->add_option("--tolerance-s", options->tolerance_s, "Largest difference of times")

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -91,14 +92,20 @@ nlohmann::ordered_json to_json(const Comparison& result, const TreeOptions& opti
 std::string to_text(const Comparison& result, const TreeOptions& options) {
   const TreeErrors& e = result.all;
   std::string text = fmt::format(
-      "alignment           {}\ntrees               {} in A, {} in B, {} matched one to one within "
-      "{:g} m (nearest first)\nrecall              {:.4f}\nprecision           {:.4f}\nposition    "
-      "  "
-      "      rmse {:.4f} m (horizontal)\ndiameter            rmse {:.4f} m, bias {:+.4f} m (A "
-      "minus "
-      "B)\nheight              rmse {:.4f} m\n",
-      options.alignment, e.trees_a, e.trees_b, e.matched, options.radius_m, e.recall, e.precision,
-      e.position_rmse_m, e.dbh_rmse_m, e.dbh_bias_m, e.height_rmse_m);
+      "alignment           {}\n"
+      "trees               {} in A, {} in B, {} matched one to one within {:g} m (nearest first)\n",
+      options.alignment, e.trees_a, e.trees_b, e.matched, options.radius_m);
+  // What no tree tells is left out: a map of stems has no heights.
+  const auto tell = [&](double figure, const std::string& line) {
+    if (std::isfinite(figure)) text += line;
+  };
+  tell(e.recall, fmt::format("recall              {:.4f}\n", e.recall));
+  tell(e.precision, fmt::format("precision           {:.4f}\n", e.precision));
+  tell(e.position_rmse_m,
+       fmt::format("position            rmse {:.4f} m (horizontal)\n", e.position_rmse_m));
+  tell(e.dbh_rmse_m, fmt::format("diameter            rmse {:.4f} m, bias {:+.4f} m (A minus B)\n",
+                                 e.dbh_rmse_m, e.dbh_bias_m));
+  tell(e.height_rmse_m, fmt::format("height              rmse {:.4f} m\n", e.height_rmse_m));
   if (result.visible) {
     const VisibleTreeErrors& v = *result.visible;
     text += fmt::format(

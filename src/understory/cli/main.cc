@@ -1,6 +1,9 @@
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <new>
+#include <string>
 
 #include "understory/cli/command.h"
 #include "understory/cli/terminal.h"
@@ -36,6 +39,19 @@ int run_guarded(const Command& command, CommandContext& context) {
   }
 }
 
+// "nan" and "inf" are numbers to the parser, and no range refuses the first.
+void check_finite(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_type_name().rfind("FLOAT", 0) != 0) continue;
+    for (const std::string& given : option->results()) {
+      if (!std::isfinite(std::strtod(given.c_str(), nullptr)))
+        throw CLI::ValidationError(option->get_name(), given + " is no finite number");
+    }
+  }
+  for (const CLI::App* chosen : command.get_subcommands())
+    check_finite(*chosen);
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Lidar SLAM and tree mapping under the forest canopy", "understory"};
   app.set_version_flag("--version", kVersion);
@@ -63,6 +79,7 @@ int run(int argc, char** argv) {
   add_georeference_command(app, chosen);
   try {
     app.parse(argc, argv);
+    check_finite(app);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kExitDone : kExitUsage;
   }

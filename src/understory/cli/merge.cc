@@ -79,7 +79,19 @@ std::vector<TreeFall> falls_in(const std::string& map) {
   return fs::exists(file) ? read_tree_falls(file) : std::vector<TreeFall>();
 }
 
+// The merged list would replace the one that it was made of.
+void refuse_own_folder(const MergeOptions& options) {
+  for (const std::string& map : {options.s, options.l, options.reference}) {
+    if (map.empty()) continue;
+    const fs::path folder = fs::absolute(file_in_folder(map, "trees.csv")).parent_path();
+    std::error_code error;
+    if (fs::equivalent(folder / "trees.csv", fs::path(options.folder) / "trees.csv", error))
+      throw ConfigError({"-o is the folder of " + map + ": the merged map needs one of its own"});
+  }
+}
+
 int merge(const MergeOptions& options, CommandContext& context) {
+  refuse_own_folder(options);
   const std::vector<Tree> s = read_trees(file_in_folder(options.s, "trees.csv"));
   const std::vector<Tree> l = beside(options.l, s, options);
   const DeformationField field = deformation_field(l, s, options.merge);

@@ -8,6 +8,7 @@
 #include "understory/recording/mcap_writer.h"
 #include "understory/simulation/field_log.h"
 #include "understory/simulation/simulator.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -61,9 +62,12 @@ bool write_events(Simulator& simulator, Writer& writer, CommandContext& context)
 }
 
 int simulate(const SimulateOptions& options, CommandContext& context) {
+  const std::string ending = std::filesystem::path(options.output).extension().string();
+  if (ending != ".mcap" && ending != ".pcap")
+    throw ConfigError({"-o " + options.output + ": expected a name that ends in .mcap or .pcap"});
   Simulator simulator(load_site(options.site, options.settings));
   bool whole = false;
-  if (std::filesystem::path(options.output).extension() == ".pcap") {
+  if (ending == ".pcap") {
     FieldLogWriter writer(options.output, simulator.site(), simulator.rig());
     whole = write_events(simulator, writer, context);
   } else {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/pipeline/correction_files.h"
@@ -61,6 +63,21 @@ std::filesystem::path stems_of(const CorrectionRequest& request) {
                    "--front-end sparse`");
 }
 
+// A mapped or moved run would lose its poses of scans and its fixes to the results of a correction;
+// those of an earlier correction are there to be replaced.
+void refuse_own_folder(const CorrectionRequest& request) {
+  const std::filesystem::path from = std::filesystem::absolute(stems_of(request)).parent_path();
+  std::error_code error;
+  if (!std::filesystem::equivalent(from, request.run_folder, error)) return;
+  std::ifstream file(from / "run.json");
+  if (!file) return;
+  const auto json = nlohmann::json::parse(file, nullptr, false);
+  if (json.is_object() && json.value("command", "") != "correct")
+    throw ConfigError(
+        {"-o is the folder of the run that holds the stems: the corrected run needs "
+         "a folder of its own"});
+}
+
 }  // namespace
 
 void describe(ConfigTable& table, CorrectionConfig& config) {
@@ -73,6 +90,7 @@ CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
                                  const ProgressSink& progress,
                                  const StopRequested& stop_requested) {
   if (!request.overwrite) refuse_unfinished_run(request.run_folder);
+  if (request.scans == nullptr) refuse_own_folder(request);
   CorrectionRun run;
   {
     const ScopedTimer timer(run.times, "reading");

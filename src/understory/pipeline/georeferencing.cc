@@ -100,7 +100,7 @@ Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log
       "{} fixes; fit {:.2f} m (symmetric, root mean square); fixes off the path by {:.2f} m in the "
       "median, {:.2f} m in the mean",
       fit.rows.size(), fit.path.symmetric_rms_m, fit.path.fixes_median_m, fit.path.fixes_mean_m);
-  if (fit.fixes_in_time > 0)
+  if (fit.fixes_in_time > 0 && std::isfinite(fit.along_rms_m))
     motion.outcome.summary += fmt::format("; {:.2f} m along and {:.2f} m across the way by time",
                                           fit.along_rms_m, fit.across_rms_m);
   if (fit.ambiguous)
@@ -160,6 +160,10 @@ PlaneArea area_of(const std::vector<GroundPoint>& points, double margin_m) {
 }
 
 Motion by_terrain(const GeoreferenceRequest& request, const Run& run) {
+  if (!request.start && !run.origin)
+    throw InputError(request.run.string(), "",
+                     "expected a run that was laid on a GNSS path, or --start: where it lies on "
+                     "the terrain model is not known (0 0 0 if its frame is that of the model)");
   Pose placed;
   if (request.start) {
     placed = Pose(Eigen::Quaterniond(

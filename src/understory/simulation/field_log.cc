@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -17,6 +18,12 @@ namespace {
 constexpr std::int64_t kFiringsPerPacket = 24;
 constexpr std::size_t kLasers = 16;
 constexpr double kDegree = std::numbers::pi / 180.0;
+
+// With the system's reason: nothing else was asked of it since the stream failed.
+OutputError unwritten(const std::string& path) {
+  return {path, errno == 0 ? "cannot be written"
+                           : std::string("cannot be written: ") + std::strerror(errno)};
+}
 
 template <typename T>
 void put(std::string& bytes, T value) {
@@ -149,14 +156,14 @@ void FieldLogWriter::write_extrinsics(const std::string& path, const Rig& rig) c
        << line("body_from_lidar", rig.body_from_lidar * turned);
   if (rig.body_from_gnss) file << line("body_from_gnss", *rig.body_from_gnss);
   file.close();
-  if (!file) throw OutputError(path, "cannot be written");
+  if (!file) throw unwritten(path);
 }
 
 void FieldLogWriter::write(const Event& event) {
   if (const auto* scan = std::get_if<ScanPtr>(&event)) write_scan(**scan);
   if (const auto* fix = std::get_if<GnssFix>(&event)) write_fix(*fix);
-  if (!pcap_) throw OutputError(pcap_path_, "cannot be written");
-  if (!nmea_) throw OutputError(nmea_path_, "cannot be written");
+  if (!pcap_) throw unwritten(pcap_path_);
+  if (!nmea_) throw unwritten(nmea_path_);
 }
 
 // Puts the points back into the firings that they came from, and those into packets of 24.
@@ -234,8 +241,8 @@ void FieldLogWriter::write_record(TimeNs stamp, std::uint16_t port, const std::s
 void FieldLogWriter::finish() {
   pcap_.close();
   nmea_.close();
-  if (!pcap_) throw OutputError(pcap_path_, "cannot be written");
-  if (!nmea_) throw OutputError(nmea_path_, "cannot be written");
+  if (!pcap_) throw unwritten(pcap_path_);
+  if (!nmea_) throw unwritten(nmea_path_);
 }
 
 }  // namespace understory

@@ -145,7 +145,8 @@ std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& co
                                   const Terrain& terrain, std::uint64_t seed) {
   std::ifstream file(path);
   std::string line;
-  if (!file || !std::getline(file, line)) {
+  if (!file) throw InputError(path, "", "the list of trees cannot be opened");
+  if (!std::getline(file, line)) {
     throw InputError(path, "", "expected a list of trees: a CSV with the columns x, y, dbh_m");
   }
   std::map<std::string, std::size_t> columns;
@@ -163,7 +164,10 @@ std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& co
   for (std::size_t number = 2; std::getline(file, line); ++number) {
     std::vector<std::string> fields = fields_of(line);
     if (fields.size() == 1 && fields[0].empty()) continue;
+    const std::size_t held = fields.size();
     const Row row(path, number, columns, std::move(fields));
+    if (held < names.size())
+      row.fail(fmt::format("holds {} of {} columns: is the list cut off?", held, names.size()));
     Random random(hash_numbers(seed, stream_of(NoiseStream::kStand), number));
     trees.push_back(
         read_tree(path, row, static_cast<int>(trees.size()) + 1, config, terrain, random));
