@@ -14,6 +14,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
 from program import Cases, program
+from recordings import read_mcap, write_mcap
 
 TIMED = {"run.json", "report.html"}
 
@@ -92,6 +93,9 @@ def report(folder):
     for figure in ("P0, figure 9", "P0, figure 10", "P0, figure 11", "P1, figure 5", "P1, figure 8"):
         assert figure in page, figure
     assert page.count("data:image/png;base64,") == 7, page.count("data:image/png;base64,")
+    # All of the recording, not from the first view that was kept to the last.
+    told = json.loads((RUN / "run.json").read_text())
+    assert f"{told['recording_s']:.1f} s</" in page, told["recording_s"]
 
 
 @cases.case("the recording's own fixes are compared with and not used")
@@ -311,6 +315,12 @@ def wrong(folder):
     assert done.returncode == 3 and "no checkpoint" in done.stderr, done.stderr
     done = sparse(folder / "none.mcap", folder / "run")
     assert done.returncode == 3 and "none.mcap" in done.stderr, done.stderr
+    plain = folder / "plain.mcap"
+    assert program("convert", REC, plain, "--compression", "none").returncode == 0
+    messages = [m for m in read_mcap(plain) if m.topic != "/lidar"]
+    write_mcap(folder / "no_lidar.mcap", messages)
+    done = sparse(folder / "no_lidar.mcap", folder / "run")
+    assert done.returncode == 3 and "no lidar scan" in done.stderr and "/gnss" in done.stderr, done.stderr
     done = program("map", "--front-end", "sparse", "--print-config")
     assert done.returncode == 0 and "distance_m" in done.stdout, done.stderr
 

@@ -135,8 +135,9 @@ std::string figures_section(const ReportInput& input) {
   std::string html = "<section class=\"tiles\">";
   if (!input.scans.empty()) {
     html += tile(fmt::format("{:.0f} m", path_length_m(input.scans)), "length of the path");
-    html += tile(duration_text(to_seconds(input.scans.back().stamp - input.scans.front().stamp)),
-                 "of recording");
+    // By stems the scans shown are the views that were kept: a machine may stand at the end.
+    const double shown_s = to_seconds(input.scans.back().stamp - input.scans.front().stamp);
+    html += tile(duration_text(std::max(shown_s, input.summary.recording_s)), "of recording");
     html += tile(count_text(input.summary.scans), "scans");
   }
   if (input.inventory != nullptr) {

@@ -64,6 +64,17 @@ class SparseRun {
   [[nodiscard]] std::size_t count() { return session_.path().size(); }
   [[nodiscard]] std::size_t kept() { return session_.steps().size(); }
   void forget_state() { state_.remove(); }
+  // Why no view was kept.
+  [[nodiscard]] std::string why_nothing() {
+    if (count() > 0)
+      return fmt::format(
+          "no stems in any of its {} scans: expected upright stems in scans with ring numbers",
+          count());
+    std::string topics;
+    for (const TopicReport& topic : source_->topics())
+      topics += (topics.empty() ? "; it holds " : ", ") + topic.name + " (" + topic.type + ")";
+    return "no lidar scan could be read from it" + topics;
+  }
   // What the correction needs to know of the recording; lives as long as this.
   [[nodiscard]] SparseScans scans(bool stopped) {
     SparseScans scans;
@@ -130,10 +141,7 @@ CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, 
   const bool stopped = run.run(progress, stop_requested);
   if (run.kept() == 0) {
     run.forget_state();
-    throw InputError(request.recording, "",
-                     fmt::format("no stems in any of its {} scans: expected upright stems in scans "
-                                 "with ring numbers",
-                                 run.count()));
+    throw InputError(request.recording, "", run.why_nothing());
   }
   const SparseScans scans = run.scans(stopped);
   CorrectionRequest correction;
