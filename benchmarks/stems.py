@@ -34,6 +34,8 @@ from strip_roads import Roads, write_strip_roads  # noqa: E402
 
 PAGE = TOP / "docs" / "sparse.md"
 PICTURE = TOP / "docs" / "pictures" / "stem_convergence.svg"
+TILT_PICTURE = TOP / "docs" / "pictures" / "stem_convergence_tilt.svg"
+TILT_REACH = 3.0  # of stem_search's tilts, in units of phi0
 ORDERS = ("small", "medium", "random", "gain")
 METHODS = ("none", "powers", "powers_printed", "lattice", "pose_graph", "gaussian_process",
            "expected_gain")
@@ -166,8 +168,9 @@ def stem_search(what, stands):
     return json.loads(done.stdout)
 
 
-def convergence_picture(found):
-    """Share of starts from which ICP comes home, over shift and yaw, with the ellipse of P0 (26)."""
+def convergence_picture(found, turn, reach):
+    """Share of starts from which ICP comes home, over shift and yaw or tilt, with the ellipse of P0
+    (26); ten steps of the turn are `reach` times the region's."""
     share, cell, left, top = found["share"], 26, 62, 16
     steps, size = len(share), 26 * len(share)
 
@@ -183,45 +186,67 @@ def convergence_picture(found):
                          f'width="{cell}" height="{cell}" fill="rgb({20 + shade},{110 + shade // 2},'
                          f'{60 + round(0.75 * shade)})"/>')
     # Cells stand for their middles: the first for no shift and no yaw.
-    radius = 10 * cell
-    marks.append(f'<path d="M {left + cell / 2 + radius} {top + size - cell / 2} A {radius} {radius} '
-                 f'0 0 0 {left + cell / 2} {top + size - cell / 2 - radius}" fill="none" '
+    wide, high = 10 * cell, 10 * cell / reach
+    marks.append(f'<path d="M {left + cell / 2 + wide} {top + size - cell / 2} A {wide} {high:.1f} '
+                 f'0 0 0 {left + cell / 2} {top + size - cell / 2 - high:.1f}" fill="none" '
                  'stroke="black" stroke-width="2"/>')
     for k in range(0, steps, 2):
         middle = left + cell * k + cell / 2
         marks.append(label(middle, top + size + 16, f"{0.1 * k * found['delta0_m']:.1f}",
                            ' text-anchor="middle"'))
         marks.append(label(left - 6, top + size - cell * k - 9,
-                           f"{0.1 * k * found['theta0_deg']:.1f}", ' text-anchor="end"'))
+                           f"{0.1 * k * found['turn_deg']:.1f}", ' text-anchor="end"'))
     marks.append(label(left + size / 2, top + size + 38, "shift, m", ' text-anchor="middle"'))
-    marks.append(label(14, top + size / 2, "yaw, °"))
+    marks.append(label(14, top + size / 2, f"{turn}, °"))
     return "\n".join(marks) + "\n</svg>\n"
 
 
-def search_page(write):
-    found = stem_search("convergence", 200)
-    inside = [value for a, row in enumerate(found["share"]) for b, value in enumerate(row)
-              if a * a + b * b <= 100]
-    beyond = [value for a, row in enumerate(found["share"]) for b, value in enumerate(row)
-              if a * a + b * b > 144]
-    if write:
-        PICTURE.write_text(convergence_picture(found))
-    text = (f"{version()}, {found['stands']} stands, delta0 {found['delta0_m']:.2f} m, theta0 "
-            f"{found['theta0_deg']:.1f}°: of the starts within (26) {100 * statistics.mean(inside):.1f} % "
-            f"come home (at the worst place of the grid {100 * min(inside):.0f} %), of those beyond 1.2 "
-            f"times its size {100 * statistics.mean(beyond):.0f} %.\n\n"
-            "| search over yaw and ±5 m | cells | boxes looked at | ms | right |\n|---|---|---|---|---|\n")
-    boxes = stem_search("boxes", 40)
-    names = {"general": "any cloud: cubes, ±180°, down to 1.0° and 1.2 m",
-             "uniform": "near-uniform: cubes, ±60°, down to theta0 and delta0",
-             "elongated": "the same, elongated boxes",
-             "certified_cubes": "certified to 2 cm, ±60°, cubes",
-             "certified": "certified to 2 cm, ±60°, elongated boxes"}
+def home_shares(found, reach):
+    """Mean and least share of the starts within P0 (26), and mean of those beyond 1.2 times it."""
+    cells = [(value, a * a + b * b * reach * reach) for a, row in enumerate(found["share"])
+             for b, value in enumerate(row)]
+    inside = [value for value, squared in cells if squared <= 100]
+    return (statistics.mean(inside), min(inside),
+            statistics.mean(value for value, squared in cells if squared > 144))
+
+
+def search_table(head, names, found):
+    text = f"| {head} | cells | boxes looked at | ms | right |\n|---|---|---|---|---|\n"
     for key, name in names.items():
-        row = boxes[key]
+        row = found[key]
+        if row["nodes"] <= 1:
+            text += f"| {name} | {row['cells']:,} | | | |\n"
+            continue
         text += (f"| {name} | {row['cells']:,} | {row['nodes']:,} | {row['ms']:.0f} | {row['right']} of "
-                 f"{boxes['stands']} |\n")
+                 f"{row['stands']} |\n")
     return text
+
+
+def search_page(write):
+    yaw, tilt = stem_search("convergence", 200), stem_search("tilt", 200)
+    in_yaw, in_tilt = home_shares(yaw, 1.0), home_shares(tilt, TILT_REACH)
+    if write:
+        PICTURE.write_text(convergence_picture(yaw, "yaw", 1.0))
+        TILT_PICTURE.write_text(convergence_picture(tilt, "tilt", TILT_REACH))
+    text = (f"{version()}, {yaw['stands']} stands, delta0 {yaw['delta0_m']:.2f} m, theta0 "
+            f"{yaw['turn_deg']:.1f}°: of the starts within (26) {100 * in_yaw[0]:.1f} % "
+            f"come home (at the worst place of the grid {100 * in_yaw[1]:.0f} %), of those beyond 1.2 "
+            f"times its size {100 * in_yaw[2]:.0f} %. With tilt instead of yaw, phi0 8.2°: "
+            f"{100 * in_tilt[0]:.1f} % ({100 * in_tilt[1]:.0f} %); without a shift "
+            f"{100 * min(tilt['share'][0]):.0f} % from every tilt up to "
+            f"{1.4 * tilt['turn_deg']:.0f}°.\n\n")
+    text += search_table("search over yaw and ±5 m", {
+        "general": "any cloud: cubes, ±180°, down to 1.0° and 1.2 m",
+        "uniform": "near-uniform: cubes, ±60°, down to theta0 and delta0",
+        "elongated": "the same, elongated boxes",
+        "certified_cubes": "certified to 2 cm, ±60°, cubes",
+        "certified": "certified to 2 cm, ±60°, elongated boxes"}, stem_search("boxes", 40))
+    return text + "\n" + search_table("search in space", {
+        "general": "any cloud, ±180°, tilt ±90°, ±5 and ±1 m, down to 1.0° and 1.2 m: counted only",
+        "uniform": "near-uniform: cubes, ±180°, tilt ±30°, down to theta0, phi0 and delta0",
+        "elongated": "the same, elongated boxes",
+        "near": "elongated, ±15°, tilt ±10°, ±2 and ±1 m",
+        "certified": "the same, certified to 10 cm"}, stem_search("space", 4))
 
 
 def method_page(rows, length_m):

@@ -84,6 +84,7 @@ void describe(ConfigTable& table, CorrectionConfig& config) {
   table.section("odometry", [&] { describe(table, config.odometry); });
   describe(table, config.stems);
   table.section("tree_list", [&] { describe(table, config.tree_list); });
+  table.section("felling", [&] { describe(table, config.felling); });
 }
 
 CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
@@ -97,6 +98,9 @@ CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
     const std::filesystem::path stems = stems_of(request);
     run.views = read_stem_views(stems, log);
     run.inputs.push_back(hash_input(stems));
+    const std::string& head_log = request.config.felling.head_log;
+    run.head_cuts = read_head_log(head_log);
+    if (!head_log.empty()) run.inputs.push_back(hash_input(head_log));
   }
   // The front end has positioned the views already, with the scans between them.
   run.steps = request.scans != nullptr ? request.scans->steps

@@ -10,6 +10,7 @@
 #include "understory/map/stem_map.h"
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/output/run_summary.h"
+#include "understory/pipeline/felling.h"
 #include "understory/pipeline/stem_correction.h"
 #include "understory/recording/recording.h"
 #include "understory/sensor/gnss_fix.h"
@@ -24,6 +25,7 @@ struct CorrectionConfig {
   SparseOdometryConfig odometry;
   StemCorrectionConfig stems;
   StemMapConfig tree_list = tree_list_config();
+  FellingConfig felling;
 };
 void describe(ConfigTable& table, CorrectionConfig& config);
 

@@ -7,7 +7,6 @@
 #include <numeric>
 #include <system_error>
 
-#include "understory/map/felled_trees.h"
 #include "understory/map/stem_map.h"
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
@@ -39,19 +38,6 @@ MapViews map_views(const CorrectionRun& run) {
     kept.world_from_body.push_back(run.correction.world_from_body[i]);
   }
   return kept;
-}
-
-// Trees of trees.csv that stood at first and were gone later, and between which views they fell.
-std::vector<TreeFall> falls_of(const MapViews& map, const std::vector<MappedStem>& stems,
-                               const std::vector<Tree>& trees) {
-  std::vector<TreeFall> falls;
-  for (const FelledTree& fell : felled_trees(map.views, map.world_from_body, stems, {})) {
-    const Tree& tree = trees[fell.tree];
-    falls.push_back({tree.id, tree.x, tree.y,
-                     map.views[static_cast<std::size_t>(fell.last_seen)].stamp,
-                     map.views[static_cast<std::size_t>(fell.first_missed)].stamp, fell.missed});
-  }
-  return falls;
 }
 
 std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
@@ -271,6 +257,8 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
     const SparseScans& scans = *request.scans;
     summary.command = "map";
     summary.inputs = hash_inputs(scans.recording);
+    const std::string& head_log = request.config.felling.head_log;
+    if (!head_log.empty()) summary.inputs.push_back(hash_input(head_log));
     summary.counts["views"] = static_cast<std::int64_t>(run.views.size());
     summary.counts["scans_positioned"] = static_cast<std::int64_t>(scans.positioned);
     if (!scans.path.empty())
@@ -286,8 +274,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
 
 }  // namespace
 
-CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionRun& run,
-                                   const Log& log) {
+CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionRun& run, Log& log) {
   const fs::path& folder = request.run_folder;
   std::error_code error;
   fs::create_directories(folder, error);
@@ -302,15 +289,17 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
     stems = build_stem_map(map.views, map.world_from_body, request.config.tree_list);
   }
   const std::vector<Tree> trees = trees_of(stems);
-  std::vector<TreeFall> falls = falls_of(map, stems, trees);
+  std::vector<HeadCut> cuts;
   {
     const ScopedTimer timer(run.times, "writing");
     write_correction_tables(request, run);
     write_trees_csv(folder / "trees.csv", trees);
-    write_tree_falls(folder / "felled.csv", falls);
+    cuts = place_cuts(run.head_cuts, read_trajectory(folder / "trajectory.tum"), log);
   }
   RunSummary summary = summary_of(request, run, stems, log);
-  summary.counts["trees_felled"] = static_cast<std::int64_t>(falls.size());
+  std::vector<TreeFall> falls =
+      write_fellings(folder, {map.views, map.world_from_body, stems, trees}, cuts,
+                     request.config.felling.cuts, summary);
   std::vector<ReportFix> fixes;
   {
     const ScopedTimer timer(run.times, "gnss_fit");

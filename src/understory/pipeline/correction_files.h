@@ -16,13 +16,15 @@ struct CorrectionRun {
   // Of every scan, before any correction; empty: the views are all there is.
   std::vector<StampedPose> path;
   StemCorrection correction;  // the answer
+  std::vector<LoggedCut> head_cuts;
   bool stopped = false;
   std::vector<InputHash> inputs;
   StageTimes times;
 };
 
-// Writes the run folder: odometry.tum, trajectory.tum, loops.csv, trees.csv, run.json, report.html.
+// Writes the run folder: odometry.tum, trajectory.tum, loops.csv, trees.csv, felled.csv, run.json,
+// report.html.
 [[nodiscard]] CorrectionOutcome write_correction(const CorrectionRequest& request,
-                                                 CorrectionRun& run, const Log& log);
+                                                 CorrectionRun& run, Log& log);
 
 }  // namespace understory

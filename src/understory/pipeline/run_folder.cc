@@ -23,7 +23,7 @@ void remove_old_results(const fs::path& run_folder) {
   for (const char* name :
        {"trajectory.tum", "odometry.tum", "keyframes.tum", "states.csv.gz", "graph.g2o", "gnss.csv",
         "steps.csv", "loops.csv", "corrections.csv", "map.laz", "trees.csv", "felled.csv",
-        "trees.gpkg", "dtm.tif", "chm.tif", "run.json", "report.html"}) {
+        "cuts.csv", "trees.gpkg", "dtm.tif", "chm.tif", "run.json", "report.html"}) {
     std::error_code ignored;  // what cannot be removed cannot be replaced, which is then said
     fs::remove(run_folder / name, ignored);
   }

@@ -164,6 +164,8 @@ CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, 
 CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& log,
                                      const ProgressSink& progress,
                                      const StopRequested& stop_requested) {
+  // A log that cannot be read is refused now, not after the hours that come before its use.
+  (void)read_head_log(request.config.correction.felling.head_log);
   return run_from(request, RunState::create(request, kSparseFrontEnd), log, progress,
                   stop_requested);
 }

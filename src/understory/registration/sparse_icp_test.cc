@@ -9,40 +9,16 @@
 #include "understory/registration/go_icp.h"
 #include "understory/registration/nearest_pairs.h"
 #include "understory/registration/nearest_table.h"
+#include "understory/registration/test_stems.h"
 #include "understory/registration/tilt_about.h"
 #include "understory/registration/yaw_vote.h"
 
 namespace understory {
 namespace {
 
-// A stand around the origin, and the same seen again: moved, with noise and with other stems.
-struct Pair {
-  SparsePoints target;
-  SparsePoints source;
-  Pose target_from_source;
-};
-
-Pair make_pair(unsigned seed, int stems, double noise_m, double lost, const Pose& truth) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> place(-25.0, 25.0);
-  std::uniform_real_distribution<double> unit(0.0, 1.0);
-  std::normal_distribution<double> noise(0.0, 1.0);
-  Pair pair;
-  pair.target_from_source = truth;
-  for (int i = 0; i < stems; ++i) {
-    const Eigen::Vector3d at(place(random), place(random), 0.03 * place(random));
-    if (unit(random) > 0.5 * lost) pair.target.push_back(at);
-    if (unit(random) > 0.5 * lost)
-      pair.source.push_back(
-          truth.inverse() *
-          (at + noise_m * Eigen::Vector3d(noise(random), noise(random), noise(random))));
-  }
-  return pair;
-}
-
-Pose yaw_pose(double yaw, double x, double y, double z) {
-  return Pose(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), {x, y, z});
-}
+using testing::make_pair;
+using testing::Pair;
+using testing::yaw_pose;
 
 // What is not searched again is what a search would find, wherever the source goes.
 TEST(NearestPairs, AreThoseOfASearchWhileTheSourceMoves) {
@@ -190,111 +166,6 @@ TEST(YawVote, FindsAnyTurn) {
     EXPECT_LT(error.translation().norm(), 1.0);
     EXPECT_LT(error.angle(), 0.06);
   }
-}
-
-// Trimmed error in the plane, computed the plain way.
-double plain_error(const Pair& pair, const Pose& pose, double outlier_ratio) {
-  std::vector<double> squared;
-  for (const auto& point : pair.source) {
-    double best = 1e300;
-    for (const auto& other : pair.target)
-      best = std::min(best, (other - pose * point).head<2>().squaredNorm());
-    squared.push_back(best);
-  }
-  std::sort(squared.begin(), squared.end());
-  const auto keep = static_cast<std::size_t>(
-      std::lround((1.0 - outlier_ratio) * static_cast<double>(squared.size())));
-  double sum = 0.0;
-  for (std::size_t i = 0; i < keep; ++i)
-    sum += squared[i];
-  return std::sqrt(sum / static_cast<double>(keep));
-}
-
-// The certificate against an exhaustive grid: no place of the grid beats the answer by more than
-// the gap, on stands that match and on two that have nothing to do with each other.
-TEST(GoIcp, NoPlaceOfAnExhaustiveGridIsBetter) {
-  for (unsigned seed = 1; seed <= 4; ++seed) {
-    Pair pair = make_pair(seed, 40, 0.1, 0.4, yaw_pose(0.15, 0.9, -0.7, 0.2));
-    if (seed % 2 == 0) pair.source = make_pair(seed + 50, 40, 0.0, 0.3, Pose()).source;
-    GoIcpConfig config;
-    config.yaw_range_deg = 20.0;
-    config.shift_range_m = 1.5;
-    const auto result = register_go_icp(SparseTarget(pair.target), pair.source, Pose(), config);
-    ASSERT_EQ(result.status, GoIcpStatus::kCertified);
-    EXPECT_LE(result.gap_m, config.gap_m);
-    EXPECT_NEAR(plain_error(pair, result.plane_optimum, config.outlier_ratio), result.error_rms_m,
-                1e-9);
-    double best = 1e300;
-    for (int a = -20; a <= 20; ++a) {
-      for (int x = -15; x <= 15; ++x) {
-        for (int y = -15; y <= 15; ++y) {
-          const Pose pose = yaw_pose(a * M_PI / 180.0, 0.1 * x, 0.1 * y, 0.0);
-          best = std::min(best, plain_error(pair, pose, config.outlier_ratio));
-        }
-      }
-    }
-    EXPECT_GE(best, result.error_rms_m - result.gap_m);
-    EXPECT_LE(result.error_rms_m, best + 1e-9 + config.gap_m);
-  }
-}
-
-TEST(GoIcp, FindsAnyTurnWithoutAGuessInBothModes) {
-  for (const auto mode : {GoIcpConfig::Mode::kCertified, GoIcpConfig::Mode::kPaper}) {
-    const Pose truth = yaw_pose(2.6, -3.5, 4.1, 0.5);
-    const Pair pair = make_pair(9, 130, 0.05, 0.3, truth);
-    GoIcpConfig config;
-    config.mode = mode;
-    const auto result = register_go_icp(SparseTarget(pair.target), pair.source, Pose(), config);
-    const Pose error = truth.inverse() * result.target_from_source;
-    EXPECT_LT(error.translation().norm(), 0.05);
-    EXPECT_LT(error.angle(), 0.005);
-    EXPECT_EQ(to_string(result.status),
-              mode == GoIcpConfig::Mode::kCertified ? "certified" : "converged");
-    EXPECT_GT(result.overlap, 0.6);
-  }
-}
-
-// P0 table 3: the shape of the boxes and where they stop changes the work, not the answer.
-TEST(GoIcp, ElongatedBoxesFindTheSameWithFewerNodes) {
-  std::int64_t elongated_nodes = 0;
-  std::int64_t cube_nodes = 0;
-  for (unsigned seed = 1; seed <= 4; ++seed) {
-    const Pair pair = make_pair(seed, 100, 0.1, 0.3, yaw_pose(0.4, 1.9, -1.2, 0.0));
-    GoIcpConfig config;
-    config.yaw_range_deg = 60.0;
-    const SparseTarget target(pair.target);
-    const GoIcpResult elongated = register_go_icp(target, pair.source, Pose(), config);
-    config.boxes = GoIcpConfig::Boxes::kCubes;
-    const GoIcpResult cubes = register_go_icp(target, pair.source, Pose(), config);
-    ASSERT_EQ(cubes.status, GoIcpStatus::kCertified);
-    EXPECT_NEAR(cubes.error_rms_m, elongated.error_rms_m, config.gap_m);
-    elongated_nodes += elongated.nodes;
-    cube_nodes += cubes.nodes;
-  }
-  EXPECT_LT(3 * elongated_nodes, 2 * cube_nodes);
-}
-
-TEST(GoIcp, CountsTheCellsOfTheFinestSize) {
-  const Pair pair = make_pair(3, 100, 0.1, 0.3, Pose());
-  GoIcpConfig config;
-  config.mode = GoIcpConfig::Mode::kPaper;
-  config.yaw_range_deg = 30.0;
-  config.shift_range_m = 2.0;
-  config.finest_yaw_deg = 2.0;
-  config.finest_shift_m = 0.5;
-  const GoIcpResult fine = register_go_icp(SparseTarget(pair.target), pair.source, Pose(), config);
-  EXPECT_NEAR(fine.cells, 60.0 / 2.0 * 8.0 * 8.0, 1e-6);
-}
-
-TEST(GoIcp, SaysWhenItGivesUp) {
-  const Pair pair = make_pair(11, 60, 0.3, 1.2, yaw_pose(0.1, 0.5, 0.5, 0.0));
-  GoIcpConfig config;
-  config.max_nodes = 10;
-  config.gap_m = 0.001;
-  const auto result = register_go_icp(SparseTarget(pair.target), pair.source, Pose(), config);
-  EXPECT_EQ(result.status, GoIcpStatus::kNodeLimit);
-  EXPECT_GT(result.gap_m, config.gap_m);
-  EXPECT_FALSE(result.reason.empty());
 }
 
 }  // namespace

@@ -115,6 +115,7 @@ enum class NoiseStream : std::uint64_t {
   kMag,
   kWeather,
   kTotalStation,
+  kHeadLog,
 };
 
 [[nodiscard]] inline std::uint64_t stream_of(NoiseStream stream) {

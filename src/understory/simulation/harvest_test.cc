@@ -9,6 +9,7 @@
 #include <fstream>
 #include <map>
 
+#include "understory/simulation/head_log.h"
 #include "understory/simulation/scanner.h"
 #include "understory/simulation/simulator.h"
 #include "understory/simulation/world.h"
@@ -60,6 +61,29 @@ TEST(Harvest, TreesAreInReachStandApartAndAreWorkedOnOneByOne) {
     EXPECT_LT((head - tree->centre(0.75)).norm(), 0.6) << felling.tree;
     EXPECT_NEAR((head - tree->centre(0.75)).head<2>().norm(), 0.0, 0.35) << felling.tree;
   }
+}
+
+// The machine's own log: a cut each, but for those missed, by the head's place and its errors.
+TEST(Harvest, TheHeadLogHasTheCutsWithItsErrors) {
+  SimulatedWorld world(load_site("lieksa1", {"seed=31", "head_log.missed=0.2"}));
+  const auto& fellings = world.plan.harvest.fellings;
+  const auto cuts = log_head_cuts(world, 0, 1e9);
+  EXPECT_LT(cuts.size(), fellings.size());
+  EXPECT_GT(cuts.size(), fellings.size() / 2);
+  double squared = 0.0;
+  for (const HeadCutSample& cut : cuts) {
+    const auto felling = std::find_if(fellings.begin(), fellings.end(), [&](const Felling& f) {
+      return from_seconds(f.grab_s) == cut.stamp;
+    });
+    ASSERT_NE(felling, fellings.end());
+    squared +=
+        (cut.head_in_body - head_in_body(world.plan.boom.value(felling->grab_s))).squaredNorm();
+  }
+  // 0.15 m from cut to cut and as much for all of them, three axes each.
+  const double rms = std::sqrt(squared / static_cast<double>(cuts.size()));
+  EXPECT_GT(rms, 0.2);
+  EXPECT_LT(rms, 0.7);
+  EXPECT_TRUE(log_head_cuts(world, 0, 0.0).empty());
 }
 
 TEST(Harvest, ATreeIsGoneOnceItIsCutAndItsStumpAndLogsStay) {

@@ -281,7 +281,8 @@ void Simulator::write_truth(const std::string& folder) const {
   const std::vector<ScanTruth>& scans = impl_->truths.scans();
   const double until_s = scans.empty() ? 0.0 : to_seconds(scans.back().stamp - impl_->start);
   write_truth_folder(folder, *impl_, impl_->start, impl_->truths,
-                     track_prism(*impl_, impl_->start, until_s));
+                     track_prism(*impl_, impl_->start, until_s),
+                     log_head_cuts(*impl_, impl_->start, until_s));
 }
 
 std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {

@@ -334,6 +334,13 @@ void describe(ConfigTable& table, SiteConfig& config) {
               "until its solution lies so far away in the plane");
   });
   describe_total_station(table, config.total_station);
+  table.section("head_log", [&] {
+    table.add("sd_m", config.head_log.sd_m, {0.0, 10.0}, "m",
+              "error of the harvester head's place at a cut, each axis");
+    table.add("bias_sd_m", config.head_log.bias_sd_m, {0.0, 10.0}, "m",
+              "the same for all cuts of a recording");
+    table.add("missed", config.head_log.missed, {0.0, 1.0}, "", "share of the cuts not noted");
+  });
   table.add("imu_preset", config.imu_preset,
             "measured IMU: site (as the site says), vectornav, xsens");
   table.add("gnss_preset", config.gnss_preset,

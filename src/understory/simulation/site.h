@@ -223,6 +223,12 @@ struct TotalStationConfig {  // a reference beside the recording: REC.truth/tota
   double search_s = 2.0;       // to find the prism again
 };
 
+struct HeadLogConfig {  // what a harvester's computer notes at each felling cut: REC.truth/head.csv
+  double sd_m = 0.15;   // error of the head's place, each axis, from cut to cut
+  double bias_sd_m = 0.15;  // the same for all cuts: the boom as it was last calibrated
+  double missed = 0.02;     // share of the cuts that are not in the log
+};
+
 struct SiteConfig {
   int seed = 1;
   double duration_s = 0.0;  // 0: as long as the route takes
@@ -235,6 +241,7 @@ struct SiteConfig {
   GnssConfig gnss;
   MagnetometerConfig mag;
   TotalStationConfig total_station;
+  HeadLogConfig head_log;
   ReceiverHoldConfig receiver_hold;
   std::string imu_preset = "site";  // a loaded site has its presets worked in and says "site"
   std::string gnss_preset = "site";

@@ -134,6 +134,16 @@ std::string prism_text(const std::vector<PrismSample>& prism) {
   return text;
 }
 
+std::string head_text(const std::vector<HeadCutSample>& cuts) {
+  std::string text = "timestamp,x,y,z\n";
+  for (const HeadCutSample& cut : cuts) {
+    const Eigen::Vector3d& p = cut.head_in_body;
+    text +=
+        fmt::format("{},{:.3f},{:.3f},{:.3f}\n", format_seconds(cut.stamp), p.x(), p.y(), p.z());
+  }
+  return text;
+}
+
 // Heights at the middle of cells of half a metre, in the truth's own frame (east, north; no
 // coordinate system).
 void write_terrain(const std::string& path, const Terrain& terrain) {
@@ -180,7 +190,8 @@ std::span<const StemReturns> TruthLog::stems(std::size_t i) const {
 }
 
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
-                        const TruthLog& log, const std::vector<PrismSample>& prism) {
+                        const TruthLog& log, const std::vector<PrismSample>& prism,
+                        const std::vector<HeadCutSample>& cuts) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw OutputError(folder, "cannot be made: " + error.message());
@@ -190,6 +201,7 @@ void write_truth_folder(const std::string& folder, const SimulatedWorld& world, 
   write_returns(folder + "/returns.csv.gz", log);
   write_text(folder + "/trees.csv", trees_text(world, start, log));
   if (!prism.empty()) write_text(folder + "/total_station.csv", prism_text(prism));
+  if (!cuts.empty()) write_text(folder + "/head.csv", head_text(cuts));
   write_terrain(folder + "/dtm.tif", world.terrain);
   SiteConfig copy = world.site;
   ConfigTable table;

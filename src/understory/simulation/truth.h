@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
+#include "understory/simulation/head_log.h"
 #include "understory/simulation/scanner.h"
 #include "understory/simulation/total_station.h"
 #include "understory/simulation/world.h"
@@ -38,9 +39,10 @@ class TruthLog {
   std::vector<std::size_t> stems_end_;  // of each scan
 };
 
-// Writes the truth folder (docs/simulation.md); that of the total station only where it measured.
-// Throws OutputError.
+// Writes the truth folder (docs/simulation.md); what the total station and the harvester's head
+// measured only where they did. Throws OutputError.
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
-                        const TruthLog& log, const std::vector<PrismSample>& prism);
+                        const TruthLog& log, const std::vector<PrismSample>& prism,
+                        const std::vector<HeadCutSample>& cuts);
 
 }  // namespace understory
