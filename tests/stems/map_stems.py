@@ -167,6 +167,34 @@ def again(folder):
     assert errors["ape_plane_rmse_m"] < 0.06, errors["ape_plane_rmse_m"]
 
 
+@cases.case("the harvester's log of its head tells which tree fell")
+def head_log(folder):
+    done = program("correct", RUN, "-o", folder / "run", "--set", f"felling.head_log={TRUTH}/head.csv")
+    assert done.returncode == 0, done.stderr
+    cuts = list(csv.DictReader((folder / "run" / "cuts.csv").open()))
+    falls = {row["id"]: row for row in csv.DictReader((folder / "run" / "felled.csv").open())}
+    felled = {row["felled_at"]: row for row in csv.DictReader((TRUTH / "trees.csv").open())
+              if row["felled_at"]}
+    listed = {row["id"]: row for row in csv.DictReader((folder / "run" / "trees.csv").open())}
+    assert cuts and len(cuts) == len(felled), (cuts, felled)
+    stamp, begin = next(iter(poses(folder / "run" / "trajectory.tum").items()))
+    true_begin = poses(TRUTH / "trajectory.tum")[stamp]
+    turned_back = [0, 0, 0, *(-v for v in true_begin[3:6]), true_begin[6]]
+    for cut in cuts:
+        tree = felled[cut["timestamp"]]
+        in_body = placed(turned_back, [float(tree[k]) - v for k, v in zip("xyz", true_begin)])
+        place, found = placed(begin, in_body), listed[cut["tree_id"]]
+        assert math.dist(place[:2], (float(found["x"]), float(found["y"]))) < 0.3, (place, found)
+        fall = falls[cut["tree_id"]]
+        assert fall["seen_until"] == fall["gone_since"] == cut["timestamp"], fall
+    log = folder / "log.csv"
+    log.write_text((TRUTH / "head.csv").read_text() + "1,2,3\n")
+    done = sparse(REC, folder / "refused", "--set", f"felling.head_log={log}")
+    assert done.returncode == 3 and "log.csv" in done.stderr and "line" in done.stderr, done
+    assert not (folder / "refused").exists()
+    return f"{len(cuts)} cuts, {float(cuts[0]['distance_m']):.2f} m from the tree"
+
+
 @cases.case("same bytes with one thread and with two")
 def threads(folder):
     done = sparse(REC, folder / "one", "--threads", 1)

@@ -72,6 +72,27 @@ def certified(folder):
     return f"{100 * shift:.1f} cm, {yaw:.2f} degrees, {told['nodes']} boxes"
 
 
+@cases.case("go-icp in space levels a view that leans")
+def leaning(folder):
+    lean = math.radians(9.0)
+    trees = [(x, math.cos(lean) * y - math.sin(lean) * z, math.sin(lean) * y + math.cos(lean) * z)
+             for x, y, z in seen(stand(), 2, (YAW, SHIFT))]
+    tilted = write(folder / "tilted.pcd", trees)
+    done = program("register", A, tilted, "--method", "go-icp", "--json", "--set",
+                   "go_icp.motion=space", "--set", "go_icp.mode=paper", "--set",
+                   "go_icp.yaw_range_deg=60", "--set", "go_icp.shift_range_m=3")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    t = told["a_from_b"]
+    assert told["status"] == "converged" and math.dist((t[3], t[7]), SHIFT[:2]) < 0.1, told
+    # What B's vertical became: A's z axis, leant back by 9 degrees.
+    assert abs(math.degrees(math.acos(t[10])) - 9.0) < 0.3, t
+    flat = json.loads(program("register", A, tilted, "--method", "go-icp", "--json", "--set",
+                              "go_icp.refine=false", "--set", "go_icp.gap_m=0.2").stdout)
+    assert abs(flat["a_from_b"][10] - 1.0) < 1e-9, flat  # the plane's search leaves it as it is
+    return f"{told['nodes']} boxes"
+
+
 @cases.case("stem-icp comes home from within its region, and says so where it does not")
 def trimmed(folder):
     guess = f"{SHIFT[0] + 0.4},{SHIFT[1] - 0.3},0,0,0,{math.sin(YAW / 2 + 0.02):.6f},{math.cos(YAW / 2 + 0.02):.6f}"
