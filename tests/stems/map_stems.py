@@ -317,6 +317,16 @@ def untold(folder):
     assert "nan" not in done.stdout and "unknown" in done.stdout, done.stdout
 
 
+@cases.case("a recording that is cut off")
+def cut_off(folder):
+    whole = REC.read_bytes()
+    (folder / "cut.mcap").write_bytes(whole[: len(whole) // 2])
+    done = sparse(folder / "cut.mcap", folder / "run")
+    assert done.returncode == 4 and "cut off" in done.stderr, (done.returncode, done.stderr)
+    told = json.loads((folder / "run" / "run.json").read_text())
+    assert told["status"] == "partial" and told["scans"] > 20, told["status"]
+
+
 @cases.case("at the speed of the sensor")
 def realtime(folder):
     began = time.monotonic()

@@ -14,6 +14,7 @@
 #include "understory/pipeline/correction_tables.h"
 #include "understory/pipeline/gnss_fit.h"
 #include "understory/pipeline/run_folder.h"
+#include "understory/pipeline/run_judgement.h"
 #include "understory/pipeline/run_truth.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
@@ -163,7 +164,7 @@ std::size_t doubtful_steps(const CorrectionRun& run) {
 }
 
 void judge(const CorrectionRequest& request, const CorrectionRun& run, std::size_t trees,
-           RunSummary& summary) {
+           const Log& log, RunSummary& summary) {
   const auto lower = [&](RunStatus status, const std::string& reason) {
     summary.status = status;
     summary.reasons.push_back(reason);
@@ -172,6 +173,13 @@ void judge(const CorrectionRequest& request, const CorrectionRun& run, std::size
   if (run.stopped || (recording && request.scans->stopped)) {
     lower(RunStatus::kPartial, std::string("stopped before the end of the recording") +
                                    (recording ? "; go on with `understory map --resume`" : ""));
+  }
+  if (recording) {
+    const RecordingDamage damage = recording_damage(log, request.scans->path.size());
+    for (const std::string& reason : damage.missing)
+      lower(RunStatus::kPartial, reason);
+    for (const std::string& reason : damage.hurt)
+      lower(RunStatus::kUntrusted, reason);
   }
   if (!run.correction.converged)
     lower(RunStatus::kUntrusted, "the loops were not solved: " + run.correction.reason);
@@ -268,7 +276,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
       add_latency(scans.realtime->latency_ms, summary);
     }
   }
-  judge(request, run, stems.size(), summary);
+  judge(request, run, stems.size(), log, summary);
   return summary;
 }
 

@@ -52,6 +52,24 @@ void judge_outages(const MappingSession& session, const RunFacts& facts,
 
 }  // namespace
 
+RecordingDamage recording_damage(const Log& log, std::uint64_t scans) {
+  RecordingDamage damage;
+  for (const Log::Warning& warning : log.warnings()) {
+    if (warning.key == "recording.damaged") {
+      damage.hurt.push_back(fmt::format("the recording is damaged ({} place(s), the first: {})",
+                                        warning.count, warning.first_message));
+    } else if (warning.key == "recording.damaged_packet" &&
+               warning.count > scans) {  // more than one a scan
+      damage.hurt.push_back(fmt::format("{} packets of the lidar are damaged, the first: {}",
+                                        warning.count, warning.first_message));
+    } else if (warning.key == "recording.truncated") {
+      damage.missing.push_back("the recording is cut off; what came after is missing: " +
+                               warning.first_message);
+    }
+  }
+  return damage;
+}
+
 RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, double smear_m,
                        const Log& log) {
   RunJudgement judgement;
@@ -66,28 +84,17 @@ RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, dou
   } else if (!trust.trusted) {
     judgement.reasons.push_back(trust.reason);
   }
-  bool cut = false;
-  std::vector<std::string> missing;
+  const RecordingDamage damage = recording_damage(log, session.counts().scans);
+  judgement.reasons.insert(judgement.reasons.end(), damage.hurt.begin(), damage.hurt.end());
   for (const Log::Warning& warning : log.warnings()) {
-    // Kinds of damage that take data away or make it unreliable, not what was merely mended.
-    if (warning.key == "recording.damaged") {
-      judgement.reasons.push_back(
-          fmt::format("the recording is damaged ({} place(s), the first: {})", warning.count,
-                      warning.first_message));
-    } else if (warning.key == "recording.damaged_packet" &&
-               warning.count > session.counts().scans) {  // more than one a scan
-      judgement.reasons.push_back(fmt::format("{} packets of the lidar are damaged, the first: {}",
-                                              warning.count, warning.first_message));
-    } else if (warning.key == "recording.truncated") {
-      cut = true;
-      missing.push_back("the recording is cut off; what came after is missing: " +
-                        warning.first_message);
-    } else if (warning.key == "recording.no_point_times" && smear_m > kMostSmearM) {
+    if (warning.key == "recording.no_point_times" && smear_m > kMostSmearM) {
       judgement.reasons.push_back(
           fmt::format("{}; the sensor moved so much that points 10 m away are smeared by {:.2f} m",
                       warning.first_message, smear_m));
     }
   }
+  std::vector<std::string> missing = damage.missing;
+  const bool cut = !missing.empty();
   if (!judgement.reasons.empty()) judgement.status = RunStatus::kUntrusted;
   if (cut && judgement.status == RunStatus::kComplete) judgement.status = RunStatus::kPartial;
   if (facts.stopped) {

@@ -14,6 +14,14 @@ struct RunJudgement {
   std::vector<std::string> reasons;
 };
 
+// Damage of a recording that takes data away (`missing`) or makes it unreliable (`hurt`), not what
+// was merely mended, in words for the user. `scans`: of the recording.
+struct RecordingDamage {
+  std::vector<std::string> hurt;
+  std::vector<std::string> missing;
+};
+[[nodiscard]] RecordingDamage recording_damage(const Log& log, std::uint64_t scans);
+
 // Whether the result of a run is to be trusted, and if not why, in words for the user. Partial: the
 // run was stopped, or the recording is cut off. Untrusted: something hurt the result (lost scans,
 // an IMU that contradicts the lidar, an outage bridged by prediction, scans blurred by motion).
