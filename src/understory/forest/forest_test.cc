@@ -345,8 +345,10 @@ std::vector<SlicePoint> arcs(double turn_deg) {
 
 TEST(StemDetector, WhatShowsAnotherSideInEachSliceIsNoStem) {
   // Pieces of a machine that stood in many places made such rings.
-  EXPECT_EQ(detect_stems(arcs(0.0), {}).size(), 1U);
-  EXPECT_TRUE(detect_stems(arcs(140.0), {}).empty());
+  std::vector<SlicePoint> stem = arcs(0.0);
+  std::vector<SlicePoint> pieces = arcs(140.0);
+  EXPECT_EQ(detect_stems(stem, {}).size(), 1U);
+  EXPECT_TRUE(detect_stems(pieces, {}).empty());
 }
 
 TEST(StemDetector, AThinStemWithWideScatterIsNotTheEdgeOfAThickOne) {

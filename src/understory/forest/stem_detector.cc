@@ -12,38 +12,58 @@
 namespace understory {
 namespace {
 
-// Points by square of the ground, to gather those around a stem.
+// Points by square of the ground, to gather those around a stem: sorts them, so that those of a
+// square, and of squares side by side, follow each other.
 class PointIndex {
  public:
-  explicit PointIndex(const std::vector<SlicePoint>& points) {
-    cells_.reserve(points.size());
-    for (std::uint32_t i = 0; i < points.size(); ++i)
-      cells_.push_back({key(cell(points[i].x), cell(points[i].y)), i});
-    std::sort(cells_.begin(), cells_.end());
+  explicit PointIndex(std::vector<SlicePoint>& points) : end_(points.size()) {
+    std::sort(points.begin(), points.end(), [](const SlicePoint& a, const SlicePoint& b) {
+      const std::uint64_t cell_a = key(a);
+      const std::uint64_t cell_b = key(b);
+      if (cell_a != cell_b) return cell_a < cell_b;
+      if (a.x != b.x) return a.x < b.x;
+      if (a.y != b.y) return a.y < b.y;
+      return a.height_m != b.height_m ? a.height_m < b.height_m : a.returns < b.returns;
+    });
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::uint64_t cell = key(points[i]);
+      if (cells_.empty() || cells_.back().key != cell) cells_.push_back({cell, i});
+    }
   }
 
-  [[nodiscard]] std::vector<std::uint32_t> near(const Eigen::Vector2d& centre, double reach) const {
-    std::vector<std::uint32_t> found;
+  // Calls visit(index) for the points of all squares within `reach` along either axis.
+  template <typename Visit>
+  void near(const Eigen::Vector2d& centre, double reach, const Visit& visit) const {
     const int r1 = cell(static_cast<float>(centre.y() + reach));
     const int c0 = cell(static_cast<float>(centre.x() - reach));
     const int c1 = cell(static_cast<float>(centre.x() + reach));
     for (int r = cell(static_cast<float>(centre.y() - reach)); r <= r1; ++r) {
-      auto it = std::lower_bound(cells_.begin(), cells_.end(), Entry{key(c0, r), 0});
-      const std::uint64_t last = key(c1, r);
-      for (; it != cells_.end() && it->first <= last; ++it)
-        found.push_back(it->second);
+      const std::size_t end = first_from(key(c1, r) + 1);
+      for (std::size_t i = first_from(key(c0, r)); i < end; ++i)
+        visit(i);
     }
-    return found;
   }
 
  private:
-  using Entry = std::pair<std::uint64_t, std::uint32_t>;
+  struct Cell {
+    std::uint64_t key;
+    std::size_t first;  // of its points
+  };
+  [[nodiscard]] std::size_t first_from(std::uint64_t wanted) const {
+    const auto found =
+        std::lower_bound(cells_.begin(), cells_.end(), wanted,
+                         [](const Cell& a, std::uint64_t value) { return a.key < value; });
+    return found == cells_.end() ? end_ : found->first;
+  }
   static int cell(float value) { return static_cast<int>(std::floor(value / 0.5F)); }
   static std::uint64_t key(int column, int row) {
     return static_cast<std::uint64_t>(static_cast<std::int64_t>(row) + (1LL << 31)) << 32 |
            static_cast<std::uint64_t>(static_cast<std::int64_t>(column) + (1LL << 31));
   }
-  std::vector<Entry> cells_;
+  static std::uint64_t key(const SlicePoint& point) { return key(cell(point.x), cell(point.y)); }
+
+  std::vector<Cell> cells_;
+  std::size_t end_;
 };
 
 // One way of cutting the points: thin slices for dense clouds, thick ones for what is left of
@@ -186,10 +206,10 @@ int unclaimed_returns(const StemFitResult& fit, const PointIndex& index,
   const StemAxis axis(fit.stem);
   const double band = std::max(2.5 * fit.evidence.scatter_m, 0.015);
   std::uint64_t returns = 0;
-  for (const std::uint32_t i : index.near(fit.stem.centre, fit.stem.radius_m + 1.2)) {
+  index.near(fit.stem.centre, fit.stem.radius_m + 1.2, [&](std::size_t i) {
     if (explained[i] == 0 && std::abs(axis.surface_error(points[i])) <= band)
       returns += points[i].returns;
-  }
+  });
   return static_cast<int>(returns);
 }
 
@@ -197,9 +217,9 @@ int unclaimed_returns(const StemFitResult& fit, const PointIndex& index,
 void mark_explained(const StemFit& stem, const PointIndex& index,
                     const std::vector<SlicePoint>& points, std::vector<char>& explained) {
   const StemAxis axis(stem);
-  for (const std::uint32_t i : index.near(stem.centre, stem.radius_m + 1.2)) {
+  index.near(stem.centre, stem.radius_m + 1.2, [&](std::size_t i) {
     if (axis.place(points[i]).distance_m <= stem.radius_m + 0.06) explained[i] = 1;
-  }
+  });
 }
 
 }  // namespace
@@ -219,21 +239,15 @@ void describe(ConfigTable& table, StemDetectorConfig& config) {
   table.add("max_lean_deg", config.max_lean_deg, {0.0, 60.0}, "deg", "from the vertical");
 }
 
-std::vector<StemFit> detect_stems(const std::vector<SlicePoint>& points,
+std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
                                   const StemDetectorConfig& config) {
-  std::vector<SlicePoint> sorted = points;
-  std::sort(sorted.begin(), sorted.end(), [](const SlicePoint& a, const SlicePoint& b) {
-    if (a.x != b.x) return a.x < b.x;
-    if (a.y != b.y) return a.y < b.y;
-    return a.height_m != b.height_m ? a.height_m < b.height_m : a.returns < b.returns;
-  });
-  const PointIndex index(sorted);
-  std::vector<char> explained(sorted.size(), 0);
+  const PointIndex index(points);
+  std::vector<char> explained(points.size(), 0);
   std::vector<StemFit> stems;
   const std::vector<Cut> cuts = {{config.slice_m, config.min_slices, 0.08, 0.02},
                                  {3.0 * config.slice_m, 2, 0.12, 0.025}};
   for (const Cut& cut : cuts) {
-    const std::vector<Ring> rings = find_rings(sorted, explained, cut, config);
+    const std::vector<Ring> rings = find_rings(points, explained, cut, config);
     const std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
     std::vector<StemFitResult> fits(starts.size());
     std::vector<char> accepted(starts.size(), 0);
@@ -243,13 +257,13 @@ std::vector<StemFit> detect_stems(const std::vector<SlicePoint>& points,
           start.radius_m + 0.4 + start.slope.norm() * (config.highest_m - kBreastHeight);
       std::vector<SlicePoint> near;
       const StemAxis axis(start);
-      for (const std::uint32_t k : index.near(start.centre, reach)) {
-        const double within = start.radius_m + 0.35;
-        if (explained[k] == 0 && axis.may_be_within(sorted[k], within) &&
-            axis.place(sorted[k]).distance_m < within) {
-          near.push_back(sorted[k]);
+      const double within = start.radius_m + 0.35;
+      index.near(start.centre, reach, [&](std::size_t k) {
+        if (explained[k] == 0 && axis.may_be_within(points[k], within) &&
+            axis.place(points[k]).distance_m < within) {
+          near.push_back(points[k]);
         }
-      }
+      });
       fits[i] = fit_stem(near, start, config);
       accepted[i] = is_stem(fits[i], cut, config) ? 1 : 0;
       if (accepted[i] != 0) {
@@ -267,12 +281,12 @@ std::vector<StemFit> detect_stems(const std::vector<SlicePoint>& points,
       const auto overlaps = [&](const StemFit& other) { return same_stem(fit.stem, other); };
       if (std::any_of(stems.begin(), stems.end(), overlaps)) continue;
       // A stem beside another must not live on the other's points.
-      if (unclaimed_returns(fit, index, sorted, explained) <
+      if (unclaimed_returns(fit, index, points, explained) <
           std::max(config.min_returns, fit.evidence.returns * 2 / 3)) {
         continue;
       }
       stems.push_back(fit.stem);
-      mark_explained(fit.stem, index, sorted, explained);
+      mark_explained(fit.stem, index, points, explained);
     }
   }
   std::sort(stems.begin(), stems.end(), [](const StemFit& a, const StemFit& b) {

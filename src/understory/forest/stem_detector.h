@@ -59,9 +59,10 @@ struct StemFit {
   std::vector<StemSlice> slices;
 };
 
-// Stems among the points of the slices. Points may be in any order; equal input gives equal output
-// for any number of threads. Stems come sorted by x, then y.
-[[nodiscard]] std::vector<StemFit> detect_stems(const std::vector<SlicePoint>& points,
+// Stems among the points of the slices. Points may be in any order, and come back sorted by place:
+// there are too many for a second copy. The same points give the same stems for any number of
+// threads. Stems come sorted by x, then y.
+[[nodiscard]] std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
                                                 const StemDetectorConfig& config);
 
 }  // namespace understory
