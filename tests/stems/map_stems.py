@@ -335,6 +335,7 @@ def realtime(folder):
     assert done.returncode == 0, done.stderr
     assert time.monotonic() - began > 7.0
     told = json.loads((folder / "run" / "run.json").read_text())
+    assert 7.0 < told["wall_s"] <= time.monotonic() - began, told["wall_s"]
     counts, quality = told["counts"], told["quality"]
     assert counts["scans_positioned"] == told["scans"], counts  # none waits
     assert told["scans"] + counts["scans_dropped"] == len(poses(folder / "run.truth" / "trajectory.tum"))

@@ -116,6 +116,13 @@ def wrong(folder):
     draw = random.Random(4)
     dense = write(folder / "dense.pcd", [tuple(draw.uniform(-9, 9) for _ in range(3)) for _ in range(6000)])
     few = write(folder / "few.pcd", stand()[:4])
+    # The best of a range that holds no match is certified, and no match.
+    far = matched("--method", "go-icp", "--guess", "1e9,0,0", code=4)
+    assert far["overlap"] < 0.1 and "little overlap" in far["reason"], far
+    assert abs(far["a_from_b"][3] - 1e9) < 10, far
+    scrap = write(folder / "scrap.pcd", seen(stand(), 7)[:20])
+    lone = json.loads(program("register", A, scrap, "--method", "go-icp", "--json", "--guess", "60,0,0").stdout)
+    assert lone["overlap"] < 0.4 and lone["reason"], lone
     for method in ("go-icp", "stem-icp"):
         done = program("register", A, dense, "--method", method)
         assert done.returncode == 3 and "dense.pcd" in done.stderr and "5000" in done.stderr, done

@@ -44,6 +44,10 @@ void print_line(const std::string& name, const Json& value) {
   }
 }
 
+// P0 (26): ICP that has not come home leaves pairs about half a neighbour's distance apart; and the
+// best of a range in which there is no match has as few partners.
+constexpr double kLeastOverlap = 0.4;
+
 // One object, or the same as lines of a name and a value; the method's own figures come last.
 template <typename Result>
 void print(const StemClouds& clouds, const Result& result, const Json& own) {
@@ -75,15 +79,18 @@ int trusted_or(bool trusted, const std::string& reason, CommandContext& context)
 int register_by_go_icp(const StemClouds& clouds, const GoIcpConfig& config,
                        CommandContext& context) {
   const auto [target, source] = sparse_pair(clouds);
-  const GoIcpResult result = register_go_icp(target, source, clouds.guess, config);
+  GoIcpResult result = register_go_icp(target, source, clouds.guess, config);
+  const bool found =
+      result.status == GoIcpStatus::kCertified || result.status == GoIcpStatus::kConverged;
+  if (found && result.overlap < kLeastOverlap)
+    result.reason =
+        "little overlap: the best motion of the range leaves most stems without a partner";
   print(clouds, result,
         {{"gap_m", result.gap_m},
          {"cells", result.cells},
          {"nodes", result.nodes},
          {"icp_runs", result.icp_runs}});
-  return trusted_or(
-      result.status == GoIcpStatus::kCertified || result.status == GoIcpStatus::kConverged,
-      result.reason, context);
+  return trusted_or(found && result.overlap >= kLeastOverlap, result.reason, context);
 }
 
 int register_by_stem_icp(const StemClouds& clouds, const SparseIcpConfig& config,
@@ -96,8 +103,6 @@ int register_by_stem_icp(const StemClouds& clouds, const SparseIcpConfig& config
          {"mean_neighbour_m", target.l0_m},
          {"iterations", result.iterations},
          {"information", numbers_of(result.information)}});
-  // P0 (26): ICP that has not come home leaves pairs about half a neighbour's distance apart.
-  constexpr double kLeastOverlap = 0.4;
   if (result.status != SparseIcpStatus::kConverged)
     return trusted_or(false, result.reason, context);
   return trusted_or(result.overlap >= kLeastOverlap,

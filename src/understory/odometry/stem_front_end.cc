@@ -92,13 +92,24 @@ bool StemFrontEnd::to_be_kept(const StemScan& result) {
   return true;
 }
 
+void StemFrontEnd::watch_imu(const StemScan& result, const Rig& rig, const ImuBuffer* samples) {
+  if (samples == nullptr || !config_.imu.use || !rig.body_from_imu) return;
+  const TimeNs now = result.view.stamp;
+  watch_.pass_time(now);
+  if (!last_matched_ || result.step.status != SparseStepStatus::kTracked) return;
+  const std::vector<InertialSample> between = samples->slice(last_->stamp, now);
+  if (between.empty()) return;
+  watch_.compare({last_->stamp, last_->world_from_body * *rig.body_from_imu},
+                 {now, result.step.world_from_body * *rig.body_from_imu}, between);
+}
+
 StemFrontEnd::Guess StemFrontEnd::guess(const Scan& scan, int frame, const Rig& rig,
                                         const StemSegments& found, const ImuBuffer* samples,
                                         double since) const {
   Guess guess;
   guess.motion_per_s = motion_per_s_;
   if (config_.predict_turn) guess.step = Pose::exp(since * motion_per_s_);
-  if (samples != nullptr && config_.imu.use && rig.body_from_imu)
+  if (samples != nullptr && config_.imu.use && rig.body_from_imu && watch_.usable())
     guess.by_imu = imu_.motion(*samples, last_->stamp, scan, *rig.body_from_imu);
   if (guess.by_imu) {
     Vector6d step = since * motion_per_s_;
@@ -162,6 +173,9 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const Im
   } else {
     imu_.forget();
   }
+  if (follows) watch_imu(result, rig, samples);
+  last_matched_ = result.step.status == SparseStepStatus::kTracked ||
+                  result.step.status == SparseStepStatus::kFirst;
   last_ = StampedPose{scan.stamp, result.step.world_from_body};
   result.keep = !result.view.stems.empty() && to_be_kept(result);
   if (result.keep) odometry_.take_up_last();
@@ -171,6 +185,8 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const Im
 void StemFrontEnd::save(BinaryWriter& writer) const {
   odometry_.save(writer);
   imu_.save(writer);
+  watch_.save(writer);
+  writer.put(last_matched_);
   put_optional(writer, up_in_lidar_,
                [](BinaryWriter& out, const Eigen::Vector3d& up) { out.put_doubles(up.data(), 3); });
   put_optional(writer, last_, put_stamped_pose);
@@ -182,6 +198,8 @@ void StemFrontEnd::save(BinaryWriter& writer) const {
 void StemFrontEnd::load(BinaryReader& reader) {
   odometry_.load(reader);
   imu_.load(reader);
+  watch_.load(reader);
+  last_matched_ = reader.get<bool>();
   up_in_lidar_ = get_optional(reader, [](BinaryReader& in) {
     Eigen::Vector3d up;
     in.get_doubles(up.data(), 3);

@@ -6,6 +6,7 @@
 
 #include "understory/features/stem_segments.h"
 #include "understory/geometry/stamped_pose.h"
+#include "understory/odometry/imu_watch.h"
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/odometry/stem_imu.h"
 #include "understory/preprocess/machine_boxes.h"
@@ -60,23 +61,30 @@ struct StemScan {
 // each moved to the scan's stamp by the motion at its own time, then matched to those before. The
 // motion within a scan is first guessed from the steps before it and, once the scan has been
 // matched, taken from its own step. An IMU, where
-// there is one, tells turns and helps to hold the tilt. Not thread-safe; deterministic.
+// there is one, tells turns and helps to hold the tilt, as long as it agrees with the stems. Not
+// thread-safe; deterministic.
 class StemFrontEnd {
  public:
   explicit StemFrontEnd(const StemFrontEndConfig& config)
-      : config_(config), odometry_(config.odometry), imu_(config.imu) {}
+      : config_(config), odometry_(config.odometry), imu_(config.imu), watch_(kGravity, nullptr) {}
 
   // `frame` is the number of the scan in the recording; scans may be left out. `samples` of the IMU
   // reach from the scan before to this one's end, as far as there are any; may be null.
   [[nodiscard]] StemScan add(const Scan& scan, int frame, const Rig& rig,
                              const ImuBuffer* samples = nullptr);
   [[nodiscard]] const SparseOdometry& odometry() const { return odometry_; }
+  // Whether the IMU agrees with the stems; left out from then on where it is sure to do harm.
+  [[nodiscard]] ImuTrust imu_trust() const { return watch_.trust(); }
+  // From here on by stems alone.
+  void refuse_imu() { config_.imu.use = false; }
 
   // The whole state, bit for bit; `load` in place of the scans so far, same configuration.
   void save(BinaryWriter& writer) const;
   void load(BinaryReader& reader);
 
  private:
+  static constexpr double kGravity = 9.81;  // m/s^2, anywhere on earth to half a percent
+
   [[nodiscard]] StemView view_of(const Scan& scan, int frame, const Rig& rig,
                                  const StemSegments& found, const Vector6d& motion_per_s) const;
   // What takes the scan from the one before to now: how the body moves within it, and where.
@@ -88,10 +96,14 @@ class StemFrontEnd {
   [[nodiscard]] Guess guess(const Scan& scan, int frame, const Rig& rig, const StemSegments& found,
                             const ImuBuffer* samples, double since) const;
   [[nodiscard]] bool to_be_kept(const StemScan& result);
+  // Holds the turn to this scan by the stems against that by the gyroscope, and gravity.
+  void watch_imu(const StemScan& result, const Rig& rig, const ImuBuffer* samples);
 
   StemFrontEndConfig config_;
   SparseOdometry odometry_;
   StemImu imu_;
+  ImuWatch watch_;
+  bool last_matched_ = false;  // the scan before was
   std::optional<Eigen::Vector3d> up_in_lidar_;
   std::optional<StampedPose> last_;
   std::optional<Pose> last_kept_;

@@ -59,6 +59,7 @@ std::vector<StemScan> StemPacer::finish(const Rig& rig) {
 
 std::vector<StemScan> StemPacer::settle(const Rig& rig) {
   std::vector<StemScan> results;
+  const bool trusted = imu_trust().trusted;
   const int last_frame = first_frame_ + static_cast<int>(waiting_.size()) - 1;
   bool whole = waiting_.size() == 1;
   if (!whole) {
@@ -87,6 +88,11 @@ std::vector<StemScan> StemPacer::settle(const Rig& rig) {
   wait_ = std::clamp(wait_, 1, std::max(1, static_cast<int>(std::min(most, 1000.0))));
   last_ = StampedPose{last.view.stamp, last.step.world_from_body};
   samples_.forget_before(last_->stamp);
+  if (trusted && !imu_trust().trusted && log_ != nullptr) {
+    log_->warn("imu.untrusted",
+               imu_trust().reason +
+                   (imu_trust().usable ? "" : "; the rest of the run does without the IMU"));
+  }
   first_frame_ = last_frame + 1;
   waiting_.clear();
   return results;

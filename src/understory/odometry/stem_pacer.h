@@ -23,7 +23,7 @@ void describe(ConfigTable& table, StemPaceConfig& config);
 class StemPacer {
  public:
   StemPacer(const StemPaceConfig& config, const StemFrontEndConfig& front_end, Log* log = nullptr)
-      : config_(config), front_end_(front_end), samples_({}, log) {}
+      : config_(config), front_end_(front_end), samples_({}, log), log_(log) {}
 
   // Of the recording's IMU, in order, up to the end of the scan that is added next.
   void add(const ImuSample& sample) { samples_.add(sample); }
@@ -34,6 +34,8 @@ class StemPacer {
   // The rest, at the recording's end.
   [[nodiscard]] std::vector<StemScan> finish(const Rig& rig);
   [[nodiscard]] std::size_t scans_in_memory() const { return waiting_.size(); }
+  [[nodiscard]] ImuTrust imu_trust() const { return front_end_.imu_trust(); }
+  void refuse_imu() { front_end_.refuse_imu(); }
 
   // The whole state, bit for bit, between gaps only: no scan may wait. `load` in place of what was
   // added so far, same configuration.
@@ -48,6 +50,7 @@ class StemPacer {
   StemPaceConfig config_;
   StemFrontEnd front_end_;
   ImuBuffer samples_;
+  Log* log_;
   std::vector<ScanPtr> waiting_;
   int first_frame_ = 0;  // of those that wait
   int wait_ = 1;         // scans from one that is positioned to the next

@@ -44,7 +44,9 @@ struct SparseScans {
   std::vector<SparseStep> steps;      // of the views in the stems' file
   const StageTimes* times = nullptr;  // "scan": all of one scan
   std::vector<GnssFix> fixes;         // of the recording; compared with, not used
+  double wall_s = 0.0;                // that it took so far
   bool stopped = false;               // before the recording's end
+  std::string imu_distrust;           // why its IMU is not believed; empty: it is, or there is none
   std::optional<RealtimeFacts> realtime;
 };
 

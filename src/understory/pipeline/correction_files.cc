@@ -180,6 +180,8 @@ void judge(const CorrectionRequest& request, const CorrectionRun& run, std::size
       lower(RunStatus::kPartial, reason);
     for (const std::string& reason : damage.hurt)
       lower(RunStatus::kUntrusted, reason);
+    if (!request.scans->imu_distrust.empty())
+      lower(RunStatus::kUntrusted, request.scans->imu_distrust);
   }
   if (!run.correction.converged)
     lower(RunStatus::kUntrusted, "the loops were not solved: " + run.correction.reason);
@@ -315,8 +317,9 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   }
   summary.stages = summarise(run.times);
   if (request.scans != nullptr) summary.stages.merge(summarise(*request.scans->times));
-  for (const auto& [name, stage] : summary.stages)
-    summary.wall_s += stage.total_wall_s;
+  summary.wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - run.start).count() +
+      (request.scans != nullptr ? request.scans->wall_s : 0.0);
   summary.cpu_s = process_cpu_seconds();
   summary.peak_memory_mb = peak_memory_mb();
   ReportInput report = correction_report(request, run, summary, trees);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <vector>
 
 #include "understory/pipeline/correction.h"
@@ -11,6 +12,7 @@ namespace understory {
 
 // What a correction run has found.
 struct CorrectionRun {
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
   std::vector<StemView> views;
   std::vector<SparseStep> steps;  // the chained odometry
   // Of every scan, before any correction; empty: the views are all there is.

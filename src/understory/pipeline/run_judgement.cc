@@ -70,6 +70,12 @@ RecordingDamage recording_damage(const Log& log, std::uint64_t scans) {
   return damage;
 }
 
+std::string imu_refusal(const std::string& reason) {
+  return reason +
+         "; the recording was mapped without the IMU: check how it is mounted (--extrinsics FILE), "
+         "its axes, units and clock";
+}
+
 RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, double smear_m,
                        const Log& log) {
   RunJudgement judgement;
@@ -77,10 +83,7 @@ RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, dou
   judge_outages(session, facts, judgement.reasons);
   const ImuTrust trust = session.odometry().motion().imu_trust();
   if (!session.imu_refused().empty()) {
-    judgement.reasons.push_back(session.imu_refused() +
-                                "; the recording was mapped without the IMU: check how it "
-                                "is mounted (--extrinsics FILE), its axes, units and "
-                                "clock");
+    judgement.reasons.push_back(imu_refusal(session.imu_refused()));
   } else if (!trust.trusted) {
     judgement.reasons.push_back(trust.reason);
   }

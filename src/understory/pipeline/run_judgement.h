@@ -22,6 +22,9 @@ struct RecordingDamage {
 };
 [[nodiscard]] RecordingDamage recording_damage(const Log& log, std::uint64_t scans);
 
+// What is said of a run that was made without its IMU, for that reason.
+[[nodiscard]] std::string imu_refusal(const std::string& reason);
+
 // Whether the result of a run is to be trusted, and if not why, in words for the user. Partial: the
 // run was stopped, or the recording is cut off. Untrusted: something hurt the result (lost scans,
 // an IMU that contradicts the lidar, an outage bridged by prediction, scans blurred by motion).

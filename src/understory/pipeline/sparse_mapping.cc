@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "understory/pipeline/realtime_player.h"
+#include "understory/pipeline/run_judgement.h"
 #include "understory/pipeline/run_state.h"
 #include "understory/pipeline/source.h"
 #include "understory/pipeline/sparse_session.h"
@@ -20,19 +23,15 @@ namespace fs = std::filesystem;
 class SparseRun {
  public:
   SparseRun(const SparseMappingRequest& request, RunState state, Log& log)
-      : request_(request),
-        log_(log),
-        state_(std::move(state)),
-        orderer_(request.config.time_repair, log),
-        source_(open_source(request.recording, request.open, log)),
-        session_(request.config, request.run_folder / "stems.csv.gz", state_.work(), log) {
+      : request_(request), log_(log), state_(std::move(state)) {
+    open();
     if (state_.events() > 0) {
       source_->skip(state_.events());
-      state_.restore(session_, orderer_, log_, source_->rig());
+      state_.restore(*session_, *orderer_, log_, source_->rig());
       events_ = state_.events();
     } else {
       // Makes the run resumable from the start.
-      state_.save(request_, session_, orderer_, log_, 0);
+      state_.save(request_, *session_, *orderer_, log_, 0);
     }
     if (request.realtime) play_at_sensor_speed();
   }
@@ -46,14 +45,15 @@ class SparseRun {
       ended = !event;
       if (event) {
         ++events_;
-        orderer_.push(std::move(*event));
+        orderer_->push(std::move(*event));
       } else {
-        orderer_.finish();
+        orderer_->finish();
       }
-      while (auto ready = orderer_.pop())
+      while (auto ready = orderer_->pop())
         handle(*ready, ended, progress);
+      if (start_over_for_imu()) ended = false;
     }
-    session_.finish(source_->rig());
+    session_->finish(source_->rig());
     if (player_ != nullptr) {
       player_->stop();
       warn_of_dropped();
@@ -61,8 +61,8 @@ class SparseRun {
     return stopped;
   }
 
-  [[nodiscard]] std::size_t count() { return session_.path().size(); }
-  [[nodiscard]] std::size_t kept() { return session_.steps().size(); }
+  [[nodiscard]] std::size_t count() { return session_->path().size(); }
+  [[nodiscard]] std::size_t kept() { return session_->steps().size(); }
   void forget_state() { state_.remove(); }
   // Why no view was kept.
   [[nodiscard]] std::string why_nothing() {
@@ -80,40 +80,66 @@ class SparseRun {
     SparseScans scans;
     scans.recording = request_.recording;
     scans.source = player_ != nullptr ? &player_->played() : source_.get();
-    scans.path = std::move(session_.path());
-    scans.steps = std::move(session_.steps());
-    scans.times = &session_.times();
-    scans.positioned = session_.positioned();
+    scans.path = std::move(session_->path());
+    scans.steps = std::move(session_->steps());
+    scans.times = &session_->times();
+    scans.positioned = session_->positioned();
+    scans.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     scans.stopped = stopped;
-    scans.fixes = std::move(session_.fixes());
+    const std::string& refused = session_->imu_refused();
+    scans.imu_distrust = refused.empty() ? session_->imu_trust().reason : imu_refusal(refused);
+    scans.fixes = std::move(session_->fixes());
     if (player_ != nullptr)
       scans.realtime = {player_->dropped_scans(), distribution_of(std::move(latencies_ms_))};
     return scans;
   }
 
  private:
+  // Session, orderer and recording at their beginning.
+  void open() {
+    session_.reset();  // lets go of its files
+    session_.emplace(request_.config, request_.run_folder / "stems.csv.gz", state_.work(), log_);
+    orderer_.emplace(request_.config.time_repair, log_);
+    source_ = open_source(request_.recording, request_.open, log_);
+    events_ = 0;
+  }
+
+  // An IMU that contradicts the stems bends what is positioned with it until that is found out. So
+  // the recording is begun anew without it. True if it was; a run at the speed of its sensors
+  // cannot, and goes on.
+  bool start_over_for_imu() {
+    const ImuTrust trust = session_->imu_trust();
+    if (player_ != nullptr || trust.trusted || !session_->imu_refused().empty()) return false;
+    log_.forget_all_but("imu.untrusted");
+    log_.info("the recording is mapped again from its beginning, without the IMU");
+    open();
+    session_->refuse_imu(trust.reason);
+    state_.save(request_, *session_, *orderer_, log_, 0);
+    return true;
+  }
+
   void play_at_sensor_speed() {
     auto player = std::make_unique<RealtimePlayer>(
         std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans));
     player_ = player.get();
     source_ = std::move(player);
-    session_.on_settled(
+    session_->on_settled(
         [this](TimeNs scan_end) { latencies_ms_.push_back(player_->latency_ms(scan_end)); });
   }
 
   void handle(const Event& event, bool ended, const ProgressSink& progress) {
-    session_.handle(event, source_->rig());
+    session_->handle(event, source_->rig());
     if (!std::holds_alternative<ScanPtr>(event)) return;
     // Between gaps only, and not once the orderer has been told that nothing comes any more.
     const TimeNs due =
         state_.last_checkpoint() + from_seconds(request_.config.checkpoint_interval_s);
-    if (!ended && session_.settled() && session_.last_scan_end() >= due)
-      state_.save(request_, session_, orderer_, log_, events_);
+    if (!ended && session_->settled() && session_->last_scan_end() >= due)
+      state_.save(request_, *session_, *orderer_, log_, events_);
     if (!progress) return;
     const double share = source_->progress();
-    const auto done = static_cast<double>(session_.scans());
+    const auto done = static_cast<double>(session_->scans());
     progress({"stems", done, share > 0.0 ? done / share : 0.0, "scans",
-              fmt::format("{} stems", session_.last_stems())});
+              fmt::format("{} stems", session_->last_stems())});
   }
 
   void warn_of_dropped() {
@@ -121,16 +147,17 @@ class SparseRun {
     if (dropped == 0) return;
     log_.warn("realtime.dropped",
               fmt::format("{} of {} scans were dropped, because the machine could not keep up",
-                          dropped, dropped + session_.scans()));
+                          dropped, dropped + session_->scans()));
   }
 
   const SparseMappingRequest& request_;
   Log& log_;
   RunState state_;
-  EventOrderer orderer_;
+  std::optional<EventOrderer> orderer_;
   std::unique_ptr<Recording> source_;
-  SparseSession session_;
+  std::optional<SparseSession> session_;
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::uint64_t events_ = 0;
   std::vector<double> latencies_ms_;
 };

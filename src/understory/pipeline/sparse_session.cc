@@ -68,6 +68,11 @@ void SparseSession::finish(const Rig& rig) {
   if (!steps_.empty()) stems_.commit();
 }
 
+void SparseSession::refuse_imu(const std::string& reason) {
+  imu_refused_ = reason;
+  pacer_.refuse_imu();
+}
+
 void SparseSession::flush() {
   if (journal_ != nullptr) journal_->flush();
 }
@@ -75,6 +80,7 @@ void SparseSession::flush() {
 void SparseSession::save(BinaryWriter& writer) const {
   writer.put(journal_ != nullptr ? journal_->bytes() : std::uint64_t{0});
   writer.put(last_scan_end_);
+  writer.put(imu_refused_);
   pacer_.save(writer);
 }
 
@@ -84,6 +90,8 @@ void SparseSession::load(BinaryReader& reader, const Rig& /*rig*/) {
   journal_ = std::make_unique<ViewJournal>(journal_file_, bytes, again);
   scans_ = path_.size();
   last_scan_end_ = reader.get<TimeNs>();
+  const std::string refused = reader.get_string();
+  if (!refused.empty()) refuse_imu(refused);
   pacer_.load(reader);
 }
 

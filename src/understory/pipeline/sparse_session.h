@@ -45,6 +45,12 @@ class SparseSession : public Resumable, private ViewSink {
   [[nodiscard]] std::vector<SparseStep>& steps() { return steps_; }  // of the views kept
   [[nodiscard]] std::vector<GnssFix>& fixes() { return fixes_; }
   [[nodiscard]] StageTimes& times() { return times_; }
+  [[nodiscard]] ImuTrust imu_trust() const { return pacer_.imu_trust(); }
+
+  // Before the first event: does without the IMU, because an earlier pass found it to be wrong.
+  void refuse_imu(const std::string& reason);
+  // Why; empty if it was not refused.
+  [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
 
  private:
   void on_scan(const ScanPtr& scan, const Rig& rig);
@@ -60,6 +66,7 @@ class SparseSession : public Resumable, private ViewSink {
   std::function<void(TimeNs)> tell_settled_;
   std::deque<TimeNs> waiting_ends_;  // of scans that have no pose yet
   TimeNs last_scan_end_ = 0;
+  std::string imu_refused_;
   std::size_t scans_ = 0;
   std::size_t positioned_ = 0;
   std::size_t last_stems_ = 0;

@@ -178,8 +178,17 @@ class Search {
     const SparseIcpResult icp =
         register_sparse_icp(target_, source_, result_.target_from_source, space);
     result_.overlap = icp.overlap;
-    if (config_.refine) result_.target_from_source = icp.target_from_source;
+    if (config_.refine && stays_near(icp.target_from_source))
+      result_.target_from_source = icp.target_from_source;
     return result_;
+  }
+
+  // Whether the refined motion is still the one that was found. Where nothing matches, ICP goes
+  // anywhere.
+  [[nodiscard]] bool stays_near(const Pose& refined) const {
+    const GoIcpBox::Sides off = GoIcpBox::sides_of(refined, result_.target_from_source);
+    return off.segment<2>(GoIcpBox::kX).norm() <= region_.delta0_m &&
+           std::abs(off[GoIcpBox::kYaw]) <= region_.theta0_rad;
   }
 
   // Moves to the median height of the pairs that match in the plane.
