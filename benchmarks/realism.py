@@ -3,7 +3,7 @@
 
     realism.py [--data FOLDER] [--out PICTURE]
 
-Real: a pine stand by mobile and by airborne laser (spanner_mls_uas_als), a pine plot by terrestrial
+Real: a pine stand by mobile laser, from an unmanned aircraft and from an aeroplane (spanner_mls_uas_als), a pine plot by terrestrial
 laser (treels), one scan of a VLP-16 in a park (evalio_botanic), scans of a VLP-16 and an OS1-128 in
 streets (drivers). Simulated: a pine stand as
 `understory map` maps it, and scans of a VLP-16. The same code judges real and simulated clouds;
@@ -31,6 +31,11 @@ PROGRAM = pathlib.Path(os.environ.get("UNDERSTORY_PROGRAM", ROOT / "build/unders
 PINES = ["stand.size_x_m=44", "stand.size_y_m=44", "stand.trees_per_ha=500", "stand.pine_share=1",
          "stand.spruce_share=0", "stand.dbh_mean_m=0.27", "stand.dbh_sd_m=0.05", "stand.dbh_min_m=0.15",
          "stand.height_mean_m=19", "stand.shrubs_per_ha=100", "stand.seedlings_per_ha=100"]
+# The same stand from a VLP-16 that looks down from 45 m.
+FROM_ABOVE = [key for key in PINES if "size" not in key] + [
+    "stand.size_x_m=90", "stand.size_y_m=90", "stand.dbh_max_m=0.6", "stand.spacing_m=2", "stand.edge_m=0",
+    "stand.crown_base_share=0", "carrier.height_m=45", "carrier.route_time_s=0", "carrier.speed_m_s=4",
+    "lidar.mount_rpy_deg=[0,90,0]", "lidar.rays_per_beam=4"]
 
 
 # ---- simulated clouds ------------------------------------------------------------------------
@@ -259,15 +264,21 @@ def main():
     options = parser.parse_args()
     data = pathlib.Path(options.data)
 
-    simulated = simulated_map("demo", PINES + ["carrier.length_m=60"], 31, 45)
-    simulated = simulated[(np.abs(simulated[:, :2] - np.median(simulated[:, :2], axis=0)) < 13).all(axis=1)]
-    stands = {"real, mobile": read_las(data / "spanner_mls_uas_als/MLS_Clip.laz"),
+    def middle(cloud):
+        return cloud[(np.abs(cloud[:, :2] - np.median(cloud[:, :2], axis=0)) < 13).all(axis=1)]
+
+    airborne = data / "spanner_mls_uas_als"
+    stands = {"real, mobile": read_las(airborne / "MLS_Clip.laz"),
               "real, terrestrial": read_las(data / "treels/pine_plot.laz"),
-              "simulated": simulated}
+              "simulated": middle(simulated_map("demo", PINES + ["carrier.length_m=60"], 31, 45)),
+              "real, UAS": read_las(airborne / "UAS_Clip.laz"),
+              "real, ALS": read_las(airborne / "ALS_Clip.laz"),
+              "simulated, UAS": middle(simulated_map("lohja1", FROM_ABOVE, 31, 60))}
     figure, axes = plt.subplots(2, 3, figsize=(15, 8.5))
     print(f"{'cloud':20}{'points':>9}{'ground':>8}{'stem':>7}{'foliage':>9}{'stems':>7}{'radius cm':>11}"
           f"{'bark sd mm':>12}{'seen %':>8}   quartiles of height / top")
-    for name, cloud in stands.items():
+    for number, (name, cloud) in enumerate(stands.items()):
+        colour = f"C{number}"
         cloud = thinned(cloud - cloud.min(axis=0), 0.01)
         heights = above_ground(cloud)
         ok = (heights > -0.5) & (heights < 40)
@@ -279,10 +290,11 @@ def main():
         top = np.percentile(heights, 99.5)
         standing = heights[heights > 0.1 * top] / top
         counts, edges = np.histogram(standing, np.linspace(0.1, 1.05, 39), density=True)
-        axes[0, 0].plot(counts, 0.5 * (edges[1:] + edges[:-1]), label=name)
+        axes[0, 0].plot(counts, 0.5 * (edges[1:] + edges[:-1]), colour, label=name)
         if len(sections):
             values = np.sort(1e3 * sections[:, 1])
-            axes[0, 1].plot(values, (np.arange(len(values)) + 0.5) / len(values), ".-", label=name)
+            axes[0, 1].plot(values, (np.arange(len(values)) + 0.5) / len(values), ".-",
+                            color=colour, label=name)
             section = [len(sections), 100 * np.median(sections[:, 0]), 1e3 * np.median(sections[:, 1]),
                        100 * np.median(sections[:, 2])]
         else:
@@ -290,7 +302,7 @@ def main():
         print(f"{name:20}{len(cloud):9d}{100 * parts[0]:8.0f}{100 * parts[1]:7.0f}{100 * parts[2]:9.0f}"
               f"{section[0]:7d}{section[1]:11.1f}{section[2]:12.1f}{section[3]:8.0f}"
               + "".join(f"{value:7.2f}" for value in np.percentile(standing, [25, 50, 75])), flush=True)
-        axes[0, 2].bar(np.arange(3) + 0.27 * list(stands).index(name), 100 * parts, 0.25, label=name)
+        axes[0, 2].bar(np.arange(3) + 0.14 * number, 100 * parts, 0.13, color=colour, label=name)
 
     botanic = np.loadtxt(data / "evalio_botanic/lidar_botanic_garden.csv", delimiter=",")[:, :3]
     park = ["stand.trees_per_ha=250", "stand.pine_share=0.3", "stand.spruce_share=0.1",
@@ -340,7 +352,7 @@ def main():
         axis.set_ylabel(y)
         axis.legend(fontsize=8)
         axis.grid(alpha=0.3)
-    axes[0, 2].set_xticks([0.27, 1.27, 2.27], ["ground", "stem", "foliage"])
+    axes[0, 2].set_xticks([0.35, 1.35, 2.35], ["ground", "stem", "foliage"])
     axes[1, 0].set_yscale("log")
     figure.tight_layout()
     pathlib.Path(options.out).parent.mkdir(parents=True, exist_ok=True)

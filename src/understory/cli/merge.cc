@@ -65,7 +65,7 @@ void write_field(const fs::path& path, const std::vector<Tree>& l, const Deforma
 // A tree list, laid on the trees of A if that was asked for.
 std::vector<Tree> beside(const std::string& file, const std::vector<Tree>& a,
                          const MergeOptions& options) {
-  const std::vector<Tree> trees = read_trees(file_in_folder(file, "trees.csv"));
+  std::vector<Tree> trees = read_trees(file_in_folder(file, "trees.csv"));
   if (!options.align) return trees;
   const auto a_from_these = align_trees(trees, a, Alignment::kYaw, options.merge.reach_m);
   if (!a_from_these)

@@ -35,7 +35,8 @@ SparsePair sparse_pair(const StemClouds& clouds) {
 }
 
 void print_line(const std::string& name, const Json& value) {
-  if (value.is_array() || value == "") return;
+  const bool said = !value.is_string() || !value.get_ref<const std::string&>().empty();
+  if (value.is_array() || !said) return;
   if (value.is_number_float()) {
     std::printf("%s %.4f\n", name.c_str(), value.get<double>());
   } else {

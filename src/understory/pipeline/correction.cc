@@ -56,7 +56,7 @@ void begin_from(const std::filesystem::path& trajectory, CorrectionRun& run) {
 // A run folder stands for the stems that it holds.
 std::filesystem::path stems_of(const CorrectionRequest& request) {
   if (!std::filesystem::is_directory(request.stems)) return request.stems;
-  const std::filesystem::path stems = request.stems / "stems.csv.gz";
+  std::filesystem::path stems = request.stems / "stems.csv.gz";
   if (std::filesystem::exists(stems)) return stems;
   throw InputError(request.stems.string(), "",
                    "expected a run folder that holds stems.csv.gz: a run of `understory map "

@@ -1,15 +1,13 @@
 #include "understory/pipeline/sparse_session.h"
 
-#include <utility>
-
 #include "understory/util/timing.h"
 
 namespace understory {
 
 SparseSession::SparseSession(const SparseMappingConfig& config,
-                             const std::filesystem::path& stems_file, std::filesystem::path folder,
-                             Log& log)
-    : journal_file_(std::move(folder) / "views.bin"),
+                             const std::filesystem::path& stems_file,
+                             const std::filesystem::path& folder, Log& log)
+    : journal_file_(folder / "views.bin"),
       pacer_(config.pace, config.front_end, &log),
       stems_(stems_file) {}
 

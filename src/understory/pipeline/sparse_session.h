@@ -22,7 +22,7 @@ class SparseSession : public Resumable, private ViewSink {
  public:
   // `stems_file` appears with `finish`; `folder` is the work folder.
   SparseSession(const SparseMappingConfig& config, const std::filesystem::path& stems_file,
-                std::filesystem::path folder, Log& log);
+                const std::filesystem::path& folder, Log& log);
 
   void handle(const Event& event, const Rig& rig);
   // At the recording's end, or where it is stopped: what still waits, and the file of stems if any

@@ -44,7 +44,7 @@ class CounterNoise {
     const float radius = std::sqrt(-2.0F * log_of(u));
     // Eighths of a turn to the nearest quarter, and the rest by series.
     const float quarters = static_cast<float>(static_cast<std::int32_t>(around)) * 0x1.0p-22F;
-    const auto whole = static_cast<std::int32_t>(quarters + 0.5F);
+    const auto whole = static_cast<std::int32_t>((around + (1U << 21)) >> 22);
     const float x = 0.5F * std::numbers::pi_v<float> * (quarters - static_cast<float>(whole));
     const float xx = x * x;
     const float sine =
