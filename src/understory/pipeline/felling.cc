@@ -17,20 +17,32 @@ TimeNs stamp_of(const FelledStand& stand, int view) {
   return stand.views[static_cast<std::size_t>(view)].stamp;
 }
 
-void write_cuts(const std::filesystem::path& path, const std::vector<HeadCut>& cuts,
-                const std::vector<CutTree>& matched, const std::vector<Tree>& trees) {
+// A row of cuts.csv.
+struct PlacedCut {
+  TimeNs stamp = 0;
+  Eigen::Vector3d head_in_world = Eigen::Vector3d::Zero();
+  int tree_id = 0;  // 0: none
+  double distance_m = 0.0;
+};
+
+void write_cuts(const std::filesystem::path& path, const std::vector<PlacedCut>& cuts) {
   AtomicTextFile file(path);
   file.write("timestamp,x,y,z,tree_id,distance_m\n");
-  for (std::size_t i = 0; i < cuts.size(); ++i) {
-    const Eigen::Vector3d& p = cuts[i].head_in_world;
-    file.write(fmt::format("{},{:.3f},{:.3f},{:.3f},", format_seconds(cuts[i].stamp), p.x(), p.y(),
-                           p.z()));
-    file.write(matched[i].tree < 0
-                   ? ",\n"
-                   : fmt::format("{},{:.3f}\n", trees[static_cast<std::size_t>(matched[i].tree)].id,
-                                 matched[i].distance_m));
+  for (const PlacedCut& cut : cuts) {
+    const Eigen::Vector3d& p = cut.head_in_world;
+    file.write(
+        fmt::format("{},{:.3f},{:.3f},{:.3f},", format_seconds(cut.stamp), p.x(), p.y(), p.z()));
+    file.write(cut.tree_id == 0 ? ",\n" : fmt::format("{},{:.3f}\n", cut.tree_id, cut.distance_m));
   }
   file.commit();
+}
+
+TimeNs stamp_in(const CsvReader& table) {
+  TimeNs stamp = 0;
+  if (!parse_seconds(std::string(table.text("timestamp")), stamp))
+    throw InputError(table.lines().file(), table.lines().position(),
+                     "expected seconds in column 'timestamp'");
+  return stamp;
 }
 
 }  // namespace
@@ -104,14 +116,17 @@ std::vector<TreeFall> write_fellings(const std::filesystem::path& folder, const 
   }
   if (!cuts.empty()) {
     const auto matched = match_cuts(cuts, stand.stems, felled, stand.views, config);
+    std::vector<PlacedCut> rows;
     for (std::size_t i = 0; i < cuts.size(); ++i) {
+      rows.push_back({cuts[i].stamp, cuts[i].head_in_world, 0, matched[i].distance_m});
       if (matched[i].tree < 0) continue;
       const auto index = static_cast<std::size_t>(matched[i].tree);
       const Tree& tree = stand.trees[index];
+      rows.back().tree_id = tree.id;
       const int missed = falls.contains(index) ? falls[index].missed : 0;
       falls[index] = {tree.id, tree.x, tree.y, cuts[i].stamp, cuts[i].stamp, missed};
     }
-    write_cuts(folder / "cuts.csv", cuts, matched, stand.trees);
+    write_cuts(folder / "cuts.csv", rows);
     summary.counts["head_cuts"] = static_cast<std::int64_t>(cuts.size());
     summary.counts["head_cuts_without_tree"] = static_cast<std::int64_t>(std::count_if(
         matched.begin(), matched.end(), [](const CutTree& cut) { return cut.tree < 0; }));
@@ -122,6 +137,25 @@ std::vector<TreeFall> write_fellings(const std::filesystem::path& folder, const 
   write_tree_falls(folder / "felled.csv", result);
   summary.counts["trees_felled"] = static_cast<std::int64_t>(result.size());
   return result;
+}
+
+void write_moved_cuts(const std::filesystem::path& from, const std::filesystem::path& to,
+                      const Pose& to_world_from_world) {
+  if (!std::filesystem::exists(from)) return;
+  CsvReader table(from, {"timestamp", "x", "y", "z", "tree_id", "distance_m"});
+  std::vector<PlacedCut> cuts;
+  while (table.next()) {
+    PlacedCut cut;
+    cut.stamp = stamp_in(table);
+    const Eigen::Vector3d head(table.finite("x"), table.finite("y"), table.finite("z"));
+    cut.head_in_world = to_world_from_world * head;
+    if (!table.text("tree_id").empty()) {
+      cut.tree_id = static_cast<int>(table.finite("tree_id"));
+      cut.distance_m = table.finite("distance_m");
+    }
+    cuts.push_back(cut);
+  }
+  write_cuts(to, cuts);
 }
 
 }  // namespace understory

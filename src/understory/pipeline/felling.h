@@ -52,4 +52,9 @@ std::vector<TreeFall> write_fellings(const std::filesystem::path& folder, const 
                                      const std::vector<HeadCut>& cuts, const CutMatching& config,
                                      RunSummary& summary);
 
+// cuts.csv of one run to that of another in which everything is moved; nothing where there is none.
+// Throws InputError or OutputError.
+void write_moved_cuts(const std::filesystem::path& from, const std::filesystem::path& to,
+                      const Pose& to_world_from_world);
+
 }  // namespace understory

@@ -92,6 +92,12 @@ TEST_F(HeadLog, TheHeadTellsWhatTheViewsCannot) {
             "timestamp,x,y,z,tree_id,distance_m\n"
             "95.000000000,5.200,4.100,1.000,2,0.224\n"
             "150.000000000,-7.000,0.000,1.000,,\n");
+  write_moved_cuts(folder / "cuts.csv", folder / "moved.csv",
+                   Pose(Eigen::Quaterniond::Identity(), {100.0, 0.0, -1.0}));
+  EXPECT_EQ(text_of(folder / "moved.csv"),
+            "timestamp,x,y,z,tree_id,distance_m\n"
+            "95.000000000,105.200,4.100,0.000,2,0.224\n"
+            "150.000000000,93.000,0.000,0.000,,\n");
   EXPECT_EQ(std::get<std::int64_t>(summary.counts.at("head_cuts_without_tree")), 1);
 }
 

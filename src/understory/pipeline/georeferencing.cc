@@ -16,6 +16,7 @@
 #include "understory/output/geo_files.h"
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/felling.h"
 #include "understory/pipeline/gnss_fit.h"
 #include "understory/pipeline/moved_map.h"
 #include "understory/pipeline/run_folder.h"
@@ -321,6 +322,7 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& 
   }
   for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum"})
     write_moved_path(request.run / name, request.result / name, motion.target_from_world);
+  write_moved_cuts(request.run / "cuts.csv", request.result / "cuts.csv", motion.target_from_world);
   copy_unmoved(request.run, request.result);
   const std::vector<Tree> trees = moved_trees(run.trees, motion.target_from_world);
   std::string system;
