@@ -163,6 +163,13 @@ std::size_t doubtful_steps(const CorrectionRun& run) {
   return doubtful;
 }
 
+double mean_smear_m(const std::vector<StampedPose>& path) {
+  double sum = 0.0;
+  for (std::size_t i = 1; i < path.size(); ++i)
+    sum += smear_of(path[i - 1].world_from_body.inverse() * path[i].world_from_body);
+  return path.size() < 2 ? 0.0 : sum / static_cast<double>(path.size() - 1);
+}
+
 void judge(const CorrectionRequest& request, const CorrectionRun& run, std::size_t trees,
            const Log& log, RunSummary& summary) {
   const auto lower = [&](RunStatus status, const std::string& reason) {
@@ -180,6 +187,8 @@ void judge(const CorrectionRequest& request, const CorrectionRun& run, std::size
       lower(RunStatus::kPartial, reason);
     for (const std::string& reason : damage.hurt)
       lower(RunStatus::kUntrusted, reason);
+    const std::string smear = smear_reason(log, mean_smear_m(request.scans->path));
+    if (!smear.empty()) lower(RunStatus::kUntrusted, smear);
     if (!request.scans->imu_distrust.empty())
       lower(RunStatus::kUntrusted, request.scans->imu_distrust);
   }

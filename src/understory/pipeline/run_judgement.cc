@@ -70,6 +70,21 @@ RecordingDamage recording_damage(const Log& log, std::uint64_t scans) {
   return damage;
 }
 
+double smear_of(const Pose& step) {
+  constexpr double kRangeM = 10.0;
+  return step.translation().norm() + kRangeM * step.angle();
+}
+
+std::string smear_reason(const Log& log, double smear_m) {
+  if (smear_m <= kMostSmearM) return {};
+  for (const Log::Warning& warning : log.warnings()) {
+    if (warning.key != "recording.no_point_times") continue;
+    return fmt::format("{}; the sensor moved so much that points 10 m away are smeared by {:.2f} m",
+                       warning.first_message, smear_m);
+  }
+  return {};
+}
+
 std::string imu_refusal(const std::string& reason) {
   return reason +
          "; the recording was mapped without the IMU: check how it is mounted (--extrinsics FILE), "
@@ -89,13 +104,8 @@ RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, dou
   }
   const RecordingDamage damage = recording_damage(log, session.counts().scans);
   judgement.reasons.insert(judgement.reasons.end(), damage.hurt.begin(), damage.hurt.end());
-  for (const Log::Warning& warning : log.warnings()) {
-    if (warning.key == "recording.no_point_times" && smear_m > kMostSmearM) {
-      judgement.reasons.push_back(
-          fmt::format("{}; the sensor moved so much that points 10 m away are smeared by {:.2f} m",
-                      warning.first_message, smear_m));
-    }
-  }
+  if (const std::string reason = smear_reason(log, smear_m); !reason.empty())
+    judgement.reasons.push_back(reason);
   std::vector<std::string> missing = damage.missing;
   const bool cut = !missing.empty();
   if (!judgement.reasons.empty()) judgement.status = RunStatus::kUntrusted;

@@ -22,6 +22,12 @@ struct RecordingDamage {
 };
 [[nodiscard]] RecordingDamage recording_damage(const Log& log, std::uint64_t scans);
 
+// How far a point 10 m away moves against the sensor on that step from scan to scan, metres.
+[[nodiscard]] double smear_of(const Pose& step);
+// What is to be said where scans had no time per point and moved by `smear_m` on average; empty if
+// that is little, or they had. Folders of clouds are taken to be deskewed and are not warned of.
+[[nodiscard]] std::string smear_reason(const Log& log, double smear_m);
+
 // What is said of a run that was made without its IMU, for that reason.
 [[nodiscard]] std::string imu_refusal(const std::string& reason);
 

@@ -25,8 +25,6 @@
 namespace understory {
 namespace {
 
-constexpr double kSmearRangeM = 10.0;
-
 // What walking through the finished trajectory yields for report and run.json.
 struct TrajectoryFacts {
   std::vector<ReportScan> scans;
@@ -86,7 +84,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
         const Pose step = last.inverse() * scan.world_from_body;
         if (facts.scans.size() > 1) {
           facts.length_m += step.translation().norm();
-          facts.smear_m += step.translation().norm() + kSmearRangeM * step.angle();
+          facts.smear_m += smear_of(step);
         }
         last = scan.world_from_body;
         if (record.iterations > 0) {

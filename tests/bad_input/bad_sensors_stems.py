@@ -1,11 +1,11 @@
-"""An IMU that is wrong, through `understory map --front-end sparse`: the stems find it out, and the
-recording is mapped as if it had none."""
+"""Sensors that fail, through `understory map --front-end sparse`: an IMU that is wrong is found out by
+the stems, and the recording mapped as if it had none; scans that are smeared are said to be."""
 
 import json
 import math
 
 from program import Cases, good_recording, program
-from recordings import edit_imu, write_mcap
+from recordings import edit_cloud, edit_imu, write_mcap
 
 cases = Cases()
 good, messages, truth = good_recording(cases.folder, seconds=24)
@@ -58,5 +58,16 @@ for name, (change, said) in SPOILT.items():
         assert said in reasons[0] and "mapped without the IMU" in reasons[0], reasons
         assert (folder / "run" / "trajectory.tum").read_bytes() == WITHOUT
         return reasons[0][:90]
+
+
+@cases.case("no time per point")
+def no_times(folder):
+    path = folder / "walk.mcap"
+    write_mcap(path, [edit_cloud(m, lambda cloud: cloud.without("t")) if m.topic == "/lidar" else m
+                      for m in messages])
+    code, reasons, _ = mapped(path, folder / "run")
+    assert code == 4 and any("no time per point" in r and "are smeared by" in r for r in reasons), reasons
+    return reasons[0][-60:]
+
 
 cases.run()
