@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -72,7 +73,8 @@ TEST(PrismErrors, NoTimesInCommonIsNothingAndAFirstPoseIsNoAlignment) {
 }
 
 TEST(PrismErrors, PlacesAreReadInTheOrderOfTheirTimes) {
-  const std::string path = ::testing::TempDir() + "/prism.csv";
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "prism.csv";
   std::ofstream(path) << "timestamp,x,y,z\n2.5,1,2,3\n1.000000001,4,5,6\n";
   const auto points = read_points(path);
   ASSERT_EQ(points.size(), 2U);
@@ -80,7 +82,6 @@ TEST(PrismErrors, PlacesAreReadInTheOrderOfTheirTimes) {
   EXPECT_EQ(points[1].point, Eigen::Vector3d(1, 2, 3));
   std::ofstream(path) << "timestamp,x,y,z\n2.5,1,,3\n";
   EXPECT_THROW((void)read_points(path), InputError);
-  std::filesystem::remove(path);
 }
 
 }  // namespace

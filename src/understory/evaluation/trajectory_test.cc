@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -13,13 +14,9 @@ namespace {
 class TrajectoryFile : public ::testing::Test {
  protected:
   [[nodiscard]] std::filesystem::path write(const std::string& text) {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::path(::testing::TempDir()) /
-            (std::string("understory_") + info->name() + ".tum");
     std::ofstream(path_) << text;
     return path_;
   }
-  void TearDown() override { std::filesystem::remove(path_); }
 
   std::string message_of(const std::string& text) {
     try {
@@ -30,7 +27,8 @@ class TrajectoryFile : public ::testing::Test {
     return "no error";
   }
 
-  std::filesystem::path path_;
+  const test::TemporaryFolder folder_;
+  const std::filesystem::path path_ = folder_ / "path.tum";
 };
 
 TEST_F(TrajectoryFile, KeepsEveryNanosecondAndPassesOverComments) {

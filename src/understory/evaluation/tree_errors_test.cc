@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 #include "understory/util/random.h"
 
 namespace understory {
@@ -161,7 +162,8 @@ TEST(TreeErrors, AgreementOfTwoMapsNearAPath) {
 }
 
 TEST(TreeErrors, ReadsTheColumnsByName) {
-  const std::string path = ::testing::TempDir() + "understory_tree_errors.csv";
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "trees.csv";
   std::ofstream(path) << "id,x,y,z,dbh_m,height_m,species\n7,1.5,-2,0.1,,21.5,pine\n";
   const std::vector<Tree> trees = read_trees(path);
   ASSERT_EQ(trees.size(), 1u);

@@ -10,6 +10,7 @@
 #include "understory/georeference/coordinate_system.h"
 #include "understory/georeference/terrain_file.h"
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -150,17 +151,12 @@ TEST(EastNorthUp, ThereAndBackAndAgainstTheEllipsoid) {
 
 class TerrainFile : public ::testing::Test {
  protected:
-  TerrainFile() { std::filesystem::create_directories(folder_); }
-  ~TerrainFile() override { std::filesystem::remove_all(folder_); }
-
   std::filesystem::path write(const std::string& name, const std::string& text) {
     std::ofstream(folder_ / name) << text;
     return folder_ / name;
   }
 
-  std::filesystem::path folder_ =
-      std::filesystem::path(testing::TempDir()) /
-      (std::string("terrain_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(TerrainFile, AnAsciiGridIsReadWhereItLies) {

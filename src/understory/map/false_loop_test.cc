@@ -8,6 +8,7 @@
 
 #include "understory/map/keyframe_map.h"
 #include "understory/registration/test_stand.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -70,7 +71,7 @@ struct Walk {
 };
 
 // `slip`: from half way on the walker truly is that far from where it believes to be.
-Walk walk(const Stand& stand, const Eigen::Vector3d& slip, const std::string& name) {
+Walk walk(const Stand& stand, const Eigen::Vector3d& slip) {
   KeyframeMap::Config config;
   config.keyframe.distance_m = 0.5;
   // The odometry is known to slip, so that the search looks far enough and the graph alone would
@@ -80,11 +81,10 @@ Walk walk(const Stand& stand, const Eigen::Vector3d& slip, const std::string& na
   config.loop_closure.source_keyframes = 3;
   config.loop_closure.handover_keyframes = 1;
   config.loop_closure.search.interval_s = 7.0;
-  const auto folder = std::filesystem::path(::testing::TempDir()) / ("understory_loops_" + name);
-  std::filesystem::create_directories(folder);
+  const test::TemporaryFolder folder;
   StageTimes times;
   Log log;
-  KeyframeMap map(config, folder, times, log);
+  KeyframeMap map(config, folder.path(), times, log);
   map.start();
   Pose moved;
   for (int step = 0; step <= kSteps; ++step) {
@@ -117,7 +117,7 @@ void print(const Walk& result) {
 // Shows that the walks below could have been closed: the place is the same, the belief 1 m off.
 TEST(FalseLoops, ATrueReturnIsClosed) {
   const Eigen::Vector3d slip(0.8, -0.6, 0.0);
-  const Walk result = walk(grown_stand(), slip, "true");
+  const Walk result = walk(grown_stand(), slip);
   print(result);
   EXPECT_GT(result.used, 0);
   const Pose truth = Pose(Eigen::Quaterniond::Identity(), slip) * believed(kSteps);
@@ -138,12 +138,12 @@ void expect_no_loop(const Walk& result) {
 }
 
 TEST(FalseLoops, AnotherPlaceOfAStandIsNone) {
-  expect_no_loop(walk(grown_stand(), {31.0, 12.0, 0.0}, "other"));
+  expect_no_loop(walk(grown_stand(), {31.0, 12.0, 0.0}));
 }
 
 // Rows fit rows at every multiple of their spacing, so the fit by itself says nothing.
 TEST(FalseLoops, RowsOfAPlantationAreNone) {
-  expect_no_loop(walk(plantation(), {8.0 * kSpacingM + 1.2, 1.0, 0.0}, "rows"));
+  expect_no_loop(walk(plantation(), {8.0 * kSpacingM + 1.2, 1.0, 0.0}));
 }
 
 }  // namespace

@@ -8,16 +8,11 @@
 #include "understory/map/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
-
-std::filesystem::path scratch(const std::string& name) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "understory_map_test";
-  std::filesystem::create_directories(folder);
-  return folder / name;
-}
 
 KeyframeCloud cloud_of(int id, std::size_t points) {
   KeyframeCloud cloud{id, 100 * id, {}, Pose(so3_exp({0.0, 0.1, 0.2}), {1.0, 2.0, 1.0 * id})};
@@ -29,7 +24,8 @@ KeyframeCloud cloud_of(int id, std::size_t points) {
 }
 
 TEST(KeyframeClouds, ReadsBackInAnyOrder) {
-  KeyframeClouds clouds(scratch("a.bin"), 0);
+  const test::TemporaryFolder folder;
+  KeyframeClouds clouds(folder / "a.bin", 0);
   for (int id = 0; id < 5; ++id)
     clouds.append(cloud_of(id, static_cast<std::size_t>(10 * id)));
   for (const std::size_t i : {4U, 0U, 2U}) {
@@ -45,29 +41,31 @@ TEST(KeyframeClouds, ReadsBackInAnyOrder) {
 }
 
 TEST(KeyframeClouds, ReopeningCutsOffWhatTheCheckpointDoesNotKnow) {
+  const test::TemporaryFolder folder;
   {
-    KeyframeClouds clouds(scratch("b.bin"), 0);
+    KeyframeClouds clouds(folder / "b.bin", 0);
     for (int id = 0; id < 5; ++id)
       clouds.append(cloud_of(id, 10));
     clouds.flush();
   }
-  KeyframeClouds clouds(scratch("b.bin"), 3);
+  KeyframeClouds clouds(folder / "b.bin", 3);
   EXPECT_EQ(clouds.size(), 3U);
   clouds.append(cloud_of(9, 4));
   EXPECT_EQ(clouds.read(3).id, 9);
   EXPECT_EQ(clouds.read(2).id, 2);
-  EXPECT_EQ(std::filesystem::file_size(scratch("b.bin")), clouds.bytes());
+  EXPECT_EQ(std::filesystem::file_size(folder / "b.bin"), clouds.bytes());
 }
 
 TEST(KeyframeClouds, ATruncatedFileIsAnInputError) {
+  const test::TemporaryFolder folder;
   {
-    KeyframeClouds clouds(scratch("c.bin"), 0);
+    KeyframeClouds clouds(folder / "c.bin", 0);
     for (int id = 0; id < 2; ++id)
       clouds.append(cloud_of(id, 10));
     clouds.flush();
   }
-  std::filesystem::resize_file(scratch("c.bin"), std::filesystem::file_size(scratch("c.bin")) - 1);
-  EXPECT_THROW(KeyframeClouds(scratch("c.bin"), 2), InputError);
+  std::filesystem::resize_file(folder / "c.bin", std::filesystem::file_size(folder / "c.bin") - 1);
+  EXPECT_THROW(KeyframeClouds(folder / "c.bin", 2), InputError);
 }
 
 // P2 (37): metres and turns on one scale.
@@ -91,7 +89,8 @@ TEST(KeyframeDistance, WeighsTurnsAgainstMetres) {
 }
 
 TEST(MapTiles, HandsBackEveryPointOnceInOrderOfTiles) {
-  MapTiles tiles(scratch("tiles"), {10.0, 0.0});
+  const test::TemporaryFolder folder;
+  MapTiles tiles(folder / "tiles", {10.0, 0.0});
   Random random(3);
   double sum = 0.0;
   for (int i = 0; i < 10'000; ++i) {
@@ -120,7 +119,8 @@ TEST(MapTiles, HandsBackEveryPointOnceInOrderOfTiles) {
 }
 
 TEST(MapTiles, ThinsToTheFirstPointOfEachCube) {
-  MapTiles tiles(scratch("thin"), {10.0, 0.1});
+  const test::TemporaryFolder folder;
+  MapTiles tiles(folder / "thin", {10.0, 0.1});
   tiles.add({1.01, 1.01, 0.01, 1, 0});
   tiles.add({1.02, 1.03, 0.04, 2, 0});
   tiles.add({1.02, 1.03, 0.14, 3, 0});
@@ -133,7 +133,8 @@ TEST(MapTiles, ThinsToTheFirstPointOfEachCube) {
 }
 
 TEST(MapTiles, RefusesPlacesThatAreNotNumbers) {
-  MapTiles tiles(scratch("nan"), {10.0, 0.1});
+  const test::TemporaryFolder folder;
+  MapTiles tiles(folder / "nan", {10.0, 0.1});
   tiles.add({std::nan(""), 0, 0, 1, 0});
   tiles.add({0, INFINITY, 0, 1, 0});
   EXPECT_EQ(tiles.points_added(), 0U);

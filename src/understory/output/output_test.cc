@@ -21,6 +21,7 @@
 #include "understory/output/run_summary.h"
 #include "understory/output/run_tables.h"
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 #include "understory/util/random.h"
 
 namespace understory {
@@ -30,13 +31,6 @@ namespace fs = std::filesystem;
 
 class OutputTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() /
-              ("understory_output_" + std::string(info->name()) + std::to_string(::getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   [[nodiscard]] static std::string content(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
     std::ostringstream text;
@@ -51,7 +45,7 @@ class OutputTest : public ::testing::Test {
     text.resize(static_cast<std::size_t>(std::max(count, 0)));
     return text;
   }
-  fs::path folder_;
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(OutputTest, AFileAppearsOnlyWhole) {
@@ -61,7 +55,7 @@ TEST_F(OutputTest, AFileAppearsOnlyWhole) {
     file.write("half");
     EXPECT_FALSE(fs::exists(path));
   }
-  EXPECT_TRUE(fs::is_empty(folder_)) << "an abandoned file leaves nothing behind";
+  EXPECT_TRUE(fs::is_empty(folder_.path())) << "an abandoned file leaves nothing behind";
   AtomicFile file(path);
   file.write("whole");
   file.commit();

@@ -8,6 +8,7 @@
 
 #include "understory/evaluation/tree_falls.h"
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -16,12 +17,6 @@ namespace fs = std::filesystem;
 
 class HeadLog : public ::testing::Test {
  protected:
-  HeadLog() : folder(fs::temp_directory_path() / "understory_felling_test") {
-    fs::remove_all(folder);
-    fs::create_directories(folder);
-  }
-  ~HeadLog() override { fs::remove_all(folder); }
-
   std::string log_of(const std::string& rows) const {
     const fs::path file = folder / "head.csv";
     std::ofstream(file) << "timestamp,x,y,z\n" << rows;
@@ -32,7 +27,7 @@ class HeadLog : public ::testing::Test {
     return {std::istreambuf_iterator<char>(stream), {}};
   }
 
-  fs::path folder;
+  const test::TemporaryFolder folder;
 };
 
 TEST_F(HeadLog, TheLogIsReadStrictly) {
@@ -82,7 +77,7 @@ TEST_F(HeadLog, TheHeadTellsWhatTheViewsCannot) {
   const std::vector<HeadCut> cuts = {{from_seconds(95.0), {5.2, 4.1, 1.0}},
                                      {from_seconds(150.0), {-7.0, 0.0, 1.0}}};
   RunSummary summary;
-  (void)write_fellings(folder, {views, poses, stems, trees}, cuts, {}, summary);
+  (void)write_fellings(folder.path(), {views, poses, stems, trees}, cuts, {}, summary);
   const auto falls = read_tree_falls(folder / "felled.csv");
   ASSERT_EQ(falls.size(), 1U);
   EXPECT_EQ(falls[0].tree_id, 2);

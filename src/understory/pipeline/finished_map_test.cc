@@ -5,13 +5,14 @@
 #include <filesystem>
 #include <map>
 
+#include "understory/util/folder_test_support.h"
+
 namespace understory {
 namespace {
 
 // A cloud of a scan between keyframes goes where its keyframe went.
 TEST(FinishedMap, CloudsMoveWithTheirKeyframes) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "understory_finished_map_test";
-  std::filesystem::create_directories(folder);
+  const test::TemporaryFolder folder;
   KeyframeClouds clouds(folder / "clouds.bin", 0);
   const Pose keyframe_from_body(so3_exp({0.0, 0.0, 0.5}), {0.2, 0.1, 0.0});
   clouds.append({0, 1'000'000'000, {{1.0F, 0.0F, 0.0F, 5, 0}}, {}});

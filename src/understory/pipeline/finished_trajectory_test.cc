@@ -4,6 +4,8 @@
 
 #include <filesystem>
 
+#include "understory/util/folder_test_support.h"
+
 namespace understory {
 namespace {
 
@@ -13,7 +15,7 @@ Pose along_x(double x) {
 
 // Keyframes at 0 s and 10 s, ten metres apart by odometry; scans every second.
 struct ShortRun {
-  ShortRun() : journal(path(), 0) {
+  ShortRun() : journal(folder / "journal.bin", 0) {
     keyframes.resize(2);
     keyframes[0].stamp = 0;
     keyframes[1].stamp = 10 * kNsPerSecond;
@@ -30,11 +32,6 @@ struct ShortRun {
     }
     journal.flush();
   }
-  static std::filesystem::path path() {
-    const auto folder = std::filesystem::path(testing::TempDir()) / "understory_finished_test";
-    std::filesystem::create_directories(folder);
-    return folder / "journal.bin";
-  }
   [[nodiscard]] std::vector<Pose> poses() const {
     std::vector<Pose> result;
     for_each_finished_scan(journal, keyframes, [&](const FinishedScan& scan) {
@@ -42,6 +39,7 @@ struct ShortRun {
     });
     return result;
   }
+  const test::TemporaryFolder folder;
   Journal journal;
   std::vector<Keyframe> keyframes;
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "understory/output/run_tables.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -58,9 +59,8 @@ TEST(LidarView, ATopIsSeenFromFarEnoughAndNotFromTooFar) {
 }
 
 TEST(LidarView, IsTheSameFromARunFolder) {
-  const std::filesystem::path run =
-      std::filesystem::temp_directory_path() / "understory_lidar_view_test";
-  std::filesystem::create_directories(run);
+  const test::TemporaryFolder folder;
+  const std::filesystem::path& run = folder.path();
   const LidarView view = view_of_a_machine();
   RunSummary summary;
   summary.lidar_view = figures_of(view);
@@ -82,7 +82,6 @@ TEST(LidarView, IsTheSameFromARunFolder) {
   }
   EXPECT_GT(seen, 20);
   EXPECT_LT(seen, 124);
-  std::filesystem::remove_all(run);
 }
 
 }  // namespace

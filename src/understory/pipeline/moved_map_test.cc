@@ -10,6 +10,7 @@
 #include "understory/output/las_writer.h"
 #include "understory/recording/byte_source.h"
 #include "understory/recording/las.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -44,17 +45,12 @@ Raster raster_of(bool ground) {
 }
 
 struct Folders {
-  fs::path run = fs::path(testing::TempDir()) / "moved_map_run";
-  fs::path result = fs::path(testing::TempDir()) / "moved_map_result";
+  test::TemporaryFolder both;
+  fs::path run = both / "run";
+  fs::path result = both / "result";
   Folders() {
-    for (const fs::path& folder : {run, result}) {
-      fs::remove_all(folder);
-      fs::create_directories(folder);
-    }
-  }
-  ~Folders() {
-    fs::remove_all(run);
-    fs::remove_all(result);
+    fs::create_directory(run);
+    fs::create_directory(result);
   }
 };
 

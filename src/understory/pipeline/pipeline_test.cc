@@ -8,15 +8,10 @@
 #include "understory/pipeline/journal.h"
 #include "understory/pipeline/realtime_player.h"
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
-
-std::filesystem::path scratch(const std::string& name) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "understory_pipeline_test";
-  std::filesystem::create_directories(folder);
-  return folder / name;
-}
 
 ScanRecord record_of(int i) {
   ScanRecord record;
@@ -30,7 +25,8 @@ ScanRecord record_of(int i) {
 }
 
 TEST(Journal, GivesBackWhatWasWrittenBitForBit) {
-  Journal journal(scratch("journal"), 0);
+  const test::TemporaryFolder folder;
+  Journal journal(folder / "journal", 0);
   for (int i = 0; i < 20; ++i)
     journal.append(record_of(i));
   journal.flush();
@@ -46,24 +42,26 @@ TEST(Journal, GivesBackWhatWasWrittenBitForBit) {
 }
 
 TEST(Journal, ReopeningKeepsWhatTheCheckpointKnows) {
+  const test::TemporaryFolder folder;
+  const auto path = folder / "journal";
   {
-    Journal journal(scratch("journal2"), 0);
+    Journal journal(path, 0);
     for (int i = 0; i < 20; ++i)
       journal.append(record_of(i));
     journal.flush();
   }
-  Journal journal(scratch("journal2"), 5);
+  Journal journal(path, 5);
   journal.append(record_of(77));
   journal.flush();
   std::vector<TimeNs> stamps;
   journal.for_each([&](const ScanRecord& record) { stamps.push_back(record.stamp); });
   EXPECT_EQ(stamps, (std::vector<TimeNs>{0, 1, 2, 3, 4, 77}));
-  EXPECT_THROW(Journal(scratch("journal2"), 50), InputError);
+  EXPECT_THROW(Journal(path, 50), InputError);
 }
 
 TEST(Checkpoint, RoundTripAndDamage) {
-  const auto path = scratch("checkpoint");
-  std::filesystem::remove(path);
+  const test::TemporaryFolder folder;
+  const auto path = folder / "checkpoint";
   EXPECT_THROW(static_cast<void>(read_checkpoint(path)), InputError);
   std::string bytes = "state";
   bytes += '\0';
@@ -78,7 +76,8 @@ TEST(Checkpoint, RoundTripAndDamage) {
 }
 
 TEST(Checkpoint, AFullDiskIsAnOutputErrorAndKeepsTheOldCheckpoint) {
-  EXPECT_THROW(write_checkpoint(scratch("missing") / "folder" / "c", "x"), OutputError);
+  const test::TemporaryFolder folder;
+  EXPECT_THROW(write_checkpoint(folder / "missing" / "folder" / "c", "x"), OutputError);
 }
 
 // A recording of scans 10 ms apart, `count` of them.

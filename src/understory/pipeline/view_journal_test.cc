@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -49,8 +50,8 @@ void tell(ViewSink& sink, int round) {
 
 class ViewJournalTest : public testing::Test {
  protected:
-  void TearDown() override { fs::remove(path_); }
-  fs::path path_ = fs::path(testing::TempDir()) / "view_journal_test.bin";
+  const test::TemporaryFolder folder_;
+  const fs::path path_ = folder_ / "views.bin";
 };
 
 TEST_F(ViewJournalTest, HandsBackWhatTheCheckpointKnowsAndGoesOn) {

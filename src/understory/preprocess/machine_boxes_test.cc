@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 #include "understory/util/random.h"
 
 namespace understory {
@@ -101,19 +102,12 @@ TEST(MachineBoxes, ScanPointsAreTestedInTheFrameOfTheBox) {
 
 class BoxFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              ("machine_boxes_" +
-               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
   std::string write(const std::string& name, const std::string& text) {
     const std::string path = (folder_ / name).string();
     std::ofstream(path) << text;
     return path;
   }
-  std::filesystem::path folder_;
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(BoxFile, ReadsAllKinds) {

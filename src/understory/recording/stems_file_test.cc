@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -17,11 +18,7 @@ namespace fs = std::filesystem;
 
 class StemsFile : public ::testing::Test {
  protected:
-  fs::path folder_ = fs::temp_directory_path() /
-                     ("stems_file_" +
-                      std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-  void SetUp() override { fs::create_directories(folder_); }
-  void TearDown() override { fs::remove_all(folder_); }
+  const test::TemporaryFolder folder_;
 
   fs::path plain(const std::string& text) {
     const fs::path path = folder_ / "stems.csv";
@@ -141,7 +138,7 @@ TEST_F(StemsFile, DamagedStreamIsBadInput) {
     EXPECT_NE(std::string(error.what()).find("undamaged gzip"), std::string::npos);
   }
   EXPECT_THROW((void)read_stem_views(folder_ / "none.csv.gz", log), InputError);
-  EXPECT_THROW((void)read_stem_views(folder_, log), InputError);
+  EXPECT_THROW((void)read_stem_views(folder_.path(), log), InputError);
 }
 
 TEST_F(StemsFile, ReadsARealRecording) {

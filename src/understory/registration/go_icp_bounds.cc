@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/util/error.h"
+
 namespace understory {
 namespace {
 
@@ -62,6 +64,7 @@ GoIcpBounds::GoIcpBounds(const SparseTarget& target, const SparsePoints& source,
       metric_(metric),
       keep_(trimmed_count(source.size(), outlier_ratio)),
       origin_(guess.translation()) {
+  UNDERSTORY_CHECK(source.size() >= kFewestStems);
   for (const Eigen::Vector3d& point : source) {
     points_.push_back(guess.rotation() * point);
     radii_.push_back(points_.back().head<2>().norm());

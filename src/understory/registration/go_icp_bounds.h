@@ -44,7 +44,8 @@ class GoIcpBounds {
  public:
   enum class Metric { kPlane, kSpace };
 
-  // `margin_m`: how far beyond the target's points sources may come.
+  // `margin_m`: how far beyond the target's points sources may come. At least `kFewestStems` source
+  // points.
   GoIcpBounds(const SparseTarget& target, const SparsePoints& source, const Pose& guess,
               Metric metric, double outlier_ratio, double margin_m);
 

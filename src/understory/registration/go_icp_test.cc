@@ -88,6 +88,50 @@ TEST(GoIcpBounds, NoMotionOfABoxHasASmallerError) {
   }
 }
 
+// One place each, so that nothing averages a bound that promises too much: the target lies where a
+// part of the box's motions leads, and only some kinds of motion have any room.
+TEST(GoIcpBounds, HoldForASinglePointWhereverItCanGo) {
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const std::vector<std::vector<GoIcpBox::Side>> kinds = {
+      {GoIcpBox::kYaw},
+      {GoIcpBox::kTiltX, GoIcpBox::kTiltY},
+      {GoIcpBox::kX, GoIcpBox::kY},
+      {GoIcpBox::kZ},
+      {GoIcpBox::kTiltX},
+      {GoIcpBox::kYaw, GoIcpBox::kTiltY, GoIcpBox::kZ}};
+  std::vector<double> tightest(kinds.size(), 0.0);
+  for (int k = 0; k < 3000; ++k) {
+    const std::size_t kind = static_cast<std::size_t>(k) % kinds.size();
+    GoIcpBox box;
+    for (std::size_t side = 0; side < GoIcpBox::kX; ++side)
+      box.middle[side] = 0.4 * unit(random);
+    for (const GoIcpBox::Side side : kinds[kind])
+      box.half[side] = side < GoIcpBox::kX ? 0.2 : 2.0;
+    const SparsePoints source(kFewestStems,
+                              {30.0 * unit(random), 30.0 * unit(random), 8.0 * unit(random)});
+    GoIcpBox end = box;  // motions go this way, and the target lies beyond
+    for (const GoIcpBox::Side side : kinds[kind])
+      end.middle[side] += box.half[side] * (unit(random) > 0.0 ? 1.0 : -1.0);
+    const Eigen::Vector3d from = box.target_from_source(Pose()) * source[0];
+    const Eigen::Vector3d way = end.target_from_source(Pose()) * source[0] - from;
+    const SparseTarget target(SparsePoints{from + 1.3 * way});
+    GoIcpBounds bounds(target, source, Pose(), GoIcpBounds::Metric::kSpace, 0.0, 5.0);
+    const double bound = bounds.of(box).bound_m;
+    double nearest = 1e300;
+    for (int l = 0; l <= 40; ++l) {
+      GoIcpBox motion = box;
+      motion.middle += l / 40.0 * (end.middle - box.middle);
+      const Eigen::Vector3d at = motion.target_from_source(Pose()) * source[0];
+      nearest = std::min(nearest, (at - target.grid.points()[0]).norm());
+    }
+    ASSERT_GE(nearest, bound - 1e-9) << "kind " << kind;
+    tightest[kind] = std::max(tightest[kind], bound / nearest);
+  }
+  for (std::size_t kind = 0; kind < kinds.size(); ++kind)
+    EXPECT_GT(tightest[kind], 0.5) << "kind " << kind;
+}
+
 TEST(GoIcpBox, SidesAreThoseOfTheMotion) {
   std::mt19937 random(6);
   const Pose guess = Pose::exp((Vector6d() << 0.2, -0.1, 0.7, 1.0, 2.0, 3.0).finished());

@@ -9,6 +9,7 @@
 #include "understory/recording/nmea.h"
 #include "understory/simulation/simulator.h"
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -17,7 +18,8 @@ namespace {
 constexpr double kLargestLift = 0.0115;
 
 TEST(FieldLog, ReadsBackThroughTheDriverAsItWasScanned) {
-  const std::string pcap = testing::TempDir() + "lieksa.pcap";
+  const test::TemporaryFolder folder;
+  const std::string pcap = folder / "lieksa.pcap";
   std::vector<ScanPtr> scans;
   std::vector<GnssFix> fixes;
   Rig rig;
@@ -34,7 +36,7 @@ TEST(FieldLog, ReadsBackThroughTheDriverAsItWasScanned) {
   }
   Log log;
   OpenOptions options;
-  options.extrinsics_file = testing::TempDir() + "lieksa.extrinsics.yaml";
+  options.extrinsics_file = folder / "lieksa.extrinsics.yaml";
   const auto recording = open_recording(pcap, options, log);
   std::size_t at = 0;
   std::size_t fix_at = 0;
@@ -77,7 +79,8 @@ TEST(FieldLog, ReadsBackThroughTheDriverAsItWasScanned) {
 }
 
 TEST(FieldLog, NmeaLogHasTheFixesWithHeightAndDilution) {
-  const std::string pcap = testing::TempDir() + "lieksa2.pcap";
+  const test::TemporaryFolder folder;
+  const std::string pcap = folder / "lieksa2.pcap";
   std::vector<GnssFix> fixes;
   {
     Simulator simulator(load_site("lieksa2", {"duration_s=12", "lidar.keep_every=50"}));
@@ -89,7 +92,7 @@ TEST(FieldLog, NmeaLogHasTheFixesWithHeightAndDilution) {
     writer.finish();
   }
   Log log;
-  std::ifstream stream(testing::TempDir() + "lieksa2.nmea");
+  std::ifstream stream(folder / "lieksa2.nmea");
   const std::int64_t day = first_nmea_day(stream);
   EXPECT_EQ(day, fixes.front().stamp / (86'400 * kNsPerSecond));
   stream.clear();
@@ -110,8 +113,8 @@ TEST(FieldLog, NmeaLogHasTheFixesWithHeightAndDilution) {
 
 TEST(FieldLog, OtherScannersAreRefused) {
   const Simulator simulator(load_site("demo", {"duration_s=1"}));
-  EXPECT_THROW(FieldLogWriter(testing::TempDir() + "x.pcap", simulator.site(), simulator.rig()),
-               ConfigError);
+  const test::TemporaryFolder folder;
+  EXPECT_THROW(FieldLogWriter(folder / "x.pcap", simulator.site(), simulator.rig()), ConfigError);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "understory/simulation/scanner.h"
 #include "understory/simulation/simulator.h"
 #include "understory/simulation/world.h"
+#include "understory/util/folder_test_support.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -190,7 +191,8 @@ TEST(Harvest, ScansAcrossAFellingAreTheSameForAnyThreadsAndOrder) {
 }
 
 TEST(Harvest, TruthSaysWhenTreesWereFelled) {
-  const std::string folder = ::testing::TempDir() + "/felled.truth";
+  const test::TemporaryFolder own;
+  const std::string folder = own / "felled.truth";
   SiteConfig config = site();
   Simulator simulator(config);
   simulator.skip(1'000'000);

@@ -10,6 +10,7 @@
 
 #include "understory/simulation/satellite.h"
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -105,8 +106,8 @@ TEST(Simulator, SkippingLeavesTheRestAsItWas) {
 }
 
 TEST(Simulator, CacheGivesTheSameEventsAndSurvivesDamage) {
-  const std::string folder = testing::TempDir() + "simulator_cache";
-  std::filesystem::remove_all(folder);
+  const test::TemporaryFolder own;
+  const std::string folder = own / "cache";
   Log log;
   SiteConfig site = small_site();
   site.duration_s = 1.5;
@@ -135,7 +136,6 @@ TEST(Simulator, CacheGivesTheSameEventsAndSurvivesDamage) {
   }
   expect_same("damaged");
   EXPECT_EQ(log.warnings().size(), 1U);
-  std::filesystem::remove_all(folder);
 }
 
 TEST(Simulator, WritesItsTruth) {
@@ -144,8 +144,8 @@ TEST(Simulator, WritesItsTruth) {
   std::size_t scans = 0;
   for (const Event& event : events)
     scans += std::holds_alternative<ScanPtr>(event) ? 1 : 0;
-  const std::string folder = testing::TempDir() + "simulator_truth";
-  std::filesystem::remove_all(folder);
+  const test::TemporaryFolder own;
+  const std::string folder = own / "run.truth";
   simulator.write_truth(folder);
   EXPECT_EQ(lines_of(folder + "/trajectory.tum"), scans);
   EXPECT_EQ(lines_of(folder + "/velocity.csv"), scans + 1);
@@ -157,7 +157,6 @@ TEST(Simulator, WritesItsTruth) {
   const SiteConfig again = load_site(folder + "/site.yaml", {});
   Simulator second(again);
   EXPECT_TRUE(same(*second.next(), events[0]));
-  std::filesystem::remove_all(folder);
   EXPECT_THROW(simulator.write_truth("/proc/nowhere"), OutputError);
 }
 

@@ -12,6 +12,7 @@
 #include "understory/simulation/stand.h"
 #include "understory/simulation/terrain.h"
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -276,16 +277,16 @@ TEST(LidarModels, HaveTheBeamsOfTheirData) {
 
 // ---- lists of trees ----------------------------------------------------------------------------
 
-std::string write_list(const char* name, const std::string& text) {
-  const std::string path = testing::TempDir() + name;
+std::string write_list(const test::TemporaryFolder& folder, const std::string& text) {
+  const std::string path = folder / "list.csv";
   std::ofstream(path) << text;
   return path;
 }
 
 TEST(TreeLists, StandWhereTheListSaysWithItsSizes) {
+  const test::TemporaryFolder folder;
   const std::string path = write_list(
-      "trees.csv",
-      "id,x,y,z,dbh_m,height_m,species\n7,3.5,-2.25,99,0.31,21.5,spruce\n9,-4,5,,0.12,,\n");
+      folder, "id,x,y,z,dbh_m,height_m,species\n7,3.5,-2.25,99,0.31,21.5,spruce\n9,-4,5,,0.12,,\n");
   const Site site("demo", {"stand.trees=" + path});
   const Stand stand = site.stand();
   ASSERT_EQ(stand.trees.size(), 2U);
@@ -300,14 +301,15 @@ TEST(TreeLists, StandWhereTheListSaysWithItsSizes) {
 }
 
 TEST(TreeLists, AreScannedWithTheirIds) {
+  const test::TemporaryFolder own;
   const std::string path =
-      write_list("scanned.csv", "id,x,y,dbh_m\n4000,6,0,0.3\n5,0,6,0.3\n8,-6,0,0.3\n6,0,-6,0.3\n");
+      write_list(own, "id,x,y,dbh_m\n4000,6,0,0.3\n5,0,6,0.3\n8,-6,0,0.3\n6,0,-6,0.3\n");
   SiteConfig config = load_site(
       "demo", {"stand.trees=" + path, "duration_s=1", "lidar.columns=512", "carrier.length_m=10"});
   Simulator simulator(config);
   while (simulator.next()) {
   }
-  const std::string folder = testing::TempDir() + "scanned.truth";
+  const std::string folder = own / "scanned.truth";
   simulator.write_truth(folder);
   std::ifstream file(folder + "/trees.csv");
   std::string text((std::istreambuf_iterator<char>(file)), {});
@@ -315,8 +317,9 @@ TEST(TreeLists, AreScannedWithTheirIds) {
 }
 
 TEST(TreeLists, BadOnesAreRefusedWithTheirLine) {
-  const auto reason = [](const std::string& text) -> std::string {
-    const std::string path = write_list("bad.csv", text);
+  const test::TemporaryFolder folder;
+  const auto reason = [&](const std::string& text) -> std::string {
+    const std::string path = write_list(folder, text);
     try {
       (void)Site("demo", {"stand.trees=" + path}).stand();
     } catch (const InputError& error) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "understory/simulation/simulator.h"
+#include "understory/util/folder_test_support.h"
 
 namespace understory {
 namespace {
@@ -73,7 +74,8 @@ TEST(TotalStation, LosesThePrismBehindTreesAndNeedsAWhile) {
 }
 
 TEST(TotalStation, IsWrittenBesideTheTruthWhereThereIsOneAndLeavesScansAlone) {
-  const std::string folder = ::testing::TempDir() + "/station.truth";
+  const test::TemporaryFolder own;
+  const std::string folder = own / "station.truth";
   const SiteConfig with = site({"duration_s=3", "lidar.columns=256"});
   SiteConfig without = with;
   without.total_station.enabled = false;

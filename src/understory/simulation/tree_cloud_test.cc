@@ -15,6 +15,7 @@
 #include "understory/simulation/terrain.h"
 #include "understory/simulation/tree_cloud.h"
 #include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
 #include "understory/util/random.h"
 #include "understory/util/timing.h"
 
@@ -54,15 +55,9 @@ std::string write_oval_tree(const std::string& name) {
 
 class CloudTrees : public ::testing::Test {
  protected:
-  void SetUp() override {
-    // Tests run side by side: to each its own.
-    folder_ = ::testing::TempDir() + "/cloud_trees_" +
-              ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::filesystem::create_directories(folder_);
-    write_oval_tree(folder_ + "/oval.ply");
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::string folder_;
+  void SetUp() override { write_oval_tree(folder_ + "/oval.ply"); }
+  const test::TemporaryFolder own_;
+  const std::string folder_ = own_.path();
 };
 
 TEST_F(CloudTrees, StemIsFollowedAndDiscsLieInItsSurface) {
