@@ -191,7 +191,10 @@ for name, content in (("empty file", b""), ("no recording", b"no recording\n" * 
         path.write_bytes(content)
         outcome = map_recording(path, folder / "run")
         assert outcome.code == 3 and f"error: {path}" in outcome.said, outcome.said
-        assert not (folder / "run" / "run.json").exists()
+        assert not (folder / "run").exists()
+        stems = program("map", path, "-o", folder / "run", "--front-end", "sparse")
+        assert stems.returncode == 3 and f"error: {path}" in stems.stderr, stems.stderr
+        assert not (folder / "run").exists()
         return outcome.said.strip().splitlines()[-1].replace(str(folder), "")
 
 

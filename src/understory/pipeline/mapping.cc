@@ -51,9 +51,10 @@ class MappingRun {
 
  private:
   void begin() {
+    source_ = open_source(request_.recording, request_.open, log_);
+    if (state_.events() == 0) state_.make_folder();
     orderer_.emplace(request_.config.time_repair, log_);
     session_.emplace(request_.config, state_.work(), log_);
-    source_ = open_source(request_.recording, request_.open, log_);
     if (state_.events() > 0) {
       source_->skip(state_.events());
       state_.restore(*session_, *orderer_, log_, source_->rig());

@@ -42,13 +42,15 @@ void get_request(BinaryReader& reader, const std::filesystem::path& path, RunReq
 }  // namespace
 
 RunState RunState::create(const RunRequest& request, const std::string& front_end) {
-  const std::filesystem::path work = request.run_folder / "work";
   if (!request.overwrite) refuse_unfinished_run(request.run_folder);
+  return {request.run_folder / "work", front_end};
+}
+
+void RunState::make_folder() const {
   std::error_code error;
-  std::filesystem::remove_all(work, error);
-  std::filesystem::create_directories(work, error);
-  if (error) throw OutputError(work.string(), "cannot be created: " + error.message());
-  return {work, front_end};
+  std::filesystem::remove_all(work_, error);
+  std::filesystem::create_directories(work_, error);
+  if (error) throw OutputError(work_.string(), "cannot be created: " + error.message());
 }
 
 RunState RunState::reopen(const std::filesystem::path& run_folder, RunRequest& request) {
@@ -104,6 +106,7 @@ void RunState::save(const RunRequest& request, Resumable& session, const EventOr
 void RunState::remove() {
   std::error_code ignored;  // what is left over harms nobody
   std::filesystem::remove_all(work_, ignored);
+  std::filesystem::remove(work_.parent_path(), ignored);  // if nothing came of the run
 }
 
 }  // namespace understory

@@ -18,12 +18,17 @@ constexpr const char* kSparseFrontEnd = "sparse";
 // the files of the session and the checkpoint. It is removed when the run is finished.
 class RunState {
  public:
-  // Makes the run folder and its work folder; throws OutputError if it cannot be written, or if it
-  // holds an unfinished run and `overwrite` is not set.
+  // Of a run that begins. Writes nothing yet. Throws OutputError if the run folder holds an
+  // unfinished run and `overwrite` is not set.
   [[nodiscard]] static RunState create(const RunRequest& request, const std::string& front_end);
   // Opens that of a killed run and reads back its request. Throws InputError if there is none.
   [[nodiscard]] static RunState reopen(const std::filesystem::path& run_folder,
                                        RunRequest& request);
+
+  // Makes the run folder and an empty work folder: once the recording is open, so that one that
+  // cannot be read leaves nothing behind and takes no unfinished run away. Throws OutputError if
+  // it cannot be written.
+  void make_folder() const;
 
   [[nodiscard]] const std::filesystem::path& work() const { return work_; }
   [[nodiscard]] const std::string& front_end() const { return front_end_; }
@@ -36,6 +41,7 @@ class RunState {
   // Writes a checkpoint: `events` have been taken from the recording.
   void save(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
             const Log& log, std::uint64_t events);
+  // Removes the work folder, and the run folder if there is nothing else in it.
   void remove();
 
  private:

@@ -64,6 +64,11 @@ class SparseRun {
   [[nodiscard]] std::size_t count() { return session_->path().size(); }
   [[nodiscard]] std::size_t kept() { return session_->steps().size(); }
   void forget_state() { state_.remove(); }
+  // Leaves nothing of a run without a result.
+  void give_up() {
+    session_.reset();  // and with it the part of the stems that was written
+    state_.remove();
+  }
   // Why no view was kept.
   [[nodiscard]] std::string why_nothing() {
     if (count() > 0)
@@ -98,9 +103,10 @@ class SparseRun {
   // Session, orderer and recording at their beginning.
   void open() {
     session_.reset();  // lets go of its files
+    source_ = open_source(request_.recording, request_.open, log_);
+    if (state_.events() == 0) state_.make_folder();
     session_.emplace(request_.config, request_.run_folder / "stems.csv.gz", state_.work(), log_);
     orderer_.emplace(request_.config.time_repair, log_);
-    source_ = open_source(request_.recording, request_.open, log_);
     events_ = 0;
   }
 
@@ -167,8 +173,9 @@ CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, 
   SparseRun run(request, std::move(state), log);
   const bool stopped = run.run(progress, stop_requested);
   if (run.kept() == 0) {
-    run.forget_state();
-    throw InputError(request.recording, "", run.why_nothing());
+    const std::string reason = run.why_nothing();
+    run.give_up();
+    throw InputError(request.recording, "", reason);
   }
   const SparseScans scans = run.scans(stopped);
   CorrectionRequest correction;
