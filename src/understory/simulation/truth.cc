@@ -180,13 +180,25 @@ void write_terrain(const std::string& path, const Terrain& terrain) {
 
 void TruthLog::add(const ScanTruth& scan, const std::vector<StemReturns>& stems) {
   scans_.push_back(scan);
-  stems_.insert(stems_.end(), stems.begin(), stems.end());
-  stems_end_.push_back(stems_.size());
+  for (const StemReturns& stem : stems) {
+    if (blocks_.empty() || blocks_.back().size() == kBlock) {
+      blocks_.emplace_back();
+      blocks_.back().reserve(kBlock);
+    }
+    blocks_.back().push_back({stem.tree, static_cast<std::uint16_t>(stem.rings),
+                              static_cast<std::uint16_t>(stem.rings_with_3),
+                              static_cast<std::uint32_t>(stem.returns)});
+  }
+  stems_end_.push_back((stems_end_.empty() ? 0 : stems_end_.back()) + stems.size());
 }
 
-std::span<const StemReturns> TruthLog::stems(std::size_t i) const {
-  const std::size_t begin = i == 0 ? 0 : stems_end_[i - 1];
-  return std::span(stems_).subspan(begin, stems_end_[i] - begin);
+std::vector<StemReturns> TruthLog::stems(std::size_t i) const {
+  std::vector<StemReturns> result;
+  for (std::size_t k = i == 0 ? 0 : stems_end_[i - 1]; k < stems_end_[i]; ++k) {
+    const Packed& stem = blocks_[k / kBlock][k % kBlock];
+    result.push_back({stem.tree, stem.rings, stem.rings_with_3, static_cast<int>(stem.returns)});
+  }
+  return result;
 }
 
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
