@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "understory/graph/pair_matching.h"
 #include "understory/registration/tilt_about.h"
 #include "understory/util/error.h"
 #include "understory/util/median.h"
@@ -12,6 +13,8 @@
 namespace understory {
 namespace {
 
+// Stems of neighbouring views nearer than that are one.
+constexpr double kMergeL0 = 0.2;
 // Views around a place, to each side, among which the nearest one is looked for.
 constexpr int kNeighbourhood = 30;
 
@@ -22,6 +25,21 @@ double median_l0(const std::vector<SparsePoints>& views) {
   });
   std::erase_if(values, [](double value) { return value <= 0.0; });
   return upper_median(std::move(values));
+}
+
+// What a single view misses of a place, or sees twice, makes its triangles unlike those of another
+// day. In half of the stems one triangle in eight is whole.
+std::vector<SparsePoints> gathered_views(const std::vector<SparsePoints>& views,
+                                         const std::vector<Pose>& poses,
+                                         const StemLoopConfig& config) {
+  if (config.gather_l0 <= 0.0) return views;
+  const double l0_m = median_l0(views);
+  std::vector<SparsePoints> gathered(views.size());
+  parallel_for(views.size(), 4, [&](std::size_t i) {
+    gathered[i] = gather_views(views, poses, static_cast<int>(i), config.gather_l0 * l0_m,
+                               config.gather_views, kMergeL0 * l0_m);
+  });
+  return gathered;
 }
 
 TreePatterns places_of(const std::vector<SparsePoints>& views, const std::vector<Pose>& poses,
@@ -52,9 +70,10 @@ Matrix6d loop_covariance(const SparseIcpResult& icp, const SparsePoints& source,
 
 class Finder {
  public:
-  Finder(const std::vector<SparsePoints>& views, const std::vector<Pose>& poses,
-         const StemLoopConfig& config)
-      : views_(views),
+  Finder(const std::vector<SparsePoints>& single, const std::vector<SparsePoints>& views,
+         const std::vector<Pose>& poses, const StemLoopConfig& config)
+      : single_(single),
+        views_(views),
         poses_(poses),
         config_(config),
         l0_m_(median_l0(views)),
@@ -65,11 +84,11 @@ class Finder {
     if (before <= 0 || l0_m_ <= 0.0) return std::nullopt;
     std::optional<StemLoop> best;
     for (const PatternCandidate& candidate : patterns_.find(view(query), before)) {
-      const StemLoop loop = verify(query, candidate.place, candidate.place_from_query);
+      const StemLoop loop = verify(views_, query, candidate.place, candidate.place_from_query);
       if (!best || loop.overlap > best->overlap) best = loop;
     }
     if (!best || best->overlap < 0.5 * config_.min_overlap) return best;
-    return nearest(*best);
+    return confirmed(nearest(*best));
   }
 
  private:
@@ -78,9 +97,11 @@ class Finder {
   }
   [[nodiscard]] const Pose& pose(int i) const { return poses_[static_cast<std::size_t>(i)]; }
 
-  [[nodiscard]] StemLoop verify(int query, int match, const Pose& guess) const {
-    const SparseIcpResult icp =
-        register_sparse_icp(SparseTarget(view(match)), view(query), guess, config_.icp);
+  [[nodiscard]] StemLoop verify(const std::vector<SparsePoints>& views, int query, int match,
+                                const Pose& guess) const {
+    const SparsePoints& source = views[static_cast<std::size_t>(query)];
+    const SparseIcpResult icp = register_sparse_icp(
+        SparseTarget(views[static_cast<std::size_t>(match)]), source, guess, config_.icp);
     StemLoop loop;
     loop.query = query;
     loop.match = match;
@@ -88,7 +109,7 @@ class Finder {
     const double apart = icp.target_from_source.translation().norm() / config_.max_distance_m;
     loop.score = icp.overlap * std::exp(-apart * apart);
     loop.match_from_query = icp.target_from_source;
-    loop.covariance = loop_covariance(icp, view(query), l0_m_);
+    loop.covariance = loop_covariance(icp, source, l0_m_);
     loop.verified = icp.overlap >= config_.min_overlap &&
                     icp.target_from_source.translation().norm() <= config_.max_distance_m;
     return loop;
@@ -103,12 +124,25 @@ class Finder {
       if ((pose(j).translation() - at).norm() < (pose(best).translation() - at).norm()) best = j;
     }
     if (best == loop.match) return loop;
-    const StemLoop moved =
-        verify(loop.query, best, pose(best).inverse() * pose(loop.match) * loop.match_from_query);
+    const StemLoop moved = verify(views_, loop.query, best,
+                                  pose(best).inverse() * pose(loop.match) * loop.match_from_query);
     return moved.overlap >= 0.8 * loop.overlap ? moved : loop;
   }
 
-  const std::vector<SparsePoints>& views_;
+  // Views laid together find a place, and single ones tell how they lie to each other: where those
+  // have little in common, what was gathered carries the odometry's errors into the loop.
+  [[nodiscard]] StemLoop confirmed(StemLoop loop) const {
+    const StemLoop single = verify(single_, loop.query, loop.match, loop.match_from_query);
+    loop.verified = single.verified;
+    if (!single.verified) return loop;
+    loop.overlap = single.overlap;
+    loop.match_from_query = single.match_from_query;
+    loop.covariance = single.covariance;
+    return loop;
+  }
+
+  const std::vector<SparsePoints>& single_;
+  const std::vector<SparsePoints>& views_;  // laid together
   const std::vector<Pose>& poses_;
   const StemLoopConfig& config_;
   double l0_m_;
@@ -125,6 +159,9 @@ void describe(ConfigTable& table, StemLoopConfig& config) {
   table.add("max_distance_m", config.max_distance_m, {0.1, 100.0}, "m",
             "views farther apart are not of the same place");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "", "P0's lambda0");
+  table.add("gather_l0", config.gather_l0, {0.0, 100.0}, "L0",
+            "views within that part of the way to each side are laid together; 0: each by itself");
+  table.add("gather_views", config.gather_views, {1, 1000}, "", "at most that many to each side");
   table.section("pattern", [&] { describe(table, config.pattern); });
   table.section("icp", [&] { describe(table, config.icp); });
 }
@@ -133,7 +170,8 @@ std::vector<StemLoop> find_stem_loops(const std::vector<SparsePoints>& level_vie
                                       const std::vector<Pose>& world_from_level,
                                       const StemLoopConfig& config) {
   UNDERSTORY_CHECK(level_views.size() == world_from_level.size());
-  const Finder finder(level_views, world_from_level, config);
+  const std::vector<SparsePoints> gathered = gathered_views(level_views, world_from_level, config);
+  const Finder finder(level_views, gathered, world_from_level, config);
   std::vector<std::optional<StemLoop>> found(level_views.size());
   parallel_for(level_views.size(), 4,
                [&](std::size_t i) { found[i] = finder.find(static_cast<int>(i)); });

@@ -15,6 +15,8 @@ struct StemLoopConfig {
   int exclude_recent = 50;      // views; nearer ones are the same passage
   double place_spacing = 2.0;   // L0; of the places that are kept to be found, along the path
   double max_distance_m = 3.0;  // views farther apart than this are not of the same place
+  double gather_l0 = 1.5;       // views within that part of the way to each side are laid together,
+  int gather_views = 4;         // at most that many to each side; 0 L0: each view by itself
   double min_overlap = 0.4;     // P0's lambda0, section 2.3
 };
 void describe(ConfigTable& table, StemLoopConfig& config);
@@ -32,9 +34,11 @@ struct StemLoop {
   bool verified = false;                       // overlap and distance are those of a loop
 };
 
-// For every view the place seen before that it looks like most, by tree pattern, verified by ICP.
-// `world_from_level` says which earlier view lies nearest to the place found, no more: no guess is
-// taken from it. Views without any candidate have no row. Same result for any number of threads.
+// For every view the place seen before that it looks like most: found by tree pattern and ICP among
+// views laid together with their neighbours (`gather_l0`), verified and measured by ICP of the two
+// views themselves. `world_from_level` says how neighbouring views lie to each other and which
+// earlier view lies nearest to the place found, no more: no guess is taken from it. Views without
+// any candidate have no row. Same result for any number of threads.
 [[nodiscard]] std::vector<StemLoop> find_stem_loops(const std::vector<SparsePoints>& level_views,
                                                     const std::vector<Pose>& world_from_level,
                                                     const StemLoopConfig& config);
