@@ -186,7 +186,7 @@ def damaged_clouds(folder):
 for name, content in (("empty file", b""), ("no recording", b"no recording\n" * 100),
                       ("only the head of an MCAP", good.read_bytes()[:40])):
     @cases.case(name)
-    def refused(folder, content=content):
+    def refused(folder, name=name, content=content):
         path = folder / "x.mcap"
         path.write_bytes(content)
         outcome = map_recording(path, folder / "run")
@@ -195,6 +195,13 @@ for name, content in (("empty file", b""), ("no recording", b"no recording\n" * 
         stems = program("map", path, "-o", folder / "run", "--front-end", "sparse")
         assert stems.returncode == 3 and f"error: {path}" in stems.stderr, stems.stderr
         assert not (folder / "run").exists()
+        if name != "only the head of an MCAP":  # that one can be opened
+            unfinished = folder / "run" / "work" / "checkpoint.bin"
+            unfinished.parent.mkdir(parents=True)
+            unfinished.write_bytes(b"kept")
+            for front_end in ("dense", "sparse"):
+                done = program("map", path, "-o", folder / "run", "--overwrite", "--front-end", front_end)
+                assert done.returncode == 3 and unfinished.read_bytes() == b"kept", done.stderr
         return outcome.said.strip().splitlines()[-1].replace(str(folder), "")
 
 

@@ -25,9 +25,10 @@ void describe(ConfigTable& table, StemLoopConfig& config);
 struct StemLoop {
   int query = 0;
   int match = 0;         // an earlier view
-  double overlap = 0.0;  // after matching, 0..1
-  // Overlap, less the farther the views are apart (views of one place overlap wherever they look
-  // from, but also with the next place): overlap * exp(-(distance / max_distance_m)^2).
+  double overlap = 0.0;  // of the two views after matching, 0..1; unverified: as laid together
+  // Overlap as laid together, less the farther the views are apart (views of one place overlap
+  // wherever they look from, but also with the next place): overlap * exp(-(distance /
+  // max_distance_m)^2).
   double score = 0.0;
   Pose match_from_query;
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation

@@ -53,10 +53,15 @@ struct Found {
   int right = 0;
   int verified = 0;
 };
-Found loops_of_the_way_back(const Walk& walk, StemLoopConfig config) {
+// `turn`: what the odometry gets wrong at each step.
+Found loops_of_the_way_back(const Walk& walk, StemLoopConfig config, double turn = 0.0) {
   config.exclude_recent = 20;
-  // Poses that know nothing of the return: the way back is said to lie far away.
   std::vector<Pose> odometry = walk.truth;
+  const Pose wrong(Eigen::Quaterniond(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ())),
+                   Eigen::Vector3d::Zero());
+  for (std::size_t i = 1; i < odometry.size(); ++i)
+    odometry[i] = odometry[i - 1] * walk.truth[i - 1].inverse() * walk.truth[i] * wrong;
+  // Poses that know nothing of the return: the way back is said to lie far away.
   for (std::size_t i = 60; i < odometry.size(); ++i)
     odometry[i] = Pose(Eigen::Quaterniond::Identity(), {0.0, 500.0, 0.0}) * odometry[i];
   Found found;
@@ -89,6 +94,11 @@ TEST(StemLoops, FindsTheWayBackWhereMostStemsAreMissed) {
   StemLoopConfig single;
   single.gather_l0 = 0.0;
   EXPECT_LE(loops_of_the_way_back(walk, single).right, 24);
+}
+
+// An odometry that turns too far lays neighbours askew: loops must not learn of it.
+TEST(StemLoops, MotionsAreThoseOfTheViewsThemselves) {
+  EXPECT_GE(loops_of_the_way_back(walk_there_and_back(60), {}, 0.03).verified, 40);
 }
 
 TEST(StemLoops, NothingIsFoundWhereNothingReturns) {
