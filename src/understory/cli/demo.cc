@@ -15,7 +15,9 @@ int run_demo(const std::string& folder, CommandContext& context) {
   MappingRequest request;
   request.recording = "sim:demo";
   request.run_folder = folder;
-  request.config = read_mapping_config("handheld", "", {});
+  ReadConfig<MappingConfig> read = read_mapping_config("handheld", "", {});
+  request.config = std::move(read.config);
+  request.config_origins = std::move(read.origins);
   request.config_yaml = mapping_table(request.config).to_yaml(false);
   request.overwrite = true;
   return report_outcome(

@@ -7,8 +7,10 @@
 #include "understory/cli/map_sparse.h"
 #include "understory/cli/open_options.h"
 #include "understory/cli/outcome.h"
+#include "understory/pipeline/adaptation.h"
 #include "understory/pipeline/mapping.h"
 #include "understory/pipeline/run_state.h"
+#include "understory/pipeline/source.h"
 #include "understory/pipeline/sparse_mapping.h"
 #include "understory/util/error.h"
 
@@ -46,25 +48,29 @@ int with_advice(const std::string& run_folder, const std::function<int()>& work)
   }
 }
 
-// The settings as given, after those that a run at the speed of its sensors begins with.
-std::vector<std::string> live(const MapOptions& options, std::vector<std::string> settings) {
-  if (!options.realtime) settings.clear();
-  settings.insert(settings.end(), options.settings.begin(), options.settings.end());
-  return settings;
-}
-
-MappingConfig resolved(const MapOptions& options) {
-  // Live, each sensor is in order, and nothing is gained by waiting for the others.
-  return read_mapping_config(options.profile, options.config_file,
-                             live(options, {"time_repair.window_s=0"}));
+// Without a recording the values asked for; with one those that would run on it.
+int print_config(const MapOptions& options, const ReadConfig<MappingConfig>& read,
+                 CommandContext& context) {
+  SensorTraits traits;
+  if (!options.recording.empty()) {
+    static_cast<void>(
+        learn_traits(open_source(options.recording, options.open, context.log), traits));
+    std::fputs(("# " + to_string(traits) + "\n").c_str(), stdout);
+  } else {
+    traits.has_imu = true;  // unknown: nothing is adapted to it
+  }
+  RunConditions conditions;
+  conditions.realtime = options.realtime;
+  const Adapted<MappingConfig> adapted = adapt(read.config, read.origins, traits, conditions);
+  std::fputs(commented_yaml(adapted, read.origins).c_str(), stdout);
+  return kExitDone;
 }
 
 int run_sparse(const MapOptions& options, CommandContext& context) {
   return with_advice(options.run_folder, [&] {
     return run_sparse_map(
         {options.recording, options.run_folder, options.profile, options.config_file,
-         live(options, {"time_repair.window_s=0", "stems.pace.longest_gap_s=0"}), options.realtime,
-         options.overwrite, options.print_config, options.open},
+         options.settings, options.realtime, options.overwrite, options.print_config, options.open},
         context);
   });
 }
@@ -85,18 +91,17 @@ int resume(const MapOptions& options, CommandContext& context) {
 int run_map(const MapOptions& options, CommandContext& context) {
   if (!options.resume.empty() && !options.print_config) return resume(options, context);
   if (options.front_end == "sparse") return run_sparse(options, context);
-  if (options.print_config) {
-    MappingConfig config = resolved(options);
-    std::fputs(mapping_table(config).to_yaml(true).c_str(), stdout);
-    return kExitDone;
-  }
+  ReadConfig<MappingConfig> read =
+      read_mapping_config(options.profile, options.config_file, options.settings);
+  if (options.print_config) return print_config(options, read, context);
   if (options.recording.empty() || options.run_folder.empty()) {
     throw ConfigError({"understory map needs a RECORDING and -o RUN (or --resume RUN)"});
   }
   MappingRequest request;
   request.recording = options.recording;
   request.run_folder = options.run_folder;
-  request.config = resolved(options);
+  request.config = std::move(read.config);
+  request.config_origins = std::move(read.origins);
   request.config_yaml = mapping_table(request.config).to_yaml(false);
   request.open = options.open;
   request.realtime = options.realtime;
@@ -128,11 +133,13 @@ void add_map_command(CLI::App& app, Command& chosen) {
       ->check(CLI::IsMember({"dense", "sparse"}));
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "
-                    "(sets time_repair.window_s=0, of stems also stems.pace.longest_gap_s=0)");
+                    "(time_repair.window_s is 0, of stems also stems.pace.longest_gap_s)");
   command->add_flag("--overwrite", options->overwrite,
                     "Start anew although the run folder holds an unfinished run");
-  command->add_flag("--print-config", options->print_config,
-                    "Print every setting with default, unit, range and meaning");
+  command->add_flag(
+      "--print-config", options->print_config,
+      "Print every setting with default, unit, range and meaning; with a RECORDING the "
+      "values that would run on it, and why");
   add_open_options(*command, options->open);
   command->footer(
       "Example:\n  understory map plot7.mcap -o plot7 --profile handheld\n"

@@ -3,25 +3,44 @@
 #include <cstdio>
 
 #include "understory/cli/outcome.h"
+#include "understory/pipeline/adaptation.h"
+#include "understory/pipeline/source.h"
 #include "understory/pipeline/sparse_mapping.h"
 #include "understory/util/error.h"
 
 namespace understory {
 
+namespace {
+
+int print_config(const SparseMapOptions& options, const ReadConfig<SparseMappingConfig>& read,
+                 CommandContext& context) {
+  if (!options.recording.empty()) {
+    SensorTraits traits;
+    static_cast<void>(
+        learn_traits(open_source(options.recording, options.open, context.log), traits));
+    std::fputs(("# " + to_string(traits) + "\n").c_str(), stdout);
+  }
+  RunConditions conditions;
+  conditions.realtime = options.realtime;
+  const Adapted<SparseMappingConfig> adapted = adapt(read.config, read.origins, conditions);
+  std::fputs(commented_yaml(adapted, read.origins).c_str(), stdout);
+  return kExitDone;
+}
+
+}  // namespace
+
 int run_sparse_map(const SparseMapOptions& options, CommandContext& context) {
   SparseMappingRequest request;
-  request.config = read_sparse_mapping_config(options.profile, options.config_file,
-                                              options.settings, context.log);
-  const ConfigTable table = sparse_mapping_table(request.config);
-  if (options.print_config) {
-    std::fputs(table.to_yaml(true).c_str(), stdout);
-    return kExitDone;
-  }
+  ReadConfig<SparseMappingConfig> read = read_sparse_mapping_config(
+      options.profile, options.config_file, options.settings, context.log);
+  if (options.print_config) return print_config(options, read, context);
+  request.config = std::move(read.config);
+  request.config_origins = std::move(read.origins);
   if (options.recording.empty() || options.run_folder.empty())
     throw ConfigError({"understory map --front-end sparse needs a RECORDING and -o RUN"});
   request.recording = options.recording;
   request.run_folder = options.run_folder;
-  request.config_yaml = table.to_yaml(false);
+  request.config_yaml = sparse_mapping_table(request.config).to_yaml(false);
   request.open = options.open;
   request.realtime = options.realtime;
   request.overwrite = options.overwrite;

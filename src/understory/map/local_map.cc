@@ -32,6 +32,8 @@ void describe(ConfigTable& table, LocalMapConfig& config) {
       "spread; 0: in its middle");
   table.add("near_side_volume", config.cells.near_side_volume, {0.0, 2.0}, "",
             "the same of cells that are neither surface nor line");
+  table.add("few_rings", config.cells.few_rings,
+            "a surface seen exactly edge-on is the trace of one ring; of sparse scans true");
   table.add("radius_m", config.radius_m, {10.0, 1000.0}, "m", "accumulate: reach of the map");
   table.add("recent_keyframes", config.recent_keyframes, {1, 10000}, "", "recent: how many");
   table.add("recent_spacing_m", config.recent_spacing_m, {0.0, 100.0}, "m",
@@ -86,7 +88,7 @@ std::vector<std::size_t> recent_keyframes(const std::vector<Eigen::Vector3d>& po
   const auto wanted = static_cast<std::size_t>(config.recent_keyframes);
   const std::size_t first = positions.size() > wanted ? positions.size() - wanted : 0;
   std::vector<std::size_t> chosen;
-  if (positions.size() <= wanted || config.recent_spacing_m <= 0.0) {
+  if (config.recent_spacing_m <= 0.0) {
     for (std::size_t i = first; i < positions.size(); ++i)
       chosen.push_back(i);
     return chosen;

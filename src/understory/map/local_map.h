@@ -56,7 +56,8 @@ class LocalMap {
 };
 
 // Which of the keyframes at these positions (oldest first) P4's local map is made of: of the most
-// recent `recent_keyframes` the one nearest to the mean of each cube of `recent_spacing_m`.
+// recent `recent_keyframes` (of all while there are fewer) the one nearest to the mean of each cube
+// of `recent_spacing_m`.
 [[nodiscard]] std::vector<std::size_t> recent_keyframes(
     const std::vector<Eigen::Vector3d>& positions, const LocalMapConfig& config);
 

@@ -6,6 +6,7 @@
 
 #include "understory/map/keyframe_clouds.h"
 #include "understory/map/keyframe_map.h"
+#include "understory/map/local_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/util/error.h"
 #include "understory/util/folder_test_support.h"
@@ -86,6 +87,27 @@ TEST(KeyframeDistance, WeighsTurnsAgainstMetres) {
   const Pose screw =
       last * Pose::exp((Vector6d() << 0, 0, std::numbers::pi / 9.0, 0, 0, 1.0).finished());
   EXPECT_NEAR(keyframe_distance(last, screw, config), std::sqrt(2.0), 1e-9);
+}
+
+// P4 section 3.1.1, Local Map: of the last 15 keyframes the one nearest to the mean of those in
+// each cube; while there are fewer than 15, of all of them.
+TEST(LocalMapOfThePaper, TakesOneOfTheRecentKeyframesPerCube) {
+  LocalMapConfig config;
+  config.recent_keyframes = 15;
+  config.recent_spacing_m = 2.0;
+  std::vector<Eigen::Vector3d> way;
+  for (int i = 0; i < 9; ++i)
+    way.emplace_back(0.1 + 0.2 * i, 0.3, 0.3);  // 0.1 to 1.7: one cube, its mean at 0.9
+  EXPECT_EQ(recent_keyframes(way, config), (std::vector<std::size_t>{4}));
+  way.emplace_back(2.3, 0.3, 0.3);
+  way.emplace_back(2.5, 0.3, 0.3);
+  way.emplace_back(3.5, 0.3, 0.3);  // mean of the second cube 2.77
+  EXPECT_EQ(recent_keyframes(way, config), (std::vector<std::size_t>{4, 10}));
+  // Of 21 the first six are too old: in the first cube 1.3 to 1.7 are left, 1.5 their mean.
+  for (int i = 0; i < 9; ++i)
+    way.emplace_back(4.1 + 0.2 * i, 0.3, 0.3);
+  EXPECT_EQ(recent_keyframes(way, config).front(), 7U);
+  EXPECT_EQ(recent_keyframes(way, config).size(), 3U);
 }
 
 TEST(MapTiles, HandsBackEveryPointOnceInOrderOfTiles) {

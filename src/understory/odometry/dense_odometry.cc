@@ -21,8 +21,7 @@ void describe(ConfigTable& table, DenseOdometryConfig& config) {
     describe(table, config.ndt);
     table.add(
         "min_inlier_ratio", config.min_inlier_ratio, {0.0, 1.0}, "",
-        "least share of a scan's points near the map for a match to count; of sparse scans at most "
-        "0.05");
+        "least share of a scan's points near the map for a match to count; of sparse scans 0.05");
     table.add("min_inlier_share", config.min_inlier_share, {0.0, 1.0}, "",
               "a match that finds less of its points than this share of what matches before it "
               "found does not count");

@@ -29,6 +29,22 @@ Verdict verdict_of(RunStatus status) {
   return {"Untrusted", "bad", "Do not rely on this result without checking it."};
 }
 
+std::string adapted_table(const std::vector<ConfigAdaptation>& changes) {
+  if (changes.empty()) return "";
+  std::string html =
+      "<h3>Settings adapted to the sensor</h3><div "
+      "class=\"scroll\"><table><tr><th>key</th><th>asked "
+      "for</th><th>ran</th><th>why</th></tr>";
+  for (const ConfigAdaptation& change : changes) {
+    std::string why = change.why;
+    if (change.when_s > 0.0) why += fmt::format(" (found at {:.1f} s)", change.when_s);
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+                        escape_html(change.key), escape_html(change.from), escape_html(change.to),
+                        escape_html(why));
+  }
+  return html + "</table></div>";
+}
+
 // What a kind of warning means for the result, by the beginning of its key.
 std::string consequence_of(const std::string& key) {
   constexpr std::array<std::pair<const char*, const char*>, 22> kMeanings = {
@@ -224,7 +240,9 @@ std::string made_section(const ReportInput& input) {
   };
   listed("Counts", s.counts);
   listed("Quality figures", s.quality);
-  html += "<h3>Configuration</h3><pre>" + escape_html(s.config_yaml) + "</pre>";
+  html += adapted_table(s.adapted);
+  const std::string& ran = s.effective_yaml.empty() ? s.config_yaml : s.effective_yaml;
+  html += "<h3>Configuration that ran</h3><pre>" + escape_html(ran) + "</pre>";
   return html + "</details></section>\n";
 }
 

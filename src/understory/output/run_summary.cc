@@ -163,6 +163,18 @@ std::string run_json(const RunSummary& summary) {
         {{"file", input.file}, {"bytes", input.bytes}, {"sha256", input.sha256}});
   }
   json["config"] = to_json(YAML::Load(summary.config_yaml));
+  json["config_origins"] = summary.config_origins;
+  const bool as_asked = summary.effective_yaml.empty();
+  json["effective_config"] =
+      as_asked ? json["config"] : to_json(YAML::Load(summary.effective_yaml));
+  json["adapted"] = Json::array();
+  for (const ConfigAdaptation& change : summary.adapted) {
+    json["adapted"].push_back({{"key", change.key},
+                               {"from", to_json(YAML::Load(change.from))},
+                               {"to", to_json(YAML::Load(change.to))},
+                               {"when_s", number(change.when_s)},
+                               {"why", change.why}});
+  }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

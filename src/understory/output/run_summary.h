@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "understory/util/config_origins.h"
 #include "understory/util/log.h"
 #include "understory/util/timing.h"
 
@@ -50,7 +51,10 @@ struct RunSummary {
   RunStatus status = RunStatus::kComplete;
   std::vector<std::string> reasons;  // empty if complete
   std::vector<Log::Warning> warnings;
-  std::string config_yaml;  // resolved, every key
+  std::string config_yaml;  // asked for, every key
+  ConfigOrigins config_origins;
+  std::string effective_yaml;  // that ran; empty: as asked for
+  std::vector<ConfigAdaptation> adapted;
   std::vector<InputHash> inputs;
   std::uint64_t scans = 0;
   std::uint64_t poses = 0;

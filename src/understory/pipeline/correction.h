@@ -15,6 +15,7 @@
 #include "understory/recording/recording.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/util/config.h"
+#include "understory/util/config_origins.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
 #include "understory/util/timing.h"
@@ -58,7 +59,11 @@ struct CorrectionRequest {
   std::filesystem::path run_folder;
   bool overwrite = false;  // also a mapping run that is not finished
   CorrectionConfig config;
-  std::string config_yaml;  // resolved, every key, for run.json
+  std::string config_yaml;  // asked for, every key, for run.json
+  ConfigOrigins config_origins;
+  // Of `understory map`: what ran, and what was changed for it.
+  std::string effective_yaml;
+  std::vector<ConfigAdaptation> adapted;
   // With it odometry.tum and trajectory.tum have a row per scan instead of one per view, and
   // run.json and the report speak of the recording.
   const SparseScans* scans = nullptr;

@@ -255,6 +255,9 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   summary.command = "correct";
   summary.version = kVersion;
   summary.config_yaml = request.config_yaml;
+  summary.config_origins = request.config_origins;
+  summary.effective_yaml = request.effective_yaml;
+  summary.adapted = request.adapted;
   summary.inputs = run.inputs;
   summary.warnings = log.warnings();
   summary.scans = run.path.empty() ? run.views.size() : run.path.size();

@@ -21,6 +21,7 @@ class MappingRun {
   MappingRun(const MappingRequest& request, RunState state, Log& log, const ProgressSink& progress,
              const StopRequested& stop_requested)
       : request_(request),
+        asked_(request.config),
         log_(log),
         progress_(progress),
         stop_requested_(stop_requested),
@@ -52,14 +53,16 @@ class MappingRun {
  private:
   void begin() {
     source_ = open_source(request_.recording, request_.open, log_);
-    if (state_.events() == 0) state_.make_folder();
-    orderer_.emplace(request_.config.time_repair, log_);
-    session_.emplace(request_.config, state_.work(), log_);
     if (state_.events() > 0) {
+      adapt_config();
       source_->skip(state_.events());
       state_.restore(*session_, *orderer_, log_, source_->rig());
       events_ = state_.events();
     } else {
+      request_.conditions.realtime = request_.realtime;
+      source_ = learn_traits(std::move(source_), request_.traits);
+      state_.make_folder();
+      adapt_config();
       // Makes the run resumable from the start.
       state_.save(request_, *session_, *orderer_, log_, 0);
     }
@@ -72,6 +75,18 @@ class MappingRun {
     }
   }
 
+  // Orderer and session at their beginning, with the configuration that suits the sensors.
+  void adapt_config() {
+    Adapted<MappingConfig> adapted =
+        adapt(asked_, request_.config_origins, request_.traits, request_.conditions);
+    request_.config = std::move(adapted.config);
+    request_.adapted = std::move(adapted.changes);
+    request_.effective_yaml = mapping_table(request_.config).to_yaml(false);
+    orderer_.emplace(request_.config.time_repair, log_);
+    session_.reset();  // lets go of its files
+    session_.emplace(request_.config, state_.work(), log_);
+  }
+
   // An IMU that contradicts the lidar bends what is positioned with it, the map included, and by
   // that the lidar's word against it. So the recording is begun anew: once to find out who is
   // right, with scans alone, and if the IMU is wrong, without it. True if it was.
@@ -82,10 +97,12 @@ class MappingRun {
     log_.forget_all_but(wrong ? "imu.untrusted" : "imu.probation");
     log_.info(wrong ? "the recording is mapped again from its beginning, without the IMU"
                     : "the recording is begun anew to find out");
-    session_.reset();  // lets go of its files
-    session_.emplace(request_.config, state_.work(), log_);
+    RunConditions& conditions = request_.conditions;
+    conditions.imu_judged_s = to_seconds(session_->last_scan_end() - request_.traits.first_scan);
+    conditions.imu_doubted = !wrong;
+    if (wrong) conditions.imu_refused = reason;
+    adapt_config();
     wrong ? session_->refuse_imu(reason) : session_->doubt_imu();
-    orderer_.emplace(request_.config.time_repair, log_);
     source_ = open_source(request_.recording, request_.open, log_);
     events_ = 0;
     state_.save(request_, *session_, *orderer_, log_, 0);
@@ -142,6 +159,12 @@ class MappingRun {
                 fmt::format("{} of {} scans were dropped, because the machine could not keep up",
                             facts.dropped_scans, facts.dropped_scans + session_->counts().scans));
     }
+    if (request_.traits.scan_points == 0) {
+      log_.warn("lidar.unknown",
+                request_.recording +
+                    ": its first messages hold no scan that tells what lidar this is: nothing was "
+                    "adapted to it");
+    }
     if (!stopped) remark_on_input(*session_, source, request_.recording, log_);
     MappingOutcome outcome = write_run(request_, *session_, facts, source, log_, progress_);
     if (!stopped) state_.remove();
@@ -172,7 +195,8 @@ class MappingRun {
            (topics.empty() ? std::string() : "; it holds " + topics);
   }
 
-  const MappingRequest& request_;
+  MappingRequest request_;  // with the configuration adapted
+  const MappingConfig asked_;
   Log& log_;
   const ProgressSink& progress_;
   const StopRequested& stop_requested_;

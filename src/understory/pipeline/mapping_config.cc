@@ -20,8 +20,7 @@ ConfigTable mapping_table(MappingConfig& config) {
               "one point per cube of this edge of each scan in it; 0: all");
     table.add(
         "cloud_distance_m", config.cloud_distance_m, {0.0, 100.0}, "m",
-        "weighted distance between scans whose clouds make the finished map; of sparse scans at "
-        "most 0.1");
+        "weighted distance between scans whose clouds make the finished map; of sparse scans 0.1");
     table.add("thin_m", config.map.thin_m, {0.0, 1.0}, "m",
               "one point per cube of this edge of the finished map; 0: all");
     table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
@@ -31,7 +30,7 @@ ConfigTable mapping_table(MappingConfig& config) {
     table.add("checkpoint_interval_s", config.checkpoint_interval_s, {0.1, 5.0}, "s",
               "of recording between checkpoints");
     table.add("sparse_scan_points", config.sparse_scan_points, {0, 100000000}, "points",
-              "a first scan with fewer is not thinned like a dense one; 0: never");
+              "a lidar with fewer in a full scan has what nobody set adapted to it; 0: none");
     table.add("lost_after_scans", config.lost_after_scans, {1, 100000}, "scans",
               "unmatched scans in a row after which a new piece of map begins");
     table.add("realtime_queue_scans", config.realtime_queue_scans, {1, 1000}, "scans",
@@ -57,20 +56,26 @@ std::string profile_text(const std::string& name) {
   throw ConfigError({"--profile " + name + ": unknown; there are " + known});
 }
 
-MappingConfig read_mapping_config(const std::string& profile, const std::string& file,
-                                  const std::vector<std::string>& settings) {
+ReadConfig<MappingConfig> read_mapping_config(const std::string& profile, const std::string& file,
+                                              const std::vector<std::string>& settings) {
   MappingConfig config;
   ConfigTable table = mapping_table(config);
   ConfigProblems problems;
+  ConfigOrigins origins;
   problems.gather([&] {
-    if (!profile.empty()) table.read_yaml(profile_text(profile), "profile " + profile);
+    if (profile.empty()) return;
+    table.read_yaml(profile_text(profile), "profile " + profile);
+    note_yaml(table, profile_text(profile), "profile " + profile, origins);
   });
   problems.gather([&] {
-    if (!file.empty()) table.read_file(file);
+    if (file.empty()) return;
+    table.read_file(file);
+    note_file(table, file, origins);
   });
   problems.gather([&] { table.set(settings); });
+  note_settings(table, settings, origins);
   problems.throw_if_any();
-  return config;
+  return {config, origins};
 }
 
 }  // namespace understory

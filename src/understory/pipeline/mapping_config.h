@@ -9,6 +9,7 @@
 #include "understory/odometry/dense_odometry.h"
 #include "understory/preprocess/event_orderer.h"
 #include "understory/util/config.h"
+#include "understory/util/config_origins.h"
 
 namespace understory {
 
@@ -25,8 +26,8 @@ struct MappingConfig {
   InventoryConfig inventory;
   double checkpoint_interval_s = 4.0;  // of recording; at most 5 s are processed again
   double cloud_distance_m = 1.0;       // weighted distance (37) between scans whose clouds are kept
-  // Scans with fewer points than this (16 beams) are matched and mapped as they are: thinned like a
-  // dense scan, too few points would be left in a cell.
+  // A lidar whose full scans have fewer points than this (16 beams) has what nobody set adapted to
+  // it (adapt()): thinned like dense scans, its scans would leave too few points in a cell.
   int sparse_scan_points = 60000;
   int lost_after_scans = 30;  // unmatched scans in a row after which a new segment begins
   int realtime_queue_scans = 3;
@@ -40,7 +41,7 @@ struct MappingConfig {
 [[nodiscard]] std::string profile_text(const std::string& name);
 
 // Defaults, then the profile, then the file, then the settings ("key=value"). Empty = none.
-[[nodiscard]] MappingConfig read_mapping_config(const std::string& profile, const std::string& file,
-                                                const std::vector<std::string>& settings);
+[[nodiscard]] ReadConfig<MappingConfig> read_mapping_config(
+    const std::string& profile, const std::string& file, const std::vector<std::string>& settings);
 
 }  // namespace understory

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "understory/geometry/pose_io.h"
@@ -18,11 +17,6 @@ constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
 constexpr std::size_t kFewPoints = 100;
 constexpr double kMostSpeedMS = 100.0;
-constexpr double kSparseVoxelM = 0.1;
-constexpr double kSparseKeyframeM = 0.3;
-constexpr double kSparseCloudM = 0.1;  // between scans of the finished map
-constexpr double kSparseVolumeWeight = 1.0;
-constexpr double kSparseInlierRatio = 0.05;  // few of the map's small cells have enough points yet
 // Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
 // and the sigma of a prediction that is no better than staying where one was.
 constexpr double kOutageS = 1.0;
@@ -36,6 +30,17 @@ constexpr double kSmearRangeM = 10.0;
 
 std::uint16_t clamp_to_u16(double value) {
   return static_cast<std::uint16_t>(std::clamp(value, 0.0, 65'535.0));
+}
+
+Points points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) {
+  const auto low = static_cast<float>(config.range_min_m);
+  const auto high = static_cast<float>(config.range_max_m);
+  Points points;
+  points.reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.range[i] >= low && cloud.range[i] <= high) points.push_back(cloud.points[i]);
+  }
+  return points;
 }
 
 }  // namespace
@@ -85,7 +90,6 @@ void MappingSession::handle(const Event& event, const Rig& rig) {
       opening_->imu_before = recent_imu_;
       opening_->fixes_before = fixes_.size();
       rig_ = rig;
-      adapt_to((*scan)->points.size());
       start_anew();
     }
     on_scan(**scan);
@@ -149,34 +153,6 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
     }
   }
   opening_.reset();
-}
-
-// A sparse scan is thinned less, its keyframes lie closer, and all cells of the map count: there
-// are not enough surfaces. Without an IMU predictions are often off by more than the finest cells
-// bridge, and the coarsest are too coarse to lead to them: a map in between helps.
-void MappingSession::adapt_to(std::size_t scan_points) {
-  sparse_ = scan_points < static_cast<std::size_t>(config_.sparse_scan_points) ? 1 : 0;
-  const bool alone = !config_.odometry.imu_enabled || !rig_.body_from_imu || imu_doubted_;
-  LocalMapConfig& local = config_.keyframe_map.local_map;
-  local.cells.viewpoint_in_source = rig_.body_from_lidar.translation();
-  std::vector<double>& cells = local.cell_sizes_m;
-  if (sparse_ != 0) {
-    VoxelFilterConfig& voxel = config_.odometry.voxel;
-    voxel.voxel_size_m = std::min(voxel.voxel_size_m, kSparseVoxelM);
-    local.cells.min_points = std::min(local.cells.min_points, 4);
-    local.cells.few_rings = true;
-    double& inliers = config_.odometry.min_inlier_ratio;
-    inliers = std::min(inliers, kSparseInlierRatio);
-    local.cells.volume_weight = std::max(local.cells.volume_weight, kSparseVolumeWeight);
-    double& distance = config_.keyframe_map.keyframe.distance_m;
-    distance = std::min(distance, kSparseKeyframeM);
-    config_.cloud_distance_m = std::min(config_.cloud_distance_m, kSparseCloudM);
-  }
-  if (alone && cells.size() == 2) {
-    cells.insert(cells.begin() + 1, std::sqrt(cells[0] * cells[1]));
-  }
-  map_ = std::make_unique<KeyframeMap>(config_.keyframe_map, folder_, times_, log_);
-  if (at_once_) map_->take_outcomes_at_once();
 }
 
 // Lost: unmatched for so long that the prediction is worth nothing, or not even finite any more.
@@ -328,7 +304,9 @@ void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& recor
 // What the map takes from a scan: more than what is matched.
 Points MappingSession::map_points(const DenseEstimate& estimate) {
   VoxelFilterConfig voxel = config_.odometry.voxel;
-  voxel.voxel_size_m = std::min(voxel.voxel_size_m, config_.keyframe_map.keyframe.voxel_size_m);
+  const double edge = config_.keyframe_map.keyframe.voxel_size_m;
+  if (edge == 0.0) return points_in_range(estimate.cloud, voxel);
+  voxel.voxel_size_m = std::min(voxel.voxel_size_m, edge);
   if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m) return estimate.thinned.points;
   return cloud_filter_.filter(estimate.cloud, voxel).points;
 }
@@ -384,7 +362,6 @@ void MappingSession::save(BinaryWriter& writer) const {
     put_fix(writer, fix);
   writer.put(counts_);
   writer.put(last_scan_end_);
-  writer.put(sparse_);
   writer.put(last_cloud_);
   put_pose(writer, keyframe_from_last_cloud_);
   put_pose(writer, last_good_);
@@ -411,7 +388,6 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
     fixes_.push_back(get_fix(reader));
   counts_ = reader.get<MappingCounts>();
   last_scan_end_ = reader.get<TimeNs>();
-  const bool sparse = reader.get<std::uint8_t>() != 0;
   last_cloud_ = reader.get<std::uint64_t>();
   keyframe_from_last_cloud_ = get_pose(reader);
   last_good_ = get_pose(reader);
@@ -426,8 +402,6 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   journal_ = std::make_unique<Journal>(folder_ / "journal.bin", reader.get<std::uint64_t>());
   clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", reader.get<std::uint64_t>());
   opening_.reset();
-  rig_ = rig;
-  adapt_to(sparse ? 0 : std::numeric_limits<std::size_t>::max());
   map_->load(reader);
   make_odometry(rig);
   odometry_->load(reader);

@@ -37,7 +37,8 @@ struct MappingCounts {
 
 // The moving part of a mapping run: takes events in order of time and keeps positioning (first
 // graph), keyframes and local map (second graph) and the journal going. Its whole state can be
-// saved; the files in `folder` belong to it. Not thread-safe.
+// saved; the files in `folder` belong to it. `config` is adapted to the sensors (adapt()).
+// Not thread-safe.
 class MappingSession : public Resumable {
  public:
   MappingSession(const MappingConfig& config, std::filesystem::path folder, Log& log);
@@ -100,7 +101,6 @@ class MappingSession : public Resumable {
   void make_odometry(const Rig& rig);
   void start_anew();
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
-  void adapt_to(std::size_t scan_points);
   void on_scan(const Scan& scan);
   [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);
   [[nodiscard]] bool lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const;
@@ -130,7 +130,6 @@ class MappingSession : public Resumable {
   TimeNs last_scan_ = 0;            // stamp
   std::string imu_refused_;
   bool imu_doubted_ = false;
-  std::uint8_t sparse_ = 0;       // the first scan was
   std::uint64_t last_cloud_ = 0;  // keyframe that the cloud kept last belongs to
   Pose keyframe_from_last_cloud_;
   Pose last_good_;  // of the last scan that was matched

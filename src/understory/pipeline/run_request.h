@@ -2,8 +2,12 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
+#include "understory/pipeline/adaptation.h"
+#include "understory/pipeline/sensor_traits.h"
 #include "understory/recording/recording.h"
+#include "understory/util/config_origins.h"
 
 namespace understory {
 
@@ -11,10 +15,17 @@ namespace understory {
 struct RunRequest {
   std::string recording;  // file, folder or sim:SITE
   std::filesystem::path run_folder;
-  std::string config_yaml;  // resolved, every key, for run.json and for resuming
+  std::string config_yaml;       // asked for, every key, for run.json and for resuming
+  ConfigOrigins config_origins;  // which of them were set, by what
   OpenOptions open;
   bool realtime = false;   // played at the speed of its sensors; late scans are dropped
   bool overwrite = false;  // start anew although the folder holds an unfinished run
+  // What the run found out itself, and goes on from when it is resumed.
+  SensorTraits traits;
+  RunConditions conditions;
+  // Made of these and the configuration asked for, for run.json.
+  std::string effective_yaml;
+  std::vector<ConfigAdaptation> adapted;
 };
 
 }  // namespace understory

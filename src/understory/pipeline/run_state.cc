@@ -19,6 +19,9 @@ void put_request(BinaryWriter& writer, const RunRequest& request) {
   }
   writer.put(open.rate_hz);
   writer.put(request.realtime);
+  put_origins(writer, request.config_origins);
+  put_traits(writer, request.traits);
+  put_conditions(writer, request.conditions);
 }
 
 void get_request(BinaryReader& reader, const std::filesystem::path& path, RunRequest& request) {
@@ -37,6 +40,9 @@ void get_request(BinaryReader& reader, const std::filesystem::path& path, RunReq
   }
   open.rate_hz = reader.get<double>();
   request.realtime = reader.get<bool>();
+  request.config_origins = get_origins(reader);
+  request.traits = get_traits(reader);
+  request.conditions = get_conditions(reader);
 }
 
 }  // namespace

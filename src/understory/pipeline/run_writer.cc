@@ -266,6 +266,9 @@ RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
   summary.command = "map";
   summary.version = kVersion;
   summary.config_yaml = request.config_yaml;
+  summary.config_origins = request.config_origins;
+  summary.effective_yaml = request.effective_yaml;
+  summary.adapted = request.adapted;
   summary.inputs = hash_inputs(request.recording);
   summary.scans = session.counts().scans;
   summary.poses = session.journal().size();

@@ -23,7 +23,8 @@ namespace fs = std::filesystem;
 class SparseRun {
  public:
   SparseRun(const SparseMappingRequest& request, RunState state, Log& log)
-      : request_(request), log_(log), state_(std::move(state)) {
+      : request_(request), asked_(request.config), log_(log), state_(std::move(state)) {
+    if (state_.events() == 0) request_.conditions.realtime = request_.realtime;
     open();
     if (state_.events() > 0) {
       source_->skip(state_.events());
@@ -33,7 +34,7 @@ class SparseRun {
       // Makes the run resumable from the start.
       state_.save(request_, *session_, *orderer_, log_, 0);
     }
-    if (request.realtime) play_at_sensor_speed();
+    if (request_.realtime) play_at_sensor_speed();
   }
 
   // True if it was stopped.
@@ -64,6 +65,7 @@ class SparseRun {
   [[nodiscard]] std::size_t count() { return session_->path().size(); }
   [[nodiscard]] std::size_t kept() { return session_->steps().size(); }
   void forget_state() { state_.remove(); }
+  [[nodiscard]] const SparseMappingRequest& request() const { return request_; }
   // Leaves nothing of a run without a result.
   void give_up() {
     session_.reset();  // and with it the part of the stems that was written
@@ -105,6 +107,7 @@ class SparseRun {
     session_.reset();  // lets go of its files
     source_ = open_source(request_.recording, request_.open, log_);
     if (state_.events() == 0) state_.make_folder();
+    adapt_config();
     session_.emplace(request_.config, request_.run_folder / "stems.csv.gz", state_.work(), log_);
     orderer_.emplace(request_.config.time_repair, log_);
     events_ = 0;
@@ -118,10 +121,21 @@ class SparseRun {
     if (player_ != nullptr || trust.trusted || !session_->imu_refused().empty()) return false;
     log_.forget_all_but("imu.untrusted");
     log_.info("the recording is mapped again from its beginning, without the IMU");
+    request_.conditions.imu_refused = trust.reason;
+    request_.conditions.imu_judged_s =
+        to_seconds(session_->last_scan_end() - session_->path().front().stamp);
     open();
     session_->refuse_imu(trust.reason);
     state_.save(request_, *session_, *orderer_, log_, 0);
     return true;
+  }
+
+  void adapt_config() {
+    Adapted<SparseMappingConfig> adapted =
+        adapt(asked_, request_.config_origins, request_.conditions);
+    request_.config = std::move(adapted.config);
+    request_.adapted = std::move(adapted.changes);
+    request_.effective_yaml = sparse_mapping_table(request_.config).to_yaml(false);
   }
 
   void play_at_sensor_speed() {
@@ -156,7 +170,8 @@ class SparseRun {
                           dropped, dropped + session_->scans()));
   }
 
-  const SparseMappingRequest& request_;
+  SparseMappingRequest request_;  // with the configuration adapted
+  const SparseMappingConfig asked_;
   Log& log_;
   RunState state_;
   std::optional<EventOrderer> orderer_;
@@ -184,6 +199,9 @@ CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, 
   correction.overwrite = true;
   correction.config = request.config.correction;
   correction.config_yaml = request.config_yaml;
+  correction.config_origins = request.config_origins;
+  correction.effective_yaml = run.request().effective_yaml;
+  correction.adapted = run.request().adapted;
   correction.scans = &scans;
   // What was seen until the user stopped it is still corrected.
   CorrectionOutcome outcome =

@@ -44,25 +44,32 @@ ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
   return table;
 }
 
-SparseMappingConfig read_sparse_mapping_config(const std::string& profile, const std::string& file,
-                                               const std::vector<std::string>& settings, Log& log) {
+ReadConfig<SparseMappingConfig> read_sparse_mapping_config(const std::string& profile,
+                                                           const std::string& file,
+                                                           const std::vector<std::string>& settings,
+                                                           Log& log) {
   SparseMappingConfig config;
   ConfigTable table = sparse_mapping_table(config);
   ConfigProblems problems;
+  ConfigOrigins origins;
   problems.gather([&] {
     if (profile.empty()) return;
     std::vector<std::string> passed_over;
     table.read_yaml(profile_text(profile), "profile " + profile, &passed_over);
+    note_yaml(table, profile_text(profile), "profile " + profile, origins);
     if (!passed_over.empty())
       log.info("profile " + profile + ": not for stems and passed over: " + joined(passed_over));
   });
   problems.gather([&] {
-    if (!file.empty()) table.read_file(file);
+    if (file.empty()) return;
+    table.read_file(file);
+    note_file(table, file, origins);
   });
   problems.gather([&] { table.set(settings); });
+  note_settings(table, settings, origins);
   problems.gather([&] { read_boxes(config); });
   problems.throw_if_any();
-  return config;
+  return {config, origins};
 }
 
 void reread(SparseMappingConfig& config, const std::string& yaml, const std::string& origin) {

@@ -8,6 +8,7 @@
 #include "understory/pipeline/correction.h"
 #include "understory/preprocess/event_orderer.h"
 #include "understory/util/config.h"
+#include "understory/util/config_origins.h"
 #include "understory/util/log.h"
 
 namespace understory {
@@ -29,7 +30,7 @@ struct SparseMappingConfig {
 // Defaults, then the profile, then the file, then the settings ("key=value"). Empty = none. Keys of
 // a profile that are not about stems are passed over, which is noted; all other problems are in one
 // ConfigError. The machine's boxes are read, too.
-[[nodiscard]] SparseMappingConfig read_sparse_mapping_config(
+[[nodiscard]] ReadConfig<SparseMappingConfig> read_sparse_mapping_config(
     const std::string& profile, const std::string& file, const std::vector<std::string>& settings,
     Log& log);
 
