@@ -19,8 +19,8 @@ void describe(ConfigTable& table, KeyframeConfig& config) {
             "weighted distance (37) after which a scan becomes a keyframe");
   table.add("rotation_as_metre_deg", config.rotation_as_metre_deg, {0.1, 360.0}, "deg",
             "rotation that counts as one metre in (37)");
-  table.add("voxel_size_m", config.voxel_size_m, {0.02, 5.0}, "m",
-            "edge of the voxels that thin a keyframe's points");
+  table.add("voxel_size_m", config.voxel_size_m, {0.0, 5.0}, "m",
+            "edge of the voxels that thin a keyframe's points; 0: it keeps all of them");
 }
 
 double keyframe_distance(const Pose& world_from_last, const Pose& world_from_current,
@@ -36,6 +36,10 @@ void KeyframeMap::describe(ConfigTable& table, Config& config) {
   table.section("loop_closure", [&] { understory::describe(table, config.loop_closure); });
   table.section("beginning", [&] { understory::describe(table, config.beginning); });
   table.section("odometry_edge", [&] {
+    table.add("rotation_deg", config.edge_rotation_deg, {0.0, 10.0}, "deg",
+              "noise of the odometry between keyframes, however near");
+    table.add("translation_m", config.edge_translation_m, {0.0, 10.0}, "m",
+              "noise of the odometry between keyframes, however near");
     table.add("rotation_deg_per_sqrt_m", config.edge_rotation_deg_per_sqrt_m, {1e-6, 10.0},
               "deg/sqrt(m)", "noise of the odometry between keyframes");
     table.add("translation_m_per_sqrt_m", config.edge_translation_m_per_sqrt_m, {1e-6, 10.0},
@@ -90,21 +94,37 @@ std::optional<Pose> KeyframeMap::add(TimeNs stamp, const Pose& world_from_body,
   keyframe.covariance = edge_covariance(keyframe.previous_from_this);
   keyframes_.push_back(keyframe);
   points_->append(stamp, points_in_body);
+  if (const auto again = close_in_present()) return moved ? *again * *moved : *again;
   update_local_map(keyframes_.size() - 1);
   loops_.consider(keyframes_, segment_start(), *points_);
   return moved;
+}
+
+// The newest keyframe is not in the local map yet. If the world moves, the map is built anew with
+// it.
+std::optional<Pose> KeyframeMap::close_in_present() {
+  if (snapshot_.empty()) return std::nullopt;
+  PresentMap present{snapshot_, {}};
+  for (const LocalMapInsertion& insertion : inserted_)
+    present.keyframes.push_back(insertion.keyframe);
+  auto outcome = loops_.close_in_present(keyframes_, segment_start(), *points_, present);
+  return outcome ? take_over(std::move(*outcome)) : std::nullopt;
 }
 
 Matrix6d KeyframeMap::edge_covariance(const Pose& previous_from_this) const {
   // A new segment hangs on a prediction over an outage: its edge says almost nothing.
   const bool joined = keyframes_.size() != segment_start();
   const double length = std::max(previous_from_this.translation().norm(), 0.1);
-  const double grown = std::sqrt(length) * (joined ? 1.0 : 1e3);
-  const double rotation = grown * config_.edge_rotation_deg_per_sqrt_m * std::numbers::pi / 180.0;
+  const double scale = joined ? 1.0 : 1e3;
+  const double grown = std::sqrt(length) * scale;
+  const double degree = std::numbers::pi / 180.0;
+  const double rotation = grown * config_.edge_rotation_deg_per_sqrt_m * degree;
   const double translation = grown * config_.edge_translation_m_per_sqrt_m;
+  const double least_rotation = scale * config_.edge_rotation_deg * degree;
+  const double least_translation = scale * config_.edge_translation_m;
   Vector6d variances;
-  variances << Eigen::Vector3d::Constant(rotation * rotation),
-      Eigen::Vector3d::Constant(translation * translation);
+  variances << Eigen::Vector3d::Constant(rotation * rotation + least_rotation * least_rotation),
+      Eigen::Vector3d::Constant(translation * translation + least_translation * least_translation);
   return variances.asDiagonal();
 }
 

@@ -27,7 +27,8 @@ struct KeyframeConfig {
   double distance_m = 0.5;
   double rotation_as_metre_deg = 30.0;
   // Edge of the voxels that thin a keyframe's points. Finer than a scan is thinned to be matched:
-  // the local map's cells have to tell a stem's near side from its flanks.
+  // the local map's cells have to tell a stem's near side from its flanks. 0: all points, as in the
+  // paper.
   double voxel_size_m = 0.1;
 };
 void describe(ConfigTable& table, KeyframeConfig& config);
@@ -46,7 +47,10 @@ class KeyframeMap {
     LocalMapConfig local_map;
     LoopCloserConfig loop_closure;
     BeginningConfig beginning;
-    // Noise of the odometry between keyframes: grows with the square root of the distance.
+    // Noise of the odometry between keyframes: that of any edge (P4: that of a match, (36)), and
+    // what grows with the square root of the distance.
+    double edge_rotation_deg = 0.0;
+    double edge_translation_m = 0.0;
     double edge_rotation_deg_per_sqrt_m = 0.02;
     double edge_translation_m_per_sqrt_m = 0.01;
   };
@@ -95,6 +99,7 @@ class KeyframeMap {
   void take_snapshot();
   void rebuild_local_map();
   [[nodiscard]] Matrix6d edge_covariance(const Pose& previous_from_this) const;
+  [[nodiscard]] std::optional<Pose> close_in_present();
   [[nodiscard]] std::optional<Pose> take_over(LoopOutcome outcome);
   void insert_all();
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/graph/local_map_loop.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
@@ -22,6 +23,17 @@ struct Search {
   KeyframePoints* points = nullptr;
 };
 
+// Points of a keyframe in the body frame of another.
+void add_points_seen_from(const Search& search, std::size_t keyframe, std::size_t from,
+                          Points& all) {
+  const auto& poses = search.problem.world_from_keyframe;
+  const Pose here_from_there = poses[from].inverse() * poses[keyframe];
+  const Eigen::Matrix3f rotation = here_from_there.rotation_matrix().cast<float>();
+  const Eigen::Vector3f translation = here_from_there.translation().cast<float>();
+  for (const Eigen::Vector3f& p : *search.points->get(keyframe))
+    all.push_back(rotation * p + translation);
+}
+
 // The clouds of the keyframes around one, along the path, in its frame.
 Points points_around(const Search& search, std::size_t keyframe, int reach) {
   const auto& poses = search.problem.world_from_keyframe;
@@ -29,15 +41,22 @@ Points points_around(const Search& search, std::size_t keyframe, int reach) {
   const std::size_t first = std::max(search.segment_start, keyframe > r ? keyframe - r : 0);
   const std::size_t last = std::min(poses.size() - 1, keyframe + r);
   Points all;
-  for (std::size_t i = first; i <= last; ++i) {
-    const Pose here_from_there = poses[keyframe].inverse() * poses[i];
-    const Eigen::Matrix3f rotation = here_from_there.rotation_matrix().cast<float>();
-    const Eigen::Vector3f translation = here_from_there.translation().cast<float>();
-    for (const Eigen::Vector3f& p : *search.points->get(i)) {
-      all.push_back(rotation * p + translation);
-    }
-  }
+  for (std::size_t i = first; i <= last; ++i)
+    add_points_seen_from(search, i, keyframe, all);
   return VoxelFilter().filter(all, search.config.voxel_size_m);
+}
+
+LoopAttempt attempt_of(std::size_t query, const LoopCandidate& candidate,
+                       const Pose& candidate_from_query, const LoopVerification& answer) {
+  LoopAttempt attempt;
+  attempt.from = candidate.keyframe;
+  attempt.to = static_cast<int>(query);
+  attempt.verified = answer.accepted;
+  attempt.reason = answer.reason;
+  attempt.correction_m =
+      (candidate_from_query.inverse() * answer.target_from_source).translation().norm();
+  attempt.edge = {attempt.from, attempt.to, answer.target_from_source, answer.covariance};
+  return attempt;
 }
 
 LoopAttempt try_loop(const Search& search, std::size_t query, const LoopCandidate& candidate) {
@@ -51,16 +70,8 @@ LoopAttempt try_loop(const Search& search, std::size_t query, const LoopCandidat
   input.sigma_rotation_rad = candidate.sigma_rotation_rad;
   input.up_in_target = poses[from].rotation().conjugate() * Eigen::Vector3d::UnitZ();
   input.up_in_source = poses[query].rotation().conjugate() * Eigen::Vector3d::UnitZ();
-  const LoopVerification answer = verify_loop(input, search.config.verification);
-  LoopAttempt attempt;
-  attempt.from = candidate.keyframe;
-  attempt.to = static_cast<int>(query);
-  attempt.verified = answer.accepted;
-  attempt.reason = answer.reason;
-  attempt.correction_m =
-      (input.target_from_source.inverse() * answer.target_from_source).translation().norm();
-  attempt.edge = {attempt.from, attempt.to, answer.target_from_source, answer.covariance};
-  return attempt;
+  return attempt_of(query, candidate, input.target_from_source,
+                    verify_loop(input, search.config.verification));
 }
 
 bool worth_applying(const Search& search, const std::vector<Pose>& answer) {
@@ -92,6 +103,37 @@ void make_local_map(const Search& search, LoopOutcome& outcome) {
   static_cast<void>(outcome.local_map->snapshot());
 }
 
+// Steps 2 and 3 of P4 (38).
+LoopAttempt try_in_present(const Search& search, std::size_t query, const LoopCandidate& candidate,
+                           const PresentMap& present) {
+  const auto& poses = search.problem.world_from_keyframe;
+  const auto from = static_cast<std::size_t>(candidate.keyframe);
+  LocalMapLoopInput input;
+  input.local_map = present.cells;
+  for (const std::size_t i : present.keyframes)
+    add_points_seen_from(search, i, query, input.map_points_in_query);
+  input.candidate_points =
+      VoxelFilter().filter(*search.points->get(from), search.config.voxel_size_m);
+  input.world_from_candidate = poses[from];
+  input.world_from_query = poses[query];
+  const Pose believed = poses[from].inverse() * poses[query];
+  return attempt_of(query, candidate, believed,
+                    register_to_local_map(input, search.config.verification));
+}
+
+// Optimises with the loops of the outcome, if there are any.
+void apply_loops(Search& search, LoopOutcome& outcome) {
+  for (const LoopAttempt& attempt : outcome.attempts) {
+    if (attempt.verified) search.problem.loops.push_back(attempt.edge);
+  }
+  const bool found = std::any_of(outcome.attempts.begin(), outcome.attempts.end(),
+                                 [](const LoopAttempt& attempt) { return attempt.verified; });
+  if (!found) return;
+  PoseGraphResult result = optimise_pose_graph(search.problem, search.config.graph);
+  if (result.converged && worth_applying(search, result.world_from_keyframe))
+    outcome.world_from_keyframe = std::move(result.world_from_keyframe);
+}
+
 LoopOutcome run_search(Search search) {
   LoopOutcome outcome;
   outcome.keyframes = search.problem.world_from_keyframe.size();
@@ -100,18 +142,9 @@ LoopOutcome run_search(Search search) {
        find_loop_candidates(search.problem, query, search.config.search)) {
     if (static_cast<std::size_t>(candidate.keyframe) < search.segment_start) continue;
     outcome.attempts.push_back(try_loop(search, query, candidate));
-    if (outcome.attempts.back().verified)
-      search.problem.loops.push_back(outcome.attempts.back().edge);
   }
-  const bool found = std::any_of(outcome.attempts.begin(), outcome.attempts.end(),
-                                 [](const LoopAttempt& attempt) { return attempt.verified; });
-  if (found) {
-    PoseGraphResult result = optimise_pose_graph(search.problem, search.config.graph);
-    if (result.converged && worth_applying(search, result.world_from_keyframe)) {
-      outcome.world_from_keyframe = std::move(result.world_from_keyframe);
-      make_local_map(search, outcome);
-    }
-  }
+  apply_loops(search, outcome);
+  if (!outcome.world_from_keyframe.empty()) make_local_map(search, outcome);
   return outcome;
 }
 
@@ -158,10 +191,35 @@ PoseGraphProblem LoopCloser::problem_of(const std::vector<Keyframe>& keyframes) 
 
 void LoopCloser::consider(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
                           KeyframePoints& points) {
-  if (!config_.enabled || running_) return;
-  if (!loop_search_due(last_search_, keyframes.back().stamp, config_.search)) return;
-  last_search_ = keyframes.back().stamp;
+  if (config_.search.method == LoopSearchConfig::Method::kPaper || !due(keyframes)) return;
   begin(keyframes, segment_start, points);
+}
+
+bool LoopCloser::due(const std::vector<Keyframe>& keyframes) {
+  if (!config_.enabled || running_) return false;
+  if (!loop_search_due(last_search_, keyframes.back().stamp, config_.search)) return false;
+  last_search_ = keyframes.back().stamp;
+  return true;
+}
+
+std::optional<LoopOutcome> LoopCloser::close_in_present(const std::vector<Keyframe>& keyframes,
+                                                        std::size_t segment_start,
+                                                        KeyframePoints& points,
+                                                        const PresentMap& present) {
+  if (config_.search.method != LoopSearchConfig::Method::kPaper || !due(keyframes))
+    return std::nullopt;
+  Search search{config_, local_map_config_, problem_of(keyframes), segment_start, &points};
+  LoopOutcome outcome;
+  outcome.keyframes = keyframes.size();
+  const std::size_t query = keyframes.size() - 1;
+  for (const LoopCandidate& candidate :
+       find_loop_candidates(search.problem, query, config_.search)) {
+    if (static_cast<std::size_t>(candidate.keyframe) < segment_start) continue;
+    outcome.attempts.push_back(try_in_present(search, query, candidate, present));
+  }
+  apply_loops(search, outcome);
+  attempts_.insert(attempts_.end(), outcome.attempts.begin(), outcome.attempts.end());
+  return outcome;
 }
 
 void LoopCloser::begin(const std::vector<Keyframe>& keyframes, std::size_t segment_start,

@@ -13,6 +13,7 @@
 #include "understory/map/keyframe.h"
 #include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
+#include "understory/registration/ndt_map.h"
 #include "understory/util/binary_io.h"
 #include "understory/util/config.h"
 #include "understory/util/log.h"
@@ -53,9 +54,16 @@ struct LoopOutcome {
   std::vector<LocalMapInsertion> inserted;
 };
 
+// The map that scans are matched to at present, in the world frame, and the keyframes in it.
+struct PresentMap {
+  const std::vector<NdtMapPtr>& cells;  // coarse to fine
+  std::vector<std::size_t> keyframes;
+};
+
 // Looks for loops beside the scan loop: one search at a time in the background, begun at most every
 // `search.interval_s` of recording, its result taken over at a keyframe that is fixed in advance,
-// so that results do not depend on how fast the machine is. P4 section 3.1.1, P2-7.
+// so that results do not depend on how fast the machine is. P2-7; P4 section 3.1.1 in its own way:
+// close_in_present.
 class LoopCloser {
  public:
   LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map);
@@ -67,6 +75,13 @@ class LoopCloser {
   // alive until its outcome has been taken.
   void consider(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
                 KeyframePoints& points);
+  // `search.method` paper: all three steps of P4 (38) for the newest keyframe if they are due, at
+  // once, so that there is never one running. `present` does without that keyframe. Nothing if not
+  // due, or by another method.
+  [[nodiscard]] std::optional<LoopOutcome> close_in_present(const std::vector<Keyframe>& keyframes,
+                                                            std::size_t segment_start,
+                                                            KeyframePoints& points,
+                                                            const PresentMap& present);
   // The outcome of the running search, nothing if none is running or due. It is due at a fixed
   // number of keyframes, and then waited for; `wait`: due now; `at_once`: due when it is there.
   [[nodiscard]] std::optional<LoopOutcome> take(std::size_t keyframes, bool wait, bool at_once);
@@ -89,6 +104,7 @@ class LoopCloser {
   };
   void begin(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
              KeyframePoints& points);
+  [[nodiscard]] bool due(const std::vector<Keyframe>& keyframes);
   [[nodiscard]] PoseGraphProblem problem_of(const std::vector<Keyframe>& keyframes) const;
 
   LoopCloserConfig config_;
