@@ -189,7 +189,8 @@ def measure_identity(table, work, seed, duration_s):
 def measure_kiss(table, work, seed, duration_s):
     """CPU time beside KISS-ICP on the same scans, both pinned to the same two processors."""
     recording, cpus = work / "kiss.mcap", own_cpus()
-    understory("simulate", "handheld", "-o", recording, "--seed", seed, "--duration-s", duration_s)
+    understory("simulate", "handheld", "-o", recording, "--overwrite", "--seed", seed, "--duration-s",
+               duration_s)
     ours = map_recording(recording, work / "kiss_run", threads=2, cpus=cpus)
     summary = work / "kiss.json"
     peer = run(sys.executable, TOP / "benchmarks" / "peers" / "kiss_icp_peer.py", recording,

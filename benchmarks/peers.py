@@ -103,7 +103,7 @@ def measure(site, options, work):
     what = f"{site}, seed {options.seed}, {options.duration_s:g} s"
     recording = work / f"{site}.mcap"
     say(f"  simulating {what}")
-    understory("simulate", site, "-o", recording, "--seed", options.seed, "--duration-s",
+    understory("simulate", site, "-o", recording, "--overwrite", "--seed", options.seed, "--duration-s",
                options.duration_s)
     cpus, truth, results = own_cpus(), recording.with_suffix(".truth"), []
     jobs = {"understory": lambda: ours(recording, work, cpus, "understory", []),

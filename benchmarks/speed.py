@@ -135,7 +135,7 @@ def main():
             recording = work / "bench.mcap"
             what = f"{options.site}, seed {options.seed}, {options.duration_s:g} s"
             say(f"  simulating {what}")
-            understory("simulate", options.site, "-o", recording, "--seed", options.seed,
+            understory("simulate", options.site, "-o", recording, "--overwrite", "--seed", options.seed,
                        "--duration-s", options.duration_s)
         text = render(measure(recording, options, work), what)
     print(text)

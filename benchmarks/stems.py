@@ -52,7 +52,7 @@ def data():
 def corrected(stems, folder, *settings):
     """One run of correct on one thread: run.json with the kernel's figures."""
     options = [word for setting in settings for word in ("--set", setting)]
-    done = understory("correct", stems, "-o", folder, "--threads", 1, *options,
+    done = understory("correct", stems, "-o", folder, "--overwrite", "--threads", 1, *options,
                       accept=(DONE, UNTRUSTED))
     result = json.loads((folder / "run.json").read_text())
     result["process"] = {"cpu_s": done.cpu_s, "peak_memory_mb": done.peak_memory_mb}

@@ -64,10 +64,10 @@ def measure_road(site, seed, folder):
         gnss[name] = understory_json(
             "georeference", moved, "--method", "gnss-path", "--gnss",
             fixes if fixes.exists() else simulated(site, seed=seed), "-o", folder / f"{run.name}_gnss_{name}",
-            "--antenna-m", 0, 0.3, 3.1)
+            "--overwrite", "--antenna-m", 0, 0.3, 3.1)
     level = folder / f"{run.name}_level"
     terrain = understory_json("georeference", run, "--method", "terrain", "--dem", truth / "dtm.tif",
-                              "--start", *start_of(run, truth), "-o", level)
+                              "--start", *start_of(run, truth), "-o", level, "--overwrite")
     rings = understory_json("evaluate", "trees", level, truth, "--truth-returns", truth, "--path", truth,
                             "--bin-m", RING_M, "--reach-m", REACH_M)["by_distance"]
     sharp = understory_json("evaluate", "map", run / "stems.csv.gz", run)

@@ -38,7 +38,7 @@ with tempfile.TemporaryDirectory() as scratch:
     whole, killed = pathlib.Path(scratch) / "whole", pathlib.Path(scratch) / "killed"
     assert start(whole, 2).wait() in (0, 4)
     run = start(killed, 2)
-    grows = killed / "work" / growing
+    grows = killed / ".understory" / growing
     for _ in range(6000):
         if grows.exists() and grows.stat().st_size > least_bytes:
             break
@@ -55,5 +55,5 @@ with tempfile.TemporaryDirectory() as scratch:
     assert subprocess.run(command, stdout=subprocess.DEVNULL).returncode in (0, 4)
     different = [f for f in files if (whole / f).read_bytes() != (killed / f).read_bytes()]
     assert not different, f"{different} differ"
-    assert not (killed / "work").exists()
+    assert not (killed / ".understory").exists()
     print(f"{len(files)} files have the same bytes")

@@ -2,7 +2,6 @@
 
 import os
 import resource
-import shutil
 import signal
 import subprocess
 import time
@@ -97,15 +96,11 @@ def limited(folder):
     return said.replace(str(folder), "")
 
 
-@cases.case("result that cannot be written")
+@cases.case("folder in the place of a result")
 def blocked_result(folder):
     run = folder / "run"
     (run / "map.laz" / "mine").mkdir(parents=True)
-    said = map_until_stopped(run)
-    assert f"error: {run / 'map.laz'}" in said and not list(run.glob(".part*")), said
-    shutil.rmtree(run / "map.laz")
-    expect_resumed(run)
-    return said.replace(str(folder), "")
+    return refused(good, run, "map.laz").replace(str(folder), "")
 
 
 @cases.case("folder that holds other things")
@@ -113,14 +108,13 @@ def other_things(folder):
     run = folder / "run"
     run.mkdir()
     (run / "notes.txt").write_text("mine")
-    (run / "gnss.csv").write_text("of an earlier run")
+    (run / "work").mkdir()
+    (run / "work" / "mine.bin").write_text("mine, too")
     outcome = map_recording(good, run)
     assert outcome.code == 0, outcome.said
     assert (run / "notes.txt").read_text() == "mine"
-    assert not (run / "gnss.csv").exists(), "results of an earlier run beside those of this one"
-    again = map_recording(good, run)  # a finished run may be made again in its place
-    assert again.code == 0, again.said
-    return "kept what is not a result, replaced what is"
+    assert (run / "work" / "mine.bin").read_text() == "mine, too"
+    return "kept what is not a result"
 
 
 def interrupted(run, checkpoints):
@@ -134,7 +128,7 @@ def interrupted(run, checkpoints):
         if len(seen) >= checkpoints:
             break
         try:
-            seen.add((run / "work" / "checkpoint.bin").stat().st_mtime_ns)
+            seen.add((run / ".understory" / "checkpoint.bin").stat().st_mtime_ns)
         except FileNotFoundError:
             pass
         time.sleep(0.0005)
@@ -153,7 +147,7 @@ def ctrl_c(folder):
     assert '"partial"' in (run / "run.json").read_text()
     assert map_recording(good, run).code == 3  # nothing is thrown away unasked
     expect_resumed(run)
-    assert not (run / "work").exists()
+    assert not (run / ".understory").exists()
     return f"exit 4 with {len(poses)} of 120 scans, the rest by --resume: the same bytes"
 
 

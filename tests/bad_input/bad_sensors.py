@@ -166,7 +166,7 @@ def all_nan(folder):
     path, outcome = mapped(folder, [edit_cloud(m, spoil) if m.topic == "/lidar" else m
                                     for m in short if m.time < start + 2e9])
     assert outcome.code == 3 and f"{path}: none of its" in outcome.said, outcome.said
-    assert not (folder / "run" / "work").exists()
+    assert not (folder / "run" / ".understory").exists()
     return outcome.said.strip().splitlines()[-1].replace(str(folder), "")
 
 

@@ -4,7 +4,7 @@ import random
 import re
 import shutil
 
-from program import Cases, error_m, good_recording, map_recording, program
+from program import Cases, error_m, good_recording, map_recording, program, unfinished_run
 from recordings import write_bag, write_capture, write_db3, write_mcap
 
 cases = Cases()
@@ -196,9 +196,7 @@ for name, content in (("empty file", b""), ("no recording", b"no recording\n" * 
         assert stems.returncode == 3 and f"error: {path}" in stems.stderr, stems.stderr
         assert not (folder / "run").exists()
         if name != "only the head of an MCAP":  # that one can be opened
-            unfinished = folder / "run" / "work" / "checkpoint.bin"
-            unfinished.parent.mkdir(parents=True)
-            unfinished.write_bytes(b"kept")
+            unfinished = unfinished_run(folder / "run", b"kept")
             for front_end in ("dense", "sparse"):
                 done = program("map", path, "-o", folder / "run", "--overwrite", "--front-end", front_end)
                 assert done.returncode == 3 and unfinished.read_bytes() == b"kept", done.stderr
@@ -240,15 +238,14 @@ def inventory(folder):
     assert done.returncode == 3 and f"{path}: the file is empty" in done.stderr, done.stderr
     before = (folder / "run" / "run.json").read_bytes()
     done = program("inventory", folder / "run", "-o", folder / "run")
-    assert done.returncode == 2 and "folder of its own" in done.stderr, done.stderr
+    assert done.returncode == 3 and "holds the input" in done.stderr, done.stderr
     assert (folder / "run" / "run.json").read_bytes() == before
-    half = folder / "half" / "work" / "checkpoint.bin"
-    half.parent.mkdir(parents=True)
-    half.write_bytes(b"half")
+    half = unfinished_run(folder / "half")
     done = program("inventory", folder / "run", "-o", folder / "half")
     assert done.returncode == 3 and "--overwrite" in done.stderr, done.stderr
     done = program("inventory", folder / "run", "-o", folder / "half", "--overwrite")
     assert done.returncode in (0, 4) and (folder / "half" / "trees.csv").exists(), done.stderr
+    assert not half.parent.exists()
     return "exit 4, trees of the readable part"
 
 

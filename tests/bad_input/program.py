@@ -43,6 +43,15 @@ def map_recording(recording, folder, *options, **more):
     return Outcome(done.returncode, done.stdout, done.stderr, folder)
 
 
+def unfinished_run(folder, checkpoint=b"half"):
+    """A run folder as a killed run leaves it, though with a checkpoint of nothing; the checkpoint."""
+    work = folder / ".understory"
+    work.mkdir(parents=True)
+    (work / "marker").write_text("Understory: work folder of a run\nformat: 1\nversion: 0\n")
+    (work / "checkpoint.bin").write_bytes(checkpoint)
+    return work / "checkpoint.bin"
+
+
 def good_recording(folder, seconds=12, seed=5):
     """Some seconds on foot with a VLP-16 and an IMU: (file, its messages, truth)."""
     first, path = folder / "first.mcap", folder / "good.mcap"

@@ -350,7 +350,7 @@ def bad(folder):
                                     "cellsize 2\n1 2 3\n")
     refused(3, "cut.asc", RUN, "--method", "terrain", "--dem", folder / "cut.asc", "--start", 0, 0, 0)
     done = georeference(PLACED, "--method", "terrain", "--dem", DEM, "-o", PLACED)
-    assert done.returncode == 2 and "own" in done.stderr, done
+    assert done.returncode == 3 and "is the input" in done.stderr, done
     (folder / "file").write_text("")
     done = georeference(RUN, "--method", "gnss-path", "--gnss", FIXES, "-o", folder / "file" / "x")
     assert done.returncode == 3, done

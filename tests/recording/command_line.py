@@ -4,6 +4,7 @@ messages that name the file, and what is kept of damaged ones."""
 import json
 import os
 import pathlib
+import resource
 import subprocess
 import tempfile
 
@@ -11,9 +12,9 @@ PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 SAMPLES = pathlib.Path(__file__).resolve().parents[2] / "fuzz" / "corpus"
 
 
-def run(*arguments):
+def run(*arguments, **options):
     done = subprocess.run([PROGRAM, "--quiet", *map(str, arguments)], capture_output=True,
-                          text=True)
+                          text=True, **options)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -55,11 +56,12 @@ def check_refusals(folder):
     sample = SAMPLES / "rosbag" / "small_none.bag"
     code, _, errors = run("convert", sample, folder / "no" / "such" / "x.mcap")
     assert code == 3 and "x.mcap" in errors, errors
-    if os.path.exists("/dev/full"):
-        full = folder / "full.mcap"
-        full.symlink_to("/dev/full")
-        code, _, errors = run("convert", sample, full)
-        assert code == 3 and "full.mcap" in errors and "space" in errors.lower(), errors
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
+    for name in ("full.mcap", "full clouds", "full.csv.gz"):
+        code, _, errors = run("convert", sample, folder / name, preexec_fn=limit)
+        assert code == 3 and not list(folder.glob("*full*")), (code, errors)
+        if name != "full.csv.gz":  # these scans have no stems
+            assert f"{folder / name}" in errors and "too large" in errors.lower(), errors
     copy = folder / "same.mcap"
     assert run("convert", sample, copy)[0] == 0
     before = copy.read_bytes()

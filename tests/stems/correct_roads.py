@@ -198,14 +198,12 @@ def run_again(folder):
     errors = [evaluated(folder / name / "trajectory.tum", site / "truth", "--align", "se3")
               ["ape_plane_rmse_m"] for name in ("none", "expected_gain")]
     assert errors[1] < 0.7 * errors[0], errors
-    # Into its own folder, too: it is read before it is replaced. But nothing of a mapped run is lost.
-    assert correct(run, run).returncode == 0 and correct(run, run).returncode == 0
-    mapped = json.loads((run / "run.json").read_text()) | {"command": "map"}
-    (run / "run.json").write_text(json.dumps(mapped))
+    # Never into the folder that it reads, whoever has made what lies there.
     before = (run / "trajectory.tum").read_bytes()
     for stems in (run, run / "stems.csv.gz"):
-        done = correct(stems, run)
-        assert done.returncode == 2 and "folder of its own" in done.stderr, done.stderr
+        for options in ((), ("--overwrite",)):
+            done = correct(stems, run, *options)
+            assert done.returncode == 3 and str(run) in done.stderr, done.stderr
     assert (run / "trajectory.tum").read_bytes() == before
     (run / "trajectory.tum").write_text("1 0 0 0 0 0 0 1\n")
     done = correct(run, folder / "late")
@@ -299,13 +297,15 @@ def absent(folder):
 @cases.case("folder of a mapping run that is not finished")
 def unfinished(folder):
     run = folder / "run"
-    (run / "work").mkdir(parents=True)
-    (run / "work" / "checkpoint.bin").write_bytes(b"half")
+    work = run / ".understory"
+    work.mkdir(parents=True)
+    (work / "marker").write_text("Understory: work folder of a run\nformat: 1\n")
+    (work / "checkpoint.bin").write_bytes(b"half")
     done = correct(STEMS, run)
     assert done.returncode == 3 and str(run) in done.stderr, done.stderr
-    assert (run / "work" / "checkpoint.bin").read_bytes() == b"half"
+    assert (work / "checkpoint.bin").read_bytes() == b"half"
     assert correct(STEMS, run, "--overwrite").returncode == 0
-    assert (run / "trajectory.tum").exists() and not (run / "work" / "checkpoint.bin").exists()
+    assert (run / "trajectory.tum").exists() and not work.exists()
     return done.stderr.strip().replace(str(run), run.name)
 
 

@@ -351,7 +351,7 @@ def wrong(folder):
         done = sparse(REC, folder / "run", *words)
         assert done.returncode == 2 and words[0].lstrip('-') in done.stderr, (words, done.stderr)
     done = program("map", "--resume", RUN)
-    assert done.returncode == 3 and "no checkpoint" in done.stderr, done.stderr
+    assert done.returncode == 3 and "nothing to go on with" in done.stderr, done.stderr
     done = sparse(folder / "none.mcap", folder / "run")
     assert done.returncode == 3 and "none.mcap" in done.stderr, done.stderr
     plain = folder / "plain.mcap"

@@ -158,15 +158,16 @@ def nothing(folder):
     done = program("merge", a, far, "-o", folder / "both")
     assert done.returncode == 4 and "--align" in done.stderr, done
     (folder / "bad.csv").write_text("name\nspruce\n")
-    done = program("merge", a, folder / "bad.csv", "-o", folder / "both")
+    done = program("merge", a, folder / "bad.csv", "-o", folder / "bad")
     assert done.returncode == 3 and "bad.csv" in done.stderr, done
+    assert not (folder / "bad").exists()
     assert program("merge", a, "-o", folder / "both").returncode == 2
     run = folder / "run"
     run.mkdir()
     before = write(run / "trees.csv", stand(50)).read_bytes()
     for maps in ((run, a), (a, run / "trees.csv")):
         done = program("merge", *maps, "-o", run)
-        assert done.returncode == 2 and "one of its own" in done.stderr, done
+        assert done.returncode == 3 and "holds the input" in done.stderr, done
     assert (run / "trees.csv").read_bytes() == before
     for option in ("--weight", "--reach-m"):
         done = program("merge", a, a, "-o", folder / "both", option, "nan")

@@ -15,6 +15,10 @@ inline constexpr int kExitUsage = 2;
 inline constexpr int kExitBadInput = 3;
 inline constexpr int kExitUntrusted = 4;
 
+// The meaning of --overwrite for commands that write a folder of results.
+inline constexpr const char* kOverwriteMeaning =
+    "Replace the results that an earlier run left in the folder";
+
 // What every subcommand is given: messages and progress go to stderr, results to stdout.
 struct CommandContext {
   Log& log;

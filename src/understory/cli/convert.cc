@@ -13,6 +13,8 @@
 #include "understory/recording/cloud_folder_writer.h"
 #include "understory/recording/mcap_writer.h"
 #include "understory/util/error.h"
+#include "understory/util/output_guard.h"
+#include "understory/util/staged_output.h"
 
 namespace understory {
 namespace {
@@ -23,28 +25,37 @@ struct ConvertOptions {
   OpenOptions open;
   std::string format;
   std::string compression = "zstd";
+  bool overwrite = false;
 };
 
-// What a recording is written to.
+// What a recording is written to; it appears with `commit`.
 class Target {
  public:
   virtual ~Target() = default;
   virtual void set_rig(const Rig& rig) = 0;
   virtual void write(const Event& event) = 0;
   virtual void finish() = 0;
+  virtual void commit() = 0;
+  [[nodiscard]] virtual bool replaces() const = 0;
 };
 
-template <typename Writer>
+// `Staged` tells the writer where to write.
+template <typename Writer, typename Staged>
 class TargetOf : public Target {
  public:
   template <typename... Arguments>
-  explicit TargetOf(Arguments&&... arguments) : writer_(std::forward<Arguments>(arguments)...) {}
+  explicit TargetOf(std::unique_ptr<Staged> staged, Arguments&&... arguments)
+      : staged_(std::move(staged)),
+        writer_(staged_->part().string(), std::forward<Arguments>(arguments)...) {}
   void set_rig(const Rig& rig) override { writer_.set_rig(rig); }
   void write(const Event& event) override { writer_.write(event); }
   void finish() override { writer_.finish(); }
+  void commit() override { staged_->commit(); }
+  [[nodiscard]] bool replaces() const override { return staged_->replaces(); }
 
  private:
-  Writer writer_;
+  std::unique_ptr<Staged> staged_;
+  Writer writer_;  // is let go of first
 };
 
 // Each return's own time goes into the GPS time.
@@ -69,19 +80,14 @@ std::unique_ptr<Target> make_target(const ConvertOptions& options) {
     mcap.compression = options.compression == "zstd"  ? McapCompression::kZstd
                        : options.compression == "lz4" ? McapCompression::kLz4
                                                       : McapCompression::kNone;
-    return std::make_unique<TargetOf<McapWriter>>(options.output, mcap);
+    return std::make_unique<TargetOf<McapWriter, StagedFile>>(
+        std::make_unique<StagedFile>(options.output, options.overwrite), mcap);
   }
   const std::string ending = "." + (options.format.empty() ? "pcd" : options.format);
   CloudWriter writer = cloud_writer(ending);
   if (!writer) writer = write_las_cloud;
-  return std::make_unique<TargetOf<CloudFolderWriter>>(options.output, ending, std::move(writer));
-}
-
-// An input must not be overwritten while it is read.
-void refuse_same_place(const ConvertOptions& options) {
-  std::error_code error;
-  if (std::filesystem::equivalent(options.input, options.output, error) && !error)
-    throw OutputError(options.output, "is the input itself");
+  return std::make_unique<TargetOf<CloudFolderWriter, StagedFolder>>(
+      std::make_unique<StagedFolder>(options.output), ending, std::move(writer));
 }
 
 // A folder of clouds by the name of a file is a slip: "stems.csv" for "stems.csv.gz".
@@ -96,13 +102,16 @@ void refuse_other_files(const ConvertOptions& options) {
 }
 
 int run_convert(const ConvertOptions& options, CommandContext& context) {
-  refuse_same_place(options);
+  if (options.output.empty()) throw ConfigError({"OUT is empty"});
+  refuse_input_as_output(options.output, files_of(options.input, options.open));
   if (is_stems_file(options.output))
-    return convert_to_stems(options.input, options.output, options.open, context);
+    return convert_to_stems(options.input, options.output, options.open, options.overwrite,
+                            context);
   refuse_other_files(options);
+  // Before the work on what it is to hold: a place that cannot be written is told at once.
+  const std::unique_ptr<Target> target = make_target(options);
   const std::unique_ptr<Recording> recording =
       open_source(options.input, options.open, context.log);
-  const std::unique_ptr<Target> target = make_target(options);
   std::uint64_t scans = 0;
   std::uint64_t events = 0;
   bool stopped = false;
@@ -134,11 +143,10 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
     stopped = context.stop_requested();
   }
   if (!has_rig) begin();
-  target->finish();
-  if (stopped) context.log.warn("convert.stopped", "stopped before the end: the output is partial");
   if (events == 0)
     throw InputError(options.input, "", "expected scans, IMU samples or fixes; found none");
-  return stopped ? kExitUntrusted : kExitDone;
+  target->finish();
+  return commit_unless_stopped(*target, stopped, options.output, context);
 }
 
 }  // namespace
@@ -152,6 +160,7 @@ void add_convert_command(CLI::App& app, Command& chosen) {
   command->add_option("IN", options->input, "Recording: file or folder, or sim:SITE?key=value")
       ->required();
   command->add_option("OUT", options->output, "File .mcap or .csv.gz, or a folder")->required();
+  command->add_flag("--overwrite", options->overwrite, "Replace a file OUT that is there already");
   command->add_option("--format", options->format, "Clouds of a folder (default pcd)")
       ->check(CLI::IsMember({"pcd", "ply", "las", "laz", "bin"}));
   command->add_option("--compression", options->compression, "Chunks of an MCAP file")

@@ -12,6 +12,7 @@
 #include "understory/pipeline/source.h"
 #include "understory/recording/cloud_file.h"
 #include "understory/util/error.h"
+#include "understory/util/staged_output.h"
 
 namespace understory {
 namespace {
@@ -31,8 +32,7 @@ void write(const StemSegments& found, const Pose& body_from_points, int frame, T
     writer.add(frame, stamp, stem_of(segment, body_from_points, found.up));
 }
 
-int convert_cloud_to_stems(const std::string& input, const std::string& output,
-                           CommandContext& context) {
+int convert_cloud_to_stems(const std::string& input, StagedFile& staged, CommandContext& context) {
   const PointCloudFile cloud = read_cloud(input, context.log);
   const StemSegments found = find_stem_segments(cloud.points, {});
   if (found.stems.empty())
@@ -46,9 +46,10 @@ int convert_cloud_to_stems(const std::string& input, const std::string& output,
         fmt::format("stems are told from {:.3f} {:.3f} {:.3f}", shift.x(), shift.y(), shift.z()));
     shift.setZero();
   }
-  StemsWriter writer(output);
+  StemsWriter writer(staged.part());
   write(found, Pose(Eigen::Quaterniond::Identity(), shift), 0, 0, writer);
   writer.commit();
+  staged.commit();
   return kExitDone;
 }
 
@@ -61,10 +62,11 @@ bool is_stems_file(const std::string& output) {
 }
 
 int convert_to_stems(const std::string& input, const std::string& output, const OpenOptions& open,
-                     CommandContext& context) {
-  if (is_cloud(input)) return convert_cloud_to_stems(input, output, context);
+                     bool overwrite, CommandContext& context) {
+  StagedFile staged(output, overwrite);
+  if (is_cloud(input)) return convert_cloud_to_stems(input, staged, context);
   const std::unique_ptr<Recording> recording = open_source(input, open, context.log);
-  StemsWriter writer(output);
+  StemsWriter writer(staged.part());
   std::optional<Eigen::Vector3d> up;
   int frame = 0;
   std::size_t stems = 0;
@@ -92,8 +94,7 @@ int convert_to_stems(const std::string& input, const std::string& output, const 
   if (stems == 0)
     throw InputError(input, "", fmt::format("no upright stems in any of its {} scans", frame));
   writer.commit();
-  if (stopped) context.log.warn("convert.stopped", "stopped before the end: the output is partial");
-  return stopped ? kExitUntrusted : kExitDone;
+  return commit_unless_stopped(staged, stopped, output, context);
 }
 
 }  // namespace understory

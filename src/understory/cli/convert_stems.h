@@ -4,6 +4,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/recording/recording.h"
+#include "understory/util/log.h"
 
 namespace understory {
 
@@ -14,6 +15,21 @@ namespace understory {
 // a scan is not taken out), or those of a cloud (.las, .laz, .ply, .pcd) that is a map. Returns the
 // exit code. Throws InputError where there is none.
 [[nodiscard]] int convert_to_stems(const std::string& input, const std::string& output,
-                                   const OpenOptions& open, CommandContext& context);
+                                   const OpenOptions& open, bool overwrite,
+                                   CommandContext& context);
+
+// Puts the output in place. What is there of a conversion that Ctrl-C stopped is put there, too,
+// but not in the place of a whole one. Returns the exit code.
+template <typename Staged>
+[[nodiscard]] int commit_unless_stopped(Staged& staged, bool stopped, const std::string& output,
+                                        CommandContext& context) {
+  const bool keep = stopped && staged.replaces();
+  if (!keep) staged.commit();
+  if (!stopped) return kExitDone;
+  context.log.warn("convert.stopped",
+                   keep ? "stopped before the end: " + output + " is left as it was"
+                        : "stopped before the end: the output is partial");
+  return kExitUntrusted;
+}
 
 }  // namespace understory

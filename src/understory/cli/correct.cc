@@ -5,6 +5,7 @@
 #include "understory/cli/outcome.h"
 #include "understory/pipeline/correction.h"
 #include "understory/util/error.h"
+#include "understory/util/output_guard.h"
 
 namespace understory {
 namespace {
@@ -30,6 +31,7 @@ int run_correct(const CorrectOptions& options, CommandContext& context) {
   }
   if (options.stems.empty() || options.run_folder.empty())
     throw ConfigError({"understory correct needs STEMS.csv.gz or a run, and -o RUN"});
+  refuse_input_as_output(options.run_folder, {options.config_file});
   request.stems = options.stems;
   request.run_folder = options.run_folder;
   request.overwrite = options.overwrite;
@@ -53,8 +55,7 @@ void add_correct_command(CLI::App& app, Command& chosen) {
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false)
       ->take_all();
-  command->add_flag("--overwrite", options->overwrite,
-                    "Even if the folder holds an unfinished mapping run");
+  command->add_flag("--overwrite", options->overwrite, kOverwriteMeaning);
   command->add_flag("--print-config", options->print_config,
                     "Print every setting with default, unit, range and meaning");
   command->footer(

@@ -8,18 +8,23 @@
 namespace understory {
 namespace {
 
-int run_demo(const std::string& folder, CommandContext& context) {
+struct DemoOptions {
+  std::string folder = "demo";
+  bool overwrite = false;
+};
+
+int run_demo(const DemoOptions& options, CommandContext& context) {
   context.log.info(
       "mapping a simulated stand of 40 x 40 m, scanned by a walker with a handheld "
       "128-channel lidar");
   MappingRequest request;
   request.recording = "sim:demo";
-  request.run_folder = folder;
+  request.run_folder = options.folder;
   ReadConfig<MappingConfig> read = read_mapping_config("handheld", "", {});
   request.config = std::move(read.config);
   request.config_origins = std::move(read.origins);
   request.config_yaml = mapping_table(request.config).to_yaml(false);
-  request.overwrite = true;
+  request.overwrite = options.overwrite;
   return report_outcome(
       run_mapping(request, context.log, context.progress, context.stop_requested));
 }
@@ -28,11 +33,12 @@ int run_demo(const std::string& folder, CommandContext& context) {
 
 void add_demo_command(CLI::App& app, Command& chosen) {
   auto* command = app.add_subcommand("demo", "Simulate a small stand, map it, show the report");
-  const auto folder = std::make_shared<std::string>("demo");
-  command->add_option("-o,--output", *folder, "Run folder to write")->capture_default_str();
+  const auto options = std::make_shared<DemoOptions>();
+  command->add_option("-o,--output", options->folder, "Run folder to write")->capture_default_str();
+  command->add_flag("--overwrite", options->overwrite, kOverwriteMeaning);
   command->footer("Example:\n  understory demo -o /tmp/demo");
-  command->callback([&chosen, folder] {
-    chosen = [folder](CommandContext& context) { return run_demo(*folder, context); };
+  command->callback([&chosen, options] {
+    chosen = [options](CommandContext& context) { return run_demo(*options, context); };
   });
 }
 

@@ -20,6 +20,7 @@ struct GeoreferenceOptions {
   std::vector<double> start;
   bool plain = false;
   bool json = false;
+  bool overwrite = false;
   TerrainFitConfig terrain;
   std::string coordinate_system;
 };
@@ -48,6 +49,7 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
   GeoreferenceRequest request;
   request.run = options.run;
   request.result = options.result;
+  request.overwrite = options.overwrite;
   request.gnss = options.gnss;
   request.terrain_model = options.terrain_model;
   request.terrain = options.terrain;
@@ -110,6 +112,7 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
   command->add_option("--crs", options->coordinate_system,
                       "Coordinate system of trees.gpkg, for instance EPSG:3067 (the UTM zone if "
                       "not given)");
+  command->add_flag("--overwrite", options->overwrite, kOverwriteMeaning);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->footer(
       "Examples:\n  understory georeference forest --method gnss-path --gnss drive.nmea -o placed\n"

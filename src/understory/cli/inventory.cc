@@ -14,6 +14,7 @@
 #include "understory/pipeline/run_folder.h"
 #include "understory/recording/cloud_file.h"
 #include "understory/util/error.h"
+#include "understory/util/output_guard.h"
 #include "understory/util/version.h"
 
 namespace understory {
@@ -39,12 +40,6 @@ fs::path cloud_of(const std::string& given) {
     throw InputError(given, "", "expected a point cloud, or a run folder with a map.laz in it");
   }
   return map;
-}
-
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw OutputError(folder.string(), "cannot be made: " + error.message());
 }
 
 PointBlocks blocks_of(const PointCloudFile& cloud) {
@@ -114,13 +109,9 @@ int run_inventory(const InventoryOptions& options, CommandContext& context) {
     throw ConfigError({"inventory needs a cloud (or run folder) and -o DIR; see --help"});
   }
   const fs::path path = cloud_of(options.cloud);
-  const fs::path folder(options.folder);
-  std::error_code ignored;  // what does not exist yet is not the run
-  if (fs::equivalent(path.parent_path(), folder, ignored) && fs::exists(folder / "run.json"))
-    throw ConfigError({"the inventory needs a folder of its own: " + folder.string() +
-                       " holds the run that made the cloud"});
-  if (!options.overwrite) refuse_unfinished_run(folder);
-  make_folder(folder);
+  refuse_input_as_output(options.folder, {options.cloud, path, options.config_file});
+  const RunFolder place = RunFolder::claim(options.folder, options.overwrite);
+  const fs::path folder = place.begin_results();
   StageTimes times;
   PointCloudFile cloud;
   {
@@ -165,8 +156,10 @@ int run_inventory(const InventoryOptions& options, CommandContext& context) {
   for (const std::string& remark : inventory.remarks)
     summary.warnings.push_back({"inventory", remark, 1});
   write_run_json(folder / "run.json", summary);
+  place.commit(context.log);
+  place.forget_state();
   std::printf("%zu trees on %.2f ha; see %s\n", inventory.trees.size(), inventory.area_m2 / 1e4,
-              (folder / "report.html").string().c_str());
+              (place.path() / "report.html").string().c_str());
   for (const std::string& reason : summary.reasons)
     std::fprintf(stderr, "%s: %s\n", to_string(summary.status).c_str(), reason.c_str());
   return summary.status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
@@ -184,8 +177,7 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_option("--config", options->config_file, "YAML file with settings");
   command->add_option("--set", options->settings, "key=value, may be repeated");
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
-  command->add_flag("--overwrite", options->overwrite,
-                    "Even if the folder holds an unfinished mapping run");
+  command->add_flag("--overwrite", options->overwrite, kOverwriteMeaning);
   command->footer(
       "Writes trees.csv, trees.gpkg, dtm.tif, chm.tif, report.html and run.json.\n"
       "Example:\n  understory inventory plot.laz -o plot-inventory");

@@ -9,6 +9,7 @@
 #include "understory/cli/terminal.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
+#include "understory/util/staged_output.h"
 #include "understory/util/version.h"
 
 namespace understory {
@@ -28,9 +29,9 @@ int run_guarded(const Command& command, CommandContext& context) {
   } catch (const ConfigError& error) {
     return complain(kExitUsage, error.what());
   } catch (const InputError& error) {
-    return complain(kExitBadInput, error.what());
+    return complain(kExitBadInput, with_names_asked_for(error.what()));
   } catch (const OutputError& error) {
-    return complain(kExitBadInput, error.what());
+    return complain(kExitBadInput, with_names_asked_for(error.what()));
   } catch (const std::bad_alloc&) {
     return complain(kExitDefect, "out of memory");
   } catch (const std::exception& error) {

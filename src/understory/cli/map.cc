@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <filesystem>
 #include <functional>
 #include <memory>
 
@@ -9,10 +8,12 @@
 #include "understory/cli/outcome.h"
 #include "understory/pipeline/adaptation.h"
 #include "understory/pipeline/mapping.h"
+#include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_state.h"
 #include "understory/pipeline/source.h"
 #include "understory/pipeline/sparse_mapping.h"
 #include "understory/util/error.h"
+#include "understory/util/output_guard.h"
 
 namespace understory {
 namespace {
@@ -35,11 +36,11 @@ struct MapOptions {
 int with_advice(const std::string& run_folder, const std::function<int()>& work) {
   try {
     return work();
+  } catch (const RefusedOutput&) {
+    throw;
   } catch (const OutputError& error) {
-    const auto checkpoint = std::filesystem::path(run_folder) / "work" / "checkpoint.bin";
-    std::error_code ignored;
     const std::string said = error.what();
-    if (!std::filesystem::exists(checkpoint, ignored) || said.find("--resume") != said.npos) throw;
+    if (!holds_unfinished_run(run_folder) || said.find("--resume") != said.npos) throw;
     const std::string file = error.file() + ": ";
     throw OutputError(error.file(), said.substr(said.rfind(file, 0) == 0 ? file.size() : 0) +
                                         "; what was mapped so far is kept: make room and go on "
@@ -102,6 +103,8 @@ int run_map(const MapOptions& options, CommandContext& context) {
   request.run_folder = options.run_folder;
   request.config = std::move(read.config);
   request.config_origins = std::move(read.origins);
+  refuse_run_over_inputs(request.run_folder, request.recording, options.open,
+                         {options.config_file, request.config.odometry.machine_boxes_file});
   request.config_yaml = mapping_table(request.config).to_yaml(false);
   request.open = options.open;
   request.realtime = options.realtime;
@@ -135,7 +138,7 @@ void add_map_command(CLI::App& app, Command& chosen) {
                     "Play the recording at sensor speed; late scans are dropped "
                     "(time_repair.window_s is 0, of stems also stems.pace.longest_gap_s)");
   command->add_flag("--overwrite", options->overwrite,
-                    "Start anew although the run folder holds an unfinished run");
+                    "Start anew although the run folder holds a run, finished or not");
   command->add_flag(
       "--print-config", options->print_config,
       "Print every setting with default, unit, range and meaning; with a RECORDING the "

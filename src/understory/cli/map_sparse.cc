@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "understory/cli/open_options.h"
 #include "understory/cli/outcome.h"
 #include "understory/pipeline/adaptation.h"
 #include "understory/pipeline/source.h"
@@ -40,6 +41,9 @@ int run_sparse_map(const SparseMapOptions& options, CommandContext& context) {
     throw ConfigError({"understory map --front-end sparse needs a RECORDING and -o RUN"});
   request.recording = options.recording;
   request.run_folder = options.run_folder;
+  refuse_run_over_inputs(request.run_folder, request.recording, options.open,
+                         {options.config_file, request.config.machine_boxes_file,
+                          request.config.correction.felling.head_log});
   request.config_yaml = sparse_mapping_table(request.config).to_yaml(false);
   request.open = options.open;
   request.realtime = options.realtime;

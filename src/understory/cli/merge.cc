@@ -12,9 +12,13 @@
 #include "understory/evaluation/tree_errors.h"
 #include "understory/evaluation/tree_falls.h"
 #include "understory/evaluation/tree_merge.h"
-#include "understory/output/atomic_file.h"
+#include "understory/output/run_summary.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/run_folder.h"
+#include "understory/util/atomic_file.h"
 #include "understory/util/error.h"
+#include "understory/util/output_guard.h"
+#include "understory/util/version.h"
 
 namespace understory {
 namespace {
@@ -29,6 +33,7 @@ struct MergeOptions {
   double weight = 0.5;
   bool align = false;
   bool json = false;
+  bool overwrite = false;
   TreeMergeConfig merge;
 };
 
@@ -79,19 +84,30 @@ std::vector<TreeFall> falls_in(const std::string& map) {
   return fs::exists(file) ? read_tree_falls(file) : std::vector<TreeFall>();
 }
 
-// The merged list would replace the one that it was made of.
-void refuse_own_folder(const MergeOptions& options) {
-  for (const std::string& map : {options.s, options.l, options.reference}) {
-    if (map.empty()) continue;
-    const fs::path folder = fs::absolute(file_in_folder(map, "trees.csv")).parent_path();
-    std::error_code error;
-    if (fs::equivalent(folder / "trees.csv", fs::path(options.folder) / "trees.csv", error))
-      throw ConfigError({"-o is the folder of " + map + ": the merged map needs one of its own"});
+// What the folder has to say of itself.
+void write_summary(const fs::path& path, const MergeOptions& options, const MergedTrees& merged,
+                   const DeformationField& field, const Log& log) {
+  RunSummary summary;
+  summary.command = "merge";
+  summary.version = kVersion;
+  summary.config_yaml = fmt::format("weight: {}\nalign: {}\n", options.weight, options.align);
+  for (const std::string& map : {options.s, options.l})
+    summary.inputs.push_back(hash_input(file_in_folder(map, "trees.csv")));
+  if (merged.joined == 0) {
+    summary.status = RunStatus::kUntrusted;
+    summary.reasons.emplace_back("no tree of one map lies near one of the other");
   }
+  summary.warnings = log.warnings();
+  summary.counts["trees"] = static_cast<std::int64_t>(merged.trees.size());
+  summary.counts["joined"] = static_cast<std::int64_t>(merged.joined);
+  summary.quality["apart_m"] = merged.apart_m;
+  summary.quality["deformation_m"] = field.mean_m;
+  write_run_json(path, summary);
 }
 
 int merge(const MergeOptions& options, CommandContext& context) {
-  refuse_own_folder(options);
+  refuse_input_as_output(options.folder, {options.s, options.l, options.reference});
+  const RunFolder place = RunFolder::claim(options.folder, options.overwrite);
   const std::vector<Tree> s = read_trees(file_in_folder(options.s, "trees.csv"));
   const std::vector<Tree> l = beside(options.l, s, options);
   const DeformationField field = deformation_field(l, s, options.merge);
@@ -105,12 +121,13 @@ int merge(const MergeOptions& options, CommandContext& context) {
     context.log.warn("merge",
                      "no tree of one map lies near one of the other: they may have "
                      "different world frames (--align)");
-  std::error_code error;
-  fs::create_directories(options.folder, error);
-  if (error) throw OutputError(options.folder, "cannot be made: " + error.message());
-  write_trees_csv(fs::path(options.folder) / "trees.csv", merged.trees);
-  write_tree_falls(fs::path(options.folder) / "felled.csv", falls);
-  write_field(fs::path(options.folder) / "deformation.csv", l, field);
+  const fs::path results = place.begin_results();
+  write_trees_csv(results / "trees.csv", merged.trees);
+  write_tree_falls(results / "felled.csv", falls);
+  write_field(results / "deformation.csv", l, field);
+  write_summary(results / "run.json", options, merged, field, context.log);
+  place.commit(context.log);
+  place.forget_state();
   nlohmann::ordered_json json{{"trees_a", s.size()},          {"trees_b", l.size()},
                               {"trees", merged.trees.size()}, {"joined", merged.joined},
                               {"apart_m", merged.apart_m},    {"deformation_m", field.mean_m},
@@ -136,7 +153,7 @@ void add_merge_command(CLI::App& app, Command& chosen) {
   command->add_option("B", options->l, "Run folder or trees.csv")->required();
   command
       ->add_option("-o,--output", options->folder,
-                   "Folder for trees.csv, felled.csv and deformation.csv")
+                   "Folder for trees.csv, felled.csv, deformation.csv and run.json")
       ->required();
   command
       ->add_option("--weight", options->weight,
@@ -164,6 +181,7 @@ void add_merge_command(CLI::App& app, Command& chosen) {
                    "Rounds of smoothing of the difference over neighbouring trees")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
+  command->add_flag("--overwrite", options->overwrite, kOverwriteMeaning);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->footer("Example:\n  understory merge monday tuesday --align -o both");
   command->callback([&chosen, options] {

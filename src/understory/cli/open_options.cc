@@ -1,5 +1,8 @@
 #include "understory/cli/open_options.h"
 
+#include "understory/pipeline/source.h"
+#include "understory/util/output_guard.h"
+
 namespace understory {
 
 void add_open_options(CLI::App& command, OpenOptions& options) {
@@ -11,6 +14,13 @@ void add_open_options(CLI::App& command, OpenOptions& options) {
   command.add_option("--gnss-topic", options.gnss_topic, "Topic of the GNSS, if there are more");
   command.add_option("--extrinsics", options.extrinsics_file,
                      "YAML with body_from_lidar, body_from_imu, body_from_gnss");
+}
+
+void refuse_run_over_inputs(const std::filesystem::path& run_folder, const std::string& recording,
+                            const OpenOptions& options, const std::vector<std::string>& more) {
+  std::vector<std::filesystem::path> inputs = files_of(recording, options);
+  inputs.insert(inputs.end(), more.begin(), more.end());
+  refuse_input_as_output(run_folder, inputs);
 }
 
 }  // namespace understory

@@ -8,7 +8,10 @@
 #include "understory/recording/mcap_writer.h"
 #include "understory/simulation/field_log.h"
 #include "understory/simulation/simulator.h"
+#include "understory/simulation/truth.h"
 #include "understory/util/error.h"
+#include "understory/util/output_guard.h"
+#include "understory/util/staged_output.h"
 
 namespace understory {
 namespace {
@@ -21,6 +24,7 @@ struct SimulateOptions {
   std::string duration_s;
   bool list = false;
   bool keys = false;
+  bool overwrite = false;
 };
 
 int list_sites() {
@@ -37,10 +41,38 @@ int print_keys(const SimulateOptions& options) {
   return kExitDone;
 }
 
-std::string truth_folder(const std::string& output) {
-  std::filesystem::path path(output);
-  return path.replace_extension(".truth").string();
+std::filesystem::path beside(std::filesystem::path output, const std::string& ending) {
+  return output.replace_extension(ending);
 }
+
+// The files of one recording. They appear together.
+class Outputs {
+ public:
+  Outputs(const SimulateOptions& options, bool capture)
+      : place_(place_of_file(options.output, options.overwrite)),
+        truth_(beside(place_, ".truth"), options.overwrite ? StagedFolder::NameTest(is_truth_file)
+                                                           : StagedFolder::NameTest()) {
+    files_.push_back(std::make_unique<StagedFile>(place_, options.overwrite));
+    if (!capture) return;
+    for (const char* ending : {".nmea", ".extrinsics.yaml"})
+      files_.push_back(std::make_unique<StagedFile>(beside(place_, ending), options.overwrite));
+  }
+
+  // Of the recording itself; what lies beside it is named after it.
+  [[nodiscard]] std::string part() const { return files_.front()->part().string(); }
+  [[nodiscard]] std::string truth_part() const { return truth_.part().string(); }
+  [[nodiscard]] bool replaces() const { return truth_.replaces() || files_.front()->replaces(); }
+  void commit() {
+    truth_.commit();
+    for (const auto& file : files_)
+      file->commit();
+  }
+
+ private:
+  std::filesystem::path place_;
+  StagedFolder truth_;
+  std::vector<std::unique_ptr<StagedFile>> files_;
+};
 
 // Writes all events to a recording of either kind; false if it was stopped.
 template <typename Writer>
@@ -61,23 +93,44 @@ bool write_events(Simulator& simulator, Writer& writer, CommandContext& context)
   return !stopped;
 }
 
+// No file that the site is read from is replaced, by whichever of the outputs; and every place is
+// looked at before anything is made in one of them.
+void refuse_places(const SimulateOptions& options, bool capture) {
+  std::vector<std::filesystem::path> inputs;
+  for (const std::string& file : site_files(options.site, options.settings))
+    inputs.emplace_back(file);
+  refuse_input_as_output(options.output, inputs);
+  for (const char* ending : {".nmea", ".extrinsics.yaml", ".truth"})
+    refuse_input_as_output(beside(options.output, ending), inputs);
+  if (!capture) return;
+  for (const char* ending : {".nmea", ".extrinsics.yaml"})
+    (void)place_of_file(beside(options.output, ending), options.overwrite);
+}
+
 int simulate(const SimulateOptions& options, CommandContext& context) {
   const std::string ending = std::filesystem::path(options.output).extension().string();
-  if (ending != ".mcap" && ending != ".pcap")
+  const bool capture = ending == ".pcap";
+  if (ending != ".mcap" && !capture)
     throw ConfigError({"-o " + options.output + ": expected a name that ends in .mcap or .pcap"});
+  refuse_places(options, capture);
+  Outputs outputs(options, capture);
   Simulator simulator(load_site(options.site, options.settings));
   bool whole = false;
-  if (ending == ".pcap") {
-    FieldLogWriter writer(options.output, simulator.site(), simulator.rig());
+  if (capture) {
+    FieldLogWriter writer(outputs.part(), simulator.site(), simulator.rig());
     whole = write_events(simulator, writer, context);
   } else {
-    McapWriter writer(options.output);
+    McapWriter writer(outputs.part());
     writer.set_rig(simulator.rig());
     whole = write_events(simulator, writer, context);
   }
-  const std::string truth = truth_folder(options.output);
-  simulator.write_truth(truth);
-  std::printf("%s\n%s\n", options.output.c_str(), truth.c_str());
+  simulator.write_truth(outputs.truth_part());
+  if (!whole && outputs.replaces()) {
+    context.log.warn("simulate.stopped", "stopped early: " + options.output + " is left as it was");
+    return kExitUntrusted;
+  }
+  outputs.commit();
+  std::printf("%s\n%s\n", options.output.c_str(), beside(options.output, ".truth").c_str());
   if (!whole) context.log.warn("simulate.stopped", "stopped early: the recording is partial");
   return whole ? kExitDone : kExitUntrusted;
 }
@@ -102,6 +155,8 @@ void add_simulate_command(CLI::App& app, Command& chosen) {
   command->add_option("site", options->site, "Name of a shipped site, or a site's YAML file");
   command->add_option("-o,--output", options->output,
                       "Recording to write: REC.mcap, or REC.pcap for a VLP-16");
+  command->add_flag("--overwrite", options->overwrite,
+                    "Replace the recording and the truth that are there already");
   command->add_option("--seed", options->seed, "Seed of everything random");
   command->add_option("--duration-s", options->duration_s, "Length of the recording in seconds");
   command->add_option("--set", options->settings, "Change a key of the site: key=value");

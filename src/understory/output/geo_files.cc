@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "understory/geometry/quiet_gdal.h"
-#include "understory/output/atomic_file.h"
+#include "understory/util/atomic_file.h"
 #include "understory/util/error.h"
 
 namespace understory {

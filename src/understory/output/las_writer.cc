@@ -14,7 +14,7 @@
 
 #include <laszip/laszip_api.h>
 
-#include "understory/output/atomic_file.h"
+#include "understory/util/atomic_file.h"
 #include "understory/util/error.h"
 
 namespace understory {

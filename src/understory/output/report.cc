@@ -1,8 +1,8 @@
 #include "understory/output/report.h"
 
-#include "understory/output/atomic_file.h"
 #include "understory/output/report_parts.h"
 #include "understory/output/svg_plot.h"
+#include "understory/util/atomic_file.h"
 
 namespace understory {
 

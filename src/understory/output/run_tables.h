@@ -10,9 +10,9 @@
 #include "understory/forest/tree.h"
 #include "understory/forest/tree_fall.h"
 #include "understory/geometry/stamped_pose.h"
-#include "understory/output/atomic_file.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/stem_view.h"
+#include "understory/util/atomic_file.h"
 
 namespace understory {
 

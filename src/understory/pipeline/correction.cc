@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
-#include <nlohmann/json.hpp>
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/pipeline/correction_files.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/recording/stems_file.h"
 #include "understory/util/error.h"
+#include "understory/util/output_guard.h"
 
 namespace understory {
 namespace {
@@ -63,35 +62,14 @@ std::filesystem::path stems_of(const CorrectionRequest& request) {
                    "--front-end sparse`");
 }
 
-// A mapped or moved run would lose its poses of scans and its fixes to the results of a correction;
-// those of an earlier correction are there to be replaced.
-void refuse_own_folder(const CorrectionRequest& request) {
-  const std::filesystem::path from = std::filesystem::absolute(stems_of(request)).parent_path();
-  std::error_code error;
-  if (!std::filesystem::equivalent(from, request.run_folder, error)) return;
-  std::ifstream file(from / "run.json");
-  if (!file) return;
-  const auto json = nlohmann::json::parse(file, nullptr, false);
-  if (json.is_object() && json.value("command", "") != "correct")
-    throw ConfigError(
-        {"-o is the folder of the run that holds the stems: the corrected run needs "
-         "a folder of its own"});
+// All that is read, where the stems are not those that a mapping run has just found.
+std::vector<std::filesystem::path> inputs_of(const CorrectionRequest& request) {
+  return {request.stems, request.config.felling.head_log};
 }
 
-}  // namespace
-
-void describe(ConfigTable& table, CorrectionConfig& config) {
-  table.section("odometry", [&] { describe(table, config.odometry); });
-  describe(table, config.stems);
-  table.section("tree_list", [&] { describe(table, config.tree_list); });
-  table.section("felling", [&] { describe(table, config.felling); });
-}
-
-CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
-                                 const ProgressSink& progress,
-                                 const StopRequested& stop_requested) {
-  if (!request.overwrite) refuse_unfinished_run(request.run_folder);
-  if (request.scans == nullptr) refuse_own_folder(request);
+CorrectionOutcome correct_into_results(const CorrectionRequest& request, Log& log,
+                                       const ProgressSink& progress,
+                                       const StopRequested& stop_requested) {
   CorrectionRun run;
   {
     const ScopedTimer timer(run.times, "reading");
@@ -120,6 +98,29 @@ CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
     run.correction = correct_stems(run.views, run.steps, request.config.stems, run.times);
   }
   return write_correction(request, run, log);
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, CorrectionConfig& config) {
+  table.section("odometry", [&] { describe(table, config.odometry); });
+  describe(table, config.stems);
+  table.section("tree_list", [&] { describe(table, config.tree_list); });
+  table.section("felling", [&] { describe(table, config.felling); });
+}
+
+CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
+                                 const ProgressSink& progress,
+                                 const StopRequested& stop_requested) {
+  if (!request.results.empty()) return correct_into_results(request, log, progress, stop_requested);
+  refuse_input_as_output(request.run_folder, inputs_of(request));
+  const RunFolder place = RunFolder::claim(request.run_folder, request.overwrite);
+  CorrectionRequest placed = request;
+  placed.results = place.begin_results();
+  CorrectionOutcome outcome = correct_into_results(placed, log, progress, stop_requested);
+  place.commit(log, stop_requested && stop_requested());
+  place.forget_state();  // of an unfinished run that this one replaces
+  return outcome;
 }
 
 }  // namespace understory

@@ -57,7 +57,10 @@ struct CorrectionRequest {
   // begins, and what is made of it has a row for each of its poses.
   std::filesystem::path stems;
   std::filesystem::path run_folder;
-  bool overwrite = false;  // also a mapping run that is not finished
+  bool overwrite = false;  // what an earlier run left in the folder, finished or not
+  // Where the files are written; the mapping run that has claimed the run folder puts them in
+  // place. Empty: the correction claims the folder itself.
+  std::filesystem::path results;
   CorrectionConfig config;
   std::string config_yaml;  // asked for, every key, for run.json
   ConfigOrigins config_origins;

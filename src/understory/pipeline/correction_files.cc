@@ -13,7 +13,6 @@
 #include "understory/pipeline/correction_report.h"
 #include "understory/pipeline/correction_tables.h"
 #include "understory/pipeline/gnss_fit.h"
-#include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_judgement.h"
 #include "understory/pipeline/run_truth.h"
 #include "understory/pipeline/source.h"
@@ -86,11 +85,11 @@ std::vector<ReportFix> compare_with_gnss(const CorrectionRequest& request, RunSu
   if (request.scans == nullptr || request.scans->fixes.empty()) return drawn;
   const auto antenna = request.scans->source->rig().body_from_gnss;
   const GnssFit fit =
-      fit_to_gnss(read_trajectory(request.run_folder / "trajectory.tum"),
+      fit_to_gnss(read_trajectory(request.results / "trajectory.tum"),
                   antenna ? antenna->translation() : Eigen::Vector3d(Eigen::Vector3d::Zero()),
                   request.scans->fixes, {});
   summary.quality.merge(figures_of(fit));
-  GnssWriter writer(request.run_folder / "gnss.csv");
+  GnssWriter writer(request.results / "gnss.csv");
   const Pose world_from_enu = fit.enu_from_world.inverse();
   for (GnssRow row : fit.rows) {
     row.position_in_world = moved(world_from_enu, row.position_in_world);
@@ -297,13 +296,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
 }  // namespace
 
 CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionRun& run, Log& log) {
-  const fs::path& folder = request.run_folder;
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw OutputError(folder.string(), "cannot be made: " + error.message());
-  // Of a run that this one replaces; the run that calls this keeps its own until it is done.
-  if (request.scans == nullptr) fs::remove(checkpoint_of(folder), error);
-  remove_old_results(folder);
+  const fs::path& folder = request.results;
   const MapViews map = map_views(run);
   std::vector<MappedStem> stems;
   {
@@ -342,9 +335,10 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   CorrectionOutcome outcome;
   outcome.status = summary.status;
   outcome.reasons = summary.reasons;
-  outcome.summary = fmt::format("{} views over {:.0f} m, {} trees, in {:.1f} s; see {}",
-                                run.views.size(), path_length(run.correction.world_from_body),
-                                stems.size(), summary.wall_s, (folder / "report.html").string());
+  outcome.summary =
+      fmt::format("{} views over {:.0f} m, {} trees, in {:.1f} s; see {}", run.views.size(),
+                  path_length(run.correction.world_from_body), stems.size(), summary.wall_s,
+                  (request.run_folder / "report.html").string());
   return outcome;
 }
 

@@ -30,8 +30,8 @@ void write_paths(const CorrectionRequest& request, const CorrectionRun& run) {
     chained = run.path;
     corrected = spread_corrections(chained, corrected);
   }
-  write_tum(request.run_folder / "odometry.tum", chained);
-  write_tum(request.run_folder / "trajectory.tum", corrected);
+  write_tum(request.results / "odometry.tum", chained);
+  write_tum(request.results / "trajectory.tum", corrected);
 }
 
 // How each view was matched to those before it: P0's e and lambda, P1's outlier ratio. Of the first
@@ -87,7 +87,7 @@ void write_corrections(const fs::path& path, const CorrectionRun& run) {
 }  // namespace
 
 void write_correction_tables(const CorrectionRequest& request, const CorrectionRun& run) {
-  const fs::path& folder = request.run_folder;
+  const fs::path& folder = request.results;
   write_paths(request, run);
   write_steps(folder / "steps.csv", run);
   write_loops(folder / "loops.csv", run);

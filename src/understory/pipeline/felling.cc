@@ -6,8 +6,8 @@
 #include <map>
 
 #include "understory/evaluation/table_reader.h"
-#include "understory/output/atomic_file.h"
 #include "understory/output/run_tables.h"
+#include "understory/util/atomic_file.h"
 #include "understory/util/error.h"
 
 namespace understory {

@@ -20,7 +20,9 @@
 #include "understory/pipeline/gnss_fit.h"
 #include "understory/pipeline/moved_map.h"
 #include "understory/pipeline/run_folder.h"
+#include "understory/pipeline/source.h"
 #include "understory/util/error.h"
+#include "understory/util/output_guard.h"
 #include "understory/util/version.h"
 
 namespace understory {
@@ -302,18 +304,17 @@ void write_summary(const GeoreferenceRequest& request, const Run& run, const Mot
 
 }  // namespace
 
-GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& log) {
-  std::error_code error;
-  if (fs::equivalent(request.run, request.result, error))
-    throw ConfigError({"the moved run needs a folder of its own, not that of the run"});
+GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& log) {
+  std::vector<fs::path> inputs = files_of(given.gnss, {});
+  inputs.insert(inputs.end(), {given.run, given.terrain_model});
+  refuse_input_as_output(given.result, inputs);
+  const RunFolder place = RunFolder::claim(given.result, given.overwrite);
+  GeoreferenceRequest request = given;
+  request.result = place.begin_results();
   if (!request.coordinate_system.empty()) (void)CoordinateSystem(request.coordinate_system);
   const Run run = read_run(request.run);
   Motion motion = request.method == GeoreferenceMethod::kTerrain ? by_terrain(request, run)
                                                                  : by_gnss_path(request, run, log);
-  fs::create_directories(request.result, error);
-  if (error) throw OutputError(request.result.string(), "cannot be made: " + error.message());
-  refuse_unfinished_run(request.result);
-  remove_old_results(request.result);
   write_moved_map(request.run, request.result, motion.target_from_world, log);
   if (motion.origin) {
     motion.outcome.figures["origin_latitude_deg"] = motion.origin->latitude_deg;
@@ -338,6 +339,8 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& 
     writer.commit();
   }
   write_summary(request, run, motion, trees, system, log);
+  place.commit(log);
+  place.forget_state();
   return motion.outcome;
 }
 

@@ -24,6 +24,7 @@ enum class GeoreferenceMethod {
 struct GeoreferenceRequest {
   std::filesystem::path run;  // folder with trajectory.tum
   std::filesystem::path result;
+  bool overwrite = false;  // what an earlier run left in the folder of the result
   GeoreferenceMethod method = GeoreferenceMethod::kGnssPath;
   std::string gnss;  // file with fixes; empty: gnss.csv of the run
   Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();

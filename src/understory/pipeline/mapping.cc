@@ -61,7 +61,7 @@ class MappingRun {
     } else {
       request_.conditions.realtime = request_.realtime;
       source_ = learn_traits(std::move(source_), request_.traits);
-      state_.make_folder();
+      state_.forget_former();
       adapt_config();
       // Makes the run resumable from the start.
       state_.save(request_, *session_, *orderer_, log_, 0);
@@ -166,7 +166,10 @@ class MappingRun {
                     "adapted to it");
     }
     if (!stopped) remark_on_input(*session_, source, request_.recording, log_);
-    MappingOutcome outcome = write_run(request_, *session_, facts, source, log_, progress_);
+    MappingOutcome outcome =
+        write_run(request_, state_.folder(), *session_, facts, source, log_, progress_);
+    // What a stopped run has so far is no successor of a former run.
+    state_.folder().commit(log_, stopped && !state_.resumed());
     if (!stopped) state_.remove();
     return outcome;
   }

@@ -1,16 +1,60 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "understory/pipeline/work_folder.h"
+#include "understory/util/log.h"
 
 namespace understory {
 
-// The part of a run folder that an unfinished mapping run goes on from.
-[[nodiscard]] std::filesystem::path checkpoint_of(const std::filesystem::path& run_folder);
+// A folder of results, claimed by one command that writes them. While it is claimed it holds
+// RUN/.understory with
+//   marker    a text that names this program and the version of the format,
+//   lock      held by the process at work; it falls with the process,
+//   results/  results until `commit`, so that what fails leaves those of before as they are,
+// and what a mapping run needs to be resumed. Nothing else in the folder is ever changed or
+// removed but the results of an earlier command, which its run.json names. Not thread-safe.
+class RunFolder {
+ public:
+  // Makes the folder if it is missing and claims it. Throws OutputError, with everything as it
+  // was, if it
+  //   - is no folder or cannot be written,
+  //   - is being written by another process,
+  //   - holds a work folder that is not of this program, or of a newer version,
+  //   - holds a run, finished or not, and `overwrite` is not set,
+  //   - holds a file by the name of a result that no run of this program has left there.
+  [[nodiscard]] static RunFolder claim(const std::filesystem::path& folder, bool overwrite);
+  // Claims that of an unfinished run. Throws InputError if there is none, OutputError as above.
+  [[nodiscard]] static RunFolder reclaim(const std::filesystem::path& folder);
 
-// OutputError if the folder holds a mapping run that is not finished.
-void refuse_unfinished_run(const std::filesystem::path& run_folder);
+  // Lets the folder go. If there is nothing to resume in it, the work folder goes as well, and the
+  // folder if `claim` made it and nothing is in it.
+  ~RunFolder();
+  RunFolder(RunFolder&&) noexcept;
+  RunFolder& operator=(RunFolder&&) noexcept;
 
-// Removes the results that an earlier run left, so that none stands beside those of another.
-void remove_old_results(const std::filesystem::path& run_folder);
+  [[nodiscard]] const std::filesystem::path& path() const;
+  [[nodiscard]] std::filesystem::path work() const;
+  // Where results are written until `commit`. Makes it, empty where it was not. Throws OutputError.
+  [[nodiscard]] std::filesystem::path begin_results() const;
+  // Removes the state of a run from the work folder.
+  void forget_state() const;
+
+  // Puts the results in place, run.json last and with the list of them. Those of the former run
+  // that have no successor go to a folder of their own, RUN/former-N, with the run.json and the
+  // report that they belong to; with `keep_former` all of them do. The log is told. Throws
+  // OutputError.
+  void commit(Log& log, bool keep_former = false) const;
+
+ private:
+  struct Claim;
+  explicit RunFolder(std::unique_ptr<Claim> claim);
+  void put_aside(const std::set<std::string>& former, const std::set<std::string>& made,
+                 Log& log) const;
+  std::unique_ptr<Claim> claim_;
+};
 
 }  // namespace understory

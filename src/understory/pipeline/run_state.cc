@@ -1,7 +1,6 @@
 #include "understory/pipeline/run_state.h"
 
 #include "understory/pipeline/checkpoint.h"
-#include "understory/pipeline/run_folder.h"
 #include "understory/util/error.h"
 #include "understory/util/version.h"
 
@@ -48,20 +47,13 @@ void get_request(BinaryReader& reader, const std::filesystem::path& path, RunReq
 }  // namespace
 
 RunState RunState::create(const RunRequest& request, const std::string& front_end) {
-  if (!request.overwrite) refuse_unfinished_run(request.run_folder);
-  return {request.run_folder / "work", front_end};
-}
-
-void RunState::make_folder() const {
-  std::error_code error;
-  std::filesystem::remove_all(work_, error);
-  std::filesystem::create_directories(work_, error);
-  if (error) throw OutputError(work_.string(), "cannot be created: " + error.message());
+  return {RunFolder::claim(request.run_folder, request.overwrite), front_end};
 }
 
 RunState RunState::reopen(const std::filesystem::path& run_folder, RunRequest& request) {
-  RunState state(run_folder / "work", "");
-  const std::filesystem::path path = state.work_ / kCheckpoint;
+  RunState state(RunFolder::reclaim(run_folder), "");
+  state.resumed_ = true;
+  const std::filesystem::path path = state.work() / kCheckpoint;
   BinaryReader reader(read_checkpoint(path), path.string());
   request.run_folder = run_folder;
   get_request(reader, path, request);
@@ -74,7 +66,7 @@ RunState RunState::reopen(const std::filesystem::path& run_folder, RunRequest& r
 
 void RunState::restore(Resumable& session, EventOrderer& orderer, Log& log, const Rig& rig) const {
   if (events_ == 0) return;
-  BinaryReader reader(state_, (work_ / kCheckpoint).string());
+  BinaryReader reader(state_, (work() / kCheckpoint).string());
   std::vector<Log::Warning> warnings(reader.get<std::uint64_t>());
   for (Log::Warning& warning : warnings) {
     warning.key = reader.get_string();
@@ -106,13 +98,7 @@ void RunState::save(const RunRequest& request, Resumable& session, const EventOr
   writer.put(events);
   writer.put(last_checkpoint_);
   writer.put(state.bytes());
-  write_checkpoint(work_ / kCheckpoint, writer.bytes());
-}
-
-void RunState::remove() {
-  std::error_code ignored;  // what is left over harms nobody
-  std::filesystem::remove_all(work_, ignored);
-  std::filesystem::remove(work_.parent_path(), ignored);  // if nothing came of the run
+  write_checkpoint(work() / kCheckpoint, writer.bytes());
 }
 
 }  // namespace understory

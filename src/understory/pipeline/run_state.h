@@ -5,6 +5,7 @@
 #include <string>
 
 #include "understory/pipeline/resumable.h"
+#include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_request.h"
 #include "understory/preprocess/event_orderer.h"
 
@@ -14,23 +15,26 @@ namespace understory {
 constexpr const char* kDenseFrontEnd = "dense";
 constexpr const char* kSparseFrontEnd = "sparse";
 
-// The part of the run folder that belongs to a run in progress, by either front end: RUN/work with
-// the files of the session and the checkpoint. It is removed when the run is finished.
+// The state of a run in progress, by either front end: the files of the session and the checkpoint
+// in the work folder of the run folder, which is claimed for as long. Gone when the run is
+// finished.
 class RunState {
  public:
-  // Of a run that begins. Writes nothing yet. Throws OutputError if the run folder holds an
-  // unfinished run and `overwrite` is not set.
+  // Of a run that begins. Claims the run folder and leaves what is in it as it is. Throws
+  // OutputError if that is refused (run_folder.h).
   [[nodiscard]] static RunState create(const RunRequest& request, const std::string& front_end);
   // Opens that of a killed run and reads back its request. Throws InputError if there is none.
   [[nodiscard]] static RunState reopen(const std::filesystem::path& run_folder,
                                        RunRequest& request);
 
-  // Makes the run folder and an empty work folder: once the recording is open, so that one that
-  // cannot be read leaves nothing behind and takes no unfinished run away. Throws OutputError if
-  // it cannot be written.
-  void make_folder() const;
+  // Forgets the state of an unfinished run that this one replaces: once the recording is open, so
+  // that one that cannot be read takes no unfinished run away.
+  void forget_former() const { folder_.forget_state(); }
 
-  [[nodiscard]] const std::filesystem::path& work() const { return work_; }
+  [[nodiscard]] const RunFolder& folder() const { return folder_; }
+  [[nodiscard]] std::filesystem::path work() const { return folder_.work(); }
+  // Goes on with an earlier run.
+  [[nodiscard]] bool resumed() const { return resumed_; }
   [[nodiscard]] const std::string& front_end() const { return front_end_; }
   // Events that the checkpoint has behind it; 0 at the start.
   [[nodiscard]] std::uint64_t events() const { return events_; }
@@ -41,15 +45,16 @@ class RunState {
   // Writes a checkpoint: `events` have been taken from the recording.
   void save(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
             const Log& log, std::uint64_t events);
-  // Removes the work folder, and the run folder if there is nothing else in it.
-  void remove();
+  // The run is finished, or nothing came of it: the work folder goes with this object.
+  void remove() { folder_.forget_state(); }
 
  private:
-  RunState(std::filesystem::path work, std::string front_end)
-      : work_(std::move(work)), front_end_(std::move(front_end)) {}
+  RunState(RunFolder folder, std::string front_end)
+      : folder_(std::move(folder)), front_end_(std::move(front_end)) {}
 
-  std::filesystem::path work_;
+  RunFolder folder_;
   std::string front_end_;
+  bool resumed_ = false;
   std::uint64_t events_ = 0;
   TimeNs last_checkpoint_ = 0;
   std::string state_;  // of session, orderer and log, as read

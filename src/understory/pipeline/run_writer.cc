@@ -301,12 +301,11 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
 
 }  // namespace
 
-MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
-                         const RunFacts& facts, const Recording& source, Log& log,
-                         const ProgressSink& progress) {
-  const std::filesystem::path& folder = request.run_folder;
+MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
+                         MappingSession& session, const RunFacts& facts, const Recording& source,
+                         Log& log, const ProgressSink& progress) {
+  const std::filesystem::path folder = place.begin_results();
   StageTimes& times = session.times();
-  remove_old_results(folder);
   const TrajectoryFacts trajectory = write_trajectory(folder, session);
   write_graph(folder, session.map());
   write_fixes(folder, session.fixes());
@@ -323,7 +322,7 @@ MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
     {
       const ScopedTimer timer(times, "finish_gather_map");
       tiles = make_finished_map(session.clouds(), session.map().keyframes(), request.config.map,
-                                folder / "work" / "tiles", progress);
+                                place.work() / "tiles", progress);
     }
     {
       const ScopedTimer timer(times, "finish_inventory");
@@ -363,8 +362,8 @@ MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
   report.loop_closure_enabled = request.config.keyframe_map.loop_closure.enabled;
   report.truth = truth;
   write_report(folder / "report.html", report);
-  return {summary.status, summary.reasons, folder / "report.html",
-          terminal_summary(summary, trajectory, inventory, folder)};
+  return {summary.status, summary.reasons, place.path() / "report.html",
+          terminal_summary(summary, trajectory, inventory, place.path())};
 }
 
 }  // namespace understory

@@ -5,6 +5,7 @@
 
 #include "understory/pipeline/mapping.h"
 #include "understory/pipeline/mapping_session.h"
+#include "understory/pipeline/run_folder.h"
 #include "understory/preprocess/event_orderer.h"
 #include "understory/recording/recording.h"
 
@@ -22,10 +23,11 @@ struct RunFacts {
   std::vector<double> memory_mb;  // resident, at each checkpoint
 };
 
-// Writes the run folder (design: formats): trajectory, states, keyframes, graph, fixes, map, trees,
-// terrain, run.json, report. Every file appears whole or not at all.
-[[nodiscard]] MappingOutcome write_run(const MappingRequest& request, MappingSession& session,
-                                       const RunFacts& facts, const Recording& source, Log& log,
+// Writes the results (design: formats) to where the run folder keeps them until they are put in
+// place: trajectory, states, keyframes, graph, fixes, map, trees, terrain, run.json, report.
+[[nodiscard]] MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
+                                       MappingSession& session, const RunFacts& facts,
+                                       const Recording& source, Log& log,
                                        const ProgressSink& progress);
 
 }  // namespace understory

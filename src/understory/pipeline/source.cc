@@ -22,6 +22,23 @@ std::unique_ptr<Recording> open_source(const std::string& name, const OpenOption
   return open_recording(name, options, log);
 }
 
+std::vector<std::filesystem::path> files_of(const std::string& recording,
+                                            const OpenOptions& options) {
+  std::vector<std::filesystem::path> files = {options.metadata_file, options.extrinsics_file};
+  if (!is_simulation(recording)) {
+    files.emplace_back(recording);
+    return files;
+  }
+  const SimulationUri uri = parse_simulation_uri(recording);
+  std::vector<std::string> settings;
+  for (const std::string& setting : uri.settings) {
+    if (setting.rfind("cache=", 0) != 0) settings.push_back(setting);
+  }
+  for (const std::string& file : site_files(uri.site, settings))
+    files.emplace_back(file);
+  return files;
+}
+
 std::vector<InputHash> hash_inputs(const std::string& recording) {
   std::vector<InputHash> hashes;
   if (is_simulation(recording)) return hashes;

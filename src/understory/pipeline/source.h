@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,5 +20,10 @@ namespace understory {
 
 // Hashes of the recording's files; none for the simulator. Throws InputError.
 [[nodiscard]] std::vector<InputHash> hash_inputs(const std::string& recording);
+
+// The files and folders that opening a recording reads: itself, the metadata and extrinsics that
+// were named, and the site and the trees of a simulation.
+[[nodiscard]] std::vector<std::filesystem::path> files_of(const std::string& recording,
+                                                          const OpenOptions& options);
 
 }  // namespace understory

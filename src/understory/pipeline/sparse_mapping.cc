@@ -64,6 +64,9 @@ class SparseRun {
 
   [[nodiscard]] std::size_t count() { return session_->path().size(); }
   [[nodiscard]] std::size_t kept() { return session_->steps().size(); }
+  [[nodiscard]] const fs::path& results() const { return results_; }
+  // Puts the results in place. What a stopped run has so far is no successor of a former run.
+  void commit(bool stopped) { state_.folder().commit(log_, stopped && !state_.resumed()); }
   void forget_state() { state_.remove(); }
   [[nodiscard]] const SparseMappingRequest& request() const { return request_; }
   // Leaves nothing of a run without a result.
@@ -106,9 +109,10 @@ class SparseRun {
   void open() {
     session_.reset();  // lets go of its files
     source_ = open_source(request_.recording, request_.open, log_);
-    if (state_.events() == 0) state_.make_folder();
+    if (state_.events() == 0) state_.forget_former();
+    results_ = state_.folder().begin_results();
     adapt_config();
-    session_.emplace(request_.config, request_.run_folder / "stems.csv.gz", state_.work(), log_);
+    session_.emplace(request_.config, results_ / "stems.csv.gz", state_.work(), log_);
     orderer_.emplace(request_.config.time_repair, log_);
     events_ = 0;
   }
@@ -174,6 +178,7 @@ class SparseRun {
   const SparseMappingConfig asked_;
   Log& log_;
   RunState state_;
+  fs::path results_;  // where they are written until `commit`
   std::optional<EventOrderer> orderer_;
   std::unique_ptr<Recording> source_;
   std::optional<SparseSession> session_;
@@ -194,9 +199,9 @@ CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, 
   }
   const SparseScans scans = run.scans(stopped);
   CorrectionRequest correction;
-  correction.stems = request.run_folder / "stems.csv.gz";
+  correction.stems = run.results() / "stems.csv.gz";
   correction.run_folder = request.run_folder;
-  correction.overwrite = true;
+  correction.results = run.results();
   correction.config = request.config.correction;
   correction.config_yaml = request.config_yaml;
   correction.config_origins = request.config_origins;
@@ -207,7 +212,9 @@ CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, 
   CorrectionOutcome outcome =
       run_correction(correction, log, progress, stopped ? StopRequested() : stop_requested);
   // A correction that was broken off is done again by `--resume`, too.
-  if (!stop_requested || !stop_requested()) run.forget_state();
+  const bool broken_off = stop_requested && stop_requested();
+  run.commit(broken_off);
+  if (!broken_off) run.forget_state();
   return outcome;
 }
 

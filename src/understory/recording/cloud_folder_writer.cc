@@ -7,8 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "understory/recording/output_file.h"
+#include "understory/recording/bytes.h"
 #include "understory/util/error.h"
+#include "understory/util/output_file.h"
 
 namespace understory {
 namespace {

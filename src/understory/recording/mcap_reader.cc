@@ -8,8 +8,8 @@
 #include "understory/recording/compression.h"
 #include "understory/recording/mcap_walker.h"
 #include "understory/recording/message_merger.h"
-#include "understory/recording/output_file.h"
 #include "understory/util/error.h"
+#include "understory/util/output_file.h"
 
 namespace understory {
 namespace {

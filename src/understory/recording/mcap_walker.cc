@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "understory/recording/output_file.h"
+#include "understory/util/output_file.h"
 
 namespace understory::mcap {
 namespace {

@@ -11,8 +11,8 @@
 #include "understory/recording/mcap_format.h"
 #include "understory/recording/message_encode.h"
 #include "understory/recording/message_schemas.h"
-#include "understory/recording/output_file.h"
 #include "understory/util/error.h"
+#include "understory/util/output_file.h"
 #include "understory/util/version.h"
 
 namespace understory {

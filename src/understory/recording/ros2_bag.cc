@@ -10,8 +10,8 @@
 
 #include "understory/recording/byte_source.h"
 #include "understory/recording/mcap_reader.h"
-#include "understory/recording/output_file.h"
 #include "understory/util/error.h"
+#include "understory/util/output_file.h"
 
 namespace understory {
 namespace {

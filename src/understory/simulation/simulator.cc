@@ -11,6 +11,7 @@
 #include "understory/simulation/satellite.h"
 #include "understory/simulation/scan_cache.h"
 #include "understory/simulation/scanner.h"
+#include "understory/simulation/stand.h"
 #include "understory/simulation/total_station.h"
 #include "understory/simulation/truth.h"
 #include "understory/simulation/world.h"
@@ -301,6 +302,19 @@ std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {
   log.debug("simulating " + parts.site);
   if (folder.empty()) return std::make_unique<Simulator>(site);
   return std::make_unique<Simulator>(site, folder, log);
+}
+
+std::vector<std::string> site_files(const std::string& name_or_path,
+                                    const std::vector<std::string>& settings) {
+  const std::string trees = load_site(name_or_path, settings).stand.trees;
+  std::vector<std::string> files;
+  if (!trees.empty()) files = tree_cloud_files(trees);
+  files.push_back(trees);
+  const std::vector<ShippedSite>& shipped = shipped_sites();
+  if (std::none_of(shipped.begin(), shipped.end(),
+                   [&](const ShippedSite& site) { return site.name == name_or_path; }))
+    files.push_back(name_or_path);
+  return files;
 }
 
 }  // namespace understory

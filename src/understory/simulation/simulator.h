@@ -50,4 +50,9 @@ class Simulator : public Recording {
 // without both nothing is kept. Throws InputError for an unknown site, ConfigError for wrong keys.
 [[nodiscard]] std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log);
 
+// The files that a site is read from: its own, if it is no shipped one, the list of its trees and
+// their clouds. Throws as load_site does.
+[[nodiscard]] std::vector<std::string> site_files(const std::string& name_or_path,
+                                                  const std::vector<std::string>& settings);
+
 }  // namespace understory

@@ -4,6 +4,8 @@
 #include <gdal_priv.h>
 #include <zlib.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -199,6 +201,13 @@ std::vector<StemReturns> TruthLog::stems(std::size_t i) const {
     result.push_back({stem.tree, stem.rings, stem.rings_with_3, static_cast<int>(stem.returns)});
   }
   return result;
+}
+
+bool is_truth_file(const std::string& name) {
+  constexpr std::array<const char*, 9> kNames = {
+      "trajectory.tum", "velocity.csv",      "imu_bias.csv", "returns.csv.gz", "trees.csv",
+      "dtm.tif",        "total_station.csv", "head.csv",     "site.yaml"};
+  return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
 }
 
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,

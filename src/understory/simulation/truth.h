@@ -48,6 +48,9 @@ class TruthLog {
   std::vector<std::size_t> stems_end_;  // of each scan
 };
 
+// Whether a file of the truth folder bears this name.
+[[nodiscard]] bool is_truth_file(const std::string& name);
+
 // Writes the truth folder (docs/simulation.md); what the total station and the harvester's head
 // measured only where they did. Throws OutputError.
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,

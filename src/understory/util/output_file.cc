@@ -1,4 +1,4 @@
-#include "understory/recording/output_file.h"
+#include "understory/util/output_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -26,7 +26,7 @@ void OutputFile::fail() {
   throw OutputError(path_, std::string("cannot be written: ") + std::strerror(error_));
 }
 
-void OutputFile::write(ByteSpan bytes) {
+void OutputFile::write(std::span<const std::uint8_t> bytes) {
   if (error_ != 0) fail();  // nothing may follow a record that is there only in part
   crc_ = crc32_of(bytes, crc_);
   while (!bytes.empty()) {
@@ -53,7 +53,7 @@ void OutputFile::close_unsynced() {
   if (::close(descriptor) != 0) fail();
 }
 
-std::uint32_t crc32_of(ByteSpan bytes, std::uint32_t start) {
+std::uint32_t crc32_of(std::span<const std::uint8_t> bytes, std::uint32_t start) {
   return static_cast<std::uint32_t>(::crc32_z(start, bytes.data(), bytes.size()));
 }
 

@@ -1,4 +1,4 @@
-#include "understory/output/atomic_file.h"
+#include "understory/util/atomic_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -11,8 +11,8 @@
 #include <system_error>
 #include <utility>
 
-#include "understory/recording/output_file.h"
 #include "understory/util/error.h"
+#include "understory/util/output_file.h"
 
 namespace understory {
 namespace {
@@ -114,8 +114,9 @@ void AtomicTextFile::commit() {
 }
 
 std::filesystem::path part_path(const std::filesystem::path& path) {
-  // The ending stays, because some programs choose the format by it.
-  return path.parent_path() / (".part." + path.filename().string());
+  // The ending stays, because some programs choose the format by it. The name is one that nobody
+  // else gives to a file.
+  return path.parent_path() / (".part.understory." + path.filename().string());
 }
 
 void sync_and_rename(const std::filesystem::path& from, const std::filesystem::path& to) {

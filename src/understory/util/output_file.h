@@ -1,9 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
-
-#include "understory/recording/bytes.h"
 
 namespace understory {
 
@@ -16,7 +15,7 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  void write(ByteSpan bytes);
+  void write(std::span<const std::uint8_t> bytes);
   // Syncs to the disk and closes.
   void close();
   // Closes without waiting for the disk: for files that are many and small.
@@ -35,6 +34,6 @@ class OutputFile {
 };
 
 // CRC-32 as in zlib, also for more than 4 GB.
-[[nodiscard]] std::uint32_t crc32_of(ByteSpan bytes, std::uint32_t start = 0);
+[[nodiscard]] std::uint32_t crc32_of(std::span<const std::uint8_t> bytes, std::uint32_t start = 0);
 
 }  // namespace understory
