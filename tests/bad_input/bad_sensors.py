@@ -1,6 +1,7 @@
 """Recordings in which a sensor fails, through `understory map`: the estimator copes or says why not."""
 
 import dataclasses
+import gzip
 import json
 import math
 import random
@@ -65,6 +66,10 @@ def imu_stops(folder):
 @cases.case("IMU that begins late")
 def imu_late(folder):
     path, outcome = mapped(folder, [m for m in short if m.topic != "/imu" or m.stamp > start + 4e9])
+    assert outcome.run["quality"]["imu_without_place_s"] == 0
+    assert 3.5 < outcome.run["quality"]["imu_without_say_s"] < 4.5  # and then it is used: biases
+    last = gzip.open(outcome.folder / "states.csv.gz", "rt").read().splitlines()[-1].split(",")
+    assert any(abs(float(v)) > 1e-6 for v in last[4:10]), last
     return expect(outcome, 0, 0.1, f"{path}: the IMU begins 4.0 s after the lidar")
 
 

@@ -52,10 +52,10 @@ def unfinished_run(folder, checkpoint=b"half"):
     return work / "checkpoint.bin"
 
 
-def good_recording(folder, seconds=12, seed=5):
-    """Some seconds on foot with a VLP-16 and an IMU: (file, its messages, truth)."""
+def good_recording(folder, seconds=12, seed=5, more=()):
+    """Some seconds on foot with a VLP-16 and an IMU: (file, its messages, truth). `more` settings."""
     first, path = folder / "first.mcap", folder / "good.mcap"
-    settings = [word for setting in (f"duration_s={seconds}", f"seed={seed}", *SITE) for word in ("--set", setting)]
+    settings = [word for setting in (f"duration_s={seconds}", f"seed={seed}", *SITE, *more) for word in ("--set", setting)]
     for words in (("simulate", "demo", "-o", first, *settings),
                   ("convert", first, path, "--compression", "none")):
         done = program(*words)

@@ -26,6 +26,10 @@ class Message:
         struct.pack_into("<iI", data, 4, stamp // NS, stamp % NS)
         return dataclasses.replace(self, time=self.time + stamp - self.stamp, data=bytes(data))
 
+    def stamped(self, stamp):
+        """The stamp alone, as of a sensor whose clock is off: it still arrives when it did."""
+        return dataclasses.replace(self.at(stamp), time=self.time)
+
 
 class Cdr:
     """A reader of little-endian CDR that knows where each value lies."""
@@ -200,6 +204,52 @@ def write_mcap(path, messages):
         record(2, struct.pack("<QQI", 0, 0, 0))
         file.write(MCAP_MAGIC)
     return places
+
+
+def write_indexed_mcap(path, messages, chunk_bytes=1_000_000):
+    """In chunks, with the index and the list of topics at the end that a recorder writes."""
+
+    def text(value):
+        return struct.pack("<I", len(value)) + value.encode()
+
+    def record(opcode, content):
+        return struct.pack("<BQ", opcode, len(content)) + content
+
+    def listing(entries):
+        return struct.pack("<I", len(entries)) + entries
+
+    ids, about = {}, b""
+    for message in messages:
+        if message.topic not in ids:
+            ids[message.topic] = len(ids) + 1
+            id = struct.pack("<H", ids[message.topic])
+            about += record(3, id + text(message.type) + text("ros2msg") + text(""))
+            about += record(4, id + id + text(message.topic) + text("cdr") + text(""))
+    with open(path, "wb") as file:
+        file.write(MCAP_MAGIC + record(1, text("") + text("test")) + about)
+        chunk, times, places, index = b"", [], {}, b""
+        for number, message in enumerate(messages):
+            id = ids[message.topic]
+            places.setdefault(id, []).append((message.time, len(chunk)))
+            chunk += record(5, struct.pack("<HIQQ", id, number, message.time, message.time) + message.data)
+            times.append(message.time)
+            if len(chunk) < chunk_bytes and number + 1 < len(messages):
+                continue
+            head = struct.pack("<QQQI", min(times), max(times), len(chunk), 0) + text("")
+            at, whole = file.tell(), record(6, head + struct.pack("<Q", len(chunk)) + chunk)
+            file.write(whole)
+            offsets = b""
+            for id, found in places.items():
+                offsets += struct.pack("<HQ", id, file.tell())
+                file.write(record(7, struct.pack("<H", id) + listing(b"".join(
+                    struct.pack("<QQ", *each) for each in found))))
+            index += record(8, struct.pack("<QQQQ", min(times), max(times), at, len(whole)) + listing(offsets)
+                            + struct.pack("<Q", file.tell() - at - len(whole)) + text("")
+                            + struct.pack("<QQ", len(chunk), len(chunk)))
+            chunk, times, places = b"", [], {}
+        file.write(record(15, struct.pack("<I", 0)))
+        summary = file.tell()
+        file.write(about + index + record(2, struct.pack("<QQI", summary, 0, 0)) + MCAP_MAGIC)
 
 
 def _ros1(message):

@@ -1,6 +1,9 @@
 #include "understory/odometry/dense_odometry.h"
 
 #include <cmath>
+#include <utility>
+
+#include "understory/odometry/imu_smoother.h"
 
 namespace understory {
 namespace {
@@ -43,6 +46,7 @@ DenseOdometry::DenseOdometry(const DenseOdometryConfig& config, const Rig& rig, 
     : config_(config),
       rig_(rig),
       times_(times),
+      log_(log),
       uses_imu_(config.imu_enabled && rig.body_from_imu.has_value()) {
   motion_ = uses_imu_ ? make_imu_smoother(config.motion, rig, &log)
                       : make_constant_velocity_model(config.motion, &log);
@@ -74,6 +78,7 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const LocalMapSnapshot& l
       estimate.update = motion_->add_scan(scan.stamp, factor);
     }
     estimate.state = estimate.update.state;
+    if (estimate.update.status != MotionStatus::kIgnored) last_scan_ = scan.stamp;
     last_matched_ = estimate.matched;
     estimate.wall_ms = timer.wall_ms();
   }
@@ -146,6 +151,18 @@ void DenseOdometry::set_initial_motion(const Eigen::Vector3d& velocity_m_s,
   motion_->set_initial_motion(velocity_m_s, angular_rate_rad_s);
 }
 
+void DenseOdometry::take_imu(const Pose& body_from_imu, std::span<const ImuSample> samples) {
+  if (!config_.imu_enabled || uses_imu_) return;
+  rig_.body_from_imu = body_from_imu;
+  const NavState last = motion_->predict(last_scan_);
+  auto smoother = std::make_unique<ImuSmoother>(config_.motion, body_from_imu, &log_);
+  for (const ImuSample& sample : samples)
+    smoother->add_imu(sample);
+  smoother->take_over(last);
+  motion_ = std::move(smoother);
+  uses_imu_ = true;
+}
+
 void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
   motion_->move_world(new_world_from_old_world);
 }
@@ -153,12 +170,14 @@ void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
 void DenseOdometry::save(BinaryWriter& writer) const {
   writer.put(last_matched_);
   writer.put(usual_inliers_);
+  writer.put(last_scan_);
   motion_->save(writer);
 }
 
 void DenseOdometry::load(BinaryReader& reader) {
   last_matched_ = reader.get<bool>();
   usual_inliers_ = reader.get<double>();
+  last_scan_ = reader.get<TimeNs>();
   motion_->load(reader);
 }
 

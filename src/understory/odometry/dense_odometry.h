@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -76,6 +77,9 @@ class DenseOdometry {
   // See MotionModel; before the first scan.
   void set_initial_motion(const Eigen::Vector3d& velocity_m_s,
                           const Eigen::Vector3d& angular_rate_rad_s);
+  // The IMU's place has become known, or the IMU has just appeared: it is used from the last scan
+  // on. `samples`: those since shortly before that scan, in order. No change without `imu_enabled`.
+  void take_imu(const Pose& body_from_imu, std::span<const ImuSample> samples);
   // The local map was moved by this (loop closure): the estimate moves along.
   void move_world(const Pose& new_world_from_old_world);
 
@@ -99,11 +103,13 @@ class DenseOdometry {
   DenseOdometryConfig config_;
   Rig rig_;
   StageTimes& times_;
+  Log& log_;
   bool uses_imu_;
   std::unique_ptr<MotionModel> motion_;
   std::vector<MachineBox> boxes_;
   VoxelFilter filter_;
   bool last_matched_ = false;
+  TimeNs last_scan_ = 0;            // stamp
   std::vector<std::uint8_t> keep_;  // workspace: points of the scan outside the machine
   double usual_inliers_ = 0.0;      // running mean of the inlier ratio of matches; 0: none yet
 };

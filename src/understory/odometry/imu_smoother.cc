@@ -1,5 +1,6 @@
 #include "understory/odometry/imu_smoother.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -88,6 +89,24 @@ void ImuSmoother::set_initial_motion(const Eigen::Vector3d& velocity_m_s,
                                      const Eigen::Vector3d& angular_rate_rad_s) {
   initial_velocity_ = velocity_m_s;
   if (!use_imu()) angular_rate_ = angular_rate_rad_s;
+}
+
+void ImuSmoother::take_over(const NavState& state) {
+  ImuState start;
+  start.stamp = state.stamp;
+  start.world_from_imu = state.world_from_body * body_from_imu_;
+  start.velocity = state.velocity_in_world;  // but for the lever arm
+  InitialUncertainty sigma;
+  const Eigen::Vector<double, 6> sigmas =
+      state.pose_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  sigma.rotation_rad = std::max(sigmas.head<3>().maxCoeff(), sigma.rotation_rad);
+  sigma.position_m = std::max(sigmas.tail<3>().maxCoeff(), sigma.position_m);
+  sigma.velocity_m_s = 1.0;
+  sigma.gyro_bias_rad_s = config_.imu.gyro_bias_sigma_rad_s;
+  sigma.accel_bias_m_s2 = config_.imu.accel_bias_sigma_m_s2;
+  window_.start(start, Eigen::Vector3d::UnitZ(), sigma);
+  how_ = Initialisation::kNoImu;
+  buffer_.forget_before(state.stamp);
 }
 
 MotionUpdate ImuSmoother::begin(TimeNs stamp) {

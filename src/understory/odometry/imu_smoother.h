@@ -16,6 +16,10 @@ class ImuSmoother : public MotionModel {
  public:
   ImuSmoother(const MotionConfig& config, const Pose& body_from_imu, Log* log);
 
+  // Goes on from a state that another model has come to, in its world; to be called before the
+  // first scan, after the samples around that state. The vertical is learnt anew, from the IMU.
+  void take_over(const NavState& state);
+
   void add_imu(const ImuSample& sample) override;
   void set_initial_motion(const Eigen::Vector3d& velocity_m_s,
                           const Eigen::Vector3d& angular_rate_rad_s) override;

@@ -14,8 +14,8 @@ TimeNs first_of(const Recording& source, const std::string& role, TimeNs otherwi
   return otherwise;
 }
 
-void remark_on_imu(const MappingSession& session, const Recording& source, const std::string& name,
-                   Log& log) {
+void remark_on_imu(const MappingSession& session, const Recording& source,
+                   const EventOrderer::Report& repair, const std::string& name, Log& log) {
   const std::optional<TimeNs> last = session.last_imu();
   if (!last) {
     log.warn("imu.none",
@@ -25,7 +25,8 @@ void remark_on_imu(const MappingSession& session, const Recording& source, const
     return;
   }
   const TimeNs begin = first_of(source, "lidar", 0);
-  const double late = to_seconds(first_of(source, "imu", begin) - begin);
+  const double late = to_seconds(first_of(source, "imu", begin) +
+                                 repair.streams[EventOrderer::kImu].offset - begin);
   if (late > kImuMissingS) {
     log.warn("imu.late",
              fmt::format("{}: the IMU begins {:.1f} s after the lidar; until then positions come "
@@ -43,8 +44,8 @@ void remark_on_imu(const MappingSession& session, const Recording& source, const
 }  // namespace
 
 void remark_on_input(const MappingSession& session, const Recording& source,
-                     const std::string& name, Log& log) {
-  remark_on_imu(session, source, name, log);
+                     const EventOrderer::Report& repair, const std::string& name, Log& log) {
+  remark_on_imu(session, source, repair, name, log);
   for (const TopicReport& topic : source.topics()) {
     if (topic.empty_points == 0) continue;
     const std::uint64_t all = topic.points + topic.empty_points;

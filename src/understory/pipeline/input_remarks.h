@@ -9,8 +9,9 @@
 namespace understory {
 
 // At the end of a recording: warns of what only its whole can show, no IMU at all, an IMU that
-// stopped, points without a return. `name` is that of the recording.
+// stopped, points without a return. `name` is that of the recording, `repair`
+// what was done to its stamps.
 void remark_on_input(const MappingSession& session, const Recording& source,
-                     const std::string& name, Log& log);
+                     const EventOrderer::Report& repair, const std::string& name, Log& log);
 
 }  // namespace understory

@@ -35,6 +35,11 @@ class MappingRun {
     bool ended = false;
     while (!ended && !(stopped = stop_requested_ && stop_requested_())) {
       std::optional<Event> event = source_->next();
+      // At the speed of the sensors there may be nothing yet, and no end of waiting for it.
+      if (!event && player_ != nullptr && stop_requested_ && stop_requested_()) {
+        stopped = true;
+        break;
+      }
       ended = !event;
       if (event) {
         ++events_;
@@ -57,6 +62,7 @@ class MappingRun {
       adapt_config();
       source_->skip(state_.events());
       state_.restore(*session_, *orderer_, log_, source_->rig());
+      stamps_believed_ = orderer_->believes_stamps(EventOrderer::kImu);
       events_ = state_.events();
     } else {
       request_.conditions.realtime = request_.realtime;
@@ -68,7 +74,8 @@ class MappingRun {
     }
     if (request_.realtime) {
       auto player = std::make_unique<RealtimePlayer>(
-          std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans));
+          std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans),
+          stop_requested_);
       player_ = player.get();
       session_->take_outcomes_at_once();
       source_ = std::move(player);
@@ -83,6 +90,7 @@ class MappingRun {
     request_.adapted = std::move(adapted.changes);
     request_.effective_yaml = mapping_table(request_.config).to_yaml(false);
     orderer_.emplace(request_.config.time_repair, log_);
+    if (stamps_believed_) orderer_->believe_stamps(EventOrderer::kImu);
     session_.reset();  // lets go of its files
     session_.emplace(request_.config, state_.work(), log_);
   }
@@ -93,6 +101,7 @@ class MappingRun {
   bool start_over_for_imu() {
     const bool wrong = session_->imu_is_wrong();
     if (!wrong && !session_->imu_is_suspected()) return false;
+    if (start_over_for_stamps()) return true;
     const std::string reason = session_->odometry().motion().imu_trust().reason;
     log_.forget_all_but(wrong ? "imu.untrusted" : "imu.probation");
     log_.info(wrong ? "the recording is mapped again from its beginning, without the IMU"
@@ -101,12 +110,29 @@ class MappingRun {
     conditions.imu_judged_s = to_seconds(session_->last_scan_end() - request_.traits.first_scan);
     conditions.imu_doubted = !wrong;
     if (wrong) conditions.imu_refused = reason;
-    adapt_config();
+    begin_anew();
     wrong ? session_->refuse_imu(reason) : session_->doubt_imu();
-    source_ = open_source(request_.recording, request_.open, log_);
-    events_ = 0;
     state_.save(request_, *session_, *orderer_, log_, 0);
     return true;
+  }
+
+  // An IMU whose clock was shifted by its arrival, and that contradicts the lidar: perhaps it came
+  // late with stamps that are right. True if the recording was begun anew with them.
+  bool start_over_for_stamps() {
+    if (orderer_->report().streams[EventOrderer::kImu].offset == 0 || stamps_believed_)
+      return false;
+    stamps_believed_ = true;
+    log_.forget_all_but("");
+    log_.info("the recording is begun anew with the IMU's own stamps");
+    begin_anew();
+    state_.save(request_, *session_, *orderer_, log_, 0);
+    return true;
+  }
+
+  void begin_anew() {
+    adapt_config();
+    source_ = open_source(request_.recording, request_.open, log_);
+    events_ = 0;
   }
 
   void handle_ready() {
@@ -165,7 +191,7 @@ class MappingRun {
                     ": its first messages hold no scan that tells what lidar this is: nothing was "
                     "adapted to it");
     }
-    if (!stopped) remark_on_input(*session_, source, request_.recording, log_);
+    if (!stopped) remark_on_input(*session_, source, facts.time_repair, request_.recording, log_);
     MappingOutcome outcome =
         write_run(request_, state_.folder(), *session_, facts, source, log_, progress_);
     // What a stopped run has so far is no successor of a former run.
@@ -210,6 +236,7 @@ class MappingRun {
   std::unique_ptr<Recording> source_;
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
   std::uint64_t events_ = 0;
+  bool stamps_believed_ = false;  // of the IMU, against the order of arrival
   std::vector<double> memory_mb_;
   std::vector<double> latencies_ms_;
 };

@@ -74,13 +74,9 @@ std::optional<TimeNs> MappingSession::last_imu() const {
 
 void MappingSession::handle(const Event& event, const Rig& rig) {
   if (opening_ && started()) opening_->events.push_back(event);
+  if (started() && settled()) complete_rig(rig);
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
-    ++counts_.imu_samples;
-    recent_imu_.push_back(*sample);
-    const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
-    while (recent_imu_.size() > most)
-      recent_imu_.pop_front();
-    if (started()) odometry_->add_imu(*sample);
+    take_sample(*sample);
   } else if (const auto* fix = std::get_if<GnssFix>(&event)) {
     fixes_.push_back(*fix);
   } else if (const auto* scan = std::get_if<ScanPtr>(&event)) {
@@ -94,6 +90,33 @@ void MappingSession::handle(const Event& event, const Rig& rig) {
     }
     on_scan(**scan);
   }
+}
+
+void MappingSession::take_sample(const ImuSample& sample) {
+  ++counts_.imu_samples;
+  if (started() && !rig_.body_from_imu && !recent_imu_.empty()) {
+    const TimeNs step = sample.stamp - recent_imu_.back().stamp;
+    counts_.imu_without_place += std::clamp<TimeNs>(step, 0, kNsPerSecond / 10);
+  }
+  recent_imu_.push_back(sample);
+  const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
+  while (recent_imu_.size() > most)
+    recent_imu_.pop_front();
+  if (started()) odometry_->add_imu(sample);
+}
+
+// A sensor that begins late, or whose place is told late, is used from then on.
+void MappingSession::complete_rig(const Rig& rig) {
+  if (!rig_.body_from_gnss && rig.body_from_gnss) {
+    rig_.body_from_gnss = rig.body_from_gnss;
+    rig_.gnss_extrinsic_source = rig.gnss_extrinsic_source;
+  }
+  if (rig_.body_from_imu || !rig.body_from_imu) return;
+  rig_.body_from_imu = rig.body_from_imu;
+  rig_.imu_extrinsic_source = rig.imu_extrinsic_source;
+  const std::vector<ImuSample> recent(recent_imu_.begin(), recent_imu_.end());
+  odometry_->take_imu(*rig_.body_from_imu, recent);
+  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(last_scan_);
 }
 
 void MappingSession::make_odometry(const Rig& rig) {
@@ -368,6 +391,8 @@ void MappingSession::save(BinaryWriter& writer) const {
   writer.put(last_good_inliers_);
   writer.put_doubles(last_good_velocity_.data(), 3);
   writer.put(last_scan_);
+  put_optional(writer, rig_.body_from_imu, put_pose);
+  put_optional(writer, rig_.body_from_gnss, put_pose);
   writer.put(started());
   writer.put(static_cast<std::uint64_t>(recent_imu_.size()));
   for (const ImuSample& sample : recent_imu_)
@@ -394,6 +419,8 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   last_good_inliers_ = reader.get<double>();
   reader.get_doubles(last_good_velocity_.data(), 3);
   last_scan_ = reader.get<TimeNs>();
+  const auto body_from_imu = get_optional(reader, get_pose);
+  const auto body_from_gnss = get_optional(reader, get_pose);
   const bool was_started = reader.get<bool>();
   const auto waiting = reader.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < waiting; ++i)
@@ -402,8 +429,11 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   journal_ = std::make_unique<Journal>(folder_ / "journal.bin", reader.get<std::uint64_t>());
   clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", reader.get<std::uint64_t>());
   opening_.reset();
+  rig_ = rig;
+  rig_.body_from_imu = body_from_imu;
+  rig_.body_from_gnss = body_from_gnss;
   map_->load(reader);
-  make_odometry(rig);
+  make_odometry(Rig(rig_));
   odometry_->load(reader);
 }
 

@@ -32,6 +32,7 @@ struct MappingCounts {
   std::uint64_t lost_in_a_row = 0;
   TimeNs first_lost = 0;  // when the second piece began
   std::uint64_t imu_samples = 0;
+  TimeNs imu_without_place = 0;  // time of the IMU's samples before its place was known
   std::uint64_t points = 0;
 };
 
@@ -54,7 +55,8 @@ class MappingSession : public Resumable {
   // The IMU has turned out to be wrong: what was positioned with it is better done again without.
   [[nodiscard]] bool imu_is_wrong() const;
 
-  // `rig` is looked at when the first scan comes.
+  // `rig` is looked at when the first scan comes, and for the places of sensors that become known
+  // later: they are used from then on.
   void handle(const Event& event, const Rig& rig);
 
   // State to go on from; `flush` has made the files safe to the same point.
@@ -99,6 +101,8 @@ class MappingSession : public Resumable {
   };
 
   void make_odometry(const Rig& rig);
+  void complete_rig(const Rig& rig);
+  void take_sample(const ImuSample& sample);
   void start_anew();
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
   void on_scan(const Scan& scan);

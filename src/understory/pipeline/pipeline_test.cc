@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <fstream>
 #include <thread>
@@ -124,6 +125,78 @@ TEST(RealtimePlayer, DropsTheOldestScansForASlowConsumer) {
   EXPECT_EQ(rest.back(), 1'000 * kNsPerSecond + 100'000'000);
   EXPECT_EQ(player.dropped_scans(), 8U);
   EXPECT_GT(player.latency_ms(rest.back()), 100.0);
+}
+
+// Any events, one after another.
+class Listed : public Recording {
+ public:
+  explicit Listed(std::vector<Event> events) : events_(std::move(events)) {}
+  std::optional<Event> next() override {
+    if (i_ == events_.size()) return std::nullopt;
+    return events_[i_++];
+  }
+  const Rig& rig() const override { return rig_; }
+  std::vector<TopicReport> topics() const override { return {}; }
+  std::string format() const override { return "list"; }
+  double progress() const override { return 0.0; }
+
+ private:
+  Rig rig_;
+  std::vector<Event> events_;
+  std::size_t i_ = 0;
+};
+
+constexpr TimeNs kYear = 31'536'000 * kNsPerSecond;
+
+// Scans 20 ms apart and IMU samples 10 ms apart whose clock is years behind; both jump by a year.
+std::vector<Event> clocks_apart() {
+  std::vector<Event> events;
+  for (TimeNs i = 0; i < 20; ++i) {
+    const TimeNs jump = i < 10 ? 0 : kYear;
+    const TimeNs back = i < 15 ? 0 : -kYear;
+    ImuSample sample;
+    sample.stamp = 10'000'000 * i + jump + back;
+    events.emplace_back(sample);
+    if (i % 2 == 1) continue;
+    auto scan = std::make_shared<Scan>();
+    scan->stamp = 50 * kYear + 10'000'000 * i + jump;
+    events.emplace_back(ScanPtr(scan));
+  }
+  return events;
+}
+
+// Regression: the second stream was waited for by the clock of the first, for years.
+TEST(RealtimePlayer, PlaysEachStreamByItsOwnClock) {
+  const auto start = std::chrono::steady_clock::now();
+  RealtimePlayer player(std::make_unique<Listed>(clocks_apart()), 100);
+  int events = 0;
+  while (player.next())
+    ++events;
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  EXPECT_EQ(events, 30);
+  EXPECT_GE(elapsed.count(), 0.12);  // two jumps cost no more than the step that each replaces
+  EXPECT_LT(elapsed.count(), 20.0);
+}
+
+TEST(RealtimePlayer, HearsTheUserWhileItWaits) {
+  std::vector<Event> events(2);
+  events[0] = ImuSample();
+  ImuSample late;
+  late.stamp = RealtimePlayer::kLongestWait - 1;
+  events[1] = late;
+  std::atomic<bool> stop = false;
+  const auto start = std::chrono::steady_clock::now();
+  {
+    RealtimePlayer player(std::make_unique<Listed>(events), 2, [&] { return stop.load(); });
+    EXPECT_TRUE(player.next());
+    std::thread user([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      stop = true;
+    });
+    EXPECT_FALSE(player.next());
+    user.join();
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(8));
 }
 
 TEST(RealtimePlayer, CanBeLeftBeforeTheEnd) {

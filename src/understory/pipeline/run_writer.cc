@@ -225,7 +225,13 @@ void fill_counts(RunSummary& summary, const MappingSession& session, const RunFa
     count((name + "_too_late").c_str(), stream.late);
     count((name + "_clock_jumps").c_str(), stream.clock_jumps);
     count((name + "_gaps").c_str(), stream.gaps);
+    if (stream.received == 0) continue;
+    count((name + "_received").c_str(), stream.received);
+    count((name + "_released").c_str(), stream.released);
+    summary.quality[name + "_without_say_s"] = to_seconds(stream.without_say);
+    summary.quality[name + "_clock_offset_s"] = to_seconds(stream.offset);
   }
+  summary.quality["imu_without_place_s"] = to_seconds(counts.imu_without_place);
   count("scans_without_imu", facts.time_repair.scans_without_imu);
   if (facts.realtime) count("scans_dropped", facts.dropped_scans);
 }

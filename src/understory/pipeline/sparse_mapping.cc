@@ -22,19 +22,21 @@ namespace fs = std::filesystem;
 // The scans of a recording in order of time, one after another through the front end.
 class SparseRun {
  public:
-  SparseRun(const SparseMappingRequest& request, RunState state, Log& log)
+  SparseRun(const SparseMappingRequest& request, RunState state, Log& log,
+            const StopRequested& stop_requested)
       : request_(request), asked_(request.config), log_(log), state_(std::move(state)) {
     if (state_.events() == 0) request_.conditions.realtime = request_.realtime;
     open();
     if (state_.events() > 0) {
       source_->skip(state_.events());
       state_.restore(*session_, *orderer_, log_, source_->rig());
+      stamps_believed_ = orderer_->believes_stamps(EventOrderer::kImu);
       events_ = state_.events();
     } else {
       // Makes the run resumable from the start.
       state_.save(request_, *session_, *orderer_, log_, 0);
     }
-    if (request_.realtime) play_at_sensor_speed();
+    if (request_.realtime) play_at_sensor_speed(stop_requested);
   }
 
   // True if it was stopped.
@@ -43,6 +45,11 @@ class SparseRun {
     bool ended = false;
     while (!ended && !(stopped = stop_requested && stop_requested())) {
       std::optional<Event> event = source_->next();
+      // At the speed of the sensors there may be nothing yet, and no end of waiting for it.
+      if (!event && player_ != nullptr && stop_requested && stop_requested()) {
+        stopped = true;
+        break;
+      }
       ended = !event;
       if (event) {
         ++events_;
@@ -114,6 +121,7 @@ class SparseRun {
     adapt_config();
     session_.emplace(request_.config, results_ / "stems.csv.gz", state_.work(), log_);
     orderer_.emplace(request_.config.time_repair, log_);
+    if (stamps_believed_) orderer_->believe_stamps(EventOrderer::kImu);
     events_ = 0;
   }
 
@@ -123,6 +131,7 @@ class SparseRun {
   bool start_over_for_imu() {
     const ImuTrust trust = session_->imu_trust();
     if (player_ != nullptr || trust.trusted || !session_->imu_refused().empty()) return false;
+    if (start_over_for_stamps()) return true;
     log_.forget_all_but("imu.untrusted");
     log_.info("the recording is mapped again from its beginning, without the IMU");
     request_.conditions.imu_refused = trust.reason;
@@ -142,9 +151,23 @@ class SparseRun {
     request_.effective_yaml = sparse_mapping_table(request_.config).to_yaml(false);
   }
 
-  void play_at_sensor_speed() {
+  // An IMU whose clock was shifted by its arrival, and that contradicts the stems: perhaps it came
+  // late with stamps that are right. True if the recording was begun anew with them.
+  bool start_over_for_stamps() {
+    if (orderer_->report().streams[EventOrderer::kImu].offset == 0 || stamps_believed_)
+      return false;
+    stamps_believed_ = true;
+    log_.forget_all_but("");
+    log_.info("the recording is mapped again from its beginning, with the IMU's own stamps");
+    open();
+    state_.save(request_, *session_, *orderer_, log_, 0);
+    return true;
+  }
+
+  void play_at_sensor_speed(const StopRequested& stop_requested) {
     auto player = std::make_unique<RealtimePlayer>(
-        std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans));
+        std::move(source_), static_cast<std::size_t>(request_.config.realtime_queue_scans),
+        stop_requested);
     player_ = player.get();
     source_ = std::move(player);
     session_->on_settled(
@@ -185,12 +208,13 @@ class SparseRun {
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::uint64_t events_ = 0;
+  bool stamps_believed_ = false;  // of an IMU, against the order of arrival
   std::vector<double> latencies_ms_;
 };
 
 CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, Log& log,
                            const ProgressSink& progress, const StopRequested& stop_requested) {
-  SparseRun run(request, std::move(state), log);
+  SparseRun run(request, std::move(state), log, stop_requested);
   const bool stopped = run.run(progress, stop_requested);
   if (run.kept() == 0) {
     const std::string reason = run.why_nothing();

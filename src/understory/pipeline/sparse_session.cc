@@ -1,5 +1,8 @@
 #include "understory/pipeline/sparse_session.h"
 
+#include <algorithm>
+
+#include "understory/geometry/pose_io.h"
 #include "understory/util/timing.h"
 
 namespace understory {
@@ -18,9 +21,17 @@ void SparseSession::handle(const Event& event, const Rig& rig) {
     journal_->on_fix(*fix);
     on_fix(*fix);
   }
-  // The recording has said so where it does not know the IMU's place.
-  const auto* sample = std::get_if<ImuSample>(&event);
-  if (sample != nullptr && rig.body_from_imu) pacer_.add(*sample);
+  if (const auto* sample = std::get_if<ImuSample>(&event)) on_sample(*sample, rig);
+}
+
+// The recording has said so where it does not know the IMU's place; it may learn it later.
+void SparseSession::on_sample(const ImuSample& sample, const Rig& rig) {
+  if (rig.body_from_imu) {
+    pacer_.add(sample);
+  } else if (last_imu_) {
+    imu_without_place_ += std::clamp<TimeNs>(sample.stamp - *last_imu_, 0, kNsPerSecond / 10);
+  }
+  last_imu_ = sample.stamp;
 }
 
 void SparseSession::on_scan(const ScanPtr& scan, const Rig& rig) {
@@ -79,6 +90,8 @@ void SparseSession::save(BinaryWriter& writer) const {
   writer.put(journal_ != nullptr ? journal_->bytes() : std::uint64_t{0});
   writer.put(last_scan_end_);
   writer.put(imu_refused_);
+  writer.put(imu_without_place_);
+  put_optional(writer, last_imu_, [](BinaryWriter& out, TimeNs time) { out.put(time); });
   pacer_.save(writer);
 }
 
@@ -90,6 +103,8 @@ void SparseSession::load(BinaryReader& reader, const Rig& /*rig*/) {
   last_scan_end_ = reader.get<TimeNs>();
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);
+  imu_without_place_ = reader.get<TimeNs>();
+  last_imu_ = get_optional(reader, [](BinaryReader& in) { return in.get<TimeNs>(); });
   pacer_.load(reader);
 }
 

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "understory/odometry/stem_pacer.h"
@@ -45,6 +46,8 @@ class SparseSession : public Resumable, private ViewSink {
   [[nodiscard]] std::vector<SparseStep>& steps() { return steps_; }  // of the views kept
   [[nodiscard]] std::vector<GnssFix>& fixes() { return fixes_; }
   [[nodiscard]] StageTimes& times() { return times_; }
+  // Time of the IMU's samples before its place was known.
+  [[nodiscard]] TimeNs imu_without_place() const { return imu_without_place_; }
   [[nodiscard]] ImuTrust imu_trust() const { return pacer_.imu_trust(); }
 
   // Before the first event: does without the IMU, because an earlier pass found it to be wrong.
@@ -54,6 +57,7 @@ class SparseSession : public Resumable, private ViewSink {
 
  private:
   void on_scan(const ScanPtr& scan, const Rig& rig);
+  void on_sample(const ImuSample& sample, const Rig& rig);
   void record(const std::vector<StemScan>& results);
   void on_pose(const StampedPose& pose, bool positioned) override;
   void on_view(const StemView& view, const SparseStep& step) override;
@@ -67,6 +71,8 @@ class SparseSession : public Resumable, private ViewSink {
   std::deque<TimeNs> waiting_ends_;  // of scans that have no pose yet
   TimeNs last_scan_end_ = 0;
   std::string imu_refused_;
+  TimeNs imu_without_place_ = 0;
+  std::optional<TimeNs> last_imu_;
   std::size_t scans_ = 0;
   std::size_t positioned_ = 0;
   std::size_t last_stems_ = 0;

@@ -5,51 +5,22 @@
 #include <tuple>
 
 #include "understory/preprocess/event_bytes.h"
+#include "understory/preprocess/event_stamp.h"
 #include "understory/util/error.h"
 
 namespace understory {
+using namespace event_stamp;
 namespace {
 
-constexpr std::array<const char*, EventOrderer::kStreams> kNames = {"lidar", "imu", "gnss", "mag"};
-// A stream that talks this much while no other does has nobody to be compared with.
+// A stream that talks this much, or for as long as the smallest jump, while no other does has
+// nobody to be compared with.
 constexpr std::size_t kMostSuspects = 1000;
-// Streams of different sensors start within this many times the smallest jump.
+constexpr std::size_t kMostSuspectScans = 32;
+// A step of this many times the smallest jump tells nothing of a stream's rate.
 constexpr TimeNs kStartFactor = 5;
-
-TimeNs ns(double seconds) {
-  return static_cast<TimeNs>(seconds * 1e9);
-}
-
-TimeNs stamp_of(const Event& event) {
-  return std::visit(
-      [](const auto& value) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, ScanPtr>)
-          return value->stamp;
-        else
-          return value.stamp;
-      },
-      event);
-}
-
-void move_stamp(Event& event, TimeNs offset) {
-  if (offset == 0) return;
-  std::visit(
-      [&](auto& value) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, ScanPtr>) {
-          auto moved = std::make_shared<Scan>(*value);
-          moved->stamp += offset;
-          value = std::move(moved);
-        } else {
-          value.stamp += offset;
-        }
-      },
-      event);
-}
-
-std::string seconds(TimeNs time) {
-  const std::string text = std::to_string(static_cast<double>(time) * 1e-9);
-  return text.substr(0, text.size() - 3) + " s";
-}
+// Messages that wait for a verdict on their clock; scans after which an IMU has fallen silent.
+constexpr std::size_t kMostHeld = 20'000;
+constexpr std::uint32_t kSilentScans = 10;
 
 }  // namespace
 
@@ -72,7 +43,11 @@ std::optional<TimeNs> EventOrderer::reference(Stream stream) const {
   std::optional<TimeNs> newest;
   for (const Stream other : {kLidar, kImu}) {
     if (other == stream || !clocks_[other].seen) continue;
-    newest = std::max(newest.value_or(clocks_[other].newest), clocks_[other].newest);
+    // One that had fallen silent before cannot tell.
+    const Clock& clock = clocks_[other];
+    if (clock.newest_time + clock.lag + 2 * ns(config_.clock_jump_s) < clocks_[stream].newest)
+      continue;
+    newest = std::max(newest.value_or(clock.newest + clock.lag), clock.newest + clock.lag);
   }
   return newest;
 }
@@ -80,9 +55,9 @@ std::optional<TimeNs> EventOrderer::reference(Stream stream) const {
 bool EventOrderer::suspicious(Stream stream, TimeNs raw) const {
   const Clock& clock = clocks_[stream];
   const TimeNs jump = ns(config_.clock_jump_s);
+  if (!clock.seen) return false;
   const std::optional<TimeNs> other = reference(stream);
   const TimeNs stamp = raw + clock.offset;
-  if (!clock.seen) return other && std::abs(stamp - *other) > kStartFactor * jump;
   if (std::abs(stamp - clock.newest) <= jump) return false;
   // After an outage of its own a stream comes back where the others are.
   return !(other && stamp > clock.newest && std::abs(stamp - *other) <= jump);
@@ -91,18 +66,41 @@ bool EventOrderer::suspicious(Stream stream, TimeNs raw) const {
 void EventOrderer::push(Event event) {
   UNDERSTORY_CHECK(!finished_);
   const auto stream = static_cast<Stream>(event.index());
-  ++report_.streams[stream].received;
+  StreamReport& report = report_.streams[stream];
+  ++report.received;
+  if (stream == kLidar) {
+    take(std::move(event), stream);
+    note_scan();
+    return;
+  }
+  if (stream == kImu) report.without_say = uncovered_;
+  weigh(stream, stamp_of(event));
+  if (clocks_[stream].arrival.verdict() != StreamOffset::Verdict::kOpen) {
+    let_go(stream);
+    take(std::move(event), stream);
+    return;
+  }
+  held_[stream].push_back(std::move(event));
+  // Before the first scan nobody has use for more.
+  if (held_[stream].size() > kMostHeld) held_[stream].pop_front();
+}
+
+// One event on its own clock, constant offsets mended.
+void EventOrderer::take(Event event, Stream stream) {
   const TimeNs raw = stamp_of(event);
   if (!suspects_.empty()) {
     if (stream == suspect_stream_) {
       if (suspicious(stream, raw)) {
         suspects_.push_back(std::move(event));
-        if (suspects_.size() >= kMostSuspects) settle(std::nullopt);
+        const bool many =
+            suspects_.size() >= (stream == kLidar ? kMostSuspectScans : kMostSuspects);
+        const TimeNs lasting = std::abs(raw - stamp_of(suspects_.front()));
+        if (many || lasting >= ns(config_.clock_jump_s)) settle(std::nullopt);
         return;
       }
       drop_suspects();
     } else if (stream == kLidar || stream == kImu) {
-      settle(raw + clocks_[stream].offset);
+      settle(raw + clocks_[stream].offset + clocks_[stream].lag);
     }
   }
   if (!suspicious(stream, raw)) {
@@ -115,16 +113,20 @@ void EventOrderer::push(Event event) {
   }
   suspects_.push_back(std::move(event));
   suspect_stream_ = stream;
-  const bool first_word = !clocks_[stream].seen;
   const std::optional<TimeNs> other = reference(stream);
-  if (first_word || !other || (stream != kLidar && stream != kImu)) settle(other);
+  if (!other || (stream != kLidar && stream != kImu)) settle(other);
+}
+
+void EventOrderer::note_glitches(Stream stream, TimeNs raw, std::size_t count) {
+  StreamReport& report = report_.streams[stream];
+  report.glitches += count;
+  if (stream != kImu) report.without_say += static_cast<TimeNs>(count) * clocks_[stream].period;
+  log_->warn("time.glitch", std::string(kNames[stream]) + ": stamp " + seconds(raw) +
+                                " is far from its neighbours; message dropped");
 }
 
 void EventOrderer::drop_suspects() {
-  report_.streams[suspect_stream_].glitches += suspects_.size();
-  log_->warn("time.glitch", std::string(kNames[suspect_stream_]) + ": stamp " +
-                                seconds(stamp_of(suspects_.front())) +
-                                " is far from its neighbours; message dropped");
+  note_glitches(suspect_stream_, stamp_of(suspects_.front()), suspects_.size());
   suspects_.clear();
 }
 
@@ -136,7 +138,8 @@ void EventOrderer::settle(std::optional<TimeNs> other) {
   const bool forward = stamp > clock.newest;
   const bool together =
       clock.seen && (!other || std::abs(*other - stamp) < std::abs(*other - clock.newest));
-  if (together && !forward) {
+  const bool leads = stream == kLidar || stream == kImu;  // the others move nobody
+  if (together && !forward && leads) {
     // All clocks went back: all go on from where they were.
     const TimeNs step = clock.newest + clock.period - stamp;
     for (Clock& each : clocks_)
@@ -181,6 +184,7 @@ void EventOrderer::note_step(Stream stream, TimeNs stamp) {
                      : static_cast<TimeNs>(config_.gap_scans * static_cast<double>(clock.period));
   if ((stream == kLidar || stream == kImu) && clock.period > 0 && step > limit) {
     ++report.gaps;
+    if (stream == kLidar) report.without_say += step - clock.period;
     if (step > report.longest_gap) {
       report.longest_gap = step;
       report.after_longest_gap = stamp;
@@ -207,10 +211,10 @@ bool EventOrderer::drop(const Pending& pending) {
                                      seconds(pending.stamp) + " dropped");
     return true;
   }
-  const bool late = pending.stream == kLidar ? clock.any_released && pending.stamp < clock.released
-                                             : any_released_ && pending.time < released_;
+  const bool late = clock.any_released && pending.stamp < clock.released;
   if (late) {
     ++report.late;
+    if (pending.stream != kImu) report.without_say += clock.period;
     log_->warn("time.late", std::string(kNames[pending.stream]) + ": message at " +
                                 seconds(pending.stamp) + " came too late to be used");
   }
@@ -232,8 +236,10 @@ void EventOrderer::accept(Event event, Stream stream) {
   clock.newest = clock.seen ? std::max(clock.newest, pending.stamp) : pending.stamp;
   clock.newest_time = clock.seen ? std::max(clock.newest_time, pending.time) : pending.time;
   clock.seen = true;
-  newest_ = any_seen_ ? std::max(newest_, pending.time) : pending.time;
-  any_seen_ = true;
+  if (stream == kLidar || stream == kImu) {
+    newest_ = any_seen_ ? std::max(newest_, pending.time) : pending.time;
+    any_seen_ = true;
+  }
   const auto key = [](const Pending& p) { return std::tuple(p.time, p.rank, p.order); };
   auto at = pending_.end();
   while (at != pending_.begin() && key(*std::prev(at)) > key(pending))
@@ -242,7 +248,7 @@ void EventOrderer::accept(Event event, Stream stream) {
 }
 
 bool EventOrderer::safe(const Pending& pending) const {
-  return finished_ || newest_ - pending.time >= ns(config_.window_s);
+  return finished_ || (any_seen_ && newest_ - pending.time >= ns(config_.window_s));
 }
 
 // Whether a scan may leave as far as the IMU is concerned.
@@ -251,7 +257,9 @@ bool EventOrderer::covered(const Pending& scan) {
   if (imu.any_released && imu.released >= scan.time) return true;
   // The first scan has waited for an IMU that there is none of so far: the others need not.
   if (!imu.seen && clocks_[kLidar].any_released) return true;
-  if (finished_ || newest_ - scan.time > ns(config_.imu_silence_s)) {
+  const bool silent = imu.scans_since >= kSilentScans;
+  if (finished_ || silent ||
+      newest_ - scan.time > ns(config_.imu_silence_s) + std::max<TimeNs>(imu.lag, 0)) {
     if (imu.seen) ++report_.scans_without_imu;
     return true;
   }
@@ -261,6 +269,7 @@ bool EventOrderer::covered(const Pending& scan) {
 std::optional<std::size_t> EventOrderer::next_to_leave() {
   if (pending_.empty() || !safe(pending_.front())) return std::nullopt;
   if (pending_.front().stream != kLidar) return 0;
+  if (held()) return std::nullopt;
   // The sensors go on until the IMU covers the scan.
   const Clock& imu = clocks_[kImu];
   const bool behind = !(imu.any_released && imu.released >= pending_.front().time);
@@ -275,24 +284,37 @@ std::optional<std::size_t> EventOrderer::next_to_leave() {
   return covered(pending_.front()) ? std::optional<std::size_t>(0) : std::nullopt;
 }
 
+// A scan leaves: for its time since the one before the IMU had no say unless it covers its end.
+void EventOrderer::note_uncovered(const Pending& scan) {
+  const Clock& imu = clocks_[kImu];
+  if (imu.any_released && imu.released >= scan.time && imu.unbroken_since <= scan.time) return;
+  const Clock& lidar = clocks_[kLidar];
+  uncovered_ += std::min(scan.stamp - lidar.released, 2 * lidar.period);
+  StreamReport& report = report_.streams[kImu];
+  if (report.received > 0) report.without_say = uncovered_;
+}
+
 std::optional<Event> EventOrderer::pop() {
   const std::optional<std::size_t> next = next_to_leave();
   if (!next) return std::nullopt;
   const auto at = pending_.begin() + static_cast<std::ptrdiff_t>(*next);
   Clock& clock = clocks_[at->stream];
+  if (at->stream == kLidar && clock.any_released) note_uncovered(*at);
+  if (!clock.any_released || at->stamp - clock.released > ns(config_.imu_gap_s))
+    clock.unbroken_since = at->stamp;
   clock.released = at->stamp;
   clock.any_released = true;
   ++report_.streams[at->stream].released;
-  if (at->stream != kLidar) {
-    released_ = any_released_ ? std::max(released_, at->time) : at->time;
-    any_released_ = true;
-  }
   Event event = std::move(at->event);
   pending_.erase(at);
   return event;
 }
 
 void EventOrderer::finish() {
+  for (const Stream stream : {kImu, kGnss, kMag}) {
+    clocks_[stream].arrival.give_up();
+    let_go(stream);
+  }
   if (!suspects_.empty()) settle(std::nullopt);
   finished_ = true;
 }
@@ -310,11 +332,15 @@ void EventOrderer::save(BinaryWriter& writer) const {
   writer.put(static_cast<std::uint64_t>(suspects_.size()));
   for (const Event& event : suspects_)
     put_event(writer, event);
+  for (const std::deque<Event>& held : held_) {
+    writer.put(static_cast<std::uint64_t>(held.size()));
+    for (const Event& event : held)
+      put_event(writer, event);
+  }
   writer.put(suspect_stream_);
   writer.put(newest_);
   writer.put(any_seen_);
-  writer.put(released_);
-  writer.put(any_released_);
+  writer.put(uncovered_);
   writer.put(finished_);
   writer.put(pushes_);
 }
@@ -337,11 +363,15 @@ void EventOrderer::load(BinaryReader& reader) {
   suspects_.clear();
   for (auto n = reader.get<std::uint64_t>(); n > 0; --n)
     suspects_.push_back(get_event(reader));
+  for (std::deque<Event>& held : held_) {
+    held.clear();
+    for (auto n = reader.get<std::uint64_t>(); n > 0; --n)
+      held.push_back(get_event(reader));
+  }
   suspect_stream_ = reader.get<Stream>();
   newest_ = reader.get<TimeNs>();
   any_seen_ = reader.get<bool>();
-  released_ = reader.get<TimeNs>();
-  any_released_ = reader.get<bool>();
+  uncovered_ = reader.get<TimeNs>();
   finished_ = reader.get<bool>();
   pushes_ = reader.get<std::uint64_t>();
 }

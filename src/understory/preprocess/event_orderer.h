@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/preprocess/stream_offset.h"
 #include "understory/recording/recording.h"
 #include "understory/util/binary_io.h"
 #include "understory/util/config.h"
@@ -15,19 +16,26 @@
 namespace understory {
 
 // Time repair. Events come in the order of the recording, which may be shuffled within limits, hold
-// duplicates, and come from clocks that jump; they leave in the order of time.
+// duplicates, and come from clocks that jump or run apart; they leave in the order of time.
 //
-// - An event leaves once the newest time seen is `window_s` ahead of it. With a window of 0 every
-//   stream is taken to be in order by itself, for least delay.
+// - Each stream has its own clock. The lidar's is the one that counts. A stream whose stamps are a
+//   constant time ahead of or behind it, told by the order of arrival (stream_offset.h), is shifted
+//   onto it from its first message on. Until this is told its messages wait, and scans wait for the
+//   IMU; where the clocks agree that takes one message after the first scan.
+// - Lidar and IMU move time on. An event leaves once the newest time of theirs is `window_s` ahead
+//   of it. GNSS and magnetometer follow, and never make another stream late. With a window of 0
+//   every stream is taken to be in order by itself, for least delay.
 // - A scan's time is its end, and it leaves right after the first IMU sample at or past that end,
 // so
 //   that deskewing never lacks samples; unless the IMU has been silent for `imu_silence_s`.
-// - Same stream and same stamp: the second is dropped. Earlier than what already left: dropped.
+// - Same stream and same stamp: the second is dropped. Earlier than what already left of the same
+//   stream: dropped.
 // - A stream whose stamps step away by more than `clock_jump_s` from its own past and from the
 // other
 //   sensors has a clock jump: its stamps are shifted so that it goes on at its usual rate, until it
-//   jumps back. If lidar and IMU step forward together, it is a gap in the recording and the stamps
-//   stand; backward together, all are shifted. A single stamp far off is dropped.
+//   jumps back. If lidar and IMU step forward together, or the other one has fallen silent before,
+//   it is a gap in the recording and the stamps stand; backward together, all are shifted. A single
+//   stamp far off is dropped.
 // Everything that was mended is counted and goes to the log under keys "time.*". The outcome
 // depends on the order of the pushes alone. Not thread-safe.
 class EventOrderer {
@@ -53,6 +61,11 @@ class EventOrderer {
     std::uint64_t gaps = 0;
     TimeNs longest_gap = 0;
     TimeNs after_longest_gap = 0;  // stamp of the message that ended it
+    TimeNs offset = 0;             // constant, added to its stamps to mend its clock
+    // Time of the recording in which the sensor had no say although the recording holds messages of
+    // it. Lidar: gaps, and scans that were dropped. IMU: scans that left without it, for whatever
+    // reason. Others: messages that were dropped, by their usual step.
+    TimeNs without_say = 0;
   };
   struct Report {
     std::array<StreamReport, kStreams> streams;
@@ -60,6 +73,11 @@ class EventOrderer {
   };
 
   EventOrderer(const Config& config, Log& log);
+
+  // Before the first push: a constant offset of this stream (below ten seconds) is taken for a
+  // delay of its arrival. Its stamps stand, and scans wait for it if it is the IMU.
+  void believe_stamps(Stream stream) { clocks_[stream].believed = true; }
+  [[nodiscard]] bool believes_stamps(Stream stream) const { return clocks_[stream].believed; }
 
   void push(Event event);
   // The next event in order of time, or nothing yet.
@@ -89,9 +107,26 @@ class EventOrderer {
     TimeNs offset = 0;       // mended = raw + offset
     TimeNs released = 0;     // stamp of the last one that left
     bool any_released = false;
+    TimeNs unbroken_since = 0;      // stamp of the first that left after the last gap of an IMU
+    bool believed = false;          // stamps, against the order of arrival
+    StreamOffset arrival;           // against the lidar's; not of the lidar itself
+    TimeNs lag = 0;                 // by which its messages come late; negative: lidar's do
+    TimeNs last_raw = 0;            // of the message that came last
+    std::uint32_t scans_since = 0;  // that message
+    bool spoken = false;            // there is one
+    bool beside = false;            // of GNSS and magnetometer: the IMU spoke beside it ...
+    TimeNs imu_beside = 0;          // ... with this stamp, as it came
   };
 
+  void take(Event event, Stream stream);
   void accept(Event event, Stream stream);
+  [[nodiscard]] std::optional<TimeNs> lead(Stream stream, TimeNs raw) const;
+  void weigh(Stream stream, TimeNs raw);
+  void weigh_beside_imu();
+  void note_scan();
+  void let_go(Stream stream);
+  void mend_offset(Stream stream);
+  [[nodiscard]] bool held() const { return !held_[kImu].empty(); }
   [[nodiscard]] bool suspicious(Stream stream, TimeNs raw) const;
   [[nodiscard]] std::optional<TimeNs> reference(Stream stream) const;
   // Decides what the waiting suspects are: `other` is a stamp of another sensor that came after
@@ -99,23 +134,25 @@ class EventOrderer {
   void settle(std::optional<TimeNs> other);
   void shift(Stream stream, TimeNs raw, std::optional<TimeNs> other);
   void drop_suspects();
+  void note_glitches(Stream stream, TimeNs raw, std::size_t count);
   void note_step(Stream stream, TimeNs stamp);
   [[nodiscard]] bool drop(const Pending& pending);
   [[nodiscard]] bool safe(const Pending& pending) const;
   [[nodiscard]] std::optional<std::size_t> next_to_leave();
   [[nodiscard]] bool covered(const Pending& scan);
+  void note_uncovered(const Pending& scan);
 
   Config config_;
   Log* log_;
   Report report_;
   std::array<Clock, kStreams> clocks_;
-  std::deque<Pending> pending_;  // sorted by time, rank, order
-  std::vector<Event> suspects_;  // of one stream, waiting for a word from another
+  std::deque<Pending> pending_;                   // sorted by time, rank, order
+  std::array<std::deque<Event>, kStreams> held_;  // until it is known how its clock runs
+  std::vector<Event> suspects_;                   // of one stream, waiting for a word from another
   Stream suspect_stream_ = kLidar;
-  TimeNs newest_ = 0;  // newest event time of lidar and IMU (of any where neither is)
+  TimeNs newest_ = 0;  // newest event time of lidar and IMU
   bool any_seen_ = false;
-  TimeNs released_ = 0;  // latest time that left, scans apart
-  bool any_released_ = false;
+  TimeNs uncovered_ = 0;  // time of scans that left without IMU
   bool finished_ = false;
   std::uint64_t pushes_ = 0;
 };

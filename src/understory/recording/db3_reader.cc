@@ -67,7 +67,7 @@ class Db3Source : public MessageSource {
       }
       message.channel = topic->second;
       message.log_time = time;
-      message.data = blob();
+      message.data = blob(rows_.get(), 3);
       ++read_;
       return true;
     }
@@ -81,6 +81,27 @@ class Db3Source : public MessageSource {
                                           static_cast<double>(end_ - begin_),
                                       0.0, 1.0)
                          : 0.0;
+  }
+
+  [[nodiscard]] std::vector<StoredMessage> first_messages(const WantedChannel& wanted,
+                                                          std::size_t most) override {
+    std::vector<StoredMessage> found;
+    if (!indexed_) return found;
+    for (const auto& [id, channel] : topics_) {
+      if (!wanted(*channel)) continue;
+      const Statement rows = prepare(
+          "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp LIMIT ?");
+      if (rows == nullptr) break;
+      sqlite3_bind_int64(rows.get(), 1, id);
+      sqlite3_bind_int64(rows.get(), 2, static_cast<std::int64_t>(most));
+      while (sqlite3_step(rows.get()) == SQLITE_ROW) {
+        const ByteSpan data = blob(rows.get(), 1);
+        found.push_back({channel,
+                         plausible_time(sqlite3_column_int64(rows.get(), 0)),
+                         {data.begin(), data.end()}});
+      }
+    }
+    return found;
   }
 
  private:
@@ -161,9 +182,9 @@ class Db3Source : public MessageSource {
     return SQLITE_DONE;
   }
 
-  ByteSpan blob() {
-    const auto* raw = static_cast<const std::uint8_t*>(sqlite3_column_blob(rows_.get(), 3));
-    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows_.get(), 3));
+  ByteSpan blob(sqlite3_stmt* rows, int column) {
+    const auto* raw = static_cast<const std::uint8_t*>(sqlite3_column_blob(rows, column));
+    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows, column));
     const ByteSpan stored(raw, raw == nullptr ? 0 : size);
     if (stored.size() < 4 || !std::equal(stored.begin(), stored.begin() + 4, kZstdMagic))
       return stored;

@@ -131,11 +131,12 @@ class ExtrinsicsFile {
 
 }  // namespace
 
-void TransformTree::add(const std::string& parent, const std::string& child,
+bool TransformTree::add(const std::string& parent, const std::string& child,
                         const Pose& parent_from_child) {
-  if (parent == child || parent.empty() || child.empty()) return;
-  edges_[parent].try_emplace(child, parent_from_child);
+  if (parent == child || parent.empty() || child.empty()) return false;
+  const bool is_new = edges_[parent].try_emplace(child, parent_from_child).second;
   edges_[child].try_emplace(parent, parent_from_child.inverse());
+  return is_new;
 }
 
 std::optional<Pose> TransformTree::find(const std::string& target,
@@ -184,6 +185,22 @@ Rig rig_from_transforms(const TransformTree& tree, const SensorFrames& frames) {
   if (!frames.gnss.empty()) rig.body_from_gnss = tree.find(body, frames.gnss);
   if (rig.body_from_gnss) rig.gnss_extrinsic_source = source(frames.gnss);
   return rig;
+}
+
+bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& rig) {
+  const std::string body = rig.body_frame == kBaseFrame ? kBaseFrame
+                           : rig.body_frame == "imu"    ? frames.imu
+                                                        : frames.lidar;
+  const auto place = [&](const std::string& frame, std::optional<Pose>& body_from_sensor,
+                         std::string& source) {
+    if (frame.empty() || body_from_sensor) return false;
+    body_from_sensor = tree.find(body, frame);
+    if (body_from_sensor) source = frame == body ? "is the body frame" : "/tf_static";
+    return body_from_sensor.has_value();
+  };
+  const bool imu = place(frames.imu, rig.body_from_imu, rig.imu_extrinsic_source);
+  const bool gnss = place(frames.gnss, rig.body_from_gnss, rig.gnss_extrinsic_source);
+  return imu || gnss;
 }
 
 void apply_extrinsics_file(const std::string& path, Rig& rig) {

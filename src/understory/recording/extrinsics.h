@@ -12,8 +12,8 @@ namespace understory {
 // Fixed transforms between named frames, as /tf_static gives them.
 class TransformTree {
  public:
-  // The first transform between two frames stays.
-  void add(const std::string& parent, const std::string& child, const Pose& parent_from_child);
+  // The first transform between two frames stays. True if this is it.
+  bool add(const std::string& parent, const std::string& child, const Pose& parent_from_child);
   // target_from_source along any chain of transforms, either way; nothing if there is none.
   [[nodiscard]] std::optional<Pose> find(const std::string& target,
                                          const std::string& source) const;
@@ -34,6 +34,10 @@ struct SensorFrames {
 // The rig by the frames: base_link is the body where it is connected to the lidar, else the IMU
 // where that is, else the lidar.
 [[nodiscard]] Rig rig_from_transforms(const TransformTree& tree, const SensorFrames& frames);
+
+// Puts the places of IMU and GNSS that have become known into a rig made by `rig_from_transforms`;
+// its body stays. True if there was any.
+bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& rig);
 
 // Puts the extrinsics of a YAML file over those of the recording:
 //     body_frame: base_link

@@ -54,6 +54,23 @@ class McapSource : public MessageSource {
   [[nodiscard]] std::map<std::string, std::string> sensor_metadata() const override {
     return walker_.sensor();
   }
+  [[nodiscard]] std::vector<StoredMessage> first_messages(const WantedChannel& wanted,
+                                                          std::size_t most) override {
+    std::vector<StoredMessage> found;
+    const mcap::Channels channels = registry_.channels();
+    for (const auto& [id, channel] : channels) {
+      if (!wanted(*channel)) continue;
+      const std::size_t enough = found.size() + most;
+      for (const Block& block : walker_.chunks_of(id)) {
+        MessageBlock loaded;
+        if (!unpack(block, loaded.bytes)) continue;
+        list_messages(block, loaded);
+        keep_messages(loaded, *channel, enough, found);
+        if (found.size() >= enough) break;
+      }
+    }
+    return found;
+  }
 
  private:
   void load(const Block& block) {

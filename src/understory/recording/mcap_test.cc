@@ -47,6 +47,25 @@ TEST_P(McapCompressions, GivesBackWhatWasWritten) {
   EXPECT_LT(right_difference(*rig.body_from_gnss, *drive.rig.body_from_gnss).norm(), 1e-14);
 }
 
+// Regression: what began after the first seconds got no extrinsics and was never used.
+TEST_P(McapCompressions, SensorsThatBeginLaterHaveTheirPlaceFromTheIndex) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "drive.mcap";
+  Drive drive = make_drive(8);
+  const TimeNs begin = event_time(drive.events.front());
+  std::erase_if(drive.events, [&](const Event& event) {
+    return event.index() != 0 && event_time(event) < begin + 5 * kNsPerSecond;
+  });
+  write_drive(path, drive, small_chunks(GetParam()));
+  Log log;
+  const auto recording = open_recording(path, {}, log);
+  ASSERT_TRUE(recording->rig().body_from_imu && recording->rig().body_from_gnss);
+  EXPECT_LT(right_difference(*recording->rig().body_from_imu, *drive.rig.body_from_imu).norm(),
+            1e-14);
+  EXPECT_EQ(read_all(*recording).size(), drive.events.size());
+  EXPECT_EQ(all_warnings(log), "");
+}
+
 // Cuts the file at many places: nothing but a prefix of the events may come out, and all of the
 // chunks that are whole.
 TEST_P(McapCompressions, ReadsTruncatedFilesUpToTheCut) {

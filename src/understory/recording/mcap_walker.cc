@@ -12,6 +12,7 @@ constexpr std::size_t kChunkHeadBytes = 64;  // start, end, sizes, crc and the c
 constexpr std::uint64_t kLongestSmallRecord = 16ULL << 20;
 constexpr std::uint64_t kLongestSummary = 256ULL << 20;
 constexpr std::size_t kSearchWindow = 1U << 20;
+constexpr std::size_t kChunksOfChannel = 16;
 constexpr std::size_t kFooterRecord = kRecordHead + kFooterContent;
 
 std::map<std::string, std::string> parse_text_map(ByteReader& reader) {
@@ -137,6 +138,7 @@ void Walker::take_summary(ByteSpan summary) {
           whole > data_end_ - block.offset)
         continue;
       known_chunks_.insert(block.offset);
+      note_channels(record, block);
       blocks.push_back(block);
     }
   }
@@ -149,6 +151,21 @@ void Walker::take_summary(ByteSpan summary) {
   if (std::is_sorted(blocks.begin(), blocks.end(), earlier)) return;
   std::sort(blocks.begin(), blocks.end(), earlier);
   plan_ = std::move(blocks);
+}
+
+void Walker::note_channels(ByteReader& record, const Block& block) {
+  ByteReader indexes(record.take(record.get<std::uint32_t>()));
+  while (record.ok() && indexes.remaining() >= 10) {
+    const auto channel = indexes.get<std::uint16_t>();
+    (void)indexes.get<std::uint64_t>();
+    std::vector<Block>& chunks = chunks_of_[channel];
+    if (chunks.size() < kChunksOfChannel) chunks.push_back(block);
+  }
+}
+
+std::vector<Block> Walker::chunks_of(std::uint16_t channel) const {
+  const auto found = chunks_of_.find(channel);
+  return found == chunks_of_.end() ? std::vector<Block>() : found->second;
 }
 
 std::optional<Walker::Head> Walker::head_at(std::uint64_t offset) {

@@ -44,6 +44,7 @@ class Registry {
   void add_schema(ByteSpan content);
   void add_channel(ByteSpan content);
   [[nodiscard]] std::shared_ptr<const MessageChannel> find(std::uint16_t id) const;
+  [[nodiscard]] const Channels& channels() const { return channels_; }
 
  private:
   std::map<std::uint16_t, std::pair<std::string, std::string>> schemas_;  // name, encoding
@@ -58,6 +59,8 @@ class Walker {
   Walker(ByteSource& file, Registry& registry, Log& log);
 
   [[nodiscard]] std::optional<Block> next();
+  // The first chunks that hold messages of a channel, as the index knows them.
+  [[nodiscard]] std::vector<Block> chunks_of(std::uint16_t channel) const;
   [[nodiscard]] std::uint64_t position() const { return position_; }
   [[nodiscard]] const std::string& profile() const { return profile_; }
   [[nodiscard]] const std::map<std::string, std::string>& sensor() const { return sensor_; }
@@ -70,6 +73,7 @@ class Walker {
 
   void read_summary();
   void take_summary(ByteSpan summary);
+  void note_channels(ByteReader& record, const Block& block);
   [[nodiscard]] std::optional<Block> next_planned();
   [[nodiscard]] std::optional<Head> head_at(std::uint64_t offset);
   [[nodiscard]] bool plausible(const Head& head, std::uint64_t offset) const;
@@ -93,7 +97,8 @@ class Walker {
   bool has_summary_ = false;
   bool has_end_ = false;                  // the magic at the end
   std::set<std::uint64_t> known_chunks_;  // from the index
-  std::vector<Block> plan_;               // blocks in the order of time, if that differs
+  std::map<std::uint16_t, std::vector<Block>> chunks_of_;
+  std::vector<Block> plan_;  // blocks in the order of time, if that differs
   std::size_t planned_ = 0;
   std::string profile_;
   std::map<std::string, std::string> sensor_;

@@ -21,6 +21,19 @@ struct MessageBlock {
   std::vector<Entry> entries;
 };
 
+// Keeps those of one channel, until there are `enough` in all.
+inline void keep_messages(const MessageBlock& block, const MessageChannel& channel,
+                          std::size_t enough, std::vector<StoredMessage>& kept) {
+  for (const MessageBlock::Entry& entry : block.entries) {
+    if (kept.size() >= enough) return;
+    if (entry.channel.get() != &channel) continue;
+    const auto begin = block.bytes.begin() + static_cast<std::ptrdiff_t>(entry.offset);
+    kept.push_back({entry.channel,
+                    entry.log_time,
+                    {begin, begin + static_cast<std::ptrdiff_t>(entry.length)}});
+  }
+}
+
 // Hands out the messages of several blocks by log time; equal times in the order in which they were
 // added. Not thread-safe.
 class MessageMerger {

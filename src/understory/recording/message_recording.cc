@@ -87,14 +87,18 @@ class MessageRecording : public Recording {
  public:
   MessageRecording(std::string file, const MessageSourceFactory& open, const OpenOptions& options,
                    Log& log)
-      : file_(std::move(file)), log_(log) {
+      : file_(std::move(file)), log_(log), extrinsics_file_(options.extrinsics_file) {
     Log quiet;  // the same damage will be met again when reading
     const auto ahead = open(quiet);
     survey_ = survey_messages(*ahead);
+    survey_late_topics(*ahead, survey_);
     choice_ = choose_topics(survey_, options, file_, log_);
     if (!choice_.quality.empty()) fixes_.expect_quality();
     source_ = open(log_);
-    make_rig(options, ahead->sensor_metadata());
+    note_frames();
+    make_rig(ahead->sensor_metadata());
+    if (lacks_place() && survey_late_transforms(*ahead, survey_)) place_sensors();
+    warn_of_missing_place();
     judge_lidar();
     judge_imu();
     survey_.topics.clear();
@@ -115,6 +119,7 @@ class MessageRecording : public Recording {
     if (events_.empty()) return std::nullopt;
     Event event = std::move(events_.front());
     events_.pop_front();
+    scan_given_ = scan_given_ || std::holds_alternative<ScanPtr>(event);
     return event;
   }
 
@@ -129,23 +134,54 @@ class MessageRecording : public Recording {
   [[nodiscard]] double progress() const override { return source_->progress(); }
 
  private:
-  void make_rig(const OpenOptions& options, const std::map<std::string, std::string>& metadata) {
+  void note_frames() {
     const auto frame_of = [&](const std::string& topic) {
       const TopicSurvey* found = survey_.find(topic);
       return found == nullptr ? std::string() : found->frame;
     };
-    rig_ = rig_from_transforms(survey_.transforms, {frame_of(choice_.lidar), frame_of(choice_.imu),
-                                                    frame_of(choice_.gnss)});
+    frames_ = {frame_of(choice_.lidar), frame_of(choice_.imu), frame_of(choice_.gnss)};
+  }
+
+  void make_rig(const std::map<std::string, std::string>& metadata) {
     const auto model = metadata.find("lidar_model");
     if (model != metadata.end()) rig_.lidar_model = model->second;
     const auto rings = metadata.find("ring_count");
     if (rings != metadata.end()) ring_count_ = std::atoi(rings->second.substr(0, 6).c_str());
-    if (!options.extrinsics_file.empty()) apply_extrinsics_file(options.extrinsics_file, rig_);
-    if (!choice_.imu.empty() && !choice_.lidar.empty() && !rig_.body_from_imu)
-      log_.warn("recording.no_imu_extrinsics",
-                file_ + ": nothing tells where the IMU (" + frame_of(choice_.imu) +
-                    ") sits relative to the lidar (" + frame_of(choice_.lidar) +
-                    "): it is not used; give --extrinsics FILE");
+    place_sensors();
+  }
+
+  // The rig by what is known of frames and transforms. Once a scan has been given the body stays
+  // what it is, and only the places of other sensors are added. True if there was anything new.
+  bool place_sensors() {
+    if (scan_given_)
+      return extrinsics_file_.empty() && complete_rig(survey_.transforms, frames_, rig_);
+    const bool had_imu = rig_.body_from_imu.has_value();
+    const std::string model = rig_.lidar_model;
+    rig_ = rig_from_transforms(survey_.transforms, frames_);
+    rig_.lidar_model = model;
+    if (!extrinsics_file_.empty()) apply_extrinsics_file(extrinsics_file_, rig_);
+    return !had_imu && rig_.body_from_imu;
+  }
+
+  [[nodiscard]] bool lacks_place() const {
+    return (!frames_.imu.empty() && !rig_.body_from_imu) ||
+           (!frames_.gnss.empty() && !rig_.body_from_gnss);
+  }
+
+  void warn_of_missing_place() {
+    if (choice_.imu.empty() || choice_.lidar.empty() || rig_.body_from_imu) return;
+    log_.warn("recording.no_imu_extrinsics",
+              file_ + ": nothing tells where the IMU (" + frames_.imu +
+                  ") sits relative to the lidar (" + frames_.lidar +
+                  "): it is not used until a transform comes that does; give --extrinsics FILE");
+  }
+
+  // A sensor that begins later than the start of the recording was looked at.
+  void note_frame(std::string& known, const std::string& frame) {
+    if (!known.empty() || frame.empty()) return;
+    known = frame;
+    place_sensors();
+    if (&known == &frames_.imu) warn_of_missing_place();
   }
 
   void judge_lidar() {
@@ -168,10 +204,25 @@ class MessageRecording : public Recording {
   // which no carrier keeps at a tenth of gravity.
   void judge_imu() {
     const TopicSurvey* imu = survey_.find(choice_.imu);
-    if (imu == nullptr || imu->delays.size() < 20) return;
+    if (imu == nullptr || imu->late) {
+      imu_text_.clear();
+      return;
+    }
+    if (imu->delays.size() < 20) return;
     const double mean = imu->specific_force_sum / static_cast<double>(imu->delays.size());
     imu_text_ = "m/s^2, rad/s";
     if (mean < 0.5 || mean > 2.0) return;
+    take_imu_in_g();
+  }
+
+  // One that begins later is judged by its first sample.
+  void judge_late_imu(const ImuSample& first) {
+    const double force = first.specific_force.norm();
+    imu_text_ = "m/s^2, rad/s";
+    if (force > 0.5 && force < 2.0) take_imu_in_g();
+  }
+
+  void take_imu_in_g() {
     imu_scale_ = kGravity;
     imu_text_ = "accelerations in g, converted to m/s^2; rad/s";
     log_.warn("imu.in_g", file_ + ": " + choice_.imu +
@@ -275,6 +326,7 @@ class MessageRecording : public Recording {
                     " have impossible times; dropped");
     topic.add_stamp(cloud->header.stamp);
     topic.report().frame = cloud->header.frame;
+    note_frame(frames_.lidar, cloud->header.frame);
     topic.report().conventions = convention_->text;
     topic.report().points += converted.scan->points.size();
     topic.report().empty_points += converted.without_return;
@@ -293,6 +345,7 @@ class MessageRecording : public Recording {
     }
     topic.add_stamp(message->header.stamp);
     topic.report().frame = message->header.frame;
+    note_frame(frames_.lidar, message->header.frame);
     topic.report().points += packets_->add(*message, events_);
     topic.report().conventions = packets_->conventions();
     if (rig_.lidar_model.empty()) rig_.lidar_model = packets_->model();
@@ -304,6 +357,8 @@ class MessageRecording : public Recording {
     if (!imu) return false;
     topic.add_stamp(imu->sample.stamp);
     topic.report().frame = imu->header.frame;
+    if (imu_text_.empty()) judge_late_imu(imu->sample);
+    note_frame(frames_.imu, imu->header.frame);
     topic.report().conventions = imu_text_ + (imu->sample.orientation ? "; with orientation" : "");
     if (!imu->sample.specific_force.allFinite() || !imu->sample.angular_rate.allFinite()) {
       log_.warn("imu.not_finite", file_ + ": " + topic.report().name + ": a sample at " +
@@ -316,16 +371,17 @@ class MessageRecording : public Recording {
     return true;
   }
 
-  // The rig was made of what the first seconds held; what comes later cannot be used any more.
+  // Transforms of the first seconds are known already; what comes later is used from then on.
   bool take_transforms(TopicStatistics& topic, const MessageReader& reader, TimeNs log_time) {
     const auto transforms = decode_transforms(reader);
     if (!transforms) return false;
     topic.add_stamp(log_time);
     for (const TransformMessage& each : *transforms) {
-      if (survey_.transforms.has_frame(each.child)) continue;
+      if (!survey_.transforms.add(each.parent, each.child, each.parent_from_child)) continue;
+      if (!place_sensors()) continue;
       log_.warn("recording.late_extrinsics",
-                file_ + ": the place of " + each.child + " on " + each.parent +
-                    " comes too late in the recording to be used: give --extrinsics FILE");
+                file_ + ": where " + each.child + " sits on " + each.parent + " is told only at " +
+                    format_seconds(log_time) + " s: sensors that hang on it are used from then on");
     }
     return true;
   }
@@ -353,6 +409,7 @@ class MessageRecording : public Recording {
       fixes_.expect_quality();
       fixes_.add_quality(gnss->fix, events_);
     } else {
+      note_frame(frames_.gnss, gnss->header.frame);
       fixes_.add_position(gnss->fix, message.log_time, events_);
     }
     return true;
@@ -363,7 +420,10 @@ class MessageRecording : public Recording {
   MessageSurvey survey_;
   TopicChoice choice_;
   std::unique_ptr<MessageSource> source_;
+  SensorFrames frames_;
+  std::string extrinsics_file_;
   Rig rig_;
+  bool scan_given_ = false;
   std::optional<TimeConvention> convention_;
   int ring_count_ = 0;
   double imu_scale_ = 1.0;

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "understory/recording/message_reader.h"
 #include "understory/util/log.h"
@@ -34,6 +35,14 @@ struct RawMessage {
   ByteSpan data;        // valid until the next call of `next`
 };
 
+// One that is kept.
+struct StoredMessage {
+  std::shared_ptr<const MessageChannel> channel;
+  TimeNs log_time = 0;
+  std::vector<std::uint8_t> data;
+};
+using WantedChannel = std::function<bool(const MessageChannel&)>;
+
 // The messages of a container file in the order of their log times, as far as they stand close to
 // each other in the file. Memory is bounded. Damage is passed over with a warning (keys
 // "recording.damaged" and "recording.truncated") that names the file and the byte.
@@ -45,6 +54,13 @@ class MessageSource {
   [[nodiscard]] virtual double progress() const = 0;     // 0 to 1
   // What the file itself says of its sensors (kSensorMetadata of our own recordings).
   [[nodiscard]] virtual std::map<std::string, std::string> sensor_metadata() const { return {}; }
+  // The first messages of each topic that `wanted` accepts, at most `most` of each, wherever in the
+  // file they stand: found by its index; none where it has no index. `next` goes on as if they had
+  // not been looked for.
+  [[nodiscard]] virtual std::vector<StoredMessage> first_messages(const WantedChannel& /*wanted*/,
+                                                                  std::size_t /*most*/) {
+    return {};
+  }
 };
 
 // Opens the same messages from the start; called once to look ahead and once to read.

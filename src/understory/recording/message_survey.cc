@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include "understory/recording/message_decode.h"
@@ -44,6 +45,13 @@ class Surveyor {
       default:
         return;
     }
+  }
+
+  void add_transforms(const MessageReader& reader) {
+    const auto transforms = decode_transforms(reader);
+    if (!transforms) return;
+    for (const TransformMessage& each : *transforms)
+      survey_.transforms.add(each.parent, each.child, each.parent_from_child);
   }
 
   [[nodiscard]] std::size_t most_clouds() const {
@@ -100,13 +108,6 @@ class Surveyor {
   template <typename Message>
   static void add_frame(TopicSurvey& topic, const std::optional<Message>& message) {
     if (message) topic.frame = message->header.frame;
-  }
-
-  void add_transforms(const MessageReader& reader) {
-    const auto transforms = decode_transforms(reader);
-    if (!transforms) return;
-    for (const TransformMessage& each : *transforms)
-      survey_.transforms.add(each.parent, each.child, each.parent_from_child);
   }
 
   MessageSurvey& survey_;
@@ -199,6 +200,37 @@ MessageSurvey survey_messages(MessageSource& source) {
   return survey;
 }
 
+void survey_late_topics(MessageSource& source, MessageSurvey& survey) {
+  const auto wanted = [&](const MessageChannel& channel) {
+    const TopicRole role = role_of(channel);
+    return role != TopicRole::kIgnored && role != TopicRole::kTransforms &&
+           survey.find(channel.topic) == nullptr;
+  };
+  for (const StoredMessage& first : source.first_messages(wanted, 1)) {
+    if (survey.find(first.channel->topic) != nullptr) continue;
+    MessageSurvey alone;
+    Surveyor(alone).add({first.channel, first.log_time, first.data});
+    // One message says what it is and where it sits, not how its clock or its units are.
+    TopicSurvey& topic = alone.topics.front();
+    topic.clouds.clear();
+    topic.delays.clear();
+    topic.late = true;
+    survey.topics.push_back(std::move(topic));
+  }
+}
+
+bool survey_late_transforms(MessageSource& source, MessageSurvey& survey) {
+  constexpr std::size_t kMost = 64;
+  const auto wanted = [](const MessageChannel& channel) {
+    return role_of(channel) == TopicRole::kTransforms;
+  };
+  const std::vector<StoredMessage> found = source.first_messages(wanted, kMost);
+  Surveyor surveyor(survey);
+  for (const StoredMessage& each : found)
+    surveyor.add_transforms(MessageReader(each.data, each.channel->serialization));
+  return !found.empty();
+}
+
 TopicChoice choose_topics(const MessageSurvey& survey, const OpenOptions& options,
                           const std::string& file, Log& log) {
   TopicChoice choice;
@@ -206,9 +238,11 @@ TopicChoice choose_topics(const MessageSurvey& survey, const OpenOptions& option
   choice.lidar = choose(
       survey, options.lidar_topic, "lidar", file, log, is_lidar, [](const TopicSurvey& topic) {
         const bool timed = topic.role != TopicRole::kCloud || !topic.time_field.empty();
-        return std::pair(timed, topic.points);
+        return std::tuple(!topic.late, timed, topic.points);
       });
-  const auto most_messages = [](const TopicSurvey& topic) { return topic.messages; };
+  const auto most_messages = [](const TopicSurvey& topic) {
+    return std::pair(!topic.late, topic.messages);
+  };
   choice.imu = choose(
       survey, options.imu_topic, "imu", file, log,
       [](TopicRole role) { return role == TopicRole::kImu; }, most_messages);
@@ -216,9 +250,15 @@ TopicChoice choose_topics(const MessageSurvey& survey, const OpenOptions& option
     return std::any_of(survey.topics.begin(), survey.topics.end(),
                        [&](const TopicSurvey& topic) { return topic.role == wanted; });
   };
+  const auto early = [&](TopicRole wanted) {
+    return std::any_of(survey.topics.begin(), survey.topics.end(), [&](const TopicSurvey& topic) {
+      return topic.role == wanted && !topic.late;
+    });
+  };
   const TopicSurvey* named = survey.find(options.gnss_topic);
-  const bool by_gps_fix =
-      named != nullptr ? named->role == TopicRole::kGpsFix : !has(TopicRole::kNavSatFix);
+  const bool only_gps_fix =
+      !has(TopicRole::kNavSatFix) || (early(TopicRole::kGpsFix) && !early(TopicRole::kNavSatFix));
+  const bool by_gps_fix = named != nullptr ? named->role == TopicRole::kGpsFix : only_gps_fix;
   const TopicRole gnss_role = by_gps_fix ? TopicRole::kGpsFix : TopicRole::kNavSatFix;
   choice.gnss = choose(
       survey, options.gnss_topic, "gnss", file, log,

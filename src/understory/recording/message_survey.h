@@ -38,6 +38,7 @@ struct TopicSurvey {
   std::vector<CloudTimes> clouds;   // of PointCloud2
   std::vector<TimeNs> delays;       // log time - stamp
   double specific_force_sum = 0.0;  // of norms, as they come
+  bool late = false;                // first seen behind the start, by the file's index
 };
 
 struct MessageSurvey {
@@ -49,6 +50,13 @@ struct MessageSurvey {
 // Reads the start of a recording: until there are enough clouds to judge their conventions and two
 // seconds have passed, never more than a minute or 256 MB.
 [[nodiscard]] MessageSurvey survey_messages(MessageSource& source);
+
+// Adds the topics of sensors that begin later, where the file's index leads to their first message:
+// name, role and frame, and that they are late.
+void survey_late_topics(MessageSource& source, MessageSurvey& survey);
+
+// Adds the transforms that the file's index leads to. True if there were any.
+bool survey_late_transforms(MessageSource& source, MessageSurvey& survey);
 
 // The topics to be used.
 struct TopicChoice {

@@ -133,6 +133,24 @@ class BagFolderSource : public MessageSource {
   [[nodiscard]] std::map<std::string, std::string> sensor_metadata() const override {
     return source_ == nullptr ? std::map<std::string, std::string>() : source_->sensor_metadata();
   }
+  // Of parts that need not be unpacked for it.
+  [[nodiscard]] std::vector<StoredMessage> first_messages(const WantedChannel& wanted,
+                                                          std::size_t most) override {
+    std::vector<StoredMessage> all;
+    for (const std::string& file : files_) {
+      if (has_ending(file, ".zstd")) continue;
+      try {
+        Log quiet;  // what is wrong is said when the part is read
+        const auto part =
+            has_ending(file, ".mcap") ? read_mcap(open_file(file), quiet) : read_db3(file, quiet);
+        for (StoredMessage& each : part->first_messages(wanted, most))
+          all.push_back(std::move(each));
+      } catch (const InputError&) {
+        continue;
+      }
+    }
+    return all;
+  }
 
  private:
   // A part that cannot be opened is left out, unless it is the only one.

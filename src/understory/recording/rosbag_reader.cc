@@ -27,6 +27,7 @@ constexpr std::string_view kChunkMark = "compression=";
 constexpr std::size_t kMarkReach = 96;  // a chunk's header begins at most that far before its mark
 // Chunks loaded at a time: neighbours may overlap in time by a little.
 constexpr std::size_t kLoadedChunks = 2;
+constexpr std::size_t kChunksOfConnection = 16;
 
 // The fields of a record's header, "name=value" each.
 using Fields = std::map<std::string_view, ByteSpan>;
@@ -81,6 +82,30 @@ class RosbagSource : public MessageSource {
     return static_cast<double>(std::min(position_, file_->size())) /
            static_cast<double>(file_->size());
   }
+  [[nodiscard]] std::vector<StoredMessage> first_messages(const WantedChannel& wanted,
+                                                          std::size_t most) override {
+    std::vector<StoredMessage> found;
+    const auto connections = connections_;
+    for (const auto& [id, channel] : connections) {
+      const auto chunks = chunks_of_.find(id);
+      if (chunks == chunks_of_.end() || !wanted(*channel)) continue;
+      const std::size_t enough = found.size() + most;
+      for (const std::uint64_t place : chunks->second) {
+        const auto record = record_at(place);
+        if (!record || record->op != kChunk || record->cut) continue;
+        const auto size = number<std::uint32_t>(record->fields, "size");
+        MessageBlock block;
+        if (!size || !unpack(*record, std::min(record->data_length, kLongestBlock),
+                             text(record->fields, "compression"), *size, block.bytes)
+                          .empty())
+          continue;
+        list_messages(block);
+        keep_messages(block, *channel, enough, found);
+        if (found.size() >= enough) break;
+      }
+    }
+    return found;
+  }
 
  private:
   struct Record {
@@ -132,15 +157,28 @@ class RosbagSource : public MessageSource {
     while (at < file_->size()) {
       const auto record = record_at(at);
       if (!record || record->cut || (record->op != kConnection && record->op != kChunkInfo)) return;
+      std::vector<std::uint8_t> data;
+      file_->read(record->data_offset, record->data_length, data);
       if (record->op == kConnection) {
-        std::vector<std::uint8_t> data;
-        file_->read(record->data_offset, record->data_length, data);
         add_connection(record->fields, data);
+      } else {
+        add_chunk_info(record->fields, data);
       }
       at = record->data_offset + record->data_length;
     }
     is_indexed_ = true;
     data_end_ = *index;
+  }
+
+  // Which connections the messages of a chunk belong to.
+  void add_chunk_info(const Fields& fields, ByteSpan data) {
+    const auto place = number<std::uint64_t>(fields, "chunk_pos");
+    ByteReader counts(data);
+    while (place && counts.remaining() >= 8) {
+      std::vector<std::uint64_t>& chunks = chunks_of_[counts.get<std::uint32_t>()];
+      (void)counts.get<std::uint32_t>();
+      if (chunks.size() < kChunksOfConnection) chunks.push_back(*place);
+    }
   }
 
   void add_connection(const Fields& fields, ByteSpan data) {
@@ -191,16 +229,8 @@ class RosbagSource : public MessageSource {
     compression_ = method == "none" ? "no compression" : method;
     std::uint64_t length = std::min(record.data_length, kLongestBlock);
     if (record.cut) length = std::min(length, pass_cut_chunk(record));
-
-    std::vector<std::uint8_t> packed;
-    file_->read(record.data_offset, length, packed);
     MessageBlock block;
-    std::string problem;
-    if (method == "none") {
-      block.bytes = std::move(packed);
-    } else {
-      problem = decompress(packed, method, *size, block.bytes);
-    }
+    std::string problem = unpack(record, length, method, *size, block.bytes);
     if (problem.empty() && block.bytes.size() != *size) problem = "its length is wrong";
     const bool whole = list_messages(block);
     if (problem.empty() && !whole) problem = "a record in it is damaged";
@@ -208,6 +238,16 @@ class RosbagSource : public MessageSource {
       warn("recording.damaged", record.offset,
            "the chunk is damaged (" + problem + "); read as far as it goes");
     merger_.add(std::move(block));
+  }
+
+  // The bytes of a chunk, as far as they can be unpacked; what is wrong with them, if anything.
+  std::string unpack(const Record& record, std::uint64_t length, const std::string& method,
+                     std::uint32_t size, std::vector<std::uint8_t>& bytes) {
+    std::vector<std::uint8_t> packed;
+    file_->read(record.data_offset, length, packed);
+    if (method != "none") return decompress(packed, method, size, bytes);
+    bytes = std::move(packed);
+    return "";
   }
 
   // A chunk that seems to reach beyond the end of the file: either the file was cut off, or the
@@ -304,6 +344,7 @@ class RosbagSource : public MessageSource {
   bool is_indexed_ = false;
   bool ended_ = false;
   std::map<std::uint32_t, std::shared_ptr<const MessageChannel>> connections_;
+  std::map<std::uint32_t, std::vector<std::uint64_t>> chunks_of_;  // connection -> places
   MessageMerger merger_;
   std::string compression_;
 };

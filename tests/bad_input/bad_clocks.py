@@ -1,0 +1,196 @@
+"""Sensors whose clocks run apart, that begin late or die, through `understory map` by both front ends:
+offsets are mended and said, and whoever comes late is used from then on."""
+
+import dataclasses
+import json
+import signal
+import subprocess
+import sys
+import time
+
+from program import PROGRAM, Cases, error_m, good_recording, map_recording, program
+from recordings import write_indexed_mcap, write_mcap
+
+FRONT_END = sys.argv[1]
+SECONDS = 16
+cases = Cases()
+good, messages, truth = good_recording(
+    cases.folder, seconds=SECONDS,
+    more=("gnss.enabled=true", "gnss.rate_hz=2", "imu.mag.enabled=true"))
+start = next(m for m in messages if m.topic == "/lidar").stamp
+OPTIONS = ["--front-end", "sparse"] if FRONT_END == "sparse" else []
+
+
+def second(message):
+    return (message.time - start) / 1e9
+
+
+def mapped(folder, spoilt, *options, write=write_mcap):
+    write(folder / "walk.mcap", sorted(spoilt, key=lambda m: m.time))
+    return judged(map_recording(folder / "walk.mcap", folder / "run", *OPTIONS, *options))
+
+
+def judged(outcome):
+    """The outcome with its error in the plane: by stems height is not known well."""
+    assert outcome.code in (0, 4), outcome.said
+    if FRONT_END == "dense":
+        outcome.error = error_m(outcome, truth)[0]
+    else:
+        done = program("evaluate", outcome.folder, truth, "--align", "se3", "--json")
+        outcome.error = json.loads(done.stdout)["ape_plane_rmse_m"]
+    return outcome
+
+
+def off(topics, seconds):
+    """The stamps of these topics moved by that; they arrive as before."""
+    return [m.stamped(m.stamp + round(seconds * 1e9)) if m.topic in topics else m for m in messages]
+
+
+UNDISTURBED = judged(map_recording(good, cases.folder / "undisturbed", *OPTIONS))
+assert UNDISTURBED.code == 0 and not any(k.startswith("time.") for k in UNDISTURBED.warnings)
+BEST = UNDISTURBED.error
+WITHOUT_IMU = mapped(cases.folder, [m for m in messages if m.topic != "/imu"]).error
+
+
+def quality(outcome, name):
+    return outcome.run["quality"][name]
+
+
+def near_undisturbed(outcome, *keys):
+    assert outcome.code == 0 or outcome.run["status"] == "partial", outcome.run["reasons"]
+    assert outcome.error < 2 * BEST + 0.005, (outcome.error, BEST)
+    for key in keys:
+        assert key in outcome.warnings, (key, outcome.said)
+    return f"{100 * outcome.error:.1f} cm, undisturbed {100 * BEST:.1f} cm"
+
+
+FIXES, FIELD = ("/gnss", "/gnss/quality"), ("/mag",)
+for seconds in (0.5, 2, 5, -0.5, -2, -5) if FRONT_END == "dense" else (2, -5):
+    @cases.case(f"fixes {seconds} s ahead and magnetometer as much behind")
+    def slow_sensors(folder, seconds=seconds):
+        spoilt = [m.stamped(m.stamp - round(seconds * 1e9)) if m.topic in FIELD else m
+                  for m in off(FIXES, seconds)]
+        outcome = mapped(folder, spoilt)
+        if FRONT_END == "dense":
+            for name in ("lidar", "imu", "gnss", "mag"):
+                received, released = (outcome.run["counts"][f"{name}_{what}"] for what in ("received", "released"))
+                assert received == released > 0, (name, received, released)
+            assert outcome.run["counts"]["scans_without_imu"] <= 1
+            for name, offset in (("gnss", seconds), ("mag", -seconds)):
+                mended = quality(outcome, f"{name}_clock_offset_s")
+                assert abs(mended + offset) < 0.15 or (offset == -0.5 and mended == 0), (name, mended)
+        return near_undisturbed(outcome, "time.clock_offset")
+
+for seconds in (0.5, 2, 5, -0.5, -2, -5) if FRONT_END == "dense" else (2, -0.5):
+    @cases.case(f"IMU {seconds} s ahead")
+    def imu_offset(folder, seconds=seconds):
+        outcome = mapped(folder, off(("/imu",), seconds))
+        assert outcome.code == 0, outcome.run["reasons"]
+        if FRONT_END == "dense":
+            assert abs(quality(outcome, "imu_clock_offset_s") + seconds) < 0.02
+            assert quality(outcome, "imu_without_say_s") < 0.5
+        said = f"imu: its stamps are {abs(seconds)}"[:-2]
+        assert said in outcome.said and "imu.late" not in outcome.warnings, outcome.said
+        return near_undisturbed(outcome, "time.clock_offset")
+
+
+@cases.case("IMU that arrives two seconds late")
+def imu_delayed(folder):
+    """Its stamps are right: they are shifted by the arrival at first, and the lidar tells better."""
+    outcome = mapped(folder, [dataclasses.replace(m, time=m.time + 2_000_000_000)
+                              if m.topic == "/imu" else m for m in messages])
+    assert outcome.code == 0 or "IMU" in " ".join(outcome.run["reasons"]), outcome.run["reasons"]
+    assert outcome.error < max(2 * BEST, 1.5 * WITHOUT_IMU) + 0.005, outcome.error
+    return f"exit {outcome.code}, {100 * outcome.error:.1f} cm"
+
+
+for indexed in (False, True):
+    write = write_indexed_mcap if indexed else write_mcap
+    container = "file with an index" if indexed else "file without an index"
+
+    @cases.case(f"IMU that begins 4 s late, {container}")
+    def imu_late(folder, write=write):
+        outcome = mapped(folder, [m for m in messages if m.topic != "/imu" or second(m) > 4], write=write)
+        if FRONT_END == "dense":
+            assert "imu.late" in outcome.warnings
+            assert 3.5 < quality(outcome, "imu_without_say_s") < 4.5
+            assert quality(outcome, "imu_without_place_s") == 0
+        assert "recording.no_imu_extrinsics" not in outcome.warnings
+        used_like_undisturbed(outcome)
+        return f"{100 * outcome.error:.1f} cm, without IMU {100 * WITHOUT_IMU:.1f} cm"
+
+    @cases.case(f"transforms that come 5 s late, {container}")
+    def transforms_late(folder, write=write, indexed=indexed):
+        outcome = mapped(folder, [dataclasses.replace(m, time=start + 5_000_000_000)
+                                  if m.topic == "/tf_static" else m for m in messages], write=write)
+        assert ("recording.late_extrinsics" in outcome.warnings) == (not indexed), outcome.said
+        if FRONT_END == "dense":
+            unused = quality(outcome, "imu_without_place_s")
+            assert unused == 0 if indexed else 4 < unused < 5.5, unused
+        used_like_undisturbed(outcome)
+        return f"{100 * outcome.error:.1f} cm, without IMU {100 * WITHOUT_IMU:.1f} cm"
+
+    @cases.case(f"first fix after 6 s, {container}")
+    def fixes_late(folder, write=write):
+        outcome = mapped(folder, [m for m in messages if m.topic not in FIXES or second(m) > 6], write=write)
+        fixes = sum(1 for _ in open(outcome.folder / "gnss.csv")) - 1
+        assert fixes > 0.9 * 2 * (SECONDS - 6), fixes
+        return near_undisturbed(outcome)
+
+
+def used_like_undisturbed(outcome):
+    """What the IMU alone can tell, biases and up, is there in the end; the error is not that without."""
+    assert outcome.error < max(2 * BEST, WITHOUT_IMU) + 0.005, (outcome.error, BEST, WITHOUT_IMU)
+    if FRONT_END == "sparse":
+        return
+    import gzip
+    last = gzip.open(outcome.folder / "states.csv.gz", "rt").read().splitlines()[-1].split(",")
+    assert any(abs(float(v)) > 1e-6 for v in last[4:10]), f"no biases of the IMU: {last[:10]}"
+
+
+@cases.case("IMU that dies, and a lidar with gaps")
+def imu_dies(folder):
+    def heard(message):
+        if message.topic == "/imu":
+            return second(message) < 4
+        return message.topic != "/lidar" or second(message) < 6 or second(message) % 3 > 0.6
+    outcome = mapped(folder, [m for m in messages if heard(m)])
+    if FRONT_END == "dense":
+        assert outcome.run["counts"]["lidar_gaps"] >= 3 and outcome.run["counts"]["lidar_clock_jumps"] == 0
+        assert quality(outcome, "imu_without_say_s") > SECONDS - 6
+        assert quality(outcome, "lidar_without_say_s") > 1
+        assert "imu.stopped" in outcome.warnings
+    assert outcome.error < 3 * max(BEST, WITHOUT_IMU) + 0.02, outcome.error
+    return f"exit {outcome.code}, {100 * outcome.error:.1f} cm"
+
+
+@cases.case("at the speed of the sensors, clocks of different epochs")
+def realtime(folder):
+    spoilt = [m.stamped(m.stamp - start + 5_000_000_000) if m.topic == "/imu" else m
+              for m in off(FIXES, 2) if second(m) < 8]
+    began = time.monotonic()
+    outcome = mapped(folder, spoilt, "--realtime")
+    assert 7 < time.monotonic() - began < 60
+    if FRONT_END == "dense":
+        assert abs(quality(outcome, "imu_clock_offset_s") - (start - 5e9) / 1e9) < 0.02
+        assert outcome.run["counts"]["imu_too_late"] == 0
+    assert "time.clock_offset" in outcome.warnings
+    return f"exit {outcome.code}, {100 * outcome.error:.1f} cm"
+
+
+@cases.case("Ctrl-C at the speed of the sensors, with a gap of eight seconds")
+def interrupted(folder):
+    write_mcap(folder / "walk.mcap", [m for m in messages if not 4 < second(m) < 12])
+    command = [PROGRAM, "--quiet", "map", folder / "walk.mcap", "-o", folder / "run", "--realtime",
+               "--set", "map.enabled=false", *OPTIONS]
+    run = subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL)
+    time.sleep(7)
+    began = time.monotonic()
+    run.send_signal(signal.SIGINT)
+    assert run.wait(60) == 4, run.stderr.read()
+    took = time.monotonic() - began
+    assert took < 4, f"{took:.1f} s after Ctrl-C"
+    return f"ended {took:.1f} s after it"
+
+
+cases.run()
