@@ -259,7 +259,7 @@ class MessageRecording : public Recording {
         decoded = take_gnss(topic, role, message, reader);
         break;
       case TopicRole::kTransforms:
-        topic.add_stamp(message.log_time);
+        decoded = take_transforms(topic, reader, message.log_time);
         break;
       default:
         break;
