@@ -238,7 +238,7 @@ def inventory(folder):
     assert done.returncode == 3 and f"{path}: the file is empty" in done.stderr, done.stderr
     before = (folder / "run" / "run.json").read_bytes()
     done = program("inventory", folder / "run", "-o", folder / "run")
-    assert done.returncode == 3 and "holds the input" in done.stderr, done.stderr
+    assert done.returncode == 3 and "which is read" in done.stderr, done.stderr
     assert (folder / "run" / "run.json").read_bytes() == before
     half = unfinished_run(folder / "half")
     done = program("inventory", folder / "run", "-o", folder / "half")

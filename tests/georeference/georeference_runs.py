@@ -322,9 +322,10 @@ def straight(folder):
 @cases.case("wrong use and bad input")
 def bad(folder):
     def refused(code, word, *arguments):
-        done = georeference(*arguments, "-o", folder / "out")
+        out = cases.folder / "refused"
+        done = georeference(*arguments, "-o", out)
         assert done.returncode == code and word in done.stderr, (arguments, done)
-        assert not (folder / "out" / "trajectory.tum").exists(), arguments
+        assert not out.exists(), arguments
 
     refused(2, "--method", RUN)
     refused(2, "--dem", RUN, "--method", "terrain")

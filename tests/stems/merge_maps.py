@@ -167,7 +167,7 @@ def nothing(folder):
     before = write(run / "trees.csv", stand(50)).read_bytes()
     for maps in ((run, a), (a, run / "trees.csv")):
         done = program("merge", *maps, "-o", run)
-        assert done.returncode == 3 and "holds the input" in done.stderr, done
+        assert done.returncode == 3 and "which is read" in done.stderr, done
     assert (run / "trees.csv").read_bytes() == before
     for option in ("--weight", "--reach-m"):
         done = program("merge", a, a, "-o", folder / "both", option, "nan")
