@@ -3,12 +3,10 @@ are, to the byte and the time of change, and nothing is left beside them."""
 
 import fcntl
 import gzip
-import hashlib
 import json
 import os
 import pathlib
 import shutil
-import stat
 
 from program import Cases, program, unfinished_run
 
@@ -21,16 +19,14 @@ inputs = cases.folder / "inputs"
 
 
 def snapshot(folder):
-    """Each path below a folder: kind, content, times, links."""
-    seen = {}
-    for path in [folder, *folder.rglob("*")]:
-        at = path.lstat()
-        content = b""
-        if stat.S_ISREG(at.st_mode):
-            content = hashlib.sha256(path.read_bytes()).digest()
-        elif stat.S_ISLNK(at.st_mode):
-            content = os.readlink(path).encode()
-        seen[str(path)] = (at.st_mode, at.st_ino, at.st_nlink, at.st_mtime_ns, content)
+    """Each path below a folder with all that the system says of it but the time of reading. No program can
+    write, rename or touch a file and leave the time of its last change (st_ctime) as it was."""
+    def tell(path):
+        at = os.lstat(path)
+        return at.st_mode, at.st_ino, at.st_nlink, at.st_size, at.st_mtime_ns, at.st_ctime_ns
+    seen = {str(folder): tell(folder)}
+    for top, folders, files in os.walk(folder):
+        seen.update({path: tell(path) for path in (os.path.join(top, name) for name in folders + files)})
     return seen
 
 
