@@ -163,6 +163,13 @@ TEST(FalseLoops, ThePapersLoopsTakeTheEdgeFromTheMatchToTheLocalMap) {
     const Vector6d error =
         right_difference(loop.edge.from_from_to, truly(loop.from).inverse() * truly(loop.to));
     EXPECT_LT(error.tail<3>().norm(), 0.1) << loop.from << " - " << loop.to;
+    // The noise of (36), nothing of the matcher's own.
+    const double rotation = LoopClosureConfig().sigma_rotation_deg * std::numbers::pi / 180.0;
+    const double translation = LoopClosureConfig().sigma_translation_m;
+    Vector6d variances;
+    variances << Eigen::Vector3d::Constant(rotation * rotation),
+        Eigen::Vector3d::Constant(translation * translation);
+    EXPECT_TRUE(loop.edge.covariance.isApprox(Matrix6d(variances.asDiagonal()), 1e-9));
   }
   const Pose truth = Pose(Eigen::Quaterniond::Identity(), slip) * believed(kSteps);
   const Pose first = result.keyframes.front().world_from_body;
