@@ -127,10 +127,11 @@ def interrupted(run, checkpoints):
     for _ in range(20_000):
         if len(seen) >= checkpoints:
             break
-        try:
-            seen.add((run / ".understory" / "checkpoint.bin").stat().st_mtime_ns)
-        except FileNotFoundError:
-            pass
+        for checkpoint in run.rglob("checkpoint*.bin"):  # two, written in turn
+            try:
+                seen.add((checkpoint.name, checkpoint.stat().st_mtime_ns))
+            except FileNotFoundError:
+                pass
         time.sleep(0.0005)
     process.send_signal(signal.SIGINT)
     said = process.communicate()[1]

@@ -76,11 +76,22 @@ int run_sparse(const MapOptions& options, CommandContext& context) {
   });
 }
 
+// A resumed run keeps what it was begun with.
+void refuse_beside_resume(const CLI::App& command) {
+  std::string given;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() == 0 || option->get_name() == "--resume") continue;
+    given += (given.empty() ? "" : ", ") + option->get_name();
+  }
+  if (given.empty()) return;
+  throw ConfigError({"--resume goes on with what the run was begun with, and does not take: " +
+                     given + " (to change it, map the recording anew)"});
+}
+
 // By the front end that the run was begun with.
 int resume(const MapOptions& options, CommandContext& context) {
   return with_advice(options.resume, [&] {
-    RunRequest request;
-    if (RunState::reopen(options.resume, request).front_end() == kSparseFrontEnd) {
+    if (RunState::front_end_of(options.resume) == kSparseFrontEnd) {
       return report_outcome(resume_sparse_mapping(options.resume, context.log, context.progress,
                                                   context.stop_requested));
     }
@@ -90,7 +101,7 @@ int resume(const MapOptions& options, CommandContext& context) {
 }
 
 int run_map(const MapOptions& options, CommandContext& context) {
-  if (!options.resume.empty() && !options.print_config) return resume(options, context);
+  if (!options.resume.empty()) return resume(options, context);
   if (options.front_end == "sparse") return run_sparse(options, context);
   ReadConfig<MappingConfig> read =
       read_mapping_config(options.profile, options.config_file, options.settings);
@@ -148,8 +159,11 @@ void add_map_command(CLI::App& app, Command& chosen) {
       "Example:\n  understory map plot7.mcap -o plot7 --profile handheld\n"
       "  understory map sim:handheld?seed=3 -o run --set loop_closure.enabled=false\n"
       "  understory map sim:lieksa2 -o forest --front-end sparse");
-  command->callback([&chosen, options] {
-    chosen = [options](CommandContext& context) { return run_map(*options, context); };
+  command->callback([&chosen, options, command] {
+    chosen = [options, command](CommandContext& context) {
+      if (!options->resume.empty()) refuse_beside_resume(*command);
+      return run_map(*options, context);
+    };
   });
 }
 

@@ -1,19 +1,18 @@
 #include "understory/map/keyframe_clouds.h"
 
 #include <array>
+#include <cmath>
+#include <cstring>
+#include <string>
 
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
-constexpr std::uint32_t kMark = 0x4b464332;  // "KFC2"
-
-struct RecordHeader {
-  std::uint32_t mark = kMark;
-  std::int32_t id = 0;
+struct CloudHead {
+  std::int64_t id = 0;
   std::int64_t stamp = 0;
-  std::uint64_t count = 0;
   std::array<double, 7> keyframe_from_body = {0, 0, 0, 0, 0, 0, 1};  // x y z, qx qy qz qw
 };
 
@@ -27,75 +26,37 @@ Pose to_pose(const std::array<double, 7>& n) {
   return {Eigen::Quaterniond(n[6], n[3], n[4], n[5]), Eigen::Vector3d(n[0], n[1], n[2])};
 }
 
+RecordFile::Bytes bytes_of_points(const std::vector<KeyframePoint>& points) {
+  return {reinterpret_cast<const std::uint8_t*>(points.data()),
+          points.size() * sizeof(KeyframePoint)};
+}
+
 }  // namespace
 
-KeyframeClouds::KeyframeClouds(const std::filesystem::path& path, std::size_t keep) : path_(path) {
-  if (keep > 0) {
-    index_existing(keep);
-  } else {
-    std::ofstream create(path, std::ios::binary | std::ios::trunc);
-    if (!create) throw OutputError(path.string(), "cannot be created");
-  }
-  file_.open(path, std::ios::binary | std::ios::in | std::ios::out);
-  if (!file_) throw OutputError(path.string(), "cannot be opened for writing");
-}
+KeyframeClouds::KeyframeClouds(const std::filesystem::path& path) : file_(path) {}
 
-void KeyframeClouds::index_existing(std::size_t keep) {
-  std::ifstream file(path_, std::ios::binary);
-  if (!file) throw InputError(path_.string(), "", "keyframe clouds of the checkpoint are missing");
-  const std::uint64_t size = std::filesystem::file_size(path_);
-  while (offsets_.size() < keep) {
-    RecordHeader header;
-    file.seekg(static_cast<std::streamoff>(end_));
-    file.read(reinterpret_cast<char*>(&header), sizeof(header));
-    const std::uint64_t left = size - end_;
-    if (!file || header.mark != kMark ||
-        header.count > (left - sizeof(header)) / sizeof(KeyframePoint)) {
-      throw InputError(path_.string(), "at byte " + std::to_string(end_),
-                       "expected cloud " + std::to_string(offsets_.size()));
-    }
-    offsets_.push_back(end_);
-    end_ += sizeof(header) + header.count * sizeof(KeyframePoint);
-  }
-  file.close();
-  std::filesystem::resize_file(path_, end_);
-}
+KeyframeClouds::KeyframeClouds(const std::filesystem::path& path, const RecordCount& known)
+    : file_(path, known, &offsets_) {}
 
 void KeyframeClouds::append(const KeyframeCloud& cloud) {
-  const RecordHeader header{kMark, cloud.id, cloud.stamp, cloud.points.size(),
-                            to_numbers(cloud.keyframe_from_body)};
-  file_.seekp(static_cast<std::streamoff>(end_));
-  file_.write(reinterpret_cast<const char*>(&header), sizeof(header));
-  const std::size_t bytes = cloud.points.size() * sizeof(KeyframePoint);
-  file_.write(reinterpret_cast<const char*>(cloud.points.data()),
-              static_cast<std::streamsize>(bytes));
-  if (!file_) throw OutputError(path_.string(), "cannot be written (is the disk full?)");
-  offsets_.push_back(end_);
-  end_ += sizeof(header) + bytes;
-}
-
-void KeyframeClouds::flush() {
-  file_.flush();
-  if (!file_) throw OutputError(path_.string(), "cannot be written (is the disk full?)");
+  const CloudHead head{cloud.id, cloud.stamp, to_numbers(cloud.keyframe_from_body)};
+  offsets_.push_back(file_.append({bytes_of(head), bytes_of_points(cloud.points)}));
 }
 
 KeyframeCloud KeyframeClouds::read(std::size_t i) const {
   UNDERSTORY_CHECK(i < offsets_.size());
-  RecordHeader header;
-  file_.seekg(static_cast<std::streamoff>(offsets_[i]));
-  file_.read(reinterpret_cast<char*>(&header), sizeof(header));
-  const bool sound = file_ && header.mark == kMark;
-  KeyframeCloud cloud;
-  if (sound) {
-    cloud = {header.id, header.stamp, std::vector<KeyframePoint>(header.count),
-             to_pose(header.keyframe_from_body)};
-    file_.read(reinterpret_cast<char*>(cloud.points.data()),
-               static_cast<std::streamsize>(header.count * sizeof(KeyframePoint)));
-  }
-  if (!sound || !file_) {
-    throw InputError(path_.string(), "at byte " + std::to_string(offsets_[i]),
+  const std::vector<std::uint8_t> bytes = file_.read(i, offsets_[i]);
+  CloudHead head;
+  if (bytes.size() < sizeof(head) || (bytes.size() - sizeof(head)) % sizeof(KeyframePoint) != 0) {
+    throw InputError(file_.path().string(), "at byte " + std::to_string(offsets_[i]),
                      "expected cloud " + std::to_string(i));
   }
+  std::memcpy(&head, bytes.data(), sizeof(head));
+  KeyframeCloud cloud{
+      static_cast<std::int32_t>(head.id), head.stamp, {}, to_pose(head.keyframe_from_body)};
+  cloud.points.resize((bytes.size() - sizeof(head)) / sizeof(KeyframePoint));
+  if (!cloud.points.empty())
+    std::memcpy(cloud.points.data(), bytes.data() + sizeof(head), bytes.size() - sizeof(head));
   return cloud;
 }
 

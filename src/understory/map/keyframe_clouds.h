@@ -2,11 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <string>
 #include <vector>
 
 #include "understory/geometry/pose.h"
+#include "understory/util/record_file.h"
 #include "understory/util/time.h"
 
 namespace understory {
@@ -28,27 +27,26 @@ struct KeyframeCloud {
 };
 
 // Clouds that belong to keyframes, on disk, appended one after another, so that memory does not
-// grow with the length of a run. What was appended before `flush` survives a crash of the program.
-// Not thread-safe. Throws OutputError where the disk is full, InputError where the file is damaged.
+// grow with the length of a run. Not thread-safe. Throws OutputError where the disk is full,
+// InputError where the file is damaged.
 class KeyframeClouds {
  public:
-  // Opens `path`; keeps the first `keep` clouds that are there and cuts off the rest (0 = all).
-  KeyframeClouds(const std::filesystem::path& path, std::size_t keep);
+  // Begins anew.
+  explicit KeyframeClouds(const std::filesystem::path& path);
+  // Goes on behind the clouds that are `known`; what follows them is cut off.
+  KeyframeClouds(const std::filesystem::path& path, const RecordCount& known);
 
   void append(const KeyframeCloud& cloud);
-  void flush();
+  // Waits until all clouds are on the disk.
+  void sync() { file_.sync(); }
   [[nodiscard]] std::size_t size() const { return offsets_.size(); }
   // The i-th appended cloud.
   [[nodiscard]] KeyframeCloud read(std::size_t i) const;
-  [[nodiscard]] std::uint64_t bytes() const { return end_; }
+  [[nodiscard]] const RecordCount& count() const { return file_.count(); }
 
  private:
-  void index_existing(std::size_t keep);
-
-  std::filesystem::path path_;
-  mutable std::fstream file_;
-  std::vector<std::uint64_t> offsets_;
-  std::uint64_t end_ = 0;
+  std::vector<std::uint64_t> offsets_;  // of the records
+  RecordFile file_;
 };
 
 }  // namespace understory

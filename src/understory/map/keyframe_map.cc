@@ -58,8 +58,6 @@ KeyframeMap::KeyframeMap(const Config& config, const std::filesystem::path& fold
 
 namespace {
 constexpr std::size_t kCachedKeyframes = 150;
-// What is too far away is looked for only now and then: it means going over the whole local map.
-constexpr std::size_t kForgetEvery = 8;
 constexpr const char* kPointsFile = "keyframe_points.bin";
 }  // namespace
 
@@ -68,7 +66,9 @@ void KeyframeMap::start() {
   segment_starts_ = {0};
   inserted_.clear();
   insert_all();
-  points_ = std::make_unique<KeyframePoints>(folder_ / kPointsFile, 0, kCachedKeyframes);
+  moved_ = false;
+  points_ = std::make_unique<KeyframePoints>(folder_ / kPointsFile, kCachedKeyframes);
+  history_ = std::make_unique<KeyframeHistory>(folder_);
 }
 
 bool KeyframeMap::wants(const Pose& world_from_body) const {
@@ -138,6 +138,7 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
                                : attempt.reason));
   }
   if (outcome.world_from_keyframe.empty()) return std::nullopt;
+  moved_ = true;
   const std::size_t known = outcome.keyframes;
   const Pose moved =
       outcome.world_from_keyframe[known - 1] * keyframes_[known - 1].world_from_body.inverse();
@@ -257,43 +258,43 @@ void KeyframeMap::move_world(const Pose& new_world_from_old_world) {
   // What a running search finds refers to the world as it was. Its loops are kept for the next
   // optimisation, its poses are not.
   static_cast<void>(loops_.take(keyframes_.size(), true, true));
+  moved_ = true;
   for (Keyframe& keyframe : keyframes_) {
     keyframe.world_from_body = new_world_from_old_world * keyframe.world_from_body;
   }
   if (!snapshot_.empty()) rebuild_local_map();
 }
 
-void KeyframeMap::flush() {
-  points_->flush();
+void KeyframeMap::sync() {
+  points_->sync();
+  history_->sync(keyframes_, segment_starts_, loops_.attempts(), std::exchange(moved_, false));
+}
+
+std::vector<CountedFile> KeyframeMap::files() const {
+  std::vector<CountedFile> files = history_->files();
+  files.push_back({kPointsFile, points_->count()});
+  return files;
 }
 
 void KeyframeMap::save(BinaryWriter& writer) const {
-  writer.put(static_cast<std::uint64_t>(keyframes_.size()));
-  for (const Keyframe& keyframe : keyframes_) {
-    writer.put(keyframe.stamp);
-    put_pose(writer, keyframe.world_from_body);
-    put_pose(writer, keyframe.previous_from_this);
-    writer.put_doubles(keyframe.covariance.data(), 36);
-  }
-  writer.put(segment_starts_);
-  writer.put(inserted_);
+  history_->save(writer);
+  writer.put(points_->count());
+  put_insertions(writer, inserted_);
   loops_.save(writer);
 }
 
 void KeyframeMap::load(BinaryReader& reader) {
-  keyframes_.resize(reader.get<std::uint64_t>());
-  for (Keyframe& keyframe : keyframes_) {
-    keyframe.stamp = reader.get<TimeNs>();
-    keyframe.world_from_body = get_pose(reader);
-    keyframe.previous_from_this = get_pose(reader);
-    reader.get_doubles(keyframe.covariance.data(), 36);
-  }
-  segment_starts_ = reader.get_vector<std::uint64_t>();
-  inserted_ = reader.get_vector<LocalMapInsertion>();
-  points_ =
-      std::make_unique<KeyframePoints>(folder_ / kPointsFile, keyframes_.size(), kCachedKeyframes);
+  KeyframeGrowth growth;
+  history_ = std::make_unique<KeyframeHistory>(folder_, reader, growth);
+  keyframes_ = std::move(growth.keyframes);
+  segment_starts_ = std::move(growth.segment_starts);
+  points_ = std::make_unique<KeyframePoints>(folder_ / kPointsFile, reader.get<RecordCount>(),
+                                             kCachedKeyframes);
+  if (points_->count().records != keyframes_.size())
+    throw InputError((folder_ / kPointsFile).string(), "", "expected the points of each keyframe");
+  inserted_ = get_insertions(reader, keyframes_.size());
   insert_all();
-  loops_.load(reader, keyframes_, *points_);
+  loops_.load(reader, std::move(growth.loops), keyframes_, *points_);
 }
 
 }  // namespace understory

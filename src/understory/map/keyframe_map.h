@@ -10,6 +10,7 @@
 #include "understory/geometry/pose.h"
 #include "understory/map/beginning.h"
 #include "understory/map/keyframe.h"
+#include "understory/map/keyframe_history.h"
 #include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
 #include "understory/map/loop_closer.h"
@@ -86,8 +87,10 @@ class KeyframeMap {
   [[nodiscard]] double search_cpu_seconds() const { return loops_.search_cpu_seconds(); }
   // --realtime: outcomes are taken over as soon as they are there.
   void take_outcomes_at_once() { at_once_ = true; }
-  // Makes what has been added so far safe on disk.
-  void flush();
+  // Waits until what has been added so far is on the disk.
+  void sync();
+  // The files in the folder that `save` counts on, as far as it does.
+  [[nodiscard]] std::vector<CountedFile> files() const;
   void save(BinaryWriter& writer) const;
   void load(BinaryReader& reader);
 
@@ -108,6 +111,8 @@ class KeyframeMap {
   StageTimes& times_;
   Log& log_;
   std::unique_ptr<KeyframePoints> points_;
+  std::unique_ptr<KeyframeHistory> history_;
+  bool moved_ = false;  // poses that are in the history already
   std::vector<Keyframe> keyframes_;
   std::vector<std::uint64_t> segment_starts_ = {0};  // first keyframe of each segment
   LocalMap local_map_;

@@ -4,9 +4,12 @@
 
 namespace understory {
 
-KeyframePoints::KeyframePoints(const std::filesystem::path& file, std::size_t keep,
+KeyframePoints::KeyframePoints(const std::filesystem::path& file, std::size_t cached)
+    : clouds_(file), cached_(cached) {}
+
+KeyframePoints::KeyframePoints(const std::filesystem::path& file, const RecordCount& known,
                                std::size_t cached)
-    : clouds_(file, keep), cached_(cached) {}
+    : clouds_(file, known), cached_(cached) {}
 
 void KeyframePoints::append(TimeNs stamp, const Points& points) {
   const std::lock_guard lock(mutex_);
@@ -49,9 +52,14 @@ void KeyframePoints::forget() {
   cache_.clear();
 }
 
-void KeyframePoints::flush() {
+void KeyframePoints::sync() {
   const std::lock_guard lock(mutex_);
-  clouds_.flush();
+  clouds_.sync();
+}
+
+RecordCount KeyframePoints::count() const {
+  const std::lock_guard lock(mutex_);
+  return clouds_.count();
 }
 
 }  // namespace understory

@@ -15,9 +15,13 @@ namespace understory {
 // The thinned clouds of all keyframes: on disk, the last used ones in memory. Thread-safe.
 class KeyframePoints {
  public:
-  KeyframePoints(const std::filesystem::path& file, std::size_t keep, std::size_t cached);
+  // Begins anew, or goes on behind what is `known`.
+  KeyframePoints(const std::filesystem::path& file, std::size_t cached);
+  KeyframePoints(const std::filesystem::path& file, const RecordCount& known, std::size_t cached);
   void append(TimeNs stamp, const Points& points);
-  void flush();
+  // Waits until everything is on the disk.
+  void sync();
+  [[nodiscard]] RecordCount count() const;
   [[nodiscard]] std::shared_ptr<const Points> get(std::size_t keyframe);
   // Frees what is in memory; everything can still be got.
   void forget();

@@ -4,8 +4,8 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
-#include "understory/geometry/pose_io.h"
 #include "understory/graph/local_map_loop.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/util/error.h"
@@ -257,41 +257,21 @@ PoseGraphResult LoopCloser::optimise(const std::vector<Keyframe>& keyframes) con
 
 void LoopCloser::save(BinaryWriter& writer) const {
   writer.put(last_search_);
-  writer.put(static_cast<std::uint64_t>(attempts_.size()));
-  for (const LoopAttempt& attempt : attempts_) {
-    writer.put(attempt.from);
-    writer.put(attempt.to);
-    writer.put(attempt.verified);
-    writer.put(attempt.correction_m);
-    put_pose(writer, attempt.edge.from_from_to);
-    writer.put_doubles(attempt.edge.covariance.data(), 36);
-    writer.put(attempt.reason);
-  }
   writer.put(running_.has_value());
   if (!running_) return;
   writer.put(running_->keyframes);
   writer.put(running_->segment_start);
 }
 
-void LoopCloser::load(BinaryReader& reader, const std::vector<Keyframe>& keyframes,
-                      KeyframePoints& points) {
+void LoopCloser::load(BinaryReader& reader, std::vector<LoopAttempt> attempts,
+                      const std::vector<Keyframe>& keyframes, KeyframePoints& points) {
+  attempts_ = std::move(attempts);
   last_search_ = reader.get<TimeNs>();
-  attempts_.resize(reader.get<std::uint64_t>());
-  for (LoopAttempt& attempt : attempts_) {
-    attempt.from = reader.get<int>();
-    attempt.to = reader.get<int>();
-    attempt.verified = reader.get<bool>();
-    attempt.correction_m = reader.get<double>();
-    attempt.edge.from = attempt.from;
-    attempt.edge.to = attempt.to;
-    attempt.edge.from_from_to = get_pose(reader);
-    reader.get_doubles(attempt.edge.covariance.data(), 36);
-    attempt.reason = reader.get_string();
-  }
   if (!reader.get<bool>()) return;
   const auto known = reader.get<std::uint64_t>();
   const auto segment_start = reader.get<std::uint64_t>();
-  UNDERSTORY_CHECK(known <= keyframes.size());
+  if (known == 0 || known > keyframes.size() || segment_start >= known)
+    throw InputError("checkpoint", "", "expected a search among keyframes that are there");
   // Keyframes do not move while a search runs (a levelling of the world waits for it), so the first
   // ones are what it began with.
   begin({keyframes.begin(), keyframes.begin() + static_cast<std::ptrdiff_t>(known)}, segment_start,

@@ -4,7 +4,6 @@
 #include <future>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "understory/graph/loop_closure.h"
@@ -13,6 +12,7 @@
 #include "understory/map/keyframe.h"
 #include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
+#include "understory/map/loop_attempt.h"
 #include "understory/registration/ndt_map.h"
 #include "understory/util/binary_io.h"
 #include "understory/util/config.h"
@@ -34,16 +34,6 @@ struct LoopCloserConfig {
   double least_correction_deg = 0.1;
 };
 void describe(ConfigTable& table, LoopCloserConfig& config);
-
-// A loop that was tried, for graph, report and run.json.
-struct LoopAttempt {
-  int from = 0;  // the older keyframe
-  int to = 0;
-  bool verified = false;      // the scans fit; whether the graph believes it is another question
-  double correction_m = 0.0;  // by how much it disagreed with the poses at the time
-  PoseEdge edge;              // if verified
-  std::string reason;         // if not
-};
 
 // What a finished search hands back.
 struct LoopOutcome {
@@ -92,9 +82,11 @@ class LoopCloser {
   // The graph optimised with all verified loops; without any, no poses.
   [[nodiscard]] PoseGraphResult optimise(const std::vector<Keyframe>& keyframes) const;
 
+  // Without the attempts, which only grow.
   void save(BinaryWriter& writer) const;
   // Begins the search again that was running when the state was saved.
-  void load(BinaryReader& reader, const std::vector<Keyframe>& keyframes, KeyframePoints& points);
+  void load(BinaryReader& reader, std::vector<LoopAttempt> attempts,
+            const std::vector<Keyframe>& keyframes, KeyframePoints& points);
 
  private:
   struct Running {

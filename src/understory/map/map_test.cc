@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <numbers>
 #include <set>
 
@@ -26,7 +27,7 @@ KeyframeCloud cloud_of(int id, std::size_t points) {
 
 TEST(KeyframeClouds, ReadsBackInAnyOrder) {
   const test::TemporaryFolder folder;
-  KeyframeClouds clouds(folder / "a.bin", 0);
+  KeyframeClouds clouds(folder / "a.bin");
   for (int id = 0; id < 5; ++id)
     clouds.append(cloud_of(id, static_cast<std::size_t>(10 * id)));
   for (const std::size_t i : {4U, 0U, 2U}) {
@@ -43,30 +44,46 @@ TEST(KeyframeClouds, ReadsBackInAnyOrder) {
 
 TEST(KeyframeClouds, ReopeningCutsOffWhatTheCheckpointDoesNotKnow) {
   const test::TemporaryFolder folder;
+  RecordCount known;
   {
-    KeyframeClouds clouds(folder / "b.bin", 0);
-    for (int id = 0; id < 5; ++id)
+    KeyframeClouds clouds(folder / "b.bin");
+    for (int id = 0; id < 5; ++id) {
+      if (id == 3) known = clouds.count();
       clouds.append(cloud_of(id, 10));
-    clouds.flush();
+    }
   }
-  KeyframeClouds clouds(folder / "b.bin", 3);
+  KeyframeClouds clouds(folder / "b.bin", known);
   EXPECT_EQ(clouds.size(), 3U);
   clouds.append(cloud_of(9, 4));
   EXPECT_EQ(clouds.read(3).id, 9);
   EXPECT_EQ(clouds.read(2).id, 2);
-  EXPECT_EQ(std::filesystem::file_size(folder / "b.bin"), clouds.bytes());
+  EXPECT_EQ(std::filesystem::file_size(folder / "b.bin"), clouds.count().bytes);
 }
 
 TEST(KeyframeClouds, ATruncatedFileIsAnInputError) {
   const test::TemporaryFolder folder;
+  RecordCount known;
   {
-    KeyframeClouds clouds(folder / "c.bin", 0);
+    KeyframeClouds clouds(folder / "c.bin");
     for (int id = 0; id < 2; ++id)
       clouds.append(cloud_of(id, 10));
-    clouds.flush();
+    known = clouds.count();
   }
   std::filesystem::resize_file(folder / "c.bin", std::filesystem::file_size(folder / "c.bin") - 1);
-  EXPECT_THROW(KeyframeClouds(folder / "c.bin", 2), InputError);
+  EXPECT_THROW(KeyframeClouds(folder / "c.bin", known), InputError);
+}
+
+TEST(KeyframeClouds, ADamagedCloudIsAnInputErrorWhenItIsRead) {
+  const test::TemporaryFolder folder;
+  KeyframeClouds clouds(folder / "d.bin");
+  for (int id = 0; id < 2; ++id)
+    clouds.append(cloud_of(id, 10));
+  std::fstream file(folder / "d.bin", std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(-5, std::ios::end);
+  file.put('x');
+  file.close();
+  EXPECT_EQ(clouds.read(0).id, 0);
+  EXPECT_THROW(static_cast<void>(clouds.read(1)), InputError);
 }
 
 // P2 (37): metres and turns on one scale.

@@ -160,7 +160,9 @@ std::string run_json(const RunSummary& summary) {
   json["inputs"] = Json::array();
   for (const InputHash& input : summary.inputs) {
     json["inputs"].push_back(
-        {{"file", input.file}, {"bytes", input.bytes}, {"sha256", input.sha256}});
+        {{"file", input.file},
+         {"bytes", input.bytes},
+         {"sha256", input.sha256.empty() ? Json(nullptr) : Json(input.sha256)}});
   }
   json["config"] = to_json(YAML::Load(summary.config_yaml));
   json["config_origins"] = summary.config_origins;

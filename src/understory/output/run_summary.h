@@ -20,7 +20,7 @@ enum class RunStatus { kComplete, kPartial, kUntrusted };
 struct InputHash {
   std::string file;
   std::uint64_t bytes = 0;
-  std::string sha256;
+  std::string sha256;  // empty: it could not be read any more
 };
 
 // SHA-256 of a file's bytes, lower-case hexadecimal. Throws InputError if it cannot be read.

@@ -1,15 +1,37 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace understory {
 
-// Writes `bytes` to `path` so that at any moment, whatever happens, `path` holds either the old or
-// the new content in full: temporary file, fsync, rename. Throws OutputError.
-void write_checkpoint(const std::filesystem::path& path, const std::string& bytes);
+// A checkpoint that was found whole.
+struct Checkpoint {
+  std::filesystem::path file;
+  std::uint64_t number = 0;  // grows by one with each that is written
+  std::string bytes;
+};
 
-// Reads what write_checkpoint wrote; throws InputError if it is missing or its checksum is wrong.
-[[nodiscard]] std::string read_checkpoint(const std::filesystem::path& path);
+// The files of the two newest checkpoints of a work folder: even and odd numbers. The first is
+// there from the beginning of a run to its end.
+[[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& work,
+                                                    std::uint64_t number);
+
+// Writes one in the place of the one before the last, so that at any moment, whatever happens, the
+// last one is whole: temporary file, synced, renamed, folder synced before and after. What it
+// counts on has to be on the disk already. Throws OutputError.
+void write_checkpoint(const std::filesystem::path& work, std::uint64_t number,
+                      const std::string& bytes);
+
+// Those that are whole, newest first. `problems` takes what is wrong with the others. Throws
+// InputError if there is none at all.
+[[nodiscard]] std::vector<Checkpoint> read_checkpoints(const std::filesystem::path& work,
+                                                       std::vector<std::string>& problems);
+
+// The content of one; throws InputError where the bytes are no whole checkpoint.
+[[nodiscard]] Checkpoint parse_checkpoint(const std::filesystem::path& file, std::string bytes);
 
 }  // namespace understory

@@ -249,7 +249,7 @@ void add_matching(const CorrectionRun& run, RunSummary& summary) {
 }
 
 RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run,
-                      const std::vector<MappedStem>& stems, const Log& log) {
+                      const std::vector<MappedStem>& stems, Log& log) {
   RunSummary summary;
   summary.command = "correct";
   summary.version = kVersion;
@@ -258,7 +258,6 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   summary.effective_yaml = request.effective_yaml;
   summary.adapted = request.adapted;
   summary.inputs = run.inputs;
-  summary.warnings = log.warnings();
   summary.scans = run.path.empty() ? run.views.size() : run.path.size();
   summary.poses = run.path.empty() ? run.correction.world_from_body.size() : run.path.size();
   summary.counts["trees"] = static_cast<std::int64_t>(stems.size());
@@ -277,7 +276,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   if (request.scans != nullptr) {
     const SparseScans& scans = *request.scans;
     summary.command = "map";
-    summary.inputs = hash_inputs(scans.recording);
+    summary.inputs = hash_inputs(scans.recording, log);
     const std::string& head_log = request.config.felling.head_log;
     if (!head_log.empty()) summary.inputs.push_back(hash_input(head_log));
     summary.counts["views"] = static_cast<std::int64_t>(run.views.size());
@@ -289,6 +288,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
       add_latency(scans.realtime->latency_ms, summary);
     }
   }
+  summary.warnings = log.warnings();
   judge(request, run, stems.size(), log, summary);
   return summary;
 }

@@ -13,7 +13,7 @@ namespace {
 // A cloud of a scan between keyframes goes where its keyframe went.
 TEST(FinishedMap, CloudsMoveWithTheirKeyframes) {
   const test::TemporaryFolder folder;
-  KeyframeClouds clouds(folder / "clouds.bin", 0);
+  KeyframeClouds clouds(folder / "clouds.bin");
   const Pose keyframe_from_body(so3_exp({0.0, 0.0, 0.5}), {0.2, 0.1, 0.0});
   clouds.append({0, 1'000'000'000, {{1.0F, 0.0F, 0.0F, 5, 0}}, {}});
   clouds.append({0, 1'100'000'000, {{1.0F, 0.0F, 0.0F, 6, 100}}, keyframe_from_body});

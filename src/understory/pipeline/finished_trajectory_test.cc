@@ -15,7 +15,7 @@ Pose along_x(double x) {
 
 // Keyframes at 0 s and 10 s, ten metres apart by odometry; scans every second.
 struct ShortRun {
-  ShortRun() : journal(folder / "journal.bin", 0) {
+  ShortRun() : journal(folder / "journal.bin") {
     keyframes.resize(2);
     keyframes[0].stamp = 0;
     keyframes[1].stamp = 10 * kNsPerSecond;
@@ -30,7 +30,6 @@ struct ShortRun {
       record.velocity = {1.0, 0.0, 0.0};
       journal.append(record);
     }
-    journal.flush();
   }
   [[nodiscard]] std::vector<Pose> poses() const {
     std::vector<Pose> result;

@@ -1,5 +1,7 @@
 #include "understory/pipeline/journal.h"
 
+#include <cstring>
+
 #include "understory/util/error.h"
 
 namespace understory {
@@ -33,42 +35,25 @@ void ScanRecord::set_covariance(const Matrix6d& matrix) {
   }
 }
 
-Journal::Journal(const std::filesystem::path& path, std::uint64_t keep) : path_(path) {
-  auto mode = std::ios::binary | std::ios::trunc;
-  if (keep > 0) {
-    std::error_code error;
-    const std::uint64_t bytes = std::filesystem::file_size(path, error);
-    if (error || bytes < keep * sizeof(ScanRecord)) {
-      throw InputError(path.string(), "",
-                       "holds fewer scans than its checkpoint says (" + std::to_string(keep) + ")");
-    }
-    std::filesystem::resize_file(path, keep * sizeof(ScanRecord));
-    mode = std::ios::binary | std::ios::app;
-  }
-  size_ = keep;
-  file_.open(path, mode);
-  if (!file_) throw OutputError(path.string(), "cannot be opened for writing");
-}
+Journal::Journal(const std::filesystem::path& path) : file_(path) {}
+
+Journal::Journal(const std::filesystem::path& path, const RecordCount& known)
+    : file_(path, known) {}
 
 void Journal::append(const ScanRecord& record) {
-  file_.write(reinterpret_cast<const char*>(&record), sizeof(record));
-  if (!file_) throw OutputError(path_.string(), "cannot be written (is the disk full?)");
-  ++size_;
-}
-
-void Journal::flush() {
-  file_.flush();
-  if (!file_) throw OutputError(path_.string(), "cannot be written (is the disk full?)");
+  file_.append({bytes_of(record)});
 }
 
 void Journal::for_each(const std::function<void(const ScanRecord&)>& visit) const {
-  std::ifstream file(path_, std::ios::binary);
-  ScanRecord record;
-  for (std::uint64_t i = 0; i < size_; ++i) {
-    file.read(reinterpret_cast<char*>(&record), sizeof(record));
-    if (!file) throw InputError(path_.string(), "record " + std::to_string(i), "ends too early");
+  file_.for_each([&](std::uint64_t offset, RecordFile::Bytes bytes) {
+    ScanRecord record;
+    if (bytes.size() != sizeof(record)) {
+      throw InputError(file_.path().string(), "at byte " + std::to_string(offset),
+                       "expected the record of a scan");
+    }
+    std::memcpy(static_cast<void*>(&record), bytes.data(), sizeof(record));
     visit(record);
-  }
+  });
 }
 
 }  // namespace understory

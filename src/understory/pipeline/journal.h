@@ -3,10 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 
 #include "understory/geometry/pose.h"
+#include "understory/util/record_file.h"
 #include "understory/util/time.h"
 
 namespace understory {
@@ -49,17 +49,20 @@ struct ScanRecord {
 // Append-only file of ScanRecords, so that memory does not grow with the length of a run.
 class Journal {
  public:
-  // Opens `path` and keeps the first `keep` records that are there (0: starts anew).
-  Journal(const std::filesystem::path& path, std::uint64_t keep);
+  // Begins anew.
+  explicit Journal(const std::filesystem::path& path);
+  // Goes on behind the scans that are `known`. Throws InputError where they are not there.
+  Journal(const std::filesystem::path& path, const RecordCount& known);
   void append(const ScanRecord& record);
-  void flush();
-  [[nodiscard]] std::uint64_t size() const { return size_; }
+  // Waits until all scans are on the disk.
+  void sync() { file_.sync(); }
+  [[nodiscard]] std::uint64_t size() const { return file_.count().records; }
+  [[nodiscard]] const RecordCount& count() const { return file_.count(); }
+  // Throws InputError at the first scan that is damaged.
   void for_each(const std::function<void(const ScanRecord&)>& visit) const;
 
  private:
-  std::filesystem::path path_;
-  std::ofstream file_;
-  std::uint64_t size_ = 0;
+  RecordFile file_;
 };
 
 }  // namespace understory

@@ -58,7 +58,8 @@ class MappingRun {
  private:
   void begin() {
     source_ = open_source(request_.recording, request_.open, log_);
-    if (state_.events() > 0) {
+    state_.check_inputs(request_);
+    if (state_.resumed()) {
       adapt_config();
       source_->skip(state_.events());
       state_.restore(*session_, *orderer_, log_, source_->rig());
@@ -112,7 +113,7 @@ class MappingRun {
     if (wrong) conditions.imu_refused = reason;
     begin_anew();
     wrong ? session_->refuse_imu(reason) : session_->doubt_imu();
-    state_.save(request_, *session_, *orderer_, log_, 0);
+    state_.begin_anew(request_, *session_, *orderer_, log_);
     return true;
   }
 
@@ -125,7 +126,7 @@ class MappingRun {
     log_.forget_all_but("");
     log_.info("the recording is begun anew with the IMU's own stamps");
     begin_anew();
-    state_.save(request_, *session_, *orderer_, log_, 0);
+    state_.begin_anew(request_, *session_, *orderer_, log_);
     return true;
   }
 
@@ -168,7 +169,6 @@ class MappingRun {
   MappingOutcome finish(bool stopped) {
     if (session_->map().keyframes().empty()) return nothing_to_map(stopped);
     session_->map().finish(request_.config.odometry.ndt);
-    session_->flush();
     RunFacts facts;
     facts.stopped = stopped;
     facts.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
@@ -245,8 +245,9 @@ class MappingRun {
 
 MappingOutcome run_mapping(const MappingRequest& request, Log& log, const ProgressSink& progress,
                            const StopRequested& stop_requested) {
-  return MappingRun(request, RunState::create(request, kDenseFrontEnd), log, progress,
-                    stop_requested)
+  MappingRequest begun = request;
+  begun.more_inputs = {request.config.odometry.machine_boxes_file};
+  return MappingRun(begun, RunState::create(begun, kDenseFrontEnd), log, progress, stop_requested)
       .run();
 }
 
@@ -255,6 +256,9 @@ MappingOutcome resume_mapping(const std::filesystem::path& run_folder, Log& log,
   MappingRequest request;
   RunState state = RunState::reopen(run_folder, request);
   mapping_table(request.config).read_yaml(request.config_yaml, run_folder.string());
+  std::string& boxes = request.config.odometry.machine_boxes_file;
+  boxes = request.found(boxes);
+  request.more_inputs = {boxes};
   return MappingRun(request, std::move(state), log, progress, stop_requested).run();
 }
 

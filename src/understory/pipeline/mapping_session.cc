@@ -13,6 +13,9 @@
 namespace understory {
 namespace {
 
+constexpr const char* kJournalFile = "journal.bin";
+constexpr const char* kCloudsFile = "clouds.bin";
+constexpr const char* kFixesFile = "fixes.bin";
 constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
 constexpr std::size_t kFewPoints = 100;
@@ -126,8 +129,8 @@ void MappingSession::make_odometry(const Rig& rig) {
 
 // An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
 void MappingSession::start_anew() {
-  journal_ = std::make_unique<Journal>(folder_ / "journal.bin", 0);
-  clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", 0);
+  journal_ = std::make_unique<Journal>(folder_ / kJournalFile);
+  clouds_ = std::make_unique<KeyframeClouds>(folder_ / kCloudsFile);
   map_->start();
   make_odometry(rig_);
   if (opening_->rounds > 0) {
@@ -369,20 +372,39 @@ void MappingSession::store_cloud(const DenseEstimate& estimate, std::size_t keyf
   clouds_->append(stored);
 }
 
-void MappingSession::flush() {
+void MappingSession::sync() {
+  if (!fixes_file_ && !fixes_.empty())
+    fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile);
+  if (fixes_file_) {
+    for (std::size_t i = fixes_file_->count().records; i < fixes_.size(); ++i) {
+      BinaryWriter record;
+      put_fix(record, fixes_[i]);
+      fixes_file_->append({bytes_of(record.bytes())});
+    }
+    fixes_file_->sync();
+  }
   if (!started()) return;
-  journal_->flush();
-  clouds_->flush();
-  map_->flush();
+  journal_->sync();
+  clouds_->sync();
+  map_->sync();
+}
+
+std::vector<CountedFile> MappingSession::files() const {
+  std::vector<CountedFile> files;
+  if (started()) {
+    files = map_->files();
+    files.push_back({kJournalFile, journal_->count()});
+    files.push_back({kCloudsFile, clouds_->count()});
+  }
+  if (fixes_file_) files.push_back({kFixesFile, fixes_file_->count()});
+  return files;
 }
 
 void MappingSession::save(BinaryWriter& writer) const {
   UNDERSTORY_CHECK(settled() || !started());
   writer.put(imu_refused_);
   writer.put(imu_doubted_);
-  writer.put(static_cast<std::uint64_t>(fixes_.size()));
-  for (const GnssFix& fix : fixes_)
-    put_fix(writer, fix);
+  writer.put(fixes_file_ ? fixes_file_->count() : RecordCount());
   writer.put(counts_);
   writer.put(last_scan_end_);
   writer.put(last_cloud_);
@@ -398,19 +420,26 @@ void MappingSession::save(BinaryWriter& writer) const {
   for (const ImuSample& sample : recent_imu_)
     put_imu(writer, sample);
   if (!started()) return;
-  writer.put(journal_->size());
-  writer.put(static_cast<std::uint64_t>(clouds_->size()));
+  writer.put(journal_->count());
+  writer.put(clouds_->count());
   map_->save(writer);
   odometry_->save(writer);
+}
+
+void MappingSession::load_fixes(const RecordCount& known) {
+  fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile, known);
+  fixes_file_->for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
+    BinaryReader record({bytes.begin(), bytes.end()}, fixes_file_->path().string());
+    fixes_.push_back(get_fix(record));
+  });
 }
 
 void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);
   imu_doubted_ = reader.get<bool>();
-  const auto fixes = reader.get<std::uint64_t>();
-  for (std::uint64_t i = 0; i < fixes; ++i)
-    fixes_.push_back(get_fix(reader));
+  const auto fixes = reader.get<RecordCount>();
+  if (fixes.records > 0) load_fixes(fixes);
   counts_ = reader.get<MappingCounts>();
   last_scan_end_ = reader.get<TimeNs>();
   last_cloud_ = reader.get<std::uint64_t>();
@@ -426,8 +455,8 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   for (std::uint64_t i = 0; i < waiting; ++i)
     recent_imu_.push_back(get_imu(reader));
   if (!was_started) return;
-  journal_ = std::make_unique<Journal>(folder_ / "journal.bin", reader.get<std::uint64_t>());
-  clouds_ = std::make_unique<KeyframeClouds>(folder_ / "clouds.bin", reader.get<std::uint64_t>());
+  journal_ = std::make_unique<Journal>(folder_ / kJournalFile, reader.get<RecordCount>());
+  clouds_ = std::make_unique<KeyframeClouds>(folder_ / kCloudsFile, reader.get<RecordCount>());
   opening_.reset();
   rig_ = rig;
   rig_.body_from_imu = body_from_imu;

@@ -59,9 +59,10 @@ class MappingSession : public Resumable {
   // later: they are used from then on.
   void handle(const Event& event, const Rig& rig);
 
-  // State to go on from; `flush` has made the files safe to the same point.
-  void flush() override;
+  // State to go on from.
+  void sync() override;
   void save(BinaryWriter& writer) const override;
+  [[nodiscard]] std::vector<CountedFile> files() const override;
   // Instead of `handle`ing from the start.
   void load(BinaryReader& reader, const Rig& rig) override;
 
@@ -100,6 +101,7 @@ class MappingSession : public Resumable {
     std::size_t fixes_before = 0;
   };
 
+  void load_fixes(const RecordCount& known);
   void make_odometry(const Rig& rig);
   void complete_rig(const Rig& rig);
   void take_sample(const ImuSample& sample);
@@ -127,6 +129,7 @@ class MappingSession : public Resumable {
   std::unique_ptr<KeyframeClouds> clouds_;
   VoxelFilter cloud_filter_;
   std::vector<GnssFix> fixes_;
+  std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced
   MappingCounts counts_;
   TimeNs last_scan_end_ = 0;
   Eigen::Vector3d last_good_velocity_ = Eigen::Vector3d::Zero();  // in its body frame

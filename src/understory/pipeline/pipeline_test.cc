@@ -4,6 +4,7 @@
 #include <chrono>
 #include <fstream>
 #include <thread>
+#include <vector>
 
 #include "understory/pipeline/checkpoint.h"
 #include "understory/pipeline/journal.h"
@@ -27,10 +28,9 @@ ScanRecord record_of(int i) {
 
 TEST(Journal, GivesBackWhatWasWrittenBitForBit) {
   const test::TemporaryFolder folder;
-  Journal journal(folder / "journal", 0);
+  Journal journal(folder / "journal");
   for (int i = 0; i < 20; ++i)
     journal.append(record_of(i));
-  journal.flush();
   int i = 0;
   journal.for_each([&](const ScanRecord& record) {
     EXPECT_EQ(record.stamp, i);
@@ -45,40 +45,71 @@ TEST(Journal, GivesBackWhatWasWrittenBitForBit) {
 TEST(Journal, ReopeningKeepsWhatTheCheckpointKnows) {
   const test::TemporaryFolder folder;
   const auto path = folder / "journal";
+  RecordCount known;
+  RecordCount more;
   {
-    Journal journal(path, 0);
-    for (int i = 0; i < 20; ++i)
+    Journal journal(path);
+    for (int i = 0; i < 20; ++i) {
+      if (i == 5) known = journal.count();
       journal.append(record_of(i));
-    journal.flush();
+    }
+    more = journal.count();
   }
-  Journal journal(path, 5);
+  Journal journal(path, known);
   journal.append(record_of(77));
-  journal.flush();
   std::vector<TimeNs> stamps;
   journal.for_each([&](const ScanRecord& record) { stamps.push_back(record.stamp); });
   EXPECT_EQ(stamps, (std::vector<TimeNs>{0, 1, 2, 3, 4, 77}));
-  EXPECT_THROW(Journal(path, 50), InputError);
+  EXPECT_THROW(Journal(path, more), InputError);
 }
 
-TEST(Checkpoint, RoundTripAndDamage) {
-  const test::TemporaryFolder folder;
-  const auto path = folder / "checkpoint";
-  EXPECT_THROW(static_cast<void>(read_checkpoint(path)), InputError);
+class CheckpointTest : public testing::Test {
+ protected:
+  std::vector<std::string> read() {
+    problems_.clear();
+    std::vector<std::string> contents;
+    for (const Checkpoint& checkpoint : read_checkpoints(folder_.path(), problems_))
+      contents.push_back(checkpoint.bytes);
+    return contents;
+  }
+  void spoil(std::uint64_t number, int from_end) {
+    std::fstream file(checkpoint_file(folder_.path(), number),
+                      std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(-from_end, std::ios::end);
+    file.put('x');
+  }
+  const test::TemporaryFolder folder_;
+  std::vector<std::string> problems_;
+};
+
+TEST_F(CheckpointTest, TheNewestTwoAreThereNewestFirst) {
+  EXPECT_THROW(read(), InputError);
   std::string bytes = "state";
   bytes += '\0';
-  bytes += "more";
-  write_checkpoint(path, bytes);
-  EXPECT_EQ(read_checkpoint(path), bytes);
-  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
-  file.seekp(-1, std::ios::end);
-  file.put('x');
-  file.close();
-  EXPECT_THROW(static_cast<void>(read_checkpoint(path)), InputError);
+  write_checkpoint(folder_.path(), 0, bytes);
+  EXPECT_EQ(read(), (std::vector<std::string>{bytes}));
+  for (std::uint64_t number = 1; number < 4; ++number) {
+    write_checkpoint(folder_.path(), number, "state " + std::to_string(number));
+    EXPECT_TRUE(std::filesystem::exists(checkpoint_file(folder_.path(), 0)));
+  }
+  EXPECT_EQ(read(), (std::vector<std::string>{"state 3", "state 2"}));
+  EXPECT_TRUE(problems_.empty());
 }
 
-TEST(Checkpoint, AFullDiskIsAnOutputErrorAndKeepsTheOldCheckpoint) {
-  const test::TemporaryFolder folder;
-  EXPECT_THROW(write_checkpoint(folder / "missing" / "folder" / "c", "x"), OutputError);
+TEST_F(CheckpointTest, ADamagedOneIsPassedOver) {
+  write_checkpoint(folder_.path(), 4, "before");
+  write_checkpoint(folder_.path(), 5, "newest");
+  spoil(5, 1);
+  EXPECT_EQ(read(), (std::vector<std::string>{"before"}));
+  ASSERT_EQ(problems_.size(), 1U);
+  EXPECT_NE(problems_[0].find("damaged"), std::string::npos);
+  spoil(4, 25);  // its number
+  EXPECT_TRUE(read().empty());
+  EXPECT_EQ(problems_.size(), 2U);
+}
+
+TEST_F(CheckpointTest, WhatCannotBeWrittenIsAnOutputError) {
+  EXPECT_THROW(write_checkpoint(folder_ / "missing", 0, "x"), OutputError);
 }
 
 // A recording of scans 10 ms apart, `count` of them.

@@ -13,6 +13,7 @@
 
 #include "understory/pipeline/run_results.h"
 #include "understory/util/atomic_file.h"
+#include "understory/util/durable.h"
 #include "understory/util/error.h"
 #include "understory/util/file_lock.h"
 #include "understory/util/output_guard.h"
@@ -129,6 +130,7 @@ void RunFolder::Claim::take(bool overwrite) {
   take_lock();
   check(overwrite);  // once more: another process may have been at work until the lock came
   leave_marker(work);
+  made->sync();
 }
 
 void RunFolder::Claim::check(bool overwrite) const {
@@ -220,6 +222,9 @@ void RunFolder::commit(Log& log, bool keep_former) const {
   for (const std::string& name : made)
     rename_to(results / name, path() / name);
   rename_to(results / "run.json", path() / "run.json");
+  // On the disk before the state that they were made of goes.
+  sync_folder(results);
+  sync_folder(path());
 }
 
 void RunFolder::put_aside(const std::set<std::string>& former, const std::set<std::string>& made,
@@ -241,6 +246,7 @@ void RunFolder::put_aside(const std::set<std::string>& former, const std::set<st
   }
   for (const std::string& name : kept)
     rename_to(path() / name, folder / name);
+  sync_folder(folder);
 }
 
 }  // namespace understory

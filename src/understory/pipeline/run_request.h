@@ -6,6 +6,7 @@
 
 #include "understory/pipeline/adaptation.h"
 #include "understory/pipeline/sensor_traits.h"
+#include "understory/pipeline/input_identity.h"
 #include "understory/recording/recording.h"
 #include "understory/util/config_origins.h"
 
@@ -26,6 +27,16 @@ struct RunRequest {
   // Made of these and the configuration asked for, for run.json.
   std::string effective_yaml;
   std::vector<ConfigAdaptation> adapted;
+  // Other files that the configuration names: the machine's boxes, the log of the head.
+  std::vector<std::string> more_inputs;
+  // Of a resumed run: where it was begun, if that is not the current folder; else empty.
+  std::filesystem::path begun_in;
+
+  // A file as the run's start named it: as given, or by its absolute path where the run is resumed
+  // from another folder.
+  [[nodiscard]] std::string found(const std::string& file) const;
+  // The recording and everything else that is read, in a fixed order. Throws InputError.
+  [[nodiscard]] std::vector<InputIdentity> identify_inputs() const;
 };
 
 }  // namespace understory

@@ -1,13 +1,13 @@
 #include "understory/pipeline/run_state.h"
 
-#include "understory/pipeline/checkpoint.h"
+#include <utility>
+#include <vector>
+
 #include "understory/util/error.h"
 #include "understory/util/version.h"
 
 namespace understory {
 namespace {
-
-constexpr const char* kCheckpoint = "checkpoint.bin";
 
 void put_request(BinaryWriter& writer, const RunRequest& request) {
   const OpenOptions& open = request.open;
@@ -21,6 +21,8 @@ void put_request(BinaryWriter& writer, const RunRequest& request) {
   put_origins(writer, request.config_origins);
   put_traits(writer, request.traits);
   put_conditions(writer, request.conditions);
+  const bool again = !request.begun_in.empty();
+  writer.put((again ? request.begun_in : std::filesystem::current_path()).string());
 }
 
 void get_request(BinaryReader& reader, const std::filesystem::path& path, RunRequest& request) {
@@ -42,6 +44,59 @@ void get_request(BinaryReader& reader, const std::filesystem::path& path, RunReq
   request.config_origins = get_origins(reader);
   request.traits = get_traits(reader);
   request.conditions = get_conditions(reader);
+  const std::filesystem::path begun_in = reader.get_string();
+  request.begun_in = begun_in == std::filesystem::current_path() ? "" : begun_in;
+  for (std::string* file : {&request.recording, &open.metadata_file, &open.extrinsics_file})
+    *file = request.found(*file);
+}
+
+void put_inputs(BinaryWriter& writer, const std::vector<InputIdentity>& inputs) {
+  writer.put(static_cast<std::uint64_t>(inputs.size()));
+  for (const InputIdentity& input : inputs) {
+    for (const std::string& text : {input.what, input.path, input.mark})
+      writer.put(text);
+  }
+}
+
+std::vector<InputIdentity> get_inputs(BinaryReader& reader) {
+  std::vector<InputIdentity> inputs;
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    InputIdentity& input = inputs.emplace_back();
+    for (std::string* text : {&input.what, &input.path, &input.mark})
+      *text = reader.get_string();
+  }
+  return inputs;
+}
+
+void put_files(BinaryWriter& writer, const std::vector<CountedFile>& files) {
+  writer.put(static_cast<std::uint64_t>(files.size()));
+  for (const CountedFile& file : files) {
+    writer.put(file.name);
+    writer.put(file.count);
+  }
+}
+
+// Reads all records that a checkpoint counts on. Throws InputError at the first that is not whole.
+void check_files(BinaryReader& reader, const std::filesystem::path& work) {
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    const std::string name = reader.get_string();
+    for_each_record(work / name, reader.get<RecordCount>(),
+                    [](std::uint64_t /*offset*/, RecordFile::Bytes /*bytes*/) {});
+  }
+}
+
+std::string joined(const std::vector<std::string>& problems) {
+  std::string text;
+  for (const std::string& problem : problems)
+    text += (text.empty() ? "" : "; ") + problem;
+  return text;
+}
+
+[[noreturn]] void nothing_whole(const std::filesystem::path& run_folder,
+                                const std::vector<std::string>& problems) {
+  throw InputError(run_folder.string(), "",
+                   "no checkpoint of this run can be gone on from (" + joined(problems) +
+                       "); nothing was changed: map the recording anew with --overwrite");
 }
 
 }  // namespace
@@ -50,25 +105,61 @@ RunState RunState::create(const RunRequest& request, const std::string& front_en
   return {RunFolder::claim(request.run_folder, request.overwrite), front_end};
 }
 
+void RunState::check_inputs(const RunRequest& request) {
+  std::vector<InputIdentity> now = request.identify_inputs();
+  if (resumed()) expect_same(inputs_, now);
+  inputs_ = std::move(now);
+}
+
+std::string RunState::front_end_of(const std::filesystem::path& run_folder) {
+  if (!holds_unfinished_run(run_folder)) (void)RunFolder::reclaim(run_folder);  // which says why
+  std::vector<std::string> problems;
+  for (const Checkpoint& checkpoint : read_checkpoints(work_folder_of(run_folder), problems)) {
+    RunRequest request;
+    BinaryReader reader(checkpoint.bytes, checkpoint.file.string());
+    get_request(reader, checkpoint.file, request);
+    (void)get_inputs(reader);
+    return reader.get_string();
+  }
+  nothing_whole(run_folder, problems);
+}
+
 RunState RunState::reopen(const std::filesystem::path& run_folder, RunRequest& request) {
   RunState state(RunFolder::reclaim(run_folder), "");
-  state.resumed_ = true;
-  const std::filesystem::path path = state.work() / kCheckpoint;
-  BinaryReader reader(read_checkpoint(path), path.string());
-  request.run_folder = run_folder;
-  get_request(reader, path, request);
-  state.front_end_ = reader.get_string();
-  state.events_ = reader.get<std::uint64_t>();
-  state.last_checkpoint_ = reader.get<TimeNs>();
-  state.state_ = reader.get_string();
-  return state;
+  std::vector<std::string> problems;
+  for (const Checkpoint& checkpoint : read_checkpoints(state.work(), problems)) {
+    try {
+      state.read(checkpoint, request);
+      request.run_folder = run_folder;
+      state.passed_over_ = joined(problems);
+      return state;
+    } catch (const InputError& problem) {
+      problems.emplace_back(problem.what());
+    }
+  }
+  nothing_whole(run_folder, problems);
+}
+
+void RunState::read(const Checkpoint& checkpoint, RunRequest& request) {
+  file_ = checkpoint.file.string();
+  BinaryReader reader(checkpoint.bytes, file_);
+  get_request(reader, checkpoint.file, request);
+  inputs_ = get_inputs(reader);
+  front_end_ = reader.get_string();
+  events_ = reader.get<std::uint64_t>();
+  last_checkpoint_ = reader.get<TimeNs>();
+  check_files(reader, work());
+  state_ = reader.get_string();
+  next_ = checkpoint.number + 1;
+  resumed_ = true;
 }
 
 void RunState::restore(Resumable& session, EventOrderer& orderer, Log& log, const Rig& rig) const {
-  if (events_ == 0) return;
-  BinaryReader reader(state_, (work() / kCheckpoint).string());
-  std::vector<Log::Warning> warnings(reader.get<std::uint64_t>());
-  for (Log::Warning& warning : warnings) {
+  UNDERSTORY_CHECK(resumed());
+  BinaryReader reader(state_, file_);
+  std::vector<Log::Warning> warnings;
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    Log::Warning& warning = warnings.emplace_back();
     warning.key = reader.get_string();
     warning.first_message = reader.get_string();
     warning.count = reader.get<std::uint64_t>();
@@ -76,11 +167,17 @@ void RunState::restore(Resumable& session, EventOrderer& orderer, Log& log, cons
   orderer.load(reader);
   session.load(reader, rig);
   log.restore(warnings);
+  log.info(last_checkpoint_ == 0 ? "goes on at the beginning of the recording"
+                                 : "goes on at " + format_seconds(last_checkpoint_) + " s");
+  if (passed_over_.empty()) return;
+  log.warn("run.older_checkpoint",
+           "the newest checkpoint is not whole (" + passed_over_ +
+               "): the run goes on from the one before, and maps a few seconds again");
 }
 
 void RunState::save(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
                     const Log& log, std::uint64_t events) {
-  session.flush();
+  session.sync();
   BinaryWriter state;
   const auto warnings = log.warnings();
   state.put(static_cast<std::uint64_t>(warnings.size()));
@@ -94,11 +191,19 @@ void RunState::save(const RunRequest& request, Resumable& session, const EventOr
   last_checkpoint_ = session.last_scan_end();
   BinaryWriter writer;
   put_request(writer, request);
+  put_inputs(writer, inputs_);
   writer.put(front_end_);
   writer.put(events);
   writer.put(last_checkpoint_);
+  put_files(writer, session.files());
   writer.put(state.bytes());
-  write_checkpoint(work() / kCheckpoint, writer.bytes());
+  write_checkpoint(work(), next_++, writer.bytes());
+}
+
+void RunState::begin_anew(const RunRequest& request, Resumable& session,
+                          const EventOrderer& orderer, const Log& log) {
+  for (int generation = 0; generation < 2; ++generation)
+    save(request, session, orderer, log, 0);
 }
 
 }  // namespace understory

@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
+#include "understory/pipeline/checkpoint.h"
 #include "understory/pipeline/resumable.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_request.h"
@@ -15,17 +17,28 @@ namespace understory {
 constexpr const char* kDenseFrontEnd = "dense";
 constexpr const char* kSparseFrontEnd = "sparse";
 
-// The state of a run in progress, by either front end: the files of the session and the checkpoint
-// in the work folder of the run folder, which is claimed for as long. Gone when the run is
-// finished.
+// The state of a run in progress, by either front end: the files of the session and the two newest
+// checkpoints in the work folder of the run folder, which is claimed for as long. Gone when the run
+// is finished.
+//
+// A power cut at any moment costs what came after the last checkpoint: what a checkpoint counts on
+// is on the disk before it, it is there before the one before the last is gone, and each record of
+// each file has a checksum. docs/decisions/003-durability.md
 class RunState {
  public:
   // Of a run that begins. Claims the run folder and leaves what is in it as it is. Throws
   // OutputError if that is refused (run_folder.h).
   [[nodiscard]] static RunState create(const RunRequest& request, const std::string& front_end);
-  // Opens that of a killed run and reads back its request. Throws InputError if there is none.
+  // The front end that the run in a folder was begun with. Throws InputError if there is none.
+  [[nodiscard]] static std::string front_end_of(const std::filesystem::path& run_folder);
+  // Opens that of a killed run and reads back its request, from the newest checkpoint that is whole
+  // with all that it counts on. Throws InputError if there is none, with the state as it was.
   [[nodiscard]] static RunState reopen(const std::filesystem::path& run_folder,
                                        RunRequest& request);
+
+  // Of a run that begins: notes what the inputs are; of one that is resumed: throws InputError if
+  // they are not those that it was begun with.
+  void check_inputs(const RunRequest& request);
 
   // Forgets the state of an unfinished run that this one replaces: once the recording is open, so
   // that one that cannot be read takes no unfinished run away.
@@ -33,18 +46,22 @@ class RunState {
 
   [[nodiscard]] const RunFolder& folder() const { return folder_; }
   [[nodiscard]] std::filesystem::path work() const { return folder_.work(); }
-  // Goes on with an earlier run.
+  // Whether it was read from a checkpoint.
   [[nodiscard]] bool resumed() const { return resumed_; }
   [[nodiscard]] const std::string& front_end() const { return front_end_; }
   // Events that the checkpoint has behind it; 0 at the start.
   [[nodiscard]] std::uint64_t events() const { return events_; }
   [[nodiscard]] TimeNs last_checkpoint() const { return last_checkpoint_; }
 
-  // Brings session, orderer and log to the state of the checkpoint.
+  // Brings session, orderer and log to the state of the checkpoint; a warning where it is not the
+  // newest (key "run.older_checkpoint").
   void restore(Resumable& session, EventOrderer& orderer, Log& log, const Rig& rig) const;
   // Writes a checkpoint: `events` have been taken from the recording.
   void save(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
             const Log& log, std::uint64_t events);
+  // The same where the recording is begun anew: no older checkpoint is gone back to.
+  void begin_anew(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
+                  const Log& log);
   // The run is finished, or nothing came of it: the work folder goes with this object.
   void remove() { folder_.forget_state(); }
 
@@ -52,11 +69,17 @@ class RunState {
   RunState(RunFolder folder, std::string front_end)
       : folder_(std::move(folder)), front_end_(std::move(front_end)) {}
 
+  void read(const Checkpoint& checkpoint, RunRequest& request);
+
   RunFolder folder_;
   std::string front_end_;
   bool resumed_ = false;
+  std::uint64_t next_ = 0;  // number of the next checkpoint
   std::uint64_t events_ = 0;
   TimeNs last_checkpoint_ = 0;
+  std::string file_;  // that was read
+  std::vector<InputIdentity> inputs_;
+  std::string passed_over_;  // what kept `reopen` from the newest checkpoint
   std::string state_;  // of session, orderer and log, as read
 };
 

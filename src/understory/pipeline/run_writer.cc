@@ -267,7 +267,7 @@ void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const 
 }
 
 RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
-                         const RunFacts& facts, const TrajectoryFacts& trajectory, const Log& log) {
+                         const RunFacts& facts, const TrajectoryFacts& trajectory, Log& log) {
   RunSummary summary;
   summary.command = "map";
   summary.version = kVersion;
@@ -275,7 +275,7 @@ RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
   summary.config_origins = request.config_origins;
   summary.effective_yaml = request.effective_yaml;
   summary.adapted = request.adapted;
-  summary.inputs = hash_inputs(request.recording);
+  summary.inputs = hash_inputs(request.recording, log);
   summary.scans = session.counts().scans;
   summary.poses = session.journal().size();
   summary.recording_s = trajectory.duration_s;

@@ -2,13 +2,30 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <system_error>
 
 #include "understory/simulation/simulator.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
 constexpr const char* kScheme = "sim:";
+
+template <typename Lost>
+std::vector<std::filesystem::path> plain_files(const std::string& recording, const Lost& lost) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(recording, error)) return {recording};
+  std::vector<std::filesystem::path> files;
+  for (std::filesystem::recursive_directory_iterator entry(recording, error), end;
+       !error && entry != end; entry.increment(error)) {
+    std::error_code ignored;
+    if (entry->is_regular_file(ignored)) files.push_back(entry->path());
+  }
+  if (error) lost(recording + ": " + error.message());
+  std::sort(files.begin(), files.end());
+  return files;
+}
 
 }  // namespace
 
@@ -39,20 +56,21 @@ std::vector<std::filesystem::path> files_of(const std::string& recording,
   return files;
 }
 
-std::vector<InputHash> hash_inputs(const std::string& recording) {
+std::vector<InputHash> hash_inputs(const std::string& recording, Log& log) {
   std::vector<InputHash> hashes;
   if (is_simulation(recording)) return hashes;
-  std::vector<std::filesystem::path> files;
-  if (std::filesystem::is_directory(recording)) {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(recording)) {
-      if (entry.is_regular_file()) files.push_back(entry.path());
+  const auto lost = [&](const std::string& said) {
+    log.warn("recording.no_hash",
+             said + ": the recording cannot be read any more, and run.json lacks its hash");
+  };
+  for (const auto& file : plain_files(recording, lost)) {
+    try {
+      hashes.push_back(hash_input(file));
+    } catch (const InputError& error) {
+      lost(error.what());
+      hashes.push_back({file.filename().string(), 0, ""});
     }
-    std::sort(files.begin(), files.end());
-  } else {
-    files.emplace_back(recording);
   }
-  for (const auto& file : files)
-    hashes.push_back(hash_input(file));
   return hashes;
 }
 

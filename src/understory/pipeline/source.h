@@ -18,8 +18,9 @@ namespace understory {
 // Whether `name` is a simulated recording.
 [[nodiscard]] bool is_simulation(const std::string& name);
 
-// Hashes of the recording's files; none for the simulator. Throws InputError.
-[[nodiscard]] std::vector<InputHash> hash_inputs(const std::string& recording);
+// Hashes of the recording's files, in order of their names; none for the simulator. What cannot be
+// read any more at the end of a run has no hash, with a warning (key "recording.no_hash").
+[[nodiscard]] std::vector<InputHash> hash_inputs(const std::string& recording, Log& log);
 
 // The files and folders that opening a recording reads: itself, the metadata and extrinsics that
 // were named, and the site and the trees of a simulation.

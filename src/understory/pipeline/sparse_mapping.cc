@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "understory/pipeline/realtime_player.h"
 #include "understory/pipeline/run_judgement.h"
@@ -25,9 +26,9 @@ class SparseRun {
   SparseRun(const SparseMappingRequest& request, RunState state, Log& log,
             const StopRequested& stop_requested)
       : request_(request), asked_(request.config), log_(log), state_(std::move(state)) {
-    if (state_.events() == 0) request_.conditions.realtime = request_.realtime;
+    if (!state_.resumed()) request_.conditions.realtime = request_.realtime;
     open();
-    if (state_.events() > 0) {
+    if (state_.resumed()) {
       source_->skip(state_.events());
       state_.restore(*session_, *orderer_, log_, source_->rig());
       stamps_believed_ = orderer_->believes_stamps(EventOrderer::kImu);
@@ -115,8 +116,12 @@ class SparseRun {
   // Session, orderer and recording at their beginning.
   void open() {
     session_.reset();  // lets go of its files
+    const bool first = source_ == nullptr;
     source_ = open_source(request_.recording, request_.open, log_);
-    if (state_.events() == 0) state_.forget_former();
+    if (first) {
+      state_.check_inputs(request_);
+      if (!state_.resumed()) state_.forget_former();
+    }
     results_ = state_.folder().begin_results();
     adapt_config();
     session_.emplace(request_.config, results_ / "stems.csv.gz", state_.work(), log_);
@@ -139,7 +144,7 @@ class SparseRun {
         to_seconds(session_->last_scan_end() - session_->path().front().stamp);
     open();
     session_->refuse_imu(trust.reason);
-    state_.save(request_, *session_, *orderer_, log_, 0);
+    state_.begin_anew(request_, *session_, *orderer_, log_);
     return true;
   }
 
@@ -160,7 +165,7 @@ class SparseRun {
     log_.forget_all_but("");
     log_.info("the recording is mapped again from its beginning, with the IMU's own stamps");
     open();
-    state_.save(request_, *session_, *orderer_, log_, 0);
+    state_.begin_anew(request_, *session_, *orderer_, log_);
     return true;
   }
 
@@ -242,6 +247,10 @@ CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, 
   return outcome;
 }
 
+std::vector<std::string> inputs_of(const SparseMappingConfig& config) {
+  return {config.machine_boxes_file, config.correction.felling.head_log};
+}
+
 }  // namespace
 
 CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& log,
@@ -249,8 +258,9 @@ CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& l
                                      const StopRequested& stop_requested) {
   // A log that cannot be read is refused now, not after the hours that come before its use.
   (void)read_head_log(request.config.correction.felling.head_log);
-  return run_from(request, RunState::create(request, kSparseFrontEnd), log, progress,
-                  stop_requested);
+  SparseMappingRequest begun = request;
+  begun.more_inputs = inputs_of(request.config);
+  return run_from(begun, RunState::create(begun, kSparseFrontEnd), log, progress, stop_requested);
 }
 
 CorrectionOutcome resume_sparse_mapping(const fs::path& run_folder, Log& log,
@@ -258,7 +268,9 @@ CorrectionOutcome resume_sparse_mapping(const fs::path& run_folder, Log& log,
                                         const StopRequested& stop_requested) {
   SparseMappingRequest request;
   RunState state = RunState::reopen(run_folder, request);
-  reread(request.config, request.config_yaml, run_folder.string());
+  reread(request.config, request.config_yaml, run_folder.string(),
+         [&](const std::string& file) { return request.found(file); });
+  request.more_inputs = inputs_of(request.config);
   return run_from(request, std::move(state), log, progress, stop_requested);
 }
 

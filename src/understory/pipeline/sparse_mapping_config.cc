@@ -72,8 +72,11 @@ ReadConfig<SparseMappingConfig> read_sparse_mapping_config(const std::string& pr
   return {config, origins};
 }
 
-void reread(SparseMappingConfig& config, const std::string& yaml, const std::string& origin) {
+void reread(SparseMappingConfig& config, const std::string& yaml, const std::string& origin,
+            const std::function<std::string(const std::string&)>& found) {
   sparse_mapping_table(config).read_yaml(yaml, origin);
+  for (std::string* file : {&config.machine_boxes_file, &config.correction.felling.head_log})
+    *file = found(*file);
   read_boxes(config);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -34,7 +35,9 @@ struct SparseMappingConfig {
     const std::string& profile, const std::string& file, const std::vector<std::string>& settings,
     Log& log);
 
-// A configuration as `to_yaml` of its table wrote it, with the boxes. Throws ConfigError.
-void reread(SparseMappingConfig& config, const std::string& yaml, const std::string& origin);
+// A configuration as `to_yaml` of its table wrote it, with the boxes; `found` says where a file
+// lies now that is named in it. Throws ConfigError.
+void reread(SparseMappingConfig& config, const std::string& yaml, const std::string& origin,
+            const std::function<std::string(const std::string&)>& found);
 
 }  // namespace understory

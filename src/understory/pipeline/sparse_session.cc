@@ -6,16 +6,19 @@
 #include "understory/util/timing.h"
 
 namespace understory {
+namespace {
+
+constexpr const char* kViewsFile = "views.bin";
+
+}  // namespace
 
 SparseSession::SparseSession(const SparseMappingConfig& config,
                              const std::filesystem::path& stems_file,
                              const std::filesystem::path& folder, Log& log)
-    : journal_file_(folder / "views.bin"),
-      pacer_(config.pace, config.front_end, &log),
-      stems_(stems_file) {}
+    : folder_(folder), pacer_(config.pace, config.front_end, &log), stems_(stems_file) {}
 
 void SparseSession::handle(const Event& event, const Rig& rig) {
-  if (journal_ == nullptr) journal_ = std::make_unique<ViewJournal>(journal_file_);
+  if (journal_ == nullptr) journal_ = std::make_unique<ViewJournal>(folder_ / kViewsFile);
   if (const auto* scan = std::get_if<ScanPtr>(&event)) on_scan(*scan, rig);
   if (const auto* fix = std::get_if<GnssFix>(&event)) {
     journal_->on_fix(*fix);
@@ -82,12 +85,17 @@ void SparseSession::refuse_imu(const std::string& reason) {
   pacer_.refuse_imu();
 }
 
-void SparseSession::flush() {
-  if (journal_ != nullptr) journal_->flush();
+void SparseSession::sync() {
+  if (journal_ != nullptr) journal_->sync();
+}
+
+std::vector<CountedFile> SparseSession::files() const {
+  if (journal_ == nullptr) return {};
+  return {{kViewsFile, journal_->count()}};
 }
 
 void SparseSession::save(BinaryWriter& writer) const {
-  writer.put(journal_ != nullptr ? journal_->bytes() : std::uint64_t{0});
+  writer.put(journal_ != nullptr ? journal_->count() : RecordCount());
   writer.put(last_scan_end_);
   writer.put(imu_refused_);
   writer.put(imu_without_place_);
@@ -96,9 +104,10 @@ void SparseSession::save(BinaryWriter& writer) const {
 }
 
 void SparseSession::load(BinaryReader& reader, const Rig& /*rig*/) {
-  const auto bytes = reader.get<std::uint64_t>();
+  const auto known = reader.get<RecordCount>();
   ViewSink& again = *this;
-  journal_ = std::make_unique<ViewJournal>(journal_file_, bytes, again);
+  if (known.records > 0)
+    journal_ = std::make_unique<ViewJournal>(folder_ / kViewsFile, known, again);
   scans_ = path_.size();
   last_scan_end_ = reader.get<TimeNs>();
   const std::string refused = reader.get_string();

@@ -30,8 +30,9 @@ class SparseSession : public Resumable, private ViewSink {
   // view was kept.
   void finish(const Rig& rig);
 
-  void flush() override;
+  void sync() override;
   void save(BinaryWriter& writer) const override;
+  [[nodiscard]] std::vector<CountedFile> files() const override;
   void load(BinaryReader& reader, const Rig& rig) override;
   [[nodiscard]] TimeNs last_scan_end() const override { return last_scan_end_; }
   // Whether no scan waits for its pose; only then the state can be saved.
@@ -63,7 +64,7 @@ class SparseSession : public Resumable, private ViewSink {
   void on_view(const StemView& view, const SparseStep& step) override;
   void on_fix(const GnssFix& fix) override;
 
-  std::filesystem::path journal_file_;
+  std::filesystem::path folder_;
   StemPacer pacer_;
   StemsWriter stems_;
   std::unique_ptr<ViewJournal> journal_;  // from the first event on

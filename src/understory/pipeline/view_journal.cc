@@ -1,6 +1,5 @@
 #include "understory/pipeline/view_journal.h"
 
-#include <sstream>
 #include <utility>
 
 #include "understory/geometry/pose_io.h"
@@ -69,40 +68,31 @@ void get_view(BinaryReader& reader, ViewSink& sink) {
   sink.on_view(view, step);
 }
 
-std::string first_bytes(const std::filesystem::path& path, std::uint64_t bytes) {
-  std::string content(bytes, '\0');
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(content.data(), static_cast<std::streamsize>(bytes)))
-    throw InputError(path.string(), "", "holds fewer views than its checkpoint says");
-  return content;
+void get_record(BinaryReader& reader, const std::string& file, ViewSink& sink) {
+  const auto kind = reader.get<Kind>();
+  if (kind == Kind::kPose) {
+    const bool positioned = reader.get<bool>();
+    sink.on_pose(get_stamped_pose(reader), positioned);
+  } else if (kind == Kind::kView) {
+    get_view(reader, sink);
+  } else if (kind == Kind::kFix) {
+    sink.on_fix(get_fix(reader));
+  } else {
+    throw InputError(file, "", "expected a pose, a view or a fix");
+  }
 }
 
 }  // namespace
 
-ViewJournal::ViewJournal(std::filesystem::path path)
-    : path_(std::move(path)), file_(path_, std::ios::binary | std::ios::trunc) {
-  if (!file_) throw OutputError(path_.string(), "cannot be opened for writing");
-}
+ViewJournal::ViewJournal(std::filesystem::path path) : file_(std::move(path)) {}
 
-ViewJournal::ViewJournal(std::filesystem::path path, std::uint64_t bytes, ViewSink& sink)
-    : path_(std::move(path)), bytes_(bytes) {
-  BinaryReader reader(first_bytes(path_, bytes), path_.string());
-  while (!reader.at_end()) {
-    const auto kind = reader.get<Kind>();
-    if (kind == Kind::kPose) {
-      const bool positioned = reader.get<bool>();
-      sink.on_pose(get_stamped_pose(reader), positioned);
-    } else if (kind == Kind::kView) {
-      get_view(reader, sink);
-    } else if (kind == Kind::kFix) {
-      sink.on_fix(get_fix(reader));
-    } else {
-      throw InputError(path_.string(), "", "is damaged: map the recording anew");
-    }
-  }
-  std::filesystem::resize_file(path_, bytes);
-  file_.open(path_, std::ios::binary | std::ios::app);
-  if (!file_) throw OutputError(path_.string(), "cannot be opened for writing");
+ViewJournal::ViewJournal(std::filesystem::path path, const RecordCount& known, ViewSink& sink)
+    : file_(std::move(path), known) {
+  const std::string file = file_.path().string();
+  file_.for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
+    BinaryReader reader({bytes.begin(), bytes.end()}, file);
+    get_record(reader, file, sink);
+  });
 }
 
 void ViewJournal::on_pose(const StampedPose& pose, bool positioned) {
@@ -132,15 +122,8 @@ void ViewJournal::on_fix(const GnssFix& fix) {
   append(record);
 }
 
-void ViewJournal::flush() {
-  file_.flush();
-  if (!file_) throw OutputError(path_.string(), "cannot be written (is the disk full?)");
-}
-
 void ViewJournal::append(const BinaryWriter& record) {
-  file_.write(record.bytes().data(), static_cast<std::streamsize>(record.bytes().size()));
-  if (!file_) throw OutputError(path_.string(), "cannot be written (is the disk full?)");
-  bytes_ += record.bytes().size();
+  file_.append({bytes_of(record.bytes())});
 }
 
 }  // namespace understory

@@ -2,13 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 
 #include "understory/geometry/stamped_pose.h"
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/stem_view.h"
 #include "understory/util/binary_io.h"
+#include "understory/util/record_file.h"
 
 namespace understory {
 
@@ -21,29 +21,27 @@ class ViewSink {
   virtual void on_fix(const GnssFix& fix) = 0;
 };
 
-// The same on disk, appended as the run goes, so that a killed run need not find it again. Bytes
-// before the last `flush` survive a crash of the program. Throws OutputError where the disk is
-// full. Not thread-safe.
+// The same on disk, appended as the run goes, so that a killed run need not find it again. Throws
+// OutputError where the disk is full. Not thread-safe.
 class ViewJournal : public ViewSink {
  public:
   // Begins anew.
   explicit ViewJournal(std::filesystem::path path);
-  // Goes on behind the first `bytes`, which are handed to `sink` once more; what follows them is
-  // cut off. Throws InputError where there are fewer or they are damaged.
-  ViewJournal(std::filesystem::path path, std::uint64_t bytes, ViewSink& sink);
+  // Goes on behind what is `known`, which is handed to `sink` once more; what follows it is cut
+  // off. Throws InputError where there is less or it is damaged.
+  ViewJournal(std::filesystem::path path, const RecordCount& known, ViewSink& sink);
 
   void on_pose(const StampedPose& pose, bool positioned) override;
   void on_view(const StemView& view, const SparseStep& step) override;
   void on_fix(const GnssFix& fix) override;
-  void flush();
-  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  // Waits until everything is on the disk.
+  void sync() { file_.sync(); }
+  [[nodiscard]] const RecordCount& count() const { return file_.count(); }
 
  private:
   void append(const BinaryWriter& record);
 
-  std::filesystem::path path_;
-  std::ofstream file_;
-  std::uint64_t bytes_ = 0;
+  RecordFile file_;
 };
 
 }  // namespace understory

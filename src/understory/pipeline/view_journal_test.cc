@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <vector>
 
 #include "understory/util/error.h"
@@ -55,14 +56,12 @@ class ViewJournalTest : public testing::Test {
 };
 
 TEST_F(ViewJournalTest, HandsBackWhatTheCheckpointKnowsAndGoesOn) {
-  std::uint64_t known = 0;
+  RecordCount known;
   {
     ViewJournal journal(path_);
     tell(journal, 1);
-    journal.flush();
-    known = journal.bytes();
+    known = journal.count();
     tell(journal, 2);  // after the checkpoint
-    journal.flush();
   }
   Told expected;
   tell(expected, 1);
@@ -71,8 +70,7 @@ TEST_F(ViewJournalTest, HandsBackWhatTheCheckpointKnowsAndGoesOn) {
     ViewJournal journal(path_, known, told);
     EXPECT_EQ(told.numbers, expected.numbers);
     tell(journal, 3);
-    journal.flush();
-    known = journal.bytes();
+    known = journal.count();
   }
   tell(expected, 3);
   Told again;
@@ -81,17 +79,36 @@ TEST_F(ViewJournalTest, HandsBackWhatTheCheckpointKnowsAndGoesOn) {
 }
 
 TEST_F(ViewJournalTest, WhatIsMissingOrDamagedIsAnInputError) {
-  std::uint64_t known = 0;
+  RecordCount known;
   {
     ViewJournal journal(path_);
     tell(journal, 1);
-    journal.flush();
-    known = journal.bytes();
+    known = journal.count();
   }
   Told told;
-  EXPECT_THROW(ViewJournal(path_, known + 1, told), InputError);
-  EXPECT_THROW(ViewJournal(path_, known - 1, told), InputError);  // in the middle of a record
-  std::fstream(path_, std::ios::binary | std::ios::in | std::ios::out).put('x');
+  RecordCount other = known;
+  other.bytes += 1;  // there are fewer
+  EXPECT_THROW(ViewJournal(path_, other, told), InputError);
+  other.bytes -= 2;  // ends in the middle of a record
+  EXPECT_THROW(ViewJournal(path_, other, told), InputError);
+  other = known;
+  other.digest += 1;  // other records
+  EXPECT_THROW(ViewJournal(path_, other, told), InputError);
+  std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp(-1, std::ios::end);
+  file.put('x');
+  file.close();
+  EXPECT_THROW(ViewJournal(path_, known, told), InputError);
+}
+
+TEST_F(ViewJournalTest, AWholeRecordOfNoKnownKindIsAnInputError) {
+  RecordCount known;
+  {
+    RecordFile file(path_);
+    file.append({bytes_of(std::string("\x09 nothing"))});
+    known = file.count();
+  }
+  Told told;
   EXPECT_THROW(ViewJournal(path_, known, told), InputError);
 }
 

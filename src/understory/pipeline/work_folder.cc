@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "understory/util/atomic_file.h"
+#include "understory/util/durable.h"
 #include "understory/util/error.h"
 #include "understory/util/output_guard.h"
 #include "understory/util/version.h"
@@ -128,9 +129,17 @@ void clear_results(const fs::path& work) {
 void clear_state(const fs::path& work) {
   std::vector<fs::path> entries = entries_of(work);
   // Checkpoints go first: they count on the rest.
-  std::stable_partition(entries.begin(), entries.end(), is_checkpoint);
-  for (const fs::path& entry : entries) {
-    if (entry.filename().string().find(".bin") != std::string::npos) (void)::unlink(entry.c_str());
+  const auto others = std::stable_partition(entries.begin(), entries.end(), is_checkpoint);
+  for (auto entry = entries.begin(); entry != others; ++entry)
+    (void)::unlink(entry->c_str());
+  try {
+    if (others != entries.begin()) sync_folder(work);  // after a power cut they do not come back
+  } catch (const OutputError&) {
+    return;  // the rest stays, for what may come back
+  }
+  for (auto entry = others; entry != entries.end(); ++entry) {
+    if (entry->filename().string().find(".bin") != std::string::npos)
+      (void)::unlink(entry->c_str());
   }
 }
 

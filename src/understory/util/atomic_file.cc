@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "understory/util/durable.h"
 #include "understory/util/error.h"
 #include "understory/util/output_file.h"
 
@@ -130,6 +131,7 @@ void sync_and_rename(const std::filesystem::path& from, const std::filesystem::p
   ::close(file);
   if (!synced) fail(code);
   if (::rename(from.c_str(), to.c_str()) != 0) fail(errno);
+  with_name_of(to, [&] { sync_folder(folder_of(to)); });
 }
 
 }  // namespace understory

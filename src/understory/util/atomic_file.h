@@ -8,8 +8,9 @@
 namespace understory {
 
 // A file that appears whole or not at all: written beside its place as `path.part`, synced to the
-// disk and renamed by `commit`; dropped by the destructor otherwise. Every failure is an
-// OutputError with the file and the system's reason (disk full, not writable). Not thread-safe.
+// disk, renamed, and its folder synced by `commit`; dropped by the destructor otherwise. Every
+// failure is an OutputError with the file and the system's reason (disk full, not writable). Not
+// thread-safe.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path path);
@@ -49,7 +50,7 @@ class AtomicTextFile {
 };
 
 // Names of files that other programs write by themselves (GDAL): a temporary path beside `path` and
-// the sync and rename to it. Throws OutputError.
+// the sync and rename to it, on the disk in the end. Throws OutputError.
 [[nodiscard]] std::filesystem::path part_path(const std::filesystem::path& path);
 void sync_and_rename(const std::filesystem::path& from, const std::filesystem::path& to);
 

@@ -54,6 +54,7 @@ void OutputFile::close_unsynced() {
 }
 
 std::uint32_t crc32_of(std::span<const std::uint8_t> bytes, std::uint32_t start) {
+  if (bytes.empty()) return start;  // zlib takes no bytes at no place for a beginning
   return static_cast<std::uint32_t>(::crc32_z(start, bytes.data(), bytes.size()));
 }
 

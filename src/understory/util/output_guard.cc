@@ -138,6 +138,11 @@ MadeFolders::MadeFolders(const fs::path& folder) {
   throw OutputError(folder.string(), "cannot be made: " + reason);
 }
 
+void MadeFolders::sync() const {
+  for (const std::filesystem::path& made : made_)
+    sync_folder(folder_of(made));
+}
+
 MadeFolders::~MadeFolders() {
   remove_empty(made_);
 }

@@ -41,6 +41,8 @@ class MadeFolders {
   MadeFolders(const MadeFolders&) = delete;
   MadeFolders& operator=(const MadeFolders&) = delete;
   void keep() { made_.clear(); }
+  // Waits until they are on the disk. Throws OutputError.
+  void sync() const;
 
  private:
   std::vector<std::filesystem::path> made_;  // from the outside in

@@ -1,0 +1,70 @@
+#include "understory/pipeline/input_identity.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+
+#include "understory/pipeline/source.h"
+#include "understory/recording/byte_source.h"
+#include "understory/util/error.h"
+#include "understory/util/output_file.h"
+#include "understory/util/record_file.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kRead = std::uint64_t{1} << 20U;  // of each end
+
+std::string mark_of_file(const std::string& path) {
+  const auto file = open_file(path);
+  const std::uint64_t size = file->size();
+  std::vector<std::uint8_t> bytes;
+  file->read(0, kRead, bytes);
+  const std::uint32_t head = crc32_of(bytes);
+  file->read(size > kRead ? size - kRead : 0, kRead, bytes);
+  return fmt::format("{} bytes, {:08x} {:08x}", size, head, crc32_of(bytes));
+}
+
+std::string mark_of_folder(const std::string& path) {
+  std::vector<std::string> files;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(path, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code ignored;
+    if (!entry->is_regular_file(ignored)) continue;
+    files.push_back(fmt::format("{} {}\n", fs::relative(entry->path(), path, ignored).string(),
+                                entry->file_size(ignored)));
+  }
+  if (error) throw InputError(path, "", error.message());
+  std::sort(files.begin(), files.end());
+  std::uint32_t checksum = 0;
+  for (const std::string& file : files)
+    checksum = crc32_of(bytes_of(file), checksum);
+  return fmt::format("{} files, {:08x}", files.size(), checksum);
+}
+
+}  // namespace
+
+InputIdentity identify(const std::string& what, const std::string& path) {
+  if (is_simulation(path)) return {what, path, path};
+  std::error_code ignored;
+  return {what, path, fs::is_directory(path, ignored) ? mark_of_folder(path) : mark_of_file(path)};
+}
+
+void expect_same(const std::vector<InputIdentity>& begun_with,
+                 const std::vector<InputIdentity>& now) {
+  for (std::size_t i = 0; i < begun_with.size() && i < now.size(); ++i) {
+    if (begun_with[i].mark == now[i].mark) continue;
+    throw InputError(now[i].path, "",
+                     "is not " + now[i].what + " that the run was begun with (" +
+                         begun_with[i].mark + " then, " + now[i].mark +
+                         " now): put that back, or map this one into another folder");
+  }
+  UNDERSTORY_CHECK(begun_with.size() == now.size());
+}
+
+}  // namespace understory

@@ -1,0 +1,82 @@
+#include "understory/pipeline/input_identity.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "understory/pipeline/source.h"
+#include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
+#include "understory/util/log.h"
+
+namespace understory {
+namespace {
+
+class InputIdentityTest : public testing::Test {
+ protected:
+  std::string file(const std::string& name, const std::string& content) const {
+    const std::filesystem::path path = folder_ / name;
+    std::filesystem::create_directories(path.parent_path());
+    std::ofstream(path, std::ios::binary) << content;
+    return path.string();
+  }
+  static bool same(const std::string& a, const std::string& b) {
+    return identify("the recording", a).mark == identify("the recording", b).mark;
+  }
+  const test::TemporaryFolder folder_;
+};
+
+TEST_F(InputIdentityTest, AFileIsKnownBySizeHeadAndTail) {
+  const std::string long_file(3'000'000, 'a');
+  const std::string a = file("a", long_file);
+  EXPECT_TRUE(same(a, file("copy", long_file)));
+  EXPECT_FALSE(same(a, file("longer", long_file + "a")));
+  for (const std::size_t at : {std::size_t{0}, long_file.size() - 1}) {
+    std::string other = long_file;
+    other[at] = 'b';
+    EXPECT_FALSE(same(a, file("other", other))) << at;
+  }
+  EXPECT_TRUE(same(file("empty", ""), file("empty too", "")));
+  EXPECT_THROW(static_cast<void>(identify("the recording", folder_ / "none")), InputError);
+}
+
+TEST_F(InputIdentityTest, AFolderIsKnownByNamesAndSizes) {
+  for (const char* name : {"x/1.pcd", "x/deep/2.pcd", "y/1.pcd", "y/deep/2.pcd"})
+    file(name, "cloud");
+  EXPECT_TRUE(same(folder_ / "x", folder_ / "y"));
+  file("y/3.pcd", "");
+  EXPECT_FALSE(same(folder_ / "x", folder_ / "y"));
+}
+
+TEST_F(InputIdentityTest, AnotherInputIsRefusedByName) {
+  const InputIdentity then = identify("the extrinsics", file("e.yaml", "one"));
+  EXPECT_NO_THROW(expect_same({then}, {then}));
+  const InputIdentity now = identify("the extrinsics", file("e.yaml", "two"));
+  try {
+    expect_same({then}, {now});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("is not the extrinsics that the run was begun with"),
+              std::string::npos);
+  }
+}
+
+// A disk that goes away after the last scan costs a hash, not the run.
+TEST_F(InputIdentityTest, WhatCannotBeReadAtTheEndHasNoHash) {
+  Log log;
+  const auto there = hash_inputs(file("there", "bytes"), log);
+  ASSERT_EQ(there.size(), 1U);
+  EXPECT_EQ(there[0].sha256.size(), 64U);
+  EXPECT_TRUE(log.warnings().empty());
+  const auto gone = hash_inputs(folder_ / "gone", log);
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].file, "gone");
+  EXPECT_TRUE(gone[0].sha256.empty());
+  ASSERT_EQ(log.warnings().size(), 1U);
+  EXPECT_EQ(log.warnings()[0].key, "recording.no_hash");
+}
+
+}  // namespace
+}  // namespace understory
