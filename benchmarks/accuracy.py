@@ -9,6 +9,8 @@
                                       identity,kiss
   ./run accuracy --sites all          the second; or some of its rows: evo2,lake
   ./run accuracy --sites all --whole  from beginning to end
+  ./run accuracy --spoilt             no table but 100 recordings spoilt so that the map is wrong beside 100
+                                      good ones: is any wrong map called complete (see spoilt.py)
   ./run accuracy --write              puts the table, or the rows of the sites, into docs/results.md
 
 Exit status 1 if a floor is missed (in the short form: by more than the stated margin).
@@ -266,6 +268,11 @@ def arguments():
     parser.add_argument("--whole", action="store_true", help="whole sites, not their first minutes")
     parser.add_argument("--write", action="store_true", help="put the table into docs/results.md")
     parser.add_argument("--keep", type=Path, help="keep the run folders here")
+    parser.add_argument("--spoilt", action="store_true", help="spoilt recordings beside good ones")
+    parser.add_argument("--wanted", type=int, default=100, metavar="N",
+                        help="with --spoilt: so many wrong maps and so many good ones")
+    parser.add_argument("--fit", action="store_true",
+                        help="with --spoilt --keep: only what good and wrong runs there are like")
     return parser.parse_args()
 
 
@@ -293,6 +300,10 @@ def main():
     floors = options.short or any(site in PARTS for site in options.sites)
     work = options.keep or Path(tempfile.mkdtemp(prefix="understory-accuracy-"))
     work.mkdir(parents=True, exist_ok=True)
+    if options.spoilt:
+        from spoilt import measure_spoilt_runs
+        good = measure_spoilt_runs(work, options.seeds, options.wanted, options.write, options.fit)
+        return 0 if good else 1
     table, begin, failure = Table(), time.perf_counter(), None
     ran = True
     try:

@@ -5,9 +5,10 @@ import gzip
 import json
 import math
 import random
+import struct
 
 from program import Cases, error_m, good_recording, map_recording, program
-from recordings import edit_cloud, edit_imu, write_mcap
+from recordings import Cloud, edit_cloud, edit_imu, write_mcap
 
 cases = Cases()
 good, messages, truth = good_recording(cases.folder, seconds=24)
@@ -41,6 +42,13 @@ def expect(outcome, code, error_below, *said, pairs=ALL):
     return f"exit {code}, {100 * error:.1f} cm; {(text + [''])[0]}".replace(str(outcome.folder), "")
 
 
+def expect_partial(outcome, *said):
+    """Whoever reads only status and reasons knows what had no say."""
+    assert outcome.run["status"] == "partial", outcome.run["reasons"]
+    for words in said:
+        assert words in "; ".join(outcome.run["reasons"]), outcome.run["reasons"]
+
+
 @cases.case("no lidar")
 def no_lidar(folder):
     path, outcome = mapped(folder, [m for m in short if m.topic != "/lidar"])
@@ -60,7 +68,8 @@ def no_imu(folder):
 def imu_stops(folder):
     path, outcome = mapped(folder, [m for m in short if m.topic != "/imu" or m.stamp < start + 6e9])
     assert "imu.stopped" in outcome.warnings
-    return expect(outcome, 0, 0.06, f"{path}: the IMU stopped at {(start + 6e9) / 1e9:.0f}"[:-1])
+    expect_partial(outcome, "the IMU had no say for", "it stops 6.")
+    return expect(outcome, 4, 0.06, f"{path}: the IMU stopped at {(start + 6e9) / 1e9:.0f}"[:-1])
 
 
 @cases.case("IMU that begins late")
@@ -70,14 +79,23 @@ def imu_late(folder):
     assert 3.5 < outcome.run["quality"]["imu_without_say_s"] < 4.5  # and then it is used: biases
     last = gzip.open(outcome.folder / "states.csv.gz", "rt").read().splitlines()[-1].split(",")
     assert any(abs(float(v)) > 1e-6 for v in last[4:10]), last
-    return expect(outcome, 0, 0.1, f"{path}: the IMU begins 4.0 s after the lidar")
+    expect_partial(outcome, "the IMU had no say for", "it begins 4.0 s after the lidar")
+    return expect(outcome, 4, 0.1, f"{path}: the IMU begins 4.0 s after the lidar")
+
+
+@cases.case("IMU that begins half a second late")
+def imu_hardly_late(folder):
+    path, outcome = mapped(folder, [m for m in short if m.topic != "/imu" or m.stamp > start + 5e8])
+    assert outcome.run["status"] == "complete", outcome.run["reasons"]
+    return expect(outcome, 0, 0.1)
 
 
 @cases.case("IMU with a hole of three seconds")
 def imu_hole(folder):
     _, outcome = mapped(folder, [m for m in short if m.topic != "/imu" or
                                  not start + 4e9 < m.stamp < start + 7e9])
-    return expect(outcome, 0, 0.06, "imu: nothing for 3.0")
+    expect_partial(outcome, "the IMU had no say for", "it was silent for 3.0 s")
+    return expect(outcome, 4, 0.06, "imu: nothing for 3.0")
 
 
 AXES = {
@@ -140,7 +158,51 @@ def wrong_extrinsics(folder):
 @cases.case("extrinsics that are not known")
 def no_extrinsics(folder):
     path, outcome = mapped(folder, [m for m in short if m.topic != "/tf_static"])
-    return expect(outcome, 0, 0.1, f"{path}: nothing tells where the IMU", "it is not used")
+    expect_partial(outcome, "the IMU had no say for 1", "nothing tells where it sits")
+    return expect(outcome, 4, 0.1, f"{path}: nothing tells where the IMU", "it is not used")
+
+
+@cases.case("times of points that run backwards")
+def backwards(folder):
+    def spoil(cloud):
+        times = [struct.unpack_from("<I", cloud.points, i * cloud.step + cloud.fields["t"][0])[0]
+                 for i in range(len(cloud))]
+        for i, time in enumerate(times):
+            cloud.put(i, "t", "I", max(times) - time)
+
+    path = folder / "walk.mcap"
+    write_mcap(path, [edit_cloud(m, spoil) if m.topic == "/lidar" else m for m in messages])
+    outcome = map_recording(path, folder / "run")
+    assert outcome.code == 4 and "times of points do not fit the motion" in outcome.said, outcome.said
+    return outcome.run["reasons"][0]
+
+
+@cases.case("clouds far apart that are taken to be a tenth of a second apart")
+def assumed_times(folder):
+    """A folder of every fifteenth cloud whose names tell no times: the walk becomes a flight."""
+    clouds = folder / "clouds"
+    clouds.mkdir()
+    for i, message in enumerate(scans[::15]):
+        cloud = Cloud(message.data)
+        at = [cloud.fields[name][0] for name in ("x", "y", "z", "intensity")]
+        (clouds / f"{i:06}.bin").write_bytes(b"".join(
+            cloud.points[k * cloud.step + offset : k * cloud.step + offset + 4]
+            for k in range(len(cloud)) for offset in at))
+    outcome = map_recording(clouds, folder / "run")
+    assert outcome.code == 4 and outcome.run["status"] == "untrusted", outcome.said
+    assert "recording.assumed_rate" in outcome.warnings
+    assert "times of the clouds were assumed" in "; ".join(outcome.run["reasons"]), outcome.run["reasons"]
+    return outcome.run["reasons"][0]
+
+
+@cases.case("lidar that repeats one scan")
+def repeated(folder):
+    frozen = next(m for m in short if m.topic == "/lidar" and m.stamp > start + 6e9)
+    _, outcome = mapped(folder, [
+        frozen.at(m.stamp) if m.topic == "/lidar" and m.stamp > frozen.stamp else m for m in short])
+    assert outcome.code == 4, outcome.said
+    assert "hold the same points as the scan before" in outcome.run["reasons"][0], outcome.run["reasons"]
+    return outcome.run["reasons"][0]
 
 
 @cases.case("no times of points")

@@ -66,6 +66,7 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const LocalMapSnapshot& l
     const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, estimate.scan_end);
     preprocess(scan, guess, estimate);
     if (!local_map.empty()) match(local_map, motion_->predict(scan.stamp), estimate);
+    watch_scan_motion(scan, local_map, guess, estimate);
     if (config_.elastic_scans && estimate.matched && by_scans_alone())
       match_elastically(scan, *local_map.back(), guess, estimate);
     std::optional<LidarFactor> factor;
@@ -100,6 +101,16 @@ bool DenseOdometry::by_scans_alone() const {
   if (!uses_imu_) return true;
   const ImuTrust trust = motion_->imu_trust();
   return !trust.usable || trust.on_probation;
+}
+
+void DenseOdometry::watch_scan_motion(const Scan& scan, const LocalMapSnapshot& local_map,
+                                      const std::vector<StampedPose>& guess,
+                                      const DenseEstimate& estimate) {
+  if (!estimate.matched) return scan_motion_.interrupt();
+  const ScopedTimer timer(times_, "scan_motion");
+  scan_motion_.add(*local_map.back(), estimate.thinned, guess,
+                   {scan.stamp, estimate.match.target_from_source}, estimate.scan_end - scan.stamp,
+                   config_.ndt);
 }
 
 void DenseOdometry::match_elastically(const Scan& scan, const NdtMap& target,
@@ -165,12 +176,14 @@ void DenseOdometry::take_imu(const Pose& body_from_imu, std::span<const ImuSampl
 
 void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
   motion_->move_world(new_world_from_old_world);
+  scan_motion_.move_world(new_world_from_old_world);
 }
 
 void DenseOdometry::save(BinaryWriter& writer) const {
   writer.put(last_matched_);
   writer.put(usual_inliers_);
   writer.put(last_scan_);
+  scan_motion_.save(writer);
   motion_->save(writer);
 }
 
@@ -178,6 +191,7 @@ void DenseOdometry::load(BinaryReader& reader) {
   last_matched_ = reader.get<bool>();
   usual_inliers_ = reader.get<double>();
   last_scan_ = reader.get<TimeNs>();
+  scan_motion_.load(reader);
   motion_->load(reader);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "understory/odometry/motion_model.h"
+#include "understory/odometry/scan_motion.h"
 #include "understory/odometry/scan_path.h"
 #include "understory/preprocess/body_cloud.h"
 #include "understory/preprocess/deskew.h"
@@ -88,6 +89,8 @@ class DenseOdometry {
 
   [[nodiscard]] const MotionModel& motion() const { return *motion_; }
   [[nodiscard]] bool uses_imu() const { return uses_imu_; }
+  // Whether the times of the points fit the motion from scan to scan.
+  [[nodiscard]] ScanMotion scan_motion() const { return scan_motion_.motion(); }
   void save(BinaryWriter& writer) const;
   void load(BinaryReader& reader);
 
@@ -98,6 +101,8 @@ class DenseOdometry {
   [[nodiscard]] bool by_scans_alone() const;
   void match_elastically(const Scan& scan, const NdtMap& target,
                          const std::vector<StampedPose>& guess, DenseEstimate& estimate);
+  void watch_scan_motion(const Scan& scan, const LocalMapSnapshot& local_map,
+                         const std::vector<StampedPose>& guess, const DenseEstimate& estimate);
   void match(const LocalMapSnapshot& local_map, const NavState& predicted, DenseEstimate& estimate);
 
   DenseOdometryConfig config_;
@@ -111,7 +116,8 @@ class DenseOdometry {
   bool last_matched_ = false;
   TimeNs last_scan_ = 0;            // stamp
   std::vector<std::uint8_t> keep_;  // workspace: points of the scan outside the machine
-  double usual_inliers_ = 0.0;      // running mean of the inlier ratio of matches; 0: none yet
+  ScanMotionWatch scan_motion_;
+  double usual_inliers_ = 0.0;  // running mean of the inlier ratio of matches; 0: none yet
 };
 
 }  // namespace understory

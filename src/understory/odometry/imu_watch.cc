@@ -7,6 +7,10 @@ namespace understory {
 ImuTrust ImuWatch::trust() const {
   ImuTrust trust = monitor_.trust();
   trust.on_probation = monitor_.on_probation();
+  trust.motion_scale = scale_.scale();
+  trust.motion_correlation = scale_.correlation();
+  trust.motion_spread_m_s2 = scale_.spread_m_s2();
+  trust.motion_windows = scale_.windows();
   return trust;
 }
 
@@ -42,10 +46,15 @@ void ImuWatch::compare(const ImuMatch& from, const ImuMatch& to,
   const double duration = to_seconds(to.stamp - from.stamp);
   const Eigen::Quaterniond& first = from.world_from_imu.rotation();
   const Eigen::Quaterniond& second = to.world_from_imu.rotation();
+  if (from.stamp != compared_) scale_.interrupt();
+  compared_ = to.stamp;
+  const Eigen::Vector3d force = mean_force(samples);
+  scale_.add(to.world_from_imu.translation() - from.world_from_imu.translation(),
+             first.slerp(0.5, second) * force, duration);
   change_standing(to.stamp, [&] {
     monitor_.add_turn(so3_log(first.conjugate() * second), raw_turn(samples), turning(samples),
                       duration);
-    monitor_.add_force(first.slerp(0.5, second), mean_force(samples), duration);
+    monitor_.add_force(first.slerp(0.5, second), force, duration);
   });
 }
 
@@ -62,11 +71,15 @@ void ImuWatch::note_samples(bool any, TimeNs from, TimeNs to) {
 
 void ImuWatch::save(BinaryWriter& writer) const {
   monitor_.save(writer);
+  scale_.save(writer);
+  writer.put(compared_);
   writer.put(silent_);
 }
 
 void ImuWatch::load(BinaryReader& reader) {
   monitor_.load(reader);
+  scale_.load(reader);
+  compared_ = reader.get<TimeNs>();
   silent_ = reader.get<bool>();
 }
 

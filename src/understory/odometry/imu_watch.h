@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "understory/odometry/motion_scale.h"
 #include "understory/odometry/preintegration.h"
 #include "understory/odometry/trust_monitor.h"
 
@@ -44,6 +45,8 @@ class ImuWatch {
   void change_standing(TimeNs now, const Change& change);
 
   TrustMonitor monitor_;
+  MotionScale scale_;
+  TimeNs compared_ = 0;  // stamp of the last match in it
   Log* log_;
   bool silent_ = false;  // no samples over the last interval
 };

@@ -61,6 +61,12 @@ struct ImuTrust {
   bool on_probation = false;  // contradicted; left out until it is clear whether it is right
   bool proven = false;        // agreed with the lidar over enough turning
   std::string reason;         // one sentence for run.json if not trusted
+  // Acceleration by matching over that by the accelerometer, and how much there was to compare; see
+  // MotionScale.
+  double motion_scale = 0.0;
+  double motion_correlation = 0.0;
+  double motion_spread_m_s2 = 0.0;
+  int motion_windows = 0;
 };
 
 // The first graph of P4 F2: a state for every scan, prediction in between. One per run, not

@@ -152,6 +152,7 @@ std::string run_json(const RunSummary& summary) {
   }
   json["counts"] = to_json(summary.counts);
   json["quality"] = to_json(summary.quality);
+  if (!summary.evidence.empty()) json["evidence"] = to_json(summary.evidence);
   if (!summary.lidar_view.highest_deg.empty()) {
     json["lidar_view"] = {{"body_from_lidar", numbers(summary.lidar_view.body_from_lidar)},
                           {"highest_deg", numbers(summary.lidar_view.highest_deg)}};

@@ -63,10 +63,11 @@ struct RunSummary {
   double cpu_s = 0.0;
   double peak_memory_mb = 0.0;
   std::map<std::string, StageSummary> stages;
-  std::map<std::string, Figure> counts;   // keyframes, loops_accepted, map_points, trees ...
-  std::map<std::string, Figure> quality;  // inlier_ratio_mean, ape_rmse_m ...
-  std::string crs_wkt;                    // empty = local frame
-  LidarViewFigures lidar_view;            // empty = unknown
+  std::map<std::string, Figure> counts;    // keyframes, loops_accepted, map_points, trees ...
+  std::map<std::string, Figure> quality;   // inlier_ratio_mean, ape_rmse_m ...
+  std::map<std::string, Figure> evidence;  // what the status rests on
+  std::string crs_wkt;                     // empty = local frame
+  LidarViewFigures lidar_view;             // empty = unknown
 };
 
 // Of a run at the speed of its sensors: milliseconds from the end of a scan to its pose, as the

@@ -107,6 +107,10 @@ void describe(ConfigTable& table, CorrectionConfig& config) {
   describe(table, config.stems);
   table.section("tree_list", [&] { describe(table, config.tree_list); });
   table.section("felling", [&] { describe(table, config.felling); });
+  table.section("judgement", [&] {
+    describe(table, config.judgement);
+    table.section("motion", [&] { describe(table, config.motion_limits); });
+  });
 }
 
 CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,

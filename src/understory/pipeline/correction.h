@@ -11,7 +11,10 @@
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/felling.h"
+#include "understory/pipeline/path_evidence.h"
+#include "understory/pipeline/run_judgement.h"
 #include "understory/pipeline/stem_correction.h"
+#include "understory/preprocess/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/util/config.h"
@@ -27,6 +30,8 @@ struct CorrectionConfig {
   StemCorrectionConfig stems;
   StemMapConfig tree_list = tree_list_config();
   FellingConfig felling;
+  JudgementConfig judgement;
+  MotionLimits motion_limits;
 };
 void describe(ConfigTable& table, CorrectionConfig& config);
 
@@ -47,7 +52,12 @@ struct SparseScans {
   std::vector<GnssFix> fixes;         // of the recording; compared with, not used
   double wall_s = 0.0;                // that it took so far
   bool stopped = false;               // before the recording's end
-  std::string imu_distrust;           // why its IMU is not believed; empty: it is, or there is none
+  EventOrderer::Report time_repair;   // of its events
+  TimeNs last_scan_end = 0;
+  std::uint64_t repeated = 0;    // scans that hold the same points as the one before
+  TimeNs imu_without_place = 0;  // time of its samples before its extrinsics were known
+  bool imu_wanted = true;        // by the configuration
+  std::string imu_distrust;      // why its IMU is not believed; empty: it is, or there is none
   std::optional<RealtimeFacts> realtime;
 };
 

@@ -10,6 +10,7 @@
 #include "understory/map/stem_map.h"
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/correction_evidence.h"
 #include "understory/pipeline/correction_report.h"
 #include "understory/pipeline/correction_tables.h"
 #include "understory/pipeline/gnss_fit.h"
@@ -134,77 +135,6 @@ double axis_noise_deg(const std::vector<MappedStem>& stems) {
   return sights > 0.0 ? std::sqrt(sum / sights) * 180.0 / M_PI : std::nan("");
 }
 
-// Steps that nothing vouches for: those without a match, and those with a weak one that no loop and
-// no correction bridges.
-std::size_t doubtful_steps(const CorrectionRun& run) {
-  std::vector<int> bridges(run.steps.size() + 1, 0);  // begin and end of each, to be summed up
-  const auto bridge = [&](int from, int to) {
-    ++bridges[static_cast<std::size_t>(std::min(from, to)) + 1];
-    --bridges[static_cast<std::size_t>(std::max(from, to)) + 1];
-  };
-  for (std::size_t k = 0; k < run.correction.loops.size(); ++k) {
-    if (run.correction.accepted[k] != 0)
-      bridge(run.correction.loops[k].match, run.correction.loops[k].query);
-  }
-  for (const TriedCorrection& tried : run.correction.self.tried) {
-    if (tried.kept) bridge(tried.pair.j, tried.pair.i);
-  }
-  std::size_t doubtful = 0;
-  int bridged = 0;
-  for (std::size_t k = 0; k < run.steps.size(); ++k) {
-    bridged += bridges[k];
-    const SparseStepStatus status = run.steps[k].status;
-    doubtful += status == SparseStepStatus::kUnmatched ||
-                        (status == SparseStepStatus::kWeak && bridged == 0)
-                    ? 1
-                    : 0;
-  }
-  return doubtful;
-}
-
-double mean_smear_m(const std::vector<StampedPose>& path) {
-  double sum = 0.0;
-  for (std::size_t i = 1; i < path.size(); ++i)
-    sum += smear_of(path[i - 1].world_from_body.inverse() * path[i].world_from_body);
-  return path.size() < 2 ? 0.0 : sum / static_cast<double>(path.size() - 1);
-}
-
-void judge(const CorrectionRequest& request, const CorrectionRun& run, std::size_t trees,
-           const Log& log, RunSummary& summary) {
-  const auto lower = [&](RunStatus status, const std::string& reason) {
-    summary.status = status;
-    summary.reasons.push_back(reason);
-  };
-  const bool recording = request.scans != nullptr;
-  if (run.stopped || (recording && request.scans->stopped)) {
-    lower(RunStatus::kPartial, std::string("stopped before the end of the recording") +
-                                   (recording ? "; go on with `understory map --resume`" : ""));
-  }
-  if (recording) {
-    const RecordingDamage damage = recording_damage(log, request.scans->path.size());
-    for (const std::string& reason : damage.missing)
-      lower(RunStatus::kPartial, reason);
-    for (const std::string& reason : damage.hurt)
-      lower(RunStatus::kUntrusted, reason);
-    const std::string smear = smear_reason(log, mean_smear_m(request.scans->path));
-    if (!smear.empty()) lower(RunStatus::kUntrusted, smear);
-    if (!request.scans->imu_distrust.empty())
-      lower(RunStatus::kUntrusted, request.scans->imu_distrust);
-  }
-  if (!run.correction.converged)
-    lower(RunStatus::kUntrusted, "the loops were not solved: " + run.correction.reason);
-  if (trees == 0)
-    lower(RunStatus::kUntrusted,
-          fmt::format("no stem was seen often enough in {} views to be listed as a tree",
-                      run.steps.size()));
-  const std::size_t doubtful = doubtful_steps(run);
-  if (doubtful == 0) return;
-  lower(RunStatus::kUntrusted,
-        fmt::format("{} of {} views found too few of the stems seen before: the path may be bent "
-                    "or broken there",
-                    doubtful, run.steps.size()));
-}
-
 void add_sharpness(const std::string& when, const MapSharpness& map, RunSummary& summary) {
   summary.quality["beta_" + when] = map.beta;
   summary.quality["beta_3d_" + when] = map.beta_3d;
@@ -289,7 +219,11 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
     }
   }
   summary.warnings = log.warnings();
-  judge(request, run, stems.size(), log, summary);
+  const RunEvidence evidence = evidence_of(request, run, stems.size(), log);
+  const RunJudgement judgement = judge_run(evidence, request.config.judgement);
+  summary.status = judgement.status;
+  summary.reasons = judgement.reasons;
+  summary.evidence = figures_of(evidence);
   return summary;
 }
 

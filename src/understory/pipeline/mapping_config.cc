@@ -26,6 +26,10 @@ ConfigTable mapping_table(MappingConfig& config) {
     table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
   });
   table.section("inventory", [&] { describe(table, config.inventory); });
+  table.section("judgement", [&] {
+    describe(table, config.judgement);
+    table.section("motion", [&] { describe(table, config.motion_limits); });
+  });
   table.section("run", [&] {
     table.add("checkpoint_interval_s", config.checkpoint_interval_s, {0.1, 5.0}, "s",
               "of recording between checkpoints");

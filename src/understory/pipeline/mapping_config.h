@@ -7,6 +7,8 @@
 #include "understory/map/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/odometry/dense_odometry.h"
+#include "understory/pipeline/path_evidence.h"
+#include "understory/pipeline/run_judgement.h"
 #include "understory/preprocess/event_orderer.h"
 #include "understory/util/config.h"
 #include "understory/util/config_origins.h"
@@ -24,6 +26,8 @@ struct MappingConfig {
   double map_range_max_m = 60.0;  // farther returns do not enter the finished map
   bool map_enabled = true;        // write map.laz and what is made from it
   InventoryConfig inventory;
+  JudgementConfig judgement;
+  MotionLimits motion_limits;
   double checkpoint_interval_s = 4.0;  // of recording; at most 5 s are processed again
   double cloud_distance_m = 1.0;       // weighted distance (37) between scans whose clouds are kept
   // A lidar whose full scans have fewer points than this (16 beams) has what nobody set adapted to

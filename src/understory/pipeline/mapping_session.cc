@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/pipeline/scan_content.h"
 #include "understory/sensor/sensor_io.h"
 #include "understory/util/error.h"
 
@@ -242,6 +243,9 @@ void MappingSession::on_scan(const Scan& scan) {
     }
   }
   last_scan_ = scan.stamp;
+  const std::uint64_t content = content_of(scan);
+  counts_.repeated += content == counts_.last_content ? 1 : 0;
+  counts_.last_content = content;
   ScanRecord record;
   record.stamp = scan.stamp;
   record.points = static_cast<std::uint32_t>(scan.points.size());

@@ -34,6 +34,8 @@ struct MappingCounts {
   std::uint64_t imu_samples = 0;
   TimeNs imu_without_place = 0;  // time of the IMU's samples before its place was known
   std::uint64_t points = 0;
+  std::uint64_t repeated = 0;      // scans that hold the same points as the one before
+  std::uint64_t last_content = 0;  // of the last scan, see content_of
 };
 
 // The moving part of a mapping run: takes events in order of time and keeps positioning (first
@@ -73,6 +75,8 @@ class MappingSession : public Resumable {
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }
   [[nodiscard]] const KeyframeMap& map() const { return *map_; }
   [[nodiscard]] KeyframeMap& map() { return *map_; }
+  // Whether the configuration of this run has it use an IMU.
+  [[nodiscard]] bool imu_wanted() const { return config_.odometry.imu_enabled; }
   [[nodiscard]] const Journal& journal() const { return *journal_; }
   [[nodiscard]] const KeyframeClouds& clouds() const { return *clouds_; }
   [[nodiscard]] const std::vector<GnssFix>& fixes() const { return fixes_; }

@@ -2,87 +2,270 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <utility>
+
 namespace understory {
 namespace {
-
-// A prediction bridges a scan or two without harm; beyond these shares the map has weak places.
-constexpr double kMostUnmatchedShare = 0.02;
-constexpr double kMostEmptyShare = 0.10;
-constexpr double kLongestLidarGapS = 1.0;
-constexpr double kMostSmearM = 0.05;
 
 double share(std::uint64_t part, std::uint64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
-void judge_scans(const MappingCounts& counts, std::vector<std::string>& reasons) {
-  const std::uint64_t failed = counts.unmatched + counts.gated;
-  if (share(failed, counts.scans) > kMostUnmatchedShare) {
-    reasons.push_back(
-        fmt::format("{} of {} scans ({:.1f} %) could not be matched to the map; their poses "
-                    "are predictions",
-                    failed, counts.scans, 100.0 * share(failed, counts.scans)));
-  }
-  if (share(counts.empty_scans, counts.scans) > kMostEmptyShare) {
-    reasons.push_back(fmt::format("{} of {} scans had hardly any usable point", counts.empty_scans,
-                                  counts.scans));
-  }
+double percent(std::uint64_t part, std::uint64_t whole) {
+  return 100.0 * share(part, whole);
 }
 
-void judge_outages(const MappingSession& session, const RunFacts& facts,
-                   std::vector<std::string>& reasons) {
-  const MappingCounts& counts = session.counts();
-  if (counts.segments > 1) {
-    reasons.push_back(
-        fmt::format("the position was lost {} time(s), first at {} s; the map consists of {} "
-                    "pieces that do not fit together",
-                    counts.segments - 1, format_seconds(counts.first_lost), counts.segments));
+// Gathers reasons for one judgement.
+class Judge {
+ public:
+  Judge(const RunEvidence& evidence, const JudgementConfig& config)
+      : evidence_(evidence), config_(config) {}
+
+  RunJudgement judge() {
+    judge_ending();
+    judge_unheard_scans();
+    judge_unheard_sensors();
+    judge_damage();
+    judge_times();
+    judge_scan_motion();
+    judge_imu();
+    judge_scale();
+    judge_motion();
+    judge_matches();
+    judge_outages();
+    judge_stems();
+    return conclude();
   }
-  const EventOrderer::StreamReport& lidar = facts.time_repair.streams[EventOrderer::kLidar];
-  if (to_seconds(lidar.longest_gap) <= kLongestLidarGapS) return;
-  const TimeNs imu_gap = facts.time_repair.streams[EventOrderer::kImu].longest_gap;
-  const bool carried = session.odometry().uses_imu() && to_seconds(imu_gap) <= kLongestLidarGapS &&
-                       counts.segments == 1;
-  reasons.push_back(fmt::format(
-      "the lidar was silent for {:.1f} s before {} s; the way in between was {}, so the map before "
-      "and after may be offset",
-      to_seconds(lidar.longest_gap), format_seconds(lidar.after_longest_gap),
-      carried ? "told by the IMU alone" : "guessed"));
-}
+
+ private:
+  void missing(std::string reason) { missing_.push_back(std::move(reason)); }
+  void hurt(std::string reason) { hurt_.push_back(std::move(reason)); }
+
+  void judge_ending() {
+    if (evidence_.stopped) {
+      missing(
+          "stopped by the user before the end of the recording; go on with "
+          "`understory map --resume`");
+    }
+    if (evidence_.cut_off) {
+      missing("the recording is cut off; what came after is missing: " + evidence_.where_cut_off);
+    }
+  }
+
+  // Of all that the lidar sent, what never reached the map.
+  void judge_unheard_scans() {
+    const SensorEvidence& lidar = evidence_.lidar;
+    const std::uint64_t all = evidence_.dropped_scans + lidar.received + lidar.unreadable;
+    const std::uint64_t unheard =
+        evidence_.dropped_scans + lidar.unreadable + lidar.late + lidar.glitches;
+    if (share(unheard, all) <= config_.most_unheard_scans) return;
+    std::string parts;
+    const std::array<std::pair<std::uint64_t, const char*>, 4> kinds = {
+        {{evidence_.dropped_scans, "dropped because the machine could not keep up"},
+         {lidar.unreadable, "unreadable"},
+         {lidar.late, "too late to be put in order"},
+         {lidar.glitches, "with a stamp far off"}}};
+    for (const auto& [count, what] : kinds) {
+      if (count == 0) continue;
+      parts += fmt::format("{}{} {}", parts.empty() ? "" : ", ", count, what);
+    }
+    missing(fmt::format("{} of {} scans ({:.1f} %) are not in the map: {}", unheard, all,
+                        percent(unheard, all), parts));
+  }
+
+  void judge_unheard_sensors() {
+    const std::array<std::pair<const char*, const SensorEvidence*>, 3> sensors = {
+        {{"IMU", &evidence_.imu}, {"GNSS", &evidence_.gnss}, {"magnetometer", &evidence_.mag}}};
+    for (const auto& [name, sensor] : sensors) {
+      if (sensor->unheard_s <= config_.most_unheard_s) continue;
+      missing(fmt::format("the {} had no say for {:.1f} s: {}", name, sensor->unheard_s,
+                          sensor->unheard_why));
+    }
+  }
+
+  void judge_damage() {
+    if (evidence_.damaged_places > 0) {
+      hurt(fmt::format("the recording is damaged ({} place(s), the first: {})",
+                       evidence_.damaged_places, evidence_.first_damage));
+    }
+    if (evidence_.damaged_packets > evidence_.match.scans) {  // more than one a scan
+      hurt(fmt::format("{} packets of the lidar are damaged, the first: {}",
+                       evidence_.damaged_packets, evidence_.first_damaged_packet));
+    }
+  }
+
+  void judge_times() {
+    const MatchEvidence& match = evidence_.match;
+    if (evidence_.point_times_missing && match.smear_m > config_.most_smear_m) {
+      hurt(fmt::format("{}; the sensor moved so much that points 10 m away are smeared by {:.2f} m",
+                       evidence_.why_no_point_times, match.smear_m));
+    }
+    if (share(match.repeated, match.scans) > config_.most_repeated) {
+      hurt(
+          fmt::format("{} of {} scans hold the same points as the scan before: the driver or the "
+                      "recorder repeats scans, and the path stands still there or jumps",
+                      match.repeated, match.scans));
+    }
+  }
+
+  // What the times of the points say of the motion within a scan.
+  void judge_scan_motion() {
+    const MatchEvidence& match = evidence_.match;
+    if (match.scan_motion_probes < config_.least_scan_motion_probes) return;
+    const double ratio = match.scan_motion_ratio;
+    if (ratio >= config_.least_scan_motion && ratio <= config_.most_scan_motion) return;
+    const char* cause = "they are wrong";
+    if (ratio < -config_.least_scan_motion) {
+      cause = "they run backwards";
+    } else if (ratio < config_.least_scan_motion) {
+      cause = "they are too long, or the points have been deskewed already";
+    }
+    hurt(fmt::format(
+        "the times of points do not fit the motion: within scans the sensor moves {:.1f} "
+        "times as far as from scan to scan; {}",
+        ratio, cause));
+  }
+
+  void judge_scale() {
+    if (!evidence_.imu_distrust.empty()) return;  // then the IMU is no witness
+    if (evidence_.imu_motion_windows < config_.least_imu_windows ||
+        evidence_.imu_motion_spread_m_s2 < config_.least_imu_spread_m_s2) {
+      return;
+    }
+    const double scale = evidence_.imu_motion_scale;
+    if (scale >= config_.least_imu_scale && scale <= config_.most_imu_scale) return;
+    hurt(fmt::format(
+        "the path speeds up and slows down {:.1f} times as much as the accelerometer "
+        "tells of: the scale of the clouds (unit), the stamps of the scans, or the IMU's "
+        "unit, clock or lever arm is wrong",
+        scale));
+  }
+
+  void judge_motion() {
+    const MotionEvidence& motion = evidence_.motion;
+    if (share(motion.impossible, motion.steps) <= config_.most_impossible) return;
+    hurt(fmt::format(
+        "{} of {} steps from scan to scan ({:.1f} %) are motions that no carrier makes (up to "
+        "{:.0f} m/s and {:.0f} m/s^2){}",
+        motion.impossible, motion.steps, percent(motion.impossible, motion.steps),
+        motion.fastest_m_s, motion.hardest_m_s2,
+        evidence_.times_assumed
+            ? ": the times of the clouds were assumed and are wrong; give --rate-hz or times.txt"
+            : ": the stamps of the scans or the matches are wrong"));
+  }
+
+  void judge_matches() {
+    const MatchEvidence& match = evidence_.match;
+    if (share(match.unmatched, match.scans) > config_.most_unmatched) {
+      hurt(
+          fmt::format("{} of {} scans ({:.1f} %) could not be matched to the map; their poses "
+                      "are predictions",
+                      match.unmatched, match.scans, percent(match.unmatched, match.scans)));
+    }
+    if (share(match.empty, match.scans) > config_.most_empty) {
+      hurt(fmt::format("{} of {} scans had hardly any usable point", match.empty, match.scans));
+    }
+    if (match.segments > 1) {
+      hurt(
+          fmt::format("the position was lost {} time(s), first at {} s; the map consists of {} "
+                      "pieces that do not fit together",
+                      match.segments - 1, match.first_lost, match.segments));
+    }
+  }
+
+  void judge_outages() {
+    const SensorEvidence& lidar = evidence_.lidar;
+    if (evidence_.by_stems || lidar.longest_gap_s <= config_.longest_lidar_gap_s) return;
+    const bool carried = evidence_.imu_used &&
+                         evidence_.imu.longest_gap_s <= config_.longest_lidar_gap_s &&
+                         evidence_.match.segments == 1;
+    hurt(fmt::format(
+        "the lidar was silent for {:.1f} s before {} s; the way in between was {}, so the map "
+        "before and after may be offset",
+        lidar.longest_gap_s, lidar.after_longest_gap,
+        carried ? "told by the IMU alone" : "guessed"));
+  }
+
+  void judge_imu() {
+    if (!evidence_.imu_distrust.empty()) hurt(evidence_.imu_distrust);
+  }
+
+  void judge_stems() {
+    if (!evidence_.by_stems) return;
+    const StemRunEvidence& stems = evidence_.stems;
+    if (!stems.loops_solved) hurt("the loops were not solved: " + stems.loops_reason);
+    if (stems.trees == 0) {
+      hurt(fmt::format("no stem was seen often enough in {} views to be listed as a tree",
+                       stems.views));
+    }
+    if (stems.doubtful > 0) {
+      hurt(
+          fmt::format("{} of {} views found too few of the stems seen before: the path may be bent "
+                      "or broken there",
+                      stems.doubtful, stems.views));
+    }
+  }
+
+  RunJudgement conclude() {
+    RunJudgement judgement;
+    if (!missing_.empty()) judgement.status = RunStatus::kPartial;
+    if (!hurt_.empty()) judgement.status = RunStatus::kUntrusted;
+    judgement.reasons = std::move(missing_);
+    judgement.reasons.insert(judgement.reasons.end(), hurt_.begin(), hurt_.end());
+    return judgement;
+  }
+
+  const RunEvidence& evidence_;
+  const JudgementConfig& config_;
+  std::vector<std::string> missing_;
+  std::vector<std::string> hurt_;
+};
 
 }  // namespace
 
-RecordingDamage recording_damage(const Log& log, std::uint64_t scans) {
-  RecordingDamage damage;
-  for (const Log::Warning& warning : log.warnings()) {
-    if (warning.key == "recording.damaged") {
-      damage.hurt.push_back(fmt::format("the recording is damaged ({} place(s), the first: {})",
-                                        warning.count, warning.first_message));
-    } else if (warning.key == "recording.damaged_packet" &&
-               warning.count > scans) {  // more than one a scan
-      damage.hurt.push_back(fmt::format("{} packets of the lidar are damaged, the first: {}",
-                                        warning.count, warning.first_message));
-    } else if (warning.key == "recording.truncated") {
-      damage.missing.push_back("the recording is cut off; what came after is missing: " +
-                               warning.first_message);
-    }
-  }
-  return damage;
+void describe(ConfigTable& table, JudgementConfig& config) {
+  const ConfigTable::Range shares{0.0, 1.0};
+  const ConfigTable::Range seconds{0.0, 1e6};
+  table.add(
+      "most_unheard_scans", config.most_unheard_scans, shares, "",
+      "partial: a larger share of the scans was dropped, late, unreadable or far off in time");
+  table.add("most_unheard_s", config.most_unheard_s, seconds, "s",
+            "partial: another sensor had no say for longer");
+  table.add("most_unmatched", config.most_unmatched, shares, "",
+            "untrusted: a larger share of the scans could not be matched");
+  table.add("most_empty", config.most_empty, shares, "",
+            "untrusted: a larger share of the scans had hardly any usable point");
+  table.add("longest_lidar_gap_s", config.longest_lidar_gap_s, seconds, "s",
+            "untrusted: the lidar was silent for longer");
+  table.add("most_smear_m", config.most_smear_m, {0.0, 100.0}, "m",
+            "untrusted: points have no times and are smeared by more, 10 m away");
+  table.add("most_repeated", config.most_repeated, shares, "",
+            "untrusted: a larger share of the scans holds the same points as the scan before");
+  table.add("most_impossible", config.most_impossible, shares, "",
+            "untrusted: a larger share of the steps is a motion that no carrier makes");
+  const ConfigTable::Range ratios{-1e6, 1e6};
+  table.add(
+      "least_scan_motion", config.least_scan_motion, ratios, "",
+      "untrusted: within scans the sensor moves less than this share of the motion from scan to "
+      "scan");
+  table.add("most_scan_motion", config.most_scan_motion, ratios, "",
+            "the same: more than this share");
+  table.add("least_scan_motion_probes", config.least_scan_motion_probes, {1, 1000000}, "scans",
+            "fewer scans tell nothing of it");
+  table.add("least_imu_scale", config.least_imu_scale, ratios, "",
+            "untrusted: accelerations by matching are less than this share of the accelerometer's");
+  table.add("most_imu_scale", config.most_imu_scale, ratios, "", "the same: more than this share");
+  table.add("least_imu_windows", config.least_imu_windows, {1, 1000000}, "windows",
+            "fewer thirds of a second tell nothing of it");
+  table.add("least_imu_spread_m_s2", config.least_imu_spread_m_s2, {0.0, 100.0}, "m/s^2",
+            "nor do accelerations with a smaller standard deviation");
 }
 
 double smear_of(const Pose& step) {
   constexpr double kRangeM = 10.0;
   return step.translation().norm() + kRangeM * step.angle();
-}
-
-std::string smear_reason(const Log& log, double smear_m) {
-  if (smear_m <= kMostSmearM) return {};
-  for (const Log::Warning& warning : log.warnings()) {
-    if (warning.key != "recording.no_point_times") continue;
-    return fmt::format("{}; the sensor moved so much that points 10 m away are smeared by {:.2f} m",
-                       warning.first_message, smear_m);
-  }
-  return {};
 }
 
 std::string imu_refusal(const std::string& reason) {
@@ -91,33 +274,8 @@ std::string imu_refusal(const std::string& reason) {
          "its axes, units and clock";
 }
 
-RunJudgement judge_run(const MappingSession& session, const RunFacts& facts, double smear_m,
-                       const Log& log) {
-  RunJudgement judgement;
-  judge_scans(session.counts(), judgement.reasons);
-  judge_outages(session, facts, judgement.reasons);
-  const ImuTrust trust = session.odometry().motion().imu_trust();
-  if (!session.imu_refused().empty()) {
-    judgement.reasons.push_back(imu_refusal(session.imu_refused()));
-  } else if (!trust.trusted) {
-    judgement.reasons.push_back(trust.reason);
-  }
-  const RecordingDamage damage = recording_damage(log, session.counts().scans);
-  judgement.reasons.insert(judgement.reasons.end(), damage.hurt.begin(), damage.hurt.end());
-  if (const std::string reason = smear_reason(log, smear_m); !reason.empty())
-    judgement.reasons.push_back(reason);
-  std::vector<std::string> missing = damage.missing;
-  const bool cut = !missing.empty();
-  if (!judgement.reasons.empty()) judgement.status = RunStatus::kUntrusted;
-  if (cut && judgement.status == RunStatus::kComplete) judgement.status = RunStatus::kPartial;
-  if (facts.stopped) {
-    judgement.status = RunStatus::kPartial;
-    missing.insert(missing.begin(),
-                   "stopped by the user before the end of the recording; go on with "
-                   "`understory map --resume`");
-  }
-  judgement.reasons.insert(judgement.reasons.begin(), missing.begin(), missing.end());
-  return judgement;
+RunJudgement judge_run(const RunEvidence& evidence, const JudgementConfig& config) {
+  return Judge(evidence, config).judge();
 }
 
 }  // namespace understory

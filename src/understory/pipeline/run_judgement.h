@@ -3,39 +3,54 @@
 #include <string>
 #include <vector>
 
+#include "understory/geometry/pose.h"
 #include "understory/output/run_summary.h"
-#include "understory/pipeline/mapping_session.h"
-#include "understory/pipeline/run_writer.h"
+#include "understory/pipeline/run_evidence.h"
+#include "understory/util/config.h"
 
 namespace understory {
 
+// Above these a run is not `complete`. How each was found: docs/troubleshooting.md, the limits;
+// `./run accuracy --spoilt --fit` shows what good and wrong maps have of each number.
+struct JudgementConfig {
+  // Partial: what had no say.
+  double most_unheard_scans = 0.01;  // share of the scans
+  double most_unheard_s = 1.0;       // of any other sensor
+  // Untrusted. A prediction bridges a scan or two without harm; beyond these shares the map has
+  // weak places.
+  double most_unmatched = 0.02;
+  double most_empty = 0.10;
+  double longest_lidar_gap_s = 1.0;
+  double most_smear_m = 0.05;
+  double most_repeated = 0.01;    // share of the scans; no lidar sees the same twice
+  double most_impossible = 0.01;  // share of the steps, see MotionLimits
+  // Motion within scans over motion between them, see ScanMotion: 1 is right.
+  double least_scan_motion = 0.4;
+  double most_scan_motion = 1.8;
+  int least_scan_motion_probes = 6;  // fewer tell nothing
+  // Acceleration by matching over that by the accelerometer, see MotionScale: 1 is right.
+  double least_imu_scale = 0.6;
+  double most_imu_scale = 1.6;
+  int least_imu_windows = 60;          // fewer tell nothing, nor does
+  double least_imu_spread_m_s2 = 0.2;  // an even motion
+};
+void describe(ConfigTable& table, JudgementConfig& config);
+
 struct RunJudgement {
   RunStatus status = RunStatus::kComplete;
-  std::vector<std::string> reasons;
+  std::vector<std::string> reasons;  // for the user, the cause first; empty if complete
 };
 
-// Damage of a recording that takes data away (`missing`) or makes it unreliable (`hurt`), not what
-// was merely mended, in words for the user. `scans`: of the recording.
-struct RecordingDamage {
-  std::vector<std::string> hurt;
-  std::vector<std::string> missing;
-};
-[[nodiscard]] RecordingDamage recording_damage(const Log& log, std::uint64_t scans);
+// Whether the result of a run is to be trusted, and if not why: a pure function of numbers, for
+// both front ends. Partial: some of the recording had no say (the run was stopped, the recording is
+// cut off, scans were dropped, a sensor was not used). Untrusted, whatever is missing: something
+// hurt the result.
+[[nodiscard]] RunJudgement judge_run(const RunEvidence& evidence, const JudgementConfig& config);
 
 // How far a point 10 m away moves against the sensor on that step from scan to scan, metres.
 [[nodiscard]] double smear_of(const Pose& step);
-// What is to be said where scans had no time per point and moved by `smear_m` on average; empty if
-// that is little, or they had. Folders of clouds are taken to be deskewed and are not warned of.
-[[nodiscard]] std::string smear_reason(const Log& log, double smear_m);
 
 // What is said of a run that was made without its IMU, for that reason.
 [[nodiscard]] std::string imu_refusal(const std::string& reason);
-
-// Whether the result of a run is to be trusted, and if not why, in words for the user. Partial: the
-// run was stopped, or the recording is cut off. Untrusted: something hurt the result (lost scans,
-// an IMU that contradicts the lidar, an outage bridged by prediction, scans blurred by motion).
-// `smear_m`: how far a point 10 m away moves against the sensor during a scan, on average.
-[[nodiscard]] RunJudgement judge_run(const MappingSession& session, const RunFacts& facts,
-                                     double smear_m, const Log& log);
 
 }  // namespace understory

@@ -12,9 +12,11 @@
 #include "understory/output/map_picture.h"
 #include "understory/output/report.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/evidence_gathering.h"
 #include "understory/pipeline/finished_map.h"
 #include "understory/pipeline/finished_trajectory.h"
 #include "understory/pipeline/lidar_view.h"
+#include "understory/pipeline/path_evidence.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_judgement.h"
 #include "understory/pipeline/run_truth.h"
@@ -33,7 +35,9 @@ struct TrajectoryFacts {
   double length_m = 0.0;
   double duration_s = 0.0;
   double period_ms = 0.0;  // median time between scans
-  double smear_m = 0.0;    // mean motion of a point 10 m away during a scan
+  MotionEvidence motion;
+  double smear_m = 0.0;      // mean motion of a point 10 m away during a scan
+  double inliers_low = 0.0;  // share that nine of ten matched scans exceed
   double inlier_ratio_mean = 0.0;
   double fitness_rms_m = 0.0;
   std::uint64_t weak = 0;
@@ -62,14 +66,15 @@ double median_period_ms(const std::vector<ReportScan>& scans) {
 }
 
 // trajectory.tum and states.csv.gz.
-TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
-                                 const MappingSession& session) {
+TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const MappingSession& session,
+                                 const MotionLimits& limits) {
   TumWriter trajectory(folder / "trajectory.tum");
   StatesWriter states(folder / "states.csv.gz");
   TrajectoryFacts facts;
   double inliers = 0.0;
   double squares = 0.0;
-  std::uint64_t matched = 0;
+  std::vector<float> inlier_ratios;
+  PathEvidence path(limits);
   Pose last;
   for_each_finished_scan(
       session.journal(), session.map().keyframes(), [&](const FinishedScan& scan) {
@@ -79,6 +84,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
                     Eigen::Vector3d::Map(record.gyro_bias.data()),
                     Eigen::Vector3d::Map(record.accel_bias.data()), record.pose_covariance()});
         facts.scans.push_back(report_scan(scan));
+        path.add({record.stamp, scan.world_from_body});
         facts.cpu_ms.push_back(record.cpu_ms);
         facts.wall_ms.push_back(record.wall_ms);
         const Pose step = last.inverse() * scan.world_from_body;
@@ -88,7 +94,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
         }
         last = scan.world_from_body;
         if (record.iterations > 0) {
-          ++matched;
+          inlier_ratios.push_back(record.inlier_ratio);
           inliers += static_cast<double>(record.inlier_ratio);
           squares += static_cast<double>(record.fitness_m2);
         }
@@ -96,10 +102,15 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
       });
   trajectory.commit();
   states.commit();
-  if (matched > 0) {
-    facts.inlier_ratio_mean = inliers / static_cast<double>(matched);
-    facts.fitness_rms_m = std::sqrt(squares / static_cast<double>(matched));
+  if (!inlier_ratios.empty()) {
+    const auto matched = static_cast<double>(inlier_ratios.size());
+    facts.inlier_ratio_mean = inliers / matched;
+    facts.fitness_rms_m = std::sqrt(squares / matched);
+    const auto low = inlier_ratios.begin() + static_cast<std::ptrdiff_t>(inlier_ratios.size() / 10);
+    std::nth_element(inlier_ratios.begin(), low, inlier_ratios.end());
+    facts.inliers_low = static_cast<double>(*low);
   }
+  facts.motion = path.evidence();
   if (facts.scans.size() > 1) facts.smear_m /= static_cast<double>(facts.scans.size() - 1);
   facts.period_ms = median_period_ms(facts.scans);
   facts.duration_s = to_seconds(facts.scans.back().stamp - facts.scans.front().stamp);
@@ -266,8 +277,22 @@ void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const 
   add_latency(distribution_of(facts.latencies_ms), summary);
 }
 
+RunEvidence evidence_of(const MappingSession& session, const RunFacts& facts,
+                        const Recording& source, const TrajectoryFacts& trajectory,
+                        const Log& log) {
+  RunEvidence evidence;
+  gather_dense(session, facts, source, log, evidence);
+  evidence.motion = trajectory.motion;
+  evidence.match.inliers_mean = trajectory.inlier_ratio_mean;
+  evidence.match.inliers_low = trajectory.inliers_low;
+  evidence.match.fitness_rms_m = trajectory.fitness_rms_m;
+  evidence.match.smear_m = trajectory.smear_m;
+  return evidence;
+}
+
 RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
-                         const RunFacts& facts, const TrajectoryFacts& trajectory, Log& log) {
+                         const RunFacts& facts, const TrajectoryFacts& trajectory,
+                         const RunEvidence& evidence, Log& log) {
   RunSummary summary;
   summary.command = "map";
   summary.version = kVersion;
@@ -279,9 +304,10 @@ RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
   summary.scans = session.counts().scans;
   summary.poses = session.journal().size();
   summary.recording_s = trajectory.duration_s;
-  const RunJudgement judgement = judge_run(session, facts, trajectory.smear_m, log);
+  const RunJudgement judgement = judge_run(evidence, request.config.judgement);
   summary.status = judgement.status;
   summary.reasons = judgement.reasons;
+  summary.evidence = figures_of(evidence);
   fill_counts(summary, session, facts);
   fill_quality(summary, trajectory, facts);
   summary.quality["loop_search_cpu_s"] = session.map().search_cpu_seconds();
@@ -312,12 +338,14 @@ MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
                          Log& log, const ProgressSink& progress) {
   const std::filesystem::path folder = place.begin_results();
   StageTimes& times = session.times();
-  const TrajectoryFacts trajectory = write_trajectory(folder, session);
+  const TrajectoryFacts trajectory =
+      write_trajectory(folder, session, request.config.motion_limits);
   write_graph(folder, session.map());
   write_fixes(folder, session.fixes());
   InventoryResult inventory;
   MapPicture picture;
-  RunSummary summary = summarise_run(request, session, facts, trajectory, log);
+  RunSummary summary = summarise_run(request, session, facts, trajectory,
+                                     evidence_of(session, facts, source, trajectory, log), log);
   const std::optional<ReportTruth> truth = compare_with_truth(folder, source);
   if (truth) {
     summary.quality["ape_rmse_m"] = truth->ape_rmse_m;

@@ -104,6 +104,11 @@ class SparseRun {
     scans.positioned = session_->positioned();
     scans.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     scans.stopped = stopped;
+    scans.time_repair = orderer_->report();
+    scans.last_scan_end = session_->last_scan_end();
+    scans.repeated = session_->repeated();
+    scans.imu_without_place = session_->imu_without_place();
+    scans.imu_wanted = request_.config.front_end.imu.use;
     const std::string& refused = session_->imu_refused();
     scans.imu_distrust = refused.empty() ? session_->imu_trust().reason : imu_refusal(refused);
     scans.fixes = std::move(session_->fixes());

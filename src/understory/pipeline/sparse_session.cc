@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/pipeline/scan_content.h"
 #include "understory/util/timing.h"
 
 namespace understory {
@@ -40,6 +41,9 @@ void SparseSession::on_sample(const ImuSample& sample, const Rig& rig) {
 void SparseSession::on_scan(const ScanPtr& scan, const Rig& rig) {
   const ScopedTimer timer(times_, "scan");
   ++scans_;
+  const std::uint64_t content = content_of(*scan);
+  repeated_ += content == last_content_ ? 1 : 0;
+  last_content_ = content;
   last_scan_end_ = scan->end();
   waiting_ends_.push_back(last_scan_end_);
   record(pacer_.add(scan, rig));
@@ -100,6 +104,8 @@ void SparseSession::save(BinaryWriter& writer) const {
   writer.put(imu_refused_);
   writer.put(imu_without_place_);
   put_optional(writer, last_imu_, [](BinaryWriter& out, TimeNs time) { out.put(time); });
+  writer.put(repeated_);
+  writer.put(last_content_);
   pacer_.save(writer);
 }
 
@@ -114,6 +120,8 @@ void SparseSession::load(BinaryReader& reader, const Rig& /*rig*/) {
   if (!refused.empty()) refuse_imu(refused);
   imu_without_place_ = reader.get<TimeNs>();
   last_imu_ = get_optional(reader, [](BinaryReader& in) { return in.get<TimeNs>(); });
+  repeated_ = reader.get<std::uint64_t>();
+  last_content_ = reader.get<std::uint64_t>();
   pacer_.load(reader);
 }
 

@@ -41,6 +41,8 @@ class SparseSession : public Resumable, private ViewSink {
   // Called with the end of each scan that has got its pose.
   void on_settled(std::function<void(TimeNs)> tell) { tell_settled_ = std::move(tell); }
   [[nodiscard]] std::size_t scans() const { return scans_; }  // of which the last may still wait
+  // Of these, how many held the same points as the one before.
+  [[nodiscard]] std::uint64_t repeated() const { return repeated_; }
   [[nodiscard]] std::size_t positioned() const { return positioned_; }
   [[nodiscard]] std::size_t last_stems() const { return last_stems_; }
   [[nodiscard]] std::vector<StampedPose>& path() { return path_; }   // of every scan
@@ -75,6 +77,8 @@ class SparseSession : public Resumable, private ViewSink {
   TimeNs imu_without_place_ = 0;
   std::optional<TimeNs> last_imu_;
   std::size_t scans_ = 0;
+  std::uint64_t repeated_ = 0;
+  std::uint64_t last_content_ = 0;
   std::size_t positioned_ = 0;
   std::size_t last_stems_ = 0;
   std::vector<StampedPose> path_;

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "understory/output/run_summary.h"
+
+namespace understory {
+
+// What one sensor of the recording said, and what of it was heard.
+struct SensorEvidence {
+  std::uint64_t received = 0;     // messages that could be decoded
+  std::uint64_t unreadable = 0;   // messages that could not
+  std::uint64_t late = 0;         // too late to be put in order, dropped
+  std::uint64_t glitches = 0;     // stamps far off, dropped
+  std::uint64_t duplicates = 0;   // the same stamp again, dropped
+  std::uint64_t reordered = 0;    // put in order
+  std::uint64_t clock_jumps = 0;  // stamps shifted from there on
+  double longest_gap_s = 0.0;
+  std::string after_longest_gap;  // stamp of the message that ended it, seconds
+  // How long the sensor had no say although it belongs to the recording: it began late, stopped,
+  // was silent, or was not used; and why, in words.
+  double unheard_s = 0.0;
+  std::string unheard_why;
+};
+
+// How the carrier moved by the finished path.
+struct MotionEvidence {
+  std::uint64_t steps = 0;  // from scan to scan
+  double speed_p99_m_s = 0.0;
+  double acceleration_p99_m_s2 = 0.0;
+  double turn_rate_p99_deg_s = 0.0;
+  double fastest_m_s = 0.0;
+  double hardest_m_s2 = 0.0;
+  // Steps beyond what any carrier does, see JudgementConfig.
+  std::uint64_t impossible = 0;
+};
+
+// How scans fitted the map.
+struct MatchEvidence {
+  std::uint64_t scans = 0;      // that reached the front end
+  std::uint64_t unmatched = 0;  // without a usable match, or dropped by the velocity gate
+  std::uint64_t empty = 0;      // hardly any usable point
+  std::uint64_t repeated = 0;   // hold the same points as the scan before
+  std::uint64_t segments = 1;   // pieces of map that hang together by predictions only
+  std::string first_lost;       // stamp of the first scan of the second piece, seconds
+  double inliers_mean = 0.0;    // share of a scan's points near the map, 0 to 1
+  double inliers_low = 0.0;     // the same of the tenth of the scans that have least
+  double fitness_rms_m = 0.0;   // distance of matched points from what they matched
+  // Motion within scans over motion between them, and on how many scans that rests; see ScanMotion.
+  double scan_motion_ratio = 0.0;
+  int scan_motion_probes = 0;
+  double smear_m = 0.0;  // how far a point 10 m away moves during a scan, on average
+};
+
+// By stems: how views fitted each other. All zero for the dense front end.
+struct StemRunEvidence {
+  std::uint64_t views = 0;
+  std::uint64_t doubtful = 0;  // views that found too few of the stems before, and no loop bridges
+  std::uint64_t trees = 0;
+  bool loops_solved = true;
+  std::string loops_reason;
+};
+
+// Everything that the judgement of a run rests on: numbers, and words only to say where. Filled by
+// evidence_gathering.h, judged by run_judgement.h, written to run.json as `evidence`.
+struct RunEvidence {
+  bool by_stems = false;            // which front end
+  bool stopped = false;             // by the user
+  std::uint64_t dropped_scans = 0;  // --realtime: the machine could not keep up
+  SensorEvidence lidar;
+  SensorEvidence imu;
+  SensorEvidence gnss;
+  SensorEvidence mag;
+  std::uint64_t damaged_places = 0;  // of the recording's files
+  std::string first_damage;
+  std::uint64_t damaged_packets = 0;
+  std::string first_damaged_packet;
+  bool cut_off = false;  // the recording ends in the middle of something
+  std::string where_cut_off;
+  bool times_assumed = false;        // nothing tells when the clouds of a folder were taken
+  bool point_times_missing = false;  // of a lidar that spins
+  std::string why_no_point_times;
+  bool imu_used = false;  // at the end
+  // Acceleration by matching over that by the accelerometer, how well they go together, and how
+  // much there was to compare; see MotionScale.
+  double imu_motion_scale = 0.0;
+  double imu_motion_correlation = 0.0;
+  double imu_motion_spread_m_s2 = 0.0;
+  int imu_motion_windows = 0;
+  std::string imu_distrust;  // why the IMU is not believed; empty: it is, or is none
+  MotionEvidence motion;
+  MatchEvidence match;
+  StemRunEvidence stems;
+};
+
+// For run.json: the numbers by name, sensors before their figures ("lidar_late").
+[[nodiscard]] std::map<std::string, Figure> figures_of(const RunEvidence& evidence);
+
+}  // namespace understory

@@ -1,0 +1,215 @@
+#include "understory/pipeline/run_judgement.h"
+
+#include <gtest/gtest.h>
+
+namespace understory {
+namespace {
+
+// A run of 1,000 scans in which nothing was wrong.
+RunEvidence good_run() {
+  RunEvidence evidence;
+  evidence.lidar.received = 1000;
+  evidence.imu.received = 20'000;
+  evidence.imu_used = true;
+  evidence.match.scans = 1000;
+  evidence.motion.steps = 999;
+  evidence.imu_motion_scale = 1.0;
+  evidence.imu_motion_windows = 300;
+  evidence.imu_motion_spread_m_s2 = 1.0;
+  evidence.match.scan_motion_ratio = 1.0;
+  evidence.match.scan_motion_probes = 40;
+  return evidence;
+}
+
+RunJudgement judged(const RunEvidence& evidence) {
+  return judge_run(evidence, JudgementConfig());
+}
+
+void expect_complete(const RunEvidence& evidence) {
+  const RunJudgement judgement = judged(evidence);
+  EXPECT_EQ(judgement.status, RunStatus::kComplete);
+  EXPECT_TRUE(judgement.reasons.empty()) << judgement.reasons.front();
+}
+
+// One reason, which says this.
+void expect(RunStatus status, const std::string& words, const RunEvidence& evidence) {
+  const RunJudgement judgement = judged(evidence);
+  EXPECT_EQ(judgement.status, status) << words;
+  ASSERT_EQ(judgement.reasons.size(), 1U) << words;
+  EXPECT_NE(judgement.reasons.front().find(words), std::string::npos) << judgement.reasons.front();
+}
+
+TEST(RunJudgement, AGoodRunIsComplete) {
+  expect_complete(good_run());
+  RunEvidence mended = good_run();
+  mended.lidar.duplicates = 500;
+  mended.lidar.reordered = 500;
+  mended.lidar.clock_jumps = 3;
+  mended.times_assumed = true;
+  expect_complete(mended);
+}
+
+TEST(RunJudgement, ScansWithoutASay) {
+  const auto with = [](std::uint64_t dropped, std::uint64_t late, std::uint64_t unreadable,
+                       std::uint64_t glitches) {
+    RunEvidence evidence = good_run();
+    evidence.dropped_scans = dropped;
+    evidence.lidar.late = late;
+    evidence.lidar.unreadable = unreadable;
+    evidence.lidar.glitches = glitches;
+    return evidence;
+  };
+  expect_complete(with(10, 0, 0, 0));
+  expect(RunStatus::kPartial, "11 dropped because the machine could not keep up",
+         with(11, 0, 0, 0));
+  expect_complete(with(0, 10, 0, 0));
+  expect(RunStatus::kPartial, "11 too late", with(0, 11, 0, 0));
+  expect(RunStatus::kPartial, "11 unreadable", with(0, 0, 11, 0));
+  expect(RunStatus::kPartial, "11 with a stamp far off", with(0, 0, 0, 11));
+  expect_complete(with(3, 3, 2, 2));
+  expect(RunStatus::kPartial, "12 of 1006 scans (1.2 %) are not in the map", with(3, 3, 3, 3));
+}
+
+TEST(RunJudgement, SensorsWithoutASay) {
+  for (SensorEvidence RunEvidence::*sensor :
+       {&RunEvidence::imu, &RunEvidence::gnss, &RunEvidence::mag}) {
+    RunEvidence evidence = good_run();
+    (evidence.*sensor).unheard_s = 1.0;
+    (evidence.*sensor).unheard_why = "it stops";
+    expect_complete(evidence);
+    (evidence.*sensor).unheard_s = 1.1;
+    expect(RunStatus::kPartial, "had no say for 1.1 s: it stops", evidence);
+  }
+}
+
+TEST(RunJudgement, WhatIsMissingIsPartialAndWhatIsWrongIsUntrusted) {
+  RunEvidence evidence = good_run();
+  evidence.stopped = true;
+  expect(RunStatus::kPartial, "understory map --resume", evidence);
+  evidence.match.unmatched = 100;
+  EXPECT_EQ(judged(evidence).status, RunStatus::kUntrusted);
+  EXPECT_EQ(judged(evidence).reasons.size(), 2U);
+  RunEvidence cut = good_run();
+  cut.cut_off = true;
+  cut.where_cut_off = "at byte 17";
+  expect(RunStatus::kPartial, "at byte 17", cut);
+}
+
+TEST(RunJudgement, Damage) {
+  RunEvidence evidence = good_run();
+  evidence.damaged_packets = 1000;  // one a scan
+  expect_complete(evidence);
+  evidence.damaged_packets = 1001;
+  expect(RunStatus::kUntrusted, "packets of the lidar are damaged", evidence);
+  RunEvidence places = good_run();
+  places.damaged_places = 1;
+  places.first_damage = "a chunk at byte 5";
+  expect(RunStatus::kUntrusted, "a chunk at byte 5", places);
+}
+
+TEST(RunJudgement, Matches) {
+  RunEvidence evidence = good_run();
+  evidence.match.unmatched = 20;
+  expect_complete(evidence);
+  evidence.match.unmatched = 21;
+  expect(RunStatus::kUntrusted, "21 of 1000 scans (2.1 %) could not be matched", evidence);
+  RunEvidence empty = good_run();
+  empty.match.empty = 100;
+  expect_complete(empty);
+  empty.match.empty = 101;
+  expect(RunStatus::kUntrusted, "hardly any usable point", empty);
+  RunEvidence pieces = good_run();
+  pieces.match.segments = 2;
+  pieces.match.first_lost = "17.5";
+  expect(RunStatus::kUntrusted, "lost 1 time(s), first at 17.5 s", pieces);
+}
+
+TEST(RunJudgement, RepeatedScans) {
+  RunEvidence evidence = good_run();
+  evidence.match.repeated = 10;
+  expect_complete(evidence);
+  evidence.match.repeated = 11;
+  expect(RunStatus::kUntrusted, "hold the same points as the scan before", evidence);
+}
+
+TEST(RunJudgement, MotionsThatNoCarrierMakes) {
+  RunEvidence evidence = good_run();
+  evidence.motion.impossible = 9;
+  expect_complete(evidence);
+  evidence.motion.impossible = 10;
+  expect(RunStatus::kUntrusted, "stamps of the scans or the matches are wrong", evidence);
+  evidence.times_assumed = true;
+  expect(RunStatus::kUntrusted, "times of the clouds were assumed", evidence);
+}
+
+TEST(RunJudgement, TimesOfPoints) {
+  RunEvidence missing = good_run();
+  missing.point_times_missing = true;
+  missing.why_no_point_times = "no time per point";
+  missing.match.smear_m = 0.05;
+  expect_complete(missing);
+  missing.match.smear_m = 0.06;
+  expect(RunStatus::kUntrusted, "smeared by 0.06 m", missing);
+  RunEvidence evidence = good_run();
+  const JudgementConfig limits;
+  for (const auto& [ratio, words] : {std::pair{-1.0, "backwards"},
+                                     {0.1, "too long"},
+                                     {limits.most_scan_motion + 0.1, "wrong"}}) {
+    evidence.match.scan_motion_ratio = ratio;
+    evidence.match.scan_motion_probes = limits.least_scan_motion_probes;
+    expect(RunStatus::kUntrusted, words, evidence);
+    evidence.match.scan_motion_probes = limits.least_scan_motion_probes - 1;
+    expect_complete(evidence);
+  }
+  evidence.match.scan_motion_probes = 100;
+  evidence.match.scan_motion_ratio = limits.least_scan_motion;
+  expect_complete(evidence);
+  evidence.match.scan_motion_ratio = limits.most_scan_motion;
+  expect_complete(evidence);
+}
+
+TEST(RunJudgement, AccelerationsOfTheImu) {
+  const JudgementConfig limits;
+  RunEvidence evidence = good_run();
+  for (const double scale : {limits.least_imu_scale - 0.01, limits.most_imu_scale + 0.01}) {
+    evidence.imu_motion_scale = scale;
+    expect(RunStatus::kUntrusted, "times as much as the accelerometer tells of", evidence);
+  }
+  evidence.imu_motion_spread_m_s2 = limits.least_imu_spread_m_s2 - 0.01;
+  expect_complete(evidence);
+  evidence.imu_motion_spread_m_s2 = 1.0;
+  evidence.imu_motion_windows = limits.least_imu_windows - 1;
+  expect_complete(evidence);
+  evidence.imu_distrust = "its axes look swapped";
+  expect(RunStatus::kUntrusted, "axes look swapped", evidence);
+}
+
+TEST(RunJudgement, SilenceOfTheLidar) {
+  RunEvidence evidence = good_run();
+  evidence.lidar.longest_gap_s = 1.0;
+  expect_complete(evidence);
+  evidence.lidar.longest_gap_s = 1.1;
+  expect(RunStatus::kUntrusted, "told by the IMU alone", evidence);
+  evidence.imu.longest_gap_s = 1.1;
+  expect(RunStatus::kUntrusted, "guessed", evidence);
+  evidence.by_stems = true;  // there a step that finds too few stems is judged
+  evidence.stems.trees = 1;
+  expect_complete(evidence);
+}
+
+TEST(RunJudgement, Stems) {
+  RunEvidence evidence = good_run();
+  evidence.by_stems = true;
+  expect(RunStatus::kUntrusted, "listed as a tree", evidence);
+  evidence.stems.trees = 5;
+  expect_complete(evidence);
+  evidence.stems.doubtful = 1;
+  expect(RunStatus::kUntrusted, "too few of the stems", evidence);
+  evidence.stems.doubtful = 0;
+  evidence.stems.loops_solved = false;
+  evidence.stems.loops_reason = "no end";
+  expect(RunStatus::kUntrusted, "no end", evidence);
+}
+
+}  // namespace
+}  // namespace understory
