@@ -45,21 +45,53 @@ std::vector<StampedVelocity> velocities_beside(const std::string& given, Log& lo
   return {};
 }
 
+Json motion_json(const Pose& truth_from_estimate) {
+  const Eigen::Vector3d& t = truth_from_estimate.translation();
+  return {{"translation_m", {t.x(), t.y(), t.z()}},
+          {"yaw_deg", yaw_deg(truth_from_estimate)},
+          {"rotation_deg", truth_from_estimate.angle() * 180.0 / M_PI}};
+}
+
+// Figures that the positions do not determine, and why.
+std::vector<std::string> notes_on(const TrajectoryErrors& errors) {
+  std::vector<std::string> notes;
+  if (!errors.alignment_determined)
+    notes.push_back(fmt::format(
+        "the rotation of the {} alignment is not determined: the positions lie in one place or "
+        "nearly on a line{}; rotation errors and velocities after it would mean nothing",
+        to_string(errors.alignment),
+        std::isfinite(errors.alignment_sd_deg)
+            ? fmt::format(" (it is off by some {:.1f} deg)", errors.alignment_sd_deg)
+            : ""));
+  if (!errors.scale_percent)
+    notes.emplace_back("the scale is not determined: a path stays within decimetres");
+  return notes;
+}
+
+// Null where a figure is not determined.
 Json to_json(const TrajectoryErrors& errors, const std::optional<Eigen::Vector3d>& velocity) {
   Json json;
   json["pairs"] = errors.pairs;
   json["alignment"] = to_string(errors.alignment);
+  json["alignment_found"] = nullptr;
+  if (errors.alignment != Alignment::kNone) {
+    json["alignment_found"] = motion_json(errors.truth_from_estimate);
+    json["alignment_found"]["rotation_sd_deg"] = errors.alignment_sd_deg;
+    json["alignment_found"]["determined"] = errors.alignment_determined;
+  }
   json["length_m"] = errors.length_m;
   json["ape_rmse_m"] = errors.ape_rmse_m;
   json["ape_plane_rmse_m"] = errors.ape_plane_rmse_m;
   json["ape_mean_m"] = errors.ape_mean_m;
   json["ape_median_m"] = errors.ape_median_m;
   json["ape_max_m"] = errors.ape_max_m;
-  json["ape_rotation_rmse_deg"] = errors.ape_rotation_rmse_deg;
+  json["ape_rotation_rmse_deg"] = nullptr;
+  if (errors.alignment_determined) json["ape_rotation_rmse_deg"] = errors.ape_rotation_rmse_deg;
   json["drift_end_m"] = errors.drift_end_m;
   json["drift_plane_m"] = errors.drift_plane_m;
   json["drift_percent"] = errors.drift_percent;
-  json["scale_percent"] = errors.scale_percent;
+  json["scale_percent"] = nullptr;
+  if (errors.scale_percent) json["scale_percent"] = *errors.scale_percent;
   json["rpe"] = Json::array();
   for (const RelativeError& rpe : errors.rpe) {
     json["rpe"].push_back({{"delta_m", rpe.delta_m},
@@ -76,26 +108,12 @@ Json to_json(const TrajectoryErrors& errors, const std::optional<Eigen::Vector3d
   }
   json["velocity_rmse_m_s"] = nullptr;
   if (velocity) json["velocity_rmse_m_s"] = {velocity->x(), velocity->y(), velocity->z()};
+  json["notes"] = notes_on(errors);
   return json;
 }
 
-std::string to_text(const TrajectoryErrors& e, const std::optional<Eigen::Vector3d>& velocity,
-                    double tolerance_s) {
-  std::string text = fmt::format(
-      "alignment           {}{}\npairs               {} within {} s, {:.1f} % of the truth's time\n"
-      "length of truth     {:.3f} m\n"
-      "APE                 rmse {:.4f} m, in the plane {:.4f} m, mean {:.4f} m, median {:.4f} m, "
-      "max "
-      "{:.4f} m, rotation rmse {:.4f} deg\n"
-      "drift at the end    {:.4f} m = {:.4f} % (first pose aligned; x {:+.4f}, y {:+.4f}, z "
-      "{:+.4f} "
-      "m; in the plane {:.4f} m)\n"
-      "scale of the path   {:+.4f} %\n",
-      to_string(e.alignment), e.alignment == Alignment::kNone ? " (positions as they are)" : "",
-      e.pairs, tolerance_s, 100.0 * e.covered, e.length_m, e.ape_rmse_m, e.ape_plane_rmse_m,
-      e.ape_mean_m, e.ape_median_m, e.ape_max_m, e.ape_rotation_rmse_deg, e.drift_end_m,
-      e.drift_percent, e.drift_end.x(), e.drift_end.y(), e.drift_end.z(), e.drift_plane_m,
-      e.scale_percent);
+std::string steps_text(const TrajectoryErrors& e) {
+  std::string text;
   for (const RelativeError& rpe : e.rpe) {
     text += rpe.pairs == 0
                 ? fmt::format("RPE over {:g} m       no pair: the estimate's path is shorter\n",
@@ -113,9 +131,36 @@ std::string to_text(const TrajectoryErrors& e, const std::optional<Eigen::Vector
         s.length_m, s.translation_percent, s.translation_plane_percent, s.rotation_deg_per_m,
         s.segments);
   }
+  return text;
+}
+
+std::string to_text(const TrajectoryErrors& e, const std::optional<Eigen::Vector3d>& velocity,
+                    double tolerance_s) {
+  std::string text = fmt::format(
+      "alignment           {}\npairs               {} within {} s, {:.1f} % of the truth's time\n"
+      "length of truth     {:.3f} m\n"
+      "APE                 rmse {:.4f} m, in the plane {:.4f} m, mean {:.4f} m, median {:.4f} m, "
+      "max {:.4f} m, rotation {}\n"
+      "drift at the end    {:.4f} m{} (first pose aligned; x {:+.4f}, y {:+.4f}, z {:+.4f} m; in "
+      "the plane {:.4f} m)\n"
+      "scale of the path   {}\n",
+      e.alignment == Alignment::kNone
+          ? "none (positions as they are)"
+          : to_string(e.alignment) + ": moved by " + motion_text(e.truth_from_estimate),
+      e.pairs, tolerance_s, 100.0 * e.covered, e.length_m, e.ape_rmse_m, e.ape_plane_rmse_m,
+      e.ape_mean_m, e.ape_median_m, e.ape_max_m,
+      e.alignment_determined ? fmt::format("rmse {:.4f} deg", e.ape_rotation_rmse_deg)
+                             : "not determined",
+      e.drift_end_m,
+      std::isfinite(e.drift_percent) ? fmt::format(" = {:.4f} %", e.drift_percent) : "",
+      e.drift_end.x(), e.drift_end.y(), e.drift_end.z(), e.drift_plane_m,
+      e.scale_percent ? fmt::format("{:+.4f} %", *e.scale_percent) : "not determined");
+  text += steps_text(e);
   text += velocity ? fmt::format("velocity            rmse x {:.4f}, y {:.4f}, z {:.4f} m/s\n",
                                  velocity->x(), velocity->y(), velocity->z())
-                   : "velocity            not compared: both folders need velocities\n";
+          : e.alignment_determined
+              ? "velocity            not compared: both folders need velocities\n"
+              : "velocity            not compared: the alignment is not determined\n";
   return text;
 }
 
@@ -125,17 +170,16 @@ void warn_of_doubts(const TrajectoryErrors& errors, Log& log) {
              fmt::format("only {:.1f} % of the truth's time is covered by the estimate",
                          100.0 * errors.covered));
   }
-  if (!errors.alignment_determined) {
-    log.warn("evaluate.alignment", "the positions do not fix the " + to_string(errors.alignment) +
-                                       " alignment (they lie in one place or on a line); rotation "
-                                       "errors mean nothing");
-  }
+  for (const std::string& note : notes_on(errors))
+    log.warn("evaluate.alignment", note);
 }
 
 Json to_json(const PrismErrors& errors) {
   Json json;
   json["pairs"] = errors.pairs;
-  json["alignment"] = to_string(errors.alignment);
+  json["alignment_found"] = nullptr;
+  if (errors.alignment != Alignment::kNone)
+    json["alignment_found"] = motion_json(errors.truth_from_estimate);
   json["ape_rmse_m"] = errors.ape_rmse_m;
   json["ape_plane_rmse_m"] = errors.ape_plane_rmse_m;
   json["ape_mean_m"] = errors.ape_mean_m;
@@ -170,9 +214,12 @@ int evaluate_places(const EvaluateOptions& options, CommandContext& context) {
                 "alignment           {}\npairs               {} within {} s\nAPE of the prism    "
                 "rmse {:.4f} m, in the plane {:.4f} m, mean {:.4f} m, median {:.4f} m, max {:.4f} "
                 "m\n",
-                to_string(errors->alignment), errors->pairs, options.tolerance_s,
-                errors->ape_rmse_m, errors->ape_plane_rmse_m, errors->ape_mean_m,
-                errors->ape_median_m, errors->ape_max_m);
+                errors->alignment == Alignment::kNone
+                    ? "none"
+                    : to_string(errors->alignment) + ": moved by " +
+                          motion_text(errors->truth_from_estimate),
+                errors->pairs, options.tolerance_s, errors->ape_rmse_m, errors->ape_plane_rmse_m,
+                errors->ape_mean_m, errors->ape_median_m, errors->ape_max_m);
   std::fputs(text.c_str(), stdout);
   return errors->alignment_determined ? kExitDone : kExitUntrusted;
 }
@@ -199,9 +246,11 @@ int evaluate(const EvaluateOptions& options, CommandContext& context) {
                     format_seconds(estimate.back().stamp), format_seconds(truth.front().stamp),
                     format_seconds(truth.back().stamp)));
   }
-  const auto velocity = velocity_rmse(velocities_beside(options.estimate, context.log),
-                                      velocities_beside(options.truth, context.log),
-                                      errors->truth_from_estimate.rotation(), options.tolerance_s);
+  std::optional<Eigen::Vector3d> velocity;
+  if (errors->alignment_determined)
+    velocity = velocity_rmse(velocities_beside(options.estimate, context.log),
+                             velocities_beside(options.truth, context.log),
+                             errors->truth_from_estimate.rotation(), options.tolerance_s);
   warn_of_doubts(*errors, context.log);
   const std::string text = options.json ? to_json(*errors, velocity).dump(2) + "\n"
                                         : to_text(*errors, velocity, options.tolerance_s);

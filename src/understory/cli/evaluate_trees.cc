@@ -35,6 +35,7 @@ struct TreeOptions {
 };
 
 struct Comparison {
+  std::optional<Pose> b_from_a;  // found by --align
   TreeErrors all;
   std::optional<VisibleTreeErrors> visible;
   std::optional<MapAgreement> agreement;
@@ -44,6 +45,14 @@ struct Comparison {
 
 nlohmann::ordered_json to_json(const Comparison& result, const TreeOptions& options) {
   nlohmann::ordered_json json;
+  json["alignment"] = options.alignment;
+  json["alignment_found"] = nullptr;
+  if (result.b_from_a) {
+    const Eigen::Vector3d& t = result.b_from_a->translation();
+    json["alignment_found"] = {{"translation_m", {t.x(), t.y(), t.z()}},
+                               {"yaw_deg", yaw_deg(*result.b_from_a)},
+                               {"rotation_deg", result.b_from_a->angle() * 180.0 / M_PI}};
+  }
   json["trees_a"] = result.all.trees_a;
   json["trees_b"] = result.all.trees_b;
   json["matched"] = result.all.matched;
@@ -94,7 +103,8 @@ std::string to_text(const Comparison& result, const TreeOptions& options) {
   std::string text = fmt::format(
       "alignment           {}\n"
       "trees               {} in A, {} in B, {} matched one to one within {:g} m (nearest first)\n",
-      options.alignment, e.trees_a, e.trees_b, e.matched, options.radius_m);
+      options.alignment + (result.b_from_a ? ": moved by " + motion_text(*result.b_from_a) : ""),
+      e.trees_a, e.trees_b, e.matched, options.radius_m);
   // What no tree tells is left out: a map of stems has no heights.
   const auto tell = [&](double figure, const std::string& line) {
     if (std::isfinite(figure)) text += line;
@@ -176,17 +186,17 @@ int evaluate_trees(const TreeOptions& options, CommandContext& context) {
   const std::vector<Tree> b = read_trees(file_in_folder(options.b, "trees.csv"));
   const Alignment alignment = alignment_from_name(options.alignment);
   bool aligned = true;
+  Comparison result;
   if (alignment != Alignment::kNone) {
-    const std::optional<Pose> b_from_a = align_trees(a, b, alignment, options.radius_m);
-    aligned = b_from_a.has_value();
-    if (aligned) a = moved(a, *b_from_a);
+    result.b_from_a = align_trees(a, b, alignment, options.radius_m);
+    aligned = result.b_from_a.has_value();
+    if (aligned) a = moved(a, *result.b_from_a);
   }
   if (!aligned) {
     context.log.warn("evaluate.trees",
                      "no motion lays three trees of A on trees of B; compared "
                      "where they are");
   }
-  Comparison result;
   result.all = compare_trees(a, b, options.radius_m);
   result.visible = compare_visible(options, a, b);
   compare_along_paths(options, a, b, result);

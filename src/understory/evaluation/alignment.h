@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -22,9 +23,13 @@ enum class Alignment {
 
 struct AlignmentResult {
   Pose target_from_source;
-  // False where the points do not fix the motion (all in one place, or for SE(3) on a line): the
-  // rest of it is then chosen smallest, and rotation errors after it mean little.
+  // False where the points do not fix the motion (all in one place, or for SE(3) on a line, or so
+  // nearly that their noise decides: rotation_sd_deg over 5): rotation errors after it mean
+  // nothing.
   bool determined = false;
+  // How far the rotation itself is off because the pairs do not agree: jackknife over ten parts of
+  // the pairs in their order, degrees. NaN where it is unknown (under six pairs).
+  double rotation_sd_deg = std::numeric_limits<double>::quiet_NaN();
 };
 
 // Least-squares rigid motion that moves `source` onto `target`, pairwise, without scale, closed
@@ -35,5 +40,10 @@ struct AlignmentResult {
 // The same with a rotation about the z axis only, closed form.
 [[nodiscard]] AlignmentResult align_points_yaw(const std::vector<Eigen::Vector3d>& source,
                                                const std::vector<Eigen::Vector3d>& target);
+
+// "x +1.200, y -0.310, z +0.020 m, yaw +31.20 deg, 31.25 deg in all": a motion in words.
+[[nodiscard]] std::string motion_text(const Pose& target_from_source);
+// Its heading: where the x axis is turned to in the plane, degrees from -180 to 180.
+[[nodiscard]] double yaw_deg(const Pose& target_from_source);
 
 }  // namespace understory

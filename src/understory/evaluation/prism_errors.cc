@@ -23,13 +23,14 @@ std::optional<PrismErrors> evaluate_prism(const Trajectory& estimate,
     measured.push_back(truth[j].point);
   }
   if (estimated.empty()) return std::nullopt;
-  AlignmentResult moved{Pose(), true};
+  AlignmentResult moved{Pose(), true, 0.0};
   if (alignment == Alignment::kYaw) moved = align_points_yaw(estimated, measured);
   if (alignment == Alignment::kSe3) moved = align_points_se3(estimated, measured);
   PrismErrors errors;
   errors.pairs = estimated.size();
   errors.alignment = alignment;
   errors.alignment_determined = moved.determined;
+  errors.truth_from_estimate = moved.target_from_source;
   std::vector<double> distances;
   double sum = 0.0;
   double sum_plane = 0.0;

@@ -15,6 +15,7 @@ struct PrismErrors {
   std::size_t pairs = 0;
   Alignment alignment = Alignment::kNone;
   bool alignment_determined = true;
+  Pose truth_from_estimate;  // the motion of the alignment
   double ape_rmse_m = 0.0;
   double ape_plane_rmse_m = 0.0;
   double ape_mean_m = 0.0;

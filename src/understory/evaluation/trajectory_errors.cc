@@ -44,9 +44,9 @@ std::vector<Eigen::Vector3d> places_of(const std::vector<Pose>& poses) {
 }
 
 AlignmentResult align(const Paired& paired, Alignment alignment) {
-  if (alignment == Alignment::kNone) return {Pose(), true};
+  if (alignment == Alignment::kNone) return {Pose(), true, 0.0};
   if (alignment == Alignment::kFirst) {
-    return {paired.truth.front() * paired.estimate.front().inverse(), true};
+    return {paired.truth.front() * paired.estimate.front().inverse(), true, 0.0};
   }
   const std::vector<Eigen::Vector3d> source = places_of(paired.estimate);
   const std::vector<Eigen::Vector3d> target = places_of(paired.truth);
@@ -65,12 +65,17 @@ void add_scale(const Paired& paired, TrajectoryErrors& errors) {
   const Eigen::Vector3d middle_in_truth = fit * middle;
   double along = 0.0;
   double own = 0.0;
+  double true_size = 0.0;
   for (std::size_t i = 0; i < source.size(); ++i) {
     const Eigen::Vector3d from_middle = fit.rotation() * (source[i] - middle);
     along += from_middle.dot(target[i] - middle_in_truth);
     own += from_middle.squaredNorm();
+    true_size += (target[i] - middle_in_truth).squaredNorm();
   }
-  errors.scale_percent = along > 0.0 ? 100.0 * (own / along - 1.0) : kNan;
+  constexpr double kLeastM = 0.1;  // root mean square distance from the middle
+  const double least = kLeastM * kLeastM * static_cast<double>(source.size());
+  if (along > 0.0 && own > least && true_size > least)
+    errors.scale_percent = 100.0 * (own / along - 1.0);
 }
 
 void add_absolute(const Paired& paired, TrajectoryErrors& errors) {
@@ -214,6 +219,7 @@ std::optional<TrajectoryErrors> evaluate_trajectory(const Trajectory& estimate,
   const AlignmentResult alignment = align(paired, options.alignment);
   errors.truth_from_estimate = alignment.target_from_source;
   errors.alignment_determined = alignment.determined;
+  errors.alignment_sd_deg = alignment.rotation_sd_deg;
   errors.length_m = path_length(truth, pairs.front().second, pairs.back().second);
   const TimeNs duration = truth.back().stamp - truth.front().stamp;
   const TimeNs common = truth[pairs.back().second].stamp - truth[pairs.front().second].stamp;

@@ -50,10 +50,11 @@ struct SegmentError {
 struct TrajectoryErrors {
   std::size_t pairs = 0;
   Alignment alignment = Alignment::kNone;
-  bool alignment_determined = true;
-  Pose truth_from_estimate;  // the motion of the alignment
-  double length_m = 0.0;     // path of the truth from the first to the last pair, all its poses
-  double covered = 0.0;      // share of the truth's duration between the first and last pair
+  bool alignment_determined = true;  // false: rotations and velocities after it mean nothing
+  double alignment_sd_deg = 0.0;     // of its rotation, see AlignmentResult; NaN: unknown
+  Pose truth_from_estimate;          // the motion of the alignment
+  double length_m = 0.0;  // path of the truth from the first to the last pair, all its poses
+  double covered = 0.0;   // share of the truth's duration between the first and last pair
 
   // Absolute pose error after the alignment.
   double ape_rmse_m = 0.0;
@@ -65,8 +66,8 @@ struct TrajectoryErrors {
 
   // By how much the estimate's path is too large (+) or too small (-): what a least-squares fit
   // with a free scale (Umeyama 1991, eq. 42) would undo, whatever `alignment` says. No error above
-  // has it taken out. NaN where the estimate stands still.
-  double scale_percent = 0.0;
+  // has it taken out. Absent where either path stays within decimetres: it has no size.
+  std::optional<double> scale_percent;
 
   // P4 T3 and T4: the last pair's error after aligning the first, whatever `alignment` says.
   Eigen::Vector3d drift_end = Eigen::Vector3d::Zero();  // truth's world frame, metres

@@ -152,13 +152,13 @@ TEST(TrajectoryErrors, ScaleOfThePathIsToldWhateverTheAlignment) {
         Pose(pose.world_from_body.rotation(), 0.998 * pose.world_from_body.translation());
   small = transformed(small, Pose(so3_exp({0.1, 0.2, 2.0}), Eigen::Vector3d(30, -4, 12)));
   for (const Alignment alignment : {Alignment::kNone, Alignment::kSe3}) {
-    EXPECT_NEAR(errors_of(small, truth, alignment).scale_percent, -0.2, 1e-6);
-    EXPECT_NEAR(errors_of(truth, truth, alignment).scale_percent, 0.0, 1e-6);
+    EXPECT_NEAR(errors_of(small, truth, alignment).scale_percent.value(), -0.2, 1e-6);
+    EXPECT_NEAR(errors_of(truth, truth, alignment).scale_percent.value(), 0.0, 1e-6);
   }
   Trajectory still = truth;
   for (StampedPose& pose : still)
     pose.world_from_body = Pose();
-  EXPECT_TRUE(std::isnan(errors_of(still, truth, Alignment::kNone).scale_percent));
+  EXPECT_FALSE(errors_of(still, truth, Alignment::kNone).scale_percent.has_value());
 }
 
 TEST(TrajectoryErrors, LongRunsHaveKittisLengths) {
