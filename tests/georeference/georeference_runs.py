@@ -56,6 +56,10 @@ def errors_of(draw, runaways=True):
         yield pose, slow[0] - 0.3 * away, slow[1] + away
 
 
+def write_status(folder):
+    (folder / "run.json").write_text('{"command": "map", "status": "complete", "reasons": []}')
+
+
 def write_run(folder, timed=True):
     folder.mkdir(parents=True)
     with (folder / "trajectory.tum").open("w") as file:
@@ -73,6 +77,7 @@ def write_run(folder, timed=True):
         true.append((x, y))
         rows.append(f"{k + 1},{u:.4f},{v:.4f},{w:.4f},0.21,0.01,,2.5,14,0.02,0.01")
     (folder / "trees.csv").write_text("\n".join(rows) + "\n")
+    write_status(folder)
     (folder / "felled.csv").write_text("id,x,y,seen_until,gone_since,missed\n"
                                        "5,0,0,1500000100.000000001,1500000130.000000000,12\n")
     return folder, true
@@ -304,6 +309,7 @@ def straight(folder):
     run.mkdir()
     lines = [f"{0.5 * k:.2f} {0.125 * k:.4f} 0 0 0 0 0 1" for k in range(1000)]
     (run / "trajectory.tum").write_text("\n".join(lines) + "\n")
+    write_status(run)
     rows = ["timestamp,latitude_deg,longitude_deg,height_m"]
     for k in range(0, 1000, 2):
         latitude, longitude = degrees(-0.125 * k, 0.4 * math.sin(k))
@@ -317,6 +323,58 @@ def straight(folder):
                                             for k, row in enumerate(rows[1:])]) + "\n")
     done = georeference(run, "--method", "gnss-path", "--gnss", fixes, "-o", folder / "b")
     assert done.returncode == 4 and "turned round" in done.stderr, done
+
+
+def heading_of(folder, name, way, noise_m, turn=0.6):
+    """A way (x, y) in the run's frame and fixes that err slowly: what was said, and how far it is off."""
+    run = folder / name
+    run.mkdir()
+    draw = random.Random(name)
+    c, s = math.cos(turn), math.sin(turn)
+    lines, rows, slow = [], ["timestamp,latitude_deg,longitude_deg,height_m"], [0.0, 0.0]
+    for k, (x, y) in enumerate(way):
+        slow = [0.95 * v + math.sqrt(1 - 0.95**2) * noise_m * draw.gauss(0, 1) for v in slow]
+        latitude, longitude = degrees(c * x - s * y + slow[0], s * x + c * y + slow[1])
+        lines.append(f"{k}.0 {x:.4f} {y:.4f} 0 0 0 0 1")
+        rows.append(f"{k}.0,{latitude:.9f},{longitude:.9f},160")
+    (run / "trajectory.tum").write_text("\n".join(lines) + "\n")
+    write_status(run)
+    (run / "fixes.csv").write_text("\n".join(rows) + "\n")
+    done = georeference(run, "--method", "gnss-path", "--gnss", run / "fixes.csv", "-o",
+                        folder / f"{name}_placed", "--json")
+    told = json.loads(done.stdout)
+    off = abs((told["gnss_yaw_deg"] - math.degrees(turn) + 180) % 360 - 180)
+    return done, told["gnss_heading_sd_deg"], off
+
+
+@cases.case("a way whose fixes cannot tell the heading is not called placed")
+def heading(folder):
+    told = []
+    short = [(0.02 * k, 0.6 * math.sin(0.02 * k)) for k in range(400)]
+    stays = [(8.0 * min(1.0, k / 40), 0.4 * math.sin(0.1 * k)) for k in range(400)]
+    circle = [(15 * math.cos(0.0157 * k), 15 * math.sin(0.0157 * k)) for k in range(400)]
+    for name, way in (("short", short), ("stays", stays), ("circle", circle)):
+        done, sd, off = heading_of(folder, name, way, 3.0)
+        assert done.returncode == 4 and "leave the heading open" in done.stderr, (name, done)
+        assert sd > 5 and f"{sd:.1f} degrees" in done.stderr, (name, sd, done.stderr)
+        run = json.loads((folder / f"{name}_placed" / "run.json").read_text())
+        assert run["status"] == "untrusted", run["status"]
+        told.append(f"{name} {off:.0f} of {sd:.0f}")
+    corner = [(0.4 * min(k, 250), 0.4 * max(0, k - 250)) for k in range(400)]
+    straight = [(0.3 * k, 0.5 * math.sin(0.05 * k)) for k in range(400)]
+    for name, way in (("corner", corner), ("straight", straight)):
+        done, sd, off = heading_of(folder, name, way, 1.5)
+        assert done.returncode == 0 and sd < 5, (name, done, sd)
+        assert off < 4 * sd + 0.1, (name, off, sd)
+        told.append(f"{name} {off:.1f} of {sd:.1f}")
+    return "; ".join(told) + " degrees off of those expected"
+
+
+@cases.case("an antenna that is tens of metres away")
+def antenna(folder):
+    done = georeference(RUN, "--method", "gnss-path", "--gnss", FIXES, "-o", folder / "far",
+                        "--antenna-m", 40, 0, 2)
+    assert "check that these are metres" in done.stderr, done
 
 
 @cases.case("wrong use and bad input")

@@ -49,6 +49,16 @@ bool CoordinateSystem::is_geographic() const {
   return impl_->system.IsGeographic() != 0;
 }
 
+double metres_per_unit(const std::string& definition) {
+  if (definition.empty()) return std::nan("");
+  OGRSpatialReference system;
+  CPLPushErrorHandler(CPLQuietErrorHandler);
+  const bool known = system.SetFromUserInput(definition.c_str()) == OGRERR_NONE;
+  CPLPopErrorHandler();
+  if (!known) return std::nan("");
+  return system.IsGeographic() != 0 ? 0.0 : system.GetLinearUnits();
+}
+
 std::string utm_zone(const GeodeticPlace& place) {
   const int zone =
       std::clamp(static_cast<int>(std::floor((place.longitude_deg + 180.0) / 6.0)) + 1, 1, 60);

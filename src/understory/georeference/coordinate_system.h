@@ -29,6 +29,10 @@ class CoordinateSystem {
   std::unique_ptr<Impl> impl_;
 };
 
+// Metres per unit of a projected system in the plane ("EPSG:2276" or WKT): 0.3048006 for US survey
+// feet. 0 for one in degrees, NaN where nothing is known (an empty or strange definition).
+[[nodiscard]] double metres_per_unit(const std::string& definition);
+
 // "EPSG:32635": the UTM zone of a place, WGS 84.
 [[nodiscard]] std::string utm_zone(const GeodeticPlace& place);
 

@@ -108,17 +108,19 @@ class Fitter {
 
   // The centres of both laid on each other.
   [[nodiscard]] Motion centred(double yaw) const {
-    const auto mean = [](const Cloud& cloud) {
-      Vector2d sum = Vector2d::Zero();
-      for (std::size_t k = 0; k < cloud.points.size(); ++k)
-        sum += cloud.weights[k] * cloud.points[k].head<2>();
-      return sum;
-    };
-    return {yaw, mean(fixes_) - Eigen::Rotation2Dd(yaw) * mean(path_)};
+    return {yaw, mean_of(fixes_) - Eigen::Rotation2Dd(yaw) * mean_of(path_)};
   }
 
   // Nearest points and the motion that fits them best, in turn.
   [[nodiscard]] Motion descend(Motion motion, bool robust, int steps) const;
+  // The same with the heading held: only the shift is fitted.
+  [[nodiscard]] Motion slide(Motion motion, double width_m, int steps) const;
+  // Turned about the middle of the path.
+  [[nodiscard]] Motion turned(const Motion& motion, double yaw) const {
+    const Vector2d middle = mean_of(path_);
+    return {motion.yaw + yaw, motion.shift + Eigen::Rotation2Dd(motion.yaw) * middle -
+                                  Eigen::Rotation2Dd(motion.yaw + yaw) * middle};
+  }
   [[nodiscard]] double value(const Motion& motion) const {
     return value_of(pairs(motion), std::numeric_limits<double>::infinity());
   }
@@ -137,6 +139,12 @@ class Fitter {
   }
 
  private:
+  [[nodiscard]] static Vector2d mean_of(const Cloud& cloud) {
+    Vector2d sum = Vector2d::Zero();
+    for (std::size_t k = 0; k < cloud.points.size(); ++k)
+      sum += cloud.weights[k] * cloud.points[k].head<2>();
+    return sum;
+  }
   [[nodiscard]] static double loss(double distance_m, double width_m) {
     if (!std::isfinite(width_m)) return distance_m * distance_m;
     const double u = std::min(1.0, std::pow(distance_m / width_m, 2.0));
@@ -185,6 +193,25 @@ Motion Fitter::descend(Motion motion, bool robust, int steps) const {
     const double turned = std::abs(std::remainder(next.yaw - motion.yaw, 2.0 * M_PI));
     motion = next;
     if (moved < 1e-6 && turned < 1e-9) break;
+  }
+  return motion;
+}
+
+Motion Fitter::slide(Motion motion, double width_m, int steps) const {
+  for (int step = 0; step < steps; ++step) {
+    const Pairs now = pairs(motion);
+    Vector2d sum = Vector2d::Zero();
+    double total = 0.0;
+    for (std::size_t k = 0; k < now.weights.size(); ++k) {
+      const double u = now.distance_m[k] / width_m;
+      const double weight = now.weights[k] * (u < 1.0 ? std::pow(1.0 - u * u, 2.0) : 0.0);
+      sum += weight * (now.target[k] - Eigen::Rotation2Dd(motion.yaw) * now.source[k]);
+      total += weight;
+    }
+    if (total <= 0.0) break;
+    const double moved = (sum / total - motion.shift).norm();
+    motion.shift = sum / total;
+    if (moved < 1e-3) break;
   }
   return motion;
 }
@@ -251,6 +278,67 @@ Motion slid(const Fitter& fitter, Motion best, const Vector2d& along, bool robus
     best = better;
   }
   return best;
+}
+
+// How many fixes with independent errors the fixes in their order are worth: a receiver errs
+// slowly, so fixes that follow each other say nearly the same.
+double independent_fixes(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
+                         const Motion& motion, double width_m) {
+  const PlaneGrid grid(gathered(path, 0.02).points);
+  const Pose source_from_target = motion.pose().inverse();
+  std::vector<Vector2d> errors;
+  for (const Vector3d& fix : fixes) {
+    const Vector3d at = source_from_target * Vector3d(fix.x(), fix.y(), 0.0);
+    const auto found = grid.nearest(at, kNowhere, 0.0);
+    if (found.squared_m2 >= width_m * width_m) continue;
+    errors.emplace_back(at.head<2>() -
+                        grid.points()[static_cast<std::size_t>(found.index)].head<2>());
+  }
+  const auto product = [&](std::size_t lag) {
+    double sum = 0.0;
+    for (std::size_t k = lag; k < errors.size(); ++k)
+      sum += errors[k].dot(errors[k - lag]);
+    return sum;
+  };
+  const double variance = product(0);
+  constexpr double kNoMore = 0.05;
+  constexpr std::size_t kLongestLag = 5'000;
+  double time = 1.0;
+  for (std::size_t lag = 1; variance > 0.0 && lag < std::min(kLongestLag, errors.size() / 3);
+       ++lag) {
+    const double correlation = product(lag) / variance;
+    if (correlation < kNoMore) break;
+    time += 2.0 * correlation;
+  }
+  return static_cast<double>(errors.size()) / time;
+}
+
+// From the profile of the robust sum over the heading: where turning by an angle, with the best
+// shift for it, costs as much as one standard deviation does. Straight, short and round paths have
+// flat profiles. Half of the wider side and the narrower one, at most 90 degrees.
+double heading_sd_deg(const Fitter& fitter, const Motion& best, double width_m,
+                      double independent) {
+  constexpr double kLeastNoiseM = 0.02;
+  constexpr double kFirstDeg = 0.25;
+  constexpr double kMostDeg = 90.0;
+  constexpr int kSteps = 15;
+  const double value = Fitter::value_of(fitter.pairs(best), width_m);
+  const double noise_m2 = std::max(value, kLeastNoiseM * kLeastNoiseM);
+  double sum = 0.0;
+  for (const double side : {-1.0, 1.0}) {
+    double sd = kMostDeg;
+    for (double deg = kFirstDeg; deg <= kMostDeg; deg *= 2.0) {
+      const Motion turned =
+          fitter.slide(fitter.turned(best, side * deg * M_PI / 180.0), width_m, kSteps);
+      const double rise = Fitter::value_of(fitter.pairs(turned), width_m) - value;
+      const double sigmas2 = independent * rise / noise_m2;
+      if (sigmas2 < 1.0) continue;
+      sd = std::min(kMostDeg, deg / std::sqrt(sigmas2));
+      break;
+    }
+    sum += 0.5 * sd;
+  }
+  return sum;
 }
 
 void tell_fixes(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
@@ -342,6 +430,8 @@ PathFit fit_path(const std::vector<Vector3d>& path, const std::vector<Vector3d>&
     fit.turned_rms_m = rms;
     fit.turned_target_from_source = other.pose();
   }
+  fit.heading_sd_deg =
+      heading_sd_deg(fine, *best, width_m, independent_fixes(path, fixes, *best, width_m));
   tell_fixes(path, fixes, width_m, fit);
   tell_path(path, fixes, fit);
   return fit;

@@ -38,6 +38,9 @@ struct PathFit {
   // that is straight fits the other way round as well.
   double turned_rms_m = 0.0;
   Pose turned_target_from_source;
+  // Standard deviation of the heading that the fixes leave, degrees, at most 90: from how (6) rises
+  // when the path is turned, its residuals, and how many fixes err independently of each other.
+  double heading_sd_deg = 0.0;
 };
 
 // Only x and y are looked at. Metres. Deterministic; thread-safe. Not found where either path has

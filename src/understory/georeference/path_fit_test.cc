@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
 
 namespace understory {
@@ -199,6 +200,75 @@ TEST(PathFit, TooLittleSaysSo) {
   const std::vector<Vector3d> still(100, Vector3d(1.0, 2.0, 3.0));
   EXPECT_FALSE(fit_path(still, drive(), {}).found);
   EXPECT_FALSE(fit_path(drive(), still, {}).found);
+}
+
+// Fixes of a path with errors that go together over a minute, and the path in a frame of its own.
+struct Laid {
+  double error_deg = 0.0;
+  double sd_deg = 0.0;
+};
+Laid laid(const std::vector<Vector3d>& path, double noise_m, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  const double keep = 0.95;
+  Vector3d slow = noise_m * Vector3d(noise(random), noise(random), 0.0);
+  std::vector<Vector3d> fixes;
+  for (std::size_t k = 0; k < path.size(); k += 2) {
+    slow = keep * slow +
+           std::sqrt(1.0 - keep * keep) * noise_m * Vector3d(noise(random), noise(random), 0.0);
+    fixes.emplace_back(motion() * path[k] + slow);
+  }
+  const PathFit fit = fit_path(path, fixes, {});
+  EXPECT_TRUE(fit.found) << fit.reason;
+  return {yaw_error_deg(fit), fit.heading_sd_deg};
+}
+
+std::vector<Vector3d> sampled(const std::function<Vector3d(double)>& at) {
+  std::vector<Vector3d> path;
+  for (int k = 0; k < 300; ++k)
+    path.push_back(at(k / 300.0));
+  return path;
+}
+
+// The figure is right within a factor of two to three where the fixes tell the heading.
+TEST(PathFit, TellsHowFarTheHeadingIsOff) {
+  const std::vector<Vector3d> corner = sampled([](double u) {
+    return Vector3d(120.0 * std::min(u, 0.6), 80.0 * std::max(0.0, u - 0.6), 0.0);
+  });
+  const std::vector<Vector3d> straight =
+      sampled([](double u) { return Vector3d(100.0 * u, 0.3 * std::sin(20.0 * u), 0.0); });
+  for (const auto& path : {corner, straight}) {
+    double errors = 0.0;
+    double expected = 0.0;
+    int used = 0;
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+      const Laid one = laid(path, 1.5, seed);
+      if (one.error_deg > 90.0) continue;  // the other way round, which the times tell
+      errors += one.error_deg * one.error_deg;
+      expected += one.sd_deg * one.sd_deg;
+      ++used;
+    }
+    const double ratio = std::sqrt(errors / expected);
+    std::printf("heading off by %.2f degrees, expected %.2f\n", std::sqrt(errors / used),
+                std::sqrt(expected / used));
+    EXPECT_GT(ratio, 0.3);
+    EXPECT_LT(ratio, 2.5);
+    EXPECT_LT(std::sqrt(expected / used), 5.0);
+  }
+}
+
+TEST(PathFit, SaysWhenTheFixesLeaveTheHeadingOpen) {
+  const std::vector<Vector3d> few_steps =
+      sampled([](double u) { return Vector3d(6.0 * u, 1.0 * std::sin(5.0 * u), 0.0); });
+  const std::vector<Vector3d> round = sampled([](double u) {
+    return Vector3d(15.0 * std::cos(6.2832 * u), 15.0 * std::sin(6.2832 * u), 0.0);
+  });
+  const std::vector<Vector3d> standing = sampled(
+      [](double u) { return Vector3d(u < 0.1 ? 50.0 * u : 5.0, 0.4 * std::sin(90.0 * u), 0.0); });
+  for (const auto& path : {few_steps, round, standing}) {
+    for (unsigned seed = 1; seed <= 2; ++seed)
+      EXPECT_GT(laid(path, 3.0, seed).sd_deg, 5.0) << seed;
+  }
 }
 
 }  // namespace

@@ -237,6 +237,7 @@ std::map<std::string, Figure> figures_of(const GnssFit& fit) {
       {"gnss_fixes_used_share",
        static_cast<double>(std::count(fit.path.fix_used.begin(), fit.path.fix_used.end(), 1)) /
            static_cast<double>(fit.path.fix_used.size())},
+      {"gnss_heading_sd_deg", fit.path.heading_sd_deg},
       {"gnss_yaw_deg", yaw_of(fit.enu_from_world) * 180.0 / M_PI}};
   if (fit.fixes_in_time > 0) {
     figures["gnss_along_rms_m"] = fit.along_rms_m;
