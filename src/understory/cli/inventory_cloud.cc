@@ -1,0 +1,106 @@
+#include "understory/cli/inventory_cloud.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/forest/cloud_shape.h"
+#include "understory/georeference/coordinate_system.h"
+
+namespace understory {
+namespace {
+
+UpAxis axis_of(const std::string& name) {
+  return *std::find_if(kUpAxes.begin(), kUpAxes.end(),
+                       [&](UpAxis axis) { return to_string(axis) == name; });
+}
+
+void bring_upright(const CloudFrame& frame, const std::string& name, PointCloudFile& cloud,
+                   Log& log) {
+  const double unit = frame.unit_m > 0.0 ? frame.unit_m : 1.0;
+  const Eigen::Matrix3d turn =
+      frame.up.empty() ? Eigen::Matrix3d::Identity() : upright_from_cloud(axis_of(frame.up));
+  if (unit == 1.0 && turn.isIdentity()) return;
+  const Eigen::Matrix3d change = unit * turn;
+  cloud.origin = change * cloud.origin;
+  for (Eigen::Vector3f& point : cloud.points)
+    point = (change * point.cast<double>()).cast<float>();
+  if (cloud.coordinate_system.empty()) return;
+  log.warn("inventory.frame", name +
+                                  ": its coordinate system does not hold for coordinates that "
+                                  "were turned or scaled; the results have none");
+  cloud.coordinate_system.clear();
+}
+
+// What the file itself says of its unit.
+std::string system_complaint(const std::string& system) {
+  const double unit = metres_per_unit(system);
+  if (unit == 0.0)
+    return "its coordinate system is in degrees: project it first, for instance to UTM";
+  if (std::abs(unit - 1.0) < 1e-9 || !std::isfinite(unit)) return {};
+  return fmt::format("its coordinate system counts in units of {:.7g} m ({}): give --unit-m {:.7g}",
+                     unit, std::abs(unit - 0.3048) < 1e-5 ? "feet" : "not metres", unit);
+}
+
+std::string doubt_of(const PointCloudFile& cloud, const std::string& system,
+                     const CloudFrame& frame) {
+  if (frame.unit_m == 0.0) {
+    if (std::string complaint = system_complaint(system); !complaint.empty()) return complaint;
+  }
+  if (frame.unit_m > 0.0 && !frame.up.empty()) return {};
+  const CloudShape shape = shape_of(blocks_of(cloud));
+  const std::string standing = frame.up.empty() ? up_complaint(shape) : "";
+  if (!standing.empty()) {
+    const auto axis = other_up_axis(shape);
+    return standing + (axis ? "; give --up " + to_string(*axis) : "; level the cloud first") +
+           ", or --up z if it is right as it is";
+  }
+  const std::string unit = frame.unit_m == 0.0 ? unit_complaint(shape) : "";
+  if (unit.empty()) return {};
+  return unit +
+         "; give --unit-m with the metres per unit (0.001 for millimetres, 0.01 for "
+         "centimetres, 1 if it is right as it is)";
+}
+
+}  // namespace
+
+void add_cloud_frame_options(CLI::App& command, CloudFrame& frame) {
+  command
+      .add_option("--unit-m", frame.unit_m,
+                  "Metres per unit of the cloud: 0.001 for millimetres, 0.3048 for feet (metres "
+                  "if not given, and it is checked that they can be)")
+      ->check(CLI::Range(1e-6, 1e6));
+  command
+      .add_option("--up", frame.up,
+                  "The cloud's axis that points up (z if not given, and it is checked that it can "
+                  "be)")
+      ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}));
+}
+
+PointBlocks blocks_of(const PointCloudFile& cloud) {
+  return [&cloud](const PointVisitor& visit) {
+    constexpr std::size_t kBlock = 65'536;
+    std::vector<Eigen::Vector3d> block;
+    block.reserve(kBlock);
+    for (const Eigen::Vector3f& point : cloud.points) {
+      block.push_back(cloud.origin + point.cast<double>());
+      if (block.size() == kBlock) {
+        visit(block);
+        block.clear();
+      }
+    }
+    if (!block.empty()) visit(block);
+  };
+}
+
+StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame, Log& log) {
+  StandCloud stand;
+  stand.cloud = read_cloud(path.string(), log);
+  const std::string system = stand.cloud.coordinate_system;
+  bring_upright(frame, path.string(), stand.cloud, log);
+  stand.doubt = doubt_of(stand.cloud, system, frame);
+  return stand;
+}
+
+}  // namespace understory

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+
+#include "understory/forest/inventory.h"
+#include "understory/recording/cloud_file.h"
+
+namespace understory {
+
+// What the user knows of a cloud's frame. What he says is believed, what he does not say is
+// checked.
+struct CloudFrame {
+  double unit_m = 0.0;  // metres per unit; 0: metres, if nothing speaks against it
+  std::string up;       // x, y, z, -x, -y, -z; empty: z, if nothing speaks against it
+};
+void add_cloud_frame_options(CLI::App& command, CloudFrame& frame);
+
+// All points of a cloud, file frame.
+[[nodiscard]] PointBlocks blocks_of(const PointCloudFile& cloud);
+
+// A cloud in metres with z up, and why it may be none.
+struct StandCloud {
+  PointCloudFile cloud;
+  std::string doubt;  // empty: none
+};
+// Reads a cloud and turns and scales it as `frame` says; then its coordinate system is dropped,
+// with a warning. Throws InputError where read_cloud does, and for a recording.
+[[nodiscard]] StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame,
+                                    Log& log);
+
+}  // namespace understory

@@ -1,0 +1,317 @@
+#include "understory/forest/cloud_shape.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <tuple>
+#include <unordered_map>
+#include <vector>
+
+namespace understory {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kMostPoints = 400'000;
+constexpr double kCellsAcross = 24.0;
+constexpr double kPointsPerCell = 64.0;   // or cells become larger
+constexpr std::size_t kLeastPoints = 16;  // in a cell
+constexpr std::size_t kLeastSteps = 100;  // between cells
+
+// Thresholds, see docs/forest.md.
+constexpr double kSmooth = 0.2;
+constexpr double kRough = 0.3;
+constexpr double kClearly = 1.8;
+constexpr double kThinnest = 3.0;        // a slice has no ground
+constexpr double kThinnestShare = 0.02;  // of the longest side
+constexpr double kSteepestDeg = 50.0;
+constexpr double kTallest = 150.0;
+constexpr double kTallestCentimetres = 4'500.0;
+constexpr double kMostAlone = 0.8;
+constexpr double kWidestDegrees = 0.05;  // 5 km; as metres narrower than a stem
+constexpr double kLeastHeight = 2.0;
+constexpr double kCube = 3.0;
+
+double quantile(std::vector<double>& values, double share) {
+  if (values.empty()) return kNan;
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+// Every n-th point, about the first one: coordinates of a grid are large.
+struct Sample {
+  std::vector<Vector3d> points;
+  std::size_t step = 1;
+};
+Sample sample_of(const PointBlocks& cloud) {
+  std::size_t all = 0;
+  cloud([&](std::span<const Vector3d> points) { all += points.size(); });
+  Sample sample;
+  sample.step = all / kMostPoints + 1;
+  Vector3d first = Vector3d::Zero();
+  std::size_t k = 0;
+  cloud([&](std::span<const Vector3d> points) {
+    for (const Vector3d& point : points) {
+      if (k == 0) first = point;
+      if (k++ % sample.step == 0) sample.points.emplace_back(point - first);
+    }
+  });
+  return sample;
+}
+
+Vector3d percentile(const std::vector<Vector3d>& points, double share) {
+  Vector3d result;
+  std::vector<double> values(points.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < points.size(); ++i)
+      values[i] = points[i][axis];
+    result[axis] = quantile(values, share);
+  }
+  return result;
+}
+
+// The lowest and highest points of upright columns over a grid.
+struct Columns {
+  double cell = 0.0;
+  int across = 0;
+  int along = 0;
+  std::vector<double> low;  // NaN: too few points
+  std::vector<double> high;
+
+  [[nodiscard]] double low_at(int column, int row) const {
+    if (column < 0 || row < 0 || column >= across || row >= along) return kNan;
+    return low[static_cast<std::size_t>(row * across + column)];
+  }
+};
+
+Columns columns_of(const std::vector<Vector3d>& points) {
+  const Vector3d from = percentile(points, 0.002);
+  const Vector3d extent = percentile(points, 0.998) - from;
+  const double area = extent.x() * extent.y();
+  Columns columns;
+  columns.cell = std::sqrt(area * std::max(1.0 / (kCellsAcross * kCellsAcross),
+                                           kPointsPerCell / static_cast<double>(points.size())));
+  // A needle has no grid.
+  if (!(columns.cell > 0.0) || extent.head<2>().maxCoeff() > 1e3 * columns.cell) return columns;
+  columns.across = static_cast<int>(extent.x() / columns.cell) + 1;
+  columns.along = static_cast<int>(extent.y() / columns.cell) + 1;
+  std::vector<std::vector<double>> heights(
+      static_cast<std::size_t>(columns.across * columns.along));
+  for (const Vector3d& point : points) {
+    const int column = static_cast<int>(std::floor((point.x() - from.x()) / columns.cell));
+    const int row = static_cast<int>(std::floor((point.y() - from.y()) / columns.cell));
+    if (column < 0 || row < 0 || column >= columns.across || row >= columns.along) continue;
+    heights[static_cast<std::size_t>(row * columns.across + column)].push_back(point.z());
+  }
+  for (std::vector<double>& cell : heights) {
+    const bool enough = cell.size() >= kLeastPoints;
+    columns.low.push_back(enough ? quantile(cell, 0.01) : kNan);
+    columns.high.push_back(enough ? quantile(cell, 0.98) : kNan);
+  }
+  return columns;
+}
+
+// Steps between neighbours that a slope does not explain.
+double roughness_of(const Columns& columns) {
+  std::vector<double> steps;
+  for (int row = 0; row < columns.along; ++row) {
+    for (int column = 0; column < columns.across; ++column) {
+      const double here = columns.low_at(column, row);
+      for (const auto& [u, v] : {std::pair(1, 0), std::pair(0, 1)}) {
+        const double bend =
+            0.5 * (columns.low_at(column - u, row - v) + columns.low_at(column + u, row + v)) -
+            here;
+        if (std::isfinite(bend)) steps.push_back(std::abs(bend));
+      }
+    }
+  }
+  return steps.size() < kLeastSteps ? kNan : quantile(steps, 0.5) / columns.cell;
+}
+
+double column_height_of(const Columns& columns) {
+  std::vector<double> heights;
+  std::vector<double> rises;
+  for (int row = 0; row < columns.along; ++row) {
+    for (int column = 0; column < columns.across; ++column) {
+      const double here = columns.low_at(column, row);
+      if (!std::isfinite(here)) continue;
+      heights.push_back(columns.high[static_cast<std::size_t>(row * columns.across + column)] -
+                        here);
+      for (const double next : {columns.low_at(column + 1, row), columns.low_at(column, row + 1)})
+        if (std::isfinite(next)) rises.push_back(std::abs(next - here));
+    }
+  }
+  constexpr std::size_t kLeastColumns = 4;
+  if (heights.size() < kLeastColumns) return kNan;
+  const double rise = rises.empty() ? 0.0 : quantile(rises, 0.75);
+  return std::max(0.0, quantile(heights, 0.9) - 2.0 * rise);
+}
+
+// Of the plane through the lowest points, fitted again to those near it.
+double slope_deg_of(const Columns& columns) {
+  std::vector<Vector3d> lows;
+  for (int row = 0; row < columns.along; ++row) {
+    for (int column = 0; column < columns.across; ++column) {
+      const double low = columns.low_at(column, row);
+      if (std::isfinite(low)) lows.emplace_back(column * columns.cell, row * columns.cell, low);
+    }
+  }
+  if (lows.size() < kLeastSteps) return kNan;
+  Vector3d plane = Vector3d::Zero();  // z = a x + b y + c
+  double width = std::numeric_limits<double>::infinity();
+  constexpr int kRounds = 6;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Vector3d right = Vector3d::Zero();
+    std::vector<double> off;
+    for (const Vector3d& low : lows) {
+      const Vector3d row(low.x(), low.y(), 1.0);
+      const double error = std::abs(low.z() - row.dot(plane));
+      off.push_back(error);
+      if (round > 0 && error > width) continue;
+      normal += row * row.transpose();
+      right += low.z() * row;
+    }
+    plane = normal.colPivHouseholderQr().solve(right);
+    for (std::size_t i = 0; i < lows.size(); ++i)
+      off[i] = std::abs(lows[i].z() - Vector3d(lows[i].x(), lows[i].y(), 1.0).dot(plane));
+    width = 2.5 * quantile(off, 0.5);
+  }
+  return std::atan(plane.head<2>().norm()) * 180.0 / M_PI;
+}
+
+double alone_share_of(const std::vector<Vector3d>& points, double cube) {
+  std::unordered_map<std::uint64_t, std::uint32_t> cubes;
+  cubes.reserve(points.size());
+  for (const Vector3d& point : points) {
+    std::uint64_t key = 0;
+    for (int axis = 0; axis < 3; ++axis)  // 21 bits each
+      key = key << 21U |
+            (static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(point[axis] / cube))) &
+             0x1fffffU);
+    ++cubes[key];
+  }
+  std::size_t alone = 0;
+  for (const auto& [key, count] : cubes)
+    alone += count == 1 ? 1 : 0;
+  return points.empty() ? 0.0 : static_cast<double>(alone) / static_cast<double>(points.size());
+}
+
+bool is_slice(const CloudShape& shape) {
+  return shape.extent.minCoeff() < std::max(kThinnest, kThinnestShare * shape.extent.maxCoeff()) &&
+         shape.extent.z() <= shape.extent.minCoeff();
+}
+
+}  // namespace
+
+std::string to_string(UpAxis axis) {
+  switch (axis) {
+    case UpAxis::kZ:
+      return "z";
+    case UpAxis::kMinusZ:
+      return "-z";
+    case UpAxis::kX:
+      return "x";
+    case UpAxis::kMinusX:
+      return "-x";
+    case UpAxis::kY:
+      return "y";
+    case UpAxis::kMinusY:
+      break;
+  }
+  return "-y";
+}
+
+Eigen::Matrix3d upright_from_cloud(UpAxis axis) {
+  Vector3d up = Vector3d::UnitZ();
+  if (axis == UpAxis::kMinusZ) up = -Vector3d::UnitZ();
+  if (axis == UpAxis::kX) up = Vector3d::UnitX();
+  if (axis == UpAxis::kMinusX) up = -Vector3d::UnitX();
+  if (axis == UpAxis::kY) up = Vector3d::UnitY();
+  if (axis == UpAxis::kMinusY) up = -Vector3d::UnitY();
+  const Vector3d first = std::abs(up.x()) > 0.5 ? Vector3d::UnitY() : Vector3d::UnitX();
+  Eigen::Matrix3d rotation;
+  rotation << first.transpose(), up.cross(first).transpose(), up.transpose();
+  return rotation;
+}
+
+CloudShape shape_of(const PointBlocks& cloud) {
+  const Sample sample = sample_of(cloud);
+  const std::vector<Vector3d>& points = sample.points;
+  CloudShape shape;
+  shape.points = points.size();
+  shape.roughness.fill(kNan);
+  shape.column_height = shape.ground_slope_deg = kNan;
+  if (points.size() < kLeastPoints) return shape;
+  shape.extent = percentile(points, 0.998) - percentile(points, 0.002);
+  // A sample of surfaces is as much sparser as if its cubes were smaller by the root.
+  shape.alone_share = alone_share_of(points, kCube * std::sqrt(static_cast<double>(sample.step)));
+  for (std::size_t k = 0; k < kUpAxes.size(); ++k) {
+    const Eigen::Matrix3d turn = upright_from_cloud(kUpAxes[k]);
+    std::vector<Vector3d> turned;
+    turned.reserve(points.size());
+    for (const Vector3d& point : points)
+      turned.emplace_back(turn * point);
+    const Columns columns = columns_of(turned);
+    shape.roughness[k] = roughness_of(columns);
+    if (kUpAxes[k] != UpAxis::kZ) continue;
+    shape.column_height = column_height_of(columns);
+    shape.ground_slope_deg = slope_deg_of(columns);
+  }
+  return shape;
+}
+
+std::optional<UpAxis> other_up_axis(const CloudShape& shape) {
+  if (is_slice(shape)) return std::nullopt;
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < kUpAxes.size(); ++k) {
+    if (shape.roughness[k] < shape.roughness[best] || !std::isfinite(shape.roughness[best]))
+      best = k;
+  }
+  const double as_given = shape.roughness[0];
+  const bool clear = best != 0 && shape.roughness[best] < kSmooth &&
+                     (as_given > std::max(kRough, kClearly * shape.roughness[best]));
+  return clear ? std::optional(kUpAxes[best]) : std::nullopt;
+}
+
+std::string up_complaint(const CloudShape& shape) {
+  if (const auto axis = other_up_axis(shape))
+    return fmt::format("z is not up: smooth ground lies below the points along {}, not along z",
+                       to_string(*axis));
+  if (shape.roughness[0] < kSmooth && shape.ground_slope_deg > kSteepestDeg && !is_slice(shape))
+    return fmt::format("z is not up: the ground is inclined by {:.0f} degrees",
+                       shape.ground_slope_deg);
+  return {};
+}
+
+std::string unit_complaint(const CloudShape& shape) {
+  const std::string size = fmt::format("it measures {:.0f} x {:.0f} x {:.0f}", shape.extent.x(),
+                                       shape.extent.y(), shape.extent.z());
+  if (shape.extent.head<2>().maxCoeff() < kWidestDegrees && shape.extent.z() > kLeastHeight)
+    return fmt::format(
+        "it measures {:.6f} x {:.6f} in the plane and {:.1f} in height: these look like degrees",
+        shape.extent.x(), shape.extent.y(), shape.extent.z());
+  if (shape.column_height > kTallestCentimetres)
+    return fmt::format("{}, and points stand {:.0f} above the ground: these look like millimetres",
+                       size, shape.column_height);
+  if (shape.column_height > kTallest)
+    return fmt::format(
+        "{}, and points stand {:.0f} above the ground: these look like centimetres (or "
+        "millimetres)",
+        size, shape.column_height);
+  if (shape.alone_share > kMostAlone)
+    return fmt::format(
+        "{}, and {:.0f} % of its points have no other one in their cube of 3 m: these look like "
+        "millimetres or centimetres",
+        size, 100.0 * shape.alone_share);
+  return {};
+}
+
+}  // namespace understory

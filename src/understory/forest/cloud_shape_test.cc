@@ -1,0 +1,108 @@
+#include "understory/forest/cloud_shape.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <vector>
+
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+using Points = std::vector<Eigen::Vector3d>;
+
+// A plot of 30 m on a slope: rolling ground, stems of 20 m with crowns that start half way up.
+Points stand(double slope = 0.15) {
+  Random random(5);
+  const auto ground = [&](double x, double y) { return slope * x + 0.5 * std::sin(0.3 * y); };
+  Points points;
+  for (int i = 0; i < 40'000; ++i) {
+    const double x = random.uniform(0.0, 30.0);
+    const double y = random.uniform(0.0, 30.0);
+    points.emplace_back(x, y, ground(x, y) + random.normal(0.0, 0.02));
+  }
+  for (int tree = 0; tree < 60; ++tree) {
+    const double x = random.uniform(0.0, 30.0);
+    const double y = random.uniform(0.0, 30.0);
+    for (int i = 0; i < 800; ++i) {
+      const double h = random.uniform(0.0, 20.0);
+      const double a = random.uniform(0.0, 2.0 * M_PI);
+      const double r = h < 10.0 ? 0.12 : random.uniform(0.0, 0.2 * (21.0 - h));
+      points.emplace_back(x + r * std::cos(a), y + r * std::sin(a), ground(x, y) + h);
+    }
+  }
+  return points;
+}
+
+Points changed(const Points& points, const Eigen::Matrix3d& change) {
+  Points result;
+  for (const Eigen::Vector3d& point : points)
+    result.emplace_back(change * point + Eigen::Vector3d(4.1e5, 6.7e6, 120.0));
+  return result;
+}
+
+CloudShape shape_of(const Points& points) {
+  return understory::shape_of([&](const PointVisitor& visit) { visit(points); });
+}
+
+TEST(CloudShape, AStandInMetresIsLeftAlone) {
+  for (const double slope : {0.0, 0.15, 0.8}) {
+    const CloudShape shape = shape_of(changed(stand(slope), Eigen::Matrix3d::Identity()));
+    EXPECT_EQ(up_complaint(shape), "") << slope;
+    EXPECT_EQ(unit_complaint(shape), "") << slope;
+    EXPECT_LT(shape.roughness[0], 0.1) << slope;
+    EXPECT_NEAR(shape.column_height, 18.0, 4.0) << slope;
+    EXPECT_NEAR(shape.ground_slope_deg, std::atan(slope) * 180.0 / M_PI, 3.0);
+  }
+}
+
+TEST(CloudShape, TheAxisThatIsUpIsNamed) {
+  for (const UpAxis axis : kUpAxes) {
+    // upright_from_cloud undoes what this does.
+    const Points turned = changed(stand(), upright_from_cloud(axis).transpose());
+    const auto found = other_up_axis(shape_of(turned));
+    if (axis == UpAxis::kZ) {
+      EXPECT_FALSE(found.has_value());
+      continue;
+    }
+    ASSERT_TRUE(found.has_value()) << to_string(axis);
+    EXPECT_EQ(*found, axis) << to_string(*found);
+    EXPECT_NE(up_complaint(shape_of(turned)).find("along " + to_string(axis)), std::string::npos);
+    EXPECT_NEAR(upright_from_cloud(axis).determinant(), 1.0, 1e-12);
+  }
+}
+
+TEST(CloudShape, GroundThatIsSteeperThanForestsStandOnIsNotLevel) {
+  const CloudShape shape = shape_of(changed(stand(1.5), Eigen::Matrix3d::Identity()));
+  EXPECT_NE(up_complaint(shape).find("inclined by 5"), std::string::npos)
+      << shape.ground_slope_deg << ' ' << shape.roughness[0];
+}
+
+TEST(CloudShape, OtherUnitsAreTold) {
+  const Points points = stand();
+  const auto complaint = [&](double scale) {
+    return unit_complaint(shape_of(changed(points, scale * Eigen::Matrix3d::Identity())));
+  };
+  EXPECT_NE(complaint(1000.0).find("millimetres"), std::string::npos);
+  EXPECT_NE(complaint(100.0).find("centimetres"), std::string::npos);
+  EXPECT_EQ(complaint(1.0 / 0.3048), "");  // feet cannot be told
+  const Eigen::Matrix3d degrees = Eigen::Vector3d(1e-5, 1e-5, 1.0).asDiagonal();
+  EXPECT_NE(unit_complaint(shape_of(changed(points, degrees))).find("degrees"), std::string::npos);
+}
+
+TEST(CloudShape, ASliceHasNoGroundAndIsNoDefect) {
+  Points slice;
+  for (const Eigen::Vector3d& point : stand(0.0))
+    if (point.z() > 1.2 && point.z() < 1.4) slice.push_back(point);
+  ASSERT_GT(slice.size(), 100U);
+  const CloudShape shape = shape_of(slice);
+  EXPECT_EQ(up_complaint(shape), "");
+  EXPECT_EQ(unit_complaint(shape), "");
+  EXPECT_EQ(unit_complaint(shape_of(Points(3, Eigen::Vector3d(1, 2, 3)))), "");
+  EXPECT_EQ(up_complaint(shape_of(Points())), "");
+}
+
+}  // namespace
+}  // namespace understory

@@ -1,0 +1,88 @@
+// Real clouds (README of the example data): none is refused, and turned or scaled each one is.
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "understory/forest/cloud_shape.h"
+#include "understory/recording/cloud_file.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path data() {
+  const char* named = std::getenv("UNDERSTORY_DATA");
+  return named != nullptr ? named : "missing";
+}
+
+PointBlocks blocks_of(const PointCloudFile& cloud, const Eigen::Matrix3d& change) {
+  return [&cloud, change](const PointVisitor& visit) {
+    std::vector<Eigen::Vector3d> points;
+    for (const Eigen::Vector3f& point : cloud.points)
+      points.emplace_back(change * (cloud.origin + point.cast<double>()));
+    visit(points);
+  };
+}
+
+const std::vector<std::string>& stands() {
+  static const std::vector<std::string> names = {
+      "spanner_mls_uas_als/MLS_Clip.laz", "spanner_mls_uas_als/UAS_Clip.laz",
+      "spanner_mls_uas_als/ALS_Clip.laz", "treels/pine_plot.laz", "chablais3/las_chablais3.laz"};
+  return names;
+}
+
+TEST(RealClouds, NoneIsRefused) {
+  std::vector<std::string> names = stands();
+  for (const char* slice :
+       {"treels/pine.laz", "fortls/diameters.laz", "arbor_dbh_slices/complex_slice0.las",
+        "arbor_dbh_slices/double_ring_slice0.las", "arbor_dbh_slices/ring50.las",
+        "arbor_dbh_slices/slice_buttress.las"})
+    names.emplace_back(slice);
+  if (!fs::exists(data() / names.front())) GTEST_SKIP();
+  for (const std::string& name : names) {
+    Log log;
+    const PointCloudFile cloud = read_cloud((data() / name).string(), log);
+    const CloudShape shape = shape_of(blocks_of(cloud, Eigen::Matrix3d::Identity()));
+    EXPECT_EQ(up_complaint(shape), "") << name;
+    EXPECT_EQ(unit_complaint(shape), "") << name;
+    RecordProperty(name, shape.column_height);
+    std::printf(
+        "%-42s roughness z %.3f -z %.3f x %.3f -x %.3f y %.3f -y %.3f, height %.1f, slope "
+        "%.0f deg, alone %.3f\n",
+        name.c_str(), shape.roughness[0], shape.roughness[1], shape.roughness[2],
+        shape.roughness[3], shape.roughness[4], shape.roughness[5], shape.column_height,
+        shape.ground_slope_deg, shape.alone_share);
+  }
+}
+
+TEST(RealClouds, TurnedOrScaledEachStandIsNoticed) {
+  if (!fs::exists(data() / stands().front())) GTEST_SKIP();
+  for (const std::string& name : stands()) {
+    Log log;
+    const PointCloudFile cloud = read_cloud((data() / name).string(), log);
+    for (const UpAxis axis : kUpAxes) {
+      const auto found =
+          other_up_axis(shape_of(blocks_of(cloud, upright_from_cloud(axis).transpose())));
+      EXPECT_EQ(found.value_or(UpAxis::kZ), axis) << name << " with " << to_string(axis) << " up";
+    }
+    for (const double scale : {1000.0, 100.0})
+      EXPECT_NE(unit_complaint(shape_of(blocks_of(cloud, scale * Eigen::Matrix3d::Identity()))), "")
+          << name << " times " << scale;
+  }
+}
+
+TEST(RealClouds, ASliceInMillimetresIsNoticed) {
+  for (const char* name : {"fortls/diameters.laz"}) {
+    if (!fs::exists(data() / name)) GTEST_SKIP();
+    Log log;
+    const PointCloudFile cloud = read_cloud((data() / name).string(), log);
+    EXPECT_NE(unit_complaint(shape_of(blocks_of(cloud, 1000.0 * Eigen::Matrix3d::Identity()))), "")
+        << name;
+  }
+}
+
+}  // namespace
+}  // namespace understory
