@@ -107,6 +107,48 @@ def felled(folder):
     assert done.returncode == 3 and "felled.csv" in done.stderr and "line 2" in done.stderr, done
 
 
+def planted(seed, count=110, side=34.0):
+    """Another stand for each seed, with diameters."""
+    draw = random.Random(seed)
+    trees = []
+    while len(trees) < count:
+        tree = (draw.uniform(0, side), draw.uniform(0, side))
+        if all(math.dist(tree, other[:2]) > 1.3 for other in trees):
+            trees.append((*tree, draw.gauss(0.22, 0.05)))
+    return trees
+
+
+def write_measured(path, trees, with_diameters=True):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = "".join(f"{k + 1},{x:.4f},{y:.4f},0,{f'{d:.3f}' if with_diameters else ''},0.01,,,9,,\n"
+                   for k, (x, y, d) in enumerate(trees))
+    path.write_text(HEADER + rows)
+    return path
+
+
+@cases.case("maps of different stands are told from two of one")
+def other_stand(folder):
+    least, most = [], []
+    for seed in (1, 2):
+        trees = planted(seed)
+        draw = random.Random(100 + seed)
+        again = [(x + 0.2 + draw.gauss(0, 0.06), y - 0.1 + draw.gauss(0, 0.06), d + draw.gauss(0, 0.015))
+                 for x, y, d in trees if draw.random() > 0.25]
+        for diameters in (True, False):
+            a = write_measured(folder / "a.csv", trees, diameters)
+            for kind, others in (("one", again), ("two", planted(10 + seed))):
+                b = write_measured(folder / f"{kind}.csv", others, diameters)
+                for align in ((), ("--align",)):
+                    done = program("merge", a, b, *align, "-o", folder / "both", "--json")
+                    chance = json.loads(done.stdout)["chance"]
+                    assert done.returncode == (0 if kind == "one" else 4), (seed, kind, align, done)
+                    told = json.loads((folder / "both" / "run.json").read_text())
+                    assert told["status"] == ("complete" if kind == "one" else "untrusted"), told
+                    assert kind == "one" or "different stands" in done.stderr, done
+                    (least if kind == "one" else most).append(chance["sigmas"])
+    return f"{min(least):.1f} sigmas and more for one stand, {max(most):.1f} and less for two"
+
+
 @cases.case("agreement near a path")
 def agreement(folder):
     trees = stand()

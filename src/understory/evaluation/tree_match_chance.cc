@@ -1,0 +1,140 @@
+#include "understory/evaluation/tree_match_chance.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+
+#include "understory/evaluation/tree_errors.h"
+#include "understory/util/parallel.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kSearchedCopies = 3;
+constexpr std::size_t kShiftedCopies = 16;
+constexpr double kLeastSigmas = 5.0;
+constexpr double kLeastDiameterSigmas = 4.0;
+constexpr std::size_t kLeastPairs = 5;
+constexpr std::size_t kLeastDiameters = 8;
+
+double weight_of(const MergedTrees& merged, double radius_m) {
+  const double share = radius_m > 0.0 ? std::pow(merged.apart_m / radius_m, 2.0) : 0.0;
+  return static_cast<double>(merged.joined) * (1.0 - share);
+}
+
+// Shifted as a whole by more than a tree is looked for; what has no overlap any more is rare.
+std::vector<Tree> shifted(std::vector<Tree> trees, double reach_m, Random& random) {
+  const double angle = random.uniform(0.0, 2.0 * M_PI);
+  const double length = random.uniform(2.0, 5.0) * reach_m;
+  for (Tree& tree : trees) {
+    tree.x += length * std::cos(angle);
+    tree.y += length * std::sin(angle);
+  }
+  return trees;
+}
+
+// Seen in a mirror, which no motion undoes, and each tree beside its place.
+std::vector<Tree> scrambled(std::vector<Tree> trees, double most_m, Random& random) {
+  for (Tree& tree : trees) {
+    const double angle = random.uniform(0.0, 2.0 * M_PI);
+    const double length = most_m * std::sqrt(random.uniform(0.0, 1.0));
+    tree.x = -tree.x + length * std::cos(angle);
+    tree.y += length * std::sin(angle);
+  }
+  return trees;
+}
+
+void judge_copies(const std::vector<Tree>& s, const std::vector<Tree>& l, double weight,
+                  const TreeMergeConfig& config, bool searched, MatchChance& chance) {
+  constexpr std::uint64_t kSeed = 20'210'707;
+  std::vector<double> found(searched ? kSearchedCopies : kShiftedCopies,
+                            std::numeric_limits<double>::quiet_NaN());
+  parallel_for(found.size(), 1, [&](std::size_t k) {
+    Random random(kSeed, k);
+    std::vector<Tree> copy = searched ? scrambled(l, k == 0 ? 0.0 : 2.0 * config.reach_m, random)
+                                      : shifted(l, config.reach_m, random);
+    if (searched) {
+      const auto motion = align_trees(copy, s, Alignment::kYaw, config.reach_m);
+      if (!motion) return;
+      copy = moved(copy, *motion);
+    }
+    found[k] = weight_of(merge_trees(s, copy, weight, config), config.duplicate_m);
+  });
+  std::vector<double> weights;
+  std::copy_if(found.begin(), found.end(), std::back_inserter(weights),
+               [](double w) { return std::isfinite(w); });
+  chance.copies = static_cast<int>(weights.size());
+  if (weights.empty()) return;
+  const auto n = static_cast<double>(weights.size());
+  for (const double w : weights)
+    chance.chance_weight += w / n;
+  for (const double w : weights)
+    chance.chance_sd += std::pow(w - chance.chance_weight, 2.0);
+  chance.chance_sd = n > 1.0 ? std::sqrt(chance.chance_sd / (n - 1.0)) : 0.0;
+}
+
+void judge_diameters(const std::vector<Tree>& s, const std::vector<Tree>& l,
+                     const MergedTrees& merged, MatchChance& chance) {
+  std::vector<Eigen::Vector2d> pairs;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (std::size_t k = 0; k < merged.trees.size(); ++k) {
+    if (merged.index_in_s[k] < 0 || merged.index_in_l[k] < 0) continue;
+    const Eigen::Vector2d dbh(s[static_cast<std::size_t>(merged.index_in_s[k])].dbh_m,
+                              l[static_cast<std::size_t>(merged.index_in_l[k])].dbh_m);
+    if (!dbh.allFinite()) continue;
+    pairs.push_back(dbh);
+    mean += dbh;
+  }
+  chance.diameters = pairs.size();
+  chance.diameter_correlation = chance.diameter_sigmas = std::numeric_limits<double>::quiet_NaN();
+  if (pairs.size() < kLeastDiameters) return;
+  const auto n = static_cast<double>(pairs.size());
+  mean /= n;
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector2d& pair : pairs)
+    scatter += (pair - mean) * (pair - mean).transpose();
+  constexpr double kLeastSpreadM = 0.005;
+  if (scatter.diagonal().minCoeff() < n * kLeastSpreadM * kLeastSpreadM) return;
+  chance.diameter_correlation = scatter(0, 1) / std::sqrt(scatter(0, 0) * scatter(1, 1));
+  chance.diameter_sigmas =
+      std::atanh(std::clamp(chance.diameter_correlation, -0.999999, 0.999999)) * std::sqrt(n - 3.0);
+}
+
+}  // namespace
+
+MatchChance match_chance(const std::vector<Tree>& s, const std::vector<Tree>& l,
+                         const MergedTrees& merged, double weight, const TreeMergeConfig& config,
+                         bool searched) {
+  MatchChance chance;
+  chance.pairs = merged.joined;
+  chance.weight = weight_of(merged, config.duplicate_m);
+  if (merged.joined == 0) return chance;
+  judge_copies(s, l, weight, config, searched, chance);
+  chance.sigmas = (chance.weight - chance.chance_weight) /
+                  std::max({1.0, chance.chance_sd, std::sqrt(chance.chance_weight)});
+  judge_diameters(s, l, merged, chance);
+  chance.beyond_chance =
+      chance.pairs >= kLeastPairs &&
+      (chance.sigmas > kLeastSigmas || chance.diameter_sigmas > kLeastDiameterSigmas);
+  return chance;
+}
+
+std::string chance_complaint(const MatchChance& chance) {
+  if (chance.beyond_chance) return {};
+  std::string text = fmt::format(
+      "the {} trees found in both maps are no more than chance explains: their weight is {:.1f}, "
+      "and that of copies of the second map without its trees' places {:.1f} +- {:.1f}",
+      chance.pairs, chance.weight, chance.chance_weight, chance.chance_sd);
+  if (std::isfinite(chance.diameter_correlation))
+    text += fmt::format("; their diameters agree with a correlation of {:.2f}",
+                        chance.diameter_correlation);
+  return text + ". The maps may be of different stands";
+}
+
+}  // namespace understory

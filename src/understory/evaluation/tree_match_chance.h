@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "understory/evaluation/tree_merge.h"
+#include "understory/forest/tree.h"
+
+namespace understory {
+
+// Whether two tree maps that were merged show the same trees, or trees that lie near each other by
+// chance: in a stand of 1,000 trees per hectare most places have a tree within 1.5 m.
+struct MatchChance {
+  std::size_t pairs = 0;  // trees that were found in both
+  // Weight of the pairs: sum of 1 - d^2 / r^2, d their distance before they were joined, r the
+  // largest one.
+  double weight = 0.0;
+  // The same for copies of the second map that keep its density and its extent, but no place of a
+  // tree: mean and standard deviation over the copies.
+  int copies = 0;
+  double chance_weight = 0.0;
+  double chance_sd = 0.0;
+  double sigmas = 0.0;  // (weight - chance_weight) / max(chance_sd, sqrt(chance_weight), 1)
+  // Agreement of the diameters of the pairs that have both: correlation, and how many of its
+  // standard deviations it is from none (Fisher). NaN: fewer than eight pairs, or no spread.
+  std::size_t diameters = 0;
+  double diameter_correlation = 0.0;
+  double diameter_sigmas = 0.0;
+  bool beyond_chance = false;
+};
+
+// `s` and `l` as they are merged. `searched`: `l` was first laid on `s` by the trees alone
+// (align_trees by heading), so each copy is, too. Deterministic. Thresholds: docs/outputs.md.
+[[nodiscard]] MatchChance match_chance(const std::vector<Tree>& s, const std::vector<Tree>& l,
+                                       const MergedTrees& merged, double weight,
+                                       const TreeMergeConfig& config, bool searched);
+
+// Why the maps may be of different stands, in words for the user; empty if they are of one.
+[[nodiscard]] std::string chance_complaint(const MatchChance& chance);
+
+}  // namespace understory
