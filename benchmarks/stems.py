@@ -274,11 +274,11 @@ def loops_of(folder, truth_file):
 
     queries = [i for i in range(len(truth)) if any(near(i, j) for j in range(0, i - 49))]
     rows = [line.split(",") for line in (folder / "loops.csv").read_text().splitlines()[1:]]
-    found = {int(q): (int(m), float(s)) for q, m, s, _ in rows}
+    found = {int(q): (int(m), float(s)) for q, m, s, *_ in rows}
     right = {q for q, (m, _) in found.items() if near(q, m) and q - m >= 50}
     wrong = [s for q, (m, s) in found.items() if q not in right]
     over = [q for q in queries if q in right and found[q][1] > max(wrong, default=-1.0)]
-    accepted = [(int(q), int(m)) for q, m, _, a in rows if a == "1"]
+    accepted = [(int(q), int(m)) for q, m, _, a, *_ in rows if a == "1"]
     return {"queries": len(queries), "recall": sum(q in right for q in queries) / len(queries),
             "recall_full_precision": len(over) / len(queries), "accepted": len(accepted),
             "accepted_right": sum(near(q, m) for q, m in accepted)}

@@ -25,6 +25,7 @@ class Page(HTMLParser):
     def __init__(self, text):
         super().__init__(convert_charrefs=True)
         self.open, self.headings, self.tiles, self.tables = [], [], {}, []
+        self.boxes = []  # classes of the open divs
         self.references, self.ids, self.kept, self.words = [], [], "", ""
         self.feed(text)
         self.close()
@@ -37,7 +38,11 @@ class Page(HTMLParser):
         self.look_at(tag, attributes)
         if tag in VOID:
             return
+        if tag == "div":
+            self.boxes.append(dict(attributes).get("class", ""))
         if tag == "table":
+            # On a narrow screen it scrolls in its own box, not the page.
+            assert self.boxes and self.boxes[-1] in ("wide", "scroll"), self.boxes
             self.tables.append([])
         elif tag == "tr":
             self.tables[-1].append([])
@@ -57,6 +62,8 @@ class Page(HTMLParser):
     def handle_endtag(self, tag):
         assert self.open and self.open[-1] == tag, f"</{tag}> within {self.open}"
         self.open.pop()
+        if tag == "div":
+            self.boxes.pop()
         if tag in ("h1", "h2"):
             self.headings.append(self.kept)
         elif tag == "b" and self.open[-1] == "div":

@@ -26,7 +26,7 @@ struct ReportScan {
   bool weak = false;  // gated, unmatched or degenerate: position is mostly a prediction
 };
 
-// A loop that was tried.
+// A loop that was tried: its two views were matched.
 struct ReportLoop {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();
   Eigen::Vector3d to = Eigen::Vector3d::Zero();
@@ -111,6 +111,7 @@ struct ReportInput {
   std::vector<ReportFix> fixes;
   double sensor_period_ms = 0.0;  // 0: unknown
   std::vector<ReportLoop> loops;
+  std::size_t loops_not_listed = 0;  // views that look like an earlier place, and matching refuted
   bool loop_closure_enabled = true;
   std::optional<ReportCorrection> correction;
   std::optional<ReportTruth> truth;

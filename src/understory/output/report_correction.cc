@@ -20,7 +20,8 @@ std::string correction_section(const ReportInput& input) {
           static_cast<double>(std::max<std::size_t>(1, input.scans.size())),
       escape_html(correction.ended));
   html +=
-      "<table><thead><tr><th></th><th class=\"n\">before</th><th class=\"n\">after</th></tr>"
+      "<div class=\"wide\"><table><thead><tr><th></th><th class=\"n\">before</th><th "
+      "class=\"n\">after</th></tr>"
       "</thead><tbody>";
   for (const ReportCorrection::Figure& figure : correction.figures) {
     html += fmt::format(
@@ -28,7 +29,7 @@ std::string correction_section(const ReportInput& input) {
         "</tr>",
         escape_html(figure.name), figure.before, figure.digits, figure.after, figure.digits);
   }
-  html += "</tbody></table>";
+  html += "</tbody></table></div>";
   html += correction_figures(correction);
   if (correction.pairs.empty() && correction.kept.empty() && correction.tried.empty())
     return html + "</section>\n";

@@ -221,22 +221,23 @@ std::string made_section(const ReportInput& input) {
       duration_text(s.cpu_s), s.peak_memory_mb);
   if (!s.inputs.empty()) {
     html +=
-        "<h3>Inputs</h3><table><tr><th>file</th><th class=\"n\">bytes</th><th>SHA-256</th></tr>";
+        "<h3>Inputs</h3><div class=\"wide\"><table><tr><th>file</th><th "
+        "class=\"n\">bytes</th><th>SHA-256</th></tr>";
     for (const InputHash& file : s.inputs) {
       html += fmt::format("<tr><td>{}</td><td class=\"n\">{}</td><td><code>{}</code></td></tr>",
                           escape_html(file.file), count_text(file.bytes), file.sha256);
     }
-    html += "</table>";
+    html += "</table></div>";
   }
   const auto listed = [&](const char* title, const std::map<std::string, Figure>& figures) {
     if (figures.empty()) return;
-    html += fmt::format("<h3>{}</h3><table>", title);
+    html += fmt::format("<h3>{}</h3><div class=\"wide\"><table>", title);
     for (const auto& [name, value] : figures) {
       const std::string text =
           std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
       html += "<tr><td>" + escape_html(name) + "</td><td>" + escape_html(text) + "</td></tr>";
     }
-    html += "</table>";
+    html += "</table></div>";
   };
   listed("Counts", s.counts);
   listed("Quality figures", s.quality);

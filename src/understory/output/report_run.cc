@@ -67,6 +67,26 @@ Series thinned_with_gaps(const Series& series) {
   return result;
 }
 
+// What was looked at, what the table below holds, and what came of it.
+std::string loop_counts(const ReportInput& input) {
+  const auto accepted = static_cast<std::size_t>(std::count_if(
+      input.loops.begin(), input.loops.end(), [](const ReportLoop& l) { return l.accepted; }));
+  const std::size_t rejected = input.loops.size() - accepted;
+  if (input.loops.empty() && input.loops_not_listed == 0) return {};
+  if (input.loops_not_listed == 0)
+    return fmt::format(
+        "<p>{} {} tried (the table below): {} closed, {} rejected as not certain.</p>",
+        input.loops.size(), input.loops.size() == 1 ? "loop was" : "loops were", accepted,
+        rejected);
+  return fmt::format(
+      "<p>{} views look like an earlier place. Matching their stems confirmed {} of them (the "
+      "table "
+      "below): {} closed, {} rejected because they contradict the others. The other {} were no "
+      "loops; loops.csv lists them with verified 0.</p>",
+      input.loops.size() + input.loops_not_listed, input.loops.size(), accepted, rejected,
+      input.loops_not_listed);
+}
+
 }  // namespace
 
 std::string matching_section(const ReportInput& input) {
@@ -116,10 +136,7 @@ std::string loops_section(const ReportInput& input) {
   if (input.scans.empty()) return "";
   std::string html = "<section><h2>Places seen again</h2>";
   if (!input.loop_closure_enabled) return html + "<p>Loop closure was off.</p></section>\n";
-  const auto accepted = static_cast<std::size_t>(std::count_if(
-      input.loops.begin(), input.loops.end(), [](const ReportLoop& l) { return l.accepted; }));
-  html += fmt::format("<p>{} of {} tried loops were closed; {} were rejected as not certain.</p>",
-                      accepted, input.loops.size(), input.loops.size() - accepted);
+  html += loop_counts(input);
   if (input.loops.empty()) {
     return html +
            "<p>The path did not come back to a place that it had seen long before, or not "
@@ -149,7 +166,8 @@ std::string loops_section(const ReportInput& input) {
   }
   html += "</tbody></table></div>";
   if (shown < input.loops.size()) {
-    html += fmt::format("<p class=\"sub\">The first {} are shown.</p>", shown);
+    html += fmt::format("<p class=\"sub\">The first {} of {} are shown.</p>", shown,
+                        input.loops.size());
   }
   return html + "</section>\n";
 }
@@ -157,7 +175,7 @@ std::string loops_section(const ReportInput& input) {
 std::string truth_section(const ReportInput& input) {
   if (!input.truth) return "";
   const ReportTruth& truth = *input.truth;
-  std::string html = "<section><h2>Errors against the known truth</h2><table>";
+  std::string html = "<section><h2>Errors against the known truth</h2><div class=\"wide\"><table>";
   const auto row = [&](const std::string& name, const std::string& value) {
     html += "<tr><td>" + escape_html(name) + "</td><td class=\"n\">" + escape_html(value) +
             "</td></tr>";
@@ -174,7 +192,7 @@ std::string truth_section(const ReportInput& input) {
   }
   for (const auto& [name, value] : truth.more)
     row(name, value);
-  html += "</table>";
+  html += "</table></div>";
   if (!truth.ape_over_time.empty()) {
     const TimeAxis axis = time_axis(input);
     Plot plot;
@@ -211,7 +229,8 @@ std::string time_section(const ReportInput& input) {
   }
   if (!input.summary.stages.empty()) {
     html +=
-        "<h3>Stages</h3><table><tr><th>stage</th><th class=\"n\">runs</th><th class=\"n\">mean, "
+        "<h3>Stages</h3><div class=\"wide\"><table><tr><th>stage</th><th class=\"n\">runs</th><th "
+        "class=\"n\">mean, "
         "ms</th><th class=\"n\">half under, ms</th><th class=\"n\">99 % under, ms</th><th "
         "class=\"n\">longest, ms</th><th class=\"n\">CPU mean, ms</th><th class=\"n\">all, s</th>"
         "</tr>";
@@ -225,7 +244,7 @@ std::string time_section(const ReportInput& input) {
           escape_html(name), wall.count, wall.mean, wall.p50, wall.p99, wall.max, stage.cpu_ms.mean,
           stage.total_wall_s);
     }
-    html += "</table>";
+    html += "</table></div>";
   }
   return html.empty() ? "" : "<section><h2>Time</h2>" + html + "</section>\n";
 }

@@ -9,7 +9,7 @@ std::string report_style() {
 @media (prefers-color-scheme:dark){:root{--bg:#151816;--card:#1e2320;--text:#e6ebe7;--soft:#9aa8a0;
 --rule:#38413b;--line:#6db1e2;--good:#5cb584;--fair:#e0a94a;--bad:#ee7b6f}}
 @media print{:root{--bg:#fff;--card:#fff;--text:#000;--soft:#444;--rule:#bbb}
-section{break-inside:avoid}.scroll{max-height:none!important;overflow:visible!important}}
+section{break-inside:avoid}.scroll,.wide{max-height:none!important;overflow:visible!important}}
 *{box-sizing:border-box}
 body{margin:0;background:var(--bg);color:var(--text);font:16px/1.5 system-ui,sans-serif}
 main{max-width:1180px;margin:0 auto;padding:24px 20px 60px}
@@ -30,8 +30,8 @@ svg.plot{max-width:1100px}svg.plot text{fill:var(--soft);font-size:12px}
 .grid{stroke:var(--rule);stroke-width:1}.axis{stroke:var(--soft);stroke-width:1;fill:none}
 .line{fill:none;stroke-width:1.4}.level{stroke:var(--bad);stroke-width:1.2;stroke-dasharray:6 4}
 .bar{fill:var(--good)}
-.two{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:16px;align-items:start}
-.two figure{max-width:620px}.panels{display:grid;grid-template-columns:repeat(auto-fit,minmax(430px,1fr));gap:14px}
+.two{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(420px,100%),1fr));gap:16px;align-items:start}
+.two figure{max-width:620px}.panels{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(430px,100%),1fr));gap:14px}
 .panels.one{grid-template-columns:minmax(0,900px)}
 .trees{display:flex;flex-wrap:wrap;gap:14px}.trees figure{width:165px}.trees.matrices figure{width:350px;max-width:100%}
 figure{margin:0}figcaption{font-size:.85rem;color:var(--soft);margin-top:4px}
@@ -43,8 +43,11 @@ table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums
 th,td{text-align:left;padding:3px 14px 3px 0;border-bottom:1px solid var(--rule);vertical-align:top}
 th.n,td.n{text-align:right}table.sort th{cursor:pointer;white-space:nowrap;position:sticky;top:0;background:var(--card)}
 table.sort th:hover{color:var(--line)}
-.scroll{max-height:460px;overflow:auto}code{font-size:.85em;overflow-wrap:anywhere}
+.scroll{max-height:460px;overflow:auto}.wide{overflow-x:auto}code{font-size:.85em;overflow-wrap:anywhere}
 pre{overflow:auto;font-size:.82rem;max-height:480px}
+@media (max-width:640px){main{padding:12px 8px 40px}section{padding:12px}
+.wide svg.plot{min-width:600px}.tiles{grid-template-columns:repeat(auto-fit,minmax(130px,1fr))}.tile b{white-space:normal}}
+li,p,td,summary,figcaption{overflow-wrap:anywhere}.wide td,.wide th,.scroll td{overflow-wrap:normal}
 .warn{margin:0;padding-left:1.2rem}.so{color:var(--soft)}
 summary{cursor:pointer;font-weight:600}
 )";

@@ -185,7 +185,9 @@ std::vector<std::pair<double, double>> thinned_series(
 
 std::string svg_plot(const Plot& plot) {
   const Frame frame = frame_of(plot);
-  std::string svg = opened(plot.width, plot.height, plot.y_label + " over " + plot.x_label);
+  // In a box of its own: on a narrow screen the plot keeps a size at which it can be read.
+  std::string svg = "<div class=\"wide\">" +
+                    opened(plot.width, plot.height, plot.y_label + " over " + plot.x_label);
   svg += axes(frame, plot.x_label, plot.y_label);
   for (const PlotSeries& series : plot.series)
     svg += drawn(series, frame);
@@ -203,7 +205,7 @@ std::string svg_plot(const Plot& plot) {
     svg += text_at(x + 18, kTop + 9, "start", series.name);
     x += 36.0 + 6.6 * static_cast<double>(series.name.size());
   }
-  return svg + "</svg>";
+  return svg + "</svg></div>";
 }
 
 std::string svg_histogram(const Histogram& histogram) {

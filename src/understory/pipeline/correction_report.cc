@@ -86,7 +86,10 @@ ReportInput correction_report(const CorrectionRequest& request, const Correction
   }
   for (std::size_t k = 0; k < run.correction.loops.size(); ++k) {
     const StemLoop& found = run.correction.loops[k];
-    if (!found.verified) continue;
+    if (!found.verified) {
+      ++report.loops_not_listed;
+      continue;
+    }
     const auto query = static_cast<std::size_t>(found.query);
     const auto match = static_cast<std::size_t>(found.match);
     ReportLoop loop;

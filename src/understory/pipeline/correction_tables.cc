@@ -55,13 +55,13 @@ void write_steps(const fs::path& path, const CorrectionRun& run) {
 // A row per view for which an earlier place was found, by the views' frame numbers.
 void write_loops(const fs::path& path, const CorrectionRun& run) {
   AtomicTextFile file(path);
-  file.write("query,match,score,accepted\n");
+  file.write("query,match,score,accepted,verified\n");
   for (std::size_t k = 0; k < run.correction.loops.size(); ++k) {
     const StemLoop& loop = run.correction.loops[k];
-    file.write(fmt::format("{},{},{:.4f},{}\n",
+    file.write(fmt::format("{},{},{:.4f},{},{}\n",
                            run.views[static_cast<std::size_t>(loop.query)].frame,
                            run.views[static_cast<std::size_t>(loop.match)].frame, loop.score,
-                           run.correction.accepted[k] != 0 ? 1 : 0));
+                           run.correction.accepted[k] != 0 ? 1 : 0, loop.verified ? 1 : 0));
   }
   file.commit();
 }
