@@ -63,7 +63,9 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
     request.start = {options.start[0], options.start[1], options.start[2]};
   const GeoreferenceOutcome outcome = run_georeferencing(request, context.log);
   if (!options.json) return report_outcome(outcome);
-  nlohmann::ordered_json json{{"status", to_string(outcome.status)}, {"method", options.method}};
+  nlohmann::ordered_json json{{"status", to_string(outcome.status)},
+                              {"reasons", outcome.reasons},
+                              {"method", options.method}};
   for (const auto& [name, figure] : outcome.figures)
     std::visit([&, &key = name](const auto& value) { json[key] = value; }, figure);
   return report_outcome(json.dump(2), outcome.status, outcome.reasons);

@@ -7,9 +7,13 @@
 #include <system_error>
 
 #include "understory/cli/command.h"
+#include "understory/cli/inventory_cloud.h"
+#include "understory/cli/outcome.h"
+#include "understory/cli/suggestion.h"
 #include "understory/forest/inventory.h"
 #include "understory/output/inventory_files.h"
 #include "understory/output/report.h"
+#include "understory/pipeline/inherited_trust.h"
 #include "understory/pipeline/lidar_view.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/recording/cloud_file.h"
@@ -29,33 +33,14 @@ struct InventoryOptions {
   std::vector<std::string> settings;
   bool print_config = false;
   bool overwrite = false;
+  CloudFrame frame;
 };
 
 // The cloud itself, or the map of a run.
 fs::path cloud_of(const std::string& given) {
+  refuse_recording(given);
   fs::path path(given);
-  if (!fs::is_directory(path)) return path;
-  fs::path map = path / "map.laz";
-  if (!fs::exists(map)) {
-    throw InputError(given, "", "expected a point cloud, or a run folder with a map.laz in it");
-  }
-  return map;
-}
-
-PointBlocks blocks_of(const PointCloudFile& cloud) {
-  return [&cloud](const PointVisitor& visit) {
-    constexpr std::size_t kBlock = 65'536;
-    std::vector<Eigen::Vector3d> block;
-    block.reserve(kBlock);
-    for (const Eigen::Vector3f& point : cloud.points) {
-      block.push_back(cloud.origin + point.cast<double>());
-      if (block.size() == kBlock) {
-        visit(block);
-        block.clear();
-      }
-    }
-    if (!block.empty()) visit(block);
-  };
+  return fs::is_directory(path) ? path / "map.laz" : path;
 }
 
 // What the user has to know before using the numbers.
@@ -94,8 +79,78 @@ RunSummary summary_of(const InventoryResult& inventory, const std::string& confi
   return summary;
 }
 
+// A finished inventory and what it was made from.
+struct Stock {
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+  fs::path path;  // of the cloud
+  bool of_run = false;
+  StandCloud stand;
+  InventoryResult inventory;
+  MapPicture picture;
+  StageTimes times;
+
+  [[nodiscard]] double elapsed_s() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+};
+
+void take_stock(const InventoryOptions& options, const InventoryConfig& config,
+                const fs::path& results, CommandContext& context, Stock& stock) {
+  {
+    const ScopedTimer timer(stock.times, "reading");
+    stock.stand = read_stand(stock.path, options.frame, context.log);
+  }
+  // The map of a run is in metres, and what is wrong with it is a matter of trust.
+  if (!stock.stand.doubt.empty() && !stock.of_run)
+    throw InputError(stock.path.string(), "", "expected metres and z up: " + stock.stand.doubt);
+  const PointBlocks blocks = blocks_of(stock.stand.cloud);
+  {
+    const ScopedTimer timer(stock.times, "inventory");
+    stock.inventory = take_inventory(blocks, config, context.progress,
+                                     stock.of_run ? seen_in_run(options.cloud) : SeenTest());
+  }
+  const ScopedTimer timer(stock.times, "writing");
+  blocks([&](std::span<const Eigen::Vector3d> points) {
+    add_to_picture(stock.picture, points, stock.inventory.ground);
+  });
+  write_inventory_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
+}
+
+// report.html and run.json.
+RunSummary report_on(const InventoryOptions& options, const std::string& config,
+                     const fs::path& results, const Stock& stock, Log& log) {
+  const InventoryResult& inventory = stock.inventory;
+  const PointCloudFile& cloud = stock.stand.cloud;
+  RunSummary summary = summary_of(inventory, config, cloud.coordinate_system, log);
+  summary.inputs.push_back(hash_input(stock.path));
+  if (!stock.stand.doubt.empty())
+    inherit({RunStatus::kUntrusted, {stock.stand.doubt}}, summary.status, summary.reasons);
+  inherit(trust_of_run(options.cloud, true), summary.status, summary.reasons);
+  for (const std::string& remark : inventory.remarks)
+    log.info(remark);
+  summary.warnings = log.warnings();
+  summary.stages = summarise(stock.times);
+  summary.wall_s = stock.elapsed_s();
+  summary.cpu_s = process_cpu_seconds();
+  summary.peak_memory_mb = peak_memory_mb();
+  ReportInput report;
+  report.title = stock.path.filename().string();
+  report.made_from =
+      fmt::format("Inventory of a point cloud: {}, {} points", cloud.format, inventory.points);
+  report.summary = summary;
+  report.picture = &stock.picture;
+  report.inventory = &inventory;
+  report.north_is_up = !cloud.coordinate_system.empty();
+  write_report(results / "report.html", report);
+  for (const std::string& remark : inventory.remarks)
+    summary.warnings.push_back({"inventory", remark, 1});
+  summary.wall_s = stock.elapsed_s();  // all of it, the report too
+  write_run_json(results / "run.json", summary);
+  return summary;
+}
+
 int run_inventory(const InventoryOptions& options, CommandContext& context) {
-  const auto start = std::chrono::steady_clock::now();
+  Stock stock;
   InventoryConfig config;
   ConfigTable table;
   describe(table, config);
@@ -108,61 +163,19 @@ int run_inventory(const InventoryOptions& options, CommandContext& context) {
   if (options.cloud.empty() || options.folder.empty()) {
     throw ConfigError({"inventory needs a cloud (or run folder) and -o DIR; see --help"});
   }
-  const fs::path path = cloud_of(options.cloud);
-  refuse_input_as_output(options.folder, {options.cloud, path, options.config_file});
+  stock.path = cloud_of(options.cloud);
+  stock.of_run = stock.path != fs::path(options.cloud);
+  refuse_input_as_output(options.folder, {options.cloud, stock.path, options.config_file});
   const RunFolder place = RunFolder::claim(options.folder, options.overwrite);
   const fs::path folder = place.begin_results();
-  StageTimes times;
-  PointCloudFile cloud;
-  {
-    const ScopedTimer timer(times, "reading");
-    cloud = read_cloud(path.string(), context.log);
-  }
-  const PointBlocks blocks = blocks_of(cloud);
-  InventoryResult inventory;
-  {
-    const ScopedTimer timer(times, "inventory");
-    const SeenTest in_view =
-        path == fs::path(options.cloud) ? SeenTest() : seen_in_run(options.cloud);
-    inventory = take_inventory(blocks, config, context.progress, in_view);
-  }
-  MapPicture picture;
-  {
-    const ScopedTimer timer(times, "writing");
-    blocks([&](std::span<const Eigen::Vector3d> points) {
-      add_to_picture(picture, points, inventory.ground);
-    });
-    write_inventory_files(folder, inventory, cloud.coordinate_system);
-  }
-  RunSummary summary =
-      summary_of(inventory, table.to_yaml(false), cloud.coordinate_system, context.log);
-  summary.inputs.push_back(hash_input(path));
-  for (const std::string& remark : inventory.remarks)
-    context.log.info(remark);
-  summary.warnings = context.log.warnings();
-  summary.stages = summarise(times);
-  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  summary.cpu_s = process_cpu_seconds();
-  summary.peak_memory_mb = peak_memory_mb();
-  ReportInput report;
-  report.title = path.filename().string();
-  report.made_from =
-      fmt::format("Inventory of a point cloud: {}, {} points", cloud.format, inventory.points);
-  report.summary = summary;
-  report.picture = &picture;
-  report.inventory = &inventory;
-  report.north_is_up = !cloud.coordinate_system.empty();
-  write_report(folder / "report.html", report);
-  for (const std::string& remark : inventory.remarks)
-    summary.warnings.push_back({"inventory", remark, 1});
-  write_run_json(folder / "run.json", summary);
+  take_stock(options, config, folder, context, stock);
+  const RunSummary summary = report_on(options, table.to_yaml(false), folder, stock, context.log);
   place.commit(context.log);
   place.forget_state();
-  std::printf("%zu trees on %.2f ha; see %s\n", inventory.trees.size(), inventory.area_m2 / 1e4,
-              (place.path() / "report.html").string().c_str());
-  for (const std::string& reason : summary.reasons)
-    std::fprintf(stderr, "%s: %s\n", to_string(summary.status).c_str(), reason.c_str());
-  return summary.status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
+  return report_outcome(
+      fmt::format("{} trees on {:.2f} ha; see {}", stock.inventory.trees.size(),
+                  stock.inventory.area_m2 / 1e4, (place.path() / "report.html").string()),
+      summary.status, summary.reasons);
 }
 
 }  // namespace
@@ -176,6 +189,7 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_option("-o,--output", options->folder, "Folder for the results");
   command->add_option("--config", options->config_file, "YAML file with settings");
   command->add_option("--set", options->settings, "key=value, may be repeated");
+  add_cloud_frame_options(*command, options->frame);
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
   command->add_flag("--overwrite", options->overwrite, kOverwriteMeaning);
   command->footer(

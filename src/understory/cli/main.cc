@@ -1,11 +1,14 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <new>
 #include <string>
+#include <vector>
 
 #include "understory/cli/command.h"
+#include "understory/cli/suggestion.h"
 #include "understory/cli/terminal.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
@@ -53,6 +56,27 @@ void check_finite(const CLI::App& command) {
     check_finite(*chosen);
 }
 
+// The parser only says that a command is missing. Empty if one is named or none is tried.
+std::string unknown_command(const CLI::App& app, int argc, char** argv) {
+  for (int k = 1; k < argc; ++k) {
+    const std::string word = argv[k];
+    if (word == "--threads") ++k;  // and its value
+    if (word.empty() || word.front() == '-') continue;
+    std::vector<std::string> names;
+    for (const CLI::App* command : app.get_subcommands({}))
+      names.push_back(command->get_name());
+    if (std::find(names.begin(), names.end(), word) != names.end()) return {};
+    const std::string meant = nearest_word(word, names);
+    std::string list;
+    for (const std::string& name : names)
+      list += (list.empty() ? "" : ", ") + name;
+    return "there is no command '" + word + "'" +
+           (meant.empty() ? "; the commands are: " + list : "; did you mean '" + meant + "'?") +
+           " (understory --help)";
+  }
+  return {};
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Lidar SLAM and tree mapping under the forest canopy", "understory"};
   app.set_version_flag("--version", kVersion);
@@ -78,6 +102,8 @@ int run(int argc, char** argv) {
   add_evaluate_command(app, chosen);
   add_merge_command(app, chosen);
   add_georeference_command(app, chosen);
+  if (const std::string complaint = unknown_command(app, argc, argv); !complaint.empty())
+    return complain(kExitUsage, complaint);
   try {
     app.parse(argc, argv);
     check_finite(app);

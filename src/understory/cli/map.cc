@@ -6,6 +6,7 @@
 #include "understory/cli/map_sparse.h"
 #include "understory/cli/open_options.h"
 #include "understory/cli/outcome.h"
+#include "understory/cli/suggestion.h"
 #include "understory/pipeline/adaptation.h"
 #include "understory/pipeline/mapping.h"
 #include "understory/pipeline/run_folder.h"
@@ -102,6 +103,7 @@ int resume(const MapOptions& options, CommandContext& context) {
 
 int run_map(const MapOptions& options, CommandContext& context) {
   if (!options.resume.empty()) return resume(options, context);
+  refuse_cloud(options.recording);
   if (options.front_end == "sparse") return run_sparse(options, context);
   ReadConfig<MappingConfig> read =
       read_mapping_config(options.profile, options.config_file, options.settings);

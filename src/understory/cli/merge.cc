@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
-#include <cstdio>
+#include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -9,11 +10,14 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/file_in_folder.h"
+#include "understory/cli/outcome.h"
 #include "understory/evaluation/tree_errors.h"
 #include "understory/evaluation/tree_falls.h"
+#include "understory/evaluation/tree_match_chance.h"
 #include "understory/evaluation/tree_merge.h"
 #include "understory/output/run_summary.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/inherited_trust.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/util/atomic_file.h"
 #include "understory/util/error.h"
@@ -84,63 +88,125 @@ std::vector<TreeFall> falls_in(const std::string& map) {
   return fs::exists(file) ? read_tree_falls(file) : std::vector<TreeFall>();
 }
 
-// What the folder has to say of itself.
-void write_summary(const fs::path& path, const MergeOptions& options, const MergedTrees& merged,
-                   const DeformationField& field, const Log& log) {
+// What two maps came to.
+struct Merge {
+  std::vector<Tree> s;
+  std::vector<Tree> l;  // beside s
+  DeformationField field;
+  MergedTrees merged;
+  std::vector<TreeFall> falls;
+  std::optional<BestWeight> best;
+  MatchChance chance;
+};
+
+Merge merge_maps(const MergeOptions& options) {
+  Merge m;
+  m.s = read_trees(file_in_folder(options.s, "trees.csv"));
+  m.l = beside(options.l, m.s, options);
+  m.field = deformation_field(m.l, m.s, options.merge);
+  m.merged = merge_trees(m.s, m.l, options.weight, options.merge);
+  m.falls = merged_falls(m.merged, m.s, falls_in(options.s), m.l, falls_in(options.l));
+  if (!options.reference.empty())
+    m.best = best_weight(m.s, m.l, beside(options.reference, m.s, options), options.merge);
+  m.chance = match_chance(m.s, m.l, m.merged, options.weight, options.merge, options.align);
+  return m;
+}
+
+nlohmann::ordered_json to_json(const Merge& m, const MergeOptions& options,
+                               const RunSummary& summary) {
+  nlohmann::ordered_json json{{"status", to_string(summary.status)},
+                              {"reasons", summary.reasons},
+                              {"trees_a", m.s.size()},
+                              {"trees_b", m.l.size()},
+                              {"trees", m.merged.trees.size()},
+                              {"joined", m.merged.joined},
+                              {"apart_m", m.merged.apart_m},
+                              {"deformation_m", m.field.mean_m},
+                              {"felled", m.falls.size()},
+                              {"weight", options.weight}};
+  json["chance"] = {{"weight", m.chance.weight},
+                    {"chance_weight", m.chance.chance_weight},
+                    {"chance_sd", m.chance.chance_sd},
+                    {"sigmas", m.chance.sigmas},
+                    {"copies", m.chance.copies},
+                    {"diameters", m.chance.diameters},
+                    {"diameter_correlation", m.chance.diameter_correlation},
+                    {"diameter_sigmas", m.chance.diameter_sigmas}};
+  if (m.best) json["best"] = {{"weight", m.best->weight}, {"position_rmse_m", m.best->rmse_m}};
+  return json;
+}
+
+std::string to_text(const Merge& m) {
+  std::string text = fmt::format(
+      "{} trees of {} and {}, {} seen in both ({:.3f} m apart once moved; {:.3f} m before)\n",
+      m.merged.trees.size(), m.s.size(), m.l.size(), m.merged.joined, m.merged.apart_m,
+      m.field.mean_m);
+  if (m.merged.joined > 0)
+    text += fmt::format("weight of these pairs {:.1f}; of pairs by chance {:.1f} +- {:.1f}\n",
+                        m.chance.weight, m.chance.chance_weight, m.chance.chance_sd);
+  if (std::isfinite(m.chance.diameter_correlation))
+    text += fmt::format("diameters of {} pairs agree with a correlation of {:.2f}\n",
+                        m.chance.diameters, m.chance.diameter_correlation);
+  if (m.best)
+    text += fmt::format("nearest to the reference with a weight of {:.2f}: {:.3f} m\n",
+                        m.best->weight, m.best->rmse_m);
+  return text;
+}
+
+// run.json, so that whoever goes on from the merged map knows what it is worth.
+RunSummary summary_of(const Merge& m, const MergeOptions& options, const Log& log) {
   RunSummary summary;
   summary.command = "merge";
   summary.version = kVersion;
-  summary.config_yaml = fmt::format("weight: {}\nalign: {}\n", options.weight, options.align);
-  for (const std::string& map : {options.s, options.l})
-    summary.inputs.push_back(hash_input(file_in_folder(map, "trees.csv")));
-  if (merged.joined == 0) {
+  if (m.merged.joined == 0) {
     summary.status = RunStatus::kUntrusted;
-    summary.reasons.emplace_back("no tree of one map lies near one of the other");
+    summary.reasons.emplace_back(
+        "no tree of one map lies near one of the other: they may have different world frames "
+        "(--align)");
+  } else if (const std::string complaint = chance_complaint(m.chance); !complaint.empty()) {
+    summary.status = RunStatus::kUntrusted;
+    summary.reasons.push_back(complaint);
+  }
+  for (const std::string& map : {options.l, options.s}) {
+    inherit(trust_of_run(map), summary.status, summary.reasons);
+    summary.inputs.insert(summary.inputs.begin(), hash_input(file_in_folder(map, "trees.csv")));
   }
   summary.warnings = log.warnings();
-  summary.counts["trees"] = static_cast<std::int64_t>(merged.trees.size());
-  summary.counts["joined"] = static_cast<std::int64_t>(merged.joined);
-  summary.quality["apart_m"] = merged.apart_m;
-  summary.quality["deformation_m"] = field.mean_m;
-  write_run_json(path, summary);
+  summary.config_yaml = fmt::format(
+      "weight: {}\nalign: {}\nreach_m: {}\nduplicate_m: {}\nsmoothing: {}\n", options.weight,
+      options.align, options.merge.reach_m, options.merge.duplicate_m, options.merge.smoothing);
+  summary.counts["trees"] = static_cast<std::int64_t>(m.merged.trees.size());
+  summary.counts["trees_seen_in_both"] = static_cast<std::int64_t>(m.merged.joined);
+  summary.counts["trees_felled"] = static_cast<std::int64_t>(m.falls.size());
+  summary.quality["apart_m"] = m.merged.apart_m;
+  summary.quality["deformation_m"] = m.field.mean_m;
+  summary.quality["pair_weight"] = m.chance.weight;
+  summary.quality["pair_weight_by_chance"] = m.chance.chance_weight;
+  summary.quality["pair_weight_by_chance_sd"] = m.chance.chance_sd;
+  summary.quality["diameter_correlation"] = m.chance.diameter_correlation;
+  summary.cpu_s = process_cpu_seconds();
+  summary.peak_memory_mb = peak_memory_mb();
+  return summary;
 }
 
 int merge(const MergeOptions& options, CommandContext& context) {
+  const auto start = std::chrono::steady_clock::now();
   refuse_input_as_output(options.folder, {options.s, options.l, options.reference});
   const RunFolder place = RunFolder::claim(options.folder, options.overwrite);
-  const std::vector<Tree> s = read_trees(file_in_folder(options.s, "trees.csv"));
-  const std::vector<Tree> l = beside(options.l, s, options);
-  const DeformationField field = deformation_field(l, s, options.merge);
-  const MergedTrees merged = merge_trees(s, l, options.weight, options.merge);
-  const std::vector<TreeFall> falls =
-      merged_falls(merged, s, falls_in(options.s), l, falls_in(options.l));
-  std::optional<BestWeight> best;
-  if (!options.reference.empty())
-    best = best_weight(s, l, beside(options.reference, s, options), options.merge);
-  if (merged.joined == 0)
-    context.log.warn("merge",
-                     "no tree of one map lies near one of the other: they may have "
-                     "different world frames (--align)");
+  const Merge m = merge_maps(options);
+  RunSummary summary = summary_of(m, options, context.log);
   const fs::path results = place.begin_results();
-  write_trees_csv(results / "trees.csv", merged.trees);
-  write_tree_falls(results / "felled.csv", falls);
-  write_field(results / "deformation.csv", l, field);
-  write_summary(results / "run.json", options, merged, field, context.log);
+  write_trees_csv(results / "trees.csv", m.merged.trees);
+  write_tree_falls(results / "felled.csv", m.falls);
+  write_field(results / "deformation.csv", m.l, m.field);
+  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  write_run_json(results / "run.json", summary);
   place.commit(context.log);
   place.forget_state();
-  nlohmann::ordered_json json{{"trees_a", s.size()},          {"trees_b", l.size()},
-                              {"trees", merged.trees.size()}, {"joined", merged.joined},
-                              {"apart_m", merged.apart_m},    {"deformation_m", field.mean_m},
-                              {"felled", falls.size()},       {"weight", options.weight}};
-  if (best) json["best"] = {{"weight", best->weight}, {"position_rmse_m", best->rmse_m}};
-  std::string text = fmt::format(
-      "{} trees of {} and {}, {} seen in both ({:.3f} m apart once moved; {:.3f} m before)\n",
-      merged.trees.size(), s.size(), l.size(), merged.joined, merged.apart_m, field.mean_m);
-  if (best)
-    text += fmt::format("nearest to the reference with a weight of {:.2f}: {:.3f} m\n",
-                        best->weight, best->rmse_m);
-  std::fputs((options.json ? json.dump(2) + "\n" : text).c_str(), stdout);
-  return merged.joined == 0 ? kExitUntrusted : kExitDone;
+  std::string text = to_text(m);
+  text.pop_back();  // the line end, which is printed
+  return report_outcome(options.json ? to_json(m, options, summary).dump(2) : text, summary.status,
+                        summary.reasons);
 }
 
 }  // namespace

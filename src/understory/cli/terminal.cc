@@ -1,12 +1,14 @@
 #include "understory/cli/terminal.h"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <mutex>
 
@@ -27,6 +29,13 @@ std::string clock_text(double seconds) {
                   : fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
 }
 
+// Columns of the terminal behind stderr; a line that is longer would wrap, and what wrapped cannot
+// be cleared again. 0: unknown.
+std::size_t terminal_columns() {
+  winsize size{};
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
+
 class ProgressLine {
  public:
   explicit ProgressLine(bool terminal) : terminal_(terminal) {}
@@ -34,28 +43,52 @@ class ProgressLine {
   void report(const ProgressReport& report) {
     const std::lock_guard lock(mutex_);
     const auto now = std::chrono::steady_clock::now();
-    if (report.stage != stage_) {
-      if (terminal_ && !stage_.empty()) std::fputs("\n", stderr);
-      stage_ = report.stage;
-      start_ = now;
-      start_done_ = report.done;
-      shown_ = now - std::chrono::hours(1);
+    const auto [at, begins] = stages_.try_emplace(report.stage);
+    Stage& stage = at->second;
+    if (begins) {
+      stage.start = now;
+      stage.start_done = report.done;
     }
+    // A stage that comes back after others keeps its pace.
     const bool finished = report.total > 0.0 && report.done >= report.total;
     const auto interval = terminal_ ? std::chrono::milliseconds(200) : std::chrono::seconds(10);
-    if (now - shown_ < interval && !(finished && !finished_)) return;
-    shown_ = now;
-    finished_ = finished;
-    std::fputs(text(report, std::chrono::duration<double>(now - start_).count()).c_str(), stderr);
-    std::fflush(stderr);
+    const bool due = begins || now - stage.shown >= interval || (finished && !stage.finished);
+    if (!due) return;
+    stage.finished = finished;
+    std::string line =
+        text(report, stage, std::chrono::duration<double>(now - stage.start).count());
+    if (line == last_) return;
+    stage.shown = now;
+    show(report.stage, line);
   }
 
  private:
-  [[nodiscard]] std::string text(const ProgressReport& report, double elapsed) const {
+  struct Stage {
+    std::chrono::steady_clock::time_point start;
+    std::chrono::steady_clock::time_point shown;
+    double start_done = 0.0;
+    bool finished = false;
+  };
+
+  void show(const std::string& stage, const std::string& line) {
+    if (!terminal_) {
+      std::fputs((line + "\n").c_str(), stderr);
+    } else {
+      if (stage != on_line_ && !on_line_.empty()) std::fputs("\n", stderr);
+      const std::size_t columns = terminal_columns();
+      const bool fits = columns < 2 || line.size() < columns;
+      std::fputs(("\r\x1b[K" + (fits ? line : line.substr(0, columns - 1))).c_str(), stderr);
+    }
+    std::fflush(stderr);
+    on_line_ = stage;
+    last_ = line;
+  }
+
+  static std::string text(const ProgressReport& report, const Stage& stage, double elapsed) {
     std::string line = report.stage;
     if (report.total > 0.0) line += fmt::format(" {:3.0f} %", 100.0 * report.done / report.total);
     line += report.unit.empty() ? " ..." : fmt::format("  {:.0f} {}", report.done, report.unit);
-    const double rate = elapsed > 0.5 ? (report.done - start_done_) / elapsed : 0.0;
+    const double rate = elapsed > 0.5 ? (report.done - stage.start_done) / elapsed : 0.0;
     if (rate > 0.0) {
       line += fmt::format("  {:.1f}/s", rate);
       if (report.total > report.done) {
@@ -63,16 +96,14 @@ class ProgressLine {
       }
     }
     if (!report.remark.empty()) line += "  " + report.remark;
-    return terminal_ ? "\r\x1b[K" + line : line + "\n";
+    return line;
   }
 
   bool terminal_;
   std::mutex mutex_;
-  std::string stage_;
-  std::chrono::steady_clock::time_point start_;
-  std::chrono::steady_clock::time_point shown_;
-  double start_done_ = 0.0;
-  bool finished_ = false;
+  std::map<std::string, Stage> stages_;
+  std::string on_line_;  // stage of the last line
+  std::string last_;
 };
 
 }  // namespace

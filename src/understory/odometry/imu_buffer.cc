@@ -1,7 +1,9 @@
 #include "understory/odometry/imu_buffer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
+#include <string>
 
 namespace understory {
 namespace {
@@ -35,6 +37,12 @@ bool ImuBuffer::acceptable(const ImuSample& sample) {
   if (!sample.angular_rate.allFinite() || !sample.specific_force.allFinite())
     return warn("imu.not_finite", "IMU sample that is not a number dropped");
   const double degree = std::numbers::pi / 180.0;
+  // No sensor tells of twice its range.
+  if (sample.angular_rate.norm() > 2.0 * config_.gyro_range_deg_s * degree)
+    return warn("imu.degrees",
+                "IMU sample with an angular rate of " +
+                    std::to_string(std::lround(sample.angular_rate.norm())) +
+                    " rad/s dropped: probably degrees per second where rad/s are expected");
   if (sample.angular_rate.cwiseAbs().maxCoeff() > config_.gyro_range_deg_s * degree ||
       sample.specific_force.cwiseAbs().maxCoeff() > config_.accel_range_m_s2)
     return warn("imu.saturated", "IMU sample beyond the range of the sensor dropped");

@@ -76,6 +76,7 @@ CorrectionOutcome correct_into_results(const CorrectionRequest& request, Log& lo
     const std::filesystem::path stems = stems_of(request);
     run.views = read_stem_views(stems, log);
     run.inputs.push_back(hash_input(stems));
+    if (request.scans == nullptr) run.trust = trust_of_run(request.stems);
     const std::string& head_log = request.config.felling.head_log;
     run.head_cuts = read_head_log(head_log);
     if (!head_log.empty()) run.inputs.push_back(hash_input(head_log));

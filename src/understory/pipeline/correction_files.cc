@@ -196,6 +196,9 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   summary.counts["steps_weak"] =
       static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kWeak));
   summary.counts["loops_found"] = static_cast<std::int64_t>(run.correction.loops.size());
+  summary.counts["loops_verified"] =
+      std::count_if(run.correction.loops.begin(), run.correction.loops.end(),
+                    [](const StemLoop& loop) { return loop.verified; });
   summary.counts["loops_accepted"] = static_cast<std::int64_t>(
       std::count(run.correction.accepted.begin(), run.correction.accepted.end(), 1));
   summary.quality["path_length_m"] = path_length(run.correction.world_from_body);
@@ -224,6 +227,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
   summary.status = judgement.status;
   summary.reasons = judgement.reasons;
   summary.evidence = figures_of(evidence);
+  inherit(run.trust, summary.status, summary.reasons);
   return summary;
 }
 
@@ -256,15 +260,18 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   }
   summary.stages = summarise(run.times);
   if (request.scans != nullptr) summary.stages.merge(summarise(*request.scans->times));
-  summary.wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - run.start).count() +
-      (request.scans != nullptr ? request.scans->wall_s : 0.0);
+  const auto elapsed_s = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - run.start).count() +
+           (request.scans != nullptr ? request.scans->wall_s : 0.0);
+  };
+  summary.wall_s = elapsed_s();
   summary.cpu_s = process_cpu_seconds();
   summary.peak_memory_mb = peak_memory_mb();
   ReportInput report = correction_report(request, run, summary, trees);
   report.fixes = std::move(fixes);
   report.falls = std::move(falls);
   write_report(folder / "report.html", report);
+  summary.wall_s = elapsed_s();  // all of it, the report too
   write_run_json(folder / "run.json", summary);
   CorrectionOutcome outcome;
   outcome.status = summary.status;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "understory/pipeline/correction.h"
+#include "understory/pipeline/inherited_trust.h"
 #include "understory/pipeline/stem_correction.h"
 #include "understory/sensor/stem_view.h"
 #include "understory/util/timing.h"
@@ -20,6 +21,7 @@ struct CorrectionRun {
   StemCorrection correction;  // the answer
   std::vector<LoggedCut> head_cuts;
   bool stopped = false;
+  InheritedTrust trust;  // of the run that the stems come from
   std::vector<InputHash> inputs;
   StageTimes times;
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -18,6 +19,7 @@
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/felling.h"
 #include "understory/pipeline/gnss_fit.h"
+#include "understory/pipeline/inherited_trust.h"
 #include "understory/pipeline/moved_map.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/source.h"
@@ -31,14 +33,20 @@ namespace {
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
 
+// A place 50 m from the middle of the path is then 4 m off.
+constexpr double kMostHeadingSdDeg = 5.0;
+constexpr double kLongestArmM = 10.0;
+
 // What a run folder holds that a motion can move.
 struct Run {
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
   Trajectory trajectory;
   std::vector<Tree> trees;
   bool has_trees = false;
   std::vector<TreeFall> falls;
   bool has_falls = false;
   std::optional<GeodeticPlace> origin;  // of its frame east, north, up
+  InheritedTrust trust;
 };
 
 // The place that an earlier fit to a GNSS path has left in run.json.
@@ -70,6 +78,7 @@ Run read_run(const fs::path& folder) {
   run.has_falls = run.has_trees && fs::exists(folder / "felled.csv");
   if (run.has_falls) run.falls = read_tree_falls(folder / "felled.csv");
   run.origin = origin_of(folder);
+  run.trust = trust_of_run(folder);
   return run;
 }
 
@@ -92,6 +101,11 @@ Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log
     throw InputError(request.run.string(), "",
                      "expected gnss.csv in the run, or --gnss with a recording, an NMEA log or a "
                      "table of fixes");
+  if (request.antenna_in_body.norm() > kLongestArmM)
+    log.warn("recording.lever_arm",
+             fmt::format("the antenna is said to be {:.1f} m from the body's origin (--antenna-m): "
+                         "check that these are metres and not a place on the earth",
+                         request.antenna_in_body.norm()));
   GnssFit fit = fit_to_gnss(run.trajectory, request.antenna_in_body, read_fixes(file.string(), log),
                             request.path);
   if (!fit.path.found) throw InputError(file.string(), "", fit.path.reason);
@@ -111,6 +125,12 @@ Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log
         fmt::format("turned round the path fits as well ({:.2f} m against {:.2f} m), and "
                     "the times do not tell which is right",
                     fit.path.turned_rms_m, fit.path.symmetric_rms_m));
+  if (fit.path.heading_sd_deg > kMostHeadingSdDeg)
+    motion.doubt(fmt::format(
+        "the fixes leave the heading open by {:.1f} degrees (one standard deviation; {:.0f} at "
+        "most): the path is too short, too straight or too round for fixes that are {:.1f} m off "
+        "it; a longer way with bends is needed, or a better receiver",
+        fit.path.heading_sd_deg, kMostHeadingSdDeg, fit.path.fixes_rms_m));
   motion.gnss = std::move(fit.rows);
   return motion;
 }
@@ -298,7 +318,14 @@ void write_summary(const GeoreferenceRequest& request, const Run& run, const Mot
     report.scans.push_back(scan);
   }
   report.fixes = fixes_of(motion.gnss);
+  const auto elapsed_s = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - run.start).count();
+  };
+  report.summary.wall_s = elapsed_s();
+  report.summary.cpu_s = process_cpu_seconds();
+  report.summary.peak_memory_mb = peak_memory_mb();
   write_report(request.result / "report.html", report);
+  report.summary.wall_s = elapsed_s();
   write_run_json(request.result / "run.json", report.summary);
 }
 
@@ -315,6 +342,7 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& lo
   const Run run = read_run(request.run);
   Motion motion = request.method == GeoreferenceMethod::kTerrain ? by_terrain(request, run)
                                                                  : by_gnss_path(request, run, log);
+  inherit(run.trust, motion.outcome.status, motion.outcome.reasons);
   write_moved_map(request.run, request.result, motion.target_from_world, log);
   if (motion.origin) {
     motion.outcome.figures["origin_latitude_deg"] = motion.origin->latitude_deg;

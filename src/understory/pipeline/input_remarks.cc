@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "understory/recording/recording_info.h"
+
 namespace understory {
 namespace {
 
@@ -43,9 +45,15 @@ void remark_on_imu(const MappingSession& session, const Recording& source,
 
 }  // namespace
 
+void remark_on_lever_arms(const Rig& rig, const std::string& name, Log& log) {
+  for (const std::string& arm : long_lever_arms(rig))
+    log.warn("recording.lever_arm", name + ": " + arm);
+}
+
 void remark_on_input(const MappingSession& session, const Recording& source,
                      const EventOrderer::Report& repair, const std::string& name, Log& log) {
   remark_on_imu(session, source, repair, name, log);
+  remark_on_lever_arms(source.rig(), name, log);
   for (const TopicReport& topic : source.topics()) {
     if (topic.empty_points == 0) continue;
     const std::uint64_t all = topic.points + topic.empty_points;

@@ -14,4 +14,8 @@ namespace understory {
 void remark_on_input(const MappingSession& session, const Recording& source,
                      const EventOrderer::Report& repair, const std::string& name, Log& log);
 
+// Warns of sensors that the extrinsics put more than 10 m from the body's origin or from the lidar:
+// millimetres taken for metres, or a place on the earth.
+void remark_on_lever_arms(const Rig& rig, const std::string& name, Log& log);
+
 }  // namespace understory

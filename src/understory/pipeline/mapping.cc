@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
-
 #include "understory/pipeline/input_remarks.h"
 #include "understory/pipeline/mapping_session.h"
 #include "understory/pipeline/realtime_player.h"
@@ -171,7 +169,7 @@ class MappingRun {
     session_->map().finish(request_.config.odometry.ndt);
     RunFacts facts;
     facts.stopped = stopped;
-    facts.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    facts.elapsed_s = [this] { return state_.elapsed_s(); };
     facts.format = source_->format();
     facts.time_repair = orderer_->report();
     facts.latencies_ms = latencies_ms_;
@@ -229,7 +227,6 @@ class MappingRun {
   Log& log_;
   const ProgressSink& progress_;
   const StopRequested& stop_requested_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   RunState state_;
   std::optional<EventOrderer> orderer_;
   std::optional<MappingSession> session_;

@@ -148,10 +148,16 @@ void RunState::read(const Checkpoint& checkpoint, RunRequest& request) {
   front_end_ = reader.get_string();
   events_ = reader.get<std::uint64_t>();
   last_checkpoint_ = reader.get<TimeNs>();
+  earlier_s_ = reader.get<double>();
   check_files(reader, work());
   state_ = reader.get_string();
   next_ = checkpoint.number + 1;
   resumed_ = true;
+}
+
+double RunState::elapsed_s() const {
+  return earlier_s_ +
+         std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
 }
 
 void RunState::restore(Resumable& session, EventOrderer& orderer, Log& log, const Rig& rig) const {
@@ -195,6 +201,7 @@ void RunState::save(const RunRequest& request, Resumable& session, const EventOr
   writer.put(front_end_);
   writer.put(events);
   writer.put(last_checkpoint_);
+  writer.put(elapsed_s());
   put_files(writer, session.files());
   writer.put(state.bytes());
   write_checkpoint(work(), next_++, writer.bytes());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -52,6 +53,9 @@ class RunState {
   // Events that the checkpoint has behind it; 0 at the start.
   [[nodiscard]] std::uint64_t events() const { return events_; }
   [[nodiscard]] TimeNs last_checkpoint() const { return last_checkpoint_; }
+  // Seconds that the run has taken so far: since this part of it began, and those of the parts
+  // before up to the checkpoint that each was resumed from.
+  [[nodiscard]] double elapsed_s() const;
 
   // Brings session, orderer and log to the state of the checkpoint; a warning where it is not the
   // newest (key "run.older_checkpoint").
@@ -81,6 +85,8 @@ class RunState {
   std::vector<InputIdentity> inputs_;
   std::string passed_over_;  // what kept `reopen` from the newest checkpoint
   std::string state_;  // of session, orderer and log, as read
+  double earlier_s_ = 0.0;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace understory

@@ -377,10 +377,9 @@ MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
   summary.counts["trees"] = static_cast<std::int64_t>(inventory.trees.size());
   summary.warnings = log.warnings();
   summary.stages = summarise(times);
-  summary.wall_s = facts.wall_s;
+  summary.wall_s = facts.elapsed_s();
   summary.cpu_s = process_cpu_seconds();
   summary.peak_memory_mb = peak_memory_mb();
-  write_run_json(folder / "run.json", summary);
 
   ReportInput report;
   report.title = std::filesystem::path(request.recording).filename().string();
@@ -396,6 +395,8 @@ MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
   report.loop_closure_enabled = request.config.keyframe_map.loop_closure.enabled;
   report.truth = truth;
   write_report(folder / "report.html", report);
+  summary.wall_s = facts.elapsed_s();  // all of it, the report too
+  write_run_json(folder / "run.json", summary);
   return {summary.status, summary.reasons, place.path() / "report.html",
           terminal_summary(summary, trajectory, inventory, place.path())};
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,9 +14,9 @@ namespace understory {
 
 // What the driving loop knows of a run beside the session.
 struct RunFacts {
-  bool stopped = false;  // ended by the user
-  double wall_s = 0.0;
-  std::string format;  // of the recording
+  bool stopped = false;               // ended by the user
+  std::function<double()> elapsed_s;  // seconds that the run has taken so far
+  std::string format;                 // of the recording
   EventOrderer::Report time_repair;
   bool realtime = false;
   std::vector<double> latencies_ms;  // one per scan, --realtime only

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "understory/pipeline/input_remarks.h"
 #include "understory/pipeline/realtime_player.h"
 #include "understory/pipeline/run_judgement.h"
 #include "understory/pipeline/run_state.h"
@@ -63,6 +64,7 @@ class SparseRun {
       if (start_over_for_imu()) ended = false;
     }
     session_->finish(source_->rig());
+    remark_on_lever_arms(source_->rig(), request_.recording, log_);
     if (player_ != nullptr) {
       player_->stop();
       warn_of_dropped();
@@ -102,7 +104,7 @@ class SparseRun {
     scans.steps = std::move(session_->steps());
     scans.times = &session_->times();
     scans.positioned = session_->positioned();
-    scans.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    scans.wall_s = state_.elapsed_s();
     scans.stopped = stopped;
     scans.time_repair = orderer_->report();
     scans.last_scan_end = session_->last_scan_end();
@@ -216,7 +218,6 @@ class SparseRun {
   std::unique_ptr<Recording> source_;
   std::optional<SparseSession> session_;
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::uint64_t events_ = 0;
   bool stamps_believed_ = false;  // of an IMU, against the order of arrival
   std::vector<double> latencies_ms_;

@@ -127,6 +127,8 @@ class RecordingSurvey::Impl {
     warn_of_lidar(info);
     warn_of_imu(info);
     warn_of_rest(info);
+    for (const std::string& arm : long_lever_arms(info.rig))
+      info.warnings.push_back(arm);
     return info;
   }
 
@@ -299,6 +301,26 @@ void RecordingSurvey::add(const Event& event) {
 RecordingInfo RecordingSurvey::finish(const std::string& path, const Recording& recording,
                                       const Log& log) const {
   return impl_->finish(path, recording, log);
+}
+
+std::vector<std::string> long_lever_arms(const Rig& rig) {
+  constexpr double kLongestM = 10.0;
+  std::vector<std::string> arms;
+  const auto look_at = [&](const char* sensor, const std::optional<Pose>& body_from_sensor,
+                           const std::string& source) {
+    if (!body_from_sensor) return;
+    const double arm =
+        std::max(body_from_sensor->translation().norm(),
+                 (body_from_sensor->translation() - rig.body_from_lidar.translation()).norm());
+    if (arm > kLongestM)
+      arms.push_back(std::string("the extrinsics (") + source + ") put the " + sensor + " " +
+                     format("%.1f m", arm) +
+                     " from the body or the lidar: check their unit and frame");
+  };
+  look_at("lidar", rig.body_from_lidar, rig.lidar_extrinsic_source);
+  look_at("IMU", rig.body_from_imu, rig.imu_extrinsic_source);
+  look_at("GNSS antenna", rig.body_from_gnss, rig.gnss_extrinsic_source);
+  return arms;
 }
 
 }  // namespace understory

@@ -86,4 +86,8 @@ class RecordingSurvey {
   std::unique_ptr<Impl> impl_;
 };
 
+// Sensors that the extrinsics put more than 10 m from the body's origin or from the lidar, in words
+// for the user: millimetres taken for metres, or a place on the earth.
+[[nodiscard]] std::vector<std::string> long_lever_arms(const Rig& rig);
+
 }  // namespace understory

@@ -1,0 +1,82 @@
+#include "understory/cli/suggestion.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <system_error>
+
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Optimal string alignment distance.
+std::size_t letters_apart(const std::string& a, const std::string& b) {
+  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i)
+    d[i][0] = i;
+  for (std::size_t j = 0; j <= b.size(); ++j)
+    d[0][j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t changed = d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, changed});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+    }
+  }
+  return d[a.size()][b.size()];
+}
+
+bool ends_with_one_of(const std::string& name, const std::vector<std::string>& endings) {
+  std::string small = name;
+  std::transform(small.begin(), small.end(), small.begin(),
+                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  return std::any_of(endings.begin(), endings.end(),
+                     [&](const std::string& ending) { return small.ends_with(ending); });
+}
+
+}  // namespace
+
+std::string nearest_word(const std::string& given, const std::vector<std::string>& words) {
+  std::string best;
+  std::size_t least = given.size() / 2 + 1;  // half of the letters may be wrong
+  for (const std::string& word : words) {
+    const bool begun = given.size() >= 2 && word.starts_with(given);
+    const std::size_t apart = begun ? 1 : letters_apart(given, word);
+    if (apart >= least) continue;
+    least = apart;
+    best = word;
+  }
+  return best;
+}
+
+void refuse_cloud(const std::string& recording) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(recording, ignored) ||
+      !ends_with_one_of(recording, {".las", ".laz", ".ply", ".pcd"}))
+    return;
+  throw InputError(
+      recording, "",
+      "is one point cloud, and a map is made of many: `understory inventory " + recording +
+          " -o DIR` measures its trees, `understory map FOLDER` maps a folder of clouds");
+}
+
+void refuse_recording(const std::string& cloud) {
+  std::error_code ignored;
+  const bool folder = fs::is_directory(cloud, ignored) && !fs::exists(fs::path(cloud) / "map.laz");
+  if (!folder && !cloud.starts_with("sim:") &&
+      !ends_with_one_of(cloud, {".mcap", ".bag", ".db3", ".pcap", ".pcapng"}))
+    return;
+  throw InputError(cloud, "",
+                   folder
+                       ? "expected a point cloud, or a run folder with a map.laz in it; a folder "
+                         "of clouds or a bag is mapped first: `understory map " +
+                             cloud + " -o RUN`"
+                       : "is a recording, no point cloud: map it first with `understory map " +
+                             cloud + " -o RUN`, then give RUN");
+}
+
+}  // namespace understory

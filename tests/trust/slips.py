@@ -1,0 +1,179 @@
+"""What a new user gets wrong is named, with what to do about it: commands that are not there, clouds for
+recordings, sensors tens of metres apart, rates in degrees; paths that do not determine a figure; progress
+that fits the terminal."""
+
+import json
+import math
+import os
+import pty
+import random
+import re
+import struct
+import subprocess
+import sys
+import fcntl
+import termios
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
+from program import PROGRAM, Cases, good_recording, map_recording, program
+from recordings import edit_imu, write_mcap
+
+cases = Cases()
+
+
+@cases.case("an unknown command is named, and the nearest one proposed")
+def unknown(folder):
+    for typed, meant in (("mpa", "map"), ("inventroy", "inventory"), ("geo", "georeference"),
+                         ("Map", "map"), ("evalaute", "evaluate")):
+        for words in ((typed,), (typed, "x.mcap", "-o", folder), ("--threads", "2", typed)):
+            done = program(*words)
+            assert done.returncode == 2, done
+            assert f"'{typed}'" in done.stderr and f"did you mean '{meant}'" in done.stderr, done
+    done = program("frobnicate")
+    assert done.returncode == 2 and "'frobnicate'" in done.stderr and "inventory" in done.stderr, done
+    assert program().returncode == 2 and program("--help").returncode == 0
+    assert program("--version").returncode == 0
+
+
+@cases.case("map of a cloud and inventory of a recording point to each other")
+def other_way(folder):
+    cloud = folder / "plot.ply"
+    cloud.write_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                     "property float z\nend_header\n1 2 3\n")
+    for more in ((), ("--front-end", "sparse")):
+        done = program("map", cloud, "-o", folder / "run", *more)
+        assert done.returncode == 3 and f"understory inventory {cloud}" in done.stderr, done
+    assert not (folder / "run").exists()
+    walk = folder / "walk.mcap"
+    walk.write_bytes(b"\x89MCAP0\r\n")
+    clouds = folder / "clouds"
+    clouds.mkdir()
+    for recording in (walk, clouds, "sim:demo"):
+        done = program("inventory", recording, "-o", folder / "plot")
+        assert done.returncode == 3 and f"understory map {recording}" in done.stderr, done
+
+
+GOOD, MESSAGES, TRUTH = good_recording(cases.folder, seconds=6)
+
+
+@cases.case("sensors that the extrinsics put tens of metres apart")
+def arms(folder):
+    done = program("info", GOOD)
+    assert "from the body or the lidar" not in done.stdout, done.stdout
+    extrinsics = folder / "arms.yaml"
+    extrinsics.write_text("body_frame: base\n"
+                          "body_from_lidar: {translation_m: [0, 0, 0], rpy_deg: [0, 0, 0]}\n"
+                          "body_from_imu: {translation_m: [30, -12, 0.1], rpy_deg: [0, 0, 0]}\n")
+    done = program("info", GOOD, "--extrinsics", extrinsics)
+    assert done.returncode == 0 and "put the IMU 3" in done.stdout, done
+    outcome = map_recording(GOOD, folder / "run", "--extrinsics", extrinsics)
+    assert "recording.lever_arm" in outcome.warnings, outcome.warnings.keys()
+
+
+@cases.case("rates in degrees a second, beyond what any sensor tells in radians")
+def degrees(folder):
+    path = folder / "degrees.mcap"
+    write_mcap(path, [edit_imu(m, lambda r, f: ([math.degrees(4 * v) for v in r], f))
+                      if m.type.endswith("Imu") else m for m in MESSAGES])
+    outcome = map_recording(path, folder / "run")
+    said = json.dumps(outcome.run)
+    assert outcome.code == 4 and "degrees per second" in said, said[:800]
+
+
+@cases.case("wall_s is that of all the run, and that of an inventory of it too")
+def wall(folder):
+    began = time.monotonic()
+    done = program("map", GOOD, "-o", folder / "run")
+    took = time.monotonic() - began
+    assert done.returncode == 0, done.stderr
+    told = json.loads((folder / "run" / "run.json").read_text())
+    finishing = sum(stage["total_wall_s"] for name, stage in told["stages"].items()
+                    if name == "scan" or name.startswith("finish_"))
+    assert finishing < told["wall_s"] <= took, (finishing, told["wall_s"], took)
+    began = time.monotonic()
+    done = program("inventory", folder / "run", "-o", folder / "plot")
+    took = time.monotonic() - began
+    told = json.loads((folder / "plot" / "run.json").read_text())
+    stages = sum(stage["total_wall_s"] for stage in told["stages"].values())
+    assert stages < told["wall_s"] <= took, (stages, told["wall_s"], took)
+    return f"{finishing:.2f} s of stages in {told['wall_s']:.2f} s"
+
+
+def path(points, noise_m=0.0, seed=1):
+    draw = random.Random(seed)
+    lines = []
+    for k, point in enumerate(points):
+        u = [v + draw.gauss(0, noise_m) for v in point]
+        lines.append(f"{100 + 0.1 * k:.9f} {u[0]:.6f} {u[1]:.6f} {u[2]:.6f} 0 0 0 1")
+    return "\n".join(lines) + "\n"
+
+
+def evaluate(folder, truth, align, noise_m=0.01):
+    (folder / "truth.tum").write_text(path(truth))
+    (folder / "run.tum").write_text(path([(1 - y, 2 + x, z) for x, y, z in truth], noise_m))
+    words = ("evaluate", folder / "run.tum", folder / "truth.tum", "--align", align)
+    done, text = program(*words, "--json"), program(*words)
+    assert "nan" not in done.stdout.lower() + text.stdout.lower(), text.stdout
+    assert done.returncode == text.returncode
+    return done, json.loads(done.stdout), text.stdout
+
+
+@cases.case("figures that a straight path or one place does not determine")
+def undetermined(folder):
+    straight = [(0.1 * k, 0.0, 0.0) for k in range(300)]
+    bent = [(0.1 * k, 3 * math.sin(0.02 * k), 0.0) for k in range(300)]
+    still = [(5.0, 5.0, 0.0)] * 300
+    done, told, text = evaluate(folder, straight, "se3")
+    assert done.returncode == 4 and told["ape_rotation_rmse_deg"] is None, told
+    assert any("not determined" in note for note in told["notes"]), told["notes"]
+    assert "rotation not determined" in text and abs(told["scale_percent"]) < 1, text
+    assert told["ape_rmse_m"] < 0.05 and told["alignment_found"]["determined"] is False, told
+    done, told, text = evaluate(folder, straight, "yaw")
+    assert done.returncode == 0 and abs(told["alignment_found"]["yaw_deg"] + 90) < 0.5, told
+    assert abs(told["alignment_found"]["translation_m"][0] + 2) < 0.1 and "yaw -" in text, (told, text)
+    done, told, text = evaluate(folder, bent, "se3")
+    assert done.returncode == 0 and told["ape_rotation_rmse_deg"] is not None, (told, done.stderr)
+    assert told["notes"] == [] and told["alignment_found"]["rotation_sd_deg"] < 1, told
+    for align in ("none", "yaw", "se3"):
+        done, told, text = evaluate(folder, still, align)
+        assert told["scale_percent"] is None and "scale of the path   not determined" in text, text
+        assert done.returncode == (0 if align == "none" else 4), (align, done)
+        assert (told["alignment_found"] is None) == (align == "none"), told
+    done, told, text = evaluate(folder, still, "se3", noise_m=0.0)
+    assert done.returncode == 4 and told["scale_percent"] is None, told
+
+
+def progress_of(words, columns=None):
+    """What the program wrote to stderr: to a file, or to a terminal of some width."""
+    if columns is None:
+        return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True).stderr
+    ours, its = pty.openpty()
+    fcntl.ioctl(its, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    child = subprocess.Popen([PROGRAM, *map(str, words)], stdout=subprocess.DEVNULL, stderr=its)
+    os.close(its)
+    told = b""
+    try:
+        while part := os.read(ours, 65536):
+            told += part
+    except OSError:  # the other side is closed
+        pass
+    child.wait()
+    os.close(ours)
+    return told.decode()
+
+
+@cases.case("progress does not repeat itself and fits the terminal")
+def progress(folder):
+    words = ("map", GOOD, "-o", folder / "run", "--overwrite")
+    lines = progress_of(words).splitlines()
+    assert any(line.startswith("mapping") for line in lines), lines
+    assert all(a != b for a, b in zip(lines, lines[1:])), lines
+    told = progress_of(words, columns=30)
+    shown = [line for line in re.split(r"\r\n|\r|\n", told.replace("\x1b[K", "")) if line]
+    assert len(shown) > 3 and max(map(len, shown)) < 30, max(shown, key=len)
+    assert any(len(line) == 29 for line in shown), shown
+
+
+cases.run()
