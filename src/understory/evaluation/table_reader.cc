@@ -3,11 +3,13 @@
 #include <zlib.h>
 
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <limits>
 
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
@@ -55,8 +57,12 @@ bool LineReader::next(std::string& line) {
                        "expected text with lines of less than a megabyte");
     }
   }
+  const int reason = errno;
   int code = Z_OK;
   const char* message = gzerror(stream_->file, &code);
+  if (code == Z_ERRNO) {
+    throw ReadError(file(), "line " + std::to_string(line_number_ + 1), reason != 0 ? reason : EIO);
+  }
   if (code != Z_OK && code != Z_STREAM_END) {
     throw InputError(file(), "line " + std::to_string(line_number_ + 1),
                      std::string("expected an undamaged gzip stream: ") + message);
@@ -98,6 +104,7 @@ CsvReader::CsvReader(const std::filesystem::path& path, const std::vector<std::s
   std::string_view header = line_;
   if (header.substr(0, 3) == "\xef\xbb\xbf") header.remove_prefix(3);
   const std::vector<std::string_view> names = split(header, ",", false);
+  width_ = names.size();
   for (std::size_t i = 0; i < names.size(); ++i)
     columns_.emplace(trimmed(names[i]), i);
   for (const std::string& name : required) {
@@ -112,10 +119,10 @@ bool CsvReader::next() {
     const std::string_view content = trimmed(line_);
     if (content.empty() || content.front() == '#') continue;
     cells_ = split(line_, ",", false);
-    if (cells_.size() < columns_.size()) {
-      throw InputError(lines_.file(), lines_.position(),
-                       "expected " + std::to_string(columns_.size()) + " cells, found " +
-                           std::to_string(cells_.size()));
+    if (cells_.size() < width_) {
+      throw InputError(
+          lines_.file(), lines_.position(),
+          "expected " + std::to_string(width_) + " cells, found " + std::to_string(cells_.size()));
     }
     return true;
   }

@@ -19,7 +19,8 @@ class LineReader {
   LineReader& operator=(const LineReader&) = delete;
 
   // The next line without its end; false at the end of the file. Throws InputError where the
-  // compressed stream is damaged, or a line is longer than a megabyte.
+  // compressed stream is damaged, or a line is longer than a megabyte; ReadError where the system
+  // cannot read the file.
   bool next(std::string& line);
   [[nodiscard]] std::size_t line_number() const { return line_number_; }
   [[nodiscard]] std::string position() const { return "line " + std::to_string(line_number_); }
@@ -58,6 +59,7 @@ class CsvReader {
  private:
   LineReader lines_;
   std::map<std::string, std::size_t, std::less<>> columns_;
+  std::size_t width_ = 0;  // cells of the header; a name may stand there twice
   std::string line_;
   std::vector<std::string_view> cells_;
 };

@@ -8,6 +8,7 @@
 
 #include "understory/output/run_summary.h"
 #include "understory/util/error.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -116,7 +117,7 @@ InputHash hash_input(const std::filesystem::path& path) {
     hash.update(reinterpret_cast<const std::uint8_t*>(buffer.data()), count);
     result.bytes += count;
   }
-  if (file.bad()) throw InputError(path.string(), "", "cannot be read to its end");
+  check_readable(file, path.string(), "at byte " + std::to_string(result.bytes));
   result.sha256 = hash.finish();
   return result;
 }

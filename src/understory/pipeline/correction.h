@@ -57,6 +57,7 @@ struct SparseScans {
   std::uint64_t repeated = 0;    // scans that hold the same points as the one before
   TimeNs imu_without_place = 0;  // time of its samples before its extrinsics were known
   bool imu_wanted = true;        // by the configuration
+  std::string unreadable;        // why it could not be read to its end; else the user stopped
   std::string imu_distrust;      // why its IMU is not believed; empty: it is, or there is none
   std::optional<RealtimeFacts> realtime;
 };

@@ -63,6 +63,7 @@ void gather_recording(const CorrectionRequest& request, const Log& log, RunEvide
   gather_reading(reading, evidence);
   if (scans.realtime) evidence.dropped_scans = scans.realtime->dropped_scans;
   evidence.stopped = evidence.stopped || scans.stopped;
+  evidence.unreadable = scans.unreadable;
   evidence.imu_used = scans.imu_wanted && scans.source->rig().body_from_imu.has_value() &&
                       scans.imu_distrust.empty();
   evidence.imu_distrust = scans.imu_distrust;

@@ -72,6 +72,9 @@ void gather_remarks(const Log& log, RunEvidence& evidence) {
     } else if (warning.key == "recording.damaged_packet") {
       evidence.damaged_packets = warning.count;
       evidence.first_damaged_packet = warning.first_message;
+    } else if (warning.key == "recording.other_frames") {
+      evidence.other_sensor_messages = warning.count;
+      evidence.first_other_sensor = warning.first_message;
     } else if (warning.key == "recording.truncated") {
       evidence.cut_off = true;
       evidence.where_cut_off = warning.first_message;
@@ -124,6 +127,7 @@ void gather_dense(const MappingSession& session, const RunFacts& facts, const Re
   reading.imu_without_place = session.counts().imu_without_place;
   gather_reading(reading, evidence);
   evidence.stopped = facts.stopped;
+  evidence.unreadable = facts.unreadable;
   evidence.dropped_scans = facts.dropped_scans;
   evidence.imu_used = session.odometry().uses_imu();
   const ImuTrust trust = session.odometry().motion().imu_trust();

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
@@ -25,6 +24,7 @@
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
 #include "understory/util/output_guard.h"
+#include "understory/util/text_file.h"
 #include "understory/util/version.h"
 
 namespace understory {
@@ -51,9 +51,8 @@ struct Run {
 
 // The place that an earlier fit to a GNSS path has left in run.json.
 std::optional<GeodeticPlace> origin_of(const fs::path& run) {
-  std::ifstream file(run / "run.json");
-  if (!file) return std::nullopt;
-  const auto json = nlohmann::json::parse(file, nullptr, false);
+  if (!fs::exists(run / "run.json")) return std::nullopt;
+  const auto json = nlohmann::json::parse(read_text_file(run / "run.json"), nullptr, false);
   if (json.is_discarded() || !json.is_object()) return std::nullopt;
   const auto quality = json.find("quality");
   if (quality == json.end() || !quality->is_object()) return std::nullopt;

@@ -10,6 +10,7 @@
 #include "understory/recording/nmea.h"
 #include "understory/util/error.h"
 #include "understory/util/median.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -27,13 +28,14 @@ char first_letter(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);
   char letter = 0;
   stream >> letter;
+  check_readable(stream, file, "at its beginning");
   return stream ? letter : '\0';
 }
 
 std::vector<GnssFix> read_nmea(const std::string& file, Log& log) {
   std::ifstream ahead(file, std::ios::binary);
   std::ifstream stream(file, std::ios::binary);
-  NmeaLogReader reader(stream, file, first_nmea_day(ahead), log);
+  NmeaLogReader reader(stream, file, first_nmea_day(ahead, file), log);
   std::vector<GnssFix> fixes;
   while (auto fix = reader.next())
     fixes.push_back(*fix);

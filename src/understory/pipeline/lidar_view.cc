@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/util/error.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -86,8 +86,8 @@ LidarViewFigures figures_of(const LidarView& view) {
 }
 
 SeenTest seen_in_run(const std::filesystem::path& run) {
-  std::ifstream file(run / "run.json");
-  const auto json = nlohmann::json::parse(file, nullptr, false);
+  if (!std::filesystem::exists(run / "run.json")) return {};
+  const auto json = nlohmann::json::parse(read_text_file(run / "run.json"), nullptr, false);
   if (!json.is_object() || !json.contains("lidar_view")) return {};
   if (!std::filesystem::exists(run / "keyframes.tum")) return {};
   LidarView view;

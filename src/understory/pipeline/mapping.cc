@@ -9,6 +9,7 @@
 #include "understory/pipeline/run_writer.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
@@ -32,7 +33,8 @@ class MappingRun {
     bool stopped = false;
     bool ended = false;
     while (!ended && !(stopped = stop_requested_ && stop_requested_())) {
-      std::optional<Event> event = source_->next();
+      std::optional<Event> event = next_event();
+      if ((stopped = !unreadable_.empty())) break;
       // At the speed of the sensors there may be nothing yet, and no end of waiting for it.
       if (!event && player_ != nullptr && stop_requested_ && stop_requested_()) {
         stopped = true;
@@ -54,6 +56,17 @@ class MappingRun {
   }
 
  private:
+  // A recording that the system cannot read any further ends the run there, with what it has.
+  std::optional<Event> next_event() {
+    try {
+      return source_->next();
+    } catch (const ReadError& error) {
+      if (!session_->settled() || !session_->started()) throw;
+      unreadable_ = error.what();
+      return std::nullopt;
+    }
+  }
+
   void begin() {
     source_ = open_source(request_.recording, request_.open, log_);
     state_.check_inputs(request_);
@@ -170,6 +183,7 @@ class MappingRun {
     RunFacts facts;
     facts.stopped = stopped;
     facts.elapsed_s = [this] { return state_.elapsed_s(); };
+    facts.unreadable = unreadable_;
     facts.format = source_->format();
     facts.time_repair = orderer_->report();
     facts.latencies_ms = latencies_ms_;
@@ -234,6 +248,7 @@ class MappingRun {
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
   std::uint64_t events_ = 0;
   bool stamps_believed_ = false;  // of the IMU, against the order of arrival
+  std::string unreadable_;  // where the recording could not be read any further, and why
   std::vector<double> memory_mb_;
   std::vector<double> latencies_ms_;
 };

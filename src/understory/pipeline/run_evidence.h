@@ -67,7 +67,8 @@ struct StemRunEvidence {
 // evidence_gathering.h, judged by run_judgement.h, written to run.json as `evidence`.
 struct RunEvidence {
   bool by_stems = false;            // which front end
-  bool stopped = false;             // by the user
+  bool stopped = false;             // before the end of the recording
+  std::string unreadable;           // why it could not be read to its end; else the user stopped
   std::uint64_t dropped_scans = 0;  // --realtime: the machine could not keep up
   SensorEvidence lidar;
   SensorEvidence imu;
@@ -77,6 +78,8 @@ struct RunEvidence {
   std::string first_damage;
   std::uint64_t damaged_packets = 0;
   std::string first_damaged_packet;
+  std::uint64_t other_sensor_messages = 0;  // of a second lidar on the topic, left out
+  std::string first_other_sensor;
   bool cut_off = false;  // the recording ends in the middle of something
   std::string where_cut_off;
   bool times_assumed = false;        // nothing tells when the clouds of a folder were taken

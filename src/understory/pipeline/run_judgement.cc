@@ -44,7 +44,10 @@ class Judge {
   void hurt(std::string reason) { hurt_.push_back(std::move(reason)); }
 
   void judge_ending() {
-    if (evidence_.stopped) {
+    if (!evidence_.unreadable.empty()) {
+      missing("the recording could not be read any further: " + evidence_.unreadable +
+              "; once it can be, go on with `understory map --resume`");
+    } else if (evidence_.stopped) {
       missing(
           "stopped by the user before the end of the recording; go on with "
           "`understory map --resume`");
@@ -86,6 +89,10 @@ class Judge {
   }
 
   void judge_damage() {
+    if (evidence_.other_sensor_messages > 0) {
+      missing(fmt::format("{} message(s) of a second sensor had no say: {}",
+                          evidence_.other_sensor_messages, evidence_.first_other_sensor));
+    }
     if (evidence_.damaged_places > 0) {
       hurt(fmt::format("the recording is damaged ({} place(s), the first: {})",
                        evidence_.damaged_places, evidence_.first_damage));

@@ -14,7 +14,8 @@ namespace understory {
 
 // What the driving loop knows of a run beside the session.
 struct RunFacts {
-  bool stopped = false;               // ended by the user
+  bool stopped = false;    // before the end of the recording
+  std::string unreadable;  // why the recording could not be read to its end; else the user stopped
   std::function<double()> elapsed_s;  // seconds that the run has taken so far
   std::string format;                 // of the recording
   EventOrderer::Report time_repair;

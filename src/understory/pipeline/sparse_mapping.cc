@@ -15,6 +15,7 @@
 #include "understory/pipeline/source.h"
 #include "understory/pipeline/sparse_session.h"
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
@@ -46,7 +47,8 @@ class SparseRun {
     bool stopped = false;
     bool ended = false;
     while (!ended && !(stopped = stop_requested && stop_requested())) {
-      std::optional<Event> event = source_->next();
+      std::optional<Event> event = next_event();
+      if ((stopped = !unreadable_.empty())) break;
       // At the speed of the sensors there may be nothing yet, and no end of waiting for it.
       if (!event && player_ != nullptr && stop_requested && stop_requested()) {
         stopped = true;
@@ -111,6 +113,7 @@ class SparseRun {
     scans.repeated = session_->repeated();
     scans.imu_without_place = session_->imu_without_place();
     scans.imu_wanted = request_.config.front_end.imu.use;
+    scans.unreadable = unreadable_;
     const std::string& refused = session_->imu_refused();
     scans.imu_distrust = refused.empty() ? session_->imu_trust().reason : imu_refusal(refused);
     scans.fixes = std::move(session_->fixes());
@@ -120,6 +123,17 @@ class SparseRun {
   }
 
  private:
+  // A recording that the system cannot read any further ends the run there, with what it has.
+  std::optional<Event> next_event() {
+    try {
+      return source_->next();
+    } catch (const ReadError& error) {
+      if (session_->steps().empty()) throw;
+      unreadable_ = error.what();
+      return std::nullopt;
+    }
+  }
+
   // Session, orderer and recording at their beginning.
   void open() {
     session_.reset();  // lets go of its files
@@ -220,6 +234,7 @@ class SparseRun {
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
   std::uint64_t events_ = 0;
   bool stamps_believed_ = false;  // of an IMU, against the order of arrival
+  std::string unreadable_;  // where the recording could not be read any further, and why
   std::vector<double> latencies_ms_;
 };
 
@@ -247,7 +262,7 @@ CorrectionOutcome run_from(const SparseMappingRequest& request, RunState state, 
   CorrectionOutcome outcome =
       run_correction(correction, log, progress, stopped ? StopRequested() : stop_requested);
   // A correction that was broken off is done again by `--resume`, too.
-  const bool broken_off = stop_requested && stop_requested();
+  const bool broken_off = scans.stopped || (stop_requested && stop_requested());
   run.commit(broken_off);
   if (!broken_off) run.forget_state();
   return outcome;

@@ -8,6 +8,7 @@
 
 #include "understory/preprocess/machine_boxes.h"
 #include "understory/util/error.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -20,27 +21,28 @@ class BoxReader {
   explicit BoxReader(std::string path) : path_(std::move(path)) {}
 
   std::vector<MachineBox> read() {
-    const YAML::Node root = load();
     std::vector<MachineBox> boxes;
-    const YAML::Node list = root["boxes"];
-    if (!root.IsMap() || root.size() != 1 || !list || !list.IsSequence())
-      problems_.push_back(path_ + ": expected one key `boxes` with a list");
-    else
-      for (const YAML::Node& node : list)
-        boxes.push_back(read_box(node));
+    try {
+      boxes = read_boxes(load_yaml(read_text_file(path_), path_));
+    } catch (const YAML::Exception& error) {
+      problems_.push_back(path_ + ": line " + std::to_string(error.mark.line + 1) + ": " +
+                          error.msg);
+    }
     if (!problems_.empty()) throw ConfigError(problems_);
     return boxes;
   }
 
  private:
-  YAML::Node load() {
-    std::ifstream file(path_);
-    if (!file) throw InputError(path_, "", "cannot be read; expected a YAML file of machine boxes");
-    try {
-      return YAML::Load(file);
-    } catch (const YAML::Exception& error) {
-      throw ConfigError({path_ + ": " + error.what()});
+  std::vector<MachineBox> read_boxes(const YAML::Node& root) {
+    std::vector<MachineBox> boxes;
+    const bool one_key = root.IsMap() && root.size() == 1;
+    if (!one_key || !root["boxes"] || !root["boxes"].IsSequence()) {
+      problems_.push_back(path_ + ": expected one key `boxes` with a list");
+      return boxes;
     }
+    for (const YAML::Node& node : root["boxes"])
+      boxes.push_back(read_box(node));
+    return boxes;
   }
 
   void problem(const YAML::Node& node, const std::string& what) {
@@ -148,15 +150,17 @@ class BoxReader {
   }
 
   static std::vector<MachineBox::Sample> read_series(const std::string& path, double scale) {
-    std::ifstream file(path);
+    std::error_code error;  // a device has no end
+    std::ifstream file;
+    if (std::filesystem::is_regular_file(path, error)) file.open(path);
     std::string line;
-    if (!file || !std::getline(file, line))
+    if (!file.is_open() || !read_line(file, line, path, 1))
       throw InputError(path, "", "cannot be read; expected a CSV file `timestamp,value`");
     if (!line.empty() && line.back() == '\r') line.pop_back();
     if (line != "timestamp,value")
       throw InputError(path, "line 1", "expected the header `timestamp,value`");
     std::vector<MachineBox::Sample> series;
-    for (int number = 2; std::getline(file, line); ++number) {
+    for (std::uint64_t number = 2; read_line(file, line, path, number); ++number) {
       if (!line.empty() && line.back() == '\r') line.pop_back();
       if (line.empty()) continue;
       const std::string at = "line " + std::to_string(number);

@@ -10,19 +10,20 @@
 #include <utility>
 
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
 
 class FileSource : public ByteSource {
  public:
-  explicit FileSource(const std::string& path) : path_(path) {
+  FileSource(const std::string& path, std::string name) : path_(std::move(name)) {
     descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor_ < 0) throw InputError(path, "", std::strerror(errno));
+    if (descriptor_ < 0) throw InputError(path_, "", std::strerror(errno));
     struct stat status {};
     if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) {
       ::close(descriptor_);
-      throw InputError(path, "", "expected a plain file");
+      throw InputError(path_, "", "expected a plain file");
     }
     size_ = static_cast<std::uint64_t>(status.st_size);
   }
@@ -32,11 +33,14 @@ class FileSource : public ByteSource {
 
   // Small reads are served from a window, so that walking from record to record costs few calls.
   std::size_t read(std::uint64_t offset, std::uint8_t* into, std::size_t count) override {
-    if (count > kWindow / 4) return read_direct(offset, into, count);
+    if (count > kWindow / 4) return read_direct(offset, into, count, count);
     if (offset < window_offset_ || offset + count > window_offset_ + window_.size()) {
-      window_.resize(kWindow);
+      std::vector<std::uint8_t> window = std::move(window_);  // none if it cannot be read
+      window_ = {};
+      window.resize(kWindow);
+      window.resize(read_direct(offset, window.data(), kWindow, count));
+      window_ = std::move(window);
       window_offset_ = offset;
-      window_.resize(read_direct(offset, window_.data(), kWindow));
     }
     const std::size_t there = window_.size() - static_cast<std::size_t>(offset - window_offset_);
     count = std::min(count, there);
@@ -49,19 +53,23 @@ class FileSource : public ByteSource {
  private:
   static constexpr std::size_t kWindow = 1U << 16;
 
-  std::size_t read_direct(std::uint64_t offset, std::uint8_t* into, std::size_t count) const {
+  // What lies behind the `wanted` bytes may be unreadable.
+  std::size_t read_direct(std::uint64_t offset, std::uint8_t* into, std::size_t count,
+                          std::size_t wanted) const {
     std::size_t done = 0;
     while (done < count) {
       const ssize_t got =
           ::pread(descriptor_, into + done, count - done, static_cast<off_t>(offset + done));
       if (got < 0 && errno == EINTR) continue;
+      if (got < 0 && done < wanted)
+        throw ReadError(path_, "at byte " + std::to_string(offset + done), errno);
       if (got <= 0) break;
       done += static_cast<std::size_t>(got);
     }
     return done;
   }
 
-  std::string path_;
+  std::string path_;  // for messages
   int descriptor_ = -1;
   std::uint64_t size_ = 0;
   std::vector<std::uint8_t> window_;
@@ -95,7 +103,11 @@ void ByteSource::read(std::uint64_t offset, std::uint64_t count, std::vector<std
 }
 
 std::unique_ptr<ByteSource> open_file(const std::string& path) {
-  return std::make_unique<FileSource>(path);
+  return std::make_unique<FileSource>(path, path);
+}
+
+std::unique_ptr<ByteSource> open_file(const std::string& path, std::string name) {
+  return std::make_unique<FileSource>(path, std::move(name));
 }
 
 std::unique_ptr<ByteSource> bytes_in_memory(std::vector<std::uint8_t> bytes, std::string name) {

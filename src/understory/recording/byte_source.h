@@ -13,8 +13,8 @@ namespace understory {
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
-  // Reads up to `count` bytes from `offset` on; fewer only at the end or at a place that the disk
-  // cannot read. Returns the number read.
+  // Reads up to `count` bytes from `offset` on; fewer only at the end. Returns the number read.
+  // Throws ReadError where the system cannot read the file.
   [[nodiscard]] virtual std::size_t read(std::uint64_t offset, std::uint8_t* into,
                                          std::size_t count) = 0;
   [[nodiscard]] virtual std::uint64_t size() const = 0;
@@ -27,6 +27,8 @@ class ByteSource {
 
 // Throws InputError if the file is missing, is not a plain file or cannot be read.
 [[nodiscard]] std::unique_ptr<ByteSource> open_file(const std::string& path);
+// The same under another name for messages.
+[[nodiscard]] std::unique_ptr<ByteSource> open_file(const std::string& path, std::string name);
 [[nodiscard]] std::unique_ptr<ByteSource> bytes_in_memory(std::vector<std::uint8_t> bytes,
                                                           std::string name);
 

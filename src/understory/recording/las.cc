@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
@@ -325,31 +326,64 @@ void limit_memory() {
 #endif
 }
 
+// What the process that decodes came to, beside the points.
+constexpr int kDecoded = 0;
+constexpr int kGaveUp = 1;
+constexpr int kUnreadable = 2;
+
+// Notes that the system could not read the file: LASzip takes that for its end.
+class WatchedFile : public ByteSource {
+ public:
+  explicit WatchedFile(ByteSource& file) : file_(file) {}
+  std::size_t read(std::uint64_t offset, std::uint8_t* into, std::size_t count) override {
+    try {
+      return file_.read(offset, into, count);
+    } catch (const ReadError&) {
+      unreadable_ = true;
+      throw;
+    }
+  }
+  [[nodiscard]] std::uint64_t size() const override { return file_.size(); }
+  [[nodiscard]] const std::string& name() const override { return file_.name(); }
+  [[nodiscard]] bool unreadable() const { return unreadable_; }
+
+ private:
+  ByteSource& file_;
+  bool unreadable_ = false;
+};
+
 // In the process that decodes: never returns.
 [[noreturn]] void serve_points(ByteSource& file, const LasHeader& header, int pipe) {
+  WatchedFile watched(file);
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGPIPE})
     std::signal(signal, SIG_DFL);
   limit_memory();
   try {
-    decode_compressed(file, header, [&](const std::vector<LasPoint>& points) {
-      if (!write_all(pipe, points.data(), points.size() * sizeof(LasPoint))) ::_exit(1);
+    decode_compressed(watched, header, [&](const std::vector<LasPoint>& points) {
+      if (!write_all(pipe, points.data(), points.size() * sizeof(LasPoint))) ::_exit(kGaveUp);
     });
   } catch (...) {
-    ::_exit(1);
+    ::_exit(watched.unreadable() ? kUnreadable : kGaveUp);
   }
-  ::_exit(0);
+  ::_exit(watched.unreadable() ? kUnreadable : kDecoded);
 }
 
 // The end of a pipe and the process at its other end.
 struct Decoding {
   int pipe = -1;
   pid_t process = -1;
-  ~Decoding() {
+  ~Decoding() { (void)wait(); }
+  // Closes the pipe and returns what the process came to.
+  int wait() {
     if (pipe >= 0) ::close(pipe);
+    int status = 0;
     if (process > 0) {
-      while (::waitpid(process, nullptr, 0) < 0 && errno == EINTR) {
+      while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
       }
     }
+    pipe = -1;
+    process = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : kGaveUp;
   }
 };
 
@@ -388,6 +422,8 @@ void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
     have -= whole * sizeof(LasPoint);
     std::memmove(part.data(), part.data() + whole * sizeof(LasPoint), have);
   }
+  if (decoding.wait() == kUnreadable)
+    throw ReadError(file.name(), "behind point " + std::to_string(read), EIO);
   report_break(file, header, read, log);
 }
 

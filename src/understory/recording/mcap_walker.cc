@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "understory/util/output_file.h"
+#include "understory/util/read_error.h"
 
 namespace understory::mcap {
 namespace {
@@ -78,7 +79,12 @@ std::shared_ptr<const MessageChannel> Registry::find(std::uint16_t id) const {
 
 Walker::Walker(ByteSource& file, Registry& registry, Log& log)
     : file_(file), registry_(registry), log_(log), data_end_(file.size()) {
-  read_summary();
+  try {
+    read_summary();
+  } catch (const ReadError& error) {
+    // What comes before it may be readable; where it is not, the reading says so.
+    log_.warn("recording.mended", std::string(error.what()) + ": reading without the index");
+  }
 }
 
 void Walker::warn(const std::string& key, std::uint64_t offset, const std::string& what) {

@@ -7,12 +7,22 @@
 #include <cmath>
 #include <vector>
 
+#include "understory/util/text_file.h"
+
 namespace understory {
 namespace {
 
 constexpr std::size_t kLongestLine = 1024;
+using Line = std::array<char, kLongestLine + 2>;
 constexpr TimeNs kDay = 86'400 * kNsPerSecond;
 constexpr double kMetresPerSecondPerKnot = 1852.0 / 3600.0;
+
+// The next line, cut where it is too long; false at the end.
+bool next_line(std::istream& stream, Line& line, const std::string& source, std::uint64_t number) {
+  const bool any = stream.getline(line.data(), line.size()) || stream.gcount() > 0;
+  check_readable(stream, source, "line " + std::to_string(number));
+  return any;
+}
 
 std::vector<std::string_view> split(std::string_view text) {
   std::vector<std::string_view> fields;
@@ -220,8 +230,8 @@ NmeaLogReader::NmeaLogReader(std::istream& stream, std::string source, std::int6
     : stream_(stream), source_(std::move(source)), log_(log), day_(first_day) {}
 
 std::optional<GnssFix> NmeaLogReader::next() {
-  std::array<char, kLongestLine + 2> line{};
-  while (stream_.getline(line.data(), line.size()) || stream_.gcount() > 0) {
+  Line line{};
+  while (next_line(stream_, line, source_, line_number_ + 1)) {
     ++line_number_;
     const std::string_view text(line.data());
     if (stream_.fail()) stream_.clear(stream_.rdstate() & ~std::ios::failbit);
@@ -272,10 +282,10 @@ std::optional<GnssFix> NmeaLogReader::close_epoch() {
   return nmea_fix(epoch, day_ * kDay + *epoch.time_of_day);
 }
 
-std::int64_t first_nmea_day(std::istream& stream) {
-  std::array<char, kLongestLine + 2> line{};
+std::int64_t first_nmea_day(std::istream& stream, const std::string& source) {
+  Line line{};
   TimeNs first_time = -1;
-  while (stream.getline(line.data(), line.size()) || stream.gcount() > 0) {
+  for (std::uint64_t number = 1; next_line(stream, line, source, number); ++number) {
     if (stream.fail()) stream.clear(stream.rdstate() & ~std::ios::failbit);
     const auto sentence = parse_nmea(line.data());
     if (!sentence || !sentence->time_of_day) continue;

@@ -39,7 +39,8 @@ struct NmeaSentence {
 
 // Reads an NMEA log: one fix per epoch, all sentences of the epoch together. Stamps are UTC; before
 // the first date (RMC, ZDA) the date is taken from `first_day` (-1: unknown, then such epochs are
-// left out with a warning). Lines with wrong checksums are passed over with a warning.
+// left out with a warning). Lines with wrong checksums are passed over with a warning. Throws
+// ReadError where the system cannot read the log.
 class NmeaLogReader {
  public:
   NmeaLogReader(std::istream& stream, std::string source, std::int64_t first_day, Log& log);
@@ -59,6 +60,7 @@ class NmeaLogReader {
 };
 
 // The day of the first dated sentence (less one if midnight passed before it), -1 if there is none.
-[[nodiscard]] std::int64_t first_nmea_day(std::istream& stream);
+// `source` is for the message of a ReadError.
+[[nodiscard]] std::int64_t first_nmea_day(std::istream& stream, const std::string& source);
 
 }  // namespace understory

@@ -18,7 +18,7 @@ using test::nmea_line;
 std::vector<GnssFix> read_log(const std::string& text, Log& log) {
   std::istringstream ahead(text);
   std::istringstream stream(text);
-  NmeaLogReader reader(stream, "test.nmea", first_nmea_day(ahead), log);
+  NmeaLogReader reader(stream, "test.nmea", first_nmea_day(ahead, "test.nmea"), log);
   std::vector<GnssFix> fixes;
   while (auto fix = reader.next())
     fixes.push_back(*fix);
@@ -121,7 +121,7 @@ TEST(Nmea, ReadsLogsOfPhones) {
     Log log;
     std::ifstream ahead(entry.path());
     std::ifstream stream(entry.path());
-    NmeaLogReader reader(stream, entry.path(), first_nmea_day(ahead), log);
+    NmeaLogReader reader(stream, entry.path(), first_nmea_day(ahead, "test.nmea"), log);
     int fixes = 0;
     while (const auto fix = reader.next()) {
       ++fixes;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "understory/util/error.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -226,17 +227,7 @@ OusterMetadata parse_ouster_metadata(const std::string& text, const std::string&
 }
 
 OusterMetadata read_ouster_metadata(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(path, "", "cannot be read");
-  std::string text;
-  std::vector<char> part(65'536);
-  while (stream.read(part.data(), static_cast<std::streamsize>(part.size())) ||
-         stream.gcount() > 0) {
-    text.append(part.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > kLargestMetadata)
-      throw InputError(path, "", "expected the metadata of an Ouster sensor, but it is too large");
-  }
-  return parse_ouster_metadata(text, path);
+  return parse_ouster_metadata(read_text_file(path, kLargestMetadata), path);
 }
 
 }  // namespace understory

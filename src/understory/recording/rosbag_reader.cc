@@ -10,6 +10,7 @@
 #include "understory/recording/compression.h"
 #include "understory/recording/message_merger.h"
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
@@ -64,7 +65,12 @@ class RosbagSource : public MessageSource {
  public:
   RosbagSource(std::unique_ptr<ByteSource> file, Log& log) : file_(std::move(file)), log_(log) {
     position_ = std::string_view(kRosbagMagic).size();
-    read_index();
+    try {
+      read_index();
+    } catch (const ReadError& error) {
+      // What comes before it may be readable; where it is not, the reading says so.
+      log_.warn("recording.mended", std::string(error.what()) + ": reading without the index");
+    }
     last_good_ = position_;
   }
 

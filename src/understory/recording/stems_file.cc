@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -12,6 +13,7 @@
 
 #include "understory/recording/text_lines.h"
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
@@ -73,8 +75,11 @@ class GzipLines {
  private:
   // Where text ends without the end of a line: the end of the file, or a stream cut short.
   void check_end() const {
+    const int reason = errno;
     int code = Z_OK;
     const char* message = gzerror(stream_, &code);
+    if (code == Z_ERRNO)
+      throw ReadError(file_, "line " + std::to_string(number_), reason != 0 ? reason : EIO);
     if (code != Z_OK && code != Z_STREAM_END)
       fail(std::string("expected an undamaged gzip stream: ") + message);
   }

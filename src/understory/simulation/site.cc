@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "understory/simulation/presets.h"
 #include "understory/simulation/stand.h"
 #include "understory/util/error.h"
 #include "understory/util/random.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -347,6 +347,19 @@ void describe(ConfigTable& table, SiteConfig& config) {
             "measured receiver: site (as the site says), phone, phone_wild");
 }
 
+namespace {
+
+// Nothing of a file that is not there: whoever needs it says so.
+void append_file(const std::string& path, std::string& text) {
+  std::ifstream file(path, std::ios::binary);
+  std::vector<char> part(std::size_t{1} << 16);
+  while (file.read(part.data(), static_cast<std::streamsize>(part.size())) || file.gcount() > 0)
+    text.append(part.data(), static_cast<std::size_t>(file.gcount()));
+  check_readable(file, path, "");
+}
+
+}  // namespace
+
 std::uint64_t site_key(const SiteConfig& config) {
   SiteConfig copy = config;
   ConfigTable table;
@@ -358,8 +371,7 @@ std::uint64_t site_key(const SiteConfig& config) {
     std::vector<std::string> files = tree_cloud_files(config.stand.trees);
     files.insert(files.begin(), config.stand.trees);
     for (const std::string& path : files) {
-      std::ifstream file(path, std::ios::binary);
-      text.append(std::istreambuf_iterator<char>(file), {});
+      append_file(path, text);
     }
   }
   std::uint64_t key = 0;

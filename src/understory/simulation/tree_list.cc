@@ -16,6 +16,7 @@
 #include "understory/simulation/stand_drawing.h"
 #include "understory/simulation/tree_cloud.h"
 #include "understory/util/error.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -128,11 +129,11 @@ std::vector<std::string> tree_cloud_files(const std::string& list) {
   std::ifstream file(list);
   std::string line;
   std::set<std::string> files;
-  if (!std::getline(file, line)) return {};
+  if (!read_line(file, line, list, 1)) return {};
   const std::vector<std::string> names = fields_of(line);
   const auto column = static_cast<std::size_t>(
       std::distance(names.begin(), std::find(names.begin(), names.end(), "cloud")));
-  while (std::getline(file, line)) {
+  for (std::uint64_t number = 2; read_line(file, line, list, number); ++number) {
     const std::vector<std::string> fields = fields_of(line);
     if (column < fields.size() && !fields[column].empty()) {
       files.insert((std::filesystem::path(list).parent_path() / fields[column]).string());
@@ -146,7 +147,7 @@ std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& co
   std::ifstream file(path);
   std::string line;
   if (!file) throw InputError(path, "", "the list of trees cannot be opened");
-  if (!std::getline(file, line)) {
+  if (!read_line(file, line, path, 1)) {
     throw InputError(path, "", "expected a list of trees: a CSV with the columns x, y, dbh_m");
   }
   std::map<std::string, std::size_t> columns;
@@ -161,7 +162,7 @@ std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& co
   }
   std::vector<GrownTree> trees;
   std::set<int> ids;
-  for (std::size_t number = 2; std::getline(file, line); ++number) {
+  for (std::size_t number = 2; read_line(file, line, path, number); ++number) {
     std::vector<std::string> fields = fields_of(line);
     if (fields.size() == 1 && fields[0].empty()) continue;
     const std::size_t held = fields.size();

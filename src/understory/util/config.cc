@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <numeric>
 #include <sstream>
 
 #include "understory/util/error.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -255,7 +255,7 @@ void ConfigTable::read_yaml(const std::string& text, const std::string& origin,
                             std::vector<std::string>* passed_over) {
   ConfigReader reader(*this, origin, passed_over);
   try {
-    const YAML::Node root = YAML::Load(text);
+    const YAML::Node root = load_yaml(text, origin);
     if (!root.IsNull() && !root.IsMap()) {
       throw ConfigError({origin + ": expected keys with values"});
     }
@@ -267,11 +267,7 @@ void ConfigTable::read_yaml(const std::string& text, const std::string& origin,
 }
 
 void ConfigTable::read_file(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw InputError(path, "", "cannot be opened");
-  std::ostringstream text;
-  text << file.rdbuf();
-  read_yaml(text.str(), path);
+  read_yaml(read_text_file(path), path);
 }
 
 void ConfigTable::set(const std::vector<std::string>& settings) {
