@@ -1,8 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <cstring>
 
+#include "understory/recording/compression.h"
+#include "understory/recording/message_recording.h"
 #include "understory/recording/recording_test_support.h"
+#include "understory/recording/ros2_bag.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -15,6 +19,25 @@ using namespace test;
 std::string sample(const std::string& name) {
   return std::string(UNDERSTORY_SOURCE_DIR) + "/fuzz/corpus/" + name;
 }
+
+// TMPDIR for as long as it lives.
+class TemporaryFolderSetting {
+ public:
+  explicit TemporaryFolderSetting(const std::filesystem::path& path) {
+    const char* before = std::getenv("TMPDIR");
+    if (before != nullptr) before_ = before;
+    std::filesystem::create_directories(path);
+    ::setenv("TMPDIR", path.c_str(), 1);
+  }
+  ~TemporaryFolderSetting() {
+    before_.empty() ? ::unsetenv("TMPDIR") : ::setenv("TMPDIR", before_.c_str(), 1);
+  }
+  TemporaryFolderSetting(const TemporaryFolderSetting&) = delete;
+  TemporaryFolderSetting& operator=(const TemporaryFolderSetting&) = delete;
+
+ private:
+  std::string before_;
+};
 
 class Bags : public ::testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(All, Bags,
@@ -113,6 +136,58 @@ TEST(Ros2Bag, ReadsAFolderInParts) {
   EXPECT_EQ(read_all(*recording).size(), 38U);
   EXPECT_EQ(count_of(log, "recording.damaged"), 1U) << all_warnings(log);
   EXPECT_FALSE(recording->next());
+}
+
+void write_packed(const std::string& path, const std::string& unpacked) {
+  write_bytes(path, compress(read_bytes(unpacked), "zstd", 3));
+}
+
+// Bug: each part was unpacked to look ahead, and again to be read.
+TEST(Ros2Bag, UnpacksEachPartOnce) {
+  const TemporaryFolder folder;
+  write_packed(folder / "a_0.db3.zstd", sample("db3/small.db3"));
+  write_packed(folder / "a_1.mcap.zstd", sample("mcap/small_plain.mcap"));
+  const auto unpacked = std::make_shared<UnpackedParts>();
+  const std::string path = folder.path().string();
+  Log log;
+  const auto recording = open_messages(
+      path, [&](Log& sink) { return read_ros2_bag(path, unpacked, sink); }, {}, log);
+  EXPECT_EQ(read_all(*recording).size(), 38U);
+  EXPECT_EQ(all_warnings(log), "");
+  EXPECT_EQ(unpacked->unpacked(), 2);
+  // And one such file by itself.
+  const auto one = open_recording(folder / "a_1.mcap.zstd", {}, log);
+  EXPECT_EQ(read_all(*one).size(), 19U);
+  EXPECT_EQ(all_warnings(log), "");
+}
+
+// Copies have no names: nothing is left in the folder for temporary files, whatever happens.
+TEST(Ros2Bag, UnpacksWhereItIsToldAndLeavesNothing) {
+  const TemporaryFolder folder;
+  const TemporaryFolderSetting setting(folder / "scratch");
+  const auto left = [&] {
+    const std::filesystem::directory_iterator entries(folder / "scratch");
+    return std::distance(begin(entries), end(entries));
+  };
+  const std::string packed = folder / "a.db3.zstd";
+  write_packed(packed, sample("db3/small.db3"));
+  Log log;
+  {
+    const auto recording = open_recording(packed, {}, log);
+    EXPECT_TRUE(recording->next());
+    EXPECT_EQ(left(), 0);
+  }
+  std::vector<std::uint8_t> cut = read_bytes(packed);
+  cut.resize(cut.size() / 2);
+  write_bytes(packed, cut);
+  try {
+    (void)read_all(*open_recording(packed, {}, log));
+    EXPECT_GT(count_of(log, "recording.damaged"), 0U);
+  } catch (const InputError&) {
+  }
+  EXPECT_EQ(left(), 0);
+  std::filesystem::remove(folder / "scratch");
+  EXPECT_THROW((void)open_recording(packed, {}, log), OutputError);
 }
 
 // The chunk of the sample twice, the first time with its record's head destroyed.

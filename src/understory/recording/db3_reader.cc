@@ -1,6 +1,7 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <map>
 #include <optional>
 #include <utility>
@@ -8,7 +9,9 @@
 #include "understory/recording/byte_source.h"
 #include "understory/recording/compression.h"
 #include "understory/recording/ros2_bag.h"
+#include "understory/recording/sqlite_source.h"
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
@@ -25,11 +28,23 @@ struct FinishStatement {
 using Database = std::unique_ptr<sqlite3, CloseDatabase>;
 using Statement = std::unique_ptr<sqlite3_stmt, FinishStatement>;
 
+// Throws ReadError where the system cannot read the file.
+void read_through(const std::string& path) {
+  constexpr std::uint64_t kStep = 1U << 20;
+  const auto file = open_file(path);
+  std::vector<std::uint8_t> part;
+  for (std::uint64_t at = 0; at < file->size(); at += kStep)
+    file->read(at, kStep, part);
+}
+
 class Db3Source : public MessageSource {
  public:
-  // `bytes` is the database if it is in memory; it must live as long as `database`.
-  Db3Source(std::string name, Database database, std::vector<std::uint8_t> bytes, Log& log)
+  // `bytes` is the database if it is in memory; it must live as long as `database`. `is_file`:
+  // `name` is its path.
+  Db3Source(std::string name, bool is_file, Database database, std::vector<std::uint8_t> bytes,
+            Log& log)
       : name_(std::move(name)),
+        is_file_(is_file),
         bytes_(std::move(bytes)),
         database_(std::move(database)),
         log_(log) {
@@ -107,7 +122,20 @@ class Db3Source : public MessageSource {
  private:
   using Place = std::pair<TimeNs, std::int64_t>;  // time and row, the order of reading
 
+  // The disk failed, in contrast to damage. SQLite calls some failures damage, so `thoroughly` looks
+  // for them in all of the file.
+  void check_readable(bool thoroughly = true) const {
+    sqlite3* database = database_.get();
+    const int code = sqlite3_extended_errcode(database);
+    if ((code & 0xFF) == SQLITE_IOERR && code != SQLITE_IOERR_SHORT_READ) {
+      const int reason = sqlite3_system_errno(database);
+      throw ReadError(name_, "behind message " + std::to_string(read_), reason != 0 ? reason : EIO);
+    }
+    if (thoroughly && is_file_ && (code & 0xFF) == SQLITE_CORRUPT) read_through(name_);
+  }
+
   [[noreturn]] void fail(const std::string& expected) const {
+    check_readable();
     throw InputError(name_, "", expected + sqlite3_errmsg(database_.get()));
   }
 
@@ -120,7 +148,10 @@ class Db3Source : public MessageSource {
   // The number that a query gives; 0 if it fails.
   std::int64_t scalar(const std::string& query) {
     const Statement statement = prepare(query);
-    if (statement == nullptr || sqlite3_step(statement.get()) != SQLITE_ROW) return 0;
+    if (statement == nullptr || sqlite3_step(statement.get()) != SQLITE_ROW) {
+      check_readable();
+      return 0;
+    }
     return sqlite3_column_int64(statement.get(), 0);
   }
 
@@ -152,6 +183,7 @@ class Db3Source : public MessageSource {
   }
 
   void warn_damage(const std::string& what) {
+    check_readable();
     log_.warn("recording.damaged",
               name_ + ": " + what + " (" + sqlite3_errmsg(database_.get()) + ")");
   }
@@ -178,6 +210,7 @@ class Db3Source : public MessageSource {
       sqlite3_reset(rows_.get());
       sqlite3_bind_int64(rows_.get(), 1, ++row_);
       if (sqlite3_step(rows_.get()) == SQLITE_ROW) return SQLITE_ROW;
+      check_readable(false);
     }
     return SQLITE_DONE;
   }
@@ -195,6 +228,7 @@ class Db3Source : public MessageSource {
   }
 
   std::string name_;
+  bool is_file_;
   std::vector<std::uint8_t> bytes_;
   Database database_;
   Log& log_;
@@ -227,7 +261,34 @@ std::string uri_of(const std::string& path) {
   return uri + "?mode=ro";
 }
 
+// With what its database is read from.
+class SourceDb3 : public MessageSource {
+ public:
+  SourceDb3(std::unique_ptr<ByteSource> bytes, Log& log)
+      : bytes_(std::move(bytes)), sqlite_(*bytes_) {
+    sqlite3* raw = nullptr;
+    const int state = sqlite3_open_v2("bag", &raw, SQLITE_OPEN_READONLY, sqlite_.vfs());
+    Database database(raw);
+    if (state != SQLITE_OK)
+      throw InputError(bytes_->name(), "", "the SQLite database cannot be opened");
+    sqlite3_exec(raw, "PRAGMA temp_store = MEMORY", nullptr, nullptr, nullptr);
+    messages_.emplace(bytes_->name(), false, std::move(database), std::vector<std::uint8_t>(), log);
+  }
+  bool next(RawMessage& message) override { return messages_->next(message); }
+  [[nodiscard]] std::string format() const override { return messages_->format(); }
+  [[nodiscard]] double progress() const override { return messages_->progress(); }
+
+ private:
+  std::unique_ptr<ByteSource> bytes_;
+  SqliteSource sqlite_;
+  std::optional<Db3Source> messages_;
+};
+
 }  // namespace
+
+std::unique_ptr<MessageSource> read_db3(std::unique_ptr<ByteSource> bytes, Log& log) {
+  return std::make_unique<SourceDb3>(std::move(bytes), log);
+}
 
 std::unique_ptr<MessageSource> read_db3(const std::string& path, Log& log) {
   if (open_file(path)->size() == 0) throw InputError(path, "", "the file is empty");
@@ -242,7 +303,8 @@ std::unique_ptr<MessageSource> read_db3(const std::string& path, Log& log) {
     if (sqlite3_exec(raw, "SELECT count(*) FROM sqlite_master", nullptr, nullptr, nullptr) ==
         SQLITE_CANTOPEN)
       continue;
-    return std::make_unique<Db3Source>(path, std::move(database), std::vector<std::uint8_t>(), log);
+    return std::make_unique<Db3Source>(path, true, std::move(database), std::vector<std::uint8_t>(),
+                                       log);
   }
   throw InputError(path, "", "the SQLite database cannot be opened");
 }
@@ -256,7 +318,7 @@ std::unique_ptr<MessageSource> read_db3(std::vector<std::uint8_t> bytes, const s
   if (state != SQLITE_OK || sqlite3_deserialize(raw, "main", bytes.data(), size, size,
                                                 SQLITE_DESERIALIZE_READONLY) != SQLITE_OK)
     throw InputError(name, "", "the SQLite database cannot be opened");
-  return std::make_unique<Db3Source>(name, std::move(database), std::move(bytes), log);
+  return std::make_unique<Db3Source>(name, false, std::move(database), std::move(bytes), log);
 }
 
 }  // namespace understory

@@ -21,9 +21,17 @@ constexpr const char* kKnownKinds =
     "(.pcd, .ply, .las, .laz, .bin) or a folder of clouds";
 
 constexpr std::string_view kSqliteMagic = "SQLite format 3";
+constexpr std::string_view kZstdMagic = "\x28\xB5\x2F\xFD";
 
 bool starts_with(ByteSpan head, std::string_view magic) {
   return head.size() >= magic.size() && std::memcmp(head.data(), magic.data(), magic.size()) == 0;
+}
+
+std::unique_ptr<Recording> open_bag(const std::string& path, const OpenOptions& options, Log& log) {
+  const auto unpacked = std::make_shared<UnpackedParts>();
+  return open_messages(
+      path, [path, unpacked](Log& sink) { return read_ros2_bag(path, unpacked, sink); }, options,
+      log);
 }
 
 std::unique_ptr<Recording> open_file_recording(const std::string& path, const OpenOptions& options,
@@ -43,6 +51,8 @@ std::unique_ptr<Recording> open_file_recording(const std::string& path, const Op
   if (starts_with(head, kSqliteMagic))
     return open_messages(
         path, [path](Log& sink) { return read_db3(path, sink); }, options, log);
+  if (starts_with(head, kZstdMagic) && fs::path(path).extension() == ".zstd")
+    return open_bag(path, options, log);
   if (is_pcap(path)) return open_pcap(path, options, log);
   if (is_cloud_file(path)) return open_cloud_folder(path, options, log);
   throw InputError(path, "at byte 0", kKnownKinds);
@@ -50,9 +60,7 @@ std::unique_ptr<Recording> open_file_recording(const std::string& path, const Op
 
 std::unique_ptr<Recording> open_folder_recording(const std::string& path,
                                                  const OpenOptions& options, Log& log) {
-  if (is_ros2_bag_folder(path))
-    return open_messages(
-        path, [path](Log& sink) { return read_ros2_bag_folder(path, sink); }, options, log);
+  if (is_ros2_bag_folder(path)) return open_bag(path, options, log);
   if (is_cloud_folder(path)) return open_cloud_folder(path, options, log);
   throw InputError(path, "", kKnownKinds);
 }
@@ -63,7 +71,9 @@ std::unique_ptr<Recording> open_recording(const std::string& path, const OpenOpt
                                           Log& log) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) throw InputError(path, "", "no such file or folder");
+  if (status.type() == fs::file_type::not_found)
+    throw InputError(path, "", "no such file or folder");
+  if (error) throw InputError(path, "", error.message());
   if (fs::is_directory(status)) return open_folder_recording(path, options, log);
   return open_file_recording(path, options, log);
 }

@@ -1,75 +1,31 @@
 #include "understory/recording/ros2_bag.h"
 
-#include <unistd.h>
 #include <yaml-cpp/yaml.h>
-#include <zstd.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <utility>
 
 #include "understory/recording/byte_source.h"
+#include "understory/recording/mcap_format.h"
 #include "understory/recording/mcap_reader.h"
 #include "understory/util/error.h"
-#include "understory/util/output_file.h"
+#include "understory/util/read_error.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kUnpackStep = 1U << 20;
-
-// An unpacked copy of a compressed file, removed at the end.
-class TemporaryCopy {
- public:
-  explicit TemporaryCopy(std::string path) : path_(std::move(path)) {}
-  ~TemporaryCopy() {
-    std::error_code ignored;
-    fs::remove(path_, ignored);
-  }
-  TemporaryCopy(const TemporaryCopy&) = delete;
-  TemporaryCopy& operator=(const TemporaryCopy&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
-std::unique_ptr<TemporaryCopy> unpack_file(const std::string& path, Log& log) {
-  const auto file = open_file(path);
-  std::string pattern = (fs::temp_directory_path() / "understory_bag_XXXXXX").string();
-  const int descriptor = ::mkstemp(pattern.data());
-  if (descriptor < 0) throw OutputError(pattern, "no place for the unpacked copy of " + path);
-  ::close(descriptor);
-  auto copy = std::make_unique<TemporaryCopy>(pattern);
-  OutputFile out(pattern);
-  const std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)> stream(ZSTD_createDStream(),
-                                                                          &ZSTD_freeDStream);
-  std::vector<std::uint8_t> packed;
-  std::vector<std::uint8_t> piece(kUnpackStep);
-  for (std::uint64_t at = 0; at < file->size(); at += packed.size()) {
-    file->ByteSource::read(at, kUnpackStep, packed);
-    if (packed.empty()) break;
-    ZSTD_inBuffer in{packed.data(), packed.size(), 0};
-    while (in.pos < in.size) {
-      ZSTD_outBuffer buffer{piece.data(), piece.size(), 0};
-      const std::size_t state = ZSTD_decompressStream(stream.get(), &buffer, &in);
-      out.write(ByteSpan(piece).first(buffer.pos));
-      if (ZSTD_isError(state) == 0) continue;
-      log.warn("recording.damaged", path + ": at byte " + std::to_string(at + in.pos) +
-                                        ": damaged zstd data; read as far as it goes");
-      out.close();
-      return copy;
-    }
-  }
-  out.close();
-  return copy;
-}
-
 bool has_ending(const std::string& name, const std::string& ending) {
   return name.size() >= ending.size() &&
          name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+bool is_packed(const std::string& name) {
+  return has_ending(name, ".zstd");
 }
 
 bool is_bag_file(const std::string& name) {
@@ -79,41 +35,61 @@ bool is_bag_file(const std::string& name) {
   return false;
 }
 
-// The files that metadata.yaml names and that are there, else those found in the folder by name.
-std::vector<std::string> files_of(const std::string& folder, Log& log) {
+// The files that metadata.yaml names and that are there; none where it cannot be understood.
+std::vector<std::string> files_of_metadata(const std::string& folder, Log& log) {
+  const std::string metadata = (fs::path(folder) / "metadata.yaml").string();
+  std::error_code error;
   std::vector<std::string> files;
-  const fs::path metadata = fs::path(folder) / "metadata.yaml";
-  if (fs::exists(metadata)) {
-    try {
-      const YAML::Node info = YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"];
-      for (const auto& each : info["relative_file_paths"]) {
-        const fs::path file = fs::path(folder) / each.as<std::string>();
-        if (fs::exists(file)) {
-          files.push_back(file.string());
-        } else {
-          log.warn("recording.missing_file",
-                   metadata.string() + ": names " + file.string() + ", which is not there");
-        }
+  if (!fs::exists(metadata, error)) return files;
+  try {
+    for (const std::string& name : bag_file_names(read_text_file(metadata), metadata)) {
+      const std::string file = (fs::path(folder) / name).string();
+      if (std::find(files.begin(), files.end(), file) != files.end()) continue;
+      if (fs::exists(file, error)) {
+        files.push_back(file);
+      } else {
+        log.warn("recording.missing_file", metadata + ": names " + file + ", which is not there");
       }
-    } catch (const YAML::Exception& error) {
-      log.warn("recording.damaged", metadata.string() + ": " + error.what() +
-                                        "; taking the files of the folder by name");
-      files.clear();
     }
+  } catch (const ConfigError& problem) {
+    log.warn("recording.damaged",
+             std::string(problem.what()) + "; taking the files of the folder by name");
+    files.clear();
   }
+  return files;
+}
+
+// Those that metadata.yaml names, else those found in the folder by name.
+std::vector<std::string> files_of(const std::string& folder, Log& log) {
+  std::vector<std::string> files = files_of_metadata(folder, log);
   if (!files.empty()) return files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file() && is_bag_file(entry.path().filename().string()))
-      files.push_back(entry.path().string());
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code ignored;
+    if (entry->is_regular_file(ignored) && is_bag_file(entry->path().filename().string()))
+      files.push_back(entry->path().string());
   }
+  if (error) throw InputError(folder, "", error.message());
   std::sort(files.begin(), files.end());
   return files;
 }
 
+bool is_mcap(ByteSource& file) {
+  std::vector<std::uint8_t> head;
+  file.read(0, sizeof(mcap::kMagic), head);
+  return head.size() == sizeof(mcap::kMagic) &&
+         std::memcmp(head.data(), mcap::kMagic, sizeof(mcap::kMagic)) == 0;
+}
+
 // The parts of a split bag one after the other.
-class BagFolderSource : public MessageSource {
+class BagFilesSource : public MessageSource {
  public:
-  BagFolderSource(std::vector<std::string> files, Log& log) : files_(std::move(files)), log_(log) {
+  BagFilesSource(std::vector<std::string> files, std::shared_ptr<UnpackedParts> unpacked, Log& log)
+      : files_(std::move(files)),
+        unpacked_(std::move(unpacked)),
+        looks_ahead_(unpacked_->begin_pass()),
+        log_(log) {
     open_next();
   }
 
@@ -156,11 +132,15 @@ class BagFolderSource : public MessageSource {
   // A part that cannot be opened is left out, unless it is the only one.
   void open_next() {
     source_.reset();
+    copy_.reset();
+    if (opened_ > 0 && !looks_ahead_) unpacked_->forget(files_[opened_ - 1]);
     while (source_ == nullptr && opened_ < files_.size()) {
       const std::string& file = files_[opened_++];
       try {
         source_ = open_part(file);
         format_ = source_->format();
+      } catch (const ReadError&) {
+        throw;
       } catch (const InputError& error) {
         if (files_.size() == 1) throw;
         log_.warn("recording.damaged", std::string(error.what()) + "; this part is left out");
@@ -170,21 +150,22 @@ class BagFolderSource : public MessageSource {
 
   std::unique_ptr<MessageSource> open_part(const std::string& file) {
     std::string path = file;
-    copy_.reset();
-    if (has_ending(file, ".zstd")) {
-      copy_ = unpack_file(file, log_);
+    if (is_packed(file)) {
+      copy_ = unpacked_->get(file, log_);
       path = copy_->path();
     }
-    if (has_ending(file, ".mcap") || has_ending(file, ".mcap.zstd"))
-      return read_mcap(open_file(path), log_);
-    return read_db3(path, log_);
+    auto bytes = open_file(path, file);
+    if (is_mcap(*bytes)) return read_mcap(std::move(bytes), log_);
+    return copy_ == nullptr ? read_db3(file, log_) : read_db3(std::move(bytes), log_);
   }
 
   std::vector<std::string> files_;
+  std::shared_ptr<UnpackedParts> unpacked_;
+  bool looks_ahead_;
   Log& log_;
   std::size_t opened_ = 0;
   std::string format_ = "ROS 2 bag";
-  std::unique_ptr<TemporaryCopy> copy_;
+  std::shared_ptr<const UnpackedFile> copy_;
   std::unique_ptr<MessageSource> source_;
 };
 
@@ -199,10 +180,26 @@ bool is_ros2_bag_folder(const std::string& path) {
   return false;
 }
 
-std::unique_ptr<MessageSource> read_ros2_bag_folder(const std::string& path, Log& log) {
-  std::vector<std::string> files = files_of(path, log);
+std::vector<std::string> bag_file_names(const std::string& metadata, const std::string& origin) {
+  const YAML::Node root = load_yaml(metadata, origin);
+  std::vector<std::string> names;
+  try {
+    const YAML::Node info = root["rosbag2_bagfile_information"];
+    for (const auto& each : info["relative_file_paths"])
+      names.push_back(each.as<std::string>());
+  } catch (const YAML::Exception& error) {
+    throw ConfigError({origin + ":" + std::to_string(error.mark.line + 1) + ": " + error.msg});
+  }
+  return names;
+}
+
+std::unique_ptr<MessageSource> read_ros2_bag(const std::string& path,
+                                             std::shared_ptr<UnpackedParts> unpacked, Log& log) {
+  std::error_code error;
+  std::vector<std::string> files{path};
+  if (fs::is_directory(path, error)) files = files_of(path, log);
   if (files.empty()) throw InputError(path, "", "expected .db3 or .mcap files in the bag's folder");
-  return std::make_unique<BagFolderSource>(std::move(files), log);
+  return std::make_unique<BagFilesSource>(std::move(files), std::move(unpacked), log);
 }
 
 }  // namespace understory

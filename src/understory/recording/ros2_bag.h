@@ -4,7 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "understory/recording/byte_source.h"
 #include "understory/recording/message_source.h"
+#include "understory/recording/unpacked_file.h"
 
 namespace understory {
 
@@ -12,15 +14,22 @@ namespace understory {
 // one by one are unpacked. A damaged file is read row by row as far as its pages allow. Throws
 // InputError if the file is no SQLite database with the tables of a bag.
 [[nodiscard]] std::unique_ptr<MessageSource> read_db3(const std::string& path, Log& log);
+// The same of a file alone, without what a journal beside it may hold.
+[[nodiscard]] std::unique_ptr<MessageSource> read_db3(std::unique_ptr<ByteSource> bytes, Log& log);
 // The same from memory.
 [[nodiscard]] std::unique_ptr<MessageSource> read_db3(std::vector<std::uint8_t> bytes,
                                                       const std::string& name, Log& log);
 
 // Whether the folder holds the files of a ROS 2 bag (.db3, .mcap, both also with .zstd).
 [[nodiscard]] bool is_ros2_bag_folder(const std::string& path);
-// The files of the bag folder one after the other, .db3 or .mcap, also with .zstd behind it (those
-// are unpacked into the folder for temporary files while they are read).
-[[nodiscard]] std::unique_ptr<MessageSource> read_ros2_bag_folder(const std::string& path,
-                                                                  Log& log);
+// The files that a bag's metadata.yaml names. Throws ConfigError if it cannot be understood.
+[[nodiscard]] std::vector<std::string> bag_file_names(const std::string& metadata,
+                                                      const std::string& origin);
+// The files of the bag's folder one after the other, .db3 or .mcap, also with .zstd behind it
+// (those are unpacked while they are read); or one such file. A part that is damaged is read as far
+// as it goes, one that cannot be opened is left out with a warning.
+[[nodiscard]] std::unique_ptr<MessageSource> read_ros2_bag(const std::string& path,
+                                                           std::shared_ptr<UnpackedParts> unpacked,
+                                                           Log& log);
 
 }  // namespace understory
