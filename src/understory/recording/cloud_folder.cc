@@ -19,6 +19,7 @@
 #include "understory/recording/point_cloud.h"
 #include "understory/recording/topic_statistics.h"
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
@@ -210,6 +211,8 @@ class CloudFolder : public Recording {
         any = true;
         field = layout->time_field();
         type = layout->time_type();
+      } catch (const ReadError&) {
+        throw;
       } catch (const InputError& error) {
         if (trouble.empty()) trouble = error.what();
       }
@@ -250,7 +253,7 @@ class CloudFolder : public Recording {
                 folder_.string() + ": of several NMEA logs only " + logs[0].string() + " is read");
     }
     std::ifstream ahead(logs[0], std::ios::binary);
-    const std::int64_t day = first_nmea_day(ahead);
+    const std::int64_t day = first_nmea_day(ahead, logs[0].string());
     nmea_stream_.open(logs[0], std::ios::binary);
     nmea_ = std::make_unique<NmeaLogReader>(nmea_stream_, logs[0].string(), day, log_);
     fix_statistics_ = side_report(logs[0].filename().string(), "NMEA 0183", "gnss", "UTC");
@@ -274,8 +277,13 @@ class CloudFolder : public Recording {
       rig_.lidar_extrinsic_source = rig_.imu_extrinsic_source = "assumed identity";
     }
     if (!options.extrinsics_file.empty()) {
-      apply_extrinsics_file(options.extrinsics_file, rig_);
-    } else if (imu_) {
+      apply_extrinsics_file(options.extrinsics_file, {}, rig_, log_);
+    }
+    // The file may place the one on the other, or both on a body of its own.
+    const bool lidar = rig_.lidar_extrinsic_source.rfind("extrinsics file", 0) == 0;
+    const bool imu = rig_.imu_extrinsic_source.rfind("extrinsics file", 0) == 0;
+    const bool known = (lidar && imu) || (rig_.body_frame == "imu" && (lidar || imu));
+    if (imu_ && !known) {
       log_.warn("recording.no_imu_extrinsics",
                 folder_.string() +
                     ": the IMU is taken to sit in the lidar's frame: give "
@@ -297,6 +305,8 @@ class CloudFolder : public Recording {
           any_scan_ = true;
           return scan;
         }
+      } catch (const ReadError&) {
+        throw;
       } catch (const InputError& error) {
         log_.warn("recording.damaged", error.what());
       }
@@ -366,6 +376,8 @@ bool is_cloud_file(const std::string& path) {
   try {
     const auto file = open_file(path);
     return cloud_format(*file) != CloudFormat::kUnknown;
+  } catch (const ReadError&) {
+    throw;
   } catch (const InputError&) {
     return false;
   }

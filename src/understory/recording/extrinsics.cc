@@ -2,12 +2,15 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "understory/util/error.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -18,34 +21,41 @@ class ExtrinsicsFile {
  public:
   explicit ExtrinsicsFile(const std::string& path) : path_(path) {}
 
-  void apply(const YAML::Node& root, Rig& rig) {
+  // What the file says.
+  struct Given {
+    std::optional<std::string> body_frame;
+    std::optional<std::string> lidar_model;
+    std::optional<Pose> body_from_lidar;
+    std::optional<Pose> body_from_imu;
+    std::optional<Pose> body_from_gnss;
+  };
+
+  Given read(const YAML::Node& root) {
+    Given given;
     if (!root.IsMap()) {
       problem("", "expected keys such as body_from_lidar");
-      return;
+      return given;
     }
     for (const auto& entry : root) {
       const auto key = entry.first.as<std::string>("");
       const YAML::Node& value = entry.second;
-      const std::string source = "extrinsics file " + path_;
       if (key == "body_frame") {
-        rig.body_frame = value.as<std::string>("");
+        given.body_frame = value.as<std::string>("");
       } else if (key == "lidar_model") {
-        rig.lidar_model = value.as<std::string>("");
+        given.lidar_model = value.as<std::string>("");
       } else if (key == "body_from_lidar") {
-        rig.body_from_lidar = read_pose(value, key);
-        rig.lidar_extrinsic_source = source;
+        given.body_from_lidar = read_pose(value, key);
       } else if (key == "body_from_imu") {
-        rig.body_from_imu = read_pose(value, key);
-        rig.imu_extrinsic_source = source;
+        given.body_from_imu = read_pose(value, key);
       } else if (key == "body_from_gnss") {
-        rig.body_from_gnss = read_pose(value, key);
-        rig.gnss_extrinsic_source = source;
+        given.body_from_gnss = read_pose(value, key);
       } else {
         problem(key,
                 "unknown key; expected body_frame, lidar_model, body_from_lidar, body_from_imu or "
                 "body_from_gnss");
       }
     }
+    return given;
   }
 
   void throw_problems() const {
@@ -129,6 +139,66 @@ class ExtrinsicsFile {
   std::vector<std::string> problems_;
 };
 
+// The file's body from the recording's, by a sensor whose place is known on both.
+std::optional<Pose> new_from_old_body(const ExtrinsicsFile::Given& given, const Rig& rig) {
+  if (given.body_from_lidar) return *given.body_from_lidar * rig.body_from_lidar.inverse();
+  if (given.body_from_imu && rig.body_from_imu)
+    return *given.body_from_imu * rig.body_from_imu->inverse();
+  if (given.body_from_gnss && rig.body_from_gnss)
+    return *given.body_from_gnss * rig.body_from_gnss->inverse();
+  return std::nullopt;
+}
+
+// Brings the recording's places onto another body.
+void move_to_body(const std::string& path, const ExtrinsicsFile::Given& given, Rig& rig, Log& log) {
+  const auto new_from_old = new_from_old_body(given, rig);
+  const std::string& body = *given.body_frame;
+  if (!new_from_old && rig.body_frame != "lidar") {
+    throw ConfigError({path + ": body_frame: " + body + " is not the body of the recording (" +
+                       rig.body_frame +
+                       "), and nothing tells where the lidar sits on it: give "
+                       "body_from_lidar"});
+  }
+  if (!new_from_old) {  // the lidar is all that the recording tells of
+    log.warn("recording.extrinsics_body", path + ": nothing tells where the lidar sits on " + body +
+                                              ": it is taken to sit in its origin");
+  }
+  const auto move = [&](const char* sensor, std::optional<Pose>& place, std::string& source) {
+    if (!place) return;
+    if (new_from_old) {
+      place = *new_from_old * *place;
+      source += ", moved to " + body + " by " + path;
+      return;
+    }
+    log.warn("recording.extrinsics_body", path + ": nothing tells where the " + sensor +
+                                              " sits on " + body + ": its place is dropped");
+    place.reset();
+    source = "none";
+  };
+  if (new_from_old) rig.body_from_lidar = *new_from_old * rig.body_from_lidar;
+  if (!given.body_from_imu) move("IMU", rig.body_from_imu, rig.imu_extrinsic_source);
+  if (!given.body_from_gnss) move("GNSS antenna", rig.body_from_gnss, rig.gnss_extrinsic_source);
+}
+
+// A file that does not name its body may mean another one than the recording has.
+void remark_on_body(const std::string& path, const ExtrinsicsFile::Given& given, const Rig& rig,
+                    Log& log) {
+  std::string kept;
+  const auto keep = [&](const char* sensor, const std::string& source) {
+    if (source.rfind("/tf_static", 0) == 0 || source.rfind("sensor metadata", 0) == 0)
+      kept += (kept.empty() ? "" : ", ") + std::string(sensor) + " by " + source;
+  };
+  if (given.body_frame) return;
+  if (!given.body_from_lidar) keep("the lidar", rig.lidar_extrinsic_source);
+  if (!given.body_from_imu) keep("the IMU", rig.imu_extrinsic_source);
+  if (!given.body_from_gnss) keep("the GNSS antenna", rig.gnss_extrinsic_source);
+  const bool places = given.body_from_lidar || given.body_from_imu || given.body_from_gnss;
+  if (kept.empty() || !places) return;
+  log.warn("recording.extrinsics_body",
+           path + ": names no body_frame: its places are taken to be on the recording's body (" +
+               rig.body_frame + "), on which other sensors stay (" + kept + ")");
+}
+
 }  // namespace
 
 bool TransformTree::add(const std::string& parent, const std::string& child,
@@ -203,18 +273,32 @@ bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& ri
   return imu || gnss;
 }
 
-void apply_extrinsics_file(const std::string& path, Rig& rig) {
-  YAML::Node root;
-  try {
-    root = YAML::LoadFile(path);
-  } catch (const YAML::BadFile&) {
-    throw InputError(path, "", "the extrinsics file cannot be read");
-  } catch (const YAML::Exception& error) {
-    throw ConfigError({path + ": " + error.what()});
-  }
+void apply_extrinsics_file(const std::string& path, const std::vector<std::string>& body_names,
+                           Rig& rig, Log& log) {
   ExtrinsicsFile file(path);
-  file.apply(root, rig);
+  const ExtrinsicsFile::Given given = file.read(load_yaml(read_text_file(path), path));
   file.throw_problems();
+  if (given.lidar_model) rig.lidar_model = *given.lidar_model;
+  if (given.body_frame && *given.body_frame != rig.body_frame &&
+      std::find(body_names.begin(), body_names.end(), *given.body_frame) == body_names.end()) {
+    move_to_body(path, given, rig, log);
+  } else {
+    remark_on_body(path, given, rig, log);
+  }
+  if (given.body_frame) rig.body_frame = *given.body_frame;
+  const std::string source = "extrinsics file " + path;
+  if (given.body_from_lidar) {
+    rig.body_from_lidar = *given.body_from_lidar;
+    rig.lidar_extrinsic_source = source;
+  }
+  if (given.body_from_imu) {
+    rig.body_from_imu = given.body_from_imu;
+    rig.imu_extrinsic_source = source;
+  }
+  if (given.body_from_gnss) {
+    rig.body_from_gnss = given.body_from_gnss;
+    rig.gnss_extrinsic_source = source;
+  }
 }
 
 }  // namespace understory

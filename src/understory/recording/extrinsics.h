@@ -4,8 +4,10 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "understory/sensor/rig.h"
+#include "understory/util/log.h"
 
 namespace understory {
 
@@ -39,15 +41,21 @@ struct SensorFrames {
 // its body stays. True if there was any.
 bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& rig);
 
-// Puts the extrinsics of a YAML file over those of the recording:
+// Puts the extrinsics of a YAML file over those of the recording, which has its own body frame:
 //     body_frame: base_link
 //     lidar_model: VLP-16
 //     body_from_lidar: {translation_m: [0, 0, 1.2], rotation_xyzw: [0, 0, 0, 1]}
 //     body_from_imu: {translation_m: [0, 0, 0], rpy_deg: [0, 0, 90]}
 //     body_from_gnss: {translation_m: [0, 0, 2]}
 // A rotation is given as rotation_xyzw, rpy_deg (fixed axes x, y, z) or matrix (nine numbers, row
-// by row); without one it is none. Throws ConfigError with all that is wrong, InputError if the
-// file cannot be read.
-void apply_extrinsics_file(const std::string& path, Rig& rig);
+// by row); without one it is none.
+// Without `body_frame`, or where that is the recording's body (`body_names` are other names of it),
+// the places are on the recording's body, and sensors that the file does not name stay where they
+// were. With another `body_frame` they move along: a sensor in the file whose place the recording
+// knows too leads from one body to the other. What cannot be moved is dropped, with a warning
+// ("recording.extrinsics_body"). Throws ConfigError with all that is wrong, and where nothing tells
+// the lidar's place; InputError if the file cannot be read.
+void apply_extrinsics_file(const std::string& path, const std::vector<std::string>& body_names,
+                           Rig& rig, Log& log);
 
 }  // namespace understory

@@ -19,6 +19,8 @@ namespace {
 constexpr double kGravity = 9.80665;
 constexpr TimeNs kFixWait = kNsPerSecond / 5;
 constexpr TimeNs kSameFix = kNsPerSecond / 1000;
+constexpr double kSamePlaceM = 0.001;
+constexpr double kSameAngle = 0.001;
 
 const char* role_name(TopicRole role) {
   switch (role) {
@@ -38,6 +40,13 @@ const char* role_name(TopicRole role) {
     default:
       return "ignored";
   }
+}
+
+// ROS 1 drivers wrote "/velodyne" and "velodyne" alike.
+std::string_view bare_frame(std::string_view frame) {
+  while (!frame.empty() && frame.front() == '/')
+    frame.remove_prefix(1);
+  return frame;
 }
 
 // Joins positions (NavSatFix) with the quality that comes on another topic (GPSFix).
@@ -94,6 +103,8 @@ class MessageRecording : public Recording {
     survey_late_topics(*ahead, survey_);
     choice_ = choose_topics(survey_, options, file_, log_);
     if (!choice_.quality.empty()) fixes_.expect_quality();
+    for (const TopicSurvey& topic : survey_.topics)
+      frame_of_topic_[topic.topic] = topic.frame;
     source_ = open(log_);
     note_frames();
     make_rig(ahead->sensor_metadata());
@@ -159,8 +170,19 @@ class MessageRecording : public Recording {
     const std::string model = rig_.lidar_model;
     rig_ = rig_from_transforms(survey_.transforms, frames_);
     rig_.lidar_model = model;
-    if (!extrinsics_file_.empty()) apply_extrinsics_file(extrinsics_file_, rig_);
+    apply_extrinsics();
     return !had_imu && rig_.body_from_imu;
+  }
+
+  // The file speaks of the recording's body by its frame or by the sensor's kind.
+  void apply_extrinsics() {
+    if (extrinsics_file_.empty()) return;
+    const std::string own = rig_.body_frame == "imu"     ? frames_.imu
+                            : rig_.body_frame == "lidar" ? frames_.lidar
+                                                         : rig_.body_frame;
+    Log unheard;
+    apply_extrinsics_file(extrinsics_file_, {own}, rig_, extrinsics_told_ ? unheard : log_);
+    extrinsics_told_ = true;
   }
 
   [[nodiscard]] bool lacks_place() const {
@@ -188,7 +210,9 @@ class MessageRecording : public Recording {
     const TopicSurvey* lidar = survey_.find(choice_.lidar);
     if (lidar == nullptr || lidar->role != TopicRole::kCloud) return;
     const TopicSurvey* imu = survey_.find(choice_.imu);
-    set_convention(detect_point_times(lidar->time_field, lidar->time_type, lidar->clouds,
+    const auto clouds = lidar->clouds.find(lidar->frame);
+    if (clouds == lidar->clouds.end()) return;
+    set_convention(detect_point_times(lidar->time_field, lidar->time_type, clouds->second,
                                       imu == nullptr ? std::vector<TimeNs>() : imu->delays));
   }
 
@@ -308,9 +332,29 @@ class MessageRecording : public Recording {
     return topics_.emplace(channel.topic, TopicStatistics(report)).first->second;
   }
 
+  // Whether a message comes from another sensor on the same topic, by its frame. There is one place
+  // for one lidar and one IMU: what comes from a second would be taken to come from there. Frames
+  // that /tf_static puts into the same place are one.
+  bool is_of_another(TopicStatistics& topic, const std::string& frame, const char* what) {
+    std::string& own = frame_of_topic_[topic.report().name];
+    if (own.empty()) own = frame;
+    if (frame.empty() || bare_frame(frame) == bare_frame(own)) return false;
+    const auto own_from_frame = survey_.transforms.find(own, frame);
+    if (own_from_frame && own_from_frame->translation().norm() < kSamePlaceM &&
+        own_from_frame->angle() < kSameAngle)
+      return false;
+    ++topic.report().left_out;
+    log_.warn("recording.other_frames",
+              file_ + ": " + topic.report().name + ": holds " + what + " of two sensors (frames " +
+                  own + " and " + frame + "); those of " + frame +
+                  " are left out: record each sensor on a topic of its own");
+    return true;
+  }
+
   bool take_cloud(TopicStatistics& topic, const MessageReader& reader, TimeNs log_time) {
     const auto cloud = decode_point_cloud2(reader);
     if (!cloud) return false;
+    if (is_of_another(topic, cloud->header.frame, "clouds")) return true;
     const auto layout = CloudLayout::find(*cloud);
     if (!layout) return false;
     if (!convention_)
@@ -336,6 +380,7 @@ class MessageRecording : public Recording {
 
   bool take_packets(TopicStatistics& topic, const std::optional<PacketsMessage>& message) {
     if (!message) return false;
+    if (is_of_another(topic, message->header.frame, "packets")) return true;
     if (!packets_) {
       // The clouds that go with packets: the ROS 1 driver's calibration has the beams' vertical
       // offsets, that of nebula for ROS 2 has not.
@@ -355,6 +400,7 @@ class MessageRecording : public Recording {
   bool take_imu(TopicStatistics& topic, const MessageReader& reader) {
     auto imu = decode_imu(reader);
     if (!imu) return false;
+    if (is_of_another(topic, imu->header.frame, "samples")) return true;
     topic.add_stamp(imu->sample.stamp);
     topic.report().frame = imu->header.frame;
     if (imu_text_.empty()) judge_late_imu(imu->sample);
@@ -419,11 +465,13 @@ class MessageRecording : public Recording {
   Log& log_;
   MessageSurvey survey_;
   TopicChoice choice_;
+  std::map<std::string, std::string> frame_of_topic_;  // of the sensor that is used
   std::unique_ptr<MessageSource> source_;
   SensorFrames frames_;
   std::string extrinsics_file_;
   Rig rig_;
   bool scan_given_ = false;
+  bool extrinsics_told_ = false;  // what the file leaves open has been warned of
   std::optional<TimeConvention> convention_;
   int ring_count_ = 0;
   double imu_scale_ = 1.0;

@@ -8,12 +8,14 @@
 #include "understory/recording/message_decode.h"
 #include "understory/recording/point_cloud.h"
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
 
 constexpr std::size_t kEnoughClouds = 8;
 constexpr std::size_t kMostSamples = 2000;
+constexpr std::size_t kMostFrames = 16;
 constexpr std::uint64_t kMostBytes = 256ULL << 20;
 constexpr TimeNs kEnoughTime = 2 * kNsPerSecond;
 constexpr TimeNs kMostTime = 60 * kNsPerSecond;
@@ -56,9 +58,11 @@ class Surveyor {
 
   [[nodiscard]] std::size_t most_clouds() const {
     std::size_t most = 0;
-    for (const TopicSurvey& topic : survey_.topics)
-      most = std::max(
-          {most, topic.clouds.size(), is_packets(topic.role) ? topic.messages : std::size_t{0}});
+    for (const TopicSurvey& topic : survey_.topics) {
+      if (is_packets(topic.role)) most = std::max<std::size_t>(most, topic.messages);
+      for (const auto& [frame, clouds] : topic.clouds)
+        most = std::max(most, clouds.size());
+    }
     return most;
   }
 
@@ -80,26 +84,37 @@ class Surveyor {
   static void add_cloud(TopicSurvey& topic, const MessageReader& reader, TimeNs log_time) {
     const auto cloud = decode_point_cloud2(reader);
     if (!cloud) return;
-    topic.frame = cloud->header.frame;
     const auto layout = CloudLayout::find(*cloud);
     if (!layout) return;
     topic.time_field = layout->time_field();
     topic.time_type = layout->time_type();
-    if (cloud->point_step > 0) topic.points += cloud->data.size() / cloud->point_step;
-    if (topic.clouds.size() < kMostSamples)
-      topic.clouds.push_back(measure_times(*cloud, *layout, log_time));
+    const std::size_t points =
+        cloud->point_step > 0 ? cloud->data.size() / cloud->point_step : std::size_t{0};
+    topic.points += points;
+    note_frame(topic, cloud->header.frame, points + 1);
+    if (topic.clouds.size() >= kMostFrames && topic.clouds.count(cloud->header.frame) == 0) return;
+    std::vector<CloudTimes>& clouds = topic.clouds[cloud->header.frame];
+    if (clouds.size() < kMostSamples) clouds.push_back(measure_times(*cloud, *layout, log_time));
+  }
+
+  // Two sensors may share a topic: the one with more data counts.
+  static void note_frame(TopicSurvey& topic, const std::string& frame, std::size_t amount) {
+    if (topic.frames.size() >= kMostFrames && topic.frames.count(frame) == 0) return;
+    const std::uint64_t sum = topic.frames[frame] += amount;
+    if (topic.frames.count(topic.frame) == 0 || sum > topic.frames[topic.frame])
+      topic.frame = frame;
   }
 
   static void add_packets(TopicSurvey& topic, const std::optional<PacketsMessage>& message) {
     if (!message) return;
-    topic.frame = message->header.frame;
+    note_frame(topic, message->header.frame, message->packets.size());
     topic.points += 384 * message->packets.size();  // a Velodyne packet holds as many
   }
 
   static void add_imu(TopicSurvey& topic, const MessageReader& reader, TimeNs log_time) {
     const auto imu = decode_imu(reader);
     if (!imu || topic.delays.size() >= kMostSamples) return;
-    topic.frame = imu->header.frame;
+    note_frame(topic, imu->header.frame, 1);
     topic.delays.push_back(log_time - imu->sample.stamp);
     if (imu->sample.specific_force.allFinite())
       topic.specific_force_sum += imu->sample.specific_force.norm();
@@ -188,7 +203,15 @@ MessageSurvey survey_messages(MessageSource& source) {
   std::uint64_t bytes = 0;
   std::optional<TimeNs> start;
   int late = 0;  // more than one, because a single log time may be damaged
-  while (source.next(message)) {
+  const auto next = [&] {
+    try {
+      return source.next(message);
+    } catch (const ReadError&) {
+      if (surveyor.most_clouds() == 0) throw;
+      return false;  // met again when it is read
+    }
+  };
+  while (next()) {
     surveyor.add(message);
     bytes += message.data.size();
     if (!start) start = message.log_time;

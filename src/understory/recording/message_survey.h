@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -30,15 +31,16 @@ enum class TopicRole {
 struct TopicSurvey {
   std::string topic;
   TopicRole role = TopicRole::kIgnored;
-  std::string frame;
+  std::string frame;  // of most of its data
   std::uint64_t messages = 0;
   std::uint64_t points = 0;
   std::string time_field;
   std::string time_type;
-  std::vector<CloudTimes> clouds;   // of PointCloud2
-  std::vector<TimeNs> delays;       // log time - stamp
-  double specific_force_sum = 0.0;  // of norms, as they come
-  bool late = false;                // first seen behind the start, by the file's index
+  std::map<std::string, std::uint64_t> frames;            // points (IMU: messages) of each
+  std::map<std::string, std::vector<CloudTimes>> clouds;  // of PointCloud2, by frame
+  std::vector<TimeNs> delays;                             // log time - stamp
+  double specific_force_sum = 0.0;                        // of norms, as they come
+  bool late = false;  // first seen behind the start, by the file's index
 };
 
 struct MessageSurvey {

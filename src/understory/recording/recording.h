@@ -35,6 +35,7 @@ struct TopicReport {
   std::uint64_t backward_steps = 0;  // stamps that go back in time
   std::uint64_t duplicates = 0;      // stamps equal to the one before
   std::uint64_t unreadable = 0;      // messages that could not be decoded
+  std::uint64_t left_out = 0;        // messages of another sensor on the same topic
   std::uint64_t points = 0;          // lidar only
   std::uint64_t empty_points = 0;    // lidar only: NaN or zero range, dropped
 };

@@ -230,19 +230,97 @@ TEST(Extrinsics, AFileOverridesAndTellsAllThatIsWrong) {
   };
   write("body_frame: base_link\nbody_from_imu: {translation_m: [1, 2, 3], rpy_deg: [0, 0, 90]}\n");
   Rig rig;
-  apply_extrinsics_file(path, rig);
+  Log log;
+  apply_extrinsics_file(path, {}, rig, log);
   EXPECT_EQ(rig.body_frame, "base_link");
+  EXPECT_NE(all_warnings(log).find("taken to sit in its origin"), std::string::npos);
   ASSERT_TRUE(rig.body_from_imu);
   EXPECT_LT((*rig.body_from_imu * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(1, 3, 3)).norm(),
             1e-12);
   write("body_from_lidar: {translation_m: [1, 2], turn: 3}\nspeed: 4\n");
   try {
-    apply_extrinsics_file(path, rig);
+    apply_extrinsics_file(path, {}, rig, log);
     FAIL();
   } catch (const ConfigError& error) {
     EXPECT_EQ(error.problems().size(), 3U);
   }
-  EXPECT_THROW(apply_extrinsics_file(folder / "none.yaml", rig), InputError);
+  EXPECT_THROW(apply_extrinsics_file(folder / "none.yaml", {}, rig, log), InputError);
+}
+
+void expect_near(const std::optional<Pose>& pose, const Pose& expected) {
+  ASSERT_TRUE(pose);
+  EXPECT_LT(right_difference(*pose, expected).norm(), 1e-9);
+}
+
+// Bug: the IMU kept its place on the recording's body although the file speaks of another one.
+TEST(Extrinsics, OtherSensorsMoveToTheBodyOfTheFile) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "rig.yaml";
+  const auto write = [&](const std::string& text) {
+    write_bytes(path, {text.begin(), text.end()});
+  };
+  Rig recorded;  // as an Ouster says it: the IMU is the body
+  recorded.body_frame = "imu";
+  recorded.body_from_lidar = Pose(so3_exp({0.1, 0.2, 0.3}), {0.01, 0.02, 0.03});
+  recorded.body_from_imu = Pose();
+  recorded.body_from_gnss = Pose(so3_exp({}), {0.0, 0.0, 1.0});
+  recorded.imu_extrinsic_source = "sensor metadata";
+  const Pose base_from_lidar(Eigen::Quaterniond::Identity(), {1.0, 2.0, 3.0});
+  const std::string place = "{translation_m: [1, 2, 3]}\n";
+  {
+    write("body_frame: base_link\nbody_from_lidar: " + place);
+    Log log;
+    Rig rig = recorded;
+    apply_extrinsics_file(path, {"os_imu"}, rig, log);
+    expect_near(rig.body_from_lidar, base_from_lidar);
+    expect_near(rig.body_from_imu, base_from_lidar * recorded.body_from_lidar.inverse());
+    expect_near(rig.body_from_gnss,
+                base_from_lidar * recorded.body_from_lidar.inverse() * *recorded.body_from_gnss);
+    EXPECT_NE(rig.imu_extrinsic_source.find("moved to base_link"), std::string::npos);
+    EXPECT_EQ(all_warnings(log), "");
+  }
+  {  // by the IMU; the lidar moves along
+    write("body_frame: base_link\nbody_from_imu: " + place);
+    Log log;
+    Rig rig = recorded;
+    apply_extrinsics_file(path, {}, rig, log);
+    expect_near(rig.body_from_imu, base_from_lidar);
+    expect_near(rig.body_from_lidar, base_from_lidar * recorded.body_from_lidar);
+  }
+  for (const char* body : {"imu", "os_imu"}) {  // the recording's body under either name
+    write(std::string("body_frame: ") + body + "\nbody_from_lidar: " + place);
+    Log log;
+    Rig rig = recorded;
+    apply_extrinsics_file(path, {"os_imu"}, rig, log);
+    expect_near(rig.body_from_lidar, base_from_lidar);
+    expect_near(rig.body_from_imu, Pose());
+    EXPECT_EQ(all_warnings(log), "");
+  }
+  {  // without a name it is the recording's body too, which is said
+    write("body_from_lidar: " + place);
+    Log log;
+    Rig rig = recorded;
+    apply_extrinsics_file(path, {}, rig, log);
+    expect_near(rig.body_from_imu, Pose());
+    EXPECT_EQ(count_of(log, "recording.extrinsics_body"), 1U);
+  }
+}
+
+TEST(Extrinsics, APlaceThatNothingTellsIsDroppedOrRefused) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "rig.yaml";
+  const std::string text = "body_frame: base_link\nbody_from_imu: {translation_m: [1, 2, 3]}\n";
+  write_bytes(path, {text.begin(), text.end()});
+  Log log;
+  Rig rig;  // the lidar is the body, nothing tells of the IMU
+  rig.body_from_gnss = Pose();
+  apply_extrinsics_file(path, {}, rig, log);
+  EXPECT_FALSE(rig.body_from_gnss);
+  EXPECT_EQ(rig.gnss_extrinsic_source, "none");
+  EXPECT_EQ(count_of(log, "recording.extrinsics_body"), 2U) << all_warnings(log);
+  Rig on_mast;
+  on_mast.body_frame = "mast";
+  EXPECT_THROW(apply_extrinsics_file(path, {}, on_mast, log), ConfigError);
 }
 
 }  // namespace
