@@ -16,6 +16,8 @@ theirs = np.concatenate([
     np.column_stack([scan[:, 0:4], scan[:, 6], scan[:, 4].astype(float)
                      + (stamp.device - 1453364282)])
     for stamp, scan in velodyne_decoder.read_pcap(str(capture), config)]).astype(float)
+# The capture begins within a turn; that part of a scan is left out here.
+theirs = theirs[theirs[:, 5] > ours[:, 5].min() - 1e-6]
 check(len(ours) == len(theirs), f"{len(ours)} points, velodyne_decoder has {len(theirs)}")
 ours = ours[np.lexsort((ours[:, 4], np.round(ours[:, 5] * 1e6)))]
 theirs = theirs[np.lexsort((theirs[:, 4], np.round(theirs[:, 5] * 1e6)))]

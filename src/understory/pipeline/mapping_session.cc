@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "understory/geometry/pose_io.h"
@@ -31,6 +33,8 @@ constexpr double kWorthlessSigmaM = 10.0;
 constexpr double kLongestOpeningS = 0.5;
 constexpr double kLeastSmearM = 0.005;
 constexpr double kSmearRangeM = 10.0;
+// A first scan that is shorter than that share of the second, or sees less around it, is a part.
+constexpr double kPartShare = 0.75;
 
 std::uint16_t clamp_to_u16(double value) {
   return static_cast<std::uint16_t>(std::clamp(value, 0.0, 65'535.0));
@@ -45,6 +49,27 @@ Points points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) 
     if (cloud.range[i] >= low && cloud.range[i] <= high) points.push_back(cloud.points[i]);
   }
   return points;
+}
+
+// Of the sectors of 10 degrees around the lidar, those with a point.
+int sectors_of(const Scan& scan) {
+  constexpr int kSectors = 36;
+  std::array<bool, kSectors> seen{};
+  for (const ScanPoint& p : scan.points) {
+    const double turn = std::atan2(p.y, p.x) / (2.0 * std::numbers::pi) + 0.5;
+    seen[static_cast<std::size_t>(std::clamp(static_cast<int>(turn * kSectors), 0, 35))] = true;
+  }
+  return static_cast<int>(std::count(seen.begin(), seen.end(), true));
+}
+
+// Whether a recording began within a turn of its lidar. The next scan then comes so soon that a
+// small error between the two is a great speed.
+bool is_part_of_turn(const Scan& first, const Scan& second) {
+  if (!first.has_point_times || !second.has_point_times)
+    return sectors_of(first) < kPartShare * sectors_of(second);
+  const auto turn = static_cast<double>(second.end() - second.stamp);
+  return static_cast<double>(first.end() - first.stamp) < kPartShare * turn &&
+         static_cast<double>(second.stamp - first.stamp) < kPartShare * turn;
 }
 
 }  // namespace
@@ -151,6 +176,10 @@ void MappingSession::start_anew() {
 void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
   if (counts_.scans < 2) return;
   const Scan& first = *std::get<ScanPtr>(opening_->events.front());
+  if (counts_.parts == 0 && opening_->rounds == 0 && is_part_of_turn(first, scan)) {
+    leave_out_first();
+    return;
+  }
   const double between = to_seconds(scan.stamp - first.stamp);
   const double lasting = to_seconds(first.end() - first.stamp);
   constexpr int kMostRounds = 6;
@@ -180,6 +209,25 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
     }
   }
   opening_.reset();
+}
+
+// Begins with the second scan instead.
+void MappingSession::leave_out_first() {
+  const std::vector<Event> events = std::exchange(opening_->events, {});
+  const Scan& first = *std::get<ScanPtr>(events.front());
+  log_.warn("scan.part",
+            fmt::format("the recording begins within a turn of the lidar: its first scan, of {} "
+                        "points at {} s, is left out",
+                        first.points.size(), format_seconds(first.stamp)));
+  recent_imu_ = opening_->imu_before;
+  fixes_.resize(opening_->fixes_before);
+  counts_ = opening_->counts_before;
+  counts_.parts = 1;
+  opening_ = std::make_unique<Opening>();
+  odometry_.reset();
+  const Rig rig = rig_;
+  for (std::size_t i = 1; i < events.size(); ++i)
+    handle(events[i], rig);
 }
 
 // Lost: unmatched for so long that the prediction is worth nothing, or not even finite any more.

@@ -30,7 +30,8 @@ struct MappingCounts {
   std::uint64_t empty_scans = 0;  // hardly any point left after preprocessing
   std::uint64_t segments = 1;     // pieces of map that hang together by predictions only
   std::uint64_t lost_in_a_row = 0;
-  TimeNs first_lost = 0;  // when the second piece began
+  std::uint64_t parts = 0;  // of a turn, at the beginning of the recording; left out
+  TimeNs first_lost = 0;    // when the second piece began
   std::uint64_t imu_samples = 0;
   TimeNs imu_without_place = 0;  // time of the IMU's samples before its place was known
   std::uint64_t points = 0;
@@ -111,6 +112,7 @@ class MappingSession : public Resumable {
   void take_sample(const ImuSample& sample);
   void start_anew();
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
+  void leave_out_first();
   void on_scan(const Scan& scan);
   [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);
   [[nodiscard]] bool lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const;

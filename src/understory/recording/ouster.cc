@@ -75,11 +75,12 @@ bool OusterDecoder::Mark::followed_by(const Mark& next) const {
 
 OusterDecoder::OusterDecoder(const OusterMetadata& metadata, std::string source, Log& log)
     : metadata_(metadata),
-      source_(std::move(source)),
+      source_(source),
       log_(log),
       sensor_from_lidar_rotation_(metadata.sensor_from_lidar.rotation_matrix()),
       sensor_from_lidar_translation_(metadata.sensor_from_lidar.translation()),
-      seen_(static_cast<std::size_t>(metadata.columns_per_frame), false) {
+      seen_(static_cast<std::size_t>(metadata.columns_per_frame), false),
+      finished_(std::move(source), log) {
   make_beams();
 }
 
@@ -214,9 +215,19 @@ void OusterDecoder::add_return(const Beam& beam, const Column& column, std::uint
 }
 
 void OusterDecoder::close_scan() {
+  finished_.add(make_scan(points_, point_times_, metadata_.pixels_per_column),
+                missing_at_beginning());
   std::fill(seen_.begin(), seen_.end(), false);
-  if (ScanPtr scan = make_scan(points_, point_times_, metadata_.pixels_per_column))
-    finished_.push_back(std::move(scan));
+}
+
+// The share of the column window that lies before the first column of the scan in progress.
+double OusterDecoder::missing_at_beginning() const {
+  const auto first = std::find(seen_.begin(), seen_.end(), true) - seen_.begin();
+  const int window = metadata_.last_column - metadata_.first_column + 1;
+  if (window > 0) return static_cast<double>(first - metadata_.first_column) / window;
+  // A window beyond column 0: what is seen of it.
+  const auto seen = std::count(seen_.begin(), seen_.end(), true);
+  return 1.0 - static_cast<double>(seen) / (metadata_.columns_per_frame + window);
 }
 
 std::optional<ImuSample> OusterDecoder::add_imu_packet(const std::uint8_t* data, std::size_t size) {
@@ -253,14 +264,12 @@ std::optional<ImuSample> OusterDecoder::add_imu_packet(const std::uint8_t* data,
 }
 
 ScanPtr OusterDecoder::take_scan() {
-  if (finished_.empty()) return nullptr;
-  ScanPtr scan = std::move(finished_.front());
-  finished_.pop_front();
-  return scan;
+  return finished_.take();
 }
 
 void OusterDecoder::finish() {
   close_scan();
+  finished_.finish();
 }
 
 std::string OusterDecoder::conventions() const {

@@ -3,11 +3,11 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "understory/recording/first_scan.h"
 #include "understory/recording/ouster_metadata.h"
 #include "understory/sensor/imu_sample.h"
 #include "understory/sensor/scan.h"
@@ -37,7 +37,8 @@ class OusterDecoder {
 
   // The next finished scan, or null. Call until null after each packet.
   [[nodiscard]] ScanPtr take_scan();
-  // Ends the scan in progress; at the end of the stream.
+  // Ends the scan in progress; at the end of the stream. A first scan that is only a part of a turn
+  // is left out (FinishedScans).
   void finish();
 
   // For `info`: "RNG15_RFL8_NIR8; per-column times on the sensor's clock (...)".
@@ -71,6 +72,7 @@ class OusterDecoder {
   void add_return(const Beam& beam, const Column& column, std::uint32_t range_mm, float intensity,
                   std::uint8_t return_index);
   void close_scan();
+  [[nodiscard]] double missing_at_beginning() const;
   void damaged(const std::string& what);
 
   OusterMetadata metadata_;
@@ -90,7 +92,7 @@ class OusterDecoder {
   double encoder_cos_ = 1.0, encoder_sin_ = 0.0;
   std::vector<ScanPoint> points_;
   std::vector<TimeNs> point_times_;
-  std::deque<ScanPtr> finished_;
+  FinishedScans finished_;
 };
 
 }  // namespace understory

@@ -23,6 +23,7 @@ OusterMetadata small_sensor(OusterProfile profile) {
   metadata.pixels_per_column = 2;
   metadata.columns_per_packet = 4;
   metadata.columns_per_frame = 16;
+  metadata.last_column = 15;
   metadata.beam_altitude_deg = {10.0, -5.0};
   metadata.beam_azimuth_deg = {4.0, -4.0};
   metadata.lidar_from_beam(0, 3) = 0.015;
@@ -90,6 +91,27 @@ std::vector<ScanPtr> drain(OusterDecoder& decoder) {
   while (ScanPtr scan = decoder.take_scan())
     scans.push_back(scan);
   return scans;
+}
+
+// A stream that begins within a turn, over the whole turn and over a window of 8 columns.
+TEST(Ouster, LeavesOutAFirstScanThatIsAPart) {
+  for (const int window : {16, 8}) {
+    OusterMetadata metadata = small_sensor(OusterProfile::kRng19);
+    metadata.last_column = window - 1;
+    for (const int first : {0, 4}) {
+      Log log;
+      OusterDecoder decoder(metadata, "test", log);
+      for (int frame = 0; frame < 3; ++frame) {
+        for (int column = frame == 0 ? first : 0; column < window; column += 4) {
+          add(decoder, make_ouster(metadata, static_cast<std::uint16_t>(frame),
+                                   static_cast<std::uint16_t>(column),
+                                   5'000'000'000 + frame * 100'000'000LL + column * 100'000LL));
+        }
+      }
+      EXPECT_EQ(drain(decoder).size(), first == 0 ? 3U : 2U) << window;
+      EXPECT_EQ(test::count_of(log, "scan.part"), first == 0 ? 0U : 1U) << window;
+    }
+  }
 }
 
 class OusterProfiles : public ::testing::TestWithParam<OusterProfile> {};

@@ -15,11 +15,13 @@
 #include "understory/recording/udp.h"
 #include "understory/recording/velodyne.h"
 #include "understory/util/error.h"
+#include "understory/util/read_error.h"
 
 namespace understory {
 namespace {
 
 constexpr int kFramesForPosition = 20'000;
+constexpr std::size_t kMostIgnored = 256;  // streams that are reported
 
 // What both kinds of sensor share: the walk through the file and the reports.
 class PcapRecording : public Recording {
@@ -30,7 +32,7 @@ class PcapRecording : public Recording {
     lidar_statistics_.report().role = "lidar";
   }
 
-  void apply_extrinsics(const std::string& path) { apply_extrinsics_file(path, rig_); }
+  void apply_extrinsics(const std::string& path) { apply_extrinsics_file(path, {}, rig_, log_); }
 
   std::optional<Event> next() override {
     while (ready_.empty()) {
@@ -75,6 +77,10 @@ class PcapRecording : public Recording {
   virtual void take(const Datagram& datagram) = 0;
   virtual void finish() = 0;
   [[nodiscard]] virtual std::string sensor() const = 0;
+  // Of which sensor a datagram is that is not used; empty if of none that could be.
+  [[nodiscard]] virtual std::string unused_sensor(const Datagram& datagram) const {
+    return is_velodyne_data(datagram.payload) ? "another lidar" : "";
+  }
 
   [[nodiscard]] bool from_lidar(const Datagram& datagram) const {
     return datagram.source == lidar_.source && datagram.port == lidar_.port;
@@ -86,7 +92,14 @@ class PcapRecording : public Recording {
   }
   void ignore(const Datagram& datagram) {
     const UdpStream key{datagram.source, datagram.port};
-    if (survey_.streams.count(key) == 0) return;  // which bounds the number of reports
+    const bool is_new = ignored_.count(key) == 0;
+    if (is_new && ignored_.size() >= kMostIgnored) return;
+    const std::string sensor = unused_sensor(datagram);
+    if (is_new && !sensor.empty() && survey_.streams.count(key) == 0) {
+      log_.warn("recording.late_sensor", file_->name() + ": " + key.name() + ": packets of " +
+                                             sensor +
+                                             " begin late in the capture; they are not used");
+    }
     TopicReport& report = ignored_[key].report();
     report.name = key.name();
     report.type = "UDP datagrams";
@@ -155,15 +168,28 @@ class VelodynePcap : public DecodedPcap<VelodyneDecoder> {
  private:
   // The model, and the hour out of the first position packet, are wanted before the first scan.
   void look_ahead() {
-    UdpAssembler udp;
-    CapturedFrame frame;
     Log unheard;  // what is damaged is told when it is read
     file_->rewind(unheard);
     VelodyneDecoder first({}, file_->name(), unheard);
+    try {
+      look_at_start(first);
+    } catch (const ReadError&) {
+      // Met again when it is read.
+    }
+    rig_.lidar_model = first.model_name();
+    file_->rewind(log_);
+  }
+
+  void look_at_start(VelodyneDecoder& first) {
+    UdpAssembler udp;
+    CapturedFrame frame;
     bool has_time = false;
-    for (int i = 0; i < kFramesForPosition && file_->next(frame); ++i) {
+    int behind = 0;  // the lidar's first datagram
+    while (behind < kFramesForPosition && file_->next(frame)) {
+      behind += behind > 0 ? 1 : 0;
       const auto datagram = udp.add(frame.link_type, frame.bytes, frame.stamp);
       if (!datagram || datagram->source != lidar_.source) continue;
+      if (from_lidar(*datagram)) behind = std::max(behind, 1);
       if (from_lidar(*datagram) && first.model_name().empty())
         first.add_packet(datagram->payload.data(), datagram->payload.size(), datagram->stamp);
       if (!has_time && is_velodyne_position(datagram->payload) && !wrong(*datagram)) {
@@ -171,8 +197,6 @@ class VelodynePcap : public DecodedPcap<VelodyneDecoder> {
       }
       if (has_time && !first.model_name().empty()) break;
     }
-    rig_.lidar_model = first.model_name();
-    file_->rewind(log_);
   }
 
   [[nodiscard]] bool wrong(const Datagram& datagram) const {
@@ -253,6 +277,12 @@ class OusterPcap : public DecodedPcap<OusterDecoder> {
   }
 
   std::string sensor() const override { return "Ouster " + metadata_.product; }
+  [[nodiscard]] std::string unused_sensor(const Datagram& datagram) const override {
+    if (datagram.payload.size() == metadata_.lidar_packet_size()) return "another lidar";
+    const bool imu = !imu_ && metadata_.legacy_imu && datagram.source == lidar_.source &&
+                     datagram.payload.size() == kOusterImuPacketSize;
+    return imu ? "the IMU" : PcapRecording::unused_sensor(datagram);
+  }
 
   OusterMetadata metadata_;
   std::optional<UdpStream> imu_;
@@ -286,36 +316,58 @@ std::uint64_t velodyne_packets(const PcapSurvey::Stream& stream) {
   return stream.velodyne;
 }
 
+// The Ouster's metadata that go with a capture.
+struct FoundMetadata {
+  std::string file;
+  std::optional<OusterMetadata> metadata;
+  std::optional<InputError> trouble;  // with what lies beside: a Velodyne's capture needs none
+};
+
+FoundMetadata metadata_of(const std::string& capture, const OpenOptions& options) {
+  FoundMetadata found;
+  try {
+    found.file =
+        options.metadata_file.empty() ? find_ouster_metadata(capture) : options.metadata_file;
+    if (!found.file.empty()) found.metadata = read_ouster_metadata(found.file);
+  } catch (const InputError& error) {
+    if (!options.metadata_file.empty()) throw;
+    found.trouble = error;
+  }
+  return found;
+}
+
 std::unique_ptr<PcapRecording> open(std::unique_ptr<ByteSource> source, const OpenOptions& options,
                                     Log& log) {
   Log unheard;
   auto file = std::make_unique<PcapFile>(std::move(source), unheard);
-  PcapSurvey survey = survey_pcap(*file);
-  file->rewind(log);
   const std::string name = file->name();
+  const FoundMetadata beside = metadata_of(name, options);
+  PcapWanted wanted;
+  wanted.velodyne = options.metadata_file.empty();
+  if (beside.metadata) wanted.ouster_packet_size = beside.metadata->lidar_packet_size();
+  wanted.stream = options.lidar_topic;
+  PcapSurvey survey = survey_pcap(*file, wanted);
+  file->rewind(log);
   if (options.metadata_file.empty()) {
     if (const auto lidar = choose(survey, options, name, log, velodyne_packets))
       return std::make_unique<VelodynePcap>(std::move(file), std::move(survey), *lidar, log);
   }
-  const std::string metadata_file =
-      options.metadata_file.empty() ? find_ouster_metadata(name) : options.metadata_file;
-  if (metadata_file.empty()) {
+  if (beside.trouble) throw InputError(*beside.trouble);
+  if (!beside.metadata) {
     throw InputError(name, "",
                      "expected Velodyne packets, or Ouster packets with their metadata (--metadata "
                      "FILE, or a .json beside it whose name its name begins with); found " +
                          survey.list());
   }
-  const OusterMetadata metadata = read_ouster_metadata(metadata_file);
-  const auto lidar = choose(survey, options, name, log, [&](const PcapSurvey::Stream& stream) {
-    const auto count = stream.by_size.find(metadata.lidar_packet_size());
-    return count == stream.by_size.end() ? 0 : count->second;
-  });
+  const auto lidar = choose(survey, options, name, log,
+                            [](const PcapSurvey::Stream& stream) { return stream.ouster; });
   if (!lidar) {
     throw InputError(name, "",
-                     "expected Ouster packets of " + std::to_string(metadata.lidar_packet_size()) +
-                         " bytes as " + metadata_file + " has them; found " + survey.list());
+                     "expected Ouster packets of " + std::to_string(wanted.ouster_packet_size) +
+                         " bytes as " + beside.file + " has them; found " + survey.list());
   }
-  return std::make_unique<OusterPcap>(std::move(file), std::move(survey), *lidar, metadata, log);
+  return std::make_unique<OusterPcap>(std::move(file), std::move(survey), *lidar, *beside.metadata,
+                                      log);
 }
 
 }  // namespace
@@ -326,6 +378,8 @@ bool is_pcap(const std::string& path) {
     std::array<std::uint8_t, 4> start{};
     return source->read(0, start.data(), start.size()) == start.size() &&
            PcapFile::recognise(start);
+  } catch (const ReadError&) {
+    throw;
   } catch (const InputError&) {
     return false;
   }

@@ -62,7 +62,7 @@ TimeNs utc_of(const NmeaSentence& sentence) {
 }  // namespace
 
 VelodyneDecoder::VelodyneDecoder(const VelodyneConfig& config, std::string source, Log& log)
-    : config_(config), source_(std::move(source)), log_(log) {
+    : config_(config), source_(source), log_(log), finished_(std::move(source), log) {
   if (config_.model != VelodyneModel::kUnknown) {
     model_ = config_.model;
     table_ = velodyne_table(model_);
@@ -253,14 +253,17 @@ void VelodyneDecoder::turn_to(double azimuth_cdeg, TimeNs time) {
   const bool back = turned_cdeg_ >= 0.0 && turned > turned_cdeg_ + 0.5 * kTurnCdeg;
   const bool endless =
       !points_.empty() && (time - scan_begin_ > kLongestScan || time < scan_begin_);
+  if (endless) missing_cdeg_ = 0.0;  // it does not spin
   if (passed || endless) close_scan();
+  if (missing_cdeg_ < 0.0) missing_cdeg_ = turned;
   if (points_.empty()) scan_begin_ = time;
   if (!back || endless) turned_cdeg_ = turned;
 }
 
 void VelodyneDecoder::close_scan() {
-  if (ScanPtr scan = make_scan(points_, point_times_, static_cast<int>(table_.lasers.size())))
-    finished_.push_back(std::move(scan));
+  finished_.add(make_scan(points_, point_times_, static_cast<int>(table_.lasers.size())),
+                missing_cdeg_ / kTurnCdeg);
+  missing_cdeg_ = -1.0;
 }
 
 bool VelodyneDecoder::set_clock(const std::uint8_t* data, std::size_t size) {
@@ -281,14 +284,12 @@ std::optional<GnssFix> VelodyneDecoder::add_position_packet(const std::uint8_t* 
 }
 
 ScanPtr VelodyneDecoder::take_scan() {
-  if (finished_.empty()) return nullptr;
-  ScanPtr scan = std::move(finished_.front());
-  finished_.pop_front();
-  return scan;
+  return finished_.take();
 }
 
 void VelodyneDecoder::finish() {
   close_scan();
+  finished_.finish();
 }
 
 std::string VelodyneDecoder::conventions() const {

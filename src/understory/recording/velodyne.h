@@ -3,11 +3,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "understory/recording/first_scan.h"
 #include "understory/recording/velodyne_clock.h"
 #include "understory/recording/velodyne_tables.h"
 #include "understory/sensor/gnss_fix.h"
@@ -59,7 +59,8 @@ class VelodyneDecoder {
 
   // The next finished scan, or null. Call until null after each packet.
   [[nodiscard]] ScanPtr take_scan();
-  // Ends the scan in progress; at the end of the stream.
+  // Ends the scan in progress; at the end of the stream. A first scan that is only a part of a turn
+  // is left out (FinishedScans).
   void finish();
 
   [[nodiscard]] VelodyneModel model() const { return model_; }
@@ -113,7 +114,8 @@ class VelodyneDecoder {
   TimeNs scan_begin_ = 0;
   std::vector<ScanPoint> points_;  // of the scan in progress
   std::vector<TimeNs> point_times_;
-  std::deque<ScanPtr> finished_;
+  double missing_cdeg_ = -1.0;  // of the scan in progress, at its beginning; -1: no firing yet
+  FinishedScans finished_;
 };
 
 }  // namespace understory

@@ -106,14 +106,46 @@ TEST(Velodyne, CutsScansWhereTheHeadPassesTheStart) {
     packet.us = static_cast<std::uint32_t>(1327 * i);
     add(decoder, packet, kFullHour + i * 1'327'000LL);
   }
+  // The first half turn is left out, the last one kept.
   const auto scans = drain(decoder);
-  ASSERT_EQ(scans.size(), 4U);
-  for (const std::size_t i : {1U, 2U}) {
+  ASSERT_EQ(scans.size(), 3U);
+  for (const std::size_t i : {0U, 1U}) {
     EXPECT_NEAR(static_cast<double>(scans[i]->points.size()), 75.0 * 384, 64);
     EXPECT_NEAR(to_seconds(scans[i]->end() - scans[i]->stamp), 0.0995, 1e-3);
     EXPECT_LT(scans[i]->points.front().x, -4.0F);
   }
-  EXPECT_EQ(log.warnings().size(), 0U) << test::all_warnings(log);
+  EXPECT_EQ(test::all_warnings(log),
+            "scan.part: test: begins within a turn of the lidar: its first scan, of 14400 points, "
+            "lacks 50 % of the turn and is left out\n");
+}
+
+// A stream that begins within a turn.
+TEST(Velodyne, LeavesOutAFirstScanThatIsAPart) {
+  for (const int first : {0, 3, 19, 37, 56}) {
+    Log log;
+    VelodyneDecoder decoder({}, "test", log);
+    for (int i = first; i < 3 * 75; ++i) {
+      VelodynePacket packet;
+      packet.azimuth_cdeg = (480 * i) % 36000;
+      packet.us = static_cast<std::uint32_t>(1327 * i);
+      add(decoder, packet, kFullHour + i * 1'327'000LL);
+    }
+    const bool part = first > 7;
+    const auto scans = drain(decoder);
+    ASSERT_EQ(scans.size(), part ? 2U : 3U) << first;
+    EXPECT_EQ(test::count_of(log, "scan.part"), part ? 1U : 0U) << first;
+    EXPECT_NEAR(to_seconds(scans[1]->stamp - scans[0]->stamp), 0.1, 0.008) << first;
+  }
+}
+
+TEST(Velodyne, KeepsAPartThatIsAll) {
+  Log log;
+  VelodyneDecoder decoder({}, "test", log);
+  VelodynePacket packet;
+  packet.azimuth_cdeg = 30'000;
+  add(decoder, packet, kFullHour);
+  EXPECT_EQ(drain(decoder).size(), 1U);
+  EXPECT_EQ(test::all_warnings(log), "");
 }
 
 TEST(Velodyne, LeavesOutZeroAndNearReturns) {

@@ -1,0 +1,47 @@
+#include "understory/recording/first_scan.h"
+
+#include <cmath>
+#include <utility>
+
+namespace understory {
+namespace {
+
+// Less does no harm: the next scan comes nearly when it should.
+constexpr double kMostMissing = 0.1;
+
+}  // namespace
+
+void FinishedScans::add(ScanPtr scan, double missing) {
+  if (scan == nullptr) return;
+  if (!any_ && missing > kMostMissing) {
+    part_ = std::move(scan);
+    missing_ = missing;
+  } else {
+    drop_part();
+    scans_.push_back(std::move(scan));
+  }
+  any_ = true;
+}
+
+void FinishedScans::drop_part() {
+  if (part_ == nullptr) return;
+  log_.warn("scan.part", source_ + ": begins within a turn of the lidar: its first scan, of " +
+                             std::to_string(part_->points.size()) + " points, lacks " +
+                             std::to_string(std::lround(100.0 * missing_)) +
+                             " % of the turn and is left out");
+  part_ = nullptr;
+}
+
+ScanPtr FinishedScans::take() {
+  if (scans_.empty()) return nullptr;
+  ScanPtr scan = std::move(scans_.front());
+  scans_.pop_front();
+  return scan;
+}
+
+void FinishedScans::finish() {
+  if (part_ != nullptr) scans_.push_back(std::move(part_));
+  part_ = nullptr;
+}
+
+}  // namespace understory
