@@ -111,12 +111,14 @@ function(understory_benchmark target)
                         RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/benchmarks")
 endfunction()
 
-# understory_fuzz(<name> SOURCE <file> [LAYERS ...] [CORPUS <folder>])
-# A libFuzzer target fuzz_<name> in <build>/fuzz; tools/fuzz.sh runs all that are there.
+# understory_fuzz(<name> SOURCE <file> [LAYERS ...] [LIBRARIES ...] [ALONE <file under src/understory>...])
+# A libFuzzer target fuzz_<name> in <build>/fuzz; tools/fuzz.sh runs all that are there. ALONE: readers of
+# a high layer that need none of its others, so that the layers below it need not be built.
 function(understory_fuzz name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "SOURCE" "LAYERS;LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "SOURCE" "LAYERS;LIBRARIES;ALONE")
   list(TRANSFORM arg_LAYERS PREPEND understory::)
-  add_executable(fuzz_${name} ${arg_SOURCE})
+  list(TRANSFORM arg_ALONE PREPEND "${PROJECT_SOURCE_DIR}/src/understory/")
+  add_executable(fuzz_${name} ${arg_SOURCE} ${arg_ALONE})
   target_link_libraries(fuzz_${name} PRIVATE understory_own_code ${arg_LAYERS} ${arg_LIBRARIES})
   target_compile_definitions(fuzz_${name} PRIVATE UNDERSTORY_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)

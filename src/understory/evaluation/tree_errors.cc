@@ -3,12 +3,24 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <tuple>
 
 #include "understory/evaluation/table_reader.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
+
+// Nothing where the cell is empty or not finite.
+std::optional<int> whole_number(const CsvReader& table, const std::string& column) {
+  const double value = table.number(column);
+  if (!std::isfinite(value)) return std::nullopt;
+  if (std::abs(value) > std::numeric_limits<int>::max())
+    throw InputError(table.lines().file(), table.lines().position(),
+                     "expected a smaller number in column '" + column + "'");
+  return static_cast<int>(value);
+}
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -51,8 +63,7 @@ std::vector<Tree> read_trees(const std::filesystem::path& path) {
   std::vector<Tree> trees;
   while (table.next()) {
     Tree tree;
-    const double id = table.number("id");
-    tree.id = std::isfinite(id) ? static_cast<int>(id) : static_cast<int>(trees.size()) + 1;
+    tree.id = whole_number(table, "id").value_or(static_cast<int>(trees.size()) + 1);
     tree.x = table.finite("x");
     tree.y = table.finite("y");
     const double z = table.number("z");
@@ -61,8 +72,7 @@ std::vector<Tree> read_trees(const std::filesystem::path& path) {
     tree.dbh_sd_m = table.number("dbh_sd_m");
     tree.height_m = table.number("height_m");
     tree.lean_deg = table.number("lean_deg");
-    const double observations = table.number("observations");
-    tree.observations = std::isfinite(observations) ? static_cast<int>(observations) : 0;
+    tree.observations = whole_number(table, "observations").value_or(0);
     tree.x_sd_m = table.number("x_sd_m");
     tree.y_sd_m = table.number("y_sd_m");
     tree.felled = !table.text("felled_at").empty();

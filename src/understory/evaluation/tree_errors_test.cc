@@ -177,6 +177,11 @@ TEST(TreeErrors, ReadsTheColumnsByName) {
   EXPECT_TRUE(read_trees(path).at(1).felled);
   std::ofstream(path) << "id,x\n1,2\n";
   EXPECT_THROW((void)read_trees(path), InputError);
+  // Bug: a name that stood twice in the header let rows through that were too short.
+  std::ofstream(path) << "x,x,y\n1,2\n";
+  EXPECT_THROW((void)read_trees(path), InputError);
+  std::ofstream(path) << "id,x,y\n1e300,1,2\n";
+  EXPECT_THROW((void)read_trees(path), InputError);
   std::ofstream(path) << "timestamp,tree_id,rings,rings_with_3,returns\n0,5,1,1,20\n1,5,1,1,11\n";
   EXPECT_EQ(read_returns(path).at(5), 31);
   std::filesystem::remove(path);

@@ -75,6 +75,8 @@ void gather_remarks(const Log& log, RunEvidence& evidence) {
     } else if (warning.key == "recording.other_frames") {
       evidence.other_sensor_messages = warning.count;
       evidence.first_other_sensor = warning.first_message;
+    } else if (warning.key == "recording.late_sensor") {
+      evidence.late_sensor = warning.first_message;
     } else if (warning.key == "recording.truncated") {
       evidence.cut_off = true;
       evidence.where_cut_off = warning.first_message;

@@ -93,6 +93,7 @@ class Judge {
       missing(fmt::format("{} message(s) of a second sensor had no say: {}",
                           evidence_.other_sensor_messages, evidence_.first_other_sensor));
     }
+    if (!evidence_.late_sensor.empty()) missing("a sensor had no say: " + evidence_.late_sensor);
     if (evidence_.damaged_places > 0) {
       hurt(fmt::format("the recording is damaged ({} place(s), the first: {})",
                        evidence_.damaged_places, evidence_.first_damage));

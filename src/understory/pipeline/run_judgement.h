@@ -50,10 +50,6 @@ struct RunJudgement {
 // How far a point 10 m away moves against the sensor on that step from scan to scan, metres.
 [[nodiscard]] double smear_of(const Pose& step);
 
-// Why a run ended before the end of its recording: the user stopped it, or, if not empty, what the
-// reader said that could read no further.
-[[nodiscard]] std::string stop_reason(const std::string& unreadable);
-
 // What is said of a run that was made without its IMU, for that reason.
 [[nodiscard]] std::string imu_refusal(const std::string& reason);
 
