@@ -109,10 +109,13 @@ void write_all(const void* bytes, std::size_t count) {
 
 void note(Kind kind, const char* path, const char* second, std::uint64_t inode, std::int64_t offset,
           const iovec* parts = nullptr, std::uint64_t bytes = 0) {
-  const Head head{kind,  path == nullptr ? 0 : static_cast<std::uint32_t>(std::strlen(path)),
+  const Head head{kind,
+                  path == nullptr ? 0 : static_cast<std::uint32_t>(std::strlen(path)),
                   second == nullptr ? 0 : static_cast<std::uint32_t>(std::strlen(second)),
-                  0,     inode,
-                  offset, bytes};
+                  0,
+                  inode,
+                  offset,
+                  bytes};
   write_all(&head, sizeof(head));
   if (path != nullptr) write_all(path, head.path);
   if (second != nullptr) write_all(second, head.second);
@@ -145,13 +148,15 @@ bool path_at(long folder, const char* given, Path& path) {
   }
   Path base{};
   if (static_cast<int>(folder) == AT_FDCWD) {
-    const long length = call(SYS_readlinkat, AT_FDCWD, "/proc/self/cwd", base.data(), base.size() - 1);
+    const long length =
+        call(SYS_readlinkat, AT_FDCWD, "/proc/self/cwd", base.data(), base.size() - 1);
     base[length > 0 ? static_cast<std::size_t>(length) : 0] = '\0';
   } else {
     (void)path_of(folder, base);
   }
   // NOLINTNEXTLINE: what does not fit is not watched
-  if (std::snprintf(path.data(), path.size(), "%s/%s", base.data(), given) >= PATH_MAX) return false;
+  if (std::snprintf(path.data(), path.size(), "%s/%s", base.data(), given) >= PATH_MAX)
+    return false;
   return is_watched(path);
 }
 
@@ -173,7 +178,8 @@ long do_open(long number, long folder, const char* path, long flags, long mode, 
   const struct stat status = status_of(file);
   if (!S_ISREG(status.st_mode)) return file;
   if ((flags & O_TMPFILE) == O_TMPFILE) note(Kind::kUnknown, absolute.data(), nullptr, 0, number);
-  if ((flags & O_CREAT) != 0 && !existed) note(Kind::kMake, absolute.data(), nullptr, status.st_ino, 0);
+  if ((flags & O_CREAT) != 0 && !existed)
+    note(Kind::kMake, absolute.data(), nullptr, status.st_ino, 0);
   if ((flags & O_TRUNC) != 0 && existed) note(Kind::kTruncate, nullptr, nullptr, status.st_ino, 0);
   return file;
 }
@@ -316,11 +322,15 @@ void on_call(int /*signal*/, siginfo_t* info, void* context) {
 }
 
 constexpr std::array<std::uint32_t, 33> kCalls = {
-    SYS_open,   SYS_creat,    SYS_openat,   SYS_openat2,   SYS_write,    SYS_pwrite64,  SYS_writev,
-    SYS_pwritev, SYS_pwritev2, SYS_rename,   SYS_renameat,  SYS_renameat2, SYS_unlink,   SYS_rmdir,
-    SYS_unlinkat, SYS_mkdir,   SYS_mkdirat,  SYS_link,      SYS_symlink,  SYS_linkat,    SYS_symlinkat,
-    SYS_truncate, SYS_ftruncate, SYS_fsync,  SYS_fdatasync, SYS_sync,     SYS_syncfs,    SYS_copy_file_range,
-    SYS_fallocate, SYS_sendfile, SYS_splice, SYS_mmap,     SYS_io_uring_setup};
+    SYS_open,          SYS_creat,    SYS_openat,    SYS_openat2,
+    SYS_write,         SYS_pwrite64, SYS_writev,    SYS_pwritev,
+    SYS_pwritev2,      SYS_rename,   SYS_renameat,  SYS_renameat2,
+    SYS_unlink,        SYS_rmdir,    SYS_unlinkat,  SYS_mkdir,
+    SYS_mkdirat,       SYS_link,     SYS_symlink,   SYS_linkat,
+    SYS_symlinkat,     SYS_truncate, SYS_ftruncate, SYS_fsync,
+    SYS_fdatasync,     SYS_sync,     SYS_syncfs,    SYS_copy_file_range,
+    SYS_fallocate,     SYS_sendfile, SYS_splice,    SYS_mmap,
+    SYS_io_uring_setup};
 
 bool install_filter() {
   const auto done = reinterpret_cast<std::uint64_t>(power_cut_call_done);
@@ -362,7 +372,8 @@ __attribute__((constructor)) void begin() {
   if (folder == nullptr || log == nullptr) return;
   watched_length = std::strlen(folder);
   std::snprintf(watched.data(), watched.size(), "%s", folder);
-  const long opened = call(SYS_openat, AT_FDCWD, log, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0644);
+  const long opened =
+      call(SYS_openat, AT_FDCWD, log, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0644);
   log_file = call(SYS_fcntl, opened, F_DUPFD_CLOEXEC, 200);
   struct sigaction action {};
   action.sa_sigaction = on_call;

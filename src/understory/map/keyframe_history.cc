@@ -168,8 +168,7 @@ void KeyframeHistory::save(BinaryWriter& writer) const {
 
 std::vector<CountedFile> KeyframeHistory::files() const {
   std::vector<CountedFile> files{{kFile, file_.count()}};
-  if (poses_number_ > 0)
-    files.push_back({poses_file(poses_number_).filename().string(), poses_});
+  if (poses_number_ > 0) files.push_back({poses_file(poses_number_).filename().string(), poses_});
   return files;
 }
 

@@ -27,8 +27,8 @@ class KeyframeHistoryTest : public testing::Test {
   }
   void move() {
     for (Keyframe& keyframe : growth_.keyframes)
-      keyframe.world_from_body = Pose(so3_exp({0.0, 0.0, 0.3}), {0.0, 1.0, 0.0}) *
-                                 keyframe.world_from_body;
+      keyframe.world_from_body =
+          Pose(so3_exp({0.0, 0.0, 0.3}), {0.0, 1.0, 0.0}) * keyframe.world_from_body;
   }
   std::string sync(KeyframeHistory& history, bool moved) {
     history.sync(growth_.keyframes, growth_.segment_starts, growth_.loops, moved);

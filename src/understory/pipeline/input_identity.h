@@ -9,8 +9,8 @@ namespace understory {
 struct InputIdentity {
   std::string what;  // "the recording", "the extrinsics"
   std::string path;  // as given
-  std::string mark;  // of a file its size and checksums of its first and last MiB; of a folder those
-                     // of the names and sizes of all files in it; of a simulation its name
+  std::string mark;  // of a file its size and checksums of its first and last MiB; of a folder
+                     // those of the names and sizes of all files in it; of a simulation its name
 };
 
 // Throws InputError where it cannot be read.

@@ -81,7 +81,7 @@ struct RunEvidence {
   std::uint64_t other_sensor_messages = 0;  // of a second lidar on the topic, left out
   std::string first_other_sensor;
   std::string late_sensor;  // one that a capture's reader met too late to use; empty: none
-  bool cut_off = false;  // the recording ends in the middle of something
+  bool cut_off = false;     // the recording ends in the middle of something
   std::string where_cut_off;
   bool times_assumed = false;        // nothing tells when the clouds of a folder were taken
   bool point_times_missing = false;  // of a lidar that spins

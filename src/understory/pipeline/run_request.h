@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "understory/pipeline/adaptation.h"
-#include "understory/pipeline/sensor_traits.h"
 #include "understory/pipeline/input_identity.h"
+#include "understory/pipeline/sensor_traits.h"
 #include "understory/recording/recording.h"
 #include "understory/util/config_origins.h"
 

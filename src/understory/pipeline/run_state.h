@@ -84,7 +84,7 @@ class RunState {
   std::string file_;  // that was read
   std::vector<InputIdentity> inputs_;
   std::string passed_over_;  // what kept `reopen` from the newest checkpoint
-  std::string state_;  // of session, orderer and log, as read
+  std::string state_;        // of session, orderer and log, as read
   double earlier_s_ = 0.0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };

@@ -234,7 +234,7 @@ class SparseRun {
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
   std::uint64_t events_ = 0;
   bool stamps_believed_ = false;  // of an IMU, against the order of arrival
-  std::string unreadable_;  // where the recording could not be read any further, and why
+  std::string unreadable_;        // where the recording could not be read any further, and why
   std::vector<double> latencies_ms_;
 };
 

@@ -122,8 +122,8 @@ class Db3Source : public MessageSource {
  private:
   using Place = std::pair<TimeNs, std::int64_t>;  // time and row, the order of reading
 
-  // The disk failed, in contrast to damage. SQLite calls some failures damage, so `thoroughly` looks
-  // for them in all of the file.
+  // The disk failed, in contrast to damage. SQLite calls some failures damage, so `thoroughly`
+  // looks for them in all of the file.
   void check_readable(bool thoroughly = true) const {
     sqlite3* database = database_.get();
     const int code = sqlite3_extended_errcode(database);

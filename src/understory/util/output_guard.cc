@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <system_error>
 
+#include "understory/util/durable.h"
+
 namespace understory {
 namespace {
 
