@@ -1,6 +1,7 @@
 """Sensors whose clocks run apart, that begin late or die, through `understory map` by both front ends:
 offsets are mended and said, and whoever comes late is used from then on."""
 
+import contextlib
 import dataclasses
 import json
 import signal
@@ -9,7 +10,7 @@ import sys
 import time
 
 from program import PROGRAM, Cases, Outcome, error_m, good_recording, program
-from recordings import write_indexed_mcap, write_mcap
+from recordings import write_bag, write_db3, write_indexed_mcap, write_mcap
 
 FRONT_END = sys.argv[1]
 SECONDS = 16
@@ -138,6 +139,47 @@ for indexed in (False, True):
         fixes = sum(1 for _ in open(outcome.folder / "gnss.csv")) - 1
         assert fixes > 0.9 * 2 * (SECONDS - 6), fixes
         return near_undisturbed(outcome)
+
+
+def write_indexed_bag(path, spoilt):
+    write_bag(path, [m for m in spoilt if m.topic in ("/lidar", "/imu", "/tf_static")], indexed=True)
+
+
+for kind, write in (("ROS 1 bag", write_indexed_bag), ("ROS 2 bag", write_db3)) if FRONT_END == "dense" else ():
+    @cases.case(f"IMU that begins 4 s late, transforms after 5 s, {kind}")
+    def late_in_bag(folder, write=write):
+        outcome = mapped(folder, [dataclasses.replace(m, time=start + 5_000_000_000)
+                                  if m.topic == "/tf_static" else m
+                                  for m in messages if m.topic != "/imu" or second(m) > 4], write=write)
+        assert "recording.late_extrinsics" not in outcome.warnings
+        assert "recording.no_imu_extrinsics" not in outcome.warnings
+        assert quality(outcome, "imu_without_place_s") == 0
+        used_like_undisturbed(outcome)
+        return f"{100 * outcome.error:.1f} cm"
+
+
+@cases.case("killed, and resumed: clocks that run apart, transforms that come late")
+def resumed(folder):
+    spoilt = [dataclasses.replace(m, time=start + 5_000_000_000) if m.topic == "/tf_static" else m
+              for m in off(("/imu",), -2)]
+    spoilt = [m.stamped(m.stamp + 2_000_000_000) if m.topic in FIXES else m for m in spoilt]
+    whole = mapped(folder, spoilt)
+    settings = ["--quiet", "--threads", "1", *OPTIONS, "--set", "run.checkpoint_interval_s=1"]
+    killed = folder / "killed"
+    command = [PROGRAM, "map", folder / "walk.mcap", "-o", killed, *settings]
+    run = subprocess.Popen(list(map(str, command)), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    written = set()
+    while run.poll() is None and len(written) < 8:  # by then some seconds are behind it
+        with contextlib.suppress(FileNotFoundError):
+            written.update(f.stat().st_mtime_ns for f in (killed / ".understory").glob("checkpoint*"))
+        time.sleep(0.002)
+    run.kill()
+    assert run.wait() == -signal.SIGKILL, "the run had ended before it could be killed"
+    done = program("map", "--resume", killed)
+    assert done.returncode in (0, 4), done.stderr
+    for name in ("trajectory.tum", "gnss.csv"):
+        assert (killed / name).read_bytes() == (whole.folder / name).read_bytes(), name
+    return f"the same bytes, exit {done.returncode}"
 
 
 def used_like_undisturbed(outcome):

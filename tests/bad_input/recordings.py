@@ -274,8 +274,8 @@ def _ros1(message):
     return out
 
 
-def write_bag(path, messages, chunk_bytes=2_000_000):
-    """A ROS 1 bag without index, as a recorder leaves it that was not closed."""
+def write_bag(path, messages, chunk_bytes=2_000_000, indexed=False):
+    """A ROS 1 bag; without index as a recorder leaves it that was not closed."""
 
     def record(fields, data):
         header = b"".join(struct.pack("<I", len(k) + 1 + len(v)) + k.encode() + b"=" + v
@@ -285,26 +285,39 @@ def write_bag(path, messages, chunk_bytes=2_000_000):
     def stamp(time):
         return struct.pack("<II", time // NS, time % NS)
 
+    def head(place, chunks):
+        return record({"op": b"\3", "index_pos": struct.pack("<Q", place),
+                       "conn_count": struct.pack("<I", len(known)),
+                       "chunk_count": struct.pack("<I", chunks)}, b" " * 4000)
+
+    known, chunk, counts, index = {}, b"", {}, []
     with open(path, "wb") as file:
-        file.write(b"#ROSBAG V2.0\n")
-        file.write(record({"op": b"\3", "index_pos": bytes(8), "conn_count": bytes(4),
-                           "chunk_count": bytes(4)}, b" " * 4000))
-        known, chunk = {}, b""
+        file.write(b"#ROSBAG V2.0\n" + head(0, 0))
         for i, message in enumerate(messages):
             if message.topic not in known:
-                known[message.topic] = struct.pack("<I", len(known))
+                id = struct.pack("<I", len(known))
                 about = b"".join(struct.pack("<I", len(k) + 1 + len(v)) + k + b"=" + v for k, v in (
                     (b"topic", message.topic.encode()), (b"md5sum", b"*"),
                     (b"type", message.type.replace("/msg/", "/").encode()),
                     (b"message_definition", b"")))
-                chunk += record({"op": b"\7", "topic": message.topic.encode(),
-                                 "conn": known[message.topic]}, about)
-            chunk += record({"op": b"\2", "conn": known[message.topic], "time": stamp(message.time)},
-                            _ros1(message))
+                known[message.topic] = (id, record({"op": b"\7", "topic": message.topic.encode(), "conn": id}, about))
+                chunk += known[message.topic][1]
+            id = known[message.topic][0]
+            chunk += record({"op": b"\2", "conn": id, "time": stamp(message.time)}, _ros1(message))
+            counts[id] = counts.get(id, 0) + 1
             if len(chunk) > chunk_bytes or i + 1 == len(messages):
+                index.append(record({"op": b"\6", "ver": struct.pack("<I", 1), "start_time": stamp(message.time),
+                                     "chunk_pos": struct.pack("<Q", file.tell()), "end_time": stamp(message.time),
+                                     "count": struct.pack("<I", len(counts))},
+                                    b"".join(id + struct.pack("<I", n) for id, n in counts.items())))
                 file.write(record({"op": b"\5", "compression": b"none",
                                    "size": struct.pack("<I", len(chunk))}, chunk))
-                chunk = b""
+                chunk, counts = b"", {}
+        if indexed:
+            place = file.tell()
+            file.write(b"".join(each for _, each in known.values()) + b"".join(index))
+            file.seek(len(b"#ROSBAG V2.0\n"))
+            file.write(head(place, len(index)))
 
 
 def write_db3(path, messages):

@@ -81,8 +81,13 @@ void EventOrderer::push(Event event) {
     return;
   }
   held_[stream].push_back(std::move(event));
-  // Before the first scan nobody has use for more.
-  if (held_[stream].size() > kMostHeld) held_[stream].pop_front();
+  if (held_[stream].size() <= kMostHeld) return;
+  if (clocks_[kLidar].seen) {  // its stamps tell nothing steady
+    clocks_[stream].arrival.give_up();
+    let_go(stream);
+  } else {  // before the first scan nobody has use for more
+    held_[stream].pop_front();
+  }
 }
 
 // One event on its own clock, constant offsets mended.

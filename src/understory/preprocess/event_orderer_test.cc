@@ -440,6 +440,20 @@ TEST(EventOrderer, ASensorThatStartsLateIsShiftedAsWell) {
   EXPECT_NEAR(to_seconds(outcome.report.streams[EventOrderer::kImu].without_say), 4.0, 0.3);
 }
 
+// Stamps of which nothing can be made are taken as they are, in the end, and none is lost.
+TEST(EventOrderer, AClockThatWandersIsNeitherMendedNorDropped) {
+  std::vector<Event> events = with_mag(recording(12.0));
+  TimeNs wander = 5'000 * kMs;
+  for (Event& event : events) {
+    if (auto* sample = std::get_if<MagSample>(&event)) sample->stamp += (wander += 15 * kMs);
+  }
+  const Outcome outcome = run(events);
+  const auto& mag = outcome.report.streams[EventOrderer::kMag];
+  EXPECT_EQ(mag.offset, 0);
+  EXPECT_EQ(mag.released + mag.late + mag.glitches, mag.received);
+  EXPECT_EQ(stamps_of(outcome.events, EventOrderer::kImu), stamps_of(events, EventOrderer::kImu));
+}
+
 // Regression: after the IMU had died every gap of the lidar made 1,000 scans wait.
 TEST(EventOrderer, AGapOfTheLidarIsSeenAtOnceWhereTheImuHasDied) {
   for (const double window : {0.5, 0.0}) {

@@ -21,11 +21,12 @@ void StreamOffset::add(TimeNs lead, TimeNs reference, const Limits& limits) {
       count_ > 0 && std::max(highest_, lead) - std::min(lowest_, lead) <= limits.spread;
   if (!steady) {
     count_ = 1;
-    since_ = reference;
+    since_ = latest_ = reference;
     lowest_ = highest_ = lead;
     return;
   }
   ++count_;
+  latest_ = reference;
   lowest_ = std::min(lowest_, lead);
   highest_ = std::max(highest_, lead);
   if (count_ >= limits.count && reference - since_ >= kLongEnough) verdict_ = Verdict::kConstant;
@@ -34,7 +35,8 @@ void StreamOffset::add(TimeNs lead, TimeNs reference, const Limits& limits) {
 void StreamOffset::give_up() {
   if (verdict_ != Verdict::kOpen) return;
   const bool apart = std::min(std::abs(lowest_), std::abs(highest_)) > kLongEnough;
-  verdict_ = count_ >= kFew && apart ? Verdict::kConstant : Verdict::kAgrees;
+  const bool lasting = count_ >= kFew && latest_ - since_ >= kLongEnough / 2;
+  verdict_ = lasting && apart ? Verdict::kConstant : Verdict::kAgrees;
 }
 
 }  // namespace understory

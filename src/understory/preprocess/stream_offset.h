@@ -43,6 +43,7 @@ class StreamOffset {
   Verdict verdict_ = Verdict::kOpen;
   std::int32_t count_ = 0;
   TimeNs since_ = 0;   // reference at the first lead
+  TimeNs latest_ = 0;  // reference at the last lead
   TimeNs lowest_ = 0;  // lead; that of the scan which was delayed least
   TimeNs highest_ = 0;
 };
