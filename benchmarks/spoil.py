@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "bad_input"))
+sys.path.append(str(Path(__file__).resolve().parent.parent / "tests" / "bad_input"))
 from recordings import Cloud, edit_imu, read_mcap, write_mcap  # noqa: E402, F401
 
 NS = 1_000_000_000

@@ -169,8 +169,12 @@ class Judge {
     if (share(match.unmatched, match.scans) > config_.most_unmatched) {
       hurt(
           fmt::format("{} of {} scans ({:.1f} %) could not be matched to the map; their poses "
-                      "are predictions",
-                      match.unmatched, match.scans, percent(match.unmatched, match.scans)));
+                      "are predictions{}",
+                      match.unmatched, match.scans, percent(match.unmatched, match.scans),
+                      evidence_.times_assumed
+                          ? "; the times of the clouds were assumed: if they lie farther apart, "
+                            "give --rate-hz or times.txt"
+                          : ""));
     }
     if (share(match.empty, match.scans) > config_.most_empty) {
       hurt(fmt::format("{} of {} scans had hardly any usable point", match.empty, match.scans));

@@ -113,6 +113,8 @@ TEST(RunJudgement, Matches) {
   expect_complete(evidence);
   evidence.match.unmatched = 21;
   expect(RunStatus::kUntrusted, "21 of 1000 scans (2.1 %) could not be matched", evidence);
+  evidence.times_assumed = true;
+  expect(RunStatus::kUntrusted, "times of the clouds were assumed", evidence);
   RunEvidence empty = good_run();
   empty.match.empty = 100;
   expect_complete(empty);
