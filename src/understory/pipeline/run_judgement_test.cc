@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <utility>
+#include <vector>
+
 namespace understory {
 namespace {
 
@@ -154,9 +158,9 @@ TEST(RunJudgement, TimesOfPoints) {
   expect(RunStatus::kUntrusted, "smeared by 0.06 m", missing);
   RunEvidence evidence = good_run();
   const JudgementConfig limits;
-  for (const auto& [ratio, words] : {std::pair{-1.0, "backwards"},
-                                     {0.1, "too long"},
-                                     {limits.most_scan_motion + 0.1, "wrong"}}) {
+  const std::vector<std::pair<double, std::string>> wrong = {
+      {-1.0, "backwards"}, {0.1, "too long"}, {limits.most_scan_motion + 0.1, "wrong"}};
+  for (const auto& [ratio, words] : wrong) {
     evidence.match.scan_motion_ratio = ratio;
     evidence.match.scan_motion_probes = limits.least_scan_motion_probes;
     expect(RunStatus::kUntrusted, words, evidence);
