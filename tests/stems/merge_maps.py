@@ -139,7 +139,7 @@ def other_stand(folder):
             for kind, others in (("one", again), ("two", planted(10 + seed))):
                 b = write_measured(folder / f"{kind}.csv", others, diameters)
                 for align in ((), ("--align",)):
-                    done = program("merge", a, b, *align, "-o", folder / "both", "--json")
+                    done = program("merge", a, b, *align, "-o", folder / "both", "--overwrite", "--json")
                     chance = json.loads(done.stdout)["chance"]
                     assert done.returncode == (0 if kind == "one" else 4), (seed, kind, align, done)
                     told = json.loads((folder / "both" / "run.json").read_text())

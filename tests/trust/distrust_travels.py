@@ -147,7 +147,7 @@ def chain(folder):
         last, name = folder / f"step{k}", f"run step{k}: {name}"
     good = write_run(folder / "good", "complete", ())
     for maps in ((last, good), (good, last)):
-        done = program("merge", *maps, "-o", folder / "both")
+        done = program("merge", *maps, "-o", folder / "both", "--overwrite")
         assert done.returncode == 4 and name in done.stderr, done
     done = program("merge", folder / "both", good, "-o", folder / "all")
     assert done.returncode == 4 and f"run both: {name}" in done.stderr, done

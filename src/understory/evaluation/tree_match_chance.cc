@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kSearchedCopies = 3;
 constexpr std::size_t kShiftedCopies = 16;
-constexpr double kLeastSigmas = 5.0;
+constexpr double kLeastSigmas = 4.0;
 constexpr double kLeastDiameterSigmas = 4.0;
 constexpr std::size_t kLeastPairs = 5;
 constexpr std::size_t kLeastDiameters = 8;

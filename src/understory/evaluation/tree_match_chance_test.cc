@@ -74,7 +74,7 @@ TEST(MatchChance, TheSameStandIsBeyondChance) {
       const MatchChance chance =
           judge(without_diameters(trees), searched ? moved(again, kElsewhere) : again, searched);
       EXPECT_TRUE(chance.beyond_chance) << chance_complaint(chance);
-      EXPECT_GT(chance.sigmas, 5.0);
+      EXPECT_GT(chance.sigmas, 4.0);
       EXPECT_EQ(chance_complaint(chance), "");
     }
     EXPECT_GT(judge(trees, again, false).diameter_correlation, 0.8);
