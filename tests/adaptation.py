@@ -106,6 +106,9 @@ def _(folder):
             done = program("map", *options, "-o", folder / "run", "--overwrite", *extra)
             assert done.returncode in (0, 4), done.stderr
             run = json.loads((folder / "run" / "run.json").read_text())
+            if str(recording).startswith("sim:"):  # the simulator behind the look ahead still tells the truth
+                assert (folder / "run.truth" / "trajectory.tum").exists()
+                assert front_end == "sparse" or "ape_rmse_m" in run["quality"], run["quality"]
             ran = flat(run["effective_config"])
             wrong = {key: (value, keys.get(key)) for key, value in ran.items()
                      if key != "map.enabled" and not same(value, keys[key][0])}

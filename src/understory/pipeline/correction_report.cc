@@ -67,7 +67,7 @@ ReportInput correction_report(const CorrectionRequest& request, const Correction
     report.made_from =
         fmt::format("{}, {} scans, stems of {} views", request.scans->source->format(),
                     request.scans->path.size(), run.views.size());
-    report.truth = compare_with_truth(request.results, *request.scans->source);
+    report.truth = compare_with_truth(request.run_folder, request.results, *request.scans->source);
   }
   report.summary = summary;
   report.remarks.push_back(

@@ -10,8 +10,10 @@
 namespace understory {
 
 // The simulator knows where it was: its truth is written to RUN.truth beside the run folder, and
-// the finished trajectory is held against it, for the report alone. Nothing for other recordings.
+// the finished trajectory, in `results`, is held against it, for the report alone. Nothing for
+// other recordings.
 [[nodiscard]] std::optional<ReportTruth> compare_with_truth(const std::filesystem::path& run_folder,
+                                                            const std::filesystem::path& results,
                                                             const Recording& source);
 
 }  // namespace understory

@@ -346,7 +346,7 @@ MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
   MapPicture picture;
   RunSummary summary = summarise_run(request, session, facts, trajectory,
                                      evidence_of(session, facts, source, trajectory, log), log);
-  const std::optional<ReportTruth> truth = compare_with_truth(folder, source);
+  const std::optional<ReportTruth> truth = compare_with_truth(request.run_folder, folder, source);
   if (truth) {
     summary.quality["ape_rmse_m"] = truth->ape_rmse_m;
     summary.quality["drift_percent"] = truth->drift_percent;

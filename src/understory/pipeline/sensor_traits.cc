@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "understory/pipeline/read_ahead.h"
 #include "understory/util/median.h"
 
 namespace understory {
@@ -17,28 +18,6 @@ constexpr std::size_t kScans = 10;
 constexpr std::size_t kEmptyScan = 1'000;     // returns; with fewer it tells nothing of the lidar
 constexpr std::size_t kMostScans = 100;       // empty ones included
 constexpr std::size_t kMostEvents = 500'000;  // held in memory: 40 minutes of an IMU alone
-
-// A recording whose first events have been read before.
-class ReadAhead : public Recording {
- public:
-  ReadAhead(std::unique_ptr<Recording> source, std::deque<Event> events)
-      : source_(std::move(source)), events_(std::move(events)) {}
-
-  std::optional<Event> next() override {
-    if (events_.empty()) return source_->next();
-    Event event = std::move(events_.front());
-    events_.pop_front();
-    return event;
-  }
-  const Rig& rig() const override { return source_->rig(); }
-  std::vector<TopicReport> topics() const override { return source_->topics(); }
-  std::string format() const override { return source_->format(); }
-  double progress() const override { return source_->progress(); }
-
- private:
-  std::unique_ptr<Recording> source_;
-  std::deque<Event> events_;
-};
 
 struct ScansSeen {
   std::vector<std::size_t> points;  // of each
