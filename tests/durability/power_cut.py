@@ -35,8 +35,10 @@ def moments(run):
     yield "in the middle of writing the fourth checkpoint", late - 2, 3, "drawn", False, most
     yield "the same, and the newest is broken", synced, 4, "drawn", True, most + INTERVAL_S
     yield "while results are written", results + 3, 5, "lost", False, most
-    yield "while the work folder is removed", calls - 4, 6, "drawn", False, most
-    yield "at the end", calls, 7, "lost", False, 0.0
+    placing = run.find(RENAME, "run/trees.csv")
+    yield "while results are put in place", placing, 6, "drawn", False, most
+    yield "while the work folder is removed", calls - 4, 7, "drawn", False, most
+    yield "at the end", calls, 8, "lost", False, 0.0
 
 
 with tempfile.TemporaryDirectory() as scratch:
@@ -55,7 +57,7 @@ with tempfile.TemporaryDirectory() as scratch:
               f"{', from the checkpoint before' if cut.older else ''} {cut.different or ''}")
         failed += [] if good else [what]
     # The model bites: had nothing been synced, the run would be lost.
-    cut = run.cut(len(run.calls) * 2 // 3, 8, syncs=False, mode="lost")
+    cut = run.cut(len(run.calls) * 2 // 3, 9, syncs=False, mode="lost")
     print(f"without syncing: {cut.outcome}")
     assert not cut.good, "the disk kept what was never synced"
     assert not failed, failed
