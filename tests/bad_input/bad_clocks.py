@@ -169,7 +169,8 @@ def resumed(folder):
     command = [PROGRAM, "map", folder / "walk.mcap", "-o", killed, *settings]
     run = subprocess.Popen(list(map(str, command)), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     written = set()
-    while run.poll() is None and len(written) < 8:  # by then some seconds are behind it
+    enough = 8 if FRONT_END == "dense" else 4  # some seconds are behind it; by stems gaps come in between
+    while run.poll() is None and len(written) < enough:
         with contextlib.suppress(FileNotFoundError):
             written.update(f.stat().st_mtime_ns for f in (killed / ".understory").glob("checkpoint*"))
         time.sleep(0.002)
