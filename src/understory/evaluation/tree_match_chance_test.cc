@@ -87,7 +87,7 @@ TEST(MatchChance, TwoStandsAreNot) {
     const std::vector<Tree> others = seen_again(stand(10 + seed), 100 + seed);
     for (const bool searched : {false, true}) {
       const MatchChance chance = judge(trees, others, searched);
-      EXPECT_GT(chance.pairs, 8U);  // which is what deceives
+      EXPECT_GE(chance.pairs, 5U);  // which is what deceives
       EXPECT_FALSE(chance.beyond_chance) << chance.sigmas << ' ' << chance.diameter_sigmas;
       EXPECT_NE(chance_complaint(chance).find("different stands"), std::string::npos);
     }

@@ -225,8 +225,8 @@ Laid laid(const std::vector<Vector3d>& path, double noise_m, unsigned seed) {
 
 std::vector<Vector3d> sampled(const std::function<Vector3d(double)>& at) {
   std::vector<Vector3d> path;
-  for (int k = 0; k < 300; ++k)
-    path.push_back(at(k / 300.0));
+  for (int k = 0; k < 800; ++k)
+    path.push_back(at(k / 800.0));
   return path;
 }
 
@@ -241,7 +241,7 @@ TEST(PathFit, TellsHowFarTheHeadingIsOff) {
     double errors = 0.0;
     double expected = 0.0;
     int used = 0;
-    for (unsigned seed = 1; seed <= 4; ++seed) {
+    for (unsigned seed = 1; seed <= 8; ++seed) {
       const Laid one = laid(path, 1.5, seed);
       if (one.error_deg > 90.0) continue;  // the other way round, which the times tell
       errors += one.error_deg * one.error_deg;
