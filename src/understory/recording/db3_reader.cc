@@ -145,13 +145,10 @@ class Db3Source : public MessageSource {
     return Statement(raw);
   }
 
-  // The number that a query gives; 0 if it fails.
+  // The number that a query gives; 0 if it fails: what cannot be read is met again.
   std::int64_t scalar(const std::string& query) {
     const Statement statement = prepare(query);
-    if (statement == nullptr || sqlite3_step(statement.get()) != SQLITE_ROW) {
-      check_readable();
-      return 0;
-    }
+    if (statement == nullptr || sqlite3_step(statement.get()) != SQLITE_ROW) return 0;
     return sqlite3_column_int64(statement.get(), 0);
   }
 

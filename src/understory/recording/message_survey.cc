@@ -223,13 +223,27 @@ MessageSurvey survey_messages(MessageSource& source) {
   return survey;
 }
 
+namespace {
+
+// None where the system cannot read them: met again when the recording is read.
+std::vector<StoredMessage> readable_messages(MessageSource& source, const WantedChannel& wanted,
+                                             std::size_t most) {
+  try {
+    return source.first_messages(wanted, most);
+  } catch (const ReadError&) {
+    return {};
+  }
+}
+
+}  // namespace
+
 void survey_late_topics(MessageSource& source, MessageSurvey& survey) {
   const auto wanted = [&](const MessageChannel& channel) {
     const TopicRole role = role_of(channel);
     return role != TopicRole::kIgnored && role != TopicRole::kTransforms &&
            survey.find(channel.topic) == nullptr;
   };
-  for (const StoredMessage& first : source.first_messages(wanted, 1)) {
+  for (const StoredMessage& first : readable_messages(source, wanted, 1)) {
     if (survey.find(first.channel->topic) != nullptr) continue;
     MessageSurvey alone;
     Surveyor(alone).add({first.channel, first.log_time, first.data});
@@ -247,7 +261,7 @@ bool survey_late_transforms(MessageSource& source, MessageSurvey& survey) {
   const auto wanted = [](const MessageChannel& channel) {
     return role_of(channel) == TopicRole::kTransforms;
   };
-  const std::vector<StoredMessage> found = source.first_messages(wanted, kMost);
+  const std::vector<StoredMessage> found = readable_messages(source, wanted, kMost);
   Surveyor surveyor(survey);
   for (const StoredMessage& each : found)
     surveyor.add_transforms(MessageReader(each.data, each.channel->serialization));

@@ -93,7 +93,7 @@ TEST(FieldLog, NmeaLogHasTheFixesWithHeightAndDilution) {
   }
   Log log;
   std::ifstream stream(folder / "lieksa2.nmea");
-  const std::int64_t day = first_nmea_day(stream);
+  const std::int64_t day = first_nmea_day(stream, "lieksa2.nmea");
   EXPECT_EQ(day, fixes.front().stamp / (86'400 * kNsPerSecond));
   stream.clear();
   stream.seekg(0);
