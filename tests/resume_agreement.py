@@ -16,7 +16,7 @@ STEMS = ["stems.csv.gz", "trajectory.tum", "odometry.tum", "steps.csv", "gnss.cs
 CASES = {
     "harvester": ("sim:harvester?seed=21&duration_s=16", "journal.bin", 40_000, [], DENSE),
     # What is adapted to sparse scans and what the user set of it are the same after the kill.
-    "sparse_scans": ("sim:lieksa2?seed=21&duration_s=60", "journal.bin", 120_000,
+    "sparse_scans": ("sim:lieksa2?seed=21&duration_s=60", "journal.bin", 60_000,
                      ["--set", "keyframe.distance_m=0.4"], DENSE),
     "stems": ("sim:lieksa2?seed=21&duration_s=120", "views.bin", 200_000,
               ["--front-end", "sparse", "--set", "run.checkpoint_interval_s=2"], STEMS),

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "understory/util/time.h"
+
 namespace understory {
 namespace {
 
@@ -17,19 +19,29 @@ void FinishedScans::add(ScanPtr scan, double missing) {
     part_ = std::move(scan);
     missing_ = missing;
   } else {
-    drop_part();
+    settle_part(*scan);
     scans_.push_back(std::move(scan));
   }
   any_ = true;
 }
 
-void FinishedScans::drop_part() {
+// A first scan that lasts as long as the next one is whole: the lidar's view is limited, and the
+// turn began where it sees nothing.
+void FinishedScans::settle_part(const Scan& next) {
   if (part_ == nullptr) return;
+  const double usual = to_seconds(next.end() - next.stamp);
+  if (to_seconds(part_->end() - part_->stamp) >= (1.0 - kMostMissing) * usual)
+    scans_.push_back(std::move(part_));
+  else
+    drop_part();
+  part_ = nullptr;
+}
+
+void FinishedScans::drop_part() {
   log_.warn("scan.part", source_ + ": begins within a turn of the lidar: its first scan, of " +
                              std::to_string(part_->points.size()) + " points, lacks " +
                              std::to_string(std::lround(100.0 * missing_)) +
                              " % of the turn and is left out");
-  part_ = nullptr;
 }
 
 ScanPtr FinishedScans::take() {
