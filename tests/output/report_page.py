@@ -194,7 +194,7 @@ def check_untrusted(recording, folder):
     for at in range(len(data) // 2, len(data) // 2 + 400):
         data[at] ^= 0x55
     spoilt.write_bytes(data)
-    run(4, "map", spoilt, "-o", folder / "run")
+    run(4, "map", spoilt, "-o", folder / "run", "--overwrite")
     page, facts = read_page(folder / "run")
     assert page.headings[0] == spoilt.name
     assert page.headings[1] == facts["status"].capitalize() and facts["status"] != "complete"
