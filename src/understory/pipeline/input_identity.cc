@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <string_view>
 #include <system_error>
 
 #include "understory/pipeline/source.h"
 #include "understory/recording/byte_source.h"
 #include "understory/util/error.h"
 #include "understory/util/output_file.h"
+#include "understory/util/read_error.h"
 #include "understory/util/record_file.h"
 
 namespace understory {
@@ -18,15 +20,29 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t kRead = std::uint64_t{1} << 20U;  // of each end
+constexpr std::string_view kUnreadable = "--------";      // an end that a failing disk keeps
 
 std::string mark_of_file(const std::string& path) {
   const auto file = open_file(path);
   const std::uint64_t size = file->size();
   std::vector<std::uint8_t> bytes;
   file->read(0, kRead, bytes);
-  const std::uint32_t head = crc32_of(bytes);
-  file->read(size > kRead ? size - kRead : 0, kRead, bytes);
-  return fmt::format("{} bytes, {:08x} {:08x}", size, head, crc32_of(bytes));
+  const std::string head = fmt::format("{} bytes, {:08x} ", size, crc32_of(bytes));
+  try {
+    file->read(size > kRead ? size - kRead : 0, kRead, bytes);
+  } catch (const ReadError&) {
+    return head + std::string(kUnreadable);
+  }
+  return head + fmt::format("{:08x}", crc32_of(bytes));
+}
+
+// An end that could not be read then or cannot be now tells nothing.
+bool same_mark(std::string_view a, std::string_view b) {
+  if (a.size() == b.size() && (a.ends_with(kUnreadable) || b.ends_with(kUnreadable))) {
+    a.remove_suffix(kUnreadable.size());
+    b.remove_suffix(kUnreadable.size());
+  }
+  return a == b;
 }
 
 std::string mark_of_folder(const std::string& path) {
@@ -58,7 +74,7 @@ InputIdentity identify(const std::string& what, const std::string& path) {
 void expect_same(const std::vector<InputIdentity>& begun_with,
                  const std::vector<InputIdentity>& now) {
   for (std::size_t i = 0; i < begun_with.size() && i < now.size(); ++i) {
-    if (begun_with[i].mark == now[i].mark) continue;
+    if (same_mark(begun_with[i].mark, now[i].mark)) continue;
     throw InputError(now[i].path, "",
                      "is not " + now[i].what + " that the run was begun with (" +
                          begun_with[i].mark + " then, " + now[i].mark +

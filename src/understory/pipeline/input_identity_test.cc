@@ -50,6 +50,20 @@ TEST_F(InputIdentityTest, AFolderIsKnownByNamesAndSizes) {
   EXPECT_FALSE(same(folder_ / "x", folder_ / "y"));
 }
 
+// An end of the recording that a failing disk kept back when the run began, or keeps back now.
+TEST_F(InputIdentityTest, AnEndThatCannotBeReadTellsNothing) {
+  const auto recording = [](const std::string& mark) {
+    return std::vector<InputIdentity>{{"the recording", "a.mcap", mark}};
+  };
+  const auto whole = recording("9 bytes, 01234567 89abcdef");
+  const auto cut_off = recording("9 bytes, 01234567 --------");
+  EXPECT_NO_THROW(expect_same(cut_off, whole));
+  EXPECT_NO_THROW(expect_same(whole, cut_off));
+  EXPECT_NO_THROW(expect_same(cut_off, cut_off));
+  EXPECT_THROW(expect_same(cut_off, recording("9 bytes, 76543210 89abcdef")), InputError);
+  EXPECT_THROW(expect_same(cut_off, recording("8 bytes, 01234567 89abcdef")), InputError);
+}
+
 TEST_F(InputIdentityTest, AnotherInputIsRefusedByName) {
   const InputIdentity then = identify("the extrinsics", file("e.yaml", "one"));
   EXPECT_NO_THROW(expect_same({then}, {then}));
