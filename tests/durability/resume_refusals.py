@@ -31,7 +31,7 @@ def started(recording, run, *options, **more):
                                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, **more)
     at = pathlib.Path(more.get("cwd", "."), run)
     for _ in range(40_000):
-        if any(path.stat().st_size > 60_000 for path in at.rglob("journal.bin")):
+        if any(path.stat().st_size > 20_000 for path in at.rglob("journal.bin")):
             return process
         time.sleep(0.005)
     raise AssertionError("the run did not get far enough")
@@ -99,7 +99,7 @@ def other_files(folder):
     extrinsics.write_text("body_from_imu: {translation_m: [0, 0, 0]}\n")
     boxes.write_text("boxes:\n  - {min_m: [-1, -1, -1], max_m: [-0.5, 1, 1]}\n")
     for more in (["--extrinsics", str(extrinsics)], ["--set", f"preprocess.machine_boxes_file={boxes}"]):
-        done = program("map", good, "-o", folder / "try", *OPTIONS, *more)
+        done = program("map", good, "-o", folder / "try", "--overwrite", *OPTIONS, *more)
         assert done.returncode in (0, 4), done.stderr
     killed(good, folder / "run", "--extrinsics", str(extrinsics), "--set", f"preprocess.machine_boxes_file={boxes}")
     for file, words in ((extrinsics, "the extrinsics"), (boxes, "the file of the configuration")):

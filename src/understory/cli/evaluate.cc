@@ -221,7 +221,7 @@ int evaluate_places(const EvaluateOptions& options, CommandContext& context) {
                 errors->pairs, options.tolerance_s, errors->ape_rmse_m, errors->ape_plane_rmse_m,
                 errors->ape_mean_m, errors->ape_median_m, errors->ape_max_m);
   std::fputs(text.c_str(), stdout);
-  return errors->alignment_determined ? kExitDone : kExitUntrusted;
+  return kExitDone;
 }
 
 int evaluate(const EvaluateOptions& options, CommandContext& context) {
@@ -255,7 +255,7 @@ int evaluate(const EvaluateOptions& options, CommandContext& context) {
   const std::string text = options.json ? to_json(*errors, velocity).dump(2) + "\n"
                                         : to_text(*errors, velocity, options.tolerance_s);
   std::fputs(text.c_str(), stdout);
-  return errors->alignment_determined ? kExitDone : kExitUntrusted;
+  return kExitDone;
 }
 
 }  // namespace
