@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "understory/pipeline/run_judgement.h"
+#include "understory/recording/finding.h"
 
 namespace understory {
 namespace {
@@ -32,9 +34,18 @@ const TopicReport* topic_of(const std::vector<TopicReport>& topics, const std::s
   return found == topics.end() ? nullptr : &*found;
 }
 
+// When the messages of a topic begin and end, by the mended clock of its stream.
+struct Span {
+  TimeNs first = 0;
+  TimeNs last = 0;
+};
+Span span_of(const TopicReport& topic, const EventOrderer::StreamReport& stream) {
+  return {topic.first_stamp + stream.offset, topic.last_stamp + stream.offset};
+}
+
 // Why the IMU had no say, in words.
-std::string silence_of_imu(const ReadingFacts& facts, const TopicReport* imu,
-                           const TopicReport* lidar, const SensorEvidence& sensor) {
+std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicReport>& topics,
+                           const SensorEvidence& sensor) {
   constexpr double kNoticeableS = 0.1;
   std::string why;
   const auto add = [&](const std::string& what) { why += (why.empty() ? "" : "; ") + what; };
@@ -43,10 +54,15 @@ std::string silence_of_imu(const ReadingFacts& facts, const TopicReport* imu,
         "nothing tells where it sits on the carrier for {:.1f} s; give --extrinsics FILE",
         to_seconds(facts.imu_without_place)));
   }
+  const TopicReport* imu = topic_of(topics, "imu");
+  const TopicReport* lidar = topic_of(topics, "lidar");
   if (imu != nullptr && lidar != nullptr) {
-    const double late = to_seconds(imu->first_stamp - lidar->first_stamp);
+    const auto& streams = facts.time_repair->streams;
+    const Span heard = span_of(*imu, streams[EventOrderer::kImu]);
+    const Span scanned = span_of(*lidar, streams[EventOrderer::kLidar]);
+    const double late = to_seconds(heard.first - scanned.first);
     if (late > kNoticeableS) add(fmt::format("it begins {:.1f} s after the lidar", late));
-    const double missing = to_seconds(facts.last_scan_end - imu->last_stamp);
+    const double missing = to_seconds(facts.last_scan_end - heard.last);
     if (missing > kNoticeableS) add(fmt::format("it stops {:.1f} s before the lidar", missing));
   }
   if (sensor.longest_gap_s > kNoticeableS) {
@@ -63,30 +79,22 @@ std::string loss_of(const SensorEvidence& sensor) {
       sensor.received + sensor.unreadable, sensor.late, sensor.glitches, sensor.unreadable);
 }
 
-// What the readers have told of files, clouds and points.
-void gather_remarks(const Log& log, RunEvidence& evidence) {
-  for (const Log::Warning& warning : log.warnings()) {
-    if (warning.key == "recording.damaged") {
-      evidence.damaged_places = warning.count;
-      evidence.first_damage = warning.first_message;
-    } else if (warning.key == "recording.damaged_packet") {
-      evidence.damaged_packets = warning.count;
-      evidence.first_damaged_packet = warning.first_message;
-    } else if (warning.key == "recording.other_frames") {
-      evidence.other_sensor_messages = warning.count;
-      evidence.first_other_sensor = warning.first_message;
-    } else if (warning.key == "recording.late_sensor") {
-      evidence.late_sensor = warning.first_message;
-    } else if (warning.key == "recording.truncated") {
-      evidence.cut_off = true;
-      evidence.where_cut_off = warning.first_message;
-    } else if (warning.key == "recording.assumed_rate") {
-      evidence.times_assumed = true;
-    } else if (warning.key == "recording.no_point_times") {
-      evidence.point_times_missing = true;
-      evidence.why_no_point_times = warning.first_message;
-    }
-  }
+// What the readers have found wrong or missing.
+void gather_findings(const Log& log, RunEvidence& evidence) {
+  const auto take = [&](Finding finding, std::uint64_t& count, std::string& first) {
+    Found of_kind = found(log, finding);
+    count = of_kind.count;
+    first = std::move(of_kind.first);
+  };
+  take(Finding::kDamage, evidence.damaged_places, evidence.first_damage);
+  take(Finding::kDamagedPacket, evidence.damaged_packets, evidence.first_damaged_packet);
+  take(Finding::kOtherSensor, evidence.other_sensor_messages, evidence.first_other_sensor);
+  evidence.late_sensor = found(log, Finding::kLateSensor).first;
+  evidence.where_cut_off = found(log, Finding::kCutOff).first;
+  evidence.cut_off = found(log, Finding::kCutOff).count > 0;
+  evidence.times_assumed = found(log, Finding::kAssumedTimes).count > 0;
+  evidence.why_no_point_times = found(log, Finding::kNoPointTimes).first;
+  evidence.point_times_missing = found(log, Finding::kNoPointTimes).count > 0;
 }
 
 }  // namespace
@@ -109,12 +117,11 @@ void gather_reading(const ReadingFacts& facts, RunEvidence& evidence) {
   }
   if (facts.imu_wanted) {
     evidence.imu.unheard_s = std::max(evidence.imu.unheard_s, to_seconds(facts.imu_without_place));
-    evidence.imu.unheard_why =
-        silence_of_imu(facts, topic_of(topics, "imu"), topic_of(topics, "lidar"), evidence.imu);
+    evidence.imu.unheard_why = silence_of_imu(facts, topics, evidence.imu);
   } else {
     evidence.imu.unheard_s = 0.0;
   }
-  gather_remarks(*facts.log, evidence);
+  gather_findings(*facts.log, evidence);
 }
 
 void gather_dense(const MappingSession& session, const RunFacts& facts, const Recording& source,

@@ -14,6 +14,7 @@
 #include "understory/recording/cloud_times.h"
 #include "understory/recording/csv_events.h"
 #include "understory/recording/extrinsics.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/las.h"
 #include "understory/recording/nmea.h"
 #include "understory/recording/point_cloud.h"
@@ -308,7 +309,7 @@ class CloudFolder : public Recording {
       } catch (const ReadError&) {
         throw;
       } catch (const InputError& error) {
-        log_.warn("recording.damaged", error.what());
+        report_finding(log_, Finding::kDamage, error.what());
       }
     }
     if (!any_scan_) throw InputError(folder_.string(), "", "no cloud holds a point");
@@ -323,8 +324,9 @@ class CloudFolder : public Recording {
     ConvertedCloud converted = convert_cloud(message, *layout, convention_);
     lidar_.report().empty_points += converted.without_return;
     if (converted.bad_times > 0) {
-      log_.warn("recording.damaged", path(i) + ": " + std::to_string(converted.bad_times) +
-                                         " points with times outside of the scan, left out");
+      report_finding(log_, Finding::kDamage,
+                     path(i) + ": " + std::to_string(converted.bad_times) +
+                         " points with times outside of the scan, left out");
     }
     if (!converted.scan->points.empty() && std::abs(converted.scan->points[0].x) > kFarFromSensor) {
       log_.warn("recording.far_cloud",

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include "understory/recording/finding.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -70,9 +71,9 @@ CloudTable read_kitti(ByteSource& file, Log& log) {
                      "expected a KITTI cloud: x, y, z, intensity as 32-bit floats");
   }
   if (table.data.size() % table.point_step != 0) {
-    log.warn("recording.damaged", file.name() + ": at byte " +
-                                      std::to_string(whole * table.point_step) +
-                                      ": the last point is not whole");
+    report_finding(log, Finding::kDamage,
+                   file.name() + ": at byte " + std::to_string(whole * table.point_step) +
+                       ": the last point is not whole");
   }
   table.data.resize(whole * table.point_step);
   table.width = static_cast<std::uint32_t>(whole);

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "understory/recording/byte_source.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/text_lines.h"
 #include "understory/util/error.h"
 
@@ -209,10 +210,10 @@ CloudFileTimes cloud_file_times(const std::string& folder, const std::vector<std
     stamps.push_back(*time);
   }
   if (stamps.size() == names.size()) return {stamps, "file names", true};
-  log.warn("recording.assumed_rate",
-           folder +
-               ": neither --rate-hz nor times.txt nor times in the names: 10 clouds a second "
-               "are assumed");
+  report_finding(log, Finding::kAssumedTimes,
+                 folder +
+                     ": neither --rate-hz nor times.txt nor times in the names: 10 clouds a second "
+                     "are assumed");
   return {regular_times(names.size(), kAssumedRate), names.size() > 1 ? "assumed 10 Hz" : "none",
           false};
 }

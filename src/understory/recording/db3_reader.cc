@@ -8,6 +8,7 @@
 
 #include "understory/recording/byte_source.h"
 #include "understory/recording/compression.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/ros2_bag.h"
 #include "understory/recording/sqlite_source.h"
 #include "understory/util/error.h"
@@ -181,8 +182,8 @@ class Db3Source : public MessageSource {
 
   void warn_damage(const std::string& what) {
     check_readable();
-    log_.warn("recording.damaged",
-              name_ + ": " + what + " (" + sqlite3_errmsg(database_.get()) + ")");
+    report_finding(log_, Finding::kDamage,
+                   name_ + ": " + what + " (" + sqlite3_errmsg(database_.get()) + ")");
   }
 
   // The next row, SQLITE_ROW or SQLITE_DONE. At the first damage it goes over to reading row by
@@ -220,7 +221,8 @@ class Db3Source : public MessageSource {
       return stored;
     const std::string problem = decompress(stored, "zstd", kLongestBlock, unpacked_);
     if (!problem.empty())
-      log_.warn("recording.damaged", name_ + ": a compressed message is damaged: " + problem);
+      report_finding(log_, Finding::kDamage,
+                     name_ + ": a compressed message is damaged: " + problem);
     return unpacked_;
   }
 

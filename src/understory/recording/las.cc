@@ -17,6 +17,7 @@
 #include <streambuf>
 #include <type_traits>
 #include <vector>
+#include "understory/recording/finding.h"
 
 #include "understory/util/error.h"
 #include "understory/util/read_error.h"
@@ -97,7 +98,7 @@ void report_break(const ByteSource& file, const LasHeader& header, std::uint64_t
   const std::string text = std::to_string(read) + " of " + std::to_string(header.points) +
                            " points can be read; the rest is damaged or cut off";
   if (read == 0) throw InputError(file.name(), "", "expected points: " + text);
-  log.warn("recording.damaged", file.name() + ": " + text);
+  report_finding(log, Finding::kDamage, file.name() + ": " + text);
 }
 
 class PointDecoder {

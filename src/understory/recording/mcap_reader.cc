@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/recording/compression.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/mcap_walker.h"
 #include "understory/recording/message_merger.h"
 #include "understory/util/error.h"
@@ -147,8 +148,8 @@ class McapSource : public MessageSource {
   }
 
   bool damaged(const Block& block, const std::string& what) {
-    log_.warn("recording.damaged",
-              file_->name() + ": at byte " + std::to_string(block.offset) + ": " + what);
+    report_finding(log_, Finding::kDamage,
+                   file_->name() + ": at byte " + std::to_string(block.offset) + ": " + what);
     return false;
   }
 

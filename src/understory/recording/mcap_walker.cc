@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "understory/recording/finding.h"
 #include "understory/util/output_file.h"
 #include "understory/util/read_error.h"
 
@@ -245,7 +246,8 @@ std::optional<Block> Walker::next_planned() {
     if (head && head->opcode == kChunk && head->length == block.length) {
       if (const auto found = block_at(block.offset, *head)) return found;
     }
-    warn("recording.damaged", block.offset, "the chunk that the index names is damaged; left out");
+    warn(key_of(Finding::kDamage), block.offset,
+         "the chunk that the index names is damaged; left out");
   }
   return std::nullopt;
 }
@@ -264,7 +266,7 @@ std::optional<Block> Walker::next() {
     if (head->opcode == kChunk && head->length > file_.size() - position_ - kRecordHead) {
       // A chunk that is in order but for its missing end is the last of a truncated file.
       if (const auto block = block_at(position_, *head)) {
-        warn("recording.truncated", position_, "the file ends inside this chunk");
+        warn(key_of(Finding::kCutOff), position_, "the file ends inside this chunk");
         ended_ = true;
         return block;
       }
@@ -339,7 +341,8 @@ void Walker::resume_at(std::uint64_t lost_at, std::uint64_t offset, const std::s
   const bool found = offset < data_end_;
   const std::string going_on =
       found ? "; going on at byte " + std::to_string(offset) : "; nothing more was found behind it";
-  warn(found || has_end_ ? "recording.damaged" : "recording.truncated", lost_at, what + going_on);
+  warn(found || has_end_ ? key_of(Finding::kDamage) : key_of(Finding::kCutOff), lost_at,
+       what + going_on);
   if (!found) ended_ = true;
 }
 

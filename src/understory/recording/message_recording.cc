@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "understory/recording/extrinsics.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/message_decode.h"
 #include "understory/recording/message_survey.h"
 #include "understory/recording/packet_topic.h"
@@ -220,7 +221,7 @@ class MessageRecording : public Recording {
     convention_ = std::move(convention);
     if (convention_->warning.empty()) return;
     const bool missing = convention_->kind == TimeConvention::Kind::kNone;
-    log_.warn(missing ? "recording.no_point_times" : "recording.point_times",
+    log_.warn(missing ? key_of(Finding::kNoPointTimes) : "recording.point_times",
               file_ + ": " + choice_.lidar + ": " + convention_->warning);
   }
 
@@ -344,10 +345,10 @@ class MessageRecording : public Recording {
         own_from_frame->angle() < kSameAngle)
       return false;
     ++topic.report().left_out;
-    log_.warn("recording.other_frames",
-              file_ + ": " + topic.report().name + ": holds " + what + " of two sensors (frames " +
-                  own + " and " + frame + "); those of " + frame +
-                  " are left out: record each sensor on a topic of its own");
+    report_finding(log_, Finding::kOtherSensor,
+                   file_ + ": " + topic.report().name + ": holds " + what +
+                       " of two sensors (frames " + own + " and " + frame + "); those of " + frame +
+                       " are left out: record each sensor on a topic of its own");
     return true;
   }
 

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <numbers>
 
+#include "understory/recording/finding.h"
 #include "understory/recording/scan_assembly.h"
 
 namespace understory {
@@ -99,8 +100,8 @@ void OusterDecoder::make_beams() {
 }
 
 void OusterDecoder::damaged(const std::string& what) {
-  log_.warn("recording.damaged_packet",
-            source_ + ": Ouster packet " + std::to_string(received_) + ": " + what);
+  report_finding(log_, Finding::kDamagedPacket,
+                 source_ + ": Ouster packet " + std::to_string(received_) + ": " + what);
 }
 
 // The valid columns of a packet.

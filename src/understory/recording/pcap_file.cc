@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "understory/recording/finding.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -221,13 +222,13 @@ bool PcapFile::resynchronise() {
   const std::uint64_t step = pcapng_ ? 4 : 1;
   for (position_ += step; position_ + 16 <= source_->size(); position_ += step) {
     if (!plausible(position_)) continue;
-    log_->warn("recording.damaged", name() + ": at byte " + std::to_string(from) +
-                                        ": damaged record; went on at byte " +
-                                        std::to_string(position_));
+    report_finding(*log_, Finding::kDamage,
+                   name() + ": at byte " + std::to_string(from) +
+                       ": damaged record; went on at byte " + std::to_string(position_));
     return true;
   }
-  log_->warn("recording.truncated",
-             name() + ": at byte " + std::to_string(from) + ": the last record is not whole");
+  report_finding(*log_, Finding::kCutOff,
+                 name() + ": at byte " + std::to_string(from) + ": the last record is not whole");
   position_ = source_->size();
   return false;
 }
@@ -250,8 +251,9 @@ bool PcapFile::next(CapturedFrame& frame) {
     position_ = record->end;
     if (!record->is_frame) continue;
     if (stamp_is_damaged(*record)) {
-      log_->warn("recording.damaged", name() + ": at byte " + std::to_string(begin) +
-                                          ": a record with a time days off, left out");
+      report_finding(*log_, Finding::kDamage,
+                     name() + ": at byte " + std::to_string(begin) +
+                         ": a record with a time days off, left out");
       continue;
     }
     source_->read(record->data, record->captured, buffer_);

@@ -8,6 +8,7 @@
 
 #include "understory/recording/byte_source.h"
 #include "understory/recording/extrinsics.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/ouster.h"
 #include "understory/recording/pcap_file.h"
 #include "understory/recording/pcap_survey.h"
@@ -49,8 +50,8 @@ class PcapRecording : public Recording {
       const auto datagram = udp_.add(frame.link_type, frame.bytes, frame.stamp);
       if (!datagram) continue;
       if (survey_.trust_checksums() && datagram->has_checksum && !datagram->checksum_ok) {
-        log_.warn("recording.damaged_packet",
-                  place(frame) + ": a packet with a wrong checksum, left out");
+        report_finding(log_, Finding::kDamagedPacket,
+                       place(frame) + ": a packet with a wrong checksum, left out");
         continue;
       }
       take(*datagram);
@@ -96,9 +97,9 @@ class PcapRecording : public Recording {
     if (is_new && ignored_.size() >= kMostIgnored) return;
     const std::string sensor = unused_sensor(datagram);
     if (is_new && !sensor.empty() && survey_.streams.count(key) == 0) {
-      log_.warn("recording.late_sensor", file_->name() + ": " + key.name() + ": packets of " +
-                                             sensor +
-                                             " begin late in the capture; they are not used");
+      report_finding(log_, Finding::kLateSensor,
+                     file_->name() + ": " + key.name() + ": packets of " + sensor +
+                         " begin late in the capture; they are not used");
     }
     TopicReport& report = ignored_[key].report();
     report.name = key.name();

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "understory/recording/cloud_table.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/text_lines.h"
 #include "understory/util/error.h"
 
@@ -157,9 +158,9 @@ void integers_to_doubles(const PcdHeader& header, CloudTable& table) {
 
 void warn_short(const ByteSource& file, std::uint64_t position, std::uint64_t have,
                 std::uint64_t stated, Log& log) {
-  log.warn("recording.damaged", file.name() + ": at byte " + std::to_string(position) + ": " +
-                                    std::to_string(have) + " of " + std::to_string(stated) +
-                                    " points are there");
+  report_finding(log, Finding::kDamage,
+                 file.name() + ": at byte " + std::to_string(position) + ": " +
+                     std::to_string(have) + " of " + std::to_string(stated) + " points are there");
 }
 
 void read_binary(ByteSource& file, const PcdHeader& header, CloudTable& table, Log& log) {
@@ -191,8 +192,9 @@ void read_compressed(ByteSource& file, const PcdHeader& header, CloudTable& tabl
   std::vector<std::uint8_t> columns(size);
   std::size_t made = 0;
   if (!lzf_expand(compressed, columns, made)) {
-    log.warn("recording.damaged", file.name() + ": at byte " + std::to_string(header.position + 8) +
-                                      ": damaged compressed data; columns that are missing are 0");
+    report_finding(log, Finding::kDamage,
+                   file.name() + ": at byte " + std::to_string(header.position + 8) +
+                       ": damaged compressed data; columns that are missing are 0");
   }
   table.data.assign(size, 0);
   std::size_t from = 0;
@@ -237,9 +239,9 @@ void read_ascii(ByteSource& file, const PcdHeader& header, CloudTable& table, Lo
     }
     if (good) continue;
     table.data.resize(begin);
-    log.warn("recording.damaged", file.name() + ": point " + std::to_string(points) +
-                                      ": expected " + std::to_string(words_per_point) +
-                                      " numbers, left out");
+    report_finding(log, Finding::kDamage,
+                   file.name() + ": point " + std::to_string(points) + ": expected " +
+                       std::to_string(words_per_point) + " numbers, left out");
   }
   if (points < header.points) warn_short(file, file.size(), points, header.points, log);
 }

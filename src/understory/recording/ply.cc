@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "understory/recording/cloud_table.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/text_lines.h"
 #include "understory/util/error.h"
 
@@ -130,9 +131,9 @@ class HeaderReader {
 };
 
 void warn_short(const ByteSource& file, std::uint64_t have, std::uint64_t stated, Log& log) {
-  log.warn("recording.damaged", file.name() + ": at byte " + std::to_string(file.size()) + ": " +
-                                    std::to_string(have) + " of " + std::to_string(stated) +
-                                    " points are there");
+  report_finding(log, Finding::kDamage,
+                 file.name() + ": at byte " + std::to_string(file.size()) + ": " +
+                     std::to_string(have) + " of " + std::to_string(stated) + " points are there");
 }
 
 void read_ascii(ByteSource& file, const PlyHeader& header, std::uint64_t skip,
@@ -162,9 +163,9 @@ void read_ascii(ByteSource& file, const PlyHeader& header, std::uint64_t skip,
     }
     if (good) continue;
     table.data.resize(begin);
-    log.warn("recording.damaged", file.name() + ": point " + std::to_string(points) +
-                                      ": expected " + std::to_string(table.fields.size()) +
-                                      " numbers, left out");
+    report_finding(log, Finding::kDamage,
+                   file.name() + ": point " + std::to_string(points) + ": expected " +
+                       std::to_string(table.fields.size()) + " numbers, left out");
   }
   if (points < vertex.count) warn_short(file, points, vertex.count, log);
 }

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <utility>
+#include "understory/recording/finding.h"
 
 #include "understory/recording/byte_source.h"
 #include "understory/recording/mcap_format.h"
@@ -52,8 +53,8 @@ std::vector<std::string> files_of_metadata(const std::string& folder, Log& log) 
       }
     }
   } catch (const ConfigError& problem) {
-    log.warn("recording.damaged",
-             std::string(problem.what()) + "; taking the files of the folder by name");
+    report_finding(log, Finding::kDamage,
+                   std::string(problem.what()) + "; taking the files of the folder by name");
     files.clear();
   }
   return files;
@@ -143,7 +144,8 @@ class BagFilesSource : public MessageSource {
         throw;
       } catch (const InputError& error) {
         if (files_.size() == 1) throw;
-        log_.warn("recording.damaged", std::string(error.what()) + "; this part is left out");
+        report_finding(log_, Finding::kDamage,
+                       std::string(error.what()) + "; this part is left out");
       }
     }
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "understory/recording/compression.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/message_merger.h"
 #include "understory/util/error.h"
 #include "understory/util/read_error.h"
@@ -231,7 +232,7 @@ class RosbagSource : public MessageSource {
     const auto size = number<std::uint32_t>(record.fields, "size");
     const std::string method = text(record.fields, "compression");
     if (!size || method.empty())
-      return warn("recording.damaged", record.offset, "a chunk without size");
+      return warn(key_of(Finding::kDamage), record.offset, "a chunk without size");
     compression_ = method == "none" ? "no compression" : method;
     std::uint64_t length = std::min(record.data_length, kLongestBlock);
     if (record.cut) length = std::min(length, pass_cut_chunk(record));
@@ -241,7 +242,7 @@ class RosbagSource : public MessageSource {
     const bool whole = list_messages(block);
     if (problem.empty() && !whole) problem = "a record in it is damaged";
     if (!problem.empty() && !record.cut)
-      warn("recording.damaged", record.offset,
+      warn(key_of(Finding::kDamage), record.offset,
            "the chunk is damaged (" + problem + "); read as far as it goes");
     merger_.add(std::move(block));
   }
@@ -262,10 +263,10 @@ class RosbagSource : public MessageSource {
     const auto following = find_chunk(record.data_offset);
     position_ = following.value_or(file_->size());
     if (following) {
-      warn("recording.damaged", record.offset,
+      warn(key_of(Finding::kDamage), record.offset,
            "the chunk's length is damaged; going on at byte " + std::to_string(*following));
     } else {
-      warn("recording.truncated", record.offset, "the file ends inside this chunk");
+      warn(key_of(Finding::kCutOff), record.offset, "the file ends inside this chunk");
       ended_ = true;
     }
     return position_ - record.data_offset;
@@ -334,10 +335,10 @@ class RosbagSource : public MessageSource {
     if (found) {
       position_ = *found;
       last_good_ = *found + 1;
-      return warn("recording.damaged", lost_at,
+      return warn(key_of(Finding::kDamage), lost_at,
                   "expected a record; going on at byte " + std::to_string(*found));
     }
-    warn(is_indexed_ ? "recording.damaged" : "recording.truncated", lost_at,
+    warn(is_indexed_ ? key_of(Finding::kDamage) : key_of(Finding::kCutOff), lost_at,
          "expected a record; nothing more was found behind it");
     ended_ = true;
   }

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 #include <vector>
+#include "understory/recording/finding.h"
 
 #include "understory/recording/byte_source.h"
 #include "understory/util/error.h"
@@ -116,7 +117,7 @@ std::shared_ptr<const UnpackedFile> UnpackedParts::get(const std::string& packed
     file = std::make_shared<const UnpackedFile>(packed);
     ++unpacked_;
   }
-  if (!file->damage().empty()) log.warn("recording.damaged", file->damage());
+  if (!file->damage().empty()) report_finding(log, Finding::kDamage, file->damage());
   return file;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string_view>
 
+#include "understory/recording/finding.h"
 #include "understory/recording/nmea.h"
 #include "understory/recording/scan_assembly.h"
 #include "understory/util/median.h"
@@ -70,8 +71,8 @@ VelodyneDecoder::VelodyneDecoder(const VelodyneConfig& config, std::string sourc
 }
 
 void VelodyneDecoder::damaged(const std::string& what) {
-  log_.warn("recording.damaged_packet",
-            source_ + ": Velodyne packet " + std::to_string(received_) + ": " + what);
+  report_finding(log_, Finding::kDamagedPacket,
+                 source_ + ": Velodyne packet " + std::to_string(received_) + ": " + what);
 }
 
 void VelodyneDecoder::add_packet(const std::uint8_t* data, std::size_t size, TimeNs stamp) {
