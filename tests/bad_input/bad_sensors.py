@@ -167,8 +167,9 @@ def backwards(folder):
     def spoil(cloud):
         times = [struct.unpack_from("<I", cloud.points, i * cloud.step + cloud.fields["t"][0])[0]
                  for i in range(len(cloud))]
+        last = max(times)
         for i, time in enumerate(times):
-            cloud.put(i, "t", "I", max(times) - time)
+            cloud.put(i, "t", "I", last - time)
 
     path = folder / "walk.mcap"
     write_mcap(path, [edit_cloud(m, spoil) if m.topic == "/lidar" else m for m in messages])

@@ -31,8 +31,9 @@ class Outcome:
 
 
 def program(*arguments, **options):
+    """The program's outcome; one that hangs fails its own case, not all of them."""
     return subprocess.run([PROGRAM, "--quiet", *map(str, arguments)], capture_output=True, text=True,
-                          **options)
+                          **{"timeout": 300, **options})
 
 
 def map_recording(recording, folder, *options, **more):
