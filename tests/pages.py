@@ -1,0 +1,117 @@
+"""Pages that a user reads: links lead somewhere, every page is reached, commands and options exist,
+and no sentence of README and guides has more than 25 words."""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+TOP = Path(__file__).resolve().parent.parent
+PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
+LONGEST_SENTENCE = 25
+wrong = []
+
+
+def anchors(page):
+    """Of its headings, as code hosts make them."""
+    heads = re.findall(r"^#+ (.*)$", page.read_text(), re.M)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+def linked(page):
+    """Pages that a page links to."""
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if re.match(r"[a-z]+:", target):
+            continue
+        name, _, anchor = target.partition("#")
+        found = (page.parent / name).resolve() if name else page
+        if not found.exists():
+            wrong.append(f"{page.relative_to(TOP)}: {target} is not there")
+        elif anchor and found.suffix == ".md" and anchor not in anchors(found):
+            wrong.append(f"{page.relative_to(TOP)}: {target} has no such heading")
+        elif found.is_dir():
+            yield from sorted(found.glob("*.md"))
+        elif found.suffix == ".md":
+            yield found
+
+
+def reached_from(first):
+    seen, todo = set(), [first]
+    while todo:
+        page = todo.pop()
+        if page not in seen:
+            seen.add(page)
+            todo += linked(page)
+    return seen
+
+
+def printed(*words):
+    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+def keys_of(*words):
+    path, keys = [], set()
+    for line in printed(*words, "--print-config").splitlines():
+        found = re.match(r"( *)(\w+):", line)
+        path = path[:len(found[1]) // 2] + [found[2]]
+        keys.add(".".join(path))
+    return keys
+
+
+def commands(page):
+    """Command lines of the program in a page, one word list each."""
+    for line in page.read_text().splitlines():
+        found = re.match(r"    (?:build/)?understory (.*?)(?:  +#.*)?$", line)
+        if found:
+            yield found[1].replace("'", "").split()
+
+
+def check_command(page, words, helps, keys):
+    command = words[0]
+    if command not in helps:
+        wrong.append(f"{page.name}: no command {command}")
+        return
+    for at, word in enumerate(words):
+        if word.startswith("--") and word not in helps[command]:
+            wrong.append(f"{page.name}: {command} has no option {word}")
+        if word == "--set":
+            name = command + (" by stems" if "sparse" in words else "")
+            key = words[at + 1].split("=")[0]
+            if key not in keys[name]:
+                wrong.append(f"{page.name}: {name} has no key {key}")
+
+
+def sentences(page):
+    text = re.sub(r"^    .*$|<!--.*?-->", "", page.read_text(), flags=re.M)
+    for block in re.split(r"\n\s*\n|\n(?=[-|#*\d])|\|", text):
+        yield from re.split(r"(?<=[.!?:;])\s+", " ".join(block.split()))
+
+
+def words_of(sentence):
+    plain = re.sub(r"\]\([^)]*\)", "", sentence)
+    return [word for word in plain.split() if re.search(r"[A-Za-z]", word)]
+
+
+first = TOP / "README.md"
+reached = reached_from(first)
+pages = {first, *(TOP / "docs").rglob("*.md"), TOP / "ARCHITECTURE.md", TOP / "CONTRIBUTING.md"}
+wrong += [f"{page.relative_to(TOP)}: no page leads to it" for page in sorted(pages - reached)]
+
+names = re.findall(r"^  ([a-z]+) ", printed("--help").split("Subcommands:")[1], re.M)
+helps = {name: printed(name, "--help") for name in names}
+keys = {"map": keys_of("map"), "map by stems": keys_of("map", "--front-end", "sparse"),
+        "correct": keys_of("correct"), "inventory": keys_of("inventory"), "register": keys_of("register")}
+guides = sorted((TOP / "docs" / "guides").glob("*.md"))
+assert len(guides) >= 5, guides
+checked = 0
+for page in [first, *guides]:
+    for words in commands(page):
+        check_command(page, words, helps, keys)
+        checked += 1
+    for sentence in sentences(page):
+        if len(words_of(sentence)) > LONGEST_SENTENCE:
+            wrong.append(f"{page.name}: {len(words_of(sentence))} words: {sentence}")
+assert checked > 20, checked
+assert not wrong, "\n".join(wrong)
+print(f"{len(reached)} pages, {checked} commands")
