@@ -227,7 +227,7 @@ void add_evaluate_trees_command(CLI::App& evaluate, Command& chosen) {
       ->capture_default_str();
   command->add_option("--path", options->path,
                       "The scanner's trajectory in B's frame: also the agreement of both maps near "
-                      "it, P1 (10)");
+                      "it");
   command->add_option("--within-m", options->within_m, "Trees further from the path do not count")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
@@ -240,8 +240,8 @@ void add_evaluate_trees_command(CLI::App& evaluate, Command& chosen) {
       ->capture_default_str();
   command->add_option(
       "--other-path", options->other_path,
-      "The trajectory of the other map, in B's frame: also the consistency of both, "
-      "P1 (10), over the trees near both paths, whole and in parts of 50 m");
+      "The trajectory of the other map, in B's frame: also the consistency of both over "
+      "the trees near both paths, whole and in parts of 50 m");
   command
       ->add_option("--pairing-m", options->consistency.pairing_m,
                    "Trees that near count as the same for the consistency")

@@ -93,7 +93,7 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
                    "Where the GNSS antenna is in the body frame: x y z (the origin if not given)")
       ->expected(3);
   command->add_flag("--plain", options->plain,
-                    "Least squares as printed in P1 (6): fixes that ran away count like others");
+                    "Plain least squares: fixes that are far off count like others");
   command->add_option("--dem", options->terrain_model,
                       "Terrain model: GeoTIFF, ESRI ASCII grid, XYZ grid");
   command

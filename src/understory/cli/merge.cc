@@ -223,7 +223,7 @@ void add_merge_command(CLI::App& app, Command& chosen) {
       ->required();
   command
       ->add_option("--weight", options->weight,
-                   "0: trees stay where A has them, 1: where B has them (P1 (9))")
+                   "0: trees stay where A has them, 1: where B has them")
       ->check(CLI::Range(-1.0, 2.0))
       ->capture_default_str();
   command->add_flag(

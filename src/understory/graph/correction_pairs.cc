@@ -40,18 +40,18 @@ void describe(ConfigTable& table, PairConfig& config) {
   table.add_enum(
       "rule", config.rule,
       {{"poisson_disks", PairRule::kPoissonDisks}, {"delaunay_stars", PairRule::kDelaunayStars}},
-      "how pairs are chosen: P0 (28, 29), or (P0 section 3) by the association of "
-      "Delaunay stars, which gives the order too");
+      "how pairs are chosen: spread by Poisson disks, or by the association of Delaunay stars, "
+      "which gives the order too");
   table.add("tested", config.tested, {1, 100'000'000}, "", "pairs of views drawn at random");
   table.add("shortest_gap", config.shortest_gap, {1, 1'000'000}, "", "views from one to the other");
   table.add("longest_gap", config.longest_gap, {0, 100'000'000}, "", "the same; 0: any");
   table.add("least_overlap", config.least_overlap, {0.0, 1.0}, "",
             "of the views' sectors, by their poses; the paper draws from 0.2 on");
   table.add("error_m", config.error_m, {0.0, 10.0}, "m",
-            "P0 (27): mean match error that is acceptable without any overlap");
+            "mean match error that is acceptable without any overlap");
   table.add("error_per_overlap_m", config.error_per_overlap_m, {0.0, 10.0}, "m",
-            "P0 (27): and how much more of it with full overlap");
-  table.add("chosen", config.chosen, {1, 1'000'000}, "", "pairs chosen of these, P0's m");
+            "how much more of it is acceptable with full overlap");
+  table.add("chosen", config.chosen, {1, 1'000'000}, "", "pairs chosen of these");
   table.add("outlier_ratio", config.outlier_ratio, {0.0, 0.95}, "",
             "share of the stems left out of the mean match error");
 }

@@ -160,9 +160,9 @@ bool loop_search_due(TimeNs last, TimeNs now, const LoopSearchConfig& config) {
 
 void describe(ConfigTable& table, LoopSearchConfig& config) {
   using Method = LoopSearchConfig::Method;
-  table.add_enum("method", config.method,
-                 {{"paper", Method::kPaper}, {"uncertainty", Method::kUncertainty}},
-                 "P4 (38): the nearest keyframe within a gate; or all that the drift allows");
+  table.add_enum(
+      "method", config.method, {{"paper", Method::kPaper}, {"uncertainty", Method::kUncertainty}},
+      "paper: the nearest keyframe within a gate; uncertainty: all that the drift allows");
   table.add("exclude_recent", config.exclude_recent, {2, 100000}, "keyframes",
             "paper: the most recent keyframes are no candidates");
   table.add("gate_m", config.gate_m, {0.0, 1e4}, "m", "paper: farther candidates are dropped");

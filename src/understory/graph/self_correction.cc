@@ -24,18 +24,18 @@ void describe_power(ConfigTable& table, PowerConfig& config) {
                   {"match_error", PowerCoefficient::kMatchError},
                   {"metric", PowerCoefficient::kMetric},
                   {"screw", PowerCoefficient::kScrew}},
-                 "share of a correction that a view between is given: P0 (21), its section 4.1 "
-                 "(path_length), P1 (5), P0 (31), P0 (32)");
+                 "share of a correction that a view in between gets: by its number, by the path's "
+                 "length, by the errors of the matches, by a metric, or by a screw motion");
   table.add("metric_rotation_m2", config.metric_rotation_m2, {0.0, 1e6}, "m^2",
-            "a of P0 (31): weight of a squared angle");
+            "metric: weight of a squared angle");
   table.add("metric_translation", config.metric_translation, {0.0, 1e6}, "",
-            "b of P0 (31): weight of a squared distance");
+            "metric: weight of a squared distance");
 }
 
 void describe_gain(ConfigTable& table, GainConfig& config) {
   table.add("pool", config.pool, {1, 1'000'000}, "", "pairs among which the next is chosen");
-  table.add("window_l0", config.window_l0, {0.0, 100.0}, "L0",
-            "views within that part of the way to each side are gathered for a match");
+  table.add("window_l0", config.window_l0, {0.0, 100.0}, "stem spacings",
+            "views within that distance along the path, to each side, are joined for a match");
   table.add("window_views", config.window_views, {1, 1000}, "", "at most that many to each side");
   table.add("match_sd_m", config.match_sd_m, {1e-4, 10.0}, "m",
             "what a match of gathered views with full overlap is worth");
@@ -43,8 +43,8 @@ void describe_gain(ConfigTable& table, GainConfig& config) {
             "it ends where no pair is expected to tell more");
   table.add("revisits", config.revisits, {0, 100}, "",
             "rounds in which accepted pairs are matched again from the better poses");
-  table.add("largest_step_l0", config.largest_step_l0, {0.0, 100.0}, "L0",
-            "a match that moves views farther is not believed");
+  table.add("largest_step_l0", config.largest_step_l0, {0.0, 100.0}, "stem spacings",
+            "a match that moves views farther is refused");
 }
 
 }  // namespace
@@ -64,35 +64,33 @@ void describe(ConfigTable& table, SelfCorrectionConfig& config) {
                   {"pose_graph", CorrectionMethod::kPoseGraph},
                   {"gaussian_process", CorrectionMethod::kGaussianProcess},
                   {"expected_gain", CorrectionMethod::kExpectedGain}},
-                 "powers: P0 section 2; lattice: P1 section 2.3; gaussian_process: P1 section 5; "
-                 "the others are described in "
-                 "docs/sparse.md");
+                 "how the map corrects itself; docs/sparse.md describes each method");
   table.add_enum("order", config.order,
                  {{"small", CorrectionOrder::kSmallGaps},
                   {"medium", CorrectionOrder::kMediumGaps},
                   {"random", CorrectionOrder::kRandom},
                   {"gain", CorrectionOrder::kGain}},
-                 "which gaps first, P0 table 1, or first what tells most (powers)");
+                 "powers: which gaps first, or first the pairs with the largest expected gain");
   table.section("pairs", [&] { describe(table, config.pairs); });
   table.section("power", [&] { describe_power(table, config.power); });
   table.section("lattice", [&] {
     table.add("spacing", config.lattice.spacing, {1, 1'000'000}, "", "every that many views");
     table.add("longest_gap", config.lattice.longest_gap, {1, 1'000'000}, "", "views");
     table.add("largest_outlier_ratio", config.lattice.largest_outlier_ratio, {0.0, 1.0}, "",
-              "of a match; 0.6 in P1's text, 0.4 in its figure 5");
+              "of a match; larger ones are refused");
   });
   table.section("gain", [&] { describe_gain(table, config.gain); });
   table.section("icp", [&] { describe(table, config.icp); });
   table.section("go_icp", [&] { describe(table, config.go_icp); });
   table.add("least_final_overlap", config.least_final_overlap, {0.0, 1.0}, "",
-            "P0's lambda0: of the views' sectors where a match ends");
+            "least overlap of the views' sectors after a match");
   table.add("largest_share", config.largest_share, {0.0, 1.0}, "",
             "corrections at most, as a share of the views (the lattice has its own number)");
   table.add("patience", config.patience, {1, 1'000'000}, "",
             "it ends after that many corrections without a sharper map (powers)");
   table.add("eliminate_factor", config.eliminate_factor, {0.0, 1e6}, "",
             "views are left out of the map whose mean square distance from the trees is more than "
-            "that times the median, P0 (33); 0: none");
+            "that times the median; 0: none");
   table.add("eliminate_share", config.eliminate_share, {0.0, 1.0}, "", "views left out at most");
   table.add("seed", config.seed, {0, 1'000'000'000}, "", "of the pairs drawn at random");
 }

@@ -154,13 +154,15 @@ class Finder {
 void describe(ConfigTable& table, StemLoopConfig& config) {
   table.add("exclude_recent", config.exclude_recent, {1, 1'000'000}, "",
             "views nearer than this in the recording are the same passage");
-  table.add("place_spacing", config.place_spacing, {0.1, 100.0}, "L0",
+  table.add("place_spacing", config.place_spacing, {0.1, 100.0}, "stem spacings",
             "along the path between the places that are kept to be found again");
   table.add("max_distance_m", config.max_distance_m, {0.1, 100.0}, "m",
             "views farther apart are not of the same place");
-  table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "", "P0's lambda0");
-  table.add("gather_l0", config.gather_l0, {0.0, 100.0}, "L0",
-            "views within that part of the way to each side are laid together; 0: each by itself");
+  table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
+            "share of the stems that two views must have in common");
+  table.add(
+      "gather_l0", config.gather_l0, {0.0, 100.0}, "stem spacings",
+      "views within that distance along the path, to each side, are joined; 0: each by itself");
   table.add("gather_views", config.gather_views, {1, 1000}, "", "at most that many to each side");
   table.section("pattern", [&] { describe(table, config.pattern); });
   table.section("icp", [&] { describe(table, config.icp); });

@@ -37,10 +37,11 @@ struct Votes {
 void describe(ConfigTable& table, TreePatternConfig& config) {
   table.add("neighbours", config.neighbours, {2, 20}, "",
             "triangles are made of a stem and two of this many nearest");
-  table.add("longest_side", config.longest_side, {0.5, 20.0}, "L0", "longer sides are left out");
-  table.add("tolerance", config.tolerance, {0.005, 0.5}, "L0",
+  table.add("longest_side", config.longest_side, {0.5, 20.0}, "stem spacings",
+            "longer sides are left out");
+  table.add("tolerance", config.tolerance, {0.005, 0.5}, "stem spacings",
             "sides and heights of the same triangle agree that well");
-  table.add("vote_cell", config.vote_cell, {0.1, 10.0}, "L0",
+  table.add("vote_cell", config.vote_cell, {0.1, 10.0}, "stem spacings",
             "triangles that agree on the place within it vote together");
   table.add("triangles", config.triangles, {10, 100'000}, "",
             "of a view, about, that are asked for");

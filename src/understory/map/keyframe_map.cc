@@ -15,10 +15,11 @@
 namespace understory {
 
 void describe(ConfigTable& table, KeyframeConfig& config) {
-  table.add("distance_m", config.distance_m, {0.0, 100.0}, "m",
-            "weighted distance (37) after which a scan becomes a keyframe");
+  table.add(
+      "distance_m", config.distance_m, {0.0, 100.0}, "m",
+      "distance after which a scan becomes a keyframe; turns count too, see the next setting");
   table.add("rotation_as_metre_deg", config.rotation_as_metre_deg, {0.1, 360.0}, "deg",
-            "rotation that counts as one metre in (37)");
+            "rotation that counts as one metre of this distance");
   table.add("voxel_size_m", config.voxel_size_m, {0.0, 5.0}, "m",
             "edge of the voxels that thin a keyframe's points; 0: it keeps all of them");
 }

@@ -278,10 +278,9 @@ MappedStem finished(const Gathered& tree) {
 }  // namespace
 
 void describe(ConfigTable& table, StemMapConfig& config) {
-  table.add(
-      "alpha_radius_m", config.alpha_radius_m, {0.0, 5.0}, "m",
-      "trees are the alpha shapes of all sights with that radius, P1 section 2.3 (there 0.5); "
-      "0: sights gathered about their mean");
+  table.add("alpha_radius_m", config.alpha_radius_m, {0.0, 5.0}, "m",
+            "trees are the alpha shapes of all sights with that radius, 0.5 in the paper; "
+            "0: sights gathered about their mean");
   table.add("min_sights", config.min_sights, {1, 100'000}, "",
             "trees seen less often are not listed");
   table.add("min_presence", config.min_presence, {0.0, 1.0}, "",

@@ -12,8 +12,8 @@ void describe_lidar(ConfigTable& table, LidarNoiseConfig& config) {
                  {{"fitness", LidarNoise::kFitness},
                   {"information", LidarNoise::kInformation},
                   {"both", LidarNoise::kBoth}},
-                 "covariance of a lidar factor: from the fitness as in P4 (36), from the matcher's "
-                 "information matrix, or the matrix with (36) as a floor");
+                 "covariance of a lidar factor: from the fitness, from the matcher's information "
+                 "matrix, or from the matrix with that of the fitness as a floor");
   table.add("sigma_rotation_deg", config.sigma_rotation_deg, {1e-4, 10.0}, "deg",
             "standard deviation of one match at good fitness");
   table.add("sigma_translation_m", config.sigma_translation_m, {1e-5, 10.0}, "m",
@@ -51,15 +51,15 @@ void describe_imu(ConfigTable& table, ImuNoiseConfig& config) {
 
 void describe_gate(ConfigTable& table, MotionConfig& config) {
   table.add("velocity_gate_m_s", config.velocity_gate_m_s, {0.0, 1000.0}, "m/s",
-            "P2-8: a match that changes the velocity by more is dropped; 0 turns the gates off");
+            "a match that changes the velocity by more is dropped; 0 turns the gates off");
   table.add("angular_gate_deg_s", config.angular_gate_deg_s, {0.0, 1e5}, "deg/s",
             "the same for the turn since the last scan, against the prediction; 0 turns it off");
   table.add_enum("velocity_gate_reference", config.velocity_gate_reference,
                  {{"prediction", VelocityGateReference::kPrediction},
                   {"previous", VelocityGateReference::kPreviousState}},
-                 "what the velocity is compared to: the IMU's prediction, or (P2) the last state");
+                 "what the velocity is compared to: the IMU's prediction, or the last state");
   table.add("velocity_gate_patience", config.velocity_gate_patience, {0, 1000}, "",
-            "matches dropped in a row before one is believed after all");
+            "matches dropped in a row after which the next one is used");
 }
 
 }  // namespace

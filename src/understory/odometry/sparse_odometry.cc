@@ -59,11 +59,12 @@ void describe(ConfigTable& table, SparseOdometryConfig& config) {
                  {{"frame", SparseOdometryConfig::Target::kFrame},
                   {"map", SparseOdometryConfig::Target::kMap}},
                  "what a view is matched to: the one before, or a local map of stems");
-  table.add_enum("matcher", config.matcher,
-                 {{"icp", SparseOdometryConfig::Matcher::kIcp},
-                  {"go_icp", SparseOdometryConfig::Matcher::kGoIcp}},
-                 "trimmed ICP from the prediction, or branch and bound in a small box around it "
-                 "before (P1)");
+  table.add_enum(
+      "matcher", config.matcher,
+      {{"icp", SparseOdometryConfig::Matcher::kIcp},
+       {"go_icp", SparseOdometryConfig::Matcher::kGoIcp}},
+      "icp: trimmed ICP from the prediction; go_icp: before it, branch and bound in a small "
+      "box around the prediction");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
             "share of a view's stems that must be found again; below it a search is made");
   table.add("map_forgetting", config.map_forgetting, {0.01, 1.0}, "",

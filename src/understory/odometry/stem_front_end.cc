@@ -38,7 +38,7 @@ void describe(ConfigTable& table, ViewChoiceConfig& config) {
             "what it was after the last one");
   table.add("region", config.region, {0.0, 10.0}, "",
             "region: when the motion since the last one leaves that share of the region where "
-            "matching converges, P0 (26)");
+            "matching converges");
 }
 
 void describe(ConfigTable& table, StemFrontEndConfig& config) {

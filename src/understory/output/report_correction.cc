@@ -49,8 +49,7 @@ std::string correction_section(const ReportInput& input) {
   dots("promising, of those drawn for the report", "var(--rule)", promising);
   dots("tried", "var(--bad)", correction.tried);
   dots("in the map", "var(--line)", correction.kept);
-  return html + "<h3>Which views were matched again (P0, figure 10)</h3>" + svg_plot(plot) +
-         "</section>\n";
+  return html + "<h3>Which views were matched again</h3>" + svg_plot(plot) + "</section>\n";
 }
 
 }  // namespace understory

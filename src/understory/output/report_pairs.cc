@@ -62,13 +62,13 @@ std::string pair_scatter(const ReportCorrection& correction) {
     std::sort(series->points.begin(), series->points.end());
     if (!series->points.empty()) plot.series.push_back(*series);
   }
-  PlotSeries line{"limit (27)", "var(--bad)", {}, false};
+  PlotSeries line{"limit", "var(--bad)", {}, false};
   for (const double overlap : {0.0, 1.0}) {
     line.points.emplace_back(
         overlap, correction.acceptable_m + overlap * correction.acceptable_per_overlap_m);
   }
   plot.series.push_back(line);
-  return "<h3>Pairs of views as the odometry placed them (P0, figure 9)</h3>" + svg_plot(plot) +
+  return "<h3>Pairs of views as the odometry placed them</h3>" + svg_plot(plot) +
          fmt::format(
              "<p class=\"so\">{} pairs drawn at random; those below the line with an overlap of "
              "more than {:.2f} are worth matching again.</p>",
@@ -111,7 +111,7 @@ std::string matrix_svg(const ReportViewMatrix& matrix, bool errors,
 // P1 figure 5.
 std::string matrices(const ReportCorrection& correction) {
   if (correction.matrix_before.side < 2) return "";
-  return "<h3>All pairs of views (P1, figure 5)</h3><div class=\"trees matrices\">" +
+  return "<h3>All pairs of views</h3><div class=\"trees matrices\">" +
          figure(matrix_svg(correction.matrix_before, false, {}),
                 "Share of stems in common, black: all. Later views to the right, earlier ones "
                 "downwards.") +
@@ -172,7 +172,7 @@ std::string sights(const ReportCorrection& correction) {
   const Window near{static_cast<double>(correction.most_moved.x()) - 0.5 * kNear,
                     static_cast<double>(correction.most_moved.y()) - 0.5 * kNear, kNear, kNear};
   const Window whole = whole_of(correction.sights_after);
-  return "<h3>Every sight of every stem (P0, figure 11)</h3><div class=\"panels\">" +
+  return "<h3>Every sight of every stem</h3><div class=\"panels\">" +
          figure(sights_svg(correction.sights_before, whole), "Before correction.") +
          figure(sights_svg(correction.sights_after, whole), "After correction.") +
          figure(sights_svg(correction.sights_before, near),
@@ -185,13 +185,13 @@ std::string sights(const ReportCorrection& correction) {
 std::string distances(const ReportCorrection& correction) {
   if (correction.trees_per_ha.empty()) return "";
   Histogram histogram;
-  histogram.x_label = "distance from the way, m";
+  histogram.x_label = "distance from the path, m";
   histogram.y_label = "listed trees per ha";
   histogram.step = correction.ring_m;
   histogram.width = 1100;
   for (const double density : correction.trees_per_ha)
     histogram.counts.push_back(static_cast<int>(std::lround(density)));
-  return "<h3>Trees over the distance from the way (P1, figure 8)</h3>" + svg_histogram(histogram) +
+  return "<h3>Trees over the distance from the path</h3>" + svg_histogram(histogram) +
          "<p class=\"so\">Where the stand is even, the list is whole as far as the bars stay "
          "level. A strip road holds fewer trees.</p>";
 }

@@ -240,15 +240,15 @@ void describe(ConfigTable& table, GoIcpConfig& config) {
   table.add("height_range_m", config.height_range_m, {0.0, 1000.0}, "m",
             "around the guess; motion=space only");
   table.add("outlier_ratio", config.outlier_ratio, {0.0, 0.95}, "",
-            "share of the source points left out, the worst; P0's gamma");
+            "share of the source points left out, those with the largest distances");
   table.add("gap_m", config.gap_m, {0.001, 100.0}, "m",
             "certified when no other place can have an error smaller by more than this");
   table.add("finest_yaw_deg", config.finest_yaw_deg, {0.0, 180.0}, "deg",
-            "half side of the boxes at which the paper's mode stops; 0: theta0, P0 (25)");
+            "paper: half side of the boxes at which the search stops; 0: as far as ICP converges");
   table.add("finest_shift_m", config.finest_shift_m, {0.0, 1000.0}, "m",
-            "the same of the shift; 0: delta0, P0 (24)");
+            "the same of the shift; 0: as far as ICP converges");
   table.add("finest_tilt_deg", config.finest_tilt_deg, {0.0, 180.0}, "deg",
-            "the same of the tilt; 0: phi0, 8.2");
+            "the same of the tilt; 0: 8.2");
   table.add("max_nodes", config.max_nodes, {1, 2'000'000'000}, "", "given up beyond");
   table.add("refine", config.refine, "all six degrees of freedom by ICP at the end");
 }

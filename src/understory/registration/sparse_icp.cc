@@ -240,13 +240,13 @@ void describe(ConfigTable& table, SparseIcpConfig& config) {
       {{"plane", SparseIcpConfig::Metric::kPlane}, {"space", SparseIcpConfig::Metric::kSpace}},
       "plane: yaw and horizontal position; space: all six");
   table.add("outlier_ratio", config.outlier_ratio, {0.0, 0.95}, "",
-            "share of the source points left out of each step, P0's gamma");
+            "share of the source points left out of each step, those with the largest distances");
   table.add("max_iterations", config.max_iterations, {1, 1000}, "", "steps of each stage");
   table.add("step_translation_m", config.step_translation_m, {0.0, 1.0}, "m", "converged below");
   table.add("step_rotation_rad", config.step_rotation_rad, {0.0, 1.0}, "rad", "and below");
   table.add("refine", config.refine, "after trimming: weights by Student's t, noise estimated");
-  table.add("overlap_distance_ratio", config.overlap_distance_ratio, {0.001, 1.0}, "L0",
-            "pairs nearer than this share of the mean neighbour distance overlap");
+  table.add("overlap_distance_ratio", config.overlap_distance_ratio, {0.001, 1.0}, "stem spacings",
+            "pairs nearer than this share of the mean distance between neighbouring stems overlap");
 }
 
 SparseTarget::SparseTarget(const SparsePoints& points, std::vector<double> height_sds_m)
