@@ -91,6 +91,14 @@ void rename_to(const fs::path& from, const fs::path& to) {
   if (error) throw OutputError(to.string(), "cannot be put in place: " + error.message());
 }
 
+// A power cut leaves each of the files in the one folder or in the other.
+void move_durably(const std::vector<std::string>& names, const fs::path& from, const fs::path& to) {
+  for (const std::string& name : names)
+    rename_to(from / name, to / name);
+  sync_folder(to);
+  sync_folder(from);
+}
+
 // A folder RUN/former-N that is not there yet.
 fs::path make_former_folder(const fs::path& folder) {
   for (int n = 1;; ++n) {
@@ -216,11 +224,13 @@ void RunFolder::commit(Log& log, bool keep_former) const {
     placed.write(name + "\n");
   placed.commit();
   put_aside(former.names, keep_former ? std::set<std::string>() : made, log);
-  // Never beside results of another run: it goes first and comes last.
+  // Never beside results of another run, on the disk neither: it goes first and comes last.
   (void)::unlink((path() / "run.json").c_str());
+  sync_folder(path());
   made.erase("run.json");
   for (const std::string& name : made)
     rename_to(results / name, path() / name);
+  sync_folder(path());
   rename_to(results / "run.json", path() / "run.json");
   // On the disk before the state that they were made of goes.
   sync_folder(results);
@@ -241,12 +251,14 @@ void RunFolder::put_aside(const std::set<std::string>& former, const std::set<st
   log.warn("run.former_results",
            fmt::format("the run does not make {} anew: those of the former run are kept in {}",
                        fmt::join(kept, ", "), folder.string()));
-  for (const char* name : {"run.json", "report.html"}) {
-    if (former.count(name) != 0 && is_there(path() / name)) kept.emplace_back(name);
+  sync_folder(path());
+  move_durably(kept, path(), folder);
+  // They name the files that are kept, so they stay until those have moved.
+  std::vector<std::string> named_last;
+  for (const char* name : {"report.html", "run.json"}) {
+    if (former.count(name) != 0 && is_there(path() / name)) named_last.emplace_back(name);
   }
-  for (const std::string& name : kept)
-    rename_to(path() / name, folder / name);
-  sync_folder(folder);
+  move_durably(named_last, path(), folder);
 }
 
 }  // namespace understory

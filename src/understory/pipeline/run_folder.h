@@ -10,13 +10,14 @@
 
 namespace understory {
 
-// A folder of results, claimed by one command that writes them. While it is claimed it holds
-// RUN/.understory with
+// A folder of results, claimed by one command that writes them. While it is claimed, it has a work
+// folder RUN/.understory with
 //   marker    a text that names this program and the version of the format,
 //   lock      held by the process at work; it falls with the process,
-//   results/  results until `commit`, so that what fails leaves those of before as they are,
-// and what a mapping run needs to be resumed. Nothing else in the folder is ever changed or
-// removed but the results of an earlier command, which its run.json names. Not thread-safe.
+//   results/  results until `commit`: a command that fails leaves the former ones as they are,
+//   the state of a mapping run that can be resumed (run_state.h).
+// In RUN itself only results of an earlier command are changed or removed. Its run.json names them.
+// Not thread-safe.
 class RunFolder {
  public:
   // Makes the folder if it is missing and claims it. Throws OutputError, with everything as it
@@ -30,8 +31,8 @@ class RunFolder {
   // Claims that of an unfinished run. Throws InputError if there is none, OutputError as above.
   [[nodiscard]] static RunFolder reclaim(const std::filesystem::path& folder);
 
-  // Lets the folder go. If there is nothing to resume in it, the work folder goes as well, and the
-  // folder if `claim` made it and nothing is in it.
+  // Lets the folder go. Where there is nothing to resume, it removes the work folder, and RUN if
+  // `claim` made it and it is empty.
   ~RunFolder();
   RunFolder(RunFolder&&) noexcept;
   RunFolder& operator=(RunFolder&&) noexcept;
@@ -43,10 +44,11 @@ class RunFolder {
   // Removes the state of a run from the work folder.
   void forget_state() const;
 
-  // Puts the results in place, run.json last and with the list of them. Those of the former run
-  // that have no successor go to a folder of their own, RUN/former-N, with the run.json and the
-  // report that they belong to; with `keep_former` all of them do. The log is told. Throws
-  // OutputError.
+  // Puts the results in place, run.json last and with the list of them. Former results without a
+  // successor go to a folder of their own, RUN/former-N, with their run.json and report. With
+  // `keep_former` all former results do. The log is told (key "run.former_results"). A power cut at
+  // any moment loses no former result without a successor, and a run that can be resumed stays so.
+  // Throws OutputError.
   void commit(Log& log, bool keep_former = false) const;
 
  private:
