@@ -43,11 +43,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   guarded([&] { (void)parse_checkpoint("fuzz", bytes); });
   guarded([&] {
     write_checkpoint(work_folder_of(folder()), 0, bytes);
-    (void)RunState::front_end_of(folder());
-  });
-  guarded([&] {
-    RunRequest request;
-    (void)RunState::reopen(folder(), request);
+    (void)RunState::reopen(folder());
   });
   guarded([&] {
     BinaryReader reader(bytes, "fuzz");

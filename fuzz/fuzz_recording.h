@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "fuzz_place.h"
 #include "understory/recording/message_recording.h"
 #include "understory/recording/recording_info.h"
 #include "understory/util/error.h"
@@ -24,6 +25,10 @@ void read_as_recording(const std::uint8_t* data, std::size_t size, const OpenByt
     while (const auto event = recording->next())
       survey.add(*event);
     (void)survey.finish("fuzz", *recording, log);
+    expect_to_go_on([&] {
+      return open_messages(
+          "fuzz", [&](Log& sink) { return open(bytes, sink); }, {}, log);
+    });
   } catch (const InputError&) {
   }
 }

@@ -1,4 +1,5 @@
 #include "fuzz_input.h"
+#include "fuzz_place.h"
 #include "understory/recording/pcap_recording.h"
 #include "understory/util/error.h"
 
@@ -14,6 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       while (recording->next()) {
       }
       (void)recording->topics();
+      expect_to_go_on([&] { return open_pcap(fuzz_source(data, size), options, log); });
     } catch (const InputError&) {
     }
   }

@@ -33,6 +33,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <string_view>
 
 // The only place from which the filter lets these calls pass.
@@ -66,7 +67,7 @@ enum class Kind : std::uint32_t {
   kRename = 4,    // path, second path
   kRemove = 5,    // path
   kFolder = 6,    // path: a new folder
-  kSync = 7,      // inode of a file, or path of a folder
+  kSync = 7,      // inode of a file, or path of a folder; offset: nanoseconds that it took
   kSyncAll = 8,
   kUnknown = 9,  // path: changed in a way that is not followed here; offset: the system call
 };
@@ -228,11 +229,19 @@ long do_path(Kind kind, long number, long folder, long path_argument, const Argu
 }
 
 // Calls on an open file.
+std::int64_t now_ns() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return time.tv_sec * 1'000'000'000 + time.tv_nsec;
+}
+
 long do_file(Kind kind, long number, std::int64_t offset, const Arguments& a) {
   Path path{};
   const bool inside = path_of(a[0], path);
+  const std::int64_t begin = now_ns();
   const long result = call(number, a[0], a[1], a[2], a[3], a[4], a[5]);
   if (result < 0 || !inside) return result;
+  if (kind == Kind::kSync) offset = now_ns() - begin;
   const struct stat status = status_of(a[0]);
   note(kind, S_ISDIR(status.st_mode) || kind == Kind::kUnknown ? path.data() : nullptr, nullptr,
        status.st_ino, offset);

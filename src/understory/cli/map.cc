@@ -92,12 +92,13 @@ void refuse_beside_resume(const CLI::App& command) {
 // By the front end that the run was begun with.
 int resume(const MapOptions& options, CommandContext& context) {
   return with_advice(options.resume, [&] {
-    if (RunState::front_end_of(options.resume) == kSparseFrontEnd) {
-      return report_outcome(resume_sparse_mapping(options.resume, context.log, context.progress,
+    UnfinishedRun run = RunState::reopen(options.resume);
+    if (run.state.front_end() == kSparseFrontEnd) {
+      return report_outcome(resume_sparse_mapping(std::move(run), context.log, context.progress,
                                                   context.stop_requested));
     }
     return report_outcome(
-        resume_mapping(options.resume, context.log, context.progress, context.stop_requested));
+        resume_mapping(std::move(run), context.log, context.progress, context.stop_requested));
   });
 }
 

@@ -15,7 +15,7 @@
 namespace understory {
 namespace {
 
-constexpr char kMark[] = "UNDERSTORY CHECKPOINT 5\n";
+constexpr char kMark[] = "UNDERSTORY CHECKPOINT 6\n";
 constexpr std::size_t kMarkBytes = sizeof(kMark) - 1;
 constexpr std::uintmax_t kMostBytes = std::uintmax_t{1} << 32U;
 

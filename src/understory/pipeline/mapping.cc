@@ -51,7 +51,8 @@ class MappingRun {
       if (!ended) checkpoint_if_due();
       if (player_ == nullptr && start_over_for_imu()) ended = false;
     }
-    if (stopped && session_->settled()) state_.save(request_, *session_, *orderer_, log_, events_);
+    if (stopped && session_->settled())
+      state_.save(request_, *session_, *orderer_, log_, *source_, events_);
     return finish(stopped);
   }
 
@@ -72,7 +73,7 @@ class MappingRun {
     state_.check_inputs(request_);
     if (state_.resumed()) {
       adapt_config();
-      source_->skip(state_.events());
+      state_.find_place(*source_);
       state_.restore(*session_, *orderer_, log_, source_->rig());
       stamps_believed_ = orderer_->believes_stamps(EventOrderer::kImu);
       events_ = state_.events();
@@ -82,7 +83,7 @@ class MappingRun {
       state_.forget_former();
       adapt_config();
       // Makes the run resumable from the start.
-      state_.save(request_, *session_, *orderer_, log_, 0);
+      state_.save(request_, *session_, *orderer_, log_, *source_, 0);
     }
     if (request_.realtime) {
       auto player = std::make_unique<RealtimePlayer>(
@@ -124,7 +125,7 @@ class MappingRun {
     if (wrong) conditions.imu_refused = reason;
     begin_anew();
     wrong ? session_->refuse_imu(reason) : session_->doubt_imu();
-    state_.begin_anew(request_, *session_, *orderer_, log_);
+    state_.begin_anew(request_, *session_, *orderer_, log_, *source_);
     return true;
   }
 
@@ -137,7 +138,7 @@ class MappingRun {
     log_.forget_all_but("");
     log_.info("the recording is begun anew with the IMU's own stamps");
     begin_anew();
-    state_.begin_anew(request_, *session_, *orderer_, log_);
+    state_.begin_anew(request_, *session_, *orderer_, log_, *source_);
     return true;
   }
 
@@ -164,7 +165,7 @@ class MappingRun {
     const TimeNs due =
         state_.last_checkpoint() + from_seconds(request_.config.checkpoint_interval_s);
     if (session_->settled() && session_->last_scan_end() >= due) {
-      state_.save(request_, *session_, *orderer_, log_, events_);
+      state_.save(request_, *session_, *orderer_, log_, *source_, events_);
       memory_mb_.push_back(resident_memory_mb());
     }
   }
@@ -263,15 +264,15 @@ MappingOutcome run_mapping(const MappingRequest& request, Log& log, const Progre
       .run();
 }
 
-MappingOutcome resume_mapping(const std::filesystem::path& run_folder, Log& log,
-                              const ProgressSink& progress, const StopRequested& stop_requested) {
+MappingOutcome resume_mapping(UnfinishedRun run, Log& log, const ProgressSink& progress,
+                              const StopRequested& stop_requested) {
   MappingRequest request;
-  RunState state = RunState::reopen(run_folder, request);
-  mapping_table(request.config).read_yaml(request.config_yaml, run_folder.string());
+  static_cast<RunRequest&>(request) = std::move(run.request);
+  mapping_table(request.config).read_yaml(request.config_yaml, request.run_folder.string());
   std::string& boxes = request.config.odometry.machine_boxes_file;
   boxes = request.found(boxes);
   request.more_inputs = {boxes};
-  return MappingRun(request, std::move(state), log, progress, stop_requested).run();
+  return MappingRun(request, std::move(run.state), log, progress, stop_requested).run();
 }
 
 }  // namespace understory

@@ -24,6 +24,8 @@ struct MappingOutcome {
   std::string summary;  // a few lines for the terminal
 };
 
+struct UnfinishedRun;  // pipeline/run_state.h
+
 // From a raw recording to the run folder: the main job, and the function to read first.
 // Throws InputError or OutputError where nothing usable can be made; what a killed run leaves
 // behind is finished by `resume_mapping`.
@@ -32,7 +34,7 @@ struct MappingOutcome {
                                          const StopRequested& stop_requested);
 
 // Goes on where a killed run stopped. Gives the same files as an undisturbed run.
-[[nodiscard]] MappingOutcome resume_mapping(const std::filesystem::path& run_folder, Log& log,
+[[nodiscard]] MappingOutcome resume_mapping(UnfinishedRun run, Log& log,
                                             const ProgressSink& progress,
                                             const StopRequested& stop_requested);
 

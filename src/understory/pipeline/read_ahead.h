@@ -8,7 +8,8 @@
 
 namespace understory {
 
-// A recording whose first events have been read before; gives them first.
+// A recording whose first events have been read before; gives them first. `load` belongs to the
+// recording itself.
 class ReadAhead : public Recording {
  public:
   ReadAhead(std::unique_ptr<Recording> source, std::deque<Event> events)
@@ -19,6 +20,10 @@ class ReadAhead : public Recording {
     Event event = std::move(events_.front());
     events_.pop_front();
     return event;
+  }
+  // The recording itself stands behind what is given, until that has caught up.
+  [[nodiscard]] bool save(BinaryWriter& writer) const override {
+    return events_.empty() && source_->save(writer);
   }
   [[nodiscard]] const Rig& rig() const override { return source_->rig(); }
   [[nodiscard]] std::vector<TopicReport> topics() const override { return source_->topics(); }

@@ -111,28 +111,15 @@ void RunState::check_inputs(const RunRequest& request) {
   inputs_ = std::move(now);
 }
 
-std::string RunState::front_end_of(const std::filesystem::path& run_folder) {
-  if (!holds_unfinished_run(run_folder)) (void)RunFolder::reclaim(run_folder);  // which says why
+UnfinishedRun RunState::reopen(const std::filesystem::path& run_folder) {
+  UnfinishedRun run{{}, RunState(RunFolder::reclaim(run_folder), "")};
   std::vector<std::string> problems;
-  for (const Checkpoint& checkpoint : read_checkpoints(work_folder_of(run_folder), problems)) {
-    RunRequest request;
-    BinaryReader reader(checkpoint.bytes, checkpoint.file.string());
-    get_request(reader, checkpoint.file, request);
-    (void)get_inputs(reader);
-    return reader.get_string();
-  }
-  nothing_whole(run_folder, problems);
-}
-
-RunState RunState::reopen(const std::filesystem::path& run_folder, RunRequest& request) {
-  RunState state(RunFolder::reclaim(run_folder), "");
-  std::vector<std::string> problems;
-  for (const Checkpoint& checkpoint : read_checkpoints(state.work(), problems)) {
+  for (const Checkpoint& checkpoint : read_checkpoints(run.state.work(), problems)) {
     try {
-      state.read(checkpoint, request);
-      request.run_folder = run_folder;
-      state.passed_over_ = joined(problems);
-      return state;
+      run.state.read(checkpoint, run.request);
+      run.request.run_folder = run_folder;
+      run.state.passed_over_ = joined(problems);
+      return run;
     } catch (const InputError& problem) {
       problems.emplace_back(problem.what());
     }
@@ -150,6 +137,8 @@ void RunState::read(const Checkpoint& checkpoint, RunRequest& request) {
   last_checkpoint_ = reader.get<TimeNs>();
   earlier_s_ = reader.get<double>();
   check_files(reader, work());
+  place_.reset();
+  if (reader.get<bool>()) place_ = reader.get_string();
   state_ = reader.get_string();
   next_ = checkpoint.number + 1;
   resumed_ = true;
@@ -158,6 +147,12 @@ void RunState::read(const Checkpoint& checkpoint, RunRequest& request) {
 double RunState::elapsed_s() const {
   return earlier_s_ +
          std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+void RunState::find_place(Recording& source) const {
+  if (!place_) return source.skip(events_);
+  BinaryReader reader(*place_, file_);
+  source.load(reader);
 }
 
 void RunState::restore(Resumable& session, EventOrderer& orderer, Log& log, const Rig& rig) const {
@@ -182,7 +177,7 @@ void RunState::restore(Resumable& session, EventOrderer& orderer, Log& log, cons
 }
 
 void RunState::save(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
-                    const Log& log, std::uint64_t events) {
+                    const Log& log, const Recording& source, std::uint64_t events) {
   session.sync();
   BinaryWriter state;
   const auto warnings = log.warnings();
@@ -203,14 +198,18 @@ void RunState::save(const RunRequest& request, Resumable& session, const EventOr
   writer.put(last_checkpoint_);
   writer.put(elapsed_s());
   put_files(writer, session.files());
+  BinaryWriter place;
+  const bool told = source.save(place);
+  writer.put(told);
+  if (told) writer.put(place.bytes());
   writer.put(state.bytes());
   write_checkpoint(work(), next_++, writer.bytes());
 }
 
 void RunState::begin_anew(const RunRequest& request, Resumable& session,
-                          const EventOrderer& orderer, const Log& log) {
+                          const EventOrderer& orderer, const Log& log, const Recording& source) {
   for (int generation = 0; generation < 2; ++generation)
-    save(request, session, orderer, log, 0);
+    save(request, session, orderer, log, source, 0);
 }
 
 }  // namespace understory

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ namespace understory {
 constexpr const char* kDenseFrontEnd = "dense";
 constexpr const char* kSparseFrontEnd = "sparse";
 
+struct UnfinishedRun;
+
 // The state of a run in progress, by either front end: the files of the session and the two newest
 // checkpoints in the work folder of the run folder, which is claimed for as long. Gone when the run
 // is finished.
@@ -30,12 +33,10 @@ class RunState {
   // Of a run that begins. Claims the run folder and leaves what is in it as it is. Throws
   // OutputError if that is refused (run_folder.h).
   [[nodiscard]] static RunState create(const RunRequest& request, const std::string& front_end);
-  // The front end that the run in a folder was begun with. Throws InputError if there is none.
-  [[nodiscard]] static std::string front_end_of(const std::filesystem::path& run_folder);
   // Opens that of a killed run and reads back its request, from the newest checkpoint that is whole
-  // with all that it counts on. Throws InputError if there is none, with the state as it was.
-  [[nodiscard]] static RunState reopen(const std::filesystem::path& run_folder,
-                                       RunRequest& request);
+  // with all that it counts on. The run folder is claimed before anything in it is read. Throws
+  // InputError if there is none, with the state as it was; OutputError as RunFolder::reclaim.
+  [[nodiscard]] static UnfinishedRun reopen(const std::filesystem::path& run_folder);
 
   // Of a run that begins: notes what the inputs are; of one that is resumed: throws InputError if
   // they are not those that it was begun with.
@@ -49,6 +50,7 @@ class RunState {
   [[nodiscard]] std::filesystem::path work() const { return folder_.work(); }
   // Whether it was read from a checkpoint.
   [[nodiscard]] bool resumed() const { return resumed_; }
+  // kDenseFrontEnd or kSparseFrontEnd.
   [[nodiscard]] const std::string& front_end() const { return front_end_; }
   // Events that the checkpoint has behind it; 0 at the start.
   [[nodiscard]] std::uint64_t events() const { return events_; }
@@ -57,15 +59,18 @@ class RunState {
   // before up to the checkpoint that each was resumed from.
   [[nodiscard]] double elapsed_s() const;
 
+  // Brings a recording that was opened just now to where the checkpoint's run had read it: at once
+  // where the recording could tell its place, else by reading up to there.
+  void find_place(Recording& source) const;
   // Brings session, orderer and log to the state of the checkpoint; a warning where it is not the
   // newest (key "run.older_checkpoint").
   void restore(Resumable& session, EventOrderer& orderer, Log& log, const Rig& rig) const;
   // Writes a checkpoint: `events` have been taken from the recording.
   void save(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
-            const Log& log, std::uint64_t events);
+            const Log& log, const Recording& source, std::uint64_t events);
   // The same where the recording is begun anew: no older checkpoint is gone back to.
   void begin_anew(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
-                  const Log& log);
+                  const Log& log, const Recording& source);
   // The run is finished, or nothing came of it: the work folder goes with this object.
   void remove() { folder_.forget_state(); }
 
@@ -81,12 +86,19 @@ class RunState {
   std::uint64_t next_ = 0;  // number of the next checkpoint
   std::uint64_t events_ = 0;
   TimeNs last_checkpoint_ = 0;
-  std::string file_;  // that was read
+  std::optional<std::string> place_;  // where the recording stood, if it could tell
+  std::string file_;                  // that was read
   std::vector<InputIdentity> inputs_;
   std::string passed_over_;  // what kept `reopen` from the newest checkpoint
   std::string state_;        // of session, orderer and log, as read
   double earlier_s_ = 0.0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// A run that was killed, stopped or cut off, with what it was begun with.
+struct UnfinishedRun {
+  RunRequest request;
+  RunState state;
 };
 
 }  // namespace understory

@@ -31,13 +31,13 @@ class SparseRun {
     if (!state_.resumed()) request_.conditions.realtime = request_.realtime;
     open();
     if (state_.resumed()) {
-      source_->skip(state_.events());
+      state_.find_place(*source_);
       state_.restore(*session_, *orderer_, log_, source_->rig());
       stamps_believed_ = orderer_->believes_stamps(EventOrderer::kImu);
       events_ = state_.events();
     } else {
       // Makes the run resumable from the start.
-      state_.save(request_, *session_, *orderer_, log_, 0);
+      state_.save(request_, *session_, *orderer_, log_, *source_, 0);
     }
     if (request_.realtime) play_at_sensor_speed(stop_requested);
   }
@@ -165,7 +165,7 @@ class SparseRun {
         to_seconds(session_->last_scan_end() - session_->path().front().stamp);
     open();
     session_->refuse_imu(trust.reason);
-    state_.begin_anew(request_, *session_, *orderer_, log_);
+    state_.begin_anew(request_, *session_, *orderer_, log_, *source_);
     return true;
   }
 
@@ -186,7 +186,7 @@ class SparseRun {
     log_.forget_all_but("");
     log_.info("the recording is mapped again from its beginning, with the IMU's own stamps");
     open();
-    state_.begin_anew(request_, *session_, *orderer_, log_);
+    state_.begin_anew(request_, *session_, *orderer_, log_, *source_);
     return true;
   }
 
@@ -207,7 +207,7 @@ class SparseRun {
     const TimeNs due =
         state_.last_checkpoint() + from_seconds(request_.config.checkpoint_interval_s);
     if (!ended && session_->settled() && session_->last_scan_end() >= due)
-      state_.save(request_, *session_, *orderer_, log_, events_);
+      state_.save(request_, *session_, *orderer_, log_, *source_, events_);
     if (!progress) return;
     const double share = source_->progress();
     const auto done = static_cast<double>(session_->scans());
@@ -284,15 +284,14 @@ CorrectionOutcome run_sparse_mapping(const SparseMappingRequest& request, Log& l
   return run_from(begun, RunState::create(begun, kSparseFrontEnd), log, progress, stop_requested);
 }
 
-CorrectionOutcome resume_sparse_mapping(const fs::path& run_folder, Log& log,
-                                        const ProgressSink& progress,
+CorrectionOutcome resume_sparse_mapping(UnfinishedRun run, Log& log, const ProgressSink& progress,
                                         const StopRequested& stop_requested) {
   SparseMappingRequest request;
-  RunState state = RunState::reopen(run_folder, request);
-  reread(request.config, request.config_yaml, run_folder.string(),
+  static_cast<RunRequest&>(request) = std::move(run.request);
+  reread(request.config, request.config_yaml, request.run_folder.string(),
          [&](const std::string& file) { return request.found(file); });
   request.more_inputs = inputs_of(request.config);
-  return run_from(request, std::move(state), log, progress, stop_requested);
+  return run_from(request, std::move(run.state), log, progress, stop_requested);
 }
 
 }  // namespace understory

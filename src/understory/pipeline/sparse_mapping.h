@@ -13,6 +13,8 @@ struct SparseMappingRequest : RunRequest {
   SparseMappingConfig config;
 };
 
+struct UnfinishedRun;  // pipeline/run_state.h
+
 // From a raw recording to the run folder by stems alone: the stems of each scan, odometry from
 // them, stems.csv.gz with the views that were kept, and the correction of what they show
 // (run_correction). Only stems and poses are held in memory. Throws InputError or OutputError; what
@@ -22,8 +24,8 @@ struct SparseMappingRequest : RunRequest {
                                                    const StopRequested& stop_requested);
 
 // Goes on where a killed run stopped. Gives the same files as an undisturbed run.
-[[nodiscard]] CorrectionOutcome resume_sparse_mapping(const std::filesystem::path& run_folder,
-                                                      Log& log, const ProgressSink& progress,
+[[nodiscard]] CorrectionOutcome resume_sparse_mapping(UnfinishedRun run, Log& log,
+                                                      const ProgressSink& progress,
                                                       const StopRequested& stop_requested);
 
 }  // namespace understory

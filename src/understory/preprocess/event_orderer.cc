@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <tuple>
 
-#include "understory/preprocess/event_bytes.h"
 #include "understory/preprocess/event_stamp.h"
+#include "understory/recording/event_bytes.h"
 #include "understory/util/error.h"
 
 namespace understory {

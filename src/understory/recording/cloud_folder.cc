@@ -19,6 +19,7 @@
 #include "understory/recording/nmea.h"
 #include "understory/recording/point_cloud.h"
 #include "understory/recording/topic_statistics.h"
+#include "understory/sensor/sensor_io.h"
 #include "understory/util/error.h"
 #include "understory/util/read_error.h"
 
@@ -142,6 +143,37 @@ class CloudFolder : public Recording {
     Event event = std::move(scan_);
     scan_ = nullptr;
     return event;
+  }
+
+  bool save(BinaryWriter& writer) const override {
+    writer.put(static_cast<std::uint64_t>(next_cloud_));
+    writer.put(scan_ != nullptr);  // the cloud before the next one waits
+    writer.put(any_scan_);
+    for (const TopicStatistics* each : {&lidar_, &imu_statistics_, &fix_statistics_})
+      each->save(writer);
+    if (imu_) imu_->save(writer);
+    if (fixes_) fixes_->save(writer);
+    if (nmea_) nmea_->save(writer);
+    writer.put(imu_head_.has_value());
+    if (imu_head_) put_imu(writer, *imu_head_);
+    writer.put(fix_head_.has_value());
+    if (fix_head_) put_fix(writer, *fix_head_);
+    return true;
+  }
+  void load(BinaryReader& reader) override {
+    next_cloud_ = static_cast<std::size_t>(reader.get<std::uint64_t>());
+    const bool waits = reader.get<bool>();
+    if (next_cloud_ > names_.size() || (waits && next_cloud_ == 0))
+      throw InputError(folder_.string(), "", "holds fewer clouds than when the run was begun");
+    if (waits) scan_ = read_scan(next_cloud_ - 1);
+    any_scan_ = reader.get<bool>();
+    for (TopicStatistics* each : {&lidar_, &imu_statistics_, &fix_statistics_})
+      each->load(reader);
+    if (imu_) imu_->load(reader);
+    if (fixes_) fixes_->load(reader);
+    if (nmea_) nmea_->load(reader);
+    if (reader.get<bool>()) imu_head_ = get_imu(reader);
+    if (reader.get<bool>()) fix_head_ = get_fix(reader);
   }
 
   const Rig& rig() const override { return rig_; }

@@ -97,6 +97,16 @@ void CsvRows::damaged(const std::string& what) {
             file_->name() + ": line " + std::to_string(lines_.number()) + ": " + what);
 }
 
+void CsvRows::save(BinaryWriter& writer) const {
+  writer.put(lines_.position());
+  writer.put(lines_.number());
+}
+
+void CsvRows::load(BinaryReader& reader) {
+  const auto position = reader.get<std::uint64_t>();
+  lines_.go_to(position, reader.get<std::uint64_t>());
+}
+
 CsvImuReader::CsvImuReader(std::unique_ptr<ByteSource> file, Log& log)
     : rows_(std::move(file), log) {
   time_ = rows_.require({"timestamp", "time", "t", "timestamp_ns", "timestamp_s", "stamp"});

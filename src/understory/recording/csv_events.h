@@ -11,6 +11,7 @@
 #include "understory/recording/text_lines.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/imu_sample.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/log.h"
 
 namespace understory {
@@ -34,6 +35,9 @@ class CsvRows {
   // seconds.
   [[nodiscard]] std::optional<TimeNs> time(std::size_t column) const;
   void damaged(const std::string& what);
+  // Which rows have been read, and back to there.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
  private:
   std::unique_ptr<ByteSource> file_;
@@ -49,6 +53,8 @@ class CsvImuReader {
  public:
   CsvImuReader(std::unique_ptr<ByteSource> file, Log& log);
   [[nodiscard]] std::optional<ImuSample> next();
+  void save(BinaryWriter& writer) const { rows_.save(writer); }
+  void load(BinaryReader& reader) { rows_.load(reader); }
 
  private:
   CsvRows rows_;
@@ -63,6 +69,8 @@ class CsvGnssReader {
  public:
   CsvGnssReader(std::unique_ptr<ByteSource> file, Log& log);
   [[nodiscard]] std::optional<GnssFix> next();
+  void save(BinaryWriter& writer) const { rows_.save(writer); }
+  void load(BinaryReader& reader) { rows_.load(reader); }
 
  private:
   [[nodiscard]] double optional_number(const std::optional<std::size_t>& column) const;

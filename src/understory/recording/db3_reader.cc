@@ -57,10 +57,7 @@ class Db3Source : public MessageSource {
     indexed_ = scalar(
                    "SELECT count(*) FROM sqlite_master WHERE type = 'index' AND "
                    "tbl_name = 'messages' AND sql LIKE '%timestamp%'") > 0;
-    // Without an index an order by time would need memory for all messages.
-    rows_ = prepare(std::string("SELECT id, topic_id, timestamp, data FROM messages ORDER BY ") +
-                    (indexed_ ? "timestamp, id" : "id"));
-    if (rows_ == nullptr) fail("expected a table of messages: ");
+    rows_ = prepare_rows("");
   }
   ~Db3Source() override {
     rows_.reset();  // statements before their database
@@ -70,8 +67,8 @@ class Db3Source : public MessageSource {
     while (!ended_) {
       const int state = step();
       if (state == SQLITE_DONE) break;
-      const Place place{plausible_time(sqlite3_column_int64(rows_.get(), 2)),
-                        sqlite3_column_int64(rows_.get(), 0)};
+      stored_time_ = sqlite3_column_int64(rows_.get(), 2);
+      const Place place{plausible_time(stored_time_), sqlite3_column_int64(rows_.get(), 0)};
       if (damaged_after_ && place <= *damaged_after_) continue;  // was read before the damage
       last_ = place;
       const TimeNs time = place.first;
@@ -89,6 +86,35 @@ class Db3Source : public MessageSource {
     }
     ended_ = true;  // a further step would begin anew
     return false;
+  }
+
+  void save(BinaryWriter& writer) const override {
+    writer.put(indexed_);
+    writer.put(ended_);
+    writer.put(read_);
+    writer.put(row_);
+    writer.put(stored_time_);
+    put_place(writer, last_);
+    writer.put(damaged_after_.has_value());
+    if (damaged_after_) put_place(writer, *damaged_after_);
+  }
+  void load(BinaryReader& reader) override {
+    if (reader.get<bool>() != indexed_)
+      throw InputError(name_, "", "its index is not what it was when the run was begun");
+    ended_ = reader.get<bool>();
+    read_ = reader.get<std::uint64_t>();
+    row_ = reader.get<std::int64_t>();
+    stored_time_ = reader.get<std::int64_t>();
+    last_ = get_place(reader);
+    if (reader.get<bool>()) damaged_after_ = get_place(reader);
+    if (damaged_after_) {
+      rows_ = prepare_row_by_row();
+    } else if (last_ != Place{-kLatestTime, 0}) {
+      rows_ = prepare_rows(indexed_ ? "WHERE timestamp >= ?1 AND (timestamp > ?1 OR id > ?2) "
+                                    : "WHERE id > ?2 ");
+      if (indexed_) sqlite3_bind_int64(rows_.get(), 1, stored_time_);
+      sqlite3_bind_int64(rows_.get(), 2, last_.second);
+    }
   }
 
   [[nodiscard]] std::string format() const override { return "ROS 2 bag (SQLite)"; }
@@ -123,6 +149,15 @@ class Db3Source : public MessageSource {
  private:
   using Place = std::pair<TimeNs, std::int64_t>;  // time and row, the order of reading
 
+  static void put_place(BinaryWriter& writer, const Place& place) {
+    writer.put(place.first);
+    writer.put(place.second);
+  }
+  static Place get_place(BinaryReader& reader) {
+    const auto time = reader.get<TimeNs>();
+    return {time, reader.get<std::int64_t>()};
+  }
+
   // The disk failed, in contrast to damage. SQLite calls some failures damage, so `thoroughly`
   // looks for them in all of the file.
   void check_readable(bool thoroughly = true) const {
@@ -144,6 +179,17 @@ class Db3Source : public MessageSource {
     sqlite3_stmt* raw = nullptr;
     sqlite3_prepare_v2(database_.get(), query.c_str(), -1, &raw, nullptr);
     return Statement(raw);
+  }
+
+  // Without an index an order by time would need memory for all messages.
+  Statement prepare_rows(const std::string& condition) {
+    Statement rows = prepare("SELECT id, topic_id, timestamp, data FROM messages " + condition +
+                             "ORDER BY " + (indexed_ ? "timestamp, id" : "id"));
+    if (rows == nullptr) fail("expected a table of messages: ");
+    return rows;
+  }
+  Statement prepare_row_by_row() {
+    return prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id = ?");
   }
 
   // The number that a query gives; 0 if it fails: what cannot be read is met again.
@@ -200,7 +246,7 @@ class Db3Source : public MessageSource {
         row_ = last_.second;
         damaged_after_ = {-kLatestTime, 0};
       }
-      rows_ = prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id = ?");
+      rows_ = prepare_row_by_row();
       if (rows_ == nullptr) return SQLITE_DONE;
     }
     for (int missing = 0; missing < kMostMissingRows; ++missing) {
@@ -237,6 +283,7 @@ class Db3Source : public MessageSource {
   TimeNs end_ = 0;
   bool indexed_ = false;                // and so in order of time
   Place last_{-kLatestTime, 0};         // of the last message
+  std::int64_t stored_time_ = 0;        // of the last message, as the file has it
   std::optional<Place> damaged_after_;  // set: reading row by row what comes later
   std::uint64_t read_ = 0;
   bool ended_ = false;
@@ -274,6 +321,8 @@ class SourceDb3 : public MessageSource {
     messages_.emplace(bytes_->name(), false, std::move(database), std::vector<std::uint8_t>(), log);
   }
   bool next(RawMessage& message) override { return messages_->next(message); }
+  void save(BinaryWriter& writer) const override { messages_->save(writer); }
+  void load(BinaryReader& reader) override { messages_->load(reader); }
   [[nodiscard]] std::string format() const override { return messages_->format(); }
   [[nodiscard]] double progress() const override { return messages_->progress(); }
 

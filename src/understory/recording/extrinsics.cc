@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "understory/geometry/pose_io.h"
 #include "understory/util/error.h"
 #include "understory/util/text_file.h"
 
@@ -207,6 +208,29 @@ bool TransformTree::add(const std::string& parent, const std::string& child,
   const bool is_new = edges_[parent].try_emplace(child, parent_from_child).second;
   edges_[child].try_emplace(parent, parent_from_child.inverse());
   return is_new;
+}
+
+void TransformTree::save(BinaryWriter& writer) const {
+  writer.put(static_cast<std::uint64_t>(edges_.size()));
+  for (const auto& [frame, others] : edges_) {
+    writer.put(frame);
+    writer.put(static_cast<std::uint64_t>(others.size()));
+    for (const auto& [other, frame_from_other] : others) {
+      writer.put(other);
+      put_pose(writer, frame_from_other);
+    }
+  }
+}
+
+void TransformTree::load(BinaryReader& reader) {
+  edges_.clear();
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    auto& others = edges_[reader.get_string()];
+    for (auto more = reader.get<std::uint64_t>(); more > 0; --more) {
+      const std::string other = reader.get_string();
+      others[other] = get_pose(reader);
+    }
+  }
 }
 
 std::optional<Pose> TransformTree::find(const std::string& target,

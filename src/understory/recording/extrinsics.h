@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "understory/sensor/rig.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/log.h"
 
 namespace understory {
@@ -21,6 +22,8 @@ class TransformTree {
                                          const std::string& source) const;
   [[nodiscard]] bool has_frame(const std::string& frame) const { return edges_.count(frame) > 0; }
   [[nodiscard]] bool empty() const { return edges_.empty(); }
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
  private:
   std::map<std::string, std::map<std::string, Pose>> edges_;  // [a][b] = a_from_b

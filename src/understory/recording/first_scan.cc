@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "understory/recording/event_bytes.h"
 #include "understory/util/time.h"
 
 namespace understory {
@@ -54,6 +55,24 @@ ScanPtr FinishedScans::take() {
 void FinishedScans::finish() {
   if (part_ != nullptr) scans_.push_back(std::move(part_));
   part_ = nullptr;
+}
+
+void FinishedScans::save(BinaryWriter& writer) const {
+  writer.put(any_);
+  put_scan(writer, part_);
+  writer.put(missing_);
+  writer.put(static_cast<std::uint64_t>(scans_.size()));
+  for (const ScanPtr& scan : scans_)
+    put_scan(writer, scan);
+}
+
+void FinishedScans::load(BinaryReader& reader) {
+  any_ = reader.get<bool>();
+  part_ = get_scan(reader);
+  missing_ = reader.get<double>();
+  scans_.clear();
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left)
+    scans_.push_back(get_scan(reader));
 }
 
 }  // namespace understory

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "understory/sensor/scan.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/log.h"
 
 namespace understory {
@@ -25,6 +26,8 @@ class FinishedScans {
   [[nodiscard]] ScanPtr take();
   // At the end of the stream.
   void finish();
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
  private:
   void settle_part(const Scan& next);

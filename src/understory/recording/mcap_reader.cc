@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/recording/compression.h"
+#include "understory/recording/event_bytes.h"
 #include "understory/recording/finding.h"
 #include "understory/recording/mcap_walker.h"
 #include "understory/recording/message_merger.h"
@@ -45,6 +46,28 @@ class McapSource : public MessageSource {
     return merger_.next(message);
   }
 
+  void save(BinaryWriter& writer) const override {
+    registry_.save(writer);
+    walker_.save(writer);
+    writer.put(compression_);
+    put_optional(writer, pending_);
+    writer.put(merger_.progress());
+  }
+  void load(BinaryReader& reader) override {
+    registry_.load(reader);
+    walker_.load(reader);
+    const std::string compression = reader.get_string();
+    pending_ = get_optional<Block>(reader);
+    for (const MessageMerger::Progress& progress : reader.get_vector<MessageMerger::Progress>()) {
+      const auto block = walker_.at(progress.place);
+      if (block) load(*block);
+      if (!block || !merger_.pass(progress))
+        throw InputError(file_->name(), "at byte " + std::to_string(progress.place),
+                         "expected the chunk that was read when the run was begun");
+    }
+    compression_ = compression;
+  }
+
   [[nodiscard]] std::string format() const override {
     std::string text = "MCAP (" + (walker_.profile().empty() ? "no profile" : walker_.profile());
     return text + (compression_.empty() ? ")" : ", " + compression_ + ")");
@@ -76,6 +99,7 @@ class McapSource : public MessageSource {
  private:
   void load(const Block& block) {
     MessageBlock loaded;
+    loaded.place = block.offset;
     loaded.bytes = merger_.take_spare();
     if (block.is_chunk) {
       if (!unpack(block, loaded.bytes)) return;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "understory/recording/finding.h"
+#include "understory/util/error.h"
 #include "understory/util/output_file.h"
 #include "understory/util/read_error.h"
 
@@ -76,6 +77,34 @@ void Registry::add_channel(ByteSpan content) {
 std::shared_ptr<const MessageChannel> Registry::find(std::uint16_t id) const {
   const auto found = channels_.find(id);
   return found == channels_.end() ? nullptr : found->second;
+}
+
+void Registry::save(BinaryWriter& writer) const {
+  writer.put(static_cast<std::uint64_t>(schemas_.size()));
+  for (const auto& [id, schema] : schemas_) {
+    writer.put(id);
+    writer.put(schema.first);
+    writer.put(schema.second);
+  }
+  writer.put(static_cast<std::uint64_t>(channels_.size()));
+  for (const auto& [id, channel] : channels_) {
+    writer.put(id);
+    put_channel(writer, *channel);
+  }
+}
+
+void Registry::load(BinaryReader& reader) {
+  schemas_.clear();
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    auto& schema = schemas_[reader.get<std::uint16_t>()];
+    schema.first = reader.get_string();
+    schema.second = reader.get_string();
+  }
+  channels_.clear();
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    auto& channel = channels_[reader.get<std::uint16_t>()];
+    channel = get_channel(reader);
+  }
 }
 
 Walker::Walker(ByteSource& file, Registry& registry, Log& log)
@@ -298,6 +327,32 @@ std::optional<Block> Walker::next() {
     return block;
   }
   return std::nullopt;
+}
+
+std::optional<Block> Walker::at(std::uint64_t offset) {
+  const auto head = head_at(offset);
+  if (!head || (head->opcode != kChunk && head->opcode != kMessage)) return std::nullopt;
+  return block_at(offset, *head);
+}
+
+void Walker::save(BinaryWriter& writer) const {
+  writer.put(static_cast<std::uint64_t>(plan_.size()));
+  for (const std::uint64_t number :
+       {static_cast<std::uint64_t>(planned_), position_, search_from_, last_search_})
+    writer.put(number);
+  writer.put(ended_);
+  writer.put(profile_);
+}
+
+void Walker::load(BinaryReader& reader) {
+  // An index that the disk kept then and gives now, or the other way round, means another order.
+  if (reader.get<std::uint64_t>() != plan_.size())
+    throw InputError(file_.name(), "", "its index is not what it was when the run was begun");
+  planned_ = static_cast<std::size_t>(reader.get<std::uint64_t>());
+  for (std::uint64_t* number : {&position_, &search_from_, &last_search_})
+    *number = reader.get<std::uint64_t>();
+  ended_ = reader.get<bool>();
+  profile_ = reader.get_string();
 }
 
 // A message outside of chunks is believed if its channel is known and a record follows it.

@@ -10,6 +10,7 @@
 #include "understory/recording/byte_source.h"
 #include "understory/recording/mcap_format.h"
 #include "understory/recording/message_source.h"
+#include "understory/util/binary_io.h"
 
 namespace understory::mcap {
 
@@ -45,6 +46,8 @@ class Registry {
   void add_channel(ByteSpan content);
   [[nodiscard]] std::shared_ptr<const MessageChannel> find(std::uint16_t id) const;
   [[nodiscard]] const Channels& channels() const { return channels_; }
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
  private:
   std::map<std::uint16_t, std::pair<std::string, std::string>> schemas_;  // name, encoding
@@ -59,6 +62,11 @@ class Walker {
   Walker(ByteSource& file, Registry& registry, Log& log);
 
   [[nodiscard]] std::optional<Block> next();
+  // The block that begins at a place of the file; nothing if none does.
+  [[nodiscard]] std::optional<Block> at(std::uint64_t offset);
+  // Where the walk stands, and back to there.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
   // The first chunks that hold messages of a channel, as the index knows them.
   [[nodiscard]] std::vector<Block> chunks_of(std::uint16_t channel) const;
   [[nodiscard]] std::uint64_t position() const { return position_; }

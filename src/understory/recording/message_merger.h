@@ -17,6 +17,7 @@ struct MessageBlock {
     std::size_t offset = 0;
     std::size_t length = 0;
   };
+  std::uint64_t place = 0;  // in the file; one block each
   std::vector<std::uint8_t> bytes;
   std::vector<Entry> entries;
 };
@@ -63,6 +64,30 @@ class MessageMerger {
   [[nodiscard]] TimeNs earliest() const { return first()->time(); }
   [[nodiscard]] std::size_t blocks() const { return blocks_.size(); }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+  // A block that is being handed out, and how many of its messages have been.
+  struct Progress {
+    std::uint64_t place = 0;
+    std::uint64_t given = 0;
+  };
+  // Of all of them, in the order in which they were added.
+  [[nodiscard]] std::vector<Progress> progress() const {
+    std::vector<Progress> all;
+    for (const Reading& reading : blocks_) {
+      if (reading.next < reading.block.entries.size())
+        all.push_back({reading.block.place, reading.next});
+    }
+    return all;
+  }
+  // Passes over the messages that had been given of a block that was added once more. False if it
+  // has no message behind them.
+  [[nodiscard]] bool pass(const Progress& progress) {
+    if (blocks_.empty() || blocks_.back().block.place != progress.place ||
+        progress.given >= blocks_.back().block.entries.size())
+      return false;
+    blocks_.back().next = static_cast<std::size_t>(progress.given);
+    return true;
+  }
 
   // The earliest message; its data stay valid until `tidy`.
   [[nodiscard]] bool next(RawMessage& message) {

@@ -5,8 +5,10 @@
 #include <map>
 #include <utility>
 
+#include "understory/recording/event_bytes.h"
 #include "understory/recording/extrinsics.h"
 #include "understory/recording/finding.h"
+#include "understory/recording/fix_joiner.h"
 #include "understory/recording/message_decode.h"
 #include "understory/recording/message_survey.h"
 #include "understory/recording/packet_topic.h"
@@ -18,30 +20,8 @@ namespace understory {
 namespace {
 
 constexpr double kGravity = 9.80665;
-constexpr TimeNs kFixWait = kNsPerSecond / 5;
-constexpr TimeNs kSameFix = kNsPerSecond / 1000;
 constexpr double kSamePlaceM = 0.001;
 constexpr double kSameAngle = 0.001;
-
-const char* role_name(TopicRole role) {
-  switch (role) {
-    case TopicRole::kCloud:
-    case TopicRole::kVelodynePackets:
-    case TopicRole::kNebulaPackets:
-      return "lidar";
-    case TopicRole::kImu:
-      return "imu";
-    case TopicRole::kMag:
-      return "mag";
-    case TopicRole::kNavSatFix:
-    case TopicRole::kGpsFix:
-      return "gnss";
-    case TopicRole::kTransforms:
-      return "tf";
-    default:
-      return "ignored";
-  }
-}
 
 // ROS 1 drivers wrote "/velodyne" and "velodyne" alike.
 std::string_view bare_frame(std::string_view frame) {
@@ -49,49 +29,6 @@ std::string_view bare_frame(std::string_view frame) {
     frame.remove_prefix(1);
   return frame;
 }
-
-// Joins positions (NavSatFix) with the quality that comes on another topic (GPSFix).
-class FixJoiner {
- public:
-  void expect_quality() { has_quality_topic_ = true; }
-
-  void add_position(GnssFix fix, TimeNs now, std::deque<Event>& events) {
-    flush(events);
-    if (!std::isfinite(fix.latitude_deg) || !std::isfinite(fix.longitude_deg)) fix.quality = 0;
-    waiting_ = fix;
-    waiting_since_ = now;
-    if (!has_quality_topic_ || join()) flush(events);
-  }
-  void add_quality(const GnssFix& quality, std::deque<Event>& events) {
-    quality_ = quality;
-    if (waiting_ && join()) flush(events);
-  }
-  void pass_time(TimeNs now, std::deque<Event>& events) {
-    if (waiting_ && (now < waiting_since_ || now - waiting_since_ > kFixWait)) flush(events);
-  }
-  void flush(std::deque<Event>& events) {
-    if (waiting_) events.emplace_back(*waiting_);
-    waiting_.reset();
-  }
-
- private:
-  bool join() {
-    if (!quality_ || std::abs(quality_->stamp - waiting_->stamp) > kSameFix) return false;
-    if (waiting_->quality > 0) waiting_->quality = quality_->quality;
-    waiting_->satellites = quality_->satellites;
-    waiting_->hdop = quality_->hdop;
-    waiting_->vdop = quality_->vdop;
-    waiting_->track_deg = quality_->track_deg;
-    waiting_->speed_m_s = quality_->speed_m_s;
-    if (!waiting_->covariance.allFinite()) waiting_->covariance = quality_->covariance;
-    return true;
-  }
-
-  bool has_quality_topic_ = false;
-  std::optional<GnssFix> waiting_;
-  TimeNs waiting_since_ = 0;
-  std::optional<GnssFix> quality_;
-};
 
 class MessageRecording : public Recording {
  public:
@@ -133,6 +70,55 @@ class MessageRecording : public Recording {
     events_.pop_front();
     scan_given_ = scan_given_ || std::holds_alternative<ScanPtr>(event);
     return event;
+  }
+
+  [[nodiscard]] bool save(BinaryWriter& writer) const override {
+    source_->save(writer);
+    survey_.transforms.save(writer);
+    put_strings(writer, frame_of_topic_);
+    for (const std::string& text : {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality,
+                                    frames_.lidar, frames_.imu, frames_.gnss, imu_text_})
+      writer.put(text);
+    put_rig(writer, rig_);
+    writer.put(scan_given_);
+    writer.put(convention_.has_value());
+    if (convention_) put_convention(writer, *convention_);
+    writer.put(ring_count_);
+    writer.put(imu_scale_);
+    writer.put(static_cast<std::uint64_t>(topics_.size()));
+    for (const auto& [name, statistics] : topics_)
+      statistics.save(writer);
+    put_events(writer, events_);
+    fixes_.save(writer);
+    writer.put(packets_ != nullptr);
+    if (packets_) packets_->save(writer);
+    writer.put(ended_);
+    return true;
+  }
+
+  void load(BinaryReader& reader) override {
+    source_->load(reader);
+    survey_.transforms.load(reader);
+    frame_of_topic_ = get_strings(reader);
+    for (std::string* text : {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality,
+                              &frames_.lidar, &frames_.imu, &frames_.gnss, &imu_text_})
+      *text = reader.get_string();
+    rig_ = get_rig(reader);
+    scan_given_ = reader.get<bool>();
+    convention_.reset();
+    if (reader.get<bool>()) convention_ = get_convention(reader);
+    ring_count_ = reader.get<int>();
+    imu_scale_ = reader.get<double>();
+    topics_.clear();
+    for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+      TopicStatistics statistics;
+      statistics.load(reader);
+      topics_.emplace(statistics.report().name, std::move(statistics));
+    }
+    get_events(reader, events_);
+    fixes_.load(reader);
+    if (reader.get<bool>()) packets().load(reader);
+    ended_ = reader.get<bool>();
   }
 
   [[nodiscard]] const Rig& rig() const override { return rig_; }
@@ -379,20 +365,24 @@ class MessageRecording : public Recording {
     return true;
   }
 
+  // The clouds that go with packets: the ROS 1 driver's calibration has the beams' vertical
+  // offsets, that of nebula for ROS 2 has not.
+  PacketTopic& packets() {
+    if (!packets_) {
+      VelodyneConfig config;
+      config.vertical_offsets = source_->format().rfind("ROS 1", 0) == 0;
+      packets_ = std::make_unique<PacketTopic>(config, file_ + " " + choice_.lidar, log_);
+    }
+    return *packets_;
+  }
+
   bool take_packets(TopicStatistics& topic, const std::optional<PacketsMessage>& message) {
     if (!message) return false;
     if (is_of_another(topic, message->header.frame, "packets")) return true;
-    if (!packets_) {
-      // The clouds that go with packets: the ROS 1 driver's calibration has the beams' vertical
-      // offsets, that of nebula for ROS 2 has not.
-      VelodyneConfig config;
-      config.vertical_offsets = source_->format().rfind("ROS 1", 0) == 0;
-      packets_ = std::make_unique<PacketTopic>(config, file_ + " " + topic.report().name, log_);
-    }
     topic.add_stamp(message->header.stamp);
     topic.report().frame = message->header.frame;
     note_frame(frames_.lidar, message->header.frame);
-    topic.report().points += packets_->add(*message, events_);
+    topic.report().points += packets().add(*message, events_);
     topic.report().conventions = packets_->conventions();
     if (rig_.lidar_model.empty()) rig_.lidar_model = packets_->model();
     return true;

@@ -27,6 +27,10 @@ class StoredSource : public MessageSource {
     message = {stored.channel, stored.log_time, stored.data};
     return true;
   }
+  void save(BinaryWriter& writer) const override { writer.put(static_cast<std::uint64_t>(at_)); }
+  void load(BinaryReader& reader) override {
+    at_ = static_cast<std::size_t>(reader.get<std::uint64_t>());
+  }
   [[nodiscard]] std::string format() const override { return "test"; }
   [[nodiscard]] double progress() const override { return 0.0; }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "understory/recording/message_reader.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 
@@ -21,6 +22,21 @@ struct MessageChannel {
   Serialization serialization = Serialization::kCdr;
   bool readable = true;  // false: an encoding other than CDR or ROS 1
 };
+
+inline void put_channel(BinaryWriter& writer, const MessageChannel& channel) {
+  writer.put(channel.topic);
+  writer.put(channel.type);
+  writer.put(channel.serialization);
+  writer.put(channel.readable);
+}
+[[nodiscard]] inline std::shared_ptr<const MessageChannel> get_channel(BinaryReader& reader) {
+  auto channel = std::make_shared<MessageChannel>();
+  channel->topic = reader.get_string();
+  channel->type = reader.get_string();
+  channel->serialization = reader.get<Serialization>();
+  channel->readable = reader.get<bool>();
+  return channel;
+}
 
 // Log times are held within half of the range of TimeNs, so that differences of damaged ones are
 // numbers too; it reaches beyond the year 2110.
@@ -50,6 +66,10 @@ class MessageSource {
  public:
   virtual ~MessageSource() = default;
   [[nodiscard]] virtual bool next(RawMessage& message) = 0;
+  // Where the reading stands, between two calls of `next`, and back to there in a source that was
+  // opened just now (Recording::save, Recording::load).
+  virtual void save(BinaryWriter& writer) const = 0;
+  virtual void load(BinaryReader& reader) = 0;
   [[nodiscard]] virtual std::string format() const = 0;  // "MCAP (ros2, zstd)"
   [[nodiscard]] virtual double progress() const = 0;     // 0 to 1
   // What the file itself says of its sensors (kSensorMetadata of our own recordings).

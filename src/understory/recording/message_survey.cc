@@ -189,6 +189,26 @@ TopicRole role_of(const MessageChannel& channel) {
   return found->second;
 }
 
+const char* role_name(TopicRole role) {
+  switch (role) {
+    case TopicRole::kCloud:
+    case TopicRole::kVelodynePackets:
+    case TopicRole::kNebulaPackets:
+      return "lidar";
+    case TopicRole::kImu:
+      return "imu";
+    case TopicRole::kMag:
+      return "mag";
+    case TopicRole::kNavSatFix:
+    case TopicRole::kGpsFix:
+      return "gnss";
+    case TopicRole::kTransforms:
+      return "tf";
+    default:
+      return "ignored";
+  }
+}
+
 const TopicSurvey* MessageSurvey::find(const std::string& topic) const {
   for (const TopicSurvey& each : topics) {
     if (each.topic == topic) return &each;

@@ -27,6 +27,9 @@ enum class TopicRole {
 // By the message's type, in ROS 1 or ROS 2 spelling.
 [[nodiscard]] TopicRole role_of(const MessageChannel& channel);
 
+// For reports: "lidar", "imu", "gnss", "mag", "tf", "ignored".
+[[nodiscard]] const char* role_name(TopicRole role);
+
 // What the first seconds of a recording say of one topic.
 struct TopicSurvey {
   std::string topic;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "understory/recording/event_bytes.h"
 #include "understory/util/text_file.h"
 
 namespace understory {
@@ -161,6 +162,32 @@ void take(std::optional<T>& into, const std::optional<T>& from) {
   if (from) into = from;
 }
 
+void put_sentence(BinaryWriter& writer, const NmeaSentence& sentence) {
+  writer.put(sentence.type);
+  for (const auto* value : {&sentence.time_of_day, &sentence.day})
+    put_optional(writer, *value);
+  for (const auto* value : {&sentence.quality, &sentence.satellites})
+    put_optional(writer, *value);
+  for (const auto* value : {&sentence.latitude_deg, &sentence.longitude_deg, &sentence.altitude_m,
+                            &sentence.geoid_separation_m, &sentence.hdop, &sentence.vdop,
+                            &sentence.track_deg, &sentence.speed_m_s})
+    put_optional(writer, *value);
+}
+
+NmeaSentence get_sentence(BinaryReader& reader) {
+  NmeaSentence sentence;
+  sentence.type = reader.get_string();
+  for (auto* value : {&sentence.time_of_day, &sentence.day})
+    *value = get_optional<std::int64_t>(reader);
+  for (auto* value : {&sentence.quality, &sentence.satellites})
+    *value = get_optional<int>(reader);
+  for (auto* value : {&sentence.latitude_deg, &sentence.longitude_deg, &sentence.altitude_m,
+                      &sentence.geoid_separation_m, &sentence.hdop, &sentence.vdop,
+                      &sentence.track_deg, &sentence.speed_m_s})
+    *value = get_optional<double>(reader);
+  return sentence;
+}
+
 void merge(NmeaSentence& epoch, const NmeaSentence& more) {
   take(epoch.day, more.day);
   take(epoch.satellites, more.satellites);
@@ -246,6 +273,31 @@ std::optional<GnssFix> NmeaLogReader::next() {
     if (auto fix = add(*sentence)) return fix;
   }
   return close_epoch();
+}
+
+void NmeaLogReader::save(BinaryWriter& writer) const {
+  // At the end of the stream it has no position.
+  writer.put(stream_.eof() ? std::int64_t{-1} : static_cast<std::int64_t>(stream_.tellg()));
+  writer.put(day_);
+  writer.put(last_time_of_day_);
+  writer.put(line_number_);
+  writer.put(epoch_.has_value());
+  if (epoch_) put_sentence(writer, *epoch_);
+}
+
+void NmeaLogReader::load(BinaryReader& reader) {
+  const auto position = reader.get<std::int64_t>();
+  stream_.clear();
+  if (position < 0) {
+    stream_.setstate(std::ios::eofbit);
+  } else {
+    stream_.seekg(position);
+  }
+  day_ = reader.get<std::int64_t>();
+  last_time_of_day_ = reader.get<TimeNs>();
+  line_number_ = reader.get<std::uint64_t>();
+  epoch_.reset();
+  if (reader.get<bool>()) epoch_ = get_sentence(reader);
 }
 
 std::optional<GnssFix> NmeaLogReader::add(const NmeaSentence& sentence) {

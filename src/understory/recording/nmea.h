@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "understory/sensor/gnss_fix.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 
@@ -45,6 +46,9 @@ class NmeaLogReader {
  public:
   NmeaLogReader(std::istream& stream, std::string source, std::int64_t first_day, Log& log);
   [[nodiscard]] std::optional<GnssFix> next();
+  // Where the reading stands, and back to there.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
  private:
   [[nodiscard]] std::optional<GnssFix> close_epoch();

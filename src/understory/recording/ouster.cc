@@ -6,8 +6,10 @@
 #include <cstring>
 #include <numbers>
 
+#include "understory/recording/event_bytes.h"
 #include "understory/recording/finding.h"
 #include "understory/recording/scan_assembly.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -271,6 +273,37 @@ ScanPtr OusterDecoder::take_scan() {
 void OusterDecoder::finish() {
   close_scan();
   finished_.finish();
+}
+
+void OusterDecoder::save(BinaryWriter& writer) const {
+  writer.put(received_);
+  put_optional(writer, last_);
+  put_optional(writer, strange_mark_);
+  writer.put(strange_);
+  put_optional(writer, last_imu_);
+  put_optional(writer, strange_imu_);
+  put_flags(writer, seen_);
+  writer.put(points_);
+  writer.put(point_times_);
+  finished_.save(writer);
+}
+
+void OusterDecoder::load(BinaryReader& reader) {
+  received_ = reader.get<std::uint64_t>();
+  last_ = get_optional<Mark>(reader);
+  strange_mark_ = get_optional<Mark>(reader);
+  strange_ = reader.get_vector<std::uint8_t>();
+  last_imu_ = get_optional<TimeNs>(reader);
+  strange_imu_ = get_optional<TimeNs>(reader);
+  const std::vector<bool> seen = get_flags(reader);
+  if (seen.size() != seen_.size())
+    throw InputError(source_, "", "its metadata are not those that the run was begun with");
+  seen_ = seen;
+  points_ = reader.get_vector<ScanPoint>();
+  point_times_ = reader.get_vector<TimeNs>();
+  if (points_.size() != point_times_.size())
+    throw InputError(source_, "", "expected as many times as points of the scan in progress");
+  finished_.load(reader);
 }
 
 std::string OusterDecoder::conventions() const {

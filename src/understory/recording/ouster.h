@@ -11,6 +11,7 @@
 #include "understory/recording/ouster_metadata.h"
 #include "understory/sensor/imu_sample.h"
 #include "understory/sensor/scan.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/log.h"
 
 namespace understory {
@@ -40,6 +41,10 @@ class OusterDecoder {
   // Ends the scan in progress; at the end of the stream. A first scan that is only a part of a turn
   // is left out (FinishedScans).
   void finish();
+
+  // All that has come in so far and is not given out yet, and back to there.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
   // For `info`: "RNG15_RFL8_NIR8; per-column times on the sensor's clock (...)".
   [[nodiscard]] std::string conventions() const;

@@ -29,6 +29,8 @@ class PacketTopic {
     decoder_.finish();
     (void)drain(events);
   }
+  void save(BinaryWriter& writer) const { decoder_.save(writer); }
+  void load(BinaryReader& reader) { decoder_.load(reader); }
   [[nodiscard]] std::string model() const { return decoder_.model_name(); }
   [[nodiscard]] std::string conventions() const { return decoder_.conventions(); }
 

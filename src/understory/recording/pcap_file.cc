@@ -21,6 +21,7 @@ constexpr std::uint32_t kEnhancedPacket = 6;
 constexpr std::uint32_t kLargestFrame = 262'144;
 constexpr std::uint32_t kLargestBlock = 16 * 1024 * 1024;
 constexpr std::size_t kMostInterfaces = 256;
+constexpr const char* kNoPlace = "expected the place where its reading stood";
 constexpr TimeNs kDay = 86'400 * kNsPerSecond;
 
 std::uint32_t swapped(std::uint32_t v) {
@@ -83,6 +84,24 @@ void PcapFile::rewind(Log& log) {
   position_ = first_;
   has_stamp_ = false;
   if (pcapng_) interfaces_.clear();
+}
+
+void PcapFile::save(BinaryWriter& writer) const {
+  writer.put(position_);
+  writer.put(last_stamp_);
+  writer.put(has_stamp_);
+  writer.put(swap_);
+  writer.put(interfaces_);
+}
+
+void PcapFile::load(BinaryReader& reader) {
+  position_ = reader.get<std::uint64_t>();
+  last_stamp_ = reader.get<TimeNs>();
+  has_stamp_ = reader.get<bool>();
+  swap_ = reader.get<bool>();
+  interfaces_ = reader.get_vector<Interface>();
+  for (const Interface& interface : interfaces_)
+    if (interface.ticks_per_second == 0) throw InputError(name(), "", kNoPlace);
 }
 
 double PcapFile::progress() const {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "understory/recording/byte_source.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 
@@ -34,6 +35,9 @@ class PcapFile {
   [[nodiscard]] bool next(CapturedFrame& frame);
   // Back to the first record, with warnings from now on to `log`.
   void rewind(Log& log);
+  // Where the reading stands, and back to there.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
   [[nodiscard]] double progress() const;
   [[nodiscard]] const std::string& name() const { return source_->name(); }
   [[nodiscard]] bool is_pcapng() const { return pcapng_; }

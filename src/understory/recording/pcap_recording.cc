@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "understory/recording/byte_source.h"
+#include "understory/recording/event_bytes.h"
 #include "understory/recording/extrinsics.h"
 #include "understory/recording/finding.h"
 #include "understory/recording/ouster.h"
@@ -61,6 +62,34 @@ class PcapRecording : public Recording {
     return event;
   }
 
+  bool save(BinaryWriter& writer) const override {
+    file_->save(writer);
+    udp_.save(writer);
+    save_decoder(writer);
+    lidar_statistics_.save(writer);
+    second_statistics_.save(writer);
+    writer.put(static_cast<std::uint64_t>(ignored_.size()));
+    for (const auto& [stream, statistics] : ignored_) {
+      writer.put(stream);
+      statistics.save(writer);
+    }
+    put_events(writer, ready_);
+    writer.put(finished_);
+    return true;
+  }
+  void load(BinaryReader& reader) override {
+    file_->load(reader);
+    udp_.load(reader);
+    load_decoder(reader);
+    lidar_statistics_.load(reader);
+    second_statistics_.load(reader);
+    ignored_.clear();
+    for (auto left = reader.get<std::uint64_t>(); left > 0; --left)
+      ignored_[reader.get<UdpStream>()].load(reader);
+    get_events(reader, ready_);
+    finished_ = reader.get<bool>();
+  }
+
   const Rig& rig() const override { return rig_; }
   std::string format() const override {
     return std::string(file_->is_pcapng() ? "PCAPNG" : "PCAP") + " (" + sensor() + ")";
@@ -77,6 +106,8 @@ class PcapRecording : public Recording {
  protected:
   virtual void take(const Datagram& datagram) = 0;
   virtual void finish() = 0;
+  virtual void save_decoder(BinaryWriter& writer) const = 0;
+  virtual void load_decoder(BinaryReader& reader) = 0;
   [[nodiscard]] virtual std::string sensor() const = 0;
   // Of which sensor a datagram is that is not used; empty if of none that could be.
   [[nodiscard]] virtual std::string unused_sensor(const Datagram& datagram) const {
@@ -141,6 +172,9 @@ class DecodedPcap : public PcapRecording {
     decoder_.finish();
     take_scans();
   }
+
+  void save_decoder(BinaryWriter& writer) const override { decoder_.save(writer); }
+  void load_decoder(BinaryReader& reader) override { decoder_.load(reader); }
 
   void take_scans() {
     while (ScanPtr scan = decoder_.take_scan())

@@ -214,4 +214,24 @@ TimeConvention detect_point_times(const std::string& field, const std::string& t
                  : with_absolute_times(name, *unit, told, span);
 }
 
+void put_convention(BinaryWriter& writer, const TimeConvention& convention) {
+  writer.put(convention.kind);
+  writer.put(convention.unit_s);
+  writer.put(convention.stamp);
+  writer.put(convention.shift);
+  writer.put(convention.text);
+  writer.put(convention.warning);
+}
+
+TimeConvention get_convention(BinaryReader& reader) {
+  TimeConvention convention;
+  convention.kind = reader.get<TimeConvention::Kind>();
+  convention.unit_s = reader.get<double>();
+  convention.stamp = reader.get<TimeConvention::Stamp>();
+  convention.shift = reader.get<TimeNs>();
+  convention.text = reader.get_string();
+  convention.warning = reader.get_string();
+  return convention;
+}
+
 }  // namespace understory

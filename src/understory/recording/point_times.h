@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/util/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {
@@ -27,6 +28,9 @@ struct TimeConvention {
   std::string text;     // for `info`: "offset in ns from the header stamp; stamp = first point"
   std::string warning;  // empty if there is nothing to worry about
 };
+
+void put_convention(BinaryWriter& writer, const TimeConvention& convention);
+[[nodiscard]] TimeConvention get_convention(BinaryReader& reader);
 
 // What one cloud tells about its times.
 struct CloudTimes {

@@ -1,5 +1,7 @@
 #include "understory/recording/recording.h"
 
+#include "understory/util/error.h"
+
 namespace understory {
 namespace {
 
@@ -20,6 +22,14 @@ void Recording::skip(std::uint64_t count) {
   for (std::uint64_t i = 0; i < count; ++i) {
     if (!next()) return;
   }
+}
+
+bool Recording::save(BinaryWriter& /*writer*/) const {
+  return false;
+}
+
+void Recording::load(BinaryReader& /*reader*/) {
+  UNDERSTORY_CHECK(false && "a recording that cannot tell its place cannot go to it");
 }
 
 }  // namespace understory

@@ -11,6 +11,7 @@
 #include "understory/sensor/imu_sample.h"
 #include "understory/sensor/rig.h"
 #include "understory/sensor/scan.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 
@@ -54,6 +55,15 @@ class Recording {
 
   // Reads past `count` events as `next` would; formats that can do it cheaper override it.
   virtual void skip(std::uint64_t count);
+
+  // Writes where the reading stands, between two calls of `next`: all that decides what `next`,
+  // `rig` and `topics` give from there on. False, with nothing written, where a recording cannot
+  // tell; `skip` leads there then.
+  [[nodiscard]] virtual bool save(BinaryWriter& writer) const;
+  // Goes to where `save` stood, in a recording that was opened in the same way just now. Reads no
+  // more than what the reading was at work on there (a chunk, a file). Throws InputError where the
+  // recording does not hold what it held then.
+  virtual void load(BinaryReader& reader);
 
   // What is known so far of the sensors and the streams. The rig is complete once the first scan
   // has been returned; reports grow with the reading.

@@ -101,6 +101,25 @@ class BagFilesSource : public MessageSource {
     }
     return false;
   }
+  void save(BinaryWriter& writer) const override {
+    writer.put(static_cast<std::uint64_t>(opened_));
+    writer.put(format_);
+    writer.put(source_ != nullptr);
+    if (source_ != nullptr) source_->save(writer);
+  }
+  void load(BinaryReader& reader) override {
+    source_.reset();
+    copy_.reset();
+    opened_ = static_cast<std::size_t>(reader.get<std::uint64_t>());
+    if (opened_ > files_.size())
+      throw InputError(files_.front(), "", "the bag has fewer parts than when the run was begun");
+    for (std::size_t i = 0; i + 1 < opened_; ++i)
+      unpacked_->forget(files_[i]);
+    format_ = reader.get_string();
+    if (!reader.get<bool>() || opened_ == 0) return;
+    source_ = open_part(files_[opened_ - 1]);
+    source_->load(reader);
+  }
   [[nodiscard]] std::string format() const override { return format_; }
   [[nodiscard]] double progress() const override {
     const double done = static_cast<double>(opened_) - (source_ == nullptr ? 0.0 : 1.0);
@@ -180,6 +199,19 @@ bool is_ros2_bag_folder(const std::string& path) {
     if (is_bag_file(entry->path().filename().string())) return true;
   }
   return false;
+}
+
+std::vector<std::string> bag_parts_outside(const std::string& path) {
+  std::vector<std::string> outside;
+  if (!is_ros2_bag_folder(path)) return outside;
+  Log unheard;  // what is wrong is said when the bag is read
+  const fs::path folder = fs::absolute(path).lexically_normal();
+  for (const std::string& file : files_of_metadata(path, unheard)) {
+    const fs::path below = fs::absolute(file).lexically_normal().lexically_relative(folder);
+    if (below.empty() || *below.begin() == "..")
+      outside.push_back(fs::path(file).lexically_normal().string());
+  }
+  return outside;
 }
 
 std::vector<std::string> bag_file_names(const std::string& metadata, const std::string& origin) {

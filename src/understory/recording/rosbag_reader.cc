@@ -82,6 +82,41 @@ class RosbagSource : public MessageSource {
     return merger_.next(message);
   }
 
+  void save(BinaryWriter& writer) const override {
+    writer.put(position_);
+    writer.put(last_good_);
+    writer.put(ended_);
+    writer.put(compression_);
+    writer.put(static_cast<std::uint64_t>(connections_.size()));
+    for (const auto& [id, channel] : connections_) {
+      writer.put(id);
+      put_channel(writer, *channel);
+    }
+    writer.put(merger_.progress());
+  }
+  void load(BinaryReader& reader) override {
+    const auto position = reader.get<std::uint64_t>();
+    const auto last_good = reader.get<std::uint64_t>();
+    const bool ended = reader.get<bool>();
+    const std::string compression = reader.get_string();
+    connections_.clear();
+    for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+      auto& channel = connections_[reader.get<std::uint32_t>()];
+      channel = get_channel(reader);
+    }
+    for (const MessageMerger::Progress& progress : reader.get_vector<MessageMerger::Progress>()) {
+      const auto record = record_at(progress.place);
+      if (record) take_block(*record);
+      if (!record || !merger_.pass(progress))
+        throw InputError(file_->name(), "at byte " + std::to_string(progress.place),
+                         "expected the chunk that was read when the run was begun");
+    }
+    position_ = position;
+    last_good_ = last_good;
+    ended_ = ended;
+    compression_ = compression;
+  }
+
   [[nodiscard]] std::string format() const override {
     return "ROS 1 bag (" + (compression_.empty() ? "no chunks" : compression_) + ")";
   }
@@ -215,17 +250,23 @@ class RosbagSource : public MessageSource {
     last_good_ = record->op == kChunk && !record->cut ? record->data_offset + record->data_length
                                                       : record->offset + 1;
     position_ = record->data_offset + record->data_length;
-    if (record->op == kChunk) return take_chunk(*record);
-    if (record->op == kMessage && !record->cut) {
-      MessageBlock block;
-      file_->read(record->data_offset, record->data_length, block.bytes);
-      add_message(record->fields, 0, block.bytes.size(), block);
-      merger_.add(std::move(block));
-    } else if (record->op == kConnection) {
+    if (record->op == kConnection) {
       std::vector<std::uint8_t> data;
       file_->read(record->data_offset, record->data_length, data);
       add_connection(record->fields, data);
     }
+    take_block(*record);
+  }
+
+  // A chunk, or a message outside of chunks.
+  void take_block(const Record& record) {
+    if (record.op == kChunk) return take_chunk(record);
+    if (record.op != kMessage || record.cut) return;
+    MessageBlock block;
+    block.place = record.offset;
+    file_->read(record.data_offset, record.data_length, block.bytes);
+    add_message(record.fields, 0, block.bytes.size(), block);
+    merger_.add(std::move(block));
   }
 
   void take_chunk(const Record& record) {
@@ -237,6 +278,7 @@ class RosbagSource : public MessageSource {
     std::uint64_t length = std::min(record.data_length, kLongestBlock);
     if (record.cut) length = std::min(length, pass_cut_chunk(record));
     MessageBlock block;
+    block.place = record.offset;
     std::string problem = unpack(record, length, method, *size, block.bytes);
     if (problem.empty() && block.bytes.size() != *size) problem = "its length is wrong";
     const bool whole = list_messages(block);

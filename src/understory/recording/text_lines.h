@@ -22,6 +22,11 @@ class TextLines {
   [[nodiscard]] bool next(std::string_view& line);
   // Where the line after the last one begins.
   [[nodiscard]] std::uint64_t position() const { return position_; }
+  // Goes to the line that begins at a position, with so many lines before it.
+  void go_to(std::uint64_t position, std::uint64_t lines_before) {
+    position_ = position;
+    number_ = lines_before;
+  }
   // Number of lines returned so far.
   [[nodiscard]] std::uint64_t number() const { return number_; }
 

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cstring>
 
+#include "understory/recording/event_bytes.h"
+#include "understory/util/error.h"
+
 namespace understory {
 namespace {
 
@@ -170,6 +173,32 @@ bool UdpAssembler::add_fragment(const Key& key, std::size_t offset, bool more, B
                 partial.bytes.begin() + static_cast<std::ptrdiff_t>(partial.total_size));
   partials_.erase(place);
   return true;
+}
+
+void UdpAssembler::save(BinaryWriter& writer) const {
+  writer.put(static_cast<std::uint64_t>(partials_.size()));
+  for (const Partial& partial : partials_) {
+    writer.put(partial.key);
+    writer.put(partial.bytes);
+    put_flags(writer, partial.have);
+    writer.put(static_cast<std::uint64_t>(partial.total_size));
+  }
+  writer.put(incomplete_);
+}
+
+void UdpAssembler::load(BinaryReader& reader) {
+  partials_.clear();
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    Partial& partial = partials_.emplace_back();
+    partial.key = reader.get<Key>();
+    partial.bytes = reader.get_vector<std::uint8_t>();
+    partial.have = get_flags(reader);
+    partial.total_size = static_cast<std::size_t>(reader.get<std::uint64_t>());
+    if (partial.have.size() != (partial.bytes.size() + 7) / 8 ||
+        partial.total_size > partial.bytes.size())
+      throw InputError("checkpoint", "parts of a datagram", "expected a mark for every 8 bytes");
+  }
+  incomplete_ = reader.get<std::uint64_t>();
 }
 
 }  // namespace understory

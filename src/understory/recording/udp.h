@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "understory/recording/bytes.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {
@@ -31,6 +32,9 @@ class UdpAssembler {
  public:
   // The datagram that this frame holds or completes, if any.
   [[nodiscard]] std::optional<Datagram> add(int link_type, ByteSpan frame, TimeNs stamp);
+  // Datagrams under way, and back to them.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
   // Fragments that never became whole.
   [[nodiscard]] std::uint64_t incomplete() const { return incomplete_; }
 

@@ -9,6 +9,7 @@
 #include "understory/recording/finding.h"
 #include "understory/recording/nmea.h"
 #include "understory/recording/scan_assembly.h"
+#include "understory/util/error.h"
 #include "understory/util/median.h"
 
 namespace understory {
@@ -291,6 +292,43 @@ ScanPtr VelodyneDecoder::take_scan() {
 void VelodyneDecoder::finish() {
   close_scan();
   finished_.finish();
+}
+
+void VelodyneDecoder::save(BinaryWriter& writer) const {
+  writer.put(model_);
+  writer.put(contradicting_);
+  clock_.save(writer);
+  writer.put(dual_);
+  writer.put(return_mode_);
+  writer.put(packets_);
+  writer.put(received_);
+  writer.put(last_fix_);
+  for (const double value : {rate_cdeg_per_us_, turned_cdeg_, missing_cdeg_})
+    writer.put(value);
+  writer.put(scan_begin_);
+  writer.put(points_);
+  writer.put(point_times_);
+  finished_.save(writer);
+}
+
+void VelodyneDecoder::load(BinaryReader& reader) {
+  model_ = reader.get<VelodyneModel>();
+  if (model_ != VelodyneModel::kUnknown) table_ = velodyne_table(model_);
+  contradicting_ = reader.get<VelodyneModel>();
+  clock_.load(reader);
+  dual_ = reader.get<bool>();
+  return_mode_ = reader.get<std::uint8_t>();
+  packets_ = reader.get<std::uint64_t>();
+  received_ = reader.get<std::uint64_t>();
+  last_fix_ = reader.get<TimeNs>();
+  for (double* value : {&rate_cdeg_per_us_, &turned_cdeg_, &missing_cdeg_})
+    *value = reader.get<double>();
+  scan_begin_ = reader.get<TimeNs>();
+  points_ = reader.get_vector<ScanPoint>();
+  point_times_ = reader.get_vector<TimeNs>();
+  if (points_.size() != point_times_.size())
+    throw InputError(source_, "", "expected as many times as points of the scan in progress");
+  finished_.load(reader);
 }
 
 std::string VelodyneDecoder::conventions() const {

@@ -12,6 +12,7 @@
 #include "understory/recording/velodyne_tables.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/scan.h"
+#include "understory/util/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 
@@ -62,6 +63,10 @@ class VelodyneDecoder {
   // Ends the scan in progress; at the end of the stream. A first scan that is only a part of a turn
   // is left out (FinishedScans).
   void finish();
+
+  // All that has come in so far and is not given out yet, and back to there.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
   [[nodiscard]] VelodyneModel model() const { return model_; }
   // "VLP-16", "HDL-32E"; "" before the first packet.

@@ -2,6 +2,8 @@
 
 #include <cstdlib>
 
+#include "understory/recording/event_bytes.h"
+
 namespace understory {
 namespace {
 
@@ -93,6 +95,26 @@ bool VelodyneClock::set_utc(std::uint32_t counter_us, TimeNs utc) {
     source_ = Source::kPosition;
   }
   return true;
+}
+
+void VelodyneClock::save(BinaryWriter& writer) const {
+  writer.put(source_);
+  put_optional(writer, last_);
+  put_optional(writer, jumped_);
+  writer.put(elapsed_us_);
+  writer.put(base_);
+  put_optional(writer, hour_);
+  writer.put(hour_counter_us_);
+}
+
+void VelodyneClock::load(BinaryReader& reader) {
+  source_ = reader.get<Source>();
+  last_ = get_optional<Reading>(reader);
+  jumped_ = get_optional<Reading>(reader);
+  elapsed_us_ = reader.get<std::int64_t>();
+  base_ = reader.get<TimeNs>();
+  hour_ = get_optional<TimeNs>(reader);
+  hour_counter_us_ = reader.get<std::uint32_t>();
 }
 
 }  // namespace understory

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "understory/util/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {
@@ -26,6 +27,9 @@ class VelodyneClock {
   bool set_utc(std::uint32_t counter_us, TimeNs utc);
 
   [[nodiscard]] Source source() const { return source_; }
+
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
 
  private:
   [[nodiscard]] bool follows(std::uint32_t counter_us, TimeNs stamp, std::uint32_t before_us,
