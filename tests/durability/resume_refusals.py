@@ -121,6 +121,40 @@ def elsewhere(folder):
     return "found the recording that was named relative to the first folder"
 
 
+@cases.case("a site's file from another folder")
+def site_elsewhere(folder):
+    site = program("simulate", "demo", "--print-site", "--set", "lidar.model=VLP-16", "--set", "carrier.still_s=1")
+    assert site.returncode == 0, site.stderr
+    (folder / "site.yaml").write_text(site.stdout)
+    recording = "sim:site.yaml?seed=5&duration_s=12&cache=scans"
+    done = program("map", recording, "-o", "undisturbed", *OPTIONS, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    killed(recording, "run", cwd=folder)
+    (folder / "elsewhere").mkdir()
+    shutil.copytree(folder / "run", folder / "copy")
+    done = program("map", "--resume", folder / "run", cwd=folder / "elsewhere")
+    assert done.returncode == 0, done.stderr
+    different = [f for f in FILES if (folder / "undisturbed" / f).read_bytes() != (folder / "run" / f).read_bytes()]
+    assert not different and not list((folder / "elsewhere").iterdir()), different
+    (folder / "site.yaml").write_text(site.stdout + "# changed\n")
+    refused(3, "--resume", folder / "copy", words=["is not the recording that the run was begun with"])
+    return "found the site and the scans that were kept; another site is refused"
+
+
+@cases.case("a run at work")
+def at_work(folder):
+    process = started(good, folder / "run")
+    process.send_signal(signal.SIGSTOP)
+    try:
+        # As if it were just being written: nothing of it is read before it is known whose it is.
+        for checkpoint in work_of(folder / "run").glob("checkpoint*.bin"):
+            checkpoint.write_bytes(b"half")
+        return refused(3, "--resume", folder / "run", words=["is being written by another understory"])
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+
+
 @cases.case("broken checkpoints")
 def broken(folder):
     killed(good, folder / "run")

@@ -9,6 +9,7 @@
 
 #include "understory/pipeline/source.h"
 #include "understory/recording/byte_source.h"
+#include "understory/recording/ros2_bag.h"
 #include "understory/util/error.h"
 #include "understory/util/output_file.h"
 #include "understory/util/read_error.h"
@@ -56,6 +57,11 @@ std::string mark_of_folder(const std::string& path) {
                                 entry->file_size(ignored)));
   }
   if (error) throw InputError(path, "", error.message());
+  for (const std::string& part : bag_parts_outside(path)) {
+    std::error_code ignored;
+    files.push_back(
+        fmt::format("{} {}\n", fs::path(part).filename().string(), fs::file_size(part, ignored)));
+  }
   std::sort(files.begin(), files.end());
   std::uint32_t checksum = 0;
   for (const std::string& file : files)
@@ -63,10 +69,18 @@ std::string mark_of_folder(const std::string& path) {
   return fmt::format("{} files, {:08x}", files.size(), checksum);
 }
 
+// The files that the site is made of. Its settings are those of the request.
+std::string mark_of_simulation(const std::string& path) {
+  std::string mark = "simulation";
+  for (const fs::path& file : files_of(path, {}))
+    if (!file.empty()) mark += ", " + mark_of_file(file.string());
+  return mark;
+}
+
 }  // namespace
 
 InputIdentity identify(const std::string& what, const std::string& path) {
-  if (is_simulation(path)) return {what, path, path};
+  if (is_simulation(path)) return {what, path, mark_of_simulation(path)};
   std::error_code ignored;
   return {what, path, fs::is_directory(path, ignored) ? mark_of_folder(path) : mark_of_file(path)};
 }

@@ -10,7 +10,8 @@ struct InputIdentity {
   std::string what;  // "the recording", "the extrinsics"
   std::string path;  // as given
   std::string mark;  // of a file its size and checksums of its first and last MiB; of a folder
-                     // those of the names and sizes of all files in it; of a simulation its name
+                     // those of the names and sizes of all files in it, and of parts of a bag that
+                     // lie elsewhere; of a simulation those of the files that it is made of
 };
 
 // Throws InputError where it cannot be read.

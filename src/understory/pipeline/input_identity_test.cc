@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -48,6 +49,48 @@ TEST_F(InputIdentityTest, AFolderIsKnownByNamesAndSizes) {
   EXPECT_TRUE(same(folder_ / "x", folder_ / "y"));
   file("y/3.pcd", "");
   EXPECT_FALSE(same(folder_ / "x", folder_ / "y"));
+}
+
+// Parts of a bag that lie elsewhere were read, but neither guarded, nor known again, nor hashed.
+TEST_F(InputIdentityTest, PartsOfABagElsewhereAreInputs) {
+  file("bag/a_0.db3", "part");
+  const std::string other = file("other/a_1.db3", "part");
+  const auto metadata = [&](const std::string& second) {
+    file("bag/metadata.yaml",
+         "rosbag2_bagfile_information:\n  relative_file_paths: [a_0.db3, " + second + "]\n");
+  };
+  const std::string bag = folder_ / "bag";
+  metadata("missing.db3");
+  EXPECT_EQ(files_of(bag, {}).size(), 3U);  // metadata and extrinsics are not named
+  for (const std::string& name : {std::string("../other/a_1.db3"), other}) {
+    metadata(name);
+    const auto files = files_of(bag, {});
+    ASSERT_EQ(files.size(), 4U) << name;
+    EXPECT_EQ(files.back(), other);
+    Log log;
+    const auto hashes = hash_inputs(bag, log);
+    ASSERT_EQ(hashes.size(), 3U);
+    EXPECT_EQ(std::count_if(hashes.begin(), hashes.end(),
+                            [](const InputHash& hash) { return hash.file == "a_1.db3"; }),
+              1);
+    const InputIdentity then = identify("the recording", bag);
+    EXPECT_NO_THROW(expect_same({then}, {identify("the recording", bag)}));
+    file("other/a_1.db3", "longer part");
+    EXPECT_THROW(expect_same({then}, {identify("the recording", bag)}), InputError);
+    file("other/a_1.db3", "part");
+  }
+}
+
+// A site's own file and its list of trees were looked for in the folder of the resuming call.
+TEST_F(InputIdentityTest, ASimulationIsFoundFromElsewhere) {
+  EXPECT_EQ(named_from("/begun", "a.mcap"), "/begun/a.mcap");
+  EXPECT_EQ(named_from("/begun", "/b/a.mcap"), "/b/a.mcap");
+  EXPECT_EQ(named_from("/begun", "sim:demo?seed=3"), "sim:demo?seed=3");
+  EXPECT_EQ(named_from("/begun", "sim:s.yaml?cache=c&stand.trees=t/x.csv&seed=3"),
+            "sim:/begun/s.yaml?cache=/begun/c&stand.trees=/begun/t/x.csv&seed=3");
+  const std::string site = file("s.yaml", "stand:\n  trees: t.csv\n");
+  EXPECT_EQ(named_from(folder_.path(), "sim:s.yaml"),
+            "sim:" + site + "?stand.trees=" + (folder_.path() / "t.csv").string());
 }
 
 // An end of the recording that a failing disk kept back when the run began, or keeps back now.

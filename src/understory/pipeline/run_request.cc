@@ -5,9 +5,8 @@
 namespace understory {
 
 std::string RunRequest::found(const std::string& file) const {
-  const bool relative = !file.empty() && std::filesystem::path(file).is_relative();
-  if (begun_in.empty() || !relative || is_simulation(file)) return file;
-  return (begun_in / file).string();
+  if (begun_in.empty() || file.empty()) return file;
+  return named_from(begun_in, file);
 }
 
 std::vector<InputIdentity> RunRequest::identify_inputs() const {

@@ -18,12 +18,16 @@ namespace understory {
 // Whether `name` is a simulated recording.
 [[nodiscard]] bool is_simulation(const std::string& name);
 
+// The same recording, named from any other folder than `folder`: paths in it are made absolute. Of
+// the simulator these are the site's file, its list of trees and the folder for scans.
+[[nodiscard]] std::string named_from(const std::filesystem::path& folder, const std::string& name);
+
 // Hashes of the recording's files, in order of their names; none for the simulator. What cannot be
 // read any more at the end of a run has no hash, with a warning (key "recording.no_hash").
 [[nodiscard]] std::vector<InputHash> hash_inputs(const std::string& recording, Log& log);
 
-// The files and folders that opening a recording reads: itself, the metadata and extrinsics that
-// were named, and the site and the trees of a simulation.
+// The files and folders that opening a recording reads: itself, parts of a bag that lie outside its
+// folder, the metadata and extrinsics that were named, and the site and the trees of a simulation.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const std::string& recording,
                                                           const OpenOptions& options);
 

@@ -82,6 +82,14 @@ std::optional<ScanReadings> unflatten(ByteSpan bytes, float step_m) {
   return readings;
 }
 
+// An empty file and one that breaks off within the first mark are.
+bool begins_as_ours(int file, std::int64_t length) {
+  std::uint64_t magic = 0;
+  const auto size = static_cast<std::size_t>(std::clamp<std::int64_t>(length, 0, sizeof(magic)));
+  return ::pread(file, &magic, size, 0) == static_cast<ssize_t>(size) &&
+         std::memcmp(&magic, &kMagic, size) == 0;
+}
+
 }  // namespace
 
 bool ScanCache::fits(const LidarConfig& config) {
@@ -113,6 +121,11 @@ void ScanCache::read_index() {
   end_ = 0;
   if (file_ < 0) return;
   const std::int64_t length = ::lseek(file_, 0, SEEK_END);
+  foreign_ = !begins_as_ours(file_, length);
+  if (foreign_) {
+    writable_ = false;
+    return;
+  }
   RecordHead head;
   while (::pread(file_, &head, sizeof(head), end_) == static_cast<ssize_t>(sizeof(head))) {
     const std::int64_t next = end_ + static_cast<std::int64_t>(sizeof(head)) + head.size;

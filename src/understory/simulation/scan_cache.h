@@ -16,8 +16,9 @@ namespace understory {
 // scan of an OS0-128. What comes back is bit for bit what went in.
 //
 // Several processes may use one file: the first one writes, the others read what was there when
-// they opened it. A torn end (kill -9, full disk) is cut off by the next writer. Trouble with the
-// file is never an error: then scans are cast. Not thread-safe.
+// they opened it. A torn end (kill -9, full disk) is cut off by the next writer. A file by that
+// name that does not begin as this program's do is left as it is. Trouble with the file is never
+// an error: then scans are cast. Not thread-safe.
 class ScanCache {
  public:
   // `key` names the site with all its settings. Ranges are whole multiples of range_step_m.
@@ -39,6 +40,8 @@ class ScanCache {
   void clear();
 
   [[nodiscard]] const std::string& path() const { return path_; }
+  // Whether the file is of another program: nothing is kept then.
+  [[nodiscard]] bool is_foreign() const { return foreign_; }
 
  private:
   void read_index();
@@ -55,6 +58,7 @@ class ScanCache {
   float step_m_;
   int file_ = -1;
   bool writable_ = false;
+  bool foreign_ = false;
   std::int64_t end_ = 0;  // of the last whole record
   // By scan. No map: its small nodes, kept among large buffers that come and go, tear the heap.
   std::vector<Place> places_;

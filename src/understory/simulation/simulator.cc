@@ -88,6 +88,10 @@ class Simulator::Impl : public SimulatedWorld {
       return;
     }
     cache = std::make_unique<ScanCache>(folder, site_key(site), site.lidar.range_step_m);
+    if (cache->is_foreign())
+      log.warn("simulation.cache", cache->path() +
+                                       ": is no file of this program, and stays as it "
+                                       "is: scans are cast and not kept");
     const auto span = cache->span();
     if (!span) return;
     for (const std::int64_t scan : {span->first, span->second}) {
@@ -310,10 +314,7 @@ std::vector<std::string> site_files(const std::string& name_or_path,
   std::vector<std::string> files;
   if (!trees.empty()) files = tree_cloud_files(trees);
   files.push_back(trees);
-  const std::vector<ShippedSite>& shipped = shipped_sites();
-  if (std::none_of(shipped.begin(), shipped.end(),
-                   [&](const ShippedSite& site) { return site.name == name_or_path; }))
-    files.push_back(name_or_path);
+  if (!is_shipped_site(name_or_path)) files.push_back(name_or_path);
   return files;
 }
 

@@ -138,6 +138,27 @@ TEST(Simulator, CacheGivesTheSameEventsAndSurvivesDamage) {
   EXPECT_EQ(log.warnings().size(), 1U);
 }
 
+// Whatever lies under the name of the kept scans was cut down to nothing.
+TEST(Simulator, AFileOfAnotherProgramInPlaceOfTheCacheStays) {
+  const test::TemporaryFolder own;
+  SiteConfig site = small_site();
+  site.duration_s = 0.3;
+  Log log;
+  { (void)read_all(*std::make_unique<Simulator>(site, own / "cache", log)); }
+  const auto file = std::filesystem::directory_iterator(own / "cache")->path();
+  for (const std::string& text : {std::string("the notes of somebody else"), std::string("x")}) {
+    std::ofstream(file, std::ios::binary | std::ios::trunc) << text;
+    Log heard;
+    Simulator simulator(site, own / "cache", heard);
+    EXPECT_FALSE(read_all(simulator).empty());
+    ASSERT_EQ(heard.warnings().size(), 1U);
+    EXPECT_EQ(heard.warnings()[0].key, "simulation.cache");
+    std::ifstream kept(file, std::ios::binary);
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(kept), {}), text);
+  }
+  EXPECT_TRUE(log.warnings().empty());
+}
+
 TEST(Simulator, WritesItsTruth) {
   Simulator simulator(small_site());
   const std::vector<Event> events = read_all(simulator);

@@ -418,6 +418,12 @@ SiteConfig load_site(const std::string& name_or_path, const std::vector<std::str
   return site;
 }
 
+bool is_shipped_site(const std::string& name) {
+  const std::vector<ShippedSite>& all = shipped_sites();
+  return std::any_of(all.begin(), all.end(),
+                     [&](const ShippedSite& site) { return site.name == name; });
+}
+
 bool is_simulation_uri(const std::string& text) {
   return text.rfind("sim:", 0) == 0;
 }

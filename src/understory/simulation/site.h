@@ -261,6 +261,7 @@ struct ShippedSite {
   std::string yaml;
 };
 [[nodiscard]] const std::vector<ShippedSite>& shipped_sites();
+[[nodiscard]] bool is_shipped_site(const std::string& name);
 
 // A site by the name of a shipped one or the path of a YAML file, with "key=value" settings
 // applied. Throws InputError if there is no such site, ConfigError with all problems for bad keys
