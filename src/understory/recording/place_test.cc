@@ -177,6 +177,37 @@ TEST_F(Places, OfDamagedBags) {
   }
 }
 
+// Damage anywhere: what is passed over before the place does not count again behind it.
+TEST_F(Places, OfFilesWithFlippedBits) {
+  const std::filesystem::path samples =
+      std::filesystem::path(UNDERSTORY_SOURCE_DIR) / "fuzz/corpus";
+  Random random(11);
+  int tried = 0;
+  for (const char* name : {"rosbag/small_none.bag", "rosbag/small_lz4.bag", "db3/small.db3",
+                           "mcap/small_plain.mcap", "mcap/small_zstd.mcap"}) {
+    const std::vector<std::uint8_t> whole = read_bytes(samples / name);
+    for (int trial = 0; trial < 80; ++trial) {
+      SCOPED_TRACE(std::string(name) + ", trial " + std::to_string(trial));
+      std::vector<std::uint8_t> bytes = whole;
+      for (int flips = 0; flips < 4; ++flips) {
+        const std::size_t at = 16 + random.below(bytes.size() - 16);
+        bytes[at] = static_cast<std::uint8_t>(bytes[at] ^ (1U << random.below(8)));
+      }
+      write_bytes(folder_ / "flipped", bytes);
+      const Open open = opening(folder_ / "flipped");
+      Log log;
+      try {
+        const auto recording = open(log);
+        const std::vector<Event> events = read_all(*recording);
+        expect_goes_on(open, events, *recording, events.size() / 2);
+        ++tried;
+      } catch (const InputError&) {
+      }
+    }
+  }
+  EXPECT_GT(tried, 200);
+}
+
 constexpr TimeNs kHourStart = 1'700'002'800 * kNsPerSecond;
 
 Bytes velodyne_udp(int i) {
