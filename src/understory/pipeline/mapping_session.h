@@ -94,6 +94,9 @@ class MappingSession : public Resumable {
   [[nodiscard]] std::optional<TimeNs> last_imu() const;
 
  private:
+  static constexpr const char* kJournalFile = "journal.bin";
+  static constexpr const char* kCloudsFile = "clouds.bin";
+
   // The first two scans. A carrier that is on its way when the recording begins smears its first
   // scan; the second one tells the speed, and both are done again with it.
   struct Opening {
