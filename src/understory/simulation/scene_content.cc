@@ -324,8 +324,8 @@ std::pair<unsigned, unsigned> SceneContent::add_crown(const GrownTree& tree,
   world_from_shape.col(2) << high * static_cast<float>(tree.lean.x()),
       high * static_cast<float>(tree.lean.y()), high;
   world_from_shape.col(3) = tree.foot.cast<float>();
-  const auto add = [&](RTCScene scene, float reflectivity) {
-    Instance instance{Surface::kFoliage, cos_yaw, sin_yaw, reflectivity};
+  const auto add = [&, x = cos_yaw, y = sin_yaw](RTCScene scene, float reflectivity) {
+    Instance instance{Surface::kFoliage, x, y, reflectivity};
     instance.sway = sway;
     const unsigned number = add_instance(top_, scene, world_from_shape, instance);
     if (sway != kStands) swaying_.push_back({number, sway});
