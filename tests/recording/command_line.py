@@ -6,7 +6,11 @@ import os
 import pathlib
 import resource
 import subprocess
+import sys
 import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "bad_input"))
+from recordings import read_mcap, write_mcap  # noqa: E402: found by the line above
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 SAMPLES = pathlib.Path(__file__).resolve().parents[2] / "fuzz" / "corpus"
@@ -96,12 +100,43 @@ def check_damage(folder):
         assert any(str(cut) in warning for warning in said["warnings"]), said["warnings"]
 
 
+def check_copies(folder):
+    """What a copy keeps beside the messages: when each arrived, and places that are told late. Readers sort by
+    arrival, which tells how the clocks of the sensors run."""
+    made, plain, copy = folder / "made.mcap", folder / "plain.mcap", folder / "again.mcap"
+    small = [word for setting in ("duration_s=4", "lidar.model=VLP-16", "stand.size_x_m=40", "stand.size_y_m=40",
+                                  "gnss.enabled=true") for word in ("--set", setting)]
+    assert run("simulate", "demo", "-o", made, *small)[0] == 0
+    assert run("convert", made, plain, "--compression", "none")[0] == 0
+    messages = read_mcap(plain)
+    start = messages[0].time
+    spoilt = []
+    for message in messages:
+        if message.topic.startswith("/gnss"):
+            message = message.stamped(message.stamp + 2_000_000_000)
+        elif message.topic == "/tf_static":
+            message.time = start + 3_000_000_000
+        spoilt.append(message)
+    spoilt.sort(key=lambda message: message.time)
+    write_mcap(folder / "spoilt.mcap", spoilt)
+    assert run("convert", folder / "spoilt.mcap", copy, "--compression", "none")[0] == 0
+    copied = read_mcap(copy)
+    for topic in ("/lidar", "/imu", "/gnss"):
+        before, after = ([m.time for m in each if m.topic == topic] for each in (spoilt, copied))
+        if topic == "/gnss":  # a fix waits for the message behind it, to be joined with its quality
+            assert len(before) == len(after) and all(0 <= b - a < 50_000_000 for a, b in zip(before, after)), after
+        else:
+            assert before == after, (topic, before[:3], after[:3])
+    assert [m.topic for m in copied if m.time > start + 2_500_000_000].count("/tf_static") == 1, "the late place is lost"
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         check_samples(folder)
         check_refusals(folder)
         check_damage(folder)
+        check_copies(folder)
 
 
 main()

@@ -3,13 +3,17 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "understory/cli/command.h"
 #include "understory/cli/convert_stems.h"
 #include "understory/cli/open_options.h"
 #include "understory/output/las_writer.h"
 #include "understory/pipeline/source.h"
+#include "understory/recording/arrival_times.h"
 #include "understory/recording/cloud_folder_writer.h"
 #include "understory/recording/mcap_writer.h"
 #include "understory/util/error.h"
@@ -33,7 +37,8 @@ class Target {
  public:
   virtual ~Target() = default;
   virtual void set_rig(const Rig& rig) = 0;
-  virtual void write(const Event& event) = 0;
+  // `arrival`: when it was recorded, where that is known.
+  virtual void write(const Event& event, std::optional<TimeNs> arrival) = 0;
   virtual void finish() = 0;
   virtual void commit() = 0;
   [[nodiscard]] virtual bool replaces() const = 0;
@@ -48,7 +53,12 @@ class TargetOf : public Target {
       : staged_(std::move(staged)),
         writer_(staged_->part().string(), std::forward<Arguments>(arguments)...) {}
   void set_rig(const Rig& rig) override { writer_.set_rig(rig); }
-  void write(const Event& event) override { writer_.write(event); }
+  void write(const Event& event, std::optional<TimeNs> arrival) override {
+    if constexpr (requires { writer_.write(event, *arrival); }) {
+      if (arrival) return writer_.write(event, *arrival);
+    }
+    writer_.write(event);
+  }
   void finish() override { writer_.finish(); }
   void commit() override { staged_->commit(); }
   [[nodiscard]] bool replaces() const override { return staged_->replaces(); }
@@ -101,6 +111,70 @@ void refuse_other_files(const ConvertOptions& options) {
                        "(its clouds by --format)"});
 }
 
+// Hands a recording on to its target. The rig is known once the first scan has come, so what comes
+// before it waits.
+class Copier {
+ public:
+  Copier(Recording& recording, Target& target)
+      : recording_(recording),
+        arrivals_(dynamic_cast<const ArrivalTimes*>(&recording)),
+        target_(target) {}
+
+  // The next event; false at the end.
+  bool copy_next() {
+    auto event = recording_.next();
+    if (!event) return false;
+    ++events_;
+    const bool is_scan = std::holds_alternative<ScanPtr>(*event);
+    scans_ += is_scan ? 1 : 0;
+    waiting_.push_back(
+        {std::move(*event), arrivals_ == nullptr ? std::nullopt : arrivals_->arrival()});
+    if (begun_ || is_scan || waiting_.size() >= kMostWaiting) pass_on();
+    return true;
+  }
+  void finish() {
+    pass_on();
+    target_.finish();
+  }
+  [[nodiscard]] std::uint64_t events() const { return events_; }
+  [[nodiscard]] std::uint64_t scans() const { return scans_; }
+
+ private:
+  static constexpr std::size_t kMostWaiting = 100'000;
+  struct Waiting {
+    Event event;
+    std::optional<TimeNs> arrival;
+  };
+
+  void pass_on() {
+    tell_rig();
+    for (const Waiting& each : waiting_)
+      target_.write(each.event, each.arrival);
+    waiting_.clear();
+  }
+  // At the beginning, and where the place of a sensor becomes known later.
+  void tell_rig() {
+    const Rig& rig = recording_.rig();
+    const bool has_imu = rig.body_from_imu.has_value();
+    const bool has_gnss = rig.body_from_gnss.has_value();
+    if (begun_ && has_imu == has_imu_ && has_gnss == has_gnss_) return;
+    target_.set_rig(rig);
+    begun_ = true;
+    has_imu_ = has_imu;
+    has_gnss_ = has_gnss;
+  }
+
+  Recording& recording_;
+  const ArrivalTimes* arrivals_;  // null where the format does not tell them
+  Target& target_;
+  std::vector<Waiting> waiting_;
+  bool begun_ = false;
+  bool has_imu_ = false;
+  bool has_gnss_ = false;
+  std::uint64_t events_ = 0;
+  std::uint64_t scans_ = 0;
+};
+
 int run_convert(const ConvertOptions& options, CommandContext& context) {
   if (options.output.empty()) throw ConfigError({"OUT is empty"});
   refuse_input_as_output(options.output, files_of(options.input, options.open));
@@ -112,40 +186,17 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
   const std::unique_ptr<Target> target = make_target(options);
   const std::unique_ptr<Recording> recording =
       open_source(options.input, options.open, context.log);
-  std::uint64_t scans = 0;
-  std::uint64_t events = 0;
+  Copier copier(*recording, *target);
   bool stopped = false;
-  bool has_rig = false;
-  // The rig is known once the first scan has come, so what comes before it waits.
-  std::vector<Event> waiting;
-  const auto begin = [&] {
-    target->set_rig(recording->rig());
-    has_rig = true;
-    for (const Event& event : waiting)
-      target->write(event);
-    waiting.clear();
-  };
-  constexpr std::size_t kMostWaiting = 100'000;
-  while (!stopped) {
-    const auto event = recording->next();
-    if (!event) break;
-    const bool is_scan = std::holds_alternative<ScanPtr>(*event);
-    if (is_scan) ++scans;
-    if (!has_rig && (is_scan || waiting.size() >= kMostWaiting)) begin();
-    if (has_rig) {
-      target->write(*event);
-    } else {
-      waiting.push_back(*event);
-    }
-    if (++events % 64 != 0) continue;
+  while (!stopped && copier.copy_next()) {
+    if (copier.events() % 64 != 0) continue;
     context.progress({"converting", 100.0 * recording->progress(), 100.0, "%",
-                      std::to_string(scans) + " scans"});
+                      std::to_string(copier.scans()) + " scans"});
     stopped = context.stop_requested();
   }
-  if (!has_rig) begin();
-  if (events == 0)
+  if (copier.events() == 0)
     throw InputError(options.input, "", "expected scans, IMU samples or fixes; found none");
-  target->finish();
+  copier.finish();
   return commit_unless_stopped(*target, stopped, options.output, context);
 }
 

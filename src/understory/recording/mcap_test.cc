@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "understory/recording/arrival_times.h"
 #include "understory/recording/mcap_format.h"
 #include "understory/recording/mcap_reader.h"
 #include "understory/recording/recording_test_support.h"
@@ -211,6 +212,29 @@ TEST(Mcap, AFullDiskIsAnOutputError) {
   EXPECT_THROW(McapWriter("/no/such/folder/x.mcap"), OutputError);
 }
 
+// Regression: a copy had the stamps as log times, and what was late or ahead came in another order.
+TEST(Mcap, KeepsTheLogTimesThatAreGiven) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "copy.mcap";
+  const std::vector<TimeNs> arrivals = {kStart + 700, kStart + 900, kStart + 1'000'000'000};
+  {
+    McapWriter writer(path);
+    for (const TimeNs arrival : arrivals) {
+      ImuSample sample;
+      sample.stamp = 2 * kStart - arrival;
+      writer.write(sample, arrival);
+    }
+  }
+  Log log;
+  const auto recording = open_recording(path, {}, log);
+  for (const TimeNs arrival : arrivals) {
+    const auto event = recording->next();
+    ASSERT_TRUE(event);
+    EXPECT_EQ(event_time(*event), 2 * kStart - arrival);
+    EXPECT_EQ(dynamic_cast<const ArrivalTimes&>(*recording).arrival(), arrival);
+  }
+}
+
 TEST(Mcap, KeepsSecondReturnsAndMissingTimes) {
   const TemporaryFolder folder;
   const std::string path = folder / "dual.mcap";
@@ -224,7 +248,7 @@ TEST(Mcap, KeepsSecondReturnsAndMissingTimes) {
   for (const Scan& scan : {dual, untimed}) {
     {
       McapWriter writer(path);
-      writer.write(scan);
+      writer.write(std::make_shared<const Scan>(scan));
     }
     Log log;
     const auto recording = open_recording(path, {}, log);

@@ -408,34 +408,22 @@ void McapWriter::set_rig(const Rig& rig) {
   impl_->set_rig(rig);
 }
 
-void McapWriter::write(const Scan& scan) {
-  impl_->note_ring_count(scan.ring_count);
-  impl_->add(kLidar, scan.end(), encode_point_cloud2(scan));
-}
-
-void McapWriter::write(const ImuSample& sample) {
-  impl_->add(kImu, sample.stamp, encode_imu(sample));
-}
-
-void McapWriter::write(const GnssFix& fix) {
-  // The quality first: a reader that has it can complete the fix as soon as that comes.
-  impl_->add(kGnssQuality, fix.stamp, encode_gps_fix(fix));
-  impl_->add(kGnss, fix.stamp, encode_nav_sat_fix(fix));
-}
-
-void McapWriter::write(const MagSample& sample) {
-  impl_->add(kMag, sample.stamp, encode_magnetic_field(sample));
-}
-
 void McapWriter::write(const Event& event) {
+  write(event, event_time(event));
+}
+
+void McapWriter::write(const Event& event, TimeNs log_time) {
   if (const auto* scan = std::get_if<ScanPtr>(&event)) {
-    write(**scan);
+    impl_->note_ring_count((*scan)->ring_count);
+    impl_->add(kLidar, log_time, encode_point_cloud2(**scan));
   } else if (const auto* sample = std::get_if<ImuSample>(&event)) {
-    write(*sample);
+    impl_->add(kImu, log_time, encode_imu(*sample));
   } else if (const auto* fix = std::get_if<GnssFix>(&event)) {
-    write(*fix);
+    // The quality first: a reader that has it can complete the fix as soon as that comes.
+    impl_->add(kGnssQuality, log_time, encode_gps_fix(*fix));
+    impl_->add(kGnss, log_time, encode_nav_sat_fix(*fix));
   } else {
-    write(std::get<MagSample>(event));
+    impl_->add(kMag, log_time, encode_magnetic_field(std::get<MagSample>(event)));
   }
 }
 

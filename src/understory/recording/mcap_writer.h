@@ -19,9 +19,10 @@ struct McapWriterOptions {
 
 // Writes the project's native recording: MCAP with ROS 2 messages (CDR), chunks with CRC, message
 // and chunk indexes, statistics and a summary, on the topics /lidar, /imu, /mag, /gnss,
-// /gnss/quality and /tf_static. A message's log time is its event_time: a scan's is its end.
+// /gnss/quality and /tf_static. A message's log time is its event_time (a scan's is its end) unless
+// another is given. Readers sort by it.
 //
-// Events are to be written in the order of their event_time; other orders are kept as they come.
+// Events are to be written in the order of their log times; other orders are kept as they come.
 // Every method throws OutputError if the file cannot be written (disk full, no permission). What
 // was written before stays readable: an unfinished file is read up to its last whole chunk. Not
 // thread-safe.
@@ -34,13 +35,13 @@ class McapWriter {
   McapWriter& operator=(const McapWriter&) = delete;
 
   // Goes out as /tf_static (body frame to each sensor whose place is known) before the next event.
+  // Again where a place becomes known later.
   void set_rig(const Rig& rig);
 
-  void write(const Scan& scan);
-  void write(const ImuSample& sample);
-  void write(const GnssFix& fix);  // /gnss/quality and /gnss
-  void write(const MagSample& sample);
-  void write(const Event& event);
+  void write(const Event& event);  // a fix goes to /gnss/quality and /gnss
+  // `log_time`: when the event was recorded, where a recording is copied. The order of arrival
+  // tells how the clocks of the sensors run (preprocess/stream_offset.h).
+  void write(const Event& event, TimeNs log_time);
 
   // Closes the last chunk, writes index and summary, and syncs the file to the disk.
   void finish();

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "understory/recording/arrival_times.h"
 #include "understory/recording/event_bytes.h"
 #include "understory/recording/extrinsics.h"
 #include "understory/recording/finding.h"
@@ -30,7 +31,7 @@ std::string_view bare_frame(std::string_view frame) {
   return frame;
 }
 
-class MessageRecording : public Recording {
+class MessageRecording : public Recording, public ArrivalTimes {
  public:
   MessageRecording(std::string file, const MessageSourceFactory& open, const OpenOptions& options,
                    Log& log)
@@ -38,7 +39,7 @@ class MessageRecording : public Recording {
     Log quiet;  // the same damage will be met again when reading
     const auto ahead = open(quiet);
     survey_ = survey_messages(*ahead);
-    survey_late_topics(*ahead, survey_);
+    survey_late_topics(*ahead, options, survey_);
     choice_ = choose_topics(survey_, options, file_, log_);
     if (!choice_.quality.empty()) fixes_.expect_quality();
     for (const TopicSurvey& topic : survey_.topics)
@@ -64,6 +65,7 @@ class MessageRecording : public Recording {
       }
       fixes_.pass_time(message.log_time, events_);
       take(message);
+      last_log_time_ = message.log_time;
     }
     if (events_.empty()) return std::nullopt;
     Event event = std::move(events_.front());
@@ -130,6 +132,7 @@ class MessageRecording : public Recording {
   }
   [[nodiscard]] std::string format() const override { return source_->format(); }
   [[nodiscard]] double progress() const override { return source_->progress(); }
+  [[nodiscard]] std::optional<TimeNs> arrival() const override { return last_log_time_; }
 
  private:
   void note_frames() {
@@ -469,6 +472,7 @@ class MessageRecording : public Recording {
   std::string imu_text_ = "m/s^2, rad/s (assumed)";
   std::map<std::string, TopicStatistics> topics_;
   std::deque<Event> events_;
+  std::optional<TimeNs> last_log_time_;  // of the message that the waiting events came with
   FixJoiner fixes_;
   std::unique_ptr<PacketTopic> packets_;
   bool ended_ = false;

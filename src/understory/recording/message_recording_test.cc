@@ -6,6 +6,7 @@
 
 #include "understory/recording/message_encode.h"
 #include "understory/recording/recording_test_support.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -102,6 +103,25 @@ TEST(MessageRecording, TakesTwoNamesOfOnePlaceForOneLidar) {
       "x.mcap", [&](Log&) { return std::make_unique<StoredSource>(messages); }, {}, log);
   EXPECT_EQ(read_all(*recording).size(), 60U);
   EXPECT_EQ(count_of(log, "recording.other_frames"), 0U) << all_warnings(log);
+}
+
+// Bug: without an index a sensor that begins late was refused where the user named its topic.
+TEST(MessageRecording, FindsANamedTopicThatBeginsLateWithoutAnIndex) {
+  std::vector<Stored> messages = two_lidars("rear_");
+  const auto imu = channel("/second/imu", "sensor_msgs/msg/Imu");
+  for (int i = 0; i < 10; ++i) {
+    ImuSample sample;
+    sample.stamp = kStart + 30'000'000'000LL + i * 10'000'000LL;
+    messages.push_back({imu, sample.stamp, bytes_of(encode_imu(sample))});
+  }
+  const auto open = [&](Log&) { return std::make_unique<StoredSource>(messages); };
+  OpenOptions options;
+  options.imu_topic = "/second/imu";
+  Log log;
+  const auto recording = open_messages("x.mcap", open, options, log);
+  EXPECT_EQ(read_all(*recording).size(), 40U);
+  options.imu_topic = "/third/imu";
+  EXPECT_THROW((void)open_messages("x.mcap", open, options, log), InputError);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -255,25 +256,45 @@ std::vector<StoredMessage> readable_messages(MessageSource& source, const Wanted
   }
 }
 
+void add_late_topic(const RawMessage& first, MessageSurvey& survey) {
+  if (survey.find(first.channel->topic) != nullptr) return;
+  MessageSurvey alone;
+  Surveyor(alone).add(first);
+  // One message says what it is and where it sits, not how its clock or its units are.
+  TopicSurvey& topic = alone.topics.front();
+  topic.clouds.clear();
+  topic.delays.clear();
+  topic.late = true;
+  survey.topics.push_back(std::move(topic));
+}
+
+// Where no index leads to a topic that the user names, the recording is read until it comes.
+void search_named_topics(MessageSource& source, const OpenOptions& options, MessageSurvey& survey) {
+  std::set<std::string> missing;
+  for (const std::string& name : {options.lidar_topic, options.imu_topic, options.gnss_topic}) {
+    if (!name.empty() && survey.find(name) == nullptr) missing.insert(name);
+  }
+  RawMessage message;
+  try {
+    while (!missing.empty() && source.next(message)) {
+      if (missing.erase(message.channel->topic) > 0) add_late_topic(message, survey);
+    }
+  } catch (const ReadError&) {
+    // Met again when it is read.
+  }
+}
+
 }  // namespace
 
-void survey_late_topics(MessageSource& source, MessageSurvey& survey) {
+void survey_late_topics(MessageSource& source, const OpenOptions& options, MessageSurvey& survey) {
   const auto wanted = [&](const MessageChannel& channel) {
     const TopicRole role = role_of(channel);
     return role != TopicRole::kIgnored && role != TopicRole::kTransforms &&
            survey.find(channel.topic) == nullptr;
   };
-  for (const StoredMessage& first : readable_messages(source, wanted, 1)) {
-    if (survey.find(first.channel->topic) != nullptr) continue;
-    MessageSurvey alone;
-    Surveyor(alone).add({first.channel, first.log_time, first.data});
-    // One message says what it is and where it sits, not how its clock or its units are.
-    TopicSurvey& topic = alone.topics.front();
-    topic.clouds.clear();
-    topic.delays.clear();
-    topic.late = true;
-    survey.topics.push_back(std::move(topic));
-  }
+  for (const StoredMessage& first : readable_messages(source, wanted, 1))
+    add_late_topic({first.channel, first.log_time, first.data}, survey);
+  search_named_topics(source, options, survey);
 }
 
 bool survey_late_transforms(MessageSource& source, MessageSurvey& survey) {

@@ -43,7 +43,7 @@ struct TopicSurvey {
   std::map<std::string, std::vector<CloudTimes>> clouds;  // of PointCloud2, by frame
   std::vector<TimeNs> delays;                             // log time - stamp
   double specific_force_sum = 0.0;                        // of norms, as they come
-  bool late = false;  // first seen behind the start, by the file's index
+  bool late = false;                                      // first seen behind the start
 };
 
 struct MessageSurvey {
@@ -56,9 +56,9 @@ struct MessageSurvey {
 // seconds have passed, never more than a minute or 256 MB.
 [[nodiscard]] MessageSurvey survey_messages(MessageSource& source);
 
-// Adds the topics of sensors that begin later, where the file's index leads to their first message:
-// name, role and frame, and that they are late.
-void survey_late_topics(MessageSource& source, MessageSurvey& survey);
+// Adds the topics of sensors that begin later: name, role and frame, and that they are late. They
+// are found by the file's index; without one, only those that the options name are, by reading on.
+void survey_late_topics(MessageSource& source, const OpenOptions& options, MessageSurvey& survey);
 
 // Adds the transforms that the file's index leads to. True if there were any.
 bool survey_late_transforms(MessageSource& source, MessageSurvey& survey);

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 
+#include "understory/recording/arrival_times.h"
 #include "understory/recording/byte_source.h"
 #include "understory/recording/event_bytes.h"
 #include "understory/recording/extrinsics.h"
@@ -26,7 +27,7 @@ constexpr int kFramesForPosition = 20'000;
 constexpr std::size_t kMostIgnored = 256;  // streams that are reported
 
 // What both kinds of sensor share: the walk through the file and the reports.
-class PcapRecording : public Recording {
+class PcapRecording : public Recording, public ArrivalTimes {
  public:
   PcapRecording(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar, Log& log)
       : log_(log), file_(std::move(file)), survey_(std::move(survey)), lidar_(lidar) {
@@ -45,6 +46,7 @@ class PcapRecording : public Recording {
         finish();
         continue;
       }
+      arrival_ = frame.stamp;
       if (frame.truncated) {
         log_.warn("recording.snapped", place(frame) + ": the capture cut a frame short");
       }
@@ -95,6 +97,7 @@ class PcapRecording : public Recording {
     return std::string(file_->is_pcapng() ? "PCAPNG" : "PCAP") + " (" + sensor() + ")";
   }
   double progress() const override { return file_->progress(); }
+  std::optional<TimeNs> arrival() const override { return arrival_; }
   std::vector<TopicReport> topics() const override {
     std::vector<TopicReport> reports{lidar_statistics_.report()};
     if (second_statistics_.report().messages > 0) reports.push_back(second_statistics_.report());
@@ -155,6 +158,7 @@ class PcapRecording : public Recording {
 
   UdpAssembler udp_;
   std::map<UdpStream, TopicStatistics> ignored_;
+  std::optional<TimeNs> arrival_;  // of the frame read last
   bool finished_ = false;
 };
 
