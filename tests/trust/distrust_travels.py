@@ -6,6 +6,7 @@ import gzip
 import json
 import math
 import random
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -170,8 +171,30 @@ def inventory(cloud, folder, *options):
     return program("inventory", cloud, "-o", folder / "inventory", "--overwrite", *options)
 
 
+def tilted(point, lean_deg, around_deg):
+    """As a scanner sees it whose axis leans by that, about a level axis in that direction."""
+    x, y, z = point
+    a, b = math.radians(around_deg), math.radians(lean_deg)
+    along, across = x * math.cos(a) + y * math.sin(a), y * math.cos(a) - x * math.sin(a)
+    across, z = across * math.cos(b) - z * math.sin(b), across * math.sin(b) + z * math.cos(b)
+    return along * math.cos(a) - across * math.sin(a), along * math.sin(a) + across * math.cos(a), z
+
+
 def listed(folder):
     return len(list(csv.DictReader((folder / "inventory" / "trees.csv").open())))
+
+
+@cases.case("a cloud in feet without a coordinate system")
+def feet(folder):
+    tall = [(x, y, z * (1 + 0.5 * (z > 2))) for x, y, z in cloud_of(stand(3))]
+    cloud = write_ply(folder / "feet.ply", [(x / 0.3048, y / 0.3048, z / 0.3048) for x, y, z in tall])
+    done = inventory(cloud, folder)
+    assert done.returncode == 4 and "usual for feet" in done.stderr and "--unit-m 0.3048" in done.stderr, done
+    told = json.loads((folder / "inventory" / "run.json").read_text())
+    assert told["status"] == "untrusted", told["reasons"]
+    for unit in (0.3048, 1):
+        done = inventory(cloud, folder, "--unit-m", unit)
+        assert "usual for feet" not in done.stderr and done.returncode in (0, 4), done
 
 
 @cases.case("a cloud in millimetres, or with another axis up")
@@ -192,6 +215,16 @@ def clouds(folder):
         assert done.returncode == 3 and f"--up {axis}" in done.stderr, (axis, done)
         done = inventory(cloud, folder, "--up", axis)
         assert done.returncode == 0 and abs(listed(folder) - upright) <= 2, (axis, listed(folder))
+    for lean, around in ((20, 30), (40, 200), (60, 300)):
+        cloud = write_ply(folder / "tilted.ply", [tilted(p, lean, around) for p in points])
+        done = inventory(cloud, folder)
+        up = re.search(r"--up=[-0-9.]+,[-0-9.]+,[-0-9.]+", done.stderr)
+        assert done.returncode == 3 and up and "stems lean" in done.stderr, (lean, done)
+        done = inventory(cloud, folder, up[0])
+        assert done.returncode == 0 and abs(listed(folder) - upright) <= 6, (lean, listed(folder), upright)
+    for wrong in ("up", "1,2", "0,0,0", "1,2,nan", "1,2,3,4"):
+        assert inventory(cloud, folder, f"--up={wrong}").returncode == 2, wrong
+    cloud = write_ply(folder / "turned.ply", [(x, -y, -z) for x, y, z in points])
     # Who says that it is right as it is, is believed.
     assert inventory(cloud, folder, "--up", "z").returncode in (0, 4)
     # The map of a run is not refused, but not trusted either.

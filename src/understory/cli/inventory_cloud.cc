@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <Eigen/Geometry>
 #include <cmath>
+#include <optional>
+#include <sstream>
 
 #include "understory/forest/cloud_shape.h"
 #include "understory/georeference/coordinate_system.h"
@@ -11,16 +13,40 @@
 namespace understory {
 namespace {
 
-UpAxis axis_of(const std::string& name) {
-  return *std::find_if(kUpAxes.begin(), kUpAxes.end(),
-                       [&](UpAxis axis) { return to_string(axis) == name; });
+// Three numbers; nothing if it is none of a direction.
+std::optional<Eigen::Vector3d> direction_of(const std::string& text) {
+  std::istringstream stream(text);
+  Eigen::Vector3d direction;
+  char comma = ',';
+  for (int i = 0; i < 3; ++i) {
+    if ((i > 0 && (!(stream >> comma) || comma != ',')) || !(stream >> direction[i]))
+      return std::nullopt;
+  }
+  const bool whole = stream.peek() == std::istringstream::traits_type::eof();
+  if (!whole || !direction.allFinite() || direction.norm() < 1e-6) return std::nullopt;
+  return direction.normalized();
+}
+
+// The rotation that makes this direction of the cloud's frame z; nothing if it names none.
+std::optional<Eigen::Matrix3d> upright_from(const std::string& up) {
+  for (const UpAxis axis : kUpAxes) {
+    if (to_string(axis) == up) return upright_from_cloud(axis);
+  }
+  const auto direction = direction_of(up);
+  if (!direction) return std::nullopt;
+  return Eigen::Quaterniond::FromTwoVectors(*direction, Eigen::Vector3d::UnitZ())
+      .toRotationMatrix();
+}
+
+std::string text_of(const Eigen::Vector3d& direction) {
+  return fmt::format("{:.3f},{:.3f},{:.3f}", direction.x(), direction.y(), direction.z());
 }
 
 void bring_upright(const CloudFrame& frame, const std::string& name, PointCloudFile& cloud,
                    Log& log) {
   const double unit = frame.unit_m > 0.0 ? frame.unit_m : 1.0;
   const Eigen::Matrix3d turn =
-      frame.up.empty() ? Eigen::Matrix3d::Identity() : upright_from_cloud(axis_of(frame.up));
+      frame.up.empty() ? Eigen::Matrix3d::Identity() : upright_from(frame.up).value();
   if (unit == 1.0 && turn.isIdentity()) return;
   const Eigen::Matrix3d change = unit * turn;
   cloud.origin = change * cloud.origin;
@@ -43,24 +69,32 @@ std::string system_complaint(const std::string& system) {
                      unit, std::abs(unit - 0.3048) < 1e-5 ? "feet" : "not metres", unit);
 }
 
-std::string doubt_of(const PointCloudFile& cloud, const std::string& system,
-                     const CloudFrame& frame) {
+// How to turn the cloud upright, as far as it is known.
+std::string up_advice(const CloudShape& shape) {
+  if (const auto axis = other_up_axis(shape)) return "give --up " + to_string(*axis);
+  if (const auto axis = leaning_axis(shape)) return "give --up=" + text_of(*axis);
+  return "level the cloud first";
+}
+
+std::string doubt_of(const CloudShape& shape, const std::string& system, const CloudFrame& frame) {
   if (frame.unit_m == 0.0) {
     if (std::string complaint = system_complaint(system); !complaint.empty()) return complaint;
   }
-  if (frame.unit_m > 0.0 && !frame.up.empty()) return {};
-  const CloudShape shape = shape_of(blocks_of(cloud));
   const std::string standing = frame.up.empty() ? up_complaint(shape) : "";
-  if (!standing.empty()) {
-    const auto axis = other_up_axis(shape);
-    return standing + (axis ? "; give --up " + to_string(*axis) : "; level the cloud first") +
-           ", or --up z if it is right as it is";
-  }
+  if (!standing.empty())
+    return standing + "; " + up_advice(shape) + " (--up z if it is right as it is)";
   const std::string unit = frame.unit_m == 0.0 ? unit_complaint(shape) : "";
   if (unit.empty()) return {};
   return unit +
          "; give --unit-m with the metres per unit (0.001 for millimetres, 0.01 for "
          "centimetres, 1 if it is right as it is)";
+}
+
+std::string suspicion_of(const CloudShape& shape, const std::string& system,
+                         const CloudFrame& frame) {
+  if (frame.unit_m > 0.0 || std::isfinite(metres_per_unit(system))) return {};
+  const std::string feet = feet_suspicion(shape);
+  return feet.empty() ? "" : feet + "; give --unit-m 0.3048 for feet, 1 if it is in metres";
 }
 
 }  // namespace
@@ -73,9 +107,12 @@ void add_cloud_frame_options(CLI::App& command, CloudFrame& frame) {
       ->check(CLI::Range(1e-6, 1e6));
   command
       .add_option("--up", frame.up,
-                  "The cloud's axis that points up (z if not given, and it is checked that it can "
-                  "be)")
-      ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}));
+                  "The cloud's direction that points up: x, y, z, -x, -y, -z or =X,Y,Z (z if not "
+                  "given, and it is checked that it can be)")
+      ->check([](const std::string& text) {
+        return upright_from(text) ? std::string()
+                                  : "expected x, y, z, -x, -y, -z or three numbers X,Y,Z";
+      });
 }
 
 PointBlocks blocks_of(const PointCloudFile& cloud) {
@@ -99,7 +136,10 @@ StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame
   stand.cloud = read_cloud(path.string(), log);
   const std::string system = stand.cloud.coordinate_system;
   bring_upright(frame, path.string(), stand.cloud, log);
-  stand.doubt = doubt_of(stand.cloud, system, frame);
+  if (frame.unit_m > 0.0 && !frame.up.empty()) return stand;
+  const CloudShape shape = shape_of(blocks_of(stand.cloud));
+  stand.doubt = doubt_of(shape, system, frame);
+  stand.suspicion = suspicion_of(shape, system, frame);
   return stand;
 }
 

@@ -13,7 +13,9 @@ namespace understory {
 // checked.
 struct CloudFrame {
   double unit_m = 0.0;  // metres per unit; 0: metres, if nothing speaks against it
-  std::string up;       // x, y, z, -x, -y, -z; empty: z, if nothing speaks against it
+  // The direction that is up: x, y, z, -x, -y, -z or three numbers "X,Y,Z"; empty: z, if nothing
+  // speaks against it.
+  std::string up;
 };
 void add_cloud_frame_options(CLI::App& command, CloudFrame& frame);
 
@@ -23,7 +25,8 @@ void add_cloud_frame_options(CLI::App& command, CloudFrame& frame);
 // A cloud in metres with z up, and why it may be none.
 struct StandCloud {
   PointCloudFile cloud;
-  std::string doubt;  // empty: none
+  std::string doubt;      // empty: none
+  std::string suspicion;  // that it is in feet; empty: none
 };
 // Reads a cloud and turns and scales it as `frame` says; then its coordinate system is dropped,
 // with a warning. Throws InputError where read_cloud does, and for a recording.

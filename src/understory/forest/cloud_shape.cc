@@ -31,6 +31,10 @@ constexpr double kClearly = 1.8;
 constexpr double kThinnest = 3.0;        // a slice has no ground
 constexpr double kThinnestShare = 0.02;  // of the longest side
 constexpr double kSteepestDeg = 50.0;
+constexpr double kLeastLeanDeg = 12.0;
+constexpr double kLeastGain = 1.42;
+constexpr double kLeastGainOverZ = 1.12;
+constexpr double kTallForMetres = 42.0;
 constexpr double kTallest = 150.0;
 constexpr double kTallestCentimetres = 4'500.0;
 constexpr double kMostAlone = 0.8;
@@ -155,7 +159,7 @@ double column_height_of(const Columns& columns) {
 }
 
 // Of the plane through the lowest points, fitted again to those near it.
-double slope_deg_of(const Columns& columns) {
+Eigen::Vector2d slope_of(const Columns& columns) {
   std::vector<Vector3d> lows;
   for (int row = 0; row < columns.along; ++row) {
     for (int column = 0; column < columns.across; ++column) {
@@ -163,7 +167,7 @@ double slope_deg_of(const Columns& columns) {
       if (std::isfinite(low)) lows.emplace_back(column * columns.cell, row * columns.cell, low);
     }
   }
-  if (lows.size() < kLeastSteps) return kNan;
+  if (lows.size() < kLeastSteps) return Eigen::Vector2d::Constant(kNan);
   Vector3d plane = Vector3d::Zero();  // z = a x + b y + c
   double width = std::numeric_limits<double>::infinity();
   constexpr int kRounds = 6;
@@ -184,7 +188,7 @@ double slope_deg_of(const Columns& columns) {
       off[i] = std::abs(lows[i].z() - Vector3d(lows[i].x(), lows[i].y(), 1.0).dot(plane));
     width = 2.5 * quantile(off, 0.5);
   }
-  return std::atan(plane.head<2>().norm()) * 180.0 / M_PI;
+  return plane.head<2>();
 }
 
 double alone_share_of(const std::vector<Vector3d>& points, double cube) {
@@ -202,6 +206,10 @@ double alone_share_of(const std::vector<Vector3d>& points, double cube) {
   for (const auto& [key, count] : cubes)
     alone += count == 1 ? 1 : 0;
   return points.empty() ? 0.0 : static_cast<double>(alone) / static_cast<double>(points.size());
+}
+
+double lean_deg(const Vector3d& axis) {
+  return std::acos(std::clamp(axis.z(), -1.0, 1.0)) * 180.0 / M_PI;
 }
 
 bool is_slice(const CloudShape& shape) {
@@ -249,6 +257,7 @@ CloudShape shape_of(const PointBlocks& cloud) {
   shape.points = points.size();
   shape.roughness.fill(kNan);
   shape.column_height = shape.ground_slope_deg = kNan;
+  shape.ground_slope.fill(kNan);
   if (points.size() < kLeastPoints) return shape;
   shape.extent = percentile(points, 0.998) - percentile(points, 0.002);
   // A sample of surfaces is as much sparser as if its cubes were smaller by the root.
@@ -263,7 +272,10 @@ CloudShape shape_of(const PointBlocks& cloud) {
     shape.roughness[k] = roughness_of(columns);
     if (kUpAxes[k] != UpAxis::kZ) continue;
     shape.column_height = column_height_of(columns);
-    shape.ground_slope_deg = slope_deg_of(columns);
+    shape.ground_slope = slope_of(columns);
+    shape.ground_slope_deg = std::atan(shape.ground_slope.norm()) * 180.0 / M_PI;
+    if (shape.ground_slope.allFinite())
+      shape.standing = standing_direction(points, shape.ground_slope);
   }
   return shape;
 }
@@ -281,10 +293,21 @@ std::optional<UpAxis> other_up_axis(const CloudShape& shape) {
   return clear ? std::optional(kUpAxes[best]) : std::nullopt;
 }
 
+std::optional<Eigen::Vector3d> leaning_axis(const CloudShape& shape) {
+  if (!shape.standing || is_slice(shape) || other_up_axis(shape)) return std::nullopt;
+  const StandingDirection& found = *shape.standing;
+  const bool clear = found.gain > kLeastGain && found.gain > kLeastGainOverZ * found.gain_of_z &&
+                     lean_deg(found.axis) > kLeastLeanDeg;
+  return clear ? std::optional(found.axis) : std::nullopt;
+}
+
 std::string up_complaint(const CloudShape& shape) {
   if (const auto axis = other_up_axis(shape))
     return fmt::format("z is not up: smooth ground lies below the points along {}, not along z",
                        to_string(*axis));
+  if (const auto axis = leaning_axis(shape))
+    return fmt::format("z is not up: all stems lean by {:.0f} degrees the same way",
+                       lean_deg(*axis));
   if (shape.roughness[0] < kSmooth && shape.ground_slope_deg > kSteepestDeg && !is_slice(shape))
     return fmt::format("z is not up: the ground is inclined by {:.0f} degrees",
                        shape.ground_slope_deg);
@@ -312,6 +335,12 @@ std::string unit_complaint(const CloudShape& shape) {
         "millimetres or centimetres",
         size, 100.0 * shape.alone_share);
   return {};
+}
+
+std::string feet_suspicion(const CloudShape& shape) {
+  if (!(shape.column_height > kTallForMetres) || !unit_complaint(shape).empty()) return {};
+  return fmt::format("points stand {:.0f} above the ground: tall for metres, usual for feet",
+                     shape.column_height);
 }
 
 }  // namespace understory

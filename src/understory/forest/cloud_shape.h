@@ -6,6 +6,7 @@
 #include <string>
 
 #include "understory/forest/ground.h"
+#include "understory/forest/standing_direction.h"
 
 namespace understory {
 
@@ -28,18 +29,25 @@ struct CloudShape {
   // From the lowest to the highest point of a column that holds more than nine tenths of the
   // others, less what the ground rises within it. NaN: too few columns.
   double column_height = 0.0;
-  double ground_slope_deg = 0.0;  // of the plane through the lowest points; NaN: unknown
-  double alone_share = 0.0;       // of points without another one in their cube of 3 units
+  // Of the plane through the lowest points, z = slope * (x, y) + constant; NaN: unknown.
+  Eigen::Vector2d ground_slope = Eigen::Vector2d::Zero();
+  double ground_slope_deg = 0.0;
+  double alone_share = 0.0;  // of points without another one in their cube of 3 units
+  std::optional<StandingDirection> standing;  // where the ground is known
 };
 // Deterministic; two runs through the cloud.
 [[nodiscard]] CloudShape shape_of(const PointBlocks& cloud);
 
 // The axis that is up, if that is clearly not z.
 [[nodiscard]] std::optional<UpAxis> other_up_axis(const CloudShape& shape);
+// The direction along which stems stand, if that is clearly not z: unit vector, cloud frame.
+[[nodiscard]] std::optional<Eigen::Vector3d> leaning_axis(const CloudShape& shape);
 // Why z is not up, in words for the user; empty: nothing speaks against it.
 [[nodiscard]] std::string up_complaint(const CloudShape& shape);
-// Why the unit cannot be the metre, what it looks like; empty: nothing speaks against it. Feet are
-// too near to the metre to be told from the shape.
+// Why the unit cannot be the metre, what it looks like; empty: nothing speaks against it.
 [[nodiscard]] std::string unit_complaint(const CloudShape& shape);
+// Why the unit may be the foot; empty: the stand is none that is tall for metres. There are trees
+// that are so tall: no reason to refuse a cloud.
+[[nodiscard]] std::string feet_suspicion(const CloudShape& shape);
 
 }  // namespace understory

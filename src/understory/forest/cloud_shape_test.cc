@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
 #include <vector>
@@ -87,9 +88,36 @@ TEST(CloudShape, OtherUnitsAreTold) {
   };
   EXPECT_NE(complaint(1000.0).find("millimetres"), std::string::npos);
   EXPECT_NE(complaint(100.0).find("centimetres"), std::string::npos);
-  EXPECT_EQ(complaint(1.0 / 0.3048), "");  // feet cannot be told
+  EXPECT_EQ(complaint(1.0 / 0.3048), "");  // feet are suspected at most
   const Eigen::Matrix3d degrees = Eigen::Vector3d(1e-5, 1e-5, 1.0).asDiagonal();
   EXPECT_NE(unit_complaint(shape_of(changed(points, degrees))).find("degrees"), std::string::npos);
+}
+
+TEST(CloudShape, FeetAreSuspectedWhereAStandIsTall) {
+  const auto suspicion = [&](double scale) {
+    return feet_suspicion(shape_of(changed(stand(), scale * Eigen::Matrix3d::Identity())));
+  };
+  EXPECT_EQ(suspicion(1.0), "");
+  EXPECT_NE(suspicion(1.0 / 0.3048).find("usual for feet"), std::string::npos);
+  EXPECT_EQ(suspicion(1000.0), "");  // refused already
+}
+
+// Scanners that stood aslant: the ground tells nothing below 50 degrees, the stems do.
+TEST(CloudShape, TheDirectionOfStemsTellsATiltedScanner) {
+  for (const double slope : {0.0, 0.3}) {
+    for (const double tilt : {20.0, 35.0, 60.0}) {
+      for (const double around : {0.2, 2.3}) {
+        const Eigen::Vector3d hinge(std::cos(around), std::sin(around), 0.0);
+        const Eigen::Matrix3d turn = Eigen::AngleAxisd(tilt * M_PI / 180.0, hinge).matrix();
+        const CloudShape shape = shape_of(changed(stand(slope), turn));
+        if (other_up_axis(shape)) continue;  // told already
+        const auto axis = leaning_axis(shape);
+        ASSERT_TRUE(axis.has_value()) << slope << ' ' << tilt << ' ' << around;
+        EXPECT_LT(std::acos(axis->dot(turn.col(2))) * 180.0 / M_PI, 4.0);
+        EXPECT_NE(up_complaint(shape).find("stems lean by"), std::string::npos);
+      }
+    }
+  }
 }
 
 TEST(CloudShape, ASliceHasNoGroundAndIsNoDefect) {

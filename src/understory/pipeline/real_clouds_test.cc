@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cstdlib>
 #include <filesystem>
 
@@ -71,6 +72,22 @@ TEST(RealClouds, TurnedOrScaledEachStandIsNoticed) {
     for (const double scale : {1000.0, 100.0})
       EXPECT_NE(unit_complaint(shape_of(blocks_of(cloud, scale * Eigen::Matrix3d::Identity()))), "")
           << name << " times " << scale;
+  }
+}
+
+// Those from aeroplanes (ALS, Chablais) show too few stems.
+TEST(RealClouds, StemsTellATiltedScanner) {
+  if (!fs::exists(data() / stands().front())) GTEST_SKIP();
+  for (const std::string& name : {stands()[0], stands()[1], stands()[3]}) {
+    Log log;
+    const PointCloudFile cloud = read_cloud((data() / name).string(), log);
+    for (const double tilt : {20.0, 40.0, 60.0}) {
+      const Eigen::Matrix3d turn =
+          Eigen::AngleAxisd(tilt * M_PI / 180.0, Eigen::Vector3d(0.6, 0.8, 0.0)).matrix();
+      const CloudShape shape = shape_of(blocks_of(cloud, turn));
+      EXPECT_NE(up_complaint(shape), "") << name << " tilted by " << tilt;
+      if (const auto axis = leaning_axis(shape)) EXPECT_GT(axis->dot(turn.col(2)), 0.995) << name;
+    }
   }
 }
 
