@@ -57,6 +57,24 @@ def no_lidar(folder):
     return outcome.said.strip().replace(str(folder), "")
 
 
+@cases.case("a lidar that is covered at first")
+def covered(folder):
+    """Nothing is adapted to a lidar of which nothing is known, and that is said."""
+    def blind(cloud):
+        cloud.points = bytearray()
+    spoilt = [edit_cloud(m, blind) if m.topic == "/lidar" and m.stamp < start + 10.5e9 else m for m in messages]
+    _, outcome = mapped(folder, spoilt)
+    assert outcome.code == 4 and "lidar.unknown" in outcome.warnings, (outcome.code, outcome.said)
+    assert not any("sparse" in change["why"] for change in outcome.run["adapted"]), outcome.run["adapted"]
+    message = outcome.warnings["lidar.unknown"]["message"]
+    assert "nothing was adapted" in message, message
+    (folder / "seen").mkdir()
+    _, outcome = mapped(folder / "seen", short)
+    assert "lidar.unknown" not in outcome.warnings, outcome.warnings
+    assert any("sparse" in change["why"] for change in outcome.run["adapted"]), outcome.run["adapted"]
+    return message.replace(str(folder), "")
+
+
 @cases.case("no IMU")
 def no_imu(folder):
     path, outcome = mapped(folder, [m for m in short if m.topic != "/imu"])

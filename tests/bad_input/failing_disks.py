@@ -3,9 +3,11 @@ was read so far is kept and can be gone on with; where nothing was, the exit cod
 that the program is made to load plays the disk."""
 
 import gzip
+import math
 import os
 import pathlib
 import re
+import shutil
 
 from program import Cases, good_recording, map_recording, program
 from recordings import write_bag, write_capture, write_db3, write_mcap
@@ -133,6 +135,32 @@ def settings(folder):
         refused(yaml, "map", good, "-o", folder / "run", *words)
     refused(yaml, "map", capture, "-o", folder / "other", "--metadata", yaml)
     return "exit 3 each"
+
+
+@cases.case("a terrain model")
+def terrain(folder):
+    """GDAL takes it for the end of the file, so the program reads the file itself before."""
+    assert program("map", good, "-o", folder / "mapped").returncode == 0
+    shutil.copy(truth / "dtm.tif", folder / "dem.tif")
+    heights = [[round(0.05 * column + math.sin(0.1 * row), 2) for column in range(300)] for row in range(300)]
+    (folder / "dem.asc").write_text("ncols 300\nnrows 300\nxllcorner -150\nyllcorner -150\ncellsize 1\n" +
+                                    "".join(" ".join(map(str, row)) + "\n" for row in heights))
+    (folder / "dem.xyz").write_text("".join(f"{column - 149.5} {149.5 - row} {heights[row][column]}\n"
+                                            for row in range(300) for column in range(300)))
+    said = []
+    for name in ("dem.tif", "dem.asc", "dem.xyz"):
+        words = ("georeference", folder / "mapped", "--method", "terrain", "--dem", folder / name, "--start", 0, 0, 0,
+                 "-o", folder / "run")
+        done = program(*words)
+        assert "cannot be read" not in done.stderr, done.stderr
+        shutil.rmtree(folder / "run", ignore_errors=True)
+        for share in (0.0, 0.5):
+            done = program(*words, env=failing(folder / name, share))
+            assert done.returncode == 3 and f"{folder / name}: " in done.stderr, (name, share, done.stderr)
+            assert "cannot be read: Input/output error" in done.stderr, (name, share, done.stderr)
+            assert not (folder / "run").exists()
+            said.append(done.stderr.strip().replace(str(folder), ""))
+    return said[1]
 
 
 cases.run()

@@ -7,12 +7,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <fstream>
 #include <limits>
 #include <string>
+#include <system_error>
+#include <vector>
 
 #include "understory/geometry/quiet_gdal.h"
 #include "understory/georeference/coordinate_system.h"
 #include "understory/util/error.h"
+#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
@@ -25,6 +30,7 @@ class TerrainFile {
  public:
   explicit TerrainFile(const std::filesystem::path& path) : path_(path.string()) {
     if (!std::filesystem::exists(path)) fail("expected a terrain model: no such file");
+    refuse_unreadable(false);
     dataset_.reset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY));
     if (dataset_ == nullptr || dataset_->GetRasterCount() < 1)
       fail("expected a terrain model (GeoTIFF, ESRI ASCII grid, XYZ on a regular grid)");
@@ -36,6 +42,21 @@ class TerrainFile {
 
   [[noreturn]] void fail(const std::string& expected) const {
     throw InputError(path_, "", expected);
+  }
+  // GDAL takes what the disk cannot read for the end of the file, or says no more than that it
+  // failed. Throws ReadError with the place. Large files are read to their end only after a
+  // failure.
+  void refuse_unreadable(bool failed) const {
+    constexpr std::uintmax_t kAlways = std::uintmax_t{1} << 30U;
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path_, error)) return;
+    if (!failed && std::filesystem::file_size(path_, error) > kAlways) return;
+    std::ifstream file(path_, std::ios::binary);
+    std::vector<char> buffer(std::size_t{1} << 20U);
+    std::uint64_t done = 0;
+    while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())))
+      done += buffer.size();
+    check_readable(file, path_, "at byte " + std::to_string(done));
   }
   // WKT, empty if none.
   [[nodiscard]] std::string system() const {
@@ -60,11 +81,17 @@ class TerrainFile {
     for (int line = 0; line < lines; ++line) {
       if (band->RasterIO(GF_Read, 0, line, 1, 1, &value, 1, 1, GDT_Float64, 0, 0, nullptr) !=
           CE_None)
-        fail(std::string("expected readable heights: ") + CPLGetLastErrorMsg());
+        fail_at(line);
     }
   }
 
  private:
+  [[noreturn]] void fail_at(int line) const {
+    refuse_unreadable(true);
+    throw InputError(path_, "line " + std::to_string(line + 1),
+                     std::string("expected readable heights: ") + CPLGetLastErrorMsg());
+  }
+
   std::string path_;
   GDALDatasetUniquePtr dataset_;
   std::array<double, 6> to_map_{};
@@ -112,7 +139,7 @@ Raster TerrainFile::read(const PlaneArea& area) const {
     const int in_file = begin + k;
     if (band->RasterIO(GF_Read, first_column, in_file, raster.columns, 1, line.data(),
                        raster.columns, 1, GDT_Float64, 0, 0, nullptr) != CE_None)
-      fail(std::string("expected readable heights: ") + CPLGetLastErrorMsg());
+      fail_at(in_file);
     for (int column = 0; column < raster.columns; ++column) {
       const double value = line[static_cast<std::size_t>(column)];
       if (!std::isfinite(value) || (has_no_data != 0 && value == no_data)) continue;
