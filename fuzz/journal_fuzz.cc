@@ -1,16 +1,16 @@
-#include <unistd.h>
-
+#include <algorithm>
 #include <filesystem>
-#include <string>
 
-#include "fuzz_input.h"
+#include "fuzz_folder.h"
 #include "understory/map/keyframe_clouds.h"
 #include "understory/map/keyframe_history.h"
 #include "understory/pipeline/journal.h"
 #include "understory/pipeline/view_journal.h"
-#include "understory/util/error.h"
 
 // The append-only files of a run: as they are, and with records whose checksums are right.
+//
+// Seeds are the .bin files of the runs that checkpoint_fuzz.cc names, cut to 4 kB, and their
+// records once more in the form that write_records reads.
 namespace understory {
 namespace {
 
@@ -20,24 +20,6 @@ class NoSink : public ViewSink {
   void on_view(const StemView& /*view*/, const SparseStep& /*step*/) override {}
   void on_fix(const GnssFix& /*fix*/) override {}
 };
-
-template <typename Work>
-void guarded(const Work& work) {
-  try {
-    work();
-  } catch (const InputError&) {
-  }
-}
-
-const std::filesystem::path& folder() {
-  static const std::filesystem::path path = [] {
-    const auto made = std::filesystem::temp_directory_path() /
-                      ("understory_journal_fuzz_" + std::to_string(::getpid()));
-    std::filesystem::create_directories(made);
-    return made;
-  }();
-  return path;
-}
 
 // Cuts the bytes into records, each as long as its first byte times `unit` says.
 RecordCount write_records(const std::filesystem::path& path, RecordFile::Bytes bytes,
@@ -55,18 +37,19 @@ void read_as_it_is(const std::filesystem::path& path, RecordFile::Bytes bytes) {
   RecordCount known{bytes.size() > 2 ? bytes[1] : 1U, bytes.size(), 0};
   { RecordFile(path).append({bytes}); }
   std::filesystem::resize_file(path, bytes.size());
-  guarded([&] { for_each_record(path, known, [](std::uint64_t, RecordFile::Bytes) {}); });
-  guarded([&] { const RecordFile file(path, known); });
+  expect_input_error_at_most(
+      [&] { for_each_record(path, known, [](std::uint64_t, RecordFile::Bytes) {}); });
+  expect_input_error_at_most([&] { const RecordFile file(path, known); });
 }
 
 void read_records(const std::filesystem::path& path, RecordFile::Bytes bytes) {
   const RecordCount known = write_records(path, bytes, 8);
-  guarded([&] { Journal(path, known).for_each([](const ScanRecord&) {}); });
-  guarded([&] {
+  expect_input_error_at_most([&] { Journal(path, known).for_each([](const ScanRecord&) {}); });
+  expect_input_error_at_most([&] {
     NoSink sink;
     const ViewJournal journal(path, known, sink);
   });
-  guarded([&] {
+  expect_input_error_at_most([&] {
     const KeyframeClouds clouds(path, known);
     for (std::size_t i = 0; i < clouds.size(); ++i)
       (void)clouds.read(i);
@@ -75,15 +58,15 @@ void read_records(const std::filesystem::path& path, RecordFile::Bytes bytes) {
 
 void read_history(RecordFile::Bytes bytes) {
   BinaryWriter state;
-  state.put(write_records(folder() / "keyframes.bin", bytes, 8));
+  state.put(write_records(fuzz_folder() / "keyframes.bin", bytes, 8));
   state.put(std::uint64_t{1});
-  state.put(write_records(folder() / "poses.1.bin", bytes, 56));
-  guarded([&] {
+  state.put(write_records(fuzz_folder() / "poses.1.bin", bytes, 56));
+  expect_input_error_at_most([&] {
     BinaryReader reader(state.bytes(), "fuzz");
     KeyframeGrowth growth;
-    const KeyframeHistory history(folder(), reader, growth);
+    const KeyframeHistory history(fuzz_folder(), reader, growth);
   });
-  guarded([&] {
+  expect_input_error_at_most([&] {
     BinaryReader reader({bytes.begin(), bytes.end()}, "fuzz");
     (void)get_insertions(reader, 100);
   });
@@ -95,7 +78,7 @@ void read_history(RecordFile::Bytes bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace understory;
   const RecordFile::Bytes bytes(data, size);
-  const std::filesystem::path path = folder() / "records";
+  const std::filesystem::path path = fuzz_folder() / "records";
   read_as_it_is(path, bytes);
   read_records(path, bytes);
   read_history(bytes);
