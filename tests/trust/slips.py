@@ -37,6 +37,27 @@ def unknown(folder):
     assert program("--version").returncode == 0
 
 
+@cases.case("an unknown option is named, and the nearest one proposed")
+def options(folder):
+    for command, typed, meant in (("map", "--sett", "--set"), ("map", "--overwirte", "--overwrite"),
+                                  ("convert", "--compresion=lz4", "--compression"), ("map", "--thread", "--threads")):
+        done = program(command, "x.mcap", "-o", folder / "run", typed, "a=b")
+        assert done.returncode == 2 and done.stderr.startswith("error: "), done
+        assert f"'{typed.split('=')[0]}'" in done.stderr and f"did you mean '{meant}'" in done.stderr, done
+    done = program("map", "x.mcap", "y.mcap", "z.mcap")
+    assert done.returncode == 2 and "z.mcap" in done.stderr, done
+
+
+@cases.case("files that are not there are said to be missing")
+def missing(folder):
+    gone = folder / "gone"
+    for words in (("inventory", gone, "-o", gone), ("evaluate", gone, gone), ("correct", gone, "-o", folder / "run"),
+                  ("info", gone), ("map", gone, "-o", folder / "run")):
+        done = program(*words)
+        assert done.returncode == 3 and f"{gone}: no such file or folder" in done.stderr, done
+        assert not gone.exists() and not (folder / "run").exists()
+
+
 @cases.case("map of a cloud and inventory of a recording point to each other")
 def other_way(folder):
     cloud = folder / "plot.ply"

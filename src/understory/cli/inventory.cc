@@ -40,6 +40,7 @@ struct InventoryOptions {
 fs::path cloud_of(const std::string& given) {
   refuse_recording(given);
   fs::path path(given);
+  if (!fs::exists(path)) throw InputError(given, "", "no such file or folder");
   return fs::is_directory(path) ? path / "map.laz" : path;
 }
 
@@ -125,6 +126,8 @@ RunSummary report_on(const InventoryOptions& options, const std::string& config,
   summary.inputs.push_back(hash_input(stock.path));
   if (!stock.stand.doubt.empty())
     inherit({RunStatus::kUntrusted, {stock.stand.doubt}}, summary.status, summary.reasons);
+  if (!stock.stand.suspicion.empty() && !stock.of_run)
+    inherit({RunStatus::kUntrusted, {stock.stand.suspicion}}, summary.status, summary.reasons);
   inherit(trust_of_run(options.cloud, true), summary.status, summary.reasons);
   for (const std::string& remark : inventory.remarks)
     log.info(remark);

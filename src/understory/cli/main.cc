@@ -77,6 +77,30 @@ std::string unknown_command(const CLI::App& app, int argc, char** argv) {
   return {};
 }
 
+// The first option that the command does not have, and the nearest one that it has; empty if each
+// is known.
+std::string unknown_option(const CLI::App& app, int argc, char** argv) {
+  const auto chosen = app.get_subcommands();
+  const CLI::App& command = chosen.empty() ? app : *chosen.front();
+  std::vector<std::string> names;
+  for (const CLI::App* each : {&app, &command}) {
+    for (const CLI::Option* option : each->get_options()) {
+      for (const std::string& name : option->get_lnames())
+        names.push_back("--" + name);
+    }
+  }
+  for (int k = 1; k < argc; ++k) {
+    const std::string word = std::string(argv[k]).substr(0, std::string(argv[k]).find('='));
+    if (word.rfind("--", 0) != 0 || std::find(names.begin(), names.end(), word) != names.end())
+      continue;
+    const std::string meant = nearest_word(word, names);
+    return command.get_name() + " has no option '" + word + "'" +
+           (meant.empty() ? "" : "; did you mean '" + meant + "'?") + " (understory " +
+           command.get_name() + " --help)";
+  }
+  return {};
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Lidar SLAM and tree mapping under the forest canopy", "understory"};
   app.set_version_flag("--version", kVersion);
@@ -107,6 +131,11 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     check_finite(app);
+  } catch (const CLI::ExtrasError& error) {
+    const std::string complaint = unknown_option(app, argc, argv);
+    if (!complaint.empty()) return complain(kExitUsage, complaint);
+    (void)app.exit(error);
+    return kExitUsage;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kExitDone : kExitUsage;
   }

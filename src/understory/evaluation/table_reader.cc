@@ -35,6 +35,7 @@ struct LineReader::Stream {
 
 LineReader::LineReader(const std::filesystem::path& path)
     : path_(path), stream_(std::make_unique<Stream>()) {
+  if (!std::filesystem::exists(path)) throw InputError(path.string(), "", "no such file or folder");
   if (!std::filesystem::is_regular_file(path)) {
     throw InputError(path.string(), "", "expected a file that can be read");
   }

@@ -46,11 +46,11 @@ class Judge {
   void judge_ending() {
     if (!evidence_.unreadable.empty()) {
       missing("the recording could not be read any further: " + evidence_.unreadable +
-              "; once it can be, go on with `understory map --resume`");
+              "; once it can be, go on with `understory map --resume RUN`");
     } else if (evidence_.stopped) {
       missing(
           "stopped by the user before the end of the recording; go on with "
-          "`understory map --resume`");
+          "`understory map --resume RUN`");
     }
     if (evidence_.cut_off) {
       missing("the recording is cut off; what came after is missing: " + evidence_.where_cut_off);

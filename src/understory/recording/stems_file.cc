@@ -48,6 +48,7 @@ constexpr std::array<std::string_view, kColumns> kNames = {
 class GzipLines {
  public:
   explicit GzipLines(const std::filesystem::path& path) : file_(path.string()) {
+    if (!std::filesystem::exists(path)) fail("no such file or folder");
     if (!std::filesystem::is_regular_file(path)) fail("expected a file that can be read");
     stream_ = gzopen(path.c_str(), "rb");
     if (stream_ == nullptr) fail("expected a file that can be read");
