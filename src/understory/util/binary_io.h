@@ -38,7 +38,7 @@ class BinaryWriter {
 };
 
 // Reads what BinaryWriter wrote, in the same order. Throws InputError (naming `origin` and the
-// byte) where the bytes end too early.
+// byte) where the bytes end too early, or hold no bool where one belongs.
 class BinaryReader {
  public:
   BinaryReader(std::string bytes, std::string origin)
@@ -47,9 +47,13 @@ class BinaryReader {
   template <typename T>
   requires std::is_trivially_copyable_v<T>
   [[nodiscard]] T get() {
-    T value;
-    std::memcpy(static_cast<void*>(&value), take(sizeof(T)), sizeof(T));
-    return value;
+    if constexpr (std::is_same_v<T, bool>) {
+      return get_bool();
+    } else {
+      T value;
+      std::memcpy(static_cast<void*>(&value), take(sizeof(T)), sizeof(T));
+      return value;
+    }
   }
   [[nodiscard]] std::string get_string() {
     const auto size = get<std::uint64_t>();
@@ -71,8 +75,14 @@ class BinaryReader {
   [[nodiscard]] bool at_end() const { return position_ == bytes_.size(); }
 
  private:
-  [[noreturn]] void fail() const {
-    throw InputError(origin_, "at byte " + std::to_string(position_), "ends too early");
+  [[noreturn]] void fail(const std::string& why = "ends too early") const {
+    throw InputError(origin_, "at byte " + std::to_string(position_), why);
+  }
+  // Any other byte in a bool has no defined meaning.
+  bool get_bool() {
+    const auto byte = static_cast<unsigned char>(*take(1));
+    if (byte > 1) fail("expected 0 or 1, found " + std::to_string(byte));
+    return byte == 1;
   }
   const char* take(std::uint64_t size) {
     if (size > bytes_.size() - position_) fail();

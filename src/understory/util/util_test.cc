@@ -136,6 +136,14 @@ TEST(BinaryIo, TruncatedBytesAreAnInputErrorAtEveryLength) {
   }
 }
 
+// Found by fuzzing: a byte of 50 in a bool is neither true nor false.
+TEST(BinaryIo, ABoolIsZeroOrOne) {
+  BinaryReader reader(std::string("\x01\x00\x32", 3), "state");
+  EXPECT_TRUE(reader.get<bool>());
+  EXPECT_FALSE(reader.get<bool>());
+  EXPECT_THROW((void)reader.get<bool>(), InputError);
+}
+
 TEST(Timing, DistributionUsesNearestRanks) {
   std::vector<double> values;
   for (int i = 100; i >= 1; --i)
