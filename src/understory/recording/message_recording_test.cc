@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "understory/recording/message_encode.h"
@@ -103,6 +104,29 @@ TEST(MessageRecording, TakesTwoNamesOfOnePlaceForOneLidar) {
       "x.mcap", [&](Log&) { return std::make_unique<StoredSource>(messages); }, {}, log);
   EXPECT_EQ(read_all(*recording).size(), 60U);
   EXPECT_EQ(count_of(log, "recording.other_frames"), 0U) << all_warnings(log);
+}
+
+// Bug: a transform that came after the survey was never used.
+TEST(MessageRecording, UsesATransformThatComesAfterTheFirstScans) {
+  std::vector<Stored> messages = two_lidars("front");
+  const auto imu = channel("/imu", "sensor_msgs/msg/Imu");
+  for (int i = 0; i < 900; ++i) {
+    ImuSample sample;
+    sample.stamp = kStart + i * 10'000'000LL;
+    messages.push_back({imu, sample.stamp, bytes_of(encode_imu(sample))});
+  }
+  const std::vector<NamedTransform> late = {{"front", "imu", Pose()}};
+  messages.push_back({channel("/tf_static", "tf2_msgs/msg/TFMessage"), kStart + 8'000'000'000LL,
+                      bytes_of(encode_transforms(late, kStart))});
+  std::stable_sort(messages.begin(), messages.end(),
+                   [](const Stored& a, const Stored& b) { return a.log_time < b.log_time; });
+  Log log;
+  const auto recording = open_messages(
+      "x.mcap", [&](Log&) { return std::make_unique<StoredSource>(messages); }, {}, log);
+  EXPECT_FALSE(recording->rig().body_from_imu.has_value());
+  (void)read_all(*recording);
+  EXPECT_TRUE(recording->rig().body_from_imu.has_value()) << all_warnings(log);
+  EXPECT_EQ(count_of(log, "recording.late_extrinsics"), 1U) << all_warnings(log);
 }
 
 // Bug: without an index a sensor that begins late was refused where the user named its topic.
