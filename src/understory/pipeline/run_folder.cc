@@ -195,7 +195,7 @@ fs::path RunFolder::work() const {
 }
 
 fs::path RunFolder::begin_results() const {
-  const fs::path results = results_in(work());
+  fs::path results = results_in(work());
   std::error_code error;
   fs::remove_all(results, error);
   if (!error) fs::create_directory(results, error);
