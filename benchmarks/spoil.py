@@ -347,6 +347,11 @@ class Way:
     spoil: object
     cause: str  # a word of which one at least stands in the reason that names the cause (|-separated)
     imu: str = "with"  # "with", "without", "both": recordings it is done to
+    withstood: bool = False  # made no wrong map of the seeds 1 and 2
+
+    @property
+    def of_imu_alone(self):
+        return self.name.startswith(("IMU", "gyroscope", "accelerometer"))
 
 
 IMU_WORDS = "gyroscope|accelerometer|IMU|specific force|gravity"
@@ -360,7 +365,8 @@ WAYS = [
     Way("folder of every 20th cloud, 10 Hz assumed", _assumed_times(20), "assumed"),
     Way("folder of every 10th cloud, 10 Hz assumed", _assumed_times(10), "assumed"),
     Way("folder of every 5th cloud, 10 Hz assumed", _assumed_times(5), "assumed"),
-    Way("lidar's clock twice as fast", _scaled_times(2.0), TIME_WORDS),
+    Way("lidar's clock twice as fast", _scaled_times(2.0), TIME_WORDS,
+        withstood=True),
     Way("lidar's clock half as fast", _scaled_times(0.5), TIME_WORDS),
     Way("scans shuffled among 5", _shuffled_times(5), TIME_WORDS + "|" + MATCH_WORDS, "both"),
     Way("scans shuffled among 20", _shuffled_times(20), TIME_WORDS + "|" + MATCH_WORDS, "both"),
@@ -371,20 +377,27 @@ WAYS = [
     Way("times of points all zero", _point_times(lambda t: 0 * t),
         "times of points|time per point", "both"),
     Way("IMU's clock off by 0.1 s", _imu_clock(0.1), "clock|" + IMU_WORDS),
-    Way("IMU's clock off by 0.3 s", _imu_clock(0.3), "clock|" + IMU_WORDS),
+    Way("IMU's clock off by 0.3 s", _imu_clock(0.3), "clock|" + IMU_WORDS,
+        withstood=True),
     Way("IMU's clock off by 1 s", _imu_clock(1.0), "clock|" + IMU_WORDS),
-    Way("IMU's x and y swapped", _imu_turned(AXES_SWAPPED), IMU_WORDS),
-    Way("IMU turned by 90 degrees", _imu_turned(turn((0, 0, 1.0), 90)), IMU_WORDS),
+    Way("IMU's x and y swapped", _imu_turned(AXES_SWAPPED), IMU_WORDS,
+        withstood=True),
+    Way("IMU turned by 90 degrees", _imu_turned(turn((0, 0, 1.0), 90)), IMU_WORDS,
+        withstood=True),
     Way("IMU turned by 180 degrees", _imu_turned(turn((1.0, 0, 0), 180)), IMU_WORDS),
     Way("gyroscope in degrees per second", _imu_scaled(180 / math.pi, 1.0), IMU_WORDS),
     Way("accelerometer in g, gyroscope in degrees", _imu_scaled(180 / math.pi, 1 / 9.81),
         IMU_WORDS),
     Way("IMU repeats one sample from a third on", _imu_frozen(0.33), IMU_WORDS),
-    Way("IMU of ten times the noise and more", _imu_noise(0.5, 5.0), IMU_WORDS),
-    Way("gyroscope that drifts by 20 degrees a second", _imu_drift(0.35), IMU_WORDS),
+    Way("IMU of ten times the noise and more", _imu_noise(0.5, 5.0), IMU_WORDS,
+        withstood=True),
+    Way("gyroscope that drifts by 20 degrees a second", _imu_drift(0.35), IMU_WORDS,
+        withstood=True),
     Way("IMU of another carrier", _imu_of("other"), IMU_WORDS),
-    Way("lidar's extrinsics wrong by 10 degrees", _lidar_turned(10), IMU_WORDS + "|mounted"),
-    Way("lidar's extrinsics wrong by 45 degrees", _lidar_turned(45), IMU_WORDS + "|mounted"),
+    Way("lidar's extrinsics wrong by 10 degrees", _lidar_turned(10), IMU_WORDS + "|mounted",
+        withstood=True),
+    Way("lidar's extrinsics wrong by 45 degrees", _lidar_turned(45), IMU_WORDS + "|mounted",
+        withstood=True),
     Way("lidar's extrinsics wrong by 180 degrees", _lidar_turned(180), IMU_WORDS + "|mounted"),
     Way("lever arm wrong by 3 m", _lidar_moved(3.0), "lever|" + IMU_WORDS),
     Way("every 5th scan", _thinned(5), MATCH_WORDS + "|speed|apart", "both"),
@@ -408,6 +421,10 @@ WAYS = [
     Way("ranges 1 m too long", _range_bias(1.0), IMU_WORDS + "|" + MATCH_WORDS + "|scale|unit"),
     Way("lidar slips in its mount", _half_turned(0.5), MATCH_WORDS + "|" + IMU_WORDS, "both"),
 ]
+
+
+# Real clouds that were thinned out: of every 57, one is there.
+APART = Way("real clouds 5.6 s apart (Newer College)", None, "apart|matched|found few")
 
 
 def write_folder(path, walk):

@@ -102,6 +102,9 @@ def degrees(folder):
     told = outcome.warnings["imu.degrees"]
     assert "degrees per second" in told["message"] and told["count"] > 100, told
     assert "degrees per second" in outcome.said, outcome.said
+    assert outcome.run["status"] != "complete", outcome.run["status"]
+    reasons = outcome.run["reasons"]
+    assert any("degrees per second" in reason for reason in reasons), reasons
 
 
 @cases.case("wall_s is that of all the run, and that of an inventory of it too")

@@ -28,24 +28,37 @@ InertialSample interpolate_samples(const InertialSample& a, const InertialSample
 
 }  // namespace
 
+SampleDefect defect_of(const ImuSample& sample, const ImuNoiseConfig& config) {
+  if (!sample.angular_rate.allFinite() || !sample.specific_force.allFinite())
+    return SampleDefect::kNotFinite;
+  const double range = config.gyro_range_deg_s * std::numbers::pi / 180.0;
+  // No sensor tells of twice its range.
+  if (sample.angular_rate.norm() > 2.0 * range) return SampleDefect::kDegrees;
+  if (sample.angular_rate.cwiseAbs().maxCoeff() > range ||
+      sample.specific_force.cwiseAbs().maxCoeff() > config.accel_range_m_s2)
+    return SampleDefect::kSaturated;
+  return SampleDefect::kNone;
+}
+
 bool ImuBuffer::acceptable(const ImuSample& sample) {
   const std::string at = " at " + format_seconds(sample.stamp) + " s";
   const auto warn = [&](const std::string& key, const std::string& message) {
     if (log_ != nullptr) log_->warn(key, message + at);
     return false;
   };
-  if (!sample.angular_rate.allFinite() || !sample.specific_force.allFinite())
-    return warn("imu.not_finite", "IMU sample that is not a number dropped");
-  const double degree = std::numbers::pi / 180.0;
-  // No sensor tells of twice its range.
-  if (sample.angular_rate.norm() > 2.0 * config_.gyro_range_deg_s * degree)
-    return warn("imu.degrees",
-                "IMU sample with an angular rate of " +
-                    std::to_string(std::lround(sample.angular_rate.norm())) +
-                    " rad/s dropped: probably degrees per second where rad/s are expected");
-  if (sample.angular_rate.cwiseAbs().maxCoeff() > config_.gyro_range_deg_s * degree ||
-      sample.specific_force.cwiseAbs().maxCoeff() > config_.accel_range_m_s2)
-    return warn("imu.saturated", "IMU sample beyond the range of the sensor dropped");
+  switch (defect_of(sample, config_)) {
+    case SampleDefect::kNone:
+      break;
+    case SampleDefect::kNotFinite:
+      return warn("imu.not_finite", "IMU sample that is not a number dropped");
+    case SampleDefect::kDegrees:
+      return warn("imu.degrees",
+                  "IMU sample with an angular rate of " +
+                      std::to_string(std::lround(sample.angular_rate.norm())) +
+                      " rad/s dropped: probably degrees per second where rad/s are expected");
+    case SampleDefect::kSaturated:
+      return warn("imu.saturated", "IMU sample beyond the range of the sensor dropped");
+  }
   if (last_stamp_ && sample.stamp == *last_stamp_)
     return warn("imu.duplicate", "IMU sample with a repeated stamp dropped");
   if (last_stamp_ && sample.stamp < *last_stamp_)

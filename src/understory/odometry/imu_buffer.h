@@ -9,6 +9,15 @@
 
 namespace understory {
 
+// Why a sample of an IMU cannot be used by itself.
+enum class SampleDefect {
+  kNone,
+  kNotFinite,
+  kDegrees,   // more than twice the sensor's range: degrees per second, no radians
+  kSaturated  // at the end of the sensor's range
+};
+[[nodiscard]] SampleDefect defect_of(const ImuSample& sample, const ImuNoiseConfig& config);
+
 // Checked IMU samples in order of time, as long as somebody needs them. Not thread-safe.
 class ImuBuffer {
  public:

@@ -14,6 +14,19 @@ ImuTrust ImuWatch::trust() const {
   return trust;
 }
 
+namespace {
+
+MotionScale::Drive drive_of(const std::vector<InertialSample>& samples,
+                            const Eigen::Quaterniond& world_from_imu) {
+  ImuState state;
+  state.world_from_imu = Pose(world_from_imu, Eigen::Vector3d::Zero());
+  for (std::size_t i = 1; i < samples.size(); ++i)
+    state = step_state(state, samples[i - 1], samples[i], Eigen::Vector3d::Zero());
+  return {state.velocity, state.world_from_imu.translation()};
+}
+
+}  // namespace
+
 template <class Change>
 void ImuWatch::change_standing(TimeNs now, const Change& change) {
   const bool was_trusted = monitor_.trust().trusted;
@@ -50,7 +63,7 @@ void ImuWatch::compare(const ImuMatch& from, const ImuMatch& to,
   compared_ = to.stamp;
   const Eigen::Vector3d force = mean_force(samples);
   scale_.add(to.world_from_imu.translation() - from.world_from_imu.translation(),
-             first.slerp(0.5, second) * force, duration);
+             drive_of(samples, first), duration);
   change_standing(to.stamp, [&] {
     monitor_.add_turn(so3_log(first.conjugate() * second), raw_turn(samples), turning(samples),
                       duration);

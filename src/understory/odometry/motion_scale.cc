@@ -10,13 +10,12 @@ constexpr double kWindowS = 0.29;  // three scans at 10 Hz
 
 }  // namespace
 
-void MotionScale::add(const Eigen::Vector3d& step, const Eigen::Vector3d& force,
-                      double duration_s) {
+void MotionScale::add(const Eigen::Vector3d& step, const Drive& drive, double duration_s) {
   if (!(duration_s > 0.0)) return;
   window_.moved += step;
-  window_.swept += (speed_ + 0.5 * duration_s * force) * duration_s;
+  window_.swept += speed_ * duration_s + drive.way;
   window_.time_s += duration_s;
-  speed_ += force * duration_s;
+  speed_ += drive.speed;
   if (window_.time_s >= kWindowS) close_window();
 }
 

@@ -12,9 +12,14 @@ namespace understory {
 // are constant in them and taken out. Not thread-safe.
 class MotionScale {
  public:
+  // What the specific force alone, turned into the world, does over a step that begins at rest.
+  struct Drive {
+    Eigen::Vector3d speed = Eigen::Vector3d::Zero();  // gained, m/s
+    Eigen::Vector3d way = Eigen::Vector3d::Zero();    // m
+  };
   // From one match to the next, in order and without a pause between calls: the step in the world,
-  // metres; the mean specific force turned into the world, m/s^2; s.
-  void add(const Eigen::Vector3d& step, const Eigen::Vector3d& force, double duration_s);
+  // metres; what the force does in it; s.
+  void add(const Eigen::Vector3d& step, const Drive& drive, double duration_s);
   // What comes next does not follow what came last.
   void interrupt();
 

@@ -11,6 +11,7 @@
 #include "understory/odometry/sparse_odometry.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/felling.h"
+#include "understory/pipeline/imu_hearing.h"
 #include "understory/pipeline/path_evidence.h"
 #include "understory/pipeline/run_judgement.h"
 #include "understory/pipeline/stem_correction.h"
@@ -54,11 +55,12 @@ struct SparseScans {
   bool stopped = false;               // before the recording's end
   EventOrderer::Report time_repair;   // of its events
   TimeNs last_scan_end = 0;
-  std::uint64_t repeated = 0;    // scans that hold the same points as the one before
-  TimeNs imu_without_place = 0;  // time of its samples before its extrinsics were known
-  bool imu_wanted = true;        // by the configuration
-  std::string unreadable;        // why it could not be read to its end; else the user stopped
-  std::string imu_distrust;      // why its IMU is not believed; empty: it is, or there is none
+  std::uint64_t repeated = 0;  // scans that hold the same points as the one before
+  ImuHearing imu_hearing;      // for how long the IMU's samples could not be used
+  ImuTrust imu_trust;          // whether they agree with the stems
+  bool imu_wanted = true;      // by the configuration
+  std::string unreadable;      // why it could not be read to its end; else the user stopped
+  std::string imu_distrust;    // why its IMU is not believed; empty: it is, or there is none
   std::optional<RealtimeFacts> realtime;
 };
 

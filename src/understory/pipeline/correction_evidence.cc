@@ -59,7 +59,7 @@ void gather_recording(const CorrectionRequest& request, const Log& log, RunEvide
   reading.log = &log;
   reading.last_scan_end = scans.last_scan_end;
   reading.imu_wanted = scans.imu_wanted;
-  reading.imu_without_place = scans.imu_without_place;
+  reading.imu_hearing = scans.imu_hearing;
   gather_reading(reading, evidence);
   if (scans.realtime) evidence.dropped_scans = scans.realtime->dropped_scans;
   evidence.stopped = evidence.stopped || scans.stopped;
@@ -67,6 +67,7 @@ void gather_recording(const CorrectionRequest& request, const Log& log, RunEvide
   evidence.imu_used = scans.imu_wanted && scans.source->rig().body_from_imu.has_value() &&
                       scans.imu_distrust.empty();
   evidence.imu_distrust = scans.imu_distrust;
+  gather_motion_scale(scans.imu_trust, evidence);
   evidence.match.scans = scans.path.size();
   evidence.match.repeated = scans.repeated;
   evidence.match.smear_m = mean_smear_m(scans.path);

@@ -49,10 +49,15 @@ std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicRep
   constexpr double kNoticeableS = 0.1;
   std::string why;
   const auto add = [&](const std::string& what) { why += (why.empty() ? "" : "; ") + what; };
-  if (facts.imu_without_place > 0) {
+  if (facts.imu_hearing.without_place() > 0) {
     add(fmt::format(
         "nothing tells where it sits on the carrier for {:.1f} s; give --extrinsics FILE",
-        to_seconds(facts.imu_without_place)));
+        to_seconds(facts.imu_hearing.without_place())));
+  }
+  if (facts.imu_hearing.unusable() > 0) {
+    add(fmt::format(
+        "its samples are not numbers or beyond its range for {:.1f} s (degrees per second?)",
+        to_seconds(facts.imu_hearing.unusable())));
   }
   const TopicReport* imu = topic_of(topics, "imu");
   const TopicReport* lidar = topic_of(topics, "lidar");
@@ -100,28 +105,31 @@ void gather_findings(const Log& log, RunEvidence& evidence) {
 }  // namespace
 
 void gather_reading(const ReadingFacts& facts, RunEvidence& evidence) {
-  const auto& streams = facts.time_repair->streams;
-  evidence.lidar = sensor_of(streams[EventOrderer::kLidar]);
-  evidence.imu = sensor_of(streams[EventOrderer::kImu]);
-  evidence.gnss = sensor_of(streams[EventOrderer::kGnss]);
-  evidence.mag = sensor_of(streams[EventOrderer::kMag]);
+  static_assert(kSensorRoles.size() == EventOrderer::kStreams);
   const std::vector<TopicReport> topics = facts.source->topics();
-  const std::pair<const char*, SensorEvidence*> sensors[] = {{"lidar", &evidence.lidar},
-                                                             {"imu", &evidence.imu},
-                                                             {"gnss", &evidence.gnss},
-                                                             {"mag", &evidence.mag}};
-  for (const auto& [role, sensor] : sensors) {
-    const TopicReport* topic = topic_of(topics, role);
-    if (topic != nullptr) sensor->unreadable = topic->unreadable;
-    sensor->unheard_why = loss_of(*sensor);
+  for (std::size_t s = 0; s < kSensorRoles.size(); ++s) {
+    SensorEvidence& sensor = evidence.*kSensorRoles[s].evidence;
+    sensor = sensor_of(facts.time_repair->streams[s]);
+    const TopicReport* topic = topic_of(topics, kSensorRoles[s].name);
+    if (topic != nullptr) sensor.unreadable = topic->unreadable;
+    sensor.unheard_why = loss_of(sensor);
   }
   if (facts.imu_wanted) {
-    evidence.imu.unheard_s = std::max(evidence.imu.unheard_s, to_seconds(facts.imu_without_place));
+    evidence.imu.unheard_s =
+        std::max(evidence.imu.unheard_s, to_seconds(facts.imu_hearing.without_place())) +
+        to_seconds(facts.imu_hearing.unusable());
     evidence.imu.unheard_why = silence_of_imu(facts, topics, evidence.imu);
   } else {
     evidence.imu.unheard_s = 0.0;
   }
   gather_findings(*facts.log, evidence);
+}
+
+void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence) {
+  evidence.imu_motion_scale = trust.motion_scale;
+  evidence.imu_motion_correlation = trust.motion_correlation;
+  evidence.imu_motion_spread_m_s2 = trust.motion_spread_m_s2;
+  evidence.imu_motion_windows = trust.motion_windows;
 }
 
 void gather_dense(const MappingSession& session, const RunFacts& facts, const Recording& source,
@@ -133,7 +141,7 @@ void gather_dense(const MappingSession& session, const RunFacts& facts, const Re
   reading.log = &log;
   reading.last_scan_end = session.last_scan_end();
   reading.imu_wanted = refused || session.imu_wanted();
-  reading.imu_without_place = session.counts().imu_without_place;
+  reading.imu_hearing = session.imu_hearing();
   gather_reading(reading, evidence);
   evidence.stopped = facts.stopped;
   evidence.unreadable = facts.unreadable;
@@ -145,10 +153,7 @@ void gather_dense(const MappingSession& session, const RunFacts& facts, const Re
   } else if (!trust.trusted) {
     evidence.imu_distrust = trust.reason;
   }
-  evidence.imu_motion_scale = trust.motion_scale;
-  evidence.imu_motion_correlation = trust.motion_correlation;
-  evidence.imu_motion_spread_m_s2 = trust.motion_spread_m_s2;
-  evidence.imu_motion_windows = trust.motion_windows;
+  gather_motion_scale(trust, evidence);
   const ScanMotion scan_motion = session.odometry().scan_motion();
   evidence.match.scan_motion_ratio = scan_motion.ratio;
   evidence.match.scan_motion_probes = scan_motion.probes;

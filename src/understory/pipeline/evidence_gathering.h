@@ -1,6 +1,7 @@
 #pragma once
 
-#include "understory/pipeline/correction.h"
+#include "understory/odometry/motion_model.h"
+#include "understory/pipeline/imu_hearing.h"
 #include "understory/pipeline/mapping_session.h"
 #include "understory/pipeline/run_evidence.h"
 #include "understory/pipeline/run_writer.h"
@@ -16,13 +17,16 @@ struct ReadingFacts {
   const EventOrderer::Report* time_repair = nullptr;
   const Log* log = nullptr;
   TimeNs last_scan_end = 0;
-  bool imu_wanted = true;        // by the configuration
-  TimeNs imu_without_place = 0;  // time of its samples before its extrinsics were known
+  bool imu_wanted = true;  // by the configuration
+  ImuHearing imu_hearing;
 };
 void gather_reading(const ReadingFacts& facts, RunEvidence& evidence);
 
+// Whether the accelerations by matching are those of the accelerometer.
+void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence);
+
 // What the dense front end knows beside; `evidence.motion` and the figures of the finished path in
-// `evidence.match` are the caller's.
+// `evidence.match` are there already.
 void gather_dense(const MappingSession& session, const RunFacts& facts, const Recording& source,
                   const Log& log, RunEvidence& evidence);
 

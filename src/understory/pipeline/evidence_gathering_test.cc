@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "understory/pipeline/correction_evidence.h"
+#include "understory/pipeline/run_judgement.h"
 #include "understory/recording/finding.h"
 
 namespace understory {
@@ -67,6 +69,53 @@ TEST(EvidenceGathering, AClockThatWasMendedIsNoLateImu) {
   EXPECT_EQ(behind, "scans left before its samples came");
   const std::string late = gathered(100.0, 156.0, 4.0).imu.unheard_why;
   EXPECT_EQ(late, "it begins 4.0 s after the lidar");
+}
+
+// A regression: samples in degrees per second were dropped with a warning, and the run was
+// complete.
+TEST(EvidenceGathering, SamplesThatCannotBeUsedHaveNoSay) {
+  const ReadRecording recording({topic("lidar", 100.0, 160.0), topic("imu", 100.0, 160.0)});
+  const EventOrderer::Report repair;
+  const Log log;
+  ReadingFacts facts;
+  facts.source = &recording;
+  facts.time_repair = &repair;
+  facts.log = &log;
+  facts.last_scan_end = from_seconds(160.0);
+  ImuSample sample;
+  sample.specific_force = {0.0, 0.0, 9.81};
+  for (int k = 0; k < 300; ++k) {
+    sample.stamp = from_seconds(100.0 + 0.01 * k);
+    sample.angular_rate = {0.0, 0.0, k > 100 ? 100.0 : 1.0};  // degrees per second
+    facts.imu_hearing.add(sample, true, ImuNoiseConfig());
+  }
+  RunEvidence evidence;
+  gather_reading(facts, evidence);
+  EXPECT_NEAR(evidence.imu.unheard_s, 1.99, 1e-9);
+  EXPECT_NE(evidence.imu.unheard_why.find("degrees per second"), std::string::npos);
+  facts.imu_wanted = false;
+  gather_reading(facts, evidence);
+  EXPECT_EQ(evidence.imu.unheard_s, 0.0);
+}
+
+// By stems, too: what is 1.3 times too large was complete.
+TEST(EvidenceGathering, AScaleThatTheAccelerometerContradictsCountsByStems) {
+  const ReadRecording recording({topic("lidar", 100.0, 160.0), topic("imu", 100.0, 160.0)});
+  SparseScans scans;
+  scans.source = &recording;
+  scans.imu_trust.motion_correlation = 0.99;
+  scans.imu_trust.motion_spread_m_s2 = 1.0;
+  scans.imu_trust.motion_windows = 200;
+  CorrectionRequest request;
+  request.scans = &scans;
+  CorrectionRun run;
+  run.correction.converged = true;
+  const Log log;
+  for (const double scale : {1.0, 1.3}) {
+    scans.imu_trust.motion_scale = scale;
+    const RunJudgement judgement = judge_run(evidence_of(request, run, 5, log), JudgementConfig());
+    EXPECT_EQ(judgement.status, scale == 1.0 ? RunStatus::kComplete : RunStatus::kUntrusted);
+  }
 }
 
 TEST(EvidenceGathering, FindingsOfTheReaders) {

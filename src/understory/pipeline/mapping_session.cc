@@ -16,7 +16,6 @@ namespace {
 
 constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
-constexpr std::size_t kFewPoints = 100;
 constexpr double kMostSpeedMS = 100.0;
 // Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
 // and the sigma of a prediction that is no better than staying where one was.
@@ -107,6 +106,7 @@ void MappingSession::handle(const Event& event, const Rig& rig) {
     if (!started()) {
       opening_->events.push_back(event);
       opening_->counts_before = counts_;
+      opening_->hearing_before = imu_hearing_;
       opening_->imu_before = recent_imu_;
       opening_->fixes_before = fixes_.size();
       rig_ = rig;
@@ -118,10 +118,8 @@ void MappingSession::handle(const Event& event, const Rig& rig) {
 
 void MappingSession::take_sample(const ImuSample& sample) {
   ++counts_.imu_samples;
-  if (started() && !rig_.body_from_imu && !recent_imu_.empty()) {
-    const TimeNs step = sample.stamp - recent_imu_.back().stamp;
-    counts_.imu_without_place += std::clamp<TimeNs>(step, 0, kNsPerSecond / 10);
-  }
+  if (started())
+    imu_hearing_.add(sample, rig_.body_from_imu.has_value(), config_.odometry.motion.imu);
   recent_imu_.push_back(sample);
   const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
   while (recent_imu_.size() > most)
@@ -161,6 +159,7 @@ void MappingSession::start_anew() {
   recent_imu_ = opening_->imu_before;
   fixes_.resize(opening_->fixes_before);
   counts_ = opening_->counts_before;
+  imu_hearing_ = opening_->hearing_before;
   last_good_inliers_ = 0.0;
   for (const ImuSample& waiting : recent_imu_)
     odometry_->add_imu(waiting);
@@ -217,6 +216,7 @@ void MappingSession::leave_out_first() {
   recent_imu_ = opening_->imu_before;
   fixes_.resize(opening_->fixes_before);
   counts_ = opening_->counts_before;
+  imu_hearing_ = opening_->hearing_before;
   counts_.parts = 1;
   opening_ = std::make_unique<Opening>();
   odometry_.reset();

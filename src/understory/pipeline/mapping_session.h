@@ -11,6 +11,7 @@
 #include "understory/map/keyframe_clouds.h"
 #include "understory/map/keyframe_map.h"
 #include "understory/odometry/dense_odometry.h"
+#include "understory/pipeline/imu_hearing.h"
 #include "understory/pipeline/journal.h"
 #include "understory/pipeline/mapping_config.h"
 #include "understory/pipeline/resumable.h"
@@ -21,6 +22,9 @@
 #include "understory/util/timing.h"
 
 namespace understory {
+
+// A scan with fewer points after preprocessing tells nothing.
+inline constexpr std::size_t kFewPoints = 100;
 
 // Counts of one run, for run.json and for what to distrust.
 struct MappingCounts {
@@ -33,7 +37,6 @@ struct MappingCounts {
   std::uint64_t parts = 0;  // of a turn, at the beginning of the recording; left out
   TimeNs first_lost = 0;    // when the second piece began
   std::uint64_t imu_samples = 0;
-  TimeNs imu_without_place = 0;  // time of the IMU's samples before its place was known
   std::uint64_t points = 0;
   std::uint64_t repeated = 0;      // scans that hold the same points as the one before
   std::uint64_t last_content = 0;  // of the last scan, see content_of
@@ -74,6 +77,8 @@ class MappingSession : public Resumable {
   [[nodiscard]] bool settled() const { return opening_ == nullptr; }
   [[nodiscard]] const Rig& rig() const { return rig_; }
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }
+  // For how long the IMU's samples could not be used.
+  [[nodiscard]] const ImuHearing& imu_hearing() const { return imu_hearing_; }
   [[nodiscard]] const KeyframeMap& map() const { return *map_; }
   [[nodiscard]] KeyframeMap& map() { return *map_; }
   // Whether the configuration of this run has it use an IMU.
@@ -105,6 +110,7 @@ class MappingSession : public Resumable {
     Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();
     int rounds = 0;
     MappingCounts counts_before;
+    ImuHearing hearing_before;
     std::deque<ImuSample> imu_before;
     std::size_t fixes_before = 0;
   };
@@ -140,6 +146,7 @@ class MappingSession : public Resumable {
   std::vector<GnssFix> fixes_;
   std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced
   MappingCounts counts_;
+  ImuHearing imu_hearing_;
   TimeNs last_scan_end_ = 0;
   Eigen::Vector3d last_good_velocity_ = Eigen::Vector3d::Zero();  // in its body frame
   double last_good_inliers_ = 0.0;  // share of that scan's points near the map

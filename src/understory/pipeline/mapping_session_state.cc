@@ -45,6 +45,7 @@ void MappingSession::save(BinaryWriter& writer) const {
   writer.put(imu_doubted_);
   writer.put(fixes_file_ ? fixes_file_->count() : RecordCount());
   writer.put(counts_);
+  imu_hearing_.save(writer);
   writer.put(last_scan_end_);
   writer.put(last_cloud_);
   put_pose(writer, keyframe_from_last_cloud_);
@@ -80,6 +81,7 @@ void MappingSession::load(BinaryReader& reader, const Rig& rig) {
   const auto fixes = reader.get<RecordCount>();
   if (fixes.records > 0) load_fixes(fixes);
   counts_ = reader.get<MappingCounts>();
+  imu_hearing_.load(reader);
   last_scan_end_ = reader.get<TimeNs>();
   last_cloud_ = reader.get<std::uint64_t>();
   keyframe_from_last_cloud_ = get_pose(reader);

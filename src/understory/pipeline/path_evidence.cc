@@ -42,6 +42,7 @@ void PathEvidence::add(const StampedPose& pose) {
     const StampedPose& before = last_.back();
     const double step_s = to_seconds(pose.stamp - before.stamp);
     if (step_s < kShortestStepS) return;
+    longest_step_s_ = std::max(longest_step_s_, step_s);
     const Pose step = before.world_from_body.inverse() * pose.world_from_body;
     const double speed = step.translation().norm() / step_s;
     const double turn_rate = step.angle() / step_s * 180.0 / std::numbers::pi;
@@ -75,6 +76,7 @@ MotionEvidence PathEvidence::evidence() const {
   motion.fastest_m_s = largest(speeds_);
   motion.hardest_m_s2 = largest(accelerations_);
   motion.impossible = impossible_;
+  motion.longest_step_s = longest_step_s_;
   return motion;
 }
 

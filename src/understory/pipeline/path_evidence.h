@@ -37,6 +37,7 @@ class PathEvidence {
   std::vector<float> accelerations_;
   std::vector<float> turn_rates_;
   std::uint64_t impossible_ = 0;
+  double longest_step_s_ = 0.0;
 };
 
 }  // namespace understory

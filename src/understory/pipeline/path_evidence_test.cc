@@ -35,6 +35,7 @@ TEST(PathEvidence, KnowsSpeedAccelerationAndTurnRate) {
   EXPECT_NEAR(motion.speed_p99_m_s, 2.0, 0.01);
   EXPECT_NEAR(motion.acceleration_p99_m_s2, 4.0 / 5.0, 0.01);
   EXPECT_NEAR(motion.turn_rate_p99_deg_s, 2.0 / 5.0 * 180.0 / M_PI, 0.1);
+  EXPECT_NEAR(motion.longest_step_s, 0.1, 1e-9);
   EXPECT_EQ(motion.impossible, 0U);
 }
 

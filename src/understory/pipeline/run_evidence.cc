@@ -1,7 +1,5 @@
 #include "understory/pipeline/run_evidence.h"
 
-#include <utility>
-
 namespace understory {
 namespace {
 
@@ -30,6 +28,7 @@ void put_motion(Figures& figures, const MotionEvidence& motion) {
   figures["speed_max_m_s"] = motion.fastest_m_s;
   figures["acceleration_p99_m_s2"] = motion.acceleration_p99_m_s2;
   figures["acceleration_max_m_s2"] = motion.hardest_m_s2;
+  figures["step_max_s"] = motion.longest_step_s;
   figures["turn_rate_p99_deg_s"] = motion.turn_rate_p99_deg_s;
 }
 
@@ -42,6 +41,9 @@ void put_match(Figures& figures, const MatchEvidence& match) {
   figures["inliers_mean"] = match.inliers_mean;
   figures["inliers_low"] = match.inliers_low;
   figures["fitness_rms_m"] = match.fitness_rms_m;
+  figures["few_share"] = match.few_share;
+  figures["chance_share"] = match.chance_share;
+  figures["blur_growth"] = match.blur_growth;
   figures["smear_m"] = match.smear_m;
   figures["scan_motion_ratio"] = match.scan_motion_ratio;
   figures["scan_motion_probes"] = std::int64_t{match.scan_motion_probes};
@@ -59,12 +61,8 @@ Figures figures_of(const RunEvidence& evidence) {
   Figures figures;
   figures["stopped"] = evidence.stopped;
   put(figures, "scans_dropped", evidence.dropped_scans);
-  const std::pair<const char*, const SensorEvidence*> sensors[] = {{"lidar", &evidence.lidar},
-                                                                   {"imu", &evidence.imu},
-                                                                   {"gnss", &evidence.gnss},
-                                                                   {"mag", &evidence.mag}};
-  for (const auto& [name, sensor] : sensors)
-    put_sensor(figures, name, *sensor);
+  for (const SensorRole& role : kSensorRoles)
+    put_sensor(figures, role.name, evidence.*role.evidence);
   put(figures, "damaged_places", evidence.damaged_places);
   put(figures, "damaged_packets", evidence.damaged_packets);
   figures["cut_off"] = evidence.cut_off;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -33,6 +34,7 @@ struct MotionEvidence {
   double turn_rate_p99_deg_s = 0.0;
   double fastest_m_s = 0.0;
   double hardest_m_s2 = 0.0;
+  double longest_step_s = 0.0;  // between two scans
   // Steps beyond what any carrier does, see JudgementConfig.
   std::uint64_t impossible = 0;
 };
@@ -43,11 +45,19 @@ struct MatchEvidence {
   std::uint64_t unmatched = 0;  // without a usable match, or dropped by the velocity gate
   std::uint64_t empty = 0;      // hardly any usable point
   std::uint64_t repeated = 0;   // hold the same points as the scan before
+  std::uint64_t cut = 0;        // one where the recording ends within a turn: empty, unmatched
   std::uint64_t segments = 1;   // pieces of map that hang together by predictions only
   std::string first_lost;       // stamp of the first scan of the second piece, seconds
   double inliers_mean = 0.0;    // share of a scan's points near the map, 0 to 1
   double inliers_low = 0.0;     // the same of the tenth of the scans that have least
   double fitness_rms_m = 0.0;   // distance of matched points from what they matched
+  // Of the windows of two seconds after the beginning, see MatchCourse: the share in which scans
+  // find few of their points in the map; in which found points lie where chance puts them; and the
+  // distance of matched points in the last third of the run over that in the first, 1 where it is
+  // not known.
+  double few_share = 0.0;
+  double chance_share = 0.0;
+  double blur_growth = 1.0;
   // Motion within scans over motion between them, and on how many scans that rests; see ScanMotion.
   double scan_motion_ratio = 0.0;
   int scan_motion_probes = 0;
@@ -98,6 +108,16 @@ struct RunEvidence {
   MatchEvidence match;
   StemRunEvidence stems;
 };
+
+// The sensors by the names of their roles, in the order of EventOrderer's streams.
+struct SensorRole {
+  const char* name;
+  SensorEvidence RunEvidence::*evidence;
+};
+inline constexpr std::array<SensorRole, 4> kSensorRoles = {{{"lidar", &RunEvidence::lidar},
+                                                            {"imu", &RunEvidence::imu},
+                                                            {"gnss", &RunEvidence::gnss},
+                                                            {"mag", &RunEvidence::mag}}};
 
 // For run.json: the numbers by name, sensors before their figures ("lidar_late").
 [[nodiscard]] std::map<std::string, Figure> figures_of(const RunEvidence& evidence);

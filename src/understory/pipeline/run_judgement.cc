@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 namespace understory {
@@ -34,6 +35,7 @@ class Judge {
     judge_scale();
     judge_motion();
     judge_matches();
+    judge_course();
     judge_outages();
     judge_stems();
     return conclude();
@@ -136,6 +138,15 @@ class Judge {
         ratio, cause));
   }
 
+  // Standard deviation of the scale, from the scatter of the accelerations about it.
+  double scale_deviation() const {
+    const double correlation = std::abs(evidence_.imu_motion_correlation);
+    if (correlation <= 0.0) return 0.0;
+    return std::abs(evidence_.imu_motion_scale) / correlation *
+           std::sqrt((1.0 - std::min(1.0, correlation * correlation)) /
+                     static_cast<double>(evidence_.imu_motion_windows));
+  }
+
   void judge_scale() {
     if (!evidence_.imu_distrust.empty()) return;  // then the IMU is no witness
     if (evidence_.imu_motion_windows < config_.least_imu_windows ||
@@ -143,9 +154,10 @@ class Judge {
       return;
     }
     const double scale = evidence_.imu_motion_scale;
-    if (scale >= config_.least_imu_scale && scale <= config_.most_imu_scale) return;
+    const double slack = 3.0 * scale_deviation();
+    if (scale + slack >= config_.least_imu_scale && scale - slack <= config_.most_imu_scale) return;
     hurt(fmt::format(
-        "the path speeds up and slows down {:.1f} times as much as the accelerometer "
+        "the path speeds up and slows down {:.2f} times as much as the accelerometer "
         "tells of: the scale of the clouds (unit), the stamps of the scans, or the IMU's "
         "unit, clock or lever arm is wrong",
         scale));
@@ -166,18 +178,20 @@ class Judge {
 
   void judge_matches() {
     const MatchEvidence& match = evidence_.match;
-    if (share(match.unmatched, match.scans) > config_.most_unmatched) {
+    const std::uint64_t unmatched = match.unmatched - std::min(match.cut, match.unmatched);
+    const std::uint64_t empty = match.empty - std::min(match.cut, match.empty);
+    if (share(unmatched, match.scans) > config_.most_unmatched) {
       hurt(
           fmt::format("{} of {} scans ({:.1f} %) could not be matched to the map; their poses "
                       "are predictions{}",
-                      match.unmatched, match.scans, percent(match.unmatched, match.scans),
+                      unmatched, match.scans, percent(unmatched, match.scans),
                       evidence_.times_assumed
                           ? "; the times of the clouds were assumed: if they lie farther apart, "
                             "give --rate-hz or times.txt"
                           : ""));
     }
-    if (share(match.empty, match.scans) > config_.most_empty) {
-      hurt(fmt::format("{} of {} scans had hardly any usable point", match.empty, match.scans));
+    if (share(empty, match.scans) > config_.most_empty) {
+      hurt(fmt::format("{} of {} scans had hardly any usable point", empty, match.scans));
     }
     if (match.segments > 1) {
       hurt(
@@ -187,17 +201,45 @@ class Judge {
     }
   }
 
+  // How scans fitted the map as it grew.
+  void judge_course() {
+    const MatchEvidence& match = evidence_.match;
+    if (match.few_share > config_.most_few) {
+      hurt(fmt::format(
+          "over {:.0f} % of the time scans found few of their points in the map: matches by so few "
+          "points may be wrong",
+          100.0 * match.few_share));
+    }
+    if (match.chance_share > config_.most_chance) {
+      hurt(fmt::format(
+          "over {:.0f} % of the time the points that scans found in the map lie no nearer than by "
+          "chance: the map is blurred, or its scans are matched wrongly",
+          100.0 * match.chance_share));
+    }
+    if (match.blur_growth > config_.most_blur_growth) {
+      hurt(fmt::format(
+          "the map blurs as it grows: matched points lie {:.2f} times as far from it in the last "
+          "third of the run as in the first",
+          match.blur_growth));
+    }
+  }
+
   void judge_outages() {
+    if (evidence_.by_stems) return;
     const SensorEvidence& lidar = evidence_.lidar;
-    if (evidence_.by_stems || lidar.longest_gap_s <= config_.longest_lidar_gap_s) return;
     const bool carried = evidence_.imu_used &&
                          evidence_.imu.longest_gap_s <= config_.longest_lidar_gap_s &&
                          evidence_.match.segments == 1;
-    hurt(fmt::format(
-        "the lidar was silent for {:.1f} s before {} s; the way in between was {}, so the map "
-        "before and after may be offset",
-        lidar.longest_gap_s, lidar.after_longest_gap,
-        carried ? "told by the IMU alone" : "guessed"));
+    const char* way = carried ? "told by the IMU alone" : "guessed";
+    if (lidar.longest_gap_s > config_.longest_lidar_gap_s) {
+      hurt(fmt::format(
+          "the lidar was silent for {:.1f} s before {} s; the way in between was {}, so the map "
+          "before and after may be offset",
+          lidar.longest_gap_s, lidar.after_longest_gap, way));
+    } else if (evidence_.motion.longest_step_s > config_.longest_lidar_gap_s) {
+      hurt(fmt::format("scans lie up to {:.1f} s apart; the way from one to the next was {}",
+                       evidence_.motion.longest_step_s, way));
+    }
   }
 
   void judge_imu() {
@@ -249,6 +291,15 @@ void describe(ConfigTable& table, JudgementConfig& config) {
             "untrusted: a larger share of the scans could not be matched");
   table.add("most_empty", config.most_empty, shares, "",
             "untrusted: a larger share of the scans had hardly any usable point");
+  table.add(
+      "most_few", config.most_few, shares, "",
+      "untrusted: over a larger share of the time scans found few of their points in the map");
+  table.add(
+      "most_chance", config.most_chance, shares, "",
+      "untrusted: over a larger share of the time matched points lay no nearer than by chance");
+  table.add(
+      "most_blur_growth", config.most_blur_growth, {1.0, 1e6}, "",
+      "untrusted: matched points lie farther off at the end than at the beginning, over this");
   table.add("longest_lidar_gap_s", config.longest_lidar_gap_s, seconds, "s",
             "untrusted: the lidar was silent for longer");
   table.add("most_smear_m", config.most_smear_m, {0.0, 100.0}, "m",

@@ -20,6 +20,9 @@ struct JudgementConfig {
   // weak places.
   double most_unmatched = 0.02;
   double most_empty = 0.10;
+  double most_few = 0.10;     // share of the time after the beginning, see MatchCourse
+  double most_chance = 0.10;  // the same
+  double most_blur_growth = 1.15;
   double longest_lidar_gap_s = 1.0;
   double most_smear_m = 0.05;
   double most_repeated = 0.01;    // share of the scans; no lidar sees the same twice
@@ -29,8 +32,8 @@ struct JudgementConfig {
   double most_scan_motion = 1.8;
   int least_scan_motion_probes = 6;  // fewer tell nothing
   // Acceleration by matching over that by the accelerometer, see MotionScale: 1 is right.
-  double least_imu_scale = 0.6;
-  double most_imu_scale = 1.6;
+  double least_imu_scale = 0.9;
+  double most_imu_scale = 1.1;
   int least_imu_windows = 60;          // fewer tell nothing, nor does
   double least_imu_spread_m_s2 = 0.2;  // an even motion
 };

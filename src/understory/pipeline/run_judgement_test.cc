@@ -18,6 +18,7 @@ RunEvidence good_run() {
   evidence.match.scans = 1000;
   evidence.motion.steps = 999;
   evidence.imu_motion_scale = 1.0;
+  evidence.imu_motion_correlation = 1.0;
   evidence.imu_motion_windows = 300;
   evidence.imu_motion_spread_m_s2 = 1.0;
   evidence.match.scan_motion_ratio = 1.0;
@@ -41,6 +42,17 @@ void expect(RunStatus status, const std::string& words, const RunEvidence& evide
   EXPECT_EQ(judgement.status, status) << words;
   ASSERT_EQ(judgement.reasons.size(), 1U) << words;
   EXPECT_NE(judgement.reasons.front().find(words), std::string::npos) << judgement.reasons.front();
+}
+
+// A good run in which `figure` is at its limit is complete; beyond, it has this status and reason.
+template <class Owner, class Value>
+void expect_limit(Owner RunEvidence::*owner, Value Owner::*figure, Value limit, Value beyond,
+                  RunStatus status, const std::string& words) {
+  RunEvidence evidence = good_run();
+  evidence.*owner.*figure = limit;
+  expect_complete(evidence);
+  evidence.*owner.*figure = beyond;
+  expect(status, words, evidence);
 }
 
 TEST(RunJudgement, AGoodRunIsComplete) {
@@ -112,40 +124,42 @@ TEST(RunJudgement, Damage) {
 }
 
 TEST(RunJudgement, Matches) {
-  RunEvidence evidence = good_run();
-  evidence.match.unmatched = 20;
-  expect_complete(evidence);
-  evidence.match.unmatched = 21;
-  expect(RunStatus::kUntrusted, "21 of 1000 scans (2.1 %) could not be matched", evidence);
-  evidence.times_assumed = true;
-  expect(RunStatus::kUntrusted, "times of the clouds were assumed", evidence);
-  RunEvidence empty = good_run();
-  empty.match.empty = 100;
-  expect_complete(empty);
-  empty.match.empty = 101;
-  expect(RunStatus::kUntrusted, "hardly any usable point", empty);
+  constexpr auto kUntrusted = RunStatus::kUntrusted;
+  expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::unmatched, 20, 21,
+                                             kUntrusted,
+                                             "21 of 1000 scans (2.1 %) could not be matched");
+  expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::empty, 100, 101,
+                                             kUntrusted, "hardly any usable point");
+  expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::repeated, 10, 11,
+                                             kUntrusted, "hold the same points as the scan before");
+  expect_limit<MotionEvidence, std::uint64_t>(&RunEvidence::motion, &MotionEvidence::impossible, 9,
+                                              10, kUntrusted,
+                                              "stamps of the scans or the matches are wrong");
   RunEvidence pieces = good_run();
   pieces.match.segments = 2;
   pieces.match.first_lost = "17.5";
-  expect(RunStatus::kUntrusted, "lost 1 time(s), first at 17.5 s", pieces);
+  expect(kUntrusted, "lost 1 time(s), first at 17.5 s", pieces);
 }
 
-TEST(RunJudgement, RepeatedScans) {
+// A regression: a good recording of five scans that ends within a turn was untrusted.
+TEST(RunJudgement, ThePartOfATurnAtTheEndIsNoLoss) {
   RunEvidence evidence = good_run();
-  evidence.match.repeated = 10;
+  evidence.match.scans = 5;
+  evidence.match.empty = evidence.match.unmatched = evidence.match.cut = 1;
   expect_complete(evidence);
-  evidence.match.repeated = 11;
-  expect(RunStatus::kUntrusted, "hold the same points as the scan before", evidence);
+  evidence.match.cut = 0;
+  EXPECT_EQ(judged(evidence).reasons.size(), 2U);
 }
 
-TEST(RunJudgement, MotionsThatNoCarrierMakes) {
-  RunEvidence evidence = good_run();
-  evidence.motion.impossible = 9;
-  expect_complete(evidence);
-  evidence.motion.impossible = 10;
-  expect(RunStatus::kUntrusted, "stamps of the scans or the matches are wrong", evidence);
-  evidence.times_assumed = true;
-  expect(RunStatus::kUntrusted, "times of the clouds were assumed", evidence);
+TEST(RunJudgement, AssumedTimesAreNamedAsTheCause) {
+  RunEvidence unmatched = good_run();
+  unmatched.times_assumed = true;
+  unmatched.match.unmatched = 21;
+  expect(RunStatus::kUntrusted, "times of the clouds were assumed", unmatched);
+  RunEvidence impossible = good_run();
+  impossible.times_assumed = true;
+  impossible.motion.impossible = 10;
+  expect(RunStatus::kUntrusted, "times of the clouds were assumed", impossible);
 }
 
 TEST(RunJudgement, TimesOfPoints) {
@@ -190,6 +204,29 @@ TEST(RunJudgement, AccelerationsOfTheImu) {
   expect(RunStatus::kUntrusted, "axes look swapped", evidence);
 }
 
+// A regression: clouds 1.2 times too large made a map 1.2 times too large that was complete.
+TEST(RunJudgement, AScaleThatIsOffByAFifthIsNoticedWhereItIsKnownWell) {
+  RunEvidence evidence = good_run();
+  evidence.imu_motion_scale = 1.2;
+  evidence.imu_motion_correlation = 0.99;  // the scale's standard deviation is 0.01
+  expect(RunStatus::kUntrusted, "1.20 times as much", evidence);
+  evidence.imu_motion_correlation = 0.5;  // 0.12
+  expect_complete(evidence);
+  evidence.imu_motion_scale = 3.3;  // 0.33
+  expect(RunStatus::kUntrusted, "3.30 times as much", evidence);
+}
+
+TEST(RunJudgement, HowScansFittedTheMap) {
+  constexpr auto kUntrusted = RunStatus::kUntrusted;
+  const JudgementConfig limits;
+  expect_limit(&RunEvidence::match, &MatchEvidence::few_share, limits.most_few,
+               limits.most_few + 0.01, kUntrusted, "found few of their points in the map");
+  expect_limit(&RunEvidence::match, &MatchEvidence::chance_share, limits.most_chance,
+               limits.most_chance + 0.01, kUntrusted, "no nearer than by chance");
+  expect_limit(&RunEvidence::match, &MatchEvidence::blur_growth, limits.most_blur_growth,
+               limits.most_blur_growth + 0.01, kUntrusted, "the map blurs as it grows");
+}
+
 TEST(RunJudgement, SilenceOfTheLidar) {
   RunEvidence evidence = good_run();
   evidence.lidar.longest_gap_s = 1.0;
@@ -201,6 +238,19 @@ TEST(RunJudgement, SilenceOfTheLidar) {
   evidence.by_stems = true;  // there a step that finds too few stems is judged
   evidence.stems.trees = 1;
   expect_complete(evidence);
+}
+
+// A regression: clouds six seconds apart, matched by chance, made a wrong map that was complete.
+TEST(RunJudgement, ScansFarApart) {
+  RunEvidence evidence = good_run();
+  evidence.motion.longest_step_s = 1.0;
+  expect_complete(evidence);
+  evidence.motion.longest_step_s = 5.7;
+  expect(RunStatus::kUntrusted, "scans lie up to 5.7 s apart; the way", evidence);
+  evidence.imu_used = false;
+  expect(RunStatus::kUntrusted, "guessed", evidence);
+  evidence.lidar.longest_gap_s = 5.7;
+  expect(RunStatus::kUntrusted, "the lidar was silent", evidence);
 }
 
 TEST(RunJudgement, Stems) {

@@ -16,6 +16,8 @@
 #include "understory/pipeline/finished_map.h"
 #include "understory/pipeline/finished_trajectory.h"
 #include "understory/pipeline/lidar_view.h"
+#include "understory/pipeline/mapping_session.h"
+#include "understory/pipeline/match_course.h"
 #include "understory/pipeline/path_evidence.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/pipeline/run_judgement.h"
@@ -36,10 +38,7 @@ struct TrajectoryFacts {
   double duration_s = 0.0;
   double period_ms = 0.0;  // median time between scans
   MotionEvidence motion;
-  double smear_m = 0.0;      // mean motion of a point 10 m away during a scan
-  double inliers_low = 0.0;  // share that nine of ten matched scans exceed
-  double inlier_ratio_mean = 0.0;
-  double fitness_rms_m = 0.0;
+  MatchEvidence match;  // what the path and the matches say of it
   std::uint64_t weak = 0;
 };
 
@@ -67,15 +66,17 @@ double median_period_ms(const std::vector<ReportScan>& scans) {
 
 // trajectory.tum and states.csv.gz.
 TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const MappingSession& session,
-                                 const MotionLimits& limits) {
+                                 const MappingConfig& config) {
   TumWriter trajectory(folder / "trajectory.tum");
   StatesWriter states(folder / "states.csv.gz");
   TrajectoryFacts facts;
   double inliers = 0.0;
   double squares = 0.0;
   std::vector<float> inlier_ratios;
-  PathEvidence path(limits);
+  PathEvidence path(config.motion_limits);
+  MatchCourse course(config.keyframe_map.local_map.cell_sizes_m.back());
   Pose last;
+  std::uint64_t empty_in_a_row = 0;
   for_each_finished_scan(
       session.journal(), session.map().keyframes(), [&](const FinishedScan& scan) {
         const ScanRecord& record = *scan.record;
@@ -85,12 +86,16 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const Mapp
                     Eigen::Vector3d::Map(record.accel_bias.data()), record.pose_covariance()});
         facts.scans.push_back(report_scan(scan));
         path.add({record.stamp, scan.world_from_body});
+        course.add(record.stamp, record.outcome == ScanOutcome::kMatched,
+                   static_cast<double>(record.inlier_ratio),
+                   static_cast<double>(record.fitness_m2));
         facts.cpu_ms.push_back(record.cpu_ms);
         facts.wall_ms.push_back(record.wall_ms);
+        empty_in_a_row = record.matched_points < kFewPoints ? empty_in_a_row + 1 : 0;
         const Pose step = last.inverse() * scan.world_from_body;
         if (facts.scans.size() > 1) {
           facts.length_m += step.translation().norm();
-          facts.smear_m += smear_of(step);
+          facts.match.smear_m += smear_of(step);
         }
         last = scan.world_from_body;
         if (record.iterations > 0) {
@@ -104,14 +109,16 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const Mapp
   states.commit();
   if (!inlier_ratios.empty()) {
     const auto matched = static_cast<double>(inlier_ratios.size());
-    facts.inlier_ratio_mean = inliers / matched;
-    facts.fitness_rms_m = std::sqrt(squares / matched);
+    facts.match.inliers_mean = inliers / matched;
+    facts.match.fitness_rms_m = std::sqrt(squares / matched);
     const auto low = inlier_ratios.begin() + static_cast<std::ptrdiff_t>(inlier_ratios.size() / 10);
     std::nth_element(inlier_ratios.begin(), low, inlier_ratios.end());
-    facts.inliers_low = static_cast<double>(*low);
+    facts.match.inliers_low = static_cast<double>(*low);
   }
   facts.motion = path.evidence();
-  if (facts.scans.size() > 1) facts.smear_m /= static_cast<double>(facts.scans.size() - 1);
+  course.put(facts.match);
+  facts.match.cut = empty_in_a_row == 1 ? 1 : 0;
+  if (facts.scans.size() > 1) facts.match.smear_m /= static_cast<double>(facts.scans.size() - 1);
   facts.period_ms = median_period_ms(facts.scans);
   facts.duration_s = to_seconds(facts.scans.back().stamp - facts.scans.front().stamp);
   return facts;
@@ -242,7 +249,7 @@ void fill_counts(RunSummary& summary, const MappingSession& session, const RunFa
     summary.quality[name + "_without_say_s"] = to_seconds(stream.without_say);
     summary.quality[name + "_clock_offset_s"] = to_seconds(stream.offset);
   }
-  summary.quality["imu_without_place_s"] = to_seconds(counts.imu_without_place);
+  summary.quality["imu_without_place_s"] = to_seconds(session.imu_hearing().without_place());
   count("scans_without_imu", facts.time_repair.scans_without_imu);
   if (facts.realtime) count("scans_dropped", facts.dropped_scans);
 }
@@ -269,8 +276,8 @@ void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const 
     summary.quality["memory_mb_end"] = facts.memory_mb.back();
   }
   summary.quality["length_m"] = trajectory.length_m;
-  summary.quality["inlier_ratio_mean"] = trajectory.inlier_ratio_mean;
-  summary.quality["match_distance_rms_m"] = trajectory.fitness_rms_m;
+  summary.quality["inlier_ratio_mean"] = trajectory.match.inliers_mean;
+  summary.quality["match_distance_rms_m"] = trajectory.match.fitness_rms_m;
   summary.quality["weak_scans_percent"] =
       100.0 * static_cast<double>(trajectory.weak) / static_cast<double>(trajectory.scans.size());
   if (!facts.realtime) return;
@@ -281,12 +288,9 @@ RunEvidence evidence_of(const MappingSession& session, const RunFacts& facts,
                         const Recording& source, const TrajectoryFacts& trajectory,
                         const Log& log) {
   RunEvidence evidence;
-  gather_dense(session, facts, source, log, evidence);
   evidence.motion = trajectory.motion;
-  evidence.match.inliers_mean = trajectory.inlier_ratio_mean;
-  evidence.match.inliers_low = trajectory.inliers_low;
-  evidence.match.fitness_rms_m = trajectory.fitness_rms_m;
-  evidence.match.smear_m = trajectory.smear_m;
+  evidence.match = trajectory.match;
+  gather_dense(session, facts, source, log, evidence);
   return evidence;
 }
 
@@ -338,8 +342,7 @@ MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
                          Log& log, const ProgressSink& progress) {
   const std::filesystem::path folder = place.begin_results();
   StageTimes& times = session.times();
-  const TrajectoryFacts trajectory =
-      write_trajectory(folder, session, request.config.motion_limits);
+  const TrajectoryFacts trajectory = write_trajectory(folder, session, request.config);
   write_graph(folder, session.map());
   write_fixes(folder, session.fixes());
   InventoryResult inventory;

@@ -111,11 +111,12 @@ class SparseRun {
     scans.time_repair = orderer_->report();
     scans.last_scan_end = session_->last_scan_end();
     scans.repeated = session_->repeated();
-    scans.imu_without_place = session_->imu_without_place();
+    scans.imu_hearing = session_->imu_hearing();
+    scans.imu_trust = session_->imu_trust();
     scans.imu_wanted = request_.config.front_end.imu.use;
     scans.unreadable = unreadable_;
     const std::string& refused = session_->imu_refused();
-    scans.imu_distrust = refused.empty() ? session_->imu_trust().reason : imu_refusal(refused);
+    scans.imu_distrust = refused.empty() ? scans.imu_trust.reason : imu_refusal(refused);
     scans.fixes = std::move(session_->fixes());
     if (player_ != nullptr)
       scans.realtime = {player_->dropped_scans(), distribution_of(std::move(latencies_ms_))};

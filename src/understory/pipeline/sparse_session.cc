@@ -30,12 +30,8 @@ void SparseSession::handle(const Event& event, const Rig& rig) {
 
 // The recording has said so where it does not know the IMU's place; it may learn it later.
 void SparseSession::on_sample(const ImuSample& sample, const Rig& rig) {
-  if (rig.body_from_imu) {
-    pacer_.add(sample);
-  } else if (last_imu_) {
-    imu_without_place_ += std::clamp<TimeNs>(sample.stamp - *last_imu_, 0, kNsPerSecond / 10);
-  }
-  last_imu_ = sample.stamp;
+  imu_hearing_.add(sample, rig.body_from_imu.has_value(), ImuNoiseConfig());
+  if (rig.body_from_imu) pacer_.add(sample);
 }
 
 void SparseSession::on_scan(const ScanPtr& scan, const Rig& rig) {
@@ -102,8 +98,7 @@ void SparseSession::save(BinaryWriter& writer) const {
   writer.put(journal_ != nullptr ? journal_->count() : RecordCount());
   writer.put(last_scan_end_);
   writer.put(imu_refused_);
-  writer.put(imu_without_place_);
-  put_optional(writer, last_imu_, [](BinaryWriter& out, TimeNs time) { out.put(time); });
+  imu_hearing_.save(writer);
   writer.put(repeated_);
   writer.put(last_content_);
   pacer_.save(writer);
@@ -118,8 +113,7 @@ void SparseSession::load(BinaryReader& reader, const Rig& /*rig*/) {
   last_scan_end_ = reader.get<TimeNs>();
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);
-  imu_without_place_ = reader.get<TimeNs>();
-  last_imu_ = get_optional(reader, [](BinaryReader& in) { return in.get<TimeNs>(); });
+  imu_hearing_.load(reader);
   repeated_ = reader.get<std::uint64_t>();
   last_content_ = reader.get<std::uint64_t>();
   pacer_.load(reader);

@@ -9,6 +9,7 @@
 
 #include "understory/odometry/stem_pacer.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/imu_hearing.h"
 #include "understory/pipeline/resumable.h"
 #include "understory/pipeline/sparse_mapping_config.h"
 #include "understory/pipeline/view_journal.h"
@@ -49,8 +50,8 @@ class SparseSession : public Resumable, private ViewSink {
   [[nodiscard]] std::vector<SparseStep>& steps() { return steps_; }  // of the views kept
   [[nodiscard]] std::vector<GnssFix>& fixes() { return fixes_; }
   [[nodiscard]] StageTimes& times() { return times_; }
-  // Time of the IMU's samples before its place was known.
-  [[nodiscard]] TimeNs imu_without_place() const { return imu_without_place_; }
+  // For how long the IMU's samples could not be used.
+  [[nodiscard]] const ImuHearing& imu_hearing() const { return imu_hearing_; }
   [[nodiscard]] ImuTrust imu_trust() const { return pacer_.imu_trust(); }
 
   // Before the first event: does without the IMU, because an earlier pass found it to be wrong.
@@ -74,8 +75,7 @@ class SparseSession : public Resumable, private ViewSink {
   std::deque<TimeNs> waiting_ends_;  // of scans that have no pose yet
   TimeNs last_scan_end_ = 0;
   std::string imu_refused_;
-  TimeNs imu_without_place_ = 0;
-  std::optional<TimeNs> last_imu_;
+  ImuHearing imu_hearing_;
   std::size_t scans_ = 0;
   std::uint64_t repeated_ = 0;
   std::uint64_t last_content_ = 0;
