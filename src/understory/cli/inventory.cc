@@ -17,6 +17,7 @@
 #include "understory/pipeline/lidar_view.h"
 #include "understory/pipeline/run_folder.h"
 #include "understory/recording/cloud_file.h"
+#include "understory/recording/finding.h"
 #include "understory/util/error.h"
 #include "understory/util/output_guard.h"
 #include "understory/util/version.h"
@@ -50,10 +51,8 @@ void judge(const InventoryResult& inventory, const Log& log, RunSummary& summary
     summary.status = status;
     summary.reasons.push_back(reason);
   };
-  for (const Log::Warning& warning : log.warnings()) {
-    if (warning.key == "recording.damaged")
-      lower(RunStatus::kPartial, "the cloud is not whole: " + warning.first_message);
-  }
+  if (const Found damage = found(log, Finding::kDamage); damage.count > 0)
+    lower(RunStatus::kPartial, "the cloud is not whole: " + damage.first);
   if (!inventory.too_sparse) return;
   if (inventory.trees.empty()) {
     lower(RunStatus::kUntrusted,
