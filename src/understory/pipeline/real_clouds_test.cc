@@ -86,7 +86,9 @@ TEST(RealClouds, StemsTellATiltedScanner) {
           Eigen::AngleAxisd(tilt * M_PI / 180.0, Eigen::Vector3d(0.6, 0.8, 0.0)).matrix();
       const CloudShape shape = shape_of(blocks_of(cloud, turn));
       EXPECT_NE(up_complaint(shape), "") << name << " tilted by " << tilt;
-      if (const auto axis = leaning_axis(shape)) EXPECT_GT(axis->dot(turn.col(2)), 0.995) << name;
+      if (const auto axis = leaning_axis(shape)) {
+        EXPECT_GT(axis->dot(turn.col(2)), 0.995) << name;
+      }
     }
   }
 }
