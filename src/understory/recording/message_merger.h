@@ -65,25 +65,27 @@ class MessageMerger {
   [[nodiscard]] std::size_t blocks() const { return blocks_.size(); }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
-  // A block that is being handed out, and how many of its messages have been.
+  // A block that is being handed out, and how many of its messages have been, of how many.
   struct Progress {
     std::uint64_t place = 0;
     std::uint64_t given = 0;
+    std::uint64_t of = 0;
   };
   // Of all of them, in the order in which they were added.
   [[nodiscard]] std::vector<Progress> progress() const {
     std::vector<Progress> all;
     for (const Reading& reading : blocks_) {
       if (reading.next < reading.block.entries.size())
-        all.push_back({reading.block.place, reading.next});
+        all.push_back({reading.block.place, reading.next, reading.block.entries.size()});
     }
     return all;
   }
   // Passes over the messages that had been given of a block that was added once more. False if it
-  // has no message behind them.
+  // has no message behind them, or another number than before: a channel that is described only
+  // behind the block is known when it is read again.
   [[nodiscard]] bool pass(const Progress& progress) {
     if (blocks_.empty() || blocks_.back().block.place != progress.place ||
-        progress.given >= blocks_.back().block.entries.size())
+        blocks_.back().block.entries.size() != progress.of || progress.given >= progress.of)
       return false;
     blocks_.back().next = static_cast<std::size_t>(progress.given);
     return true;

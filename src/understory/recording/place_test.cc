@@ -8,6 +8,7 @@
 #include "understory/recording/compression.h"
 #include "understory/recording/event_bytes.h"
 #include "understory/recording/message_encode.h"
+#include "understory/recording/message_merger.h"
 #include "understory/recording/packet_test_support.h"
 #include "understory/recording/pcap_recording.h"
 #include "understory/recording/recording_test_support.h"
@@ -295,6 +296,28 @@ TEST_F(Places, AnotherRecordingIsRefused) {
   const auto second = open_recording(folder_ / "short.mcap", {}, log);
   BinaryReader reader(writer.bytes(), "place");
   EXPECT_THROW(second->load(reader), InputError);
+}
+
+// Found by fuzzing: a channel that is described only behind a chunk is known when the chunk is read
+// again, and messages came that had been passed over.
+TEST(MessageMerger, ABlockThatHoldsMoreThanBeforeIsNotGoneOnWith) {
+  const auto block = [](std::size_t messages) {
+    MessageBlock made;
+    made.place = 7;
+    made.entries.resize(messages);
+    return made;
+  };
+  MessageMerger first;
+  first.add(block(2));
+  RawMessage message;
+  ASSERT_TRUE(first.next(message));
+  const auto progress = first.progress();
+  ASSERT_EQ(progress.size(), 1U);
+  for (const std::size_t messages : {2U, 3U}) {
+    MessageMerger second;
+    second.add(block(messages));
+    EXPECT_EQ(second.pass(progress[0]), messages == 2U);
+  }
 }
 
 }  // namespace
