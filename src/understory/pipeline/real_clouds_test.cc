@@ -3,21 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <cstdlib>
 #include <filesystem>
 
 #include "understory/forest/cloud_shape.h"
 #include "understory/recording/cloud_file.h"
+#include "understory/recording/recording_test_support.h"
 
 namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
 
-fs::path data() {
-  const char* named = std::getenv("UNDERSTORY_DATA");
-  return named != nullptr ? named : "missing";
-}
+using test::data_folder;
 
 PointBlocks blocks_of(const PointCloudFile& cloud, const Eigen::Matrix3d& change) {
   return [&cloud, change](const PointVisitor& visit) {
@@ -42,10 +39,10 @@ TEST(RealClouds, NoneIsRefused) {
         "arbor_dbh_slices/double_ring_slice0.las", "arbor_dbh_slices/ring50.las",
         "arbor_dbh_slices/slice_buttress.las"})
     names.emplace_back(slice);
-  if (!fs::exists(data() / names.front())) GTEST_SKIP();
+  if (!fs::exists(data_folder() / names.front())) GTEST_SKIP();
   for (const std::string& name : names) {
     Log log;
-    const PointCloudFile cloud = read_cloud((data() / name).string(), log);
+    const PointCloudFile cloud = read_cloud((data_folder() / name).string(), log);
     const CloudShape shape = shape_of(blocks_of(cloud, Eigen::Matrix3d::Identity()));
     EXPECT_EQ(up_complaint(shape), "") << name;
     EXPECT_EQ(unit_complaint(shape), "") << name;
@@ -60,10 +57,10 @@ TEST(RealClouds, NoneIsRefused) {
 }
 
 TEST(RealClouds, TurnedOrScaledEachStandIsNoticed) {
-  if (!fs::exists(data() / stands().front())) GTEST_SKIP();
+  if (!fs::exists(data_folder() / stands().front())) GTEST_SKIP();
   for (const std::string& name : stands()) {
     Log log;
-    const PointCloudFile cloud = read_cloud((data() / name).string(), log);
+    const PointCloudFile cloud = read_cloud((data_folder() / name).string(), log);
     for (const UpAxis axis : kUpAxes) {
       const auto found =
           other_up_axis(shape_of(blocks_of(cloud, upright_from_cloud(axis).transpose())));
@@ -77,10 +74,10 @@ TEST(RealClouds, TurnedOrScaledEachStandIsNoticed) {
 
 // Those from aeroplanes (ALS, Chablais) show too few stems.
 TEST(RealClouds, StemsTellATiltedScanner) {
-  if (!fs::exists(data() / stands().front())) GTEST_SKIP();
+  if (!fs::exists(data_folder() / stands().front())) GTEST_SKIP();
   for (const std::string& name : {stands()[0], stands()[1], stands()[3]}) {
     Log log;
-    const PointCloudFile cloud = read_cloud((data() / name).string(), log);
+    const PointCloudFile cloud = read_cloud((data_folder() / name).string(), log);
     for (const double tilt : {20.0, 40.0, 60.0}) {
       const Eigen::Matrix3d turn =
           Eigen::AngleAxisd(tilt * M_PI / 180.0, Eigen::Vector3d(0.6, 0.8, 0.0)).matrix();
@@ -95,9 +92,9 @@ TEST(RealClouds, StemsTellATiltedScanner) {
 
 TEST(RealClouds, ASliceInMillimetresIsNoticed) {
   for (const char* name : {"fortls/diameters.laz"}) {
-    if (!fs::exists(data() / name)) GTEST_SKIP();
+    if (!fs::exists(data_folder() / name)) GTEST_SKIP();
     Log log;
-    const PointCloudFile cloud = read_cloud((data() / name).string(), log);
+    const PointCloudFile cloud = read_cloud((data_folder() / name).string(), log);
     EXPECT_NE(unit_complaint(shape_of(blocks_of(cloud, 1000.0 * Eigen::Matrix3d::Identity()))), "")
         << name;
   }
