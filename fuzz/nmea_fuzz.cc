@@ -10,7 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Log log;
   std::istringstream ahead(text);
   std::istringstream stream(text);
-  NmeaLogReader reader(stream, "fuzz", first_nmea_day(ahead), log);
+  NmeaLogReader reader(stream, "fuzz", first_nmea_day(ahead, "fuzz"), log);
   while (reader.next()) {
   }
   return 0;

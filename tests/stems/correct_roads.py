@@ -293,7 +293,7 @@ def one_view(folder):
 
 @cases.case("no such file")
 def absent(folder):
-    return refused(folder / "stems.csv.gz", folder / "run", "can be read")
+    return refused(folder / "stems.csv.gz", folder / "run", "no such file or folder")
 
 
 @cases.case("folder of a mapping run that is not finished")
