@@ -2,18 +2,14 @@
 #include <string>
 
 #include "fuzz_folder.h"
-#include "understory/odometry/dense_odometry.h"
-#include "understory/odometry/stem_pacer.h"
 #include "understory/pipeline/checkpoint.h"
-#include "understory/preprocess/event_orderer.h"
 
-// Checkpoints: whole files, and the states in them where the checksum is right. The first byte says
-// what the rest is read as: 0 and 1 checkpoint.bin, alone and beside an older one; 2 EventOrderer,
-// 3 DenseOdometry, 4 StemPacer.
+// Checkpoints: whole files. The first byte says what the rest is read as: one checkpoint, or
+// checkpoint.bin beside an older one. The states in a checkpoint are read only where its checksum
+// is right, so they are not read here.
 //
 // Seeds are of `understory map "sim:demo?duration_s=3&lidar.model=VLP-16" -o RUN`, dense and by
-// stems, with --set run.checkpoint_interval_s=1: checkpoint.bin of the killed run, cut to 4 kB, and
-// what `save` of these classes wrote into it.
+// stems, with --set run.checkpoint_interval_s=1: checkpoint.bin of the killed run, cut to 4 kB.
 namespace understory {
 namespace {
 
@@ -25,26 +21,11 @@ void read_files(const std::string& bytes) {
   (void)read_checkpoints(work, problems);
 }
 
-Rig rig_with_imu() {
-  Rig rig;
-  rig.body_from_imu = Pose();
-  return rig;
-}
-
 void read_as(std::uint8_t kind, const std::string& bytes) {
-  BinaryReader reader(bytes, "fuzz");
-  Log log;
-  StageTimes times;
   if (kind == 0) {
     (void)parse_checkpoint("fuzz", bytes);
-  } else if (kind == 1) {
-    read_files(bytes);
-  } else if (kind == 2) {
-    EventOrderer({}, log).load(reader);
-  } else if (kind == 3) {
-    DenseOdometry({}, rig_with_imu(), times, log).load(reader);
   } else {
-    StemPacer({}, {}, &log).load(reader);
+    read_files(bytes);
   }
 }
 
@@ -55,6 +36,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace understory;
   if (size == 0) return 0;
   const std::string bytes(reinterpret_cast<const char*>(data + 1), size - 1);
-  expect_input_error_at_most([&] { read_as(data[0] % 5, bytes); });
+  expect_input_error_at_most([&] { read_as(data[0] % 2, bytes); });
   return 0;
 }
