@@ -38,6 +38,17 @@ TopicReport topic(const std::string& role, double first_s, double last_s) {
   return report;
 }
 
+// Of a recording that was read to its end; what it points to has to live as long.
+ReadingFacts facts_of(const ReadRecording& recording, const EventOrderer::Report& repair,
+                      const Log& log) {
+  ReadingFacts facts;
+  facts.source = &recording;
+  facts.time_repair = &repair;
+  facts.log = &log;
+  facts.last_scan_end = from_seconds(160.0);
+  return facts;
+}
+
 // A lidar from 100 s to 160 s, and an IMU whose stamps lie between these.
 RunEvidence gathered(double imu_first_s, double imu_last_s, double imu_offset_s) {
   const ReadRecording recording(
@@ -45,11 +56,7 @@ RunEvidence gathered(double imu_first_s, double imu_last_s, double imu_offset_s)
   EventOrderer::Report repair;
   repair.streams[EventOrderer::kImu].offset = from_seconds(imu_offset_s);
   const Log log;
-  ReadingFacts facts;
-  facts.source = &recording;
-  facts.time_repair = &repair;
-  facts.log = &log;
-  facts.last_scan_end = from_seconds(160.0);
+  ReadingFacts facts = facts_of(recording, repair, log);
   RunEvidence evidence;
   gather_reading(facts, evidence);
   return evidence;
@@ -77,11 +84,7 @@ TEST(EvidenceGathering, SamplesThatCannotBeUsedHaveNoSay) {
   const ReadRecording recording({topic("lidar", 100.0, 160.0), topic("imu", 100.0, 160.0)});
   const EventOrderer::Report repair;
   const Log log;
-  ReadingFacts facts;
-  facts.source = &recording;
-  facts.time_repair = &repair;
-  facts.log = &log;
-  facts.last_scan_end = from_seconds(160.0);
+  ReadingFacts facts = facts_of(recording, repair, log);
   ImuSample sample;
   sample.specific_force = {0.0, 0.0, 9.81};
   for (int k = 0; k < 300; ++k) {

@@ -17,8 +17,8 @@
 #include <streambuf>
 #include <type_traits>
 #include <vector>
-#include "understory/recording/finding.h"
 
+#include "understory/recording/finding.h"
 #include "understory/util/error.h"
 #include "understory/util/read_error.h"
 

@@ -6,9 +6,9 @@
 #include <cstring>
 #include <filesystem>
 #include <utility>
-#include "understory/recording/finding.h"
 
 #include "understory/recording/byte_source.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/mcap_format.h"
 #include "understory/recording/mcap_reader.h"
 #include "understory/util/error.h"

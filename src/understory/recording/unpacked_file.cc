@@ -11,9 +11,9 @@
 #include <cstring>
 #include <filesystem>
 #include <vector>
-#include "understory/recording/finding.h"
 
 #include "understory/recording/byte_source.h"
+#include "understory/recording/finding.h"
 #include "understory/util/error.h"
 
 namespace understory {
