@@ -11,7 +11,7 @@
   ./run accuracy --sites all --whole  from beginning to end
   ./run accuracy --spoilt             no table but 100 recordings spoilt so that the map is wrong beside 100
                                       good ones: is any wrong map called complete (see spoilt.py)
-  ./run accuracy --write              puts the table, or the rows of the sites, into docs/results.md
+  ./run accuracy --write              puts the table, or the rows of the sites, into docs/method/results.md
 
 Exit status 1 if a floor is missed (in the short form: by more than the stated margin).
 """
@@ -35,7 +35,7 @@ REPORTED_SEEDS = [21, 22, 23]
 NO_LOOPS = "loop_closure.enabled=false"
 # Files that hold times and memory; every other byte of a run folder must not depend on threads.
 TIMED_FILES = {"run.json", "report.html"}
-RESULTS = TOP / "docs" / "results.md"
+RESULTS = TOP / "docs" / "method" / "results.md"
 BEGIN, END = "<!-- accuracy table: ./run accuracy --write -->", "<!-- end of accuracy table -->"
 
 
@@ -266,7 +266,7 @@ def arguments():
     parser.add_argument("--sites", type=site_names, default="floors,all", metavar="A,B",
                         help=f"of {', '.join(['floors', 'all', *PARTS, *SITES])}")
     parser.add_argument("--whole", action="store_true", help="whole sites, not their first minutes")
-    parser.add_argument("--write", action="store_true", help="put the table into docs/results.md")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/method/results.md")
     parser.add_argument("--keep", type=Path, help="keep the run folders here")
     parser.add_argument("--spoilt", action="store_true", help="spoilt recordings beside good ones")
     parser.add_argument("--wanted", type=int, default=100, metavar="N",

@@ -5,7 +5,7 @@
 
 FOLDER holds NMEA logs whose names begin with a plot (S01_...) and reference_data.csv with the
 plots in UTM zone 32 (EPSG:25832). Each log is a row, then the same number of simulated receivers:
-SITE with its carrier standing still for as long, one seed each. docs/simulation.md explains the
+SITE with its carrier standing still for as long, one seed each. docs/method/simulation.md explains the
 columns."""
 import argparse
 import csv

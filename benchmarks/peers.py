@@ -4,7 +4,7 @@
   ./run bench peers                               60 s of handheld and harvester, seed 21
   ./run bench peers --sites handheld --duration-s 180 --seed 22
   ./run bench peers --only DLIO KissICP           some of them
-  ./run bench peers --write                       puts each table into docs/results.md when it is done
+  ./run bench peers --write                       puts each table into docs/method/results.md when it is done
 
 From PyPI, into an environment of their own: evalio (LIO-SAM, DLIO, LOAM, KISS-ICP, GenZ-ICP, CT-ICP,
 MAD-ICP, FORM) and RKO-LIO. One after another, two threads, pinned to the same two processors. Errors
@@ -24,7 +24,7 @@ from program import (Failed, TOP, machine, map_recording, own_cpus, run, say, un
 from sites import SITES
 
 PEERS = TOP / "benchmarks" / "peers"
-RESULTS = TOP / "docs" / "results.md"
+RESULTS = TOP / "docs" / "method" / "results.md"
 BEGIN, END = "<!-- peers table: ./run bench peers --write -->", "<!-- end of peers table -->"
 # DLIO and LIO-SAM work in threads of their own and are fed at the sensor's rate.
 EVALIO = {"LioSAM": 1.0, "DLIO": 1.0, "LOAM": 0, "KissICP": 0, "GenZICP": 0, "CTICP": 0,

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Simulated scans beside real ones: docs/pictures/realism.png and the tables of docs/simulation.md.
+"""Simulated scans beside real ones: docs/pictures/realism.png and the tables of docs/method/simulation.md.
 
     realism.py [--data FOLDER] [--out PICTURE]
 

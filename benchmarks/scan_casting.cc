@@ -1,5 +1,5 @@
 // How fast the simulator casts: milliseconds a scan, wall and CPU, against the time that the sensor
-// takes for it (docs/simulation.md).
+// takes for it (docs/method/simulation.md).
 // The sum is that of the readings' bytes: a change that keeps it keeps every cache of scans.
 //   scan_casting SITE SEED [THREADS] [key=value ...]
 #include <algorithm>
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/simulation/scanner.h"
+#include "understory/simulation/sensors/scanner.h"
 #include "understory/simulation/world.h"
 #include "understory/util/parallel.h"
 #include "understory/util/timing.h"

@@ -20,7 +20,7 @@ SITES = ["evo1", "evo2", "evo3", "tuusniemi1", "tuusniemi3", "lieksa1", "lieksa2
          "lohja1", "lohja2", "lake", "forest", "skidoo", "demo"]
 OTHER_WAYS = {"lieksa1": "by stems", "lieksa2": "by stems", "lieksa3": "by stems",
               "tuusniemi1": "machine boxes", "tuusniemi3": "machine boxes"}
-RESULTS = TOP / "docs" / "results.md"
+RESULTS = TOP / "docs" / "method" / "results.md"
 BEGIN = "<!-- sites table: ./run accuracy --sites all --write -->"
 END = "<!-- end of sites table -->"
 HEAD = ("| site | seed | part | way m | APE SE(3) cm | drift % | stems to be seen | found % | false % "

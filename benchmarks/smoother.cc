@@ -1,8 +1,8 @@
 // Smoothers of the first graph on a carrier with known truth: time per scan, and root mean square
-// errors over five seeds (docs/decisions/002-smoother.md).
+// errors over five seeds (docs/method/decisions/002-smoother.md).
 #include <benchmark/benchmark.h>
 
-#include "understory/odometry/motion_model.h"
+#include "understory/odometry/motion/motion_model.h"
 #include "understory/odometry/test_carrier.h"
 
 namespace understory {

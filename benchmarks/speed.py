@@ -4,7 +4,7 @@
   ./run bench                        20 s of the handheld site, 3 rounds
   ./run bench --recording REC.mcap   another recording in this project's MCAP form
   ./run bench peers                  accuracy beside many more: benchmarks/peers.py
-  ./run bench --write                puts the table into docs/results.md
+  ./run bench --write                puts the table into docs/method/results.md
 
 All take the same scans on the same two processors, in turn, round after round, so that whatever
 else the machine does falls on all of them; ratios are made within a round, and the median of the
@@ -24,7 +24,7 @@ from program import (TOP, machine, map_recording, own_cpus, run, say, understory
                      version)
 
 PEERS = TOP / "benchmarks" / "peers"
-RESULTS = TOP / "docs" / "results.md"
+RESULTS = TOP / "docs" / "method" / "results.md"
 BEGIN, END = "<!-- speed table: ./run bench --write -->", "<!-- end of speed table -->"
 
 

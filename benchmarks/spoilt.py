@@ -5,7 +5,7 @@
   ./run accuracy --spoilt --keep DIR            results.jsonl stays there; run again, it goes on where it was
   ./run accuracy --spoilt --keep DIR --fit      from the results there: what each number of the evidence is
                                                 in good and in wrong runs, beside the limits
-  ./run accuracy --spoilt --write               puts the table into docs/results.md
+  ./run accuracy --spoilt --write               puts the table into docs/method/results.md
 
 Wrong: the error of the positions (RMS after the best rigid motion, scans taken at their true times) is
 over 10 times that of the undisturbed recording and over 20 cm. A spoilt recording that stays below does
@@ -47,7 +47,7 @@ SPOILT_SITES = {
 GOOD_SITES = ["handheld", "harvester", "evo1", "evo2", "evo3", "tuusniemi1", "tuusniemi3", "lieksa1",
               "lieksa2", "lieksa3", "lohja1", "lohja2", "lake", "forest", "skidoo", "demo"]
 BEGIN, END = "<!-- spoilt table: ./run accuracy --spoilt --write -->", "<!-- end of spoilt table -->"
-RESULTS = TOP / "docs" / "results.md"
+RESULTS = TOP / "docs" / "method" / "results.md"
 
 
 # --- One recording -------------------------------------------------------------------------------

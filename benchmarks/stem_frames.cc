@@ -1,5 +1,5 @@
 // Stems of single frames against the truth of the simulator: recall over range, precision, errors
-// of the centre, the foot and the radius, time a frame (docs/sparse.md).
+// of the centre, the foot and the radius, time a frame (docs/method/sparse.md).
 //   stem_frames SITE SEED [EVERY] [key=value ...] [--traits FILE] [--repeats N] [--map FRAMES]
 #include <algorithm>
 #include <cmath>

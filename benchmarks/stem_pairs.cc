@@ -18,9 +18,9 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/odometry/stem_levelling.h"
-#include "understory/recording/stems_file.h"
-#include "understory/registration/go_icp.h"
+#include "understory/odometry/stems/stem_levelling.h"
+#include "understory/recording/clouds/stems_file.h"
+#include "understory/registration/stems/go_icp.h"
 #include "understory/util/log.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/registration/go_icp.h"
+#include "understory/registration/stems/go_icp.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 

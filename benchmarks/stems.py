@@ -12,7 +12,7 @@
   ./run bench stems --table --runs FOLDER [--site-seed N] [--sites lieksa1,lieksa2]
                                     P1's table 1 over whole simulated sites; runs that are in the
                                     folder are not made again (each takes minutes)
-  ./run bench stems --write         puts the tables into docs/sparse-experiments.md
+  ./run bench stems --write         puts the tables into docs/method/sparse-experiments.md
 
 The roads are those of tests/stems/strip_roads.py: three, 22.5 m apart. Truth is for the
 columns of the table alone; `understory correct` never sees it. Everything runs on one thread.
@@ -35,7 +35,7 @@ sys.path.insert(0, str(TOP / "tests" / "stems"))
 from strip_road_table import table_page  # noqa: E402
 from strip_roads import Roads, write_strip_roads  # noqa: E402
 
-PAGE = TOP / "docs" / "sparse-experiments.md"
+PAGE = TOP / "docs" / "method" / "sparse-experiments.md"
 PICTURE = TOP / "docs" / "pictures" / "stem_convergence.svg"
 TILT_PICTURE = TOP / "docs" / "pictures" / "stem_convergence_tilt.svg"
 TILT_REACH = 3.0  # of stem_search's tilts, in units of phi0
@@ -397,7 +397,7 @@ def main():
     parser.add_argument("--sites", default="lieksa1,lieksa2,lieksa3")
     parser.add_argument("--rows", help="file that keeps what was measured; its seeds are not "
                         "measured again")
-    parser.add_argument("--write", action="store_true", help="into docs/sparse-experiments.md")
+    parser.add_argument("--write", action="store_true", help="into docs/method/sparse-experiments.md")
     options = parser.parse_args()
     first, last = map(int, options.seeds.split("-"))
     tables = {}

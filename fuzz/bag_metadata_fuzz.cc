@@ -1,7 +1,7 @@
 #include <string>
 
 #include "fuzz_file.h"
-#include "understory/recording/ros2_bag.h"
+#include "understory/recording/bags/ros2_bag.h"
 #include "understory/util/error.h"
 
 // metadata.yaml of a ROS 2 bag.

@@ -2,7 +2,7 @@
 #include <string>
 
 #include "fuzz_folder.h"
-#include "understory/pipeline/checkpoint.h"
+#include "understory/pipeline/run_folder/checkpoint.h"
 
 // Checkpoints: whole files. The first byte says what the rest is read as: one checkpoint, or
 // checkpoint.bin beside an older one. The states in a checkpoint are read only where its checksum

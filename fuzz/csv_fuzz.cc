@@ -1,5 +1,5 @@
 #include "fuzz_input.h"
-#include "understory/recording/csv_events.h"
+#include "understory/recording/clouds/csv_events.h"
 #include "understory/util/error.h"
 
 // imu.csv and gnss.csv.

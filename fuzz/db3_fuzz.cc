@@ -1,5 +1,5 @@
 #include "fuzz_recording.h"
-#include "understory/recording/ros2_bag.h"
+#include "understory/recording/bags/ros2_bag.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace understory;

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "understory/recording/byte_source.h"
+#include "understory/recording/bags/byte_source.h"
 
 namespace understory {
 

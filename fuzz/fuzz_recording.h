@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "fuzz_place.h"
-#include "understory/recording/message_recording.h"
+#include "understory/recording/messages/message_recording.h"
 #include "understory/recording/recording_info.h"
 #include "understory/util/error.h"
 

@@ -4,8 +4,8 @@
 #include "fuzz_folder.h"
 #include "understory/map/keyframe_clouds.h"
 #include "understory/map/keyframe_history.h"
-#include "understory/pipeline/journal.h"
-#include "understory/pipeline/view_journal.h"
+#include "understory/pipeline/run_folder/journal.h"
+#include "understory/pipeline/run_folder/view_journal.h"
 
 // The append-only files of a run: as they are, and with records whose checksums are right.
 //

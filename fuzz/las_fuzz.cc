@@ -1,5 +1,5 @@
 #include "fuzz_input.h"
-#include "understory/recording/cloud_file.h"
+#include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
 
 // LASzip does not free all it has read of a header that it then refuses.

@@ -1,5 +1,5 @@
 #include "fuzz_recording.h"
-#include "understory/recording/mcap_reader.h"
+#include "understory/recording/bags/mcap_reader.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace understory;

@@ -1,5 +1,5 @@
-#include "understory/recording/message_decode.h"
-#include "understory/recording/point_cloud.h"
+#include "understory/recording/messages/message_decode.h"
+#include "understory/recording/messages/point_cloud.h"
 
 // The first byte chooses the serialisation, the rest is decoded as every type of message.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

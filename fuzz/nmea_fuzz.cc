@@ -2,7 +2,7 @@
 #include <string>
 
 #include "fuzz_input.h"
-#include "understory/recording/nmea.h"
+#include "understory/recording/captures/nmea.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace understory;

@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "fuzz_input.h"
-#include "understory/recording/ouster.h"
+#include "understory/recording/captures/ouster.h"
 
 namespace {
 

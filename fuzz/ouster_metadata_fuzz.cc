@@ -1,7 +1,7 @@
 #include <string>
 
 #include "fuzz_input.h"
-#include "understory/recording/ouster.h"
+#include "understory/recording/captures/ouster.h"
 #include "understory/util/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

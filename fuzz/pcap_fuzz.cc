@@ -1,6 +1,6 @@
 #include "fuzz_input.h"
 #include "fuzz_place.h"
-#include "understory/recording/pcap_recording.h"
+#include "understory/recording/captures/pcap_recording.h"
 #include "understory/util/error.h"
 
 // The metadata of a small Ouster stands beside, so that both kinds of sensor are reached.

@@ -1,6 +1,6 @@
 #include "fuzz_input.h"
-#include "understory/recording/cloud_table.h"
-#include "understory/recording/point_cloud.h"
+#include "understory/recording/clouds/cloud_table.h"
+#include "understory/recording/messages/point_cloud.h"
 #include "understory/util/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

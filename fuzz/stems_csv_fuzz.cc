@@ -1,5 +1,5 @@
 #include "fuzz_file.h"
-#include "understory/recording/stems_file.h"
+#include "understory/recording/clouds/stems_file.h"
 #include "understory/util/error.h"
 
 // stems.csv and stems.csv.gz.

@@ -2,7 +2,7 @@
 #include <cstring>
 
 #include "fuzz_input.h"
-#include "understory/recording/velodyne.h"
+#include "understory/recording/captures/velodyne.h"
 
 // Packets one after another, each with two bytes before it by which its stamp advances.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

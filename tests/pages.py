@@ -105,7 +105,7 @@ keys = {"map": keys_of("map"), "map by stems": keys_of("map", "--front-end", "sp
 guides = sorted((TOP / "docs" / "guides").glob("*.md"))
 assert len(guides) >= 5, guides
 checked = 0
-for page in [first, TOP / "docs" / "configuration.md", *guides]:
+for page in [first, TOP / "docs" / "reference" / "configuration.md", *guides]:
     for words in commands(page):
         check_command(page, words, helps, keys)
         checked += 1
@@ -115,7 +115,7 @@ for page in [first, TOP / "docs" / "configuration.md", *guides]:
 assert checked > 20, checked
 
 # The settings that a page lists in tables, first column, exist.
-settings = TOP / "docs" / "configuration.md"
+settings = TOP / "docs" / "reference" / "configuration.md"
 listed = re.findall(r"^\| ([a-z_]+(?:\.[a-z_]+)+) \|", settings.read_text(), re.M)
 assert len(listed) == 20, len(listed)
 wrong += [f"{settings.name}: no key {key}" for key in listed if key not in keys["map"] | keys["map by stems"]]

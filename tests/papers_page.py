@@ -1,4 +1,4 @@
-"""docs/papers.md names what is there: each file, test and key of the configuration in it exists."""
+"""docs/method/papers.md names what is there: each file, test and key of the configuration in it exists."""
 
 import os
 import re
@@ -7,7 +7,7 @@ from pathlib import Path
 
 top = Path(__file__).resolve().parent.parent
 program = os.environ["UNDERSTORY_PROGRAM"]
-page = (top / "docs" / "papers.md").read_text()
+page = (top / "docs" / "method" / "papers.md").read_text()
 named = set(re.findall(r"`([^`\n]+)`", page))
 
 tests = set()

@@ -24,7 +24,7 @@ CASES = {
                   ["--front-end", "sparse", "--set", "run.checkpoint_interval_s=2"], STEMS),
 }
 program = os.environ["UNDERSTORY_PROGRAM"]
-recording, growing, least_bytes, options, files = CASES[sys.argv[1]]
+recording, growing, min_bytes, options, files = CASES[sys.argv[1]]
 
 
 def start(folder, threads):
@@ -37,7 +37,7 @@ with tempfile.TemporaryDirectory() as scratch:
     assert start(whole, 2).wait() in (0, 4)
     run = start(killed, 2)
     for _ in range(6000):
-        if any(path.stat().st_size > least_bytes for path in killed.rglob(growing)):
+        if any(path.stat().st_size > min_bytes for path in killed.rglob(growing)):
             break
         time.sleep(0.01)
     if sys.argv[-1] == "interrupted":  # by Ctrl-C: leaves what there is so far

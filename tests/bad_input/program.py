@@ -1,5 +1,5 @@
 """Runs the program on spoilt input and keeps what it said. What is promised is in
-docs/troubleshooting.md: 0 mended or harmless, 3 nothing usable, 4 not to be trusted or partial."""
+docs/reference/troubleshooting.md: 0 mended or harmless, 3 nothing usable, 4 not to be trusted or partial."""
 
 import concurrent.futures
 import json

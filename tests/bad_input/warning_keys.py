@@ -1,10 +1,10 @@
-"""Every kind of warning that the sources know is explained in docs/troubleshooting.md."""
+"""Every kind of warning that the sources know is explained in docs/reference/troubleshooting.md."""
 
 import pathlib
 import re
 
 TOP = pathlib.Path(__file__).resolve().parents[2]
-explained = (TOP / "docs" / "troubleshooting.md").read_text()
+explained = (TOP / "docs" / "reference" / "troubleshooting.md").read_text()
 keys = set()
 for path in sorted((TOP / "src").rglob("*.cc")):
     if path.name.endswith("_test.cc"):

@@ -61,12 +61,12 @@ def difference(a, b):
     return np.linalg.norm(a[:3, 3] - b[:3, 3]), degrees
 
 
-def compare(name, ours, theirs, most_m, most_deg):
+def compare(name, ours, theirs, max_m, max_deg):
     """How many relative poses differ by more."""
     failures = 0
     for pair, step in ours.items():
         metres, degrees = difference(step, theirs[pair])
-        good = metres < most_m and degrees < most_deg
+        good = metres < max_m and degrees < max_deg
         failures += not good
         print(f"{name} {pair[0]}-{pair[1]}: {np.linalg.norm(step[:3, 3]):.3f} m, differs by "
               f"{100 * metres:.2f} cm, {degrees:.3f} deg{'' if good else '  TOO FAR'}")

@@ -170,7 +170,7 @@ def again(folder):
 
 @cases.case("the harvester's log of its head tells which tree fell")
 def head_log(folder):
-    done = program("correct", RUN, "-o", folder / "run", "--set", f"felling.head_log={TRUTH}/head.csv")
+    done = program("correct", RUN, "-o", folder / "run", "--set", f"harvester.head_log={TRUTH}/head.csv")
     assert done.returncode == 0, done.stderr
     cuts = list(csv.DictReader((folder / "run" / "cuts.csv").open()))
     falls = {row["id"]: row for row in csv.DictReader((folder / "run" / "felled.csv").open())}
@@ -190,7 +190,7 @@ def head_log(folder):
         assert fall["seen_until"] == fall["gone_since"] == cut["timestamp"], fall
     log = folder / "log.csv"
     log.write_text((TRUTH / "head.csv").read_text() + "1,2,3\n")
-    done = sparse(REC, folder / "refused", "--set", f"felling.head_log={log}")
+    done = sparse(REC, folder / "refused", "--set", f"harvester.head_log={log}")
     assert done.returncode == 3 and "log.csv" in done.stderr and "line" in done.stderr, done
     assert not (folder / "refused").exists()
     return f"{len(cuts)} cuts, {float(cuts[0]['distance_m']):.2f} m from the tree"

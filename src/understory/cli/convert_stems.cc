@@ -10,7 +10,7 @@
 #include "understory/features/stem_segments.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/source.h"
-#include "understory/recording/cloud_file.h"
+#include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
 #include "understory/util/staged_output.h"
 

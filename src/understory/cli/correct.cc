@@ -3,7 +3,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/outcome.h"
-#include "understory/pipeline/correction.h"
+#include "understory/pipeline/correction/correction.h"
 #include "understory/util/error.h"
 #include "understory/util/output_guard.h"
 

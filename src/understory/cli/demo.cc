@@ -3,7 +3,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/outcome.h"
-#include "understory/pipeline/mapping.h"
+#include "understory/pipeline/mapping/mapping.h"
 
 namespace understory {
 namespace {

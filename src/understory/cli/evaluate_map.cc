@@ -12,8 +12,8 @@
 #include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/strip_roads.h"
 #include "understory/evaluation/trajectory.h"
-#include "understory/pipeline/stem_correction.h"
-#include "understory/recording/stems_file.h"
+#include "understory/pipeline/correction/stem_correction.h"
+#include "understory/recording/clouds/stems_file.h"
 #include "understory/util/error.h"
 
 namespace understory {

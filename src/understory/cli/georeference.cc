@@ -4,7 +4,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/outcome.h"
-#include "understory/pipeline/georeferencing.h"
+#include "understory/pipeline/georeferencing/georeferencing.h"
 #include "understory/util/error.h"
 
 namespace understory {

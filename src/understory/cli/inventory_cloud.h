@@ -5,7 +5,7 @@
 #include <string>
 
 #include "understory/forest/inventory.h"
-#include "understory/recording/cloud_file.h"
+#include "understory/recording/clouds/cloud_file.h"
 
 namespace understory {
 

@@ -4,9 +4,9 @@
 
 #include "understory/cli/open_options.h"
 #include "understory/cli/outcome.h"
-#include "understory/pipeline/adaptation.h"
+#include "understory/pipeline/mapping/adaptation.h"
+#include "understory/pipeline/mapping/sparse_mapping.h"
 #include "understory/pipeline/source.h"
-#include "understory/pipeline/sparse_mapping.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -43,7 +43,7 @@ int run_sparse_map(const SparseMapOptions& options, CommandContext& context) {
   request.run_folder = options.run_folder;
   refuse_run_over_inputs(request.run_folder, request.recording, options.open,
                          {options.config_file, request.config.machine_boxes_file,
-                          request.config.correction.felling.head_log});
+                          request.config.correction.harvester.head_log});
   request.config_yaml = sparse_mapping_table(request.config).to_yaml(false);
   request.open = options.open;
   request.realtime = options.realtime;

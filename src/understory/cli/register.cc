@@ -8,9 +8,9 @@
 #include "understory/cli/register_output.h"
 #include "understory/cli/register_stems.h"
 #include "understory/preprocess/voxel_filter.h"
-#include "understory/recording/cloud_file.h"
-#include "understory/registration/icp.h"
-#include "understory/registration/ndt.h"
+#include "understory/recording/clouds/cloud_file.h"
+#include "understory/registration/icp/icp.h"
+#include "understory/registration/ndt/ndt.h"
 #include "understory/util/error.h"
 
 namespace understory {

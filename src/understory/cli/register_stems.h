@@ -5,8 +5,8 @@
 #include "understory/cli/command.h"
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/go_icp.h"
-#include "understory/registration/sparse_icp.h"
+#include "understory/registration/stems/go_icp.h"
+#include "understory/registration/stems/sparse_icp.h"
 
 namespace understory {
 

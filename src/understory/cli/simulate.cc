@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "understory/cli/command.h"
-#include "understory/recording/mcap_writer.h"
-#include "understory/simulation/field_log.h"
+#include "understory/recording/bags/mcap_writer.h"
+#include "understory/simulation/sensors/field_log.h"
 #include "understory/simulation/simulator.h"
 #include "understory/simulation/truth.h"
 #include "understory/util/error.h"

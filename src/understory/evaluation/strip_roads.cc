@@ -147,7 +147,7 @@ std::vector<StripRoad> find_strip_roads(const std::vector<Pose>& world_from_body
       sum += heading[i];
       continue;
     }
-    if (i > first && (at[i - 1] - at[first]).norm() >= config.least_length_m)
+    if (i > first && (at[i - 1] - at[first]).norm() >= config.min_length_m)
       roads.push_back({first, i - 1});
     first = i;
     sum = i < at.size() ? heading[i] : Vector2d::Zero();
@@ -176,7 +176,7 @@ std::vector<RoadConsistency> road_consistencies(const std::vector<StemView>& vie
       const Vector2d middle = p.middle + 0.5 * (apart - t * p.along);
       const Region region{middle, p.along, std::max(-p.half_length, t - q.half_length),
                           std::min(p.half_length, t + q.half_length), config.within_m};
-      if (region.end_m - region.begin_m < config.least_length_m) continue;
+      if (region.end_m - region.begin_m < config.min_length_m) continue;
       RoadConsistency compared = compare(trees[a], trees[b], region, config);
       compared.road = a + 1;
       compared.other = b + 1;

@@ -14,13 +14,13 @@ namespace understory {
 // Self-consistency of strip roads, P1 (10) and table 1: trees mapped from one road alone against
 // those mapped from a neighbouring road alone.
 struct StripRoadConfig {
-  double least_length_m = 50.0;  // of a straight stretch to count as a road
-  double smoothed_m = 10.0;      // way over which the heading of the path is taken
-  double straight_deg = 30.0;    // a road's heading stays that near
-  double farthest_m = 40.0;      // between neighbouring roads
-  double within_m = 15.0;        // trees that near to both roads are compared; see below
-  double pairing_m = 0.3;        // of trees that count as the same
-  double part_m = 50.0;          // length of the parts
+  double min_length_m = 50.0;  // of a straight stretch to count as a road
+  double smoothed_m = 10.0;    // way over which the heading of the path is taken
+  double straight_deg = 30.0;  // a road's heading stays that near
+  double farthest_m = 40.0;    // between neighbouring roads
+  double within_m = 15.0;      // trees that near to both roads are compared; see below
+  double pairing_m = 0.3;      // of trees that count as the same
+  double part_m = 50.0;        // length of the parts
   StemMapConfig map;
 };
 

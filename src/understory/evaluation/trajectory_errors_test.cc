@@ -40,7 +40,8 @@ TrajectoryErrors errors_of(const Trajectory& estimate, const Trajectory& truth,
   return errors.value_or(TrajectoryErrors());
 }
 
-// The definitions of docs/evaluation.md written out once more, pose by pose, with matrices.
+// The definitions of docs/reference/evaluation.md written out once more, pose by pose, with
+// matrices.
 double matrix_rpe(const Trajectory& estimate, const Trajectory& truth, double delta) {
   double sum = 0.0;
   int n = 0;

@@ -12,9 +12,9 @@
 
 namespace understory {
 
-// Reads trees.csv (docs/outputs.md); of its columns only x and y are needed; a time in felled_at
-// marks a tree as felled. Throws InputError with the line where a position is missing or a cell is
-// no number.
+// Reads trees.csv (docs/reference/outputs.md); of its columns only x and y are needed; a time in
+// felled_at marks a tree as felled. Throws InputError with the line where a position is missing or
+// a cell is no number.
 [[nodiscard]] std::vector<Tree> read_trees(const std::filesystem::path& path);
 
 // An index into A and one into B.

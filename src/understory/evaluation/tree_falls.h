@@ -8,8 +8,8 @@
 
 namespace understory {
 
-// Reads felled.csv (docs/outputs.md). Throws InputError with the line where a cell is no number or
-// a time is missing.
+// Reads felled.csv (docs/reference/outputs.md). Throws InputError with the line where a cell is no
+// number or a time is missing.
 [[nodiscard]] std::vector<TreeFall> read_tree_falls(const std::filesystem::path& path);
 
 // The same falls where `trees` has their trees by now; those of trees that it does not list are

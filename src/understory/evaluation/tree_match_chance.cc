@@ -40,10 +40,10 @@ std::vector<Tree> shifted(std::vector<Tree> trees, double reach_m, Random& rando
 }
 
 // Seen in a mirror, which no motion undoes, and each tree beside its place.
-std::vector<Tree> scrambled(std::vector<Tree> trees, double most_m, Random& random) {
+std::vector<Tree> scrambled(std::vector<Tree> trees, double max_m, Random& random) {
   for (Tree& tree : trees) {
     const double angle = random.uniform(0.0, 2.0 * M_PI);
-    const double length = most_m * std::sqrt(random.uniform(0.0, 1.0));
+    const double length = max_m * std::sqrt(random.uniform(0.0, 1.0));
     tree.x = -tree.x + length * std::cos(angle);
     tree.y += length * std::sin(angle);
   }

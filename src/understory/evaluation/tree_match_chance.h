@@ -31,7 +31,8 @@ struct MatchChance {
 };
 
 // `s` and `l` as they are merged. `searched`: `l` was first laid on `s` by the trees alone
-// (align_trees by heading), so each copy is, too. Deterministic. Thresholds: docs/outputs.md.
+// (align_trees by heading), so each copy is, too. Deterministic. Thresholds:
+// docs/reference/outputs.md.
 [[nodiscard]] MatchChance match_chance(const std::vector<Tree>& s, const std::vector<Tree>& l,
                                        const MergedTrees& merged, double weight,
                                        const TreeMergeConfig& config, bool searched);

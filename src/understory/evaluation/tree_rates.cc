@@ -7,7 +7,7 @@
 
 #include "understory/evaluation/alignment.h"
 #include "understory/evaluation/tree_errors.h"
-#include "understory/registration/plane_grid.h"
+#include "understory/registration/ndt/plane_grid.h"
 
 namespace understory {
 namespace {

@@ -7,7 +7,7 @@ namespace understory {
 namespace {
 
 // Fitted by benchmarks/stem_score.py to the chains of simulated frames (VLP-16 and OS0-128 of four
-// sites, seeds 11 to 14) whose truth is known; docs/sparse.md.
+// sites, seeds 11 to 14) whose truth is known; docs/method/sparse.md.
 // clang-format off
 // weights begin
 constexpr double kBias = -1.409;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "understory/features/stem_segments.h"
-#include "understory/simulation/scanner.h"
+#include "understory/simulation/sensors/scanner.h"
 #include "understory/simulation/world.h"
 
 namespace understory {

@@ -194,8 +194,8 @@ class GroupSearch {
     std::vector<Circle> found;
     int failures = 0;
     const Eigen::Vector2f extent = extent_of(points_);
-    const int most_failures = 2 + static_cast<int>(0.5F * extent.x() * extent.y());
-    while (static_cast<int>(points_.size()) >= config_.min_points && failures < most_failures) {
+    const int max_failures = 2 + static_cast<int>(0.5F * extent.x() * extent.y());
+    while (static_cast<int>(points_.size()) >= config_.min_points && failures < max_failures) {
       const CellIndex fine(points_, 0.08F);
       const CellIndex coarse(points_, 0.3F);
       const Circle sampled = sample(fine, coarse);

@@ -24,7 +24,7 @@ constexpr double kPointsPerCell = 64.0;   // or cells become larger
 constexpr std::size_t kLeastPoints = 16;  // in a cell
 constexpr std::size_t kLeastSteps = 100;  // between cells
 
-// Thresholds, see docs/forest.md.
+// Thresholds, see docs/method/forest.md.
 constexpr double kSmooth = 0.2;
 constexpr double kRough = 0.3;
 constexpr double kClearly = 1.8;

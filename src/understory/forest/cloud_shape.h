@@ -19,7 +19,7 @@ inline constexpr std::array<UpAxis, 6> kUpAxes = {
 [[nodiscard]] Eigen::Matrix3d upright_from_cloud(UpAxis axis);
 
 // What tells whether a cloud is a stand in metres with z up. Thresholds and where they come from:
-// docs/forest.md. Lengths are in the unit of the cloud, which may be wrong.
+// docs/method/forest.md. Lengths are in the unit of the cloud, which may be wrong.
 struct CloudShape {
   std::size_t points = 0;                            // looked at: 400,000 at most
   Eigen::Vector3d extent = Eigen::Vector3d::Zero();  // between the 0.2 and 99.8 percentiles

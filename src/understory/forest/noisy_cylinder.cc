@@ -53,7 +53,7 @@ class Estimator {
       const Eigen::Vector2d along = start.slope / lean;
       squeeze_ -= (1.0 - 1.0 / std::sqrt(1.0 + lean * lean)) * along * along.transpose();
     }
-    const auto most = static_cast<std::size_t>(config.most_points);
+    const auto most = static_cast<std::size_t>(config.max_points);
     const std::size_t stride = std::max<std::size_t>(1, (points.size() + most - 1) / most);
     for (std::size_t i = 0; i < points.size(); i += stride) {
       const SlicePoint& p = points[i];

@@ -32,7 +32,7 @@ struct NoisyCylinderConfig {
   double usual_taper = -0.008;  // of the radius per metre of height
   double taper_sd = 0.006;      // how far stems differ from it
   double slope_sd = 0.03;       // how far the slope may leave that of the start
-  int most_points = 400;        // every n-th where there are more
+  int max_points = 400;         // every n-th where there are more
   int cycles = 20;              // of two steps and an extrapolation, at most
 };
 

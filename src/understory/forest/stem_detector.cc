@@ -109,7 +109,7 @@ std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
 // How much may lie beside the surface, as the sum of both ratios of StemEvidence, for it still to
 // be a stem. In a thicket it takes many slices that agree to believe in one; a steep lean is what a
 // line through scattered points has.
-double most_clutter(const StemFitResult& fit, double lean_deg) {
+double max_clutter(const StemFitResult& fit, double lean_deg) {
   const auto rings = static_cast<double>(fit.stem.slices.size());
   if (lean_deg > 8.0) return 0.25;
   const double limit = std::min(0.65, 0.34 + 0.085 * std::max(0.0, rings - 2.0));
@@ -155,7 +155,7 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
   if (cut.min_slices < config.min_slices && dense && (clutter > 0.25 || e.scatter_m > 0.025)) {
     return false;
   }
-  return 4 * e.inside <= e.on && e.inside_ratio <= 0.35 && clutter <= most_clutter(fit, lean_deg) &&
+  return 4 * e.inside <= e.on && e.inside_ratio <= 0.35 && clutter <= max_clutter(fit, lean_deg) &&
          e.scatter_m <= std::max(0.012, 0.2 * stem.radius_m) + 0.008;
 }
 

@@ -7,7 +7,7 @@ namespace understory {
 
 // Tangent vectors of SE(3) are ordered (rotation, translation): xi = (omega, v) with omega in
 // radians and v in metres. Perturbations act on the right: pose * Pose::exp(xi). Both conventions
-// hold everywhere in the project (docs/frames.md).
+// hold everywhere in the project (docs/reference/frames.md).
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 

@@ -10,7 +10,7 @@
 #include <map>
 #include <utility>
 
-#include "understory/registration/plane_grid.h"
+#include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/median.h"
 
 namespace understory {

@@ -6,7 +6,7 @@
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/plane_grid.h"
+#include "understory/registration/ndt/plane_grid.h"
 
 namespace understory {
 

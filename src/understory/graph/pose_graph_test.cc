@@ -9,7 +9,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "understory/graph/loop_search.h"
+#include "understory/graph/loops/loop_search.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 

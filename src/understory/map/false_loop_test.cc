@@ -89,10 +89,10 @@ KeyframeMap::Config paper_config() {
   config.local_map.method = LocalMapConfig::Method::kRecent;
   config.local_map.recent_spacing_m = 0.5;
   config.loop_closure.search.method = LoopSearchConfig::Method::kPaper;
-  config.loop_closure.least_correction_m = 0.0;
+  config.loop_closure.min_correction_m = 0.0;
   config.loop_closure.graph.robust_loops = false;
   config.loop_closure.graph.check_consistency = false;
-  config.beginning.enabled = false;
+  config.first_keyframes.enabled = false;
   return config;
 }
 

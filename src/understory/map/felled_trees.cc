@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
-#include "understory/graph/view_cone.h"
-#include "understory/registration/plane_grid.h"
+#include "understory/graph/loops/view_cone.h"
+#include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/error.h"
 
 namespace understory {

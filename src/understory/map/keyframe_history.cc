@@ -60,7 +60,7 @@ LoopAttempt get_loop(BinaryReader& reader) {
 }
 
 void get_record(BinaryReader& reader, const std::string& file, KeyframeGrowth& growth) {
-  switch (reader.get<Kind>()) {
+  switch (reader.get_enum(Kind::kLoop)) {
     case Kind::kKeyframe:
       growth.keyframes.push_back(get_keyframe(reader));
       return;

@@ -35,7 +35,7 @@ void KeyframeMap::describe(ConfigTable& table, Config& config) {
   table.section("keyframe", [&] { understory::describe(table, config.keyframe); });
   table.section("local_map", [&] { understory::describe(table, config.local_map); });
   table.section("loop_closure", [&] { understory::describe(table, config.loop_closure); });
-  table.section("beginning", [&] { understory::describe(table, config.beginning); });
+  table.section("first_keyframes", [&] { understory::describe(table, config.first_keyframes); });
   table.section("odometry_edge", [&] {
     table.add("rotation_deg", config.edge_rotation_deg, {0.0, 10.0}, "deg",
               "noise of the odometry between keyframes, however near");
@@ -82,7 +82,7 @@ std::optional<Pose> KeyframeMap::add(TimeNs stamp, const Pose& world_from_body,
                                      const Points& points_in_body) {
   const ScopedTimer timer(times_, "keyframe");
   std::optional<Pose> moved;
-  if (auto outcome = loops_.take(keyframes_.size(), false, at_once_)) {
+  if (auto outcome = loops_.take(keyframes_.size(), false, takes_loops_when_found_)) {
     moved = take_over(std::move(*outcome));
   }
   Keyframe keyframe;
@@ -121,11 +121,11 @@ Matrix6d KeyframeMap::edge_covariance(const Pose& previous_from_this) const {
   const double degree = std::numbers::pi / 180.0;
   const double rotation = grown * config_.edge_rotation_deg_per_sqrt_m * degree;
   const double translation = grown * config_.edge_translation_m_per_sqrt_m;
-  const double least_rotation = scale * config_.edge_rotation_deg * degree;
-  const double least_translation = scale * config_.edge_translation_m;
+  const double min_rotation = scale * config_.edge_rotation_deg * degree;
+  const double min_translation = scale * config_.edge_translation_m;
   Vector6d variances;
-  variances << Eigen::Vector3d::Constant(rotation * rotation + least_rotation * least_rotation),
-      Eigen::Vector3d::Constant(translation * translation + least_translation * least_translation);
+  variances << Eigen::Vector3d::Constant(rotation * rotation + min_rotation * min_rotation),
+      Eigen::Vector3d::Constant(translation * translation + min_translation * min_translation);
   return variances.asDiagonal();
 }
 
@@ -176,20 +176,20 @@ void KeyframeMap::finish(const NdtConfig& ndt) {
   }
   snapshot_.clear();
   local_map_.clear();
-  if (config_.beginning.enabled) refine_beginnings(ndt);
+  if (config_.first_keyframes.enabled) refine_first_keyframes_of_segments(ndt);
   points_->forget();
   give_free_memory_back();
 }
 
-void KeyframeMap::refine_beginnings(const NdtConfig& ndt) {
+void KeyframeMap::refine_first_keyframes_of_segments(const NdtConfig& ndt) {
   for (std::size_t s = 0; s < segment_starts_.size(); ++s) {
     const std::size_t first = segment_starts_[s];
     const bool is_last = s + 1 == segment_starts_.size();
     const std::size_t end = is_last ? keyframes_.size() : segment_starts_[s + 1];
-    const std::vector<Pose> refined = refine_beginning(
+    const std::vector<Pose> refined = refine_first_keyframes(
         std::span(keyframes_).subspan(first, end - first),
         [&](std::size_t i) { return points_->get(first + i); }, config_.local_map, ndt,
-        config_.beginning);
+        config_.first_keyframes);
     if (refined.empty()) continue;
     for (std::size_t i = 0; i < refined.size(); ++i)
       keyframes_[first + i].world_from_body = refined[i];

@@ -8,7 +8,7 @@
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
-#include "understory/map/beginning.h"
+#include "understory/map/first_keyframes.h"
 #include "understory/map/keyframe.h"
 #include "understory/map/keyframe_history.h"
 #include "understory/map/keyframe_points.h"
@@ -47,7 +47,7 @@ class KeyframeMap {
     KeyframeConfig keyframe;
     LocalMapConfig local_map;
     LoopCloserConfig loop_closure;
-    BeginningConfig beginning;
+    FirstKeyframesConfig first_keyframes;
     // Noise of the odometry between keyframes: that of any edge (P4: that of a match, (36)), and
     // what grows with the square root of the distance.
     double edge_rotation_deg = 0.0;
@@ -86,7 +86,7 @@ class KeyframeMap {
   // CPU time of the searches for loops, which run beside the scan loop.
   [[nodiscard]] double search_cpu_seconds() const { return loops_.search_cpu_seconds(); }
   // --realtime: outcomes are taken over as soon as they are there.
-  void take_outcomes_at_once() { at_once_ = true; }
+  void take_loops_when_found() { takes_loops_when_found_ = true; }
   // Waits until what has been added so far is on the disk.
   void sync();
   // The files in the folder that `save` counts on, as far as it does.
@@ -95,7 +95,7 @@ class KeyframeMap {
   void load(BinaryReader& reader);
 
  private:
-  void refine_beginnings(const NdtConfig& ndt);
+  void refine_first_keyframes_of_segments(const NdtConfig& ndt);
   [[nodiscard]] std::size_t segment_start() const { return segment_starts_.back(); }
   void update_local_map(std::size_t keyframe);
   void insert(std::size_t keyframe);
@@ -119,7 +119,7 @@ class KeyframeMap {
   std::vector<LocalMapInsertion>
       inserted_;  // since the local map was empty, in order: builds it again
   std::vector<NdtMapPtr> snapshot_;
-  bool at_once_ = false;
+  bool takes_loops_when_found_ = false;
   std::vector<char> loops_used_;
   LoopCloser loops_;
 };

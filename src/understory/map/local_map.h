@@ -5,7 +5,7 @@
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/ndt_map.h"
+#include "understory/registration/ndt/ndt_map.h"
 #include "understory/util/config.h"
 
 namespace understory {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-#include "understory/graph/local_map_loop.h"
+#include "understory/graph/loops/local_map_loop.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
@@ -78,8 +78,8 @@ bool worth_applying(const Search& search, const std::vector<Pose>& answer) {
   const auto& poses = search.problem.world_from_keyframe;
   for (std::size_t i = 0; i < answer.size(); ++i) {
     const Pose change = poses[i].inverse() * answer[i];
-    if (change.translation().norm() > search.config.least_correction_m ||
-        change.angle() > search.config.least_correction_deg * std::numbers::pi / 180.0) {
+    if (change.translation().norm() > search.config.min_correction_m ||
+        change.angle() > search.config.min_correction_deg * std::numbers::pi / 180.0) {
       return true;
     }
   }
@@ -162,9 +162,9 @@ void describe(ConfigTable& table, LoopCloserConfig& config) {
   table.add("voxel_size_m", config.voxel_size_m, {0.05, 5.0}, "m", "thins what is matched");
   table.add("handover_keyframes", config.handover_keyframes, {1, 1000}, "",
             "keyframes after which the result of a search is taken over");
-  table.add("least_correction_m", config.least_correction_m, {0.0, 10.0}, "m",
+  table.add("min_correction_m", config.min_correction_m, {0.0, 10.0}, "m",
             "smaller corrections wait for the next");
-  table.add("least_correction_deg", config.least_correction_deg, {0.0, 180.0}, "deg",
+  table.add("min_correction_deg", config.min_correction_deg, {0.0, 180.0}, "deg",
             "smaller corrections wait for the next");
 }
 

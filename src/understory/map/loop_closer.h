@@ -6,14 +6,14 @@
 #include <optional>
 #include <vector>
 
-#include "understory/graph/loop_closure.h"
-#include "understory/graph/loop_search.h"
+#include "understory/graph/loops/loop_closure.h"
+#include "understory/graph/loops/loop_search.h"
 #include "understory/graph/pose_graph.h"
 #include "understory/map/keyframe.h"
 #include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
 #include "understory/map/loop_attempt.h"
-#include "understory/registration/ndt_map.h"
+#include "understory/registration/ndt/ndt_map.h"
 #include "understory/util/binary_io.h"
 #include "understory/util/config.h"
 #include "understory/util/log.h"
@@ -30,8 +30,8 @@ struct LoopCloserConfig {
   int source_keyframes = 4;     // on each side of the query, that are matched
   double voxel_size_m = 0.2;    // thins both
   int handover_keyframes = 30;  // results are taken over that many keyframes after the search began
-  double least_correction_m = 0.03;  // smaller ones wait for the next
-  double least_correction_deg = 0.1;
+  double min_correction_m = 0.03;  // smaller ones wait for the next
+  double min_correction_deg = 0.1;
 };
 void describe(ConfigTable& table, LoopCloserConfig& config);
 

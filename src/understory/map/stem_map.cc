@@ -8,8 +8,8 @@
 #include <unordered_map>
 
 #include "understory/geometry/alpha_shape.h"
-#include "understory/graph/view_cone.h"
-#include "understory/registration/plane_grid.h"
+#include "understory/graph/loops/view_cone.h"
+#include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/error.h"
 
 namespace understory {

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "understory/odometry/motion_model.h"
-#include "understory/odometry/preintegration.h"
+#include "understory/odometry/imu/preintegration.h"
+#include "understory/odometry/motion/motion_model.h"
 #include "understory/util/random.h"
 
 namespace understory {

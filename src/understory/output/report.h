@@ -72,7 +72,7 @@ struct ReportViewMatrix {
   std::vector<float> error_m;
 };
 
-// How a map of stems corrected itself (graph/self_correction.h).
+// How a map of stems corrected itself (graph/self_correction/self_correction.h).
 struct ReportCorrection {
   struct Figure {
     std::string name;  // with unit
@@ -88,12 +88,12 @@ struct ReportCorrection {
   std::vector<ReportPair> pairs;  // drawn at random; empty: not drawn
   double acceptable_m = 0.3;      // P0 (27)
   double acceptable_per_overlap_m = 0.5;
-  double least_overlap = 0.4;
+  double min_overlap = 0.4;
   ReportViewMatrix matrix_before;
   ReportViewMatrix matrix_after;
   std::vector<Eigen::Vector2f> sights_before;  // of all views, world frame
   std::vector<Eigen::Vector2f> sights_after;
-  Eigen::Vector2f most_moved = Eigen::Vector2f::Zero();
+  Eigen::Vector2f max_moved = Eigen::Vector2f::Zero();
   double ring_m = 5.0;
   std::vector<double> trees_per_ha;  // in rings about the way
 };

@@ -72,7 +72,7 @@ std::string pair_scatter(const ReportCorrection& correction) {
          fmt::format(
              "<p class=\"so\">{} pairs drawn at random; those below the line with an overlap of "
              "more than {:.2f} are worth matching again.</p>",
-             correction.pairs.size(), correction.least_overlap);
+             correction.pairs.size(), correction.min_overlap);
 }
 
 // A matrix of all pairs, later views to the right, earlier ones downwards, with the corrections.
@@ -169,8 +169,8 @@ std::string sights_svg(const std::vector<Eigen::Vector2f>& sights, const Window&
 std::string sights(const ReportCorrection& correction) {
   if (correction.sights_after.empty() || correction.sights_before.empty()) return "";
   constexpr double kNear = 24.0;
-  const Window near{static_cast<double>(correction.most_moved.x()) - 0.5 * kNear,
-                    static_cast<double>(correction.most_moved.y()) - 0.5 * kNear, kNear, kNear};
+  const Window near{static_cast<double>(correction.max_moved.x()) - 0.5 * kNear,
+                    static_cast<double>(correction.max_moved.y()) - 0.5 * kNear, kNear, kNear};
   const Window whole = whole_of(correction.sights_after);
   return "<h3>Every sight of every stem</h3><div class=\"panels\">" +
          figure(sights_svg(correction.sights_before, whole), "Before correction.") +

@@ -74,7 +74,7 @@ struct RunSummary {
 // figures latency_ms_mean, _p50, _p99 and _max.
 void add_latency(const Distribution& latency_ms, RunSummary& summary);
 
-// Writes run.json (keys of docs/outputs.md); NaN becomes null.
+// Writes run.json (keys of docs/reference/outputs.md); NaN becomes null.
 void write_run_json(const std::filesystem::path& path, const RunSummary& summary);
 [[nodiscard]] std::string run_json(const RunSummary& summary);
 

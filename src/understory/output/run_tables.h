@@ -16,8 +16,9 @@
 
 namespace understory {
 
-// The tables of a run folder (docs/outputs.md). Each writer takes rows in order and makes the file
-// appear with `commit`; memory does not grow with the rows. OutputError where it cannot be written.
+// The tables of a run folder (docs/reference/outputs.md). Each writer takes rows in order and makes
+// the file appear with `commit`; memory does not grow with the rows. OutputError where it cannot be
+// written.
 
 // trajectory.tum, keyframes.tum: `timestamp_s x y z qx qy qz qw`, nine decimals, w not negative.
 class TumWriter {
@@ -89,7 +90,7 @@ void write_g2o(const std::filesystem::path& path, const std::vector<GraphVertex>
 // Information of a right perturbation (rotation, translation) as g2o's (translation, quaternion).
 [[nodiscard]] Matrix6d g2o_information(const Matrix6d& information);
 
-// trees.csv with the columns of docs/outputs.md; empty where unknown.
+// trees.csv with the columns of docs/reference/outputs.md; empty where unknown.
 void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>& trees);
 
 // felled.csv: `id,x,y,seen_until,gone_since,missed`.

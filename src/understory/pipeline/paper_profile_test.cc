@@ -3,8 +3,8 @@
 
 #include <numbers>
 
-#include "understory/odometry/motion_model.h"
-#include "understory/pipeline/mapping_config.h"
+#include "understory/odometry/motion/motion_model.h"
+#include "understory/pipeline/mapping/mapping_config.h"
 #include "understory/util/time.h"
 
 namespace understory {
@@ -58,8 +58,8 @@ TEST(PaperProfile, LoopsByEquation38AndItsThreeSteps) {
   EXPECT_EQ(config.search.gate_m, 5.0);
   EXPECT_EQ(config.voxel_size_m, 0.4);  // a candidate's scan is thinned as any that is registered
   EXPECT_EQ(config.verification.max_fitness_m2, 0.3);
-  EXPECT_EQ(config.least_correction_m, 0.0);
-  EXPECT_EQ(config.least_correction_deg, 0.0);
+  EXPECT_EQ(config.min_correction_m, 0.0);
+  EXPECT_EQ(config.min_correction_deg, 0.0);
   EXPECT_FALSE(config.graph.robust_loops);
   EXPECT_FALSE(config.graph.check_consistency);
 }
@@ -83,7 +83,7 @@ TEST(PaperProfile, WhatIsNotThePapersIsOff) {
   EXPECT_EQ(config.odometry.motion.angular_gate_deg_s, 0.0);
   EXPECT_EQ(config.keyframe_map.local_map.cells.near_side_line, 0.0);
   EXPECT_EQ(config.keyframe_map.local_map.cells.near_side_volume, 0.0);
-  EXPECT_FALSE(config.keyframe_map.beginning.enabled);
+  EXPECT_FALSE(config.keyframe_map.first_keyframes.enabled);
 }
 
 }  // namespace

@@ -6,9 +6,9 @@
 #include <thread>
 #include <vector>
 
-#include "understory/pipeline/checkpoint.h"
-#include "understory/pipeline/journal.h"
-#include "understory/pipeline/realtime_player.h"
+#include "understory/pipeline/mapping/realtime_player.h"
+#include "understory/pipeline/run_folder/checkpoint.h"
+#include "understory/pipeline/run_folder/journal.h"
 #include "understory/util/error.h"
 #include "understory/util/folder_test_support.h"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "understory/forest/cloud_shape.h"
-#include "understory/recording/cloud_file.h"
+#include "understory/recording/clouds/cloud_file.h"
 #include "understory/recording/recording_test_support.h"
 
 namespace understory {

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "understory/pipeline/adaptation.h"
-#include "understory/pipeline/input_identity.h"
-#include "understory/pipeline/sensor_traits.h"
+#include "understory/pipeline/mapping/adaptation.h"
+#include "understory/pipeline/mapping/sensor_traits.h"
+#include "understory/pipeline/run_folder/input_identity.h"
 #include "understory/recording/recording.h"
 #include "understory/util/config_origins.h"
 

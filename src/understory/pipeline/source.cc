@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include "understory/recording/ros2_bag.h"
+#include "understory/recording/bags/ros2_bag.h"
 #include "understory/simulation/simulator.h"
 #include "understory/util/error.h"
 

@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "understory/preprocess/event_stamp.h"
-#include "understory/recording/event_bytes.h"
+#include "understory/recording/messages/event_bytes.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -358,7 +358,7 @@ void EventOrderer::load(BinaryReader& reader) {
   for (auto n = reader.get<std::uint64_t>(); n > 0; --n) {
     Pending pending;
     pending.order = reader.get<std::uint64_t>();
-    pending.stream = reader.get<Stream>();
+    pending.stream = reader.get_enum(kMag);
     pending.event = get_event(reader);
     pending.rank = pending.stream == kLidar ? 1 : 0;
     pending.time = event_time(pending.event);
@@ -373,7 +373,7 @@ void EventOrderer::load(BinaryReader& reader) {
     for (auto n = reader.get<std::uint64_t>(); n > 0; --n)
       held.push_back(get_event(reader));
   }
-  suspect_stream_ = reader.get<Stream>();
+  suspect_stream_ = reader.get_enum(kMag);
   newest_ = reader.get<TimeNs>();
   any_seen_ = reader.get<bool>();
   uncovered_ = reader.get<TimeNs>();

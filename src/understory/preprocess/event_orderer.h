@@ -49,7 +49,7 @@ class EventOrderer {
   };
   static void describe(ConfigTable& table, Config& config);
 
-  enum Stream { kLidar = 0, kImu, kGnss, kMag, kStreams };
+  enum Stream : int { kLidar = 0, kImu, kGnss, kMag, kStreams };
   struct StreamReport {
     std::uint64_t received = 0;
     std::uint64_t released = 0;

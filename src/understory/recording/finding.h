@@ -19,7 +19,7 @@ enum class Finding {
   kNoPointTimes,   // of a lidar that spins
 };
 
-// The key of its warning, for docs/troubleshooting.md and run.json.
+// The key of its warning, for docs/reference/troubleshooting.md and run.json.
 [[nodiscard]] const char* key_of(Finding finding);
 
 // Warns of it and counts it; a checkpoint keeps the count together with the warnings.

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "understory/recording/event_bytes.h"
+#include "understory/recording/messages/event_bytes.h"
 #include "understory/util/time.h"
 
 namespace understory {

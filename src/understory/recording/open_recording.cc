@@ -1,14 +1,14 @@
 #include <filesystem>
 
-#include "understory/recording/byte_source.h"
-#include "understory/recording/cloud_folder.h"
-#include "understory/recording/mcap_format.h"
-#include "understory/recording/mcap_reader.h"
-#include "understory/recording/message_recording.h"
-#include "understory/recording/pcap_recording.h"
+#include "understory/recording/bags/byte_source.h"
+#include "understory/recording/bags/mcap_format.h"
+#include "understory/recording/bags/mcap_reader.h"
+#include "understory/recording/bags/ros2_bag.h"
+#include "understory/recording/bags/rosbag_reader.h"
+#include "understory/recording/captures/pcap_recording.h"
+#include "understory/recording/clouds/cloud_folder.h"
+#include "understory/recording/messages/message_recording.h"
 #include "understory/recording/recording.h"
-#include "understory/recording/ros2_bag.h"
-#include "understory/recording/rosbag_reader.h"
 #include "understory/util/error.h"
 
 namespace understory {

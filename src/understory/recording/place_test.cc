@@ -3,14 +3,14 @@
 #include <fstream>
 #include <functional>
 
-#include "understory/recording/byte_source.h"
-#include "understory/recording/cloud_folder.h"
-#include "understory/recording/compression.h"
-#include "understory/recording/event_bytes.h"
-#include "understory/recording/message_encode.h"
-#include "understory/recording/message_merger.h"
-#include "understory/recording/packet_test_support.h"
-#include "understory/recording/pcap_recording.h"
+#include "understory/recording/bags/byte_source.h"
+#include "understory/recording/bags/compression.h"
+#include "understory/recording/captures/packet_test_support.h"
+#include "understory/recording/captures/pcap_recording.h"
+#include "understory/recording/clouds/cloud_folder.h"
+#include "understory/recording/messages/event_bytes.h"
+#include "understory/recording/messages/message_encode.h"
+#include "understory/recording/messages/message_merger.h"
 #include "understory/recording/recording_test_support.h"
 #include "understory/util/error.h"
 

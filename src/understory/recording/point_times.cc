@@ -225,9 +225,9 @@ void put_convention(BinaryWriter& writer, const TimeConvention& convention) {
 
 TimeConvention get_convention(BinaryReader& reader) {
   TimeConvention convention;
-  convention.kind = reader.get<TimeConvention::Kind>();
+  convention.kind = reader.get_enum(TimeConvention::Kind::kForeignClock);
   convention.unit_s = reader.get<double>();
-  convention.stamp = reader.get<TimeConvention::Stamp>();
+  convention.stamp = reader.get_enum(TimeConvention::Stamp::kBetween);
   convention.shift = reader.get<TimeNs>();
   convention.text = reader.get_string();
   convention.warning = reader.get_string();

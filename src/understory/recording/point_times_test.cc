@@ -5,8 +5,8 @@
 #include <cmath>
 #include <functional>
 
-#include "understory/recording/message_encode.h"
-#include "understory/recording/point_cloud.h"
+#include "understory/recording/messages/message_encode.h"
+#include "understory/recording/messages/point_cloud.h"
 #include "understory/recording/recording_test_support.h"
 
 namespace understory {

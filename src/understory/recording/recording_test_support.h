@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/recording/mcap_writer.h"
+#include "understory/recording/bags/mcap_writer.h"
 #include "understory/recording/recording.h"
 #include "understory/util/folder_test_support.h"
 #include "understory/util/random.h"

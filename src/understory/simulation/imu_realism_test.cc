@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "understory/simulation/carrier.h"
-#include "understory/simulation/inertial.h"
+#include "understory/simulation/carrier/carrier.h"
+#include "understory/simulation/sensors/inertial.h"
 
 namespace understory {
 namespace {

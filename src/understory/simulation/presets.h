@@ -16,7 +16,7 @@ struct SensorPreset {
 // vectornav, xsens: the Allan figures of the two IMUs of the FoMo data set (Foret Montmorency),
 // means over the axes.
 [[nodiscard]] const std::vector<SensorPreset>& imu_presets();
-// phone: as telephones behaved that stood still under trees (docs/simulation.md).
+// phone: as telephones behaved that stood still under trees (docs/method/simulation.md).
 [[nodiscard]] const std::vector<SensorPreset>& gnss_presets();
 
 // The settings of a preset; none for the name "site". Throws ConfigError for any other name.

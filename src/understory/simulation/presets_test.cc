@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string>
 
-#include "understory/simulation/satellite.h"
+#include "understory/simulation/sensors/satellite.h"
 #include "understory/simulation/site.h"
 #include "understory/simulation/world.h"
 #include "understory/util/error.h"
@@ -95,8 +95,8 @@ TEST(Presets, PhoneHoldsItsPositionWhileItStandsAndLetsGoWhenItWalks) {
   EXPECT_TRUE(largest == 0.0 || largest > 3.4) << largest;
 }
 
-// The wild half of the logs in docs/simulation.md: fixes half of the time, 8 m apart, jumps of 20
-// m.
+// The wild half of the logs in docs/method/simulation.md: fixes half of the time, 8 m apart, jumps
+// of 20 m.
 TEST(Presets, AWildPhoneJumpsAndIsOftenLost) {
   double squares = 0.0;
   double largest = 0.0;

@@ -6,13 +6,13 @@
 #include <cstring>
 #include <limits>
 
-#include "understory/simulation/inertial.h"
-#include "understory/simulation/magnetometer.h"
-#include "understory/simulation/satellite.h"
-#include "understory/simulation/scan_cache.h"
-#include "understory/simulation/scanner.h"
-#include "understory/simulation/stand.h"
-#include "understory/simulation/total_station.h"
+#include "understory/simulation/scene/scan_cache.h"
+#include "understory/simulation/sensors/inertial.h"
+#include "understory/simulation/sensors/magnetometer.h"
+#include "understory/simulation/sensors/satellite.h"
+#include "understory/simulation/sensors/scanner.h"
+#include "understory/simulation/sensors/total_station.h"
+#include "understory/simulation/stand/stand.h"
 #include "understory/simulation/truth.h"
 #include "understory/simulation/world.h"
 

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <numbers>
 
-#include "understory/simulation/satellite.h"
+#include "understory/simulation/sensors/satellite.h"
 #include "understory/util/error.h"
 #include "understory/util/folder_test_support.h"
 #include "understory/util/parallel.h"

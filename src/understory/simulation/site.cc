@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "understory/simulation/presets.h"
-#include "understory/simulation/stand.h"
+#include "understory/simulation/stand/stand.h"
 #include "understory/util/error.h"
 #include "understory/util/random.h"
 #include "understory/util/text_file.h"

@@ -9,7 +9,7 @@
 namespace understory {
 
 // What a site is made of. Every member is a key of the site's YAML file (configs/sites/*.yaml) with
-// the unit in its name; docs/simulation.md lists them.
+// the unit in its name; docs/method/simulation.md lists them.
 
 struct OriginConfig {  // where the east-north-up frame of the truth has its zero
   double latitude_deg = 61.2;

@@ -5,12 +5,12 @@
 #include <fstream>
 #include <numbers>
 
-#include "understory/simulation/carrier.h"
-#include "understory/simulation/lidar_model.h"
-#include "understory/simulation/route.h"
+#include "understory/simulation/carrier/carrier.h"
+#include "understory/simulation/carrier/route.h"
+#include "understory/simulation/scene/terrain.h"
+#include "understory/simulation/sensors/lidar_model.h"
 #include "understory/simulation/simulator.h"
-#include "understory/simulation/stand.h"
-#include "understory/simulation/terrain.h"
+#include "understory/simulation/stand/stand.h"
 #include "understory/util/error.h"
 #include "understory/util/folder_test_support.h"
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
-#include "understory/simulation/head_log.h"
-#include "understory/simulation/scanner.h"
-#include "understory/simulation/total_station.h"
+#include "understory/simulation/sensors/head_log.h"
+#include "understory/simulation/sensors/scanner.h"
+#include "understory/simulation/sensors/total_station.h"
 #include "understory/simulation/world.h"
 #include "understory/util/time.h"
 
@@ -51,8 +51,8 @@ class TruthLog {
 // Whether a file of the truth folder bears this name.
 [[nodiscard]] bool is_truth_file(const std::string& name);
 
-// Writes the truth folder (docs/simulation.md); what the total station and the harvester's head
-// measured only where they did. Throws OutputError.
+// Writes the truth folder (docs/method/simulation.md); what the total station and the harvester's
+// head measured only where they did. Throws OutputError.
 void write_truth_folder(const std::string& folder, const SimulatedWorld& world, TimeNs start,
                         const TruthLog& log, const std::vector<PrismSample>& prism,
                         const std::vector<HeadCutSample>& cuts);

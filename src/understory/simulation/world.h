@@ -2,13 +2,13 @@
 
 #include <cstdint>
 
-#include "understory/simulation/carrier.h"
-#include "understory/simulation/machine.h"
-#include "understory/simulation/route.h"
-#include "understory/simulation/scene.h"
+#include "understory/simulation/carrier/carrier.h"
+#include "understory/simulation/carrier/machine.h"
+#include "understory/simulation/carrier/route.h"
+#include "understory/simulation/scene/scene.h"
+#include "understory/simulation/scene/terrain.h"
 #include "understory/simulation/site.h"
-#include "understory/simulation/stand.h"
-#include "understory/simulation/terrain.h"
+#include "understory/simulation/stand/stand.h"
 
 namespace understory {
 

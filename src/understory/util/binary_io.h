@@ -38,7 +38,7 @@ class BinaryWriter {
 };
 
 // Reads what BinaryWriter wrote, in the same order. Throws InputError (naming `origin` and the
-// byte) where the bytes end too early, or hold no bool where one belongs.
+// byte) where the bytes end too early, or hold no value of a bool or an enumeration.
 class BinaryReader {
  public:
   BinaryReader(std::string bytes, std::string origin)
@@ -47,6 +47,7 @@ class BinaryReader {
   template <typename T>
   requires std::is_trivially_copyable_v<T>
   [[nodiscard]] T get() {
+    static_assert(!std::is_enum_v<T>, "get_enum checks the range");
     if constexpr (std::is_same_v<T, bool>) {
       return get_bool();
     } else {
@@ -54,6 +55,18 @@ class BinaryReader {
       std::memcpy(static_cast<void*>(&value), take(sizeof(T)), sizeof(T));
       return value;
     }
+  }
+  // An enumeration whose values count up from 0 or 1 to `last`.
+  template <typename T>
+  requires std::is_enum_v<T>
+  [[nodiscard]] T get_enum(T last) {
+    const auto value = get<std::underlying_type_t<T>>();
+    const auto number = static_cast<std::int64_t>(value);
+    if (number < 0 || number > static_cast<std::int64_t>(last)) {
+      fail("expected a number from 0 to " + std::to_string(static_cast<std::int64_t>(last)) +
+           ", found " + std::to_string(number));
+    }
+    return static_cast<T>(value);
   }
   [[nodiscard]] std::string get_string() {
     const auto size = get<std::uint64_t>();

@@ -57,7 +57,7 @@ ReadError::ReadError(const std::string& file, const std::string& position, int c
     : InputError(file, position,
                  "cannot be read: " + std::error_code(code, std::generic_category()).message()) {}
 
-std::string read_text_file(const std::string& path, std::uint64_t most_bytes) {
+std::string read_text_file(const std::string& path, std::uint64_t max_bytes) {
   const Descriptor file(path);
   std::string text;
   std::vector<char> part(std::size_t{1} << 16);
@@ -67,9 +67,9 @@ std::string read_text_file(const std::string& path, std::uint64_t most_bytes) {
     if (got < 0) throw ReadError(path, "at byte " + std::to_string(text.size()), errno);
     if (got == 0) return text;
     text.append(part.data(), static_cast<std::size_t>(got));
-    if (text.size() > most_bytes)
+    if (text.size() > max_bytes)
       throw InputError(path, "",
-                       "expected a text of at most " + std::to_string(most_bytes) + " bytes");
+                       "expected a text of at most " + std::to_string(max_bytes) + " bytes");
   }
 }
 

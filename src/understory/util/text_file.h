@@ -10,10 +10,10 @@ class Node;
 
 namespace understory {
 
-// A whole small text file. Throws InputError if it cannot be opened or is larger than `most_bytes`,
+// A whole small text file. Throws InputError if it cannot be opened or is larger than `max_bytes`,
 // ReadError with the place where the system cannot read it.
 [[nodiscard]] std::string read_text_file(const std::string& path,
-                                         std::uint64_t most_bytes = 64ULL << 20);
+                                         std::uint64_t max_bytes = 64ULL << 20);
 
 // Throws ReadError if the system could not read the stream of that file any further; an end of the
 // file is none. To be asked at once where reading stops.

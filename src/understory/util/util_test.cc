@@ -137,6 +137,24 @@ TEST(BinaryIo, TruncatedBytesAreAnInputErrorAtEveryLength) {
 }
 
 // Found by fuzzing: a byte of 50 in a bool is neither true nor false.
+TEST(BinaryIo, AnEnumerationHasOneOfItsValues) {
+  enum class Colour { kRed, kGreen };
+  BinaryWriter writer;
+  writer.put(Colour::kGreen);
+  writer.put(2);
+  writer.put(-1);
+  BinaryReader reader(writer.bytes(), "run/checkpoint.bin");
+  EXPECT_EQ(reader.get_enum(Colour::kGreen), Colour::kGreen);
+  for (const char* found : {"found 2", "found -1"}) {
+    try {
+      static_cast<void>(reader.get_enum(Colour::kGreen));
+      ADD_FAILURE() << "expected an InputError that says " << found;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(found), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST(BinaryIo, ABoolIsZeroOrOne) {
   BinaryReader reader(std::string("\x01\x00\x32", 3), "state");
   EXPECT_TRUE(reader.get<bool>());

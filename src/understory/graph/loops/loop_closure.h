@@ -1,0 +1,82 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "understory/geometry/points.h"
+#include "understory/geometry/pose.h"
+#include "understory/registration/icp/icp.h"
+#include "understory/registration/ndt/ndt.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+// Two places that may be the same, and what is believed of their relative pose. Points of both in
+// the body frames of their keyframes, thinned by a voxel filter (about 0.2-0.4 m); best each a
+// small map of a few keyframes around it.
+struct LoopInput {
+  Points target_points;
+  Points source_points;
+  Pose target_from_source;           // believed
+  double sigma_translation_m = 0.0;  // of that, per axis
+  double sigma_rotation_rad = 0.0;   // of its heading
+  Eigen::Vector3d up_in_target = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d up_in_source = Eigen::Vector3d::UnitZ();
+};
+
+struct LoopClosureConfig {
+  std::vector<double> cell_sizes_m = {2.0, 0.5};  // of NDT, coarse to fine
+  NdtMapConfig cells = {.sigma_floor_m = 0.01};
+  NdtConfig ndt;
+  // What gives the last word: ICP as in P2-7, or the finest NDT.
+  enum class Refine { kIcp, kNdt };
+  Refine refine = Refine::kNdt;
+  IcpConfig icp;
+  // Where the belief is uncertain, NDT starts from many places: a grid over so many standard
+  // deviations, with steps that the coarsest cells can bridge.
+  double search_sigmas = 2.0;
+  double search_step_m = 1.5;
+  double search_yaw_step_deg = 4.0;
+  int max_starts = 600;    // beyond, the steps grow
+  int refined_starts = 6;  // of those, the best few are carried through
+  // Acceptance.
+  double max_fitness_m2 = 0.3;   // of ICP; grows with the spacing of the points, so it is wide
+  double structure_low_m = 0.7;  // heights above ground of what is compared
+  double structure_high_m = 6.0;
+  double structure_cell_m = 0.25;
+  int min_structure_points = 100;
+  double min_overlap = 0.4;       // share of the structure that is found again
+  double min_contrast = 0.15;     // by how much that is more than by chance
+  double contrast_shift_m = 1.5;  // chance is measured shifted by this in eight directions
+  double max_runner_up = 0.85;    // overlap of the second best place, as a share of the best
+  double max_asymmetry_m = 0.1;   // between source to target and target to source
+  double max_asymmetry_deg = 0.5;
+  bool check_symmetry = true;
+  // The least that is believed of the result's standard deviations.
+  double sigma_rotation_deg = 0.1;
+  double sigma_translation_m = 0.02;
+  double sigma_translation_per_m = 0.002;  // of the distance between the two: surfaces seen from
+                                           // different sides fit a little too near
+};
+void describe(ConfigTable& table, LoopClosureConfig& config);
+
+struct [[nodiscard]] LoopVerification {
+  bool accepted = false;
+  std::string reason;  // why not
+  Pose target_from_source;
+  Matrix6d covariance = Matrix6d::Identity();  // right perturbation, rotation first
+  double fitness_m2 = 0.0;
+  double overlap = 0.0;         // of the structure
+  double chance_overlap = 0.0;  // the same, shifted
+  double runner_up = 0.0;       // overlap of the best other place
+  double asymmetry_m = 0.0;
+  double asymmetry_deg = 0.0;
+  int starts = 0;
+};
+
+// Decides whether two places are the same, P2-7: NDT for a first estimate, ICP to refine, and
+// checks that a chance match among stems does not pass. Pure function of its inputs; may run in the
+// background. Parallel inside; same bits for any number of threads.
+LoopVerification verify_loop(const LoopInput& input, const LoopClosureConfig& config);
+
+}  // namespace understory

@@ -1,0 +1,187 @@
+#include "understory/graph/loops/stem_loops.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "understory/graph/stem_matching/pair_matching.h"
+#include "understory/registration/stems/tilt_about.h"
+#include "understory/util/error.h"
+#include "understory/util/median.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+// Stems of neighbouring views nearer than that are one.
+constexpr double kMergeL0 = 0.2;
+// Views around a place, to each side, among which the nearest one is looked for.
+constexpr int kNeighbourhood = 30;
+
+double median_l0(const std::vector<SparsePoints>& views) {
+  std::vector<double> values(views.size());
+  parallel_for(views.size(), 16, [&](std::size_t i) {
+    if (i % 8 == 0) values[i] = SparseTarget(views[i]).l0_m;
+  });
+  std::erase_if(values, [](double value) { return value <= 0.0; });
+  return upper_median(std::move(values));
+}
+
+// What a single view misses of a place, or sees twice, makes its triangles unlike those of another
+// day. In half of the stems one triangle in eight is whole.
+std::vector<SparsePoints> gathered_views(const std::vector<SparsePoints>& views,
+                                         const std::vector<Pose>& poses,
+                                         const StemLoopConfig& config) {
+  if (config.gather_l0 <= 0.0) return views;
+  const double l0_m = median_l0(views);
+  std::vector<SparsePoints> gathered(views.size());
+  parallel_for(views.size(), 4, [&](std::size_t i) {
+    gathered[i] = gather_views(views, poses, static_cast<int>(i), config.gather_l0 * l0_m,
+                               config.gather_views, kMergeL0 * l0_m);
+  });
+  return gathered;
+}
+
+TreePatterns places_of(const std::vector<SparsePoints>& views, const std::vector<Pose>& poses,
+                       double l0_m, const StemLoopConfig& config) {
+  TreePatterns patterns(l0_m, config.pattern);
+  std::optional<Eigen::Vector3d> last;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Eigen::Vector3d& at = poses[i].translation();
+    if (last && (at - *last).norm() < config.place_spacing * l0_m) continue;
+    last = at;
+    patterns.add(static_cast<int>(i), views[i]);
+  }
+  patterns.finish();
+  return patterns;
+}
+
+// The covariance of a loop: its own noise, and what both views got wrong alike.
+Matrix6d loop_covariance(const SparseIcpResult& icp, const SparsePoints& source, double l0_m) {
+  Matrix6d information = icp.information + 1e-6 * Matrix6d::Identity();
+  Matrix6d covariance = 9.0 * information.inverse();
+  const double tilt = 0.5 * M_PI / 180.0;
+  const double yaw = 0.1 * M_PI / 180.0;
+  const double shift = 0.02 * l0_m;
+  covariance.diagonal() +=
+      (Vector6d() << 0.0, 0.0, yaw * yaw, shift * shift, shift * shift, shift * shift).finished();
+  return covariance + tilt_about(middle_of(source), tilt);
+}
+
+class Finder {
+ public:
+  Finder(const std::vector<SparsePoints>& single, const std::vector<SparsePoints>& views,
+         const std::vector<Pose>& poses, const StemLoopConfig& config)
+      : single_(single),
+        views_(views),
+        poses_(poses),
+        config_(config),
+        l0_m_(median_l0(views)),
+        patterns_(places_of(views, poses, l0_m_, config)) {}
+
+  [[nodiscard]] std::optional<StemLoop> find(int query) const {
+    const int before = query - config_.exclude_recent + 1;
+    if (before <= 0 || l0_m_ <= 0.0) return std::nullopt;
+    std::optional<StemLoop> best;
+    for (const PatternCandidate& candidate : patterns_.find(view(query), before)) {
+      const StemLoop loop = verify(views_, query, candidate.place, candidate.place_from_query);
+      if (!best || loop.overlap > best->overlap) best = loop;
+    }
+    if (!best || best->overlap < 0.5 * config_.min_overlap) return best;
+    return confirmed(nearest(*best));
+  }
+
+ private:
+  [[nodiscard]] const SparsePoints& view(int i) const {
+    return views_[static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] const Pose& pose(int i) const { return poses_[static_cast<std::size_t>(i)]; }
+
+  [[nodiscard]] StemLoop verify(const std::vector<SparsePoints>& views, int query, int match,
+                                const Pose& guess) const {
+    const SparsePoints& source = views[static_cast<std::size_t>(query)];
+    const SparseIcpResult icp = register_sparse_icp(
+        SparseTarget(views[static_cast<std::size_t>(match)]), source, guess, config_.icp);
+    StemLoop loop;
+    loop.query = query;
+    loop.match = match;
+    loop.overlap = icp.overlap;
+    const double apart = icp.target_from_source.translation().norm() / config_.max_distance_m;
+    loop.score = icp.overlap * std::exp(-apart * apart);
+    loop.match_from_query = icp.target_from_source;
+    loop.covariance = loop_covariance(icp, source, l0_m_);
+    loop.verified = icp.overlap >= config_.min_overlap &&
+                    icp.target_from_source.translation().norm() <= config_.max_distance_m;
+    return loop;
+  }
+
+  // The view around the place that the query stands nearest to.
+  [[nodiscard]] StemLoop nearest(const StemLoop& loop) const {
+    const Eigen::Vector3d at = pose(loop.match) * loop.match_from_query.translation();
+    int best = loop.match;
+    const int last = std::min(loop.query - config_.exclude_recent, loop.match + kNeighbourhood);
+    for (int j = std::max(0, loop.match - kNeighbourhood); j <= last; ++j) {
+      if ((pose(j).translation() - at).norm() < (pose(best).translation() - at).norm()) best = j;
+    }
+    if (best == loop.match) return loop;
+    const StemLoop moved = verify(views_, loop.query, best,
+                                  pose(best).inverse() * pose(loop.match) * loop.match_from_query);
+    return moved.overlap >= 0.8 * loop.overlap ? moved : loop;
+  }
+
+  // Views laid together find a place, and single ones tell how they lie to each other: where those
+  // have little in common, what was gathered carries the odometry's errors into the loop.
+  [[nodiscard]] StemLoop confirmed(StemLoop loop) const {
+    const StemLoop single = verify(single_, loop.query, loop.match, loop.match_from_query);
+    loop.verified = single.verified;
+    if (!single.verified) return loop;
+    loop.overlap = single.overlap;
+    loop.match_from_query = single.match_from_query;
+    loop.covariance = single.covariance;
+    return loop;
+  }
+
+  const std::vector<SparsePoints>& single_;
+  const std::vector<SparsePoints>& views_;  // laid together
+  const std::vector<Pose>& poses_;
+  const StemLoopConfig& config_;
+  double l0_m_;
+  TreePatterns patterns_;
+};
+
+}  // namespace
+
+void describe(ConfigTable& table, StemLoopConfig& config) {
+  table.add("exclude_recent", config.exclude_recent, {1, 1'000'000}, "",
+            "views nearer than this in the recording are the same passage");
+  table.add("place_spacing", config.place_spacing, {0.1, 100.0}, "stem spacings",
+            "along the path between the places that are kept to be found again");
+  table.add("max_distance_m", config.max_distance_m, {0.1, 100.0}, "m",
+            "views farther apart are not of the same place");
+  table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
+            "share of the stems that two views must have in common");
+  table.add(
+      "gather_l0", config.gather_l0, {0.0, 100.0}, "stem spacings",
+      "views within that distance along the path, to each side, are joined; 0: each by itself");
+  table.add("gather_views", config.gather_views, {1, 1000}, "", "at most that many to each side");
+  table.section("pattern", [&] { describe(table, config.pattern); });
+  table.section("icp", [&] { describe(table, config.icp); });
+}
+
+std::vector<StemLoop> find_stem_loops(const std::vector<SparsePoints>& level_views,
+                                      const std::vector<Pose>& world_from_level,
+                                      const StemLoopConfig& config) {
+  UNDERSTORY_CHECK(level_views.size() == world_from_level.size());
+  const std::vector<SparsePoints> gathered = gathered_views(level_views, world_from_level, config);
+  const Finder finder(level_views, gathered, world_from_level, config);
+  std::vector<std::optional<StemLoop>> found(level_views.size());
+  parallel_for(level_views.size(), 4,
+               [&](std::size_t i) { found[i] = finder.find(static_cast<int>(i)); });
+  std::vector<StemLoop> loops;
+  for (const std::optional<StemLoop>& loop : found) {
+    if (loop) loops.push_back(*loop);
+  }
+  return loops;
+}
+
+}  // namespace understory

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <vector>
+
+#include "understory/graph/stem_matching/tree_pattern.h"
+#include "understory/registration/stems/sparse_icp.h"
+#include "understory/util/config.h"
+#include "understory/util/progress.h"
+
+namespace understory {
+
+struct StemLoopConfig {
+  TreePatternConfig pattern;
+  SparseIcpConfig icp;
+  int exclude_recent = 50;      // views; nearer ones are the same passage
+  double place_spacing = 2.0;   // L0; of the places that are kept to be found, along the path
+  double max_distance_m = 3.0;  // views farther apart than this are not of the same place
+  double gather_l0 = 1.5;       // views within that part of the way to each side are laid together,
+  int gather_views = 4;         // at most that many to each side; 0 L0: each view by itself
+  double min_overlap = 0.4;     // P0's lambda0, section 2.3
+};
+void describe(ConfigTable& table, StemLoopConfig& config);
+
+// The best place that was found for one view. Poses are of level frames (z up).
+struct StemLoop {
+  int query = 0;
+  int match = 0;         // an earlier view
+  double overlap = 0.0;  // of the two views after matching, 0..1; unverified: as laid together
+  // Overlap as laid together, less the farther the views are apart (views of one place overlap
+  // wherever they look from, but also with the next place): overlap * exp(-(distance /
+  // max_distance_m)^2).
+  double score = 0.0;
+  Pose match_from_query;
+  Matrix6d covariance = Matrix6d::Identity();  // right perturbation
+  bool verified = false;                       // overlap and distance are those of a loop
+};
+
+// For every view the place seen before that it looks like most: found by tree pattern and ICP among
+// views laid together with their neighbours (`gather_l0`), verified and measured by ICP of the two
+// views themselves. `world_from_level` says how neighbouring views lie to each other and which
+// earlier view lies nearest to the place found, no more: no guess is taken from it. Views without
+// any candidate have no row. Same result for any number of threads.
+[[nodiscard]] std::vector<StemLoop> find_stem_loops(const std::vector<SparsePoints>& level_views,
+                                                    const std::vector<Pose>& world_from_level,
+                                                    const StemLoopConfig& config);
+
+}  // namespace understory

@@ -1,0 +1,75 @@
+#include "understory/graph/loops/view_cone.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kSamples = 256;
+constexpr double kRangeShare = 0.9;   // of the stems lie nearer than the range
+constexpr double kAngleShare = 0.98;  // and within the sector: false stems may lie anywhere
+
+double quantile(std::vector<double>& values, double share) {
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+}  // namespace
+
+ViewCone estimate_view_cone(const std::vector<SparsePoints>& level_views) {
+  std::vector<double> ranges;
+  std::vector<double> angles;
+  for (const SparsePoints& view : level_views) {
+    for (const Eigen::Vector3d& point : view) {
+      ranges.push_back(point.head<2>().norm());
+      angles.push_back(std::abs(std::atan2(point.y(), point.x())));
+    }
+  }
+  if (ranges.empty()) return {};
+  ViewCone cone;
+  cone.range_m = quantile(ranges, kRangeShare);
+  cone.half_angle_rad = std::min(M_PI, quantile(angles, kAngleShare) / kAngleShare);
+  return cone;
+}
+
+ConeOverlap::ConeOverlap(const ViewCone& cone) : cone_(cone) {
+  // Radii by equal areas, angles by the golden ratio: an even spread without a pattern.
+  constexpr double kGolden = 0.6180339887498949;
+  for (std::size_t i = 0; i < kSamples; ++i) {
+    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(kSamples);
+    const double turn = std::fmod(static_cast<double>(i) * kGolden, 1.0);
+    const double angle = (2.0 * turn - 1.0) * cone.half_angle_rad;
+    const double radius = cone.range_m * std::sqrt(share);
+    samples_.emplace_back(radius * std::cos(angle), radius * std::sin(angle));
+  }
+}
+
+bool ConeOverlap::holds(const Eigen::Vector3d& point_in_view) const {
+  const Eigen::Vector2d p = point_in_view.head<2>();
+  if (p.squaredNorm() > cone_.range_m * cone_.range_m) return false;
+  return cone_.half_angle_rad >= M_PI || std::abs(std::atan2(p.y(), p.x())) <= cone_.half_angle_rad;
+}
+
+double ConeOverlap::operator()(const Pose& world_from_a, const Pose& world_from_b) const {
+  const Eigen::Vector3d apart = world_from_b.translation() - world_from_a.translation();
+  if (apart.head<2>().norm() >= 2.0 * cone_.range_m) return 0.0;
+  const Pose b_from_a = world_from_b.inverse() * world_from_a;
+  const Eigen::Vector3d x = b_from_a.rotation() * Eigen::Vector3d::UnitX();
+  const Eigen::Rotation2Dd turn(std::atan2(x.y(), x.x()));
+  const Eigen::Vector2d shift = b_from_a.translation().head<2>();
+  const double squared = cone_.range_m * cone_.range_m;
+  // Beyond the edge of the sector means below the cosine of its half angle.
+  const double least = std::cos(cone_.half_angle_rad);
+  std::size_t inside = 0;
+  for (const Eigen::Vector2d& sample : samples_) {
+    const Eigen::Vector2d p = turn * sample + shift;
+    const double reach = p.squaredNorm();
+    if (reach > squared) continue;
+    inside += cone_.half_angle_rad >= M_PI || p.x() >= least * std::sqrt(reach) ? 1 : 0;
+  }
+  return static_cast<double>(inside) / static_cast<double>(samples_.size());
+}
+
+}  // namespace understory

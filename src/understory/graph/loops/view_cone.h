@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+#include "understory/registration/ndt/plane_grid.h"
+
+namespace understory {
+
+// What one view sees of the plane: a sector about the x axis of the view, P0 figure 8.
+struct ViewCone {
+  double range_m = 0.0;         // R: nine of ten stems lie nearer
+  double half_angle_rad = 0.0;  // pi: all around
+};
+
+// The sector that most stems of the views lie in, from the views themselves: nothing about the
+// scanner has to be known. Its middle is taken to be the views' x axis. An empty sector (range 0)
+// for views without stems. Deterministic.
+[[nodiscard]] ViewCone estimate_view_cone(const std::vector<SparsePoints>& level_views);
+
+// Overlap of two views by their poses alone, P0 section 2.4 and figure 8: the share of the one's
+// sector that lies in the other's too, seen from above. Heights and tilt do not count. Immutable,
+// thread-safe.
+class ConeOverlap {
+ public:
+  explicit ConeOverlap(const ViewCone& cone);
+
+  // lambda, 0..1, exact to about a hundredth. Symmetric up to that.
+  [[nodiscard]] double operator()(const Pose& world_from_a, const Pose& world_from_b) const;
+  // Whether a point of a view's level frame lies in its sector.
+  [[nodiscard]] bool holds(const Eigen::Vector3d& point_in_view) const;
+  [[nodiscard]] const ViewCone& cone() const { return cone_; }
+
+ private:
+  ViewCone cone_;
+  std::vector<Eigen::Vector2d> samples_;  // spread evenly over the sector
+};
+
+}  // namespace understory

@@ -1,0 +1,102 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "understory/graph/self_correction/correction_methods.h"
+#include "understory/graph/self_correction/path_process.h"
+#include "understory/graph/stem_matching/pair_matching.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+// Of a step on average, diagonal. The views' frames and the world are level, and views look every
+// way, so what is in the plane is alike along and across.
+Vector6d mean_variances(const std::vector<Matrix6d>& covariances) {
+  Vector6d sum = Vector6d::Constant(1e-12);
+  for (std::size_t k = 1; k < covariances.size(); ++k)
+    sum += covariances[k].diagonal() / static_cast<double>(covariances.size() - 1);
+  sum.head<2>().setConstant(0.5 * (sum[0] + sum[1]));
+  sum.segment<2>(3).setConstant(0.5 * (sum[3] + sum[4]));
+  return sum;
+}
+
+// Loops are in the poses already; that they hold is told to the regression as well.
+std::vector<PathObservation> observed_loops(const std::vector<PoseEdge>& loops) {
+  constexpr std::size_t kMost = 200;  // the time is cubic in them
+  const std::size_t count = std::min(loops.size(), kMost);
+  std::vector<PathObservation> result;
+  for (std::size_t k = 0; k < count; ++k) {
+    const PoseEdge& loop = loops[k * loops.size() / count];
+    if (loop.from < loop.to)
+      result.push_back({loop.from, loop.to, loop.from_from_to, loop.covariance});
+  }
+  return result;
+}
+
+std::string told_of(const PathProcessResult& regressed) {
+  char text[128];
+  std::snprintf(text, sizeof text,
+                "regressed: steps err alike over %.0f views, by %.2f times what they say",
+                regressed.length_views, regressed.scale);
+  return text;
+}
+
+}  // namespace
+
+void correct_by_gaussian_process(const CorrectionViews& views, const SelfCorrectionConfig& config,
+                                 SelfCorrectionResult& result) {
+  const std::vector<CorrectionPair> pairs = chosen_pairs(views, config, result);
+  const std::vector<Pose>& first = views.problem.world_from_view;
+  const Vector6d variances = mean_variances(views.problem.step_covariances);
+  const std::vector<PathObservation> loops = observed_loops(views.problem.loops);
+  std::vector<Pose> poses = first;
+  std::vector<PairMatch> accepted(pairs.size());
+  double min_beta = result.before.beta;
+  result.stopped_because = "no pair could be matched";
+  // Matched from where they are, regressed, and matched again from there.
+  constexpr int kRounds = 2;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<PairMatch> matches(pairs.size());
+    parallel_for(pairs.size(), 1, [&](std::size_t k) {
+      const CorrectionPair& pair = pairs[k];
+      matches[k] =
+          match_pair(views.targets[at(pair.j)], views.problem.views[at(pair.i)],
+                     poses[at(pair.j)].inverse() * poses[at(pair.i)], views.overlap, config);
+    });
+    std::vector<PathObservation> observations = loops;
+    std::vector<std::size_t> rows;
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      if (round == 0) result.tried.push_back(told_match(pairs[k], matches[k], first));
+      // A match that finds nothing to mend the second time leaves what the first one said.
+      if (matches[k].accepted) accepted[k] = matches[k];
+      if (!accepted[k].accepted) continue;
+      result.tried[k].accepted = true;
+      rows.push_back(k);
+      observations.push_back(
+          {pairs[k].j, pairs[k].i, accepted[k].j_from_i, accepted[k].covariance});
+    }
+    if (rows.empty()) return;
+    const PathProcessResult regressed = regress_path(first, variances, observations, {});
+    poses = regressed.world_from_view;
+    const double beta = beta_of(views, poses, config);
+    if (beta >= min_beta) {
+      if (round == 0) result.stopped_because = "the map would not have become sharper";
+      continue;
+    }
+    min_beta = beta;
+    result.world_from_view = poses;
+    result.stopped_because = told_of(regressed);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      TriedCorrection& tried = result.tried[rows[k]];
+      tried.kept = regressed.used[loops.size() + k] != 0;
+      tried.reason = tried.kept ? "" : "contradicts the others";
+    }
+  }
+}
+
+}  // namespace understory

@@ -1,0 +1,172 @@
+#include "understory/graph/stem_matching/pair_matching.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/registration/stems/tilt_about.h"
+
+namespace understory {
+namespace {
+
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+void judge(const SparseTarget& target, const SparsePoints& source, const ConeOverlap& overlap,
+           const SelfCorrectionConfig& config, PairMatch& match) {
+  match.error_m = placed_error(target, source, match.j_from_i, overlap, config.pairs.outlier_ratio);
+  match.overlap = overlap(Pose(), match.j_from_i);
+  match.accepted = false;
+  if (match.overlap < config.min_final_overlap) {
+    match.reason = "too little overlap";
+  } else if (!acceptable(match.error_m, match.overlap, config.pairs)) {
+    match.reason = "stems do not lie on stems";
+  } else {
+    match.accepted = true;
+    match.reason.clear();
+  }
+}
+
+PairMatch begin(const SparseTarget& target, const SparsePoints& source, const Pose& j_from_i,
+                const ConeOverlap& overlap, const SelfCorrectionConfig& config) {
+  PairMatch match;
+  match.j_from_i = j_from_i;
+  match.error_before_m =
+      placed_error(target, source, j_from_i, overlap, config.pairs.outlier_ratio);
+  return match;
+}
+
+// P0 section 1: the overlap of the views stands for the share that can match, lambda = 1 - gamma;
+// of these again a share is missed or false.
+double outlier_ratio_of(double overlap, double within_overlap) {
+  constexpr double kMost = 0.9;
+  return std::min(kMost, 1.0 - overlap * (1.0 - within_overlap));
+}
+
+void require_better(PairMatch& match) {
+  // Where nothing could be measured before, anything is better.
+  if (!match.accepted || std::isnan(match.error_before_m) || match.error_m < match.error_before_m)
+    return;
+  match.accepted = false;
+  match.reason = "no smaller error than before";
+}
+
+}  // namespace
+
+Matrix6d match_covariance(const Matrix6d& information, const SparsePoints& source,
+                          double shift_sd_m) {
+  // Heights and tilt hang on feet of stems, which look higher the farther away they are.
+  const double tilt = 2.0 * M_PI / 180.0;
+  const double height = 0.5;
+  const double yaw = 0.03 * M_PI / 180.0;
+  Matrix6d covariance = 4.0 * (information + 1e-6 * Matrix6d::Identity()).inverse();
+  const double shift = shift_sd_m * shift_sd_m;
+  covariance.diagonal() +=
+      (Vector6d() << 0.0, 0.0, yaw * yaw, shift, shift, height * height).finished();
+  return covariance + tilt_about(middle_of(source), tilt);
+}
+
+PairMatch match_pair(const SparseTarget& target, const SparsePoints& source, const Pose& j_from_i,
+                     const ConeOverlap& overlap, const SelfCorrectionConfig& config) {
+  PairMatch match = begin(target, source, j_from_i, overlap, config);
+  SparseIcpConfig icp_config = config.icp;
+  icp_config.outlier_ratio =
+      outlier_ratio_of(overlap(Pose(), j_from_i), config.pairs.outlier_ratio);
+  SparseIcpResult icp = register_sparse_icp(target, source, j_from_i, icp_config);
+  if (icp.status == SparseIcpStatus::kTooFewPoints) {
+    match.reason = icp.reason;
+    return match;
+  }
+  match.j_from_i = icp.target_from_source;
+  judge(target, source, overlap, config, match);
+  if (!match.accepted) {
+    GoIcpConfig search = config.go_icp;
+    search.outlier_ratio = icp_config.outlier_ratio;
+    const GoIcpResult found = register_go_icp(target, source, j_from_i, search);
+    match.by_go_icp = true;
+    if (found.status == GoIcpStatus::kTooFewPoints) return match;
+    icp = register_sparse_icp(target, source, found.target_from_source, icp_config);
+    match.j_from_i = icp.target_from_source;
+    judge(target, source, overlap, config, match);
+  }
+  match.outlier_ratio = icp.outlier_ratio;
+  match.covariance = match_covariance(icp.information, source, 0.02 * target.l0_m);
+  require_better(match);
+  return match;
+}
+
+PairMatch match_lattice_pair(const SparseTarget& target, const SparsePoints& source,
+                             const Pose& j_from_i, const ConeOverlap& overlap,
+                             const SelfCorrectionConfig& config) {
+  PairMatch match = begin(target, source, j_from_i, overlap, config);
+  GoIcpConfig search = config.go_icp;
+  search.outlier_ratio = outlier_ratio_of(overlap(Pose(), j_from_i), config.pairs.outlier_ratio);
+  const GoIcpResult found = register_go_icp(target, source, j_from_i, search);
+  match.by_go_icp = true;
+  if (found.status == GoIcpStatus::kTooFewPoints) {
+    match.reason = found.reason;
+    return match;
+  }
+  match.j_from_i = found.target_from_source;
+  match.error_m = placed_error(target, source, match.j_from_i, overlap, config.pairs.outlier_ratio);
+  match.overlap = found.overlap;
+  match.outlier_ratio = 1.0 - found.overlap;
+  match.accepted = match.outlier_ratio < config.lattice.largest_outlier_ratio;
+  if (!match.accepted) match.reason = "too many outliers";
+  require_better(match);
+  return match;
+}
+
+SparsePoints gather_views(const std::vector<SparsePoints>& views,
+                          const std::vector<Pose>& world_from_view, int centre, double reach_m,
+                          int max_views, double merge_m) {
+  // The reach is measured along the way, so that a turn on the spot gathers all around.
+  const auto last_within = [&](int step) {
+    double way = 0.0;
+    int k = centre;
+    while (k + step >= 0 && at(k + step) < views.size()) {
+      way += (world_from_view[at(k + step)].translation() - world_from_view[at(k)].translation())
+                 .norm();
+      if (way > reach_m) break;
+      k += step;
+    }
+    return k;
+  };
+  const int first = last_within(-1);
+  const int last = last_within(1);
+  const int stride = std::max(1, (last - first) / (2 * max_views));
+  const Pose centre_from_world = world_from_view[at(centre)].inverse();
+  SparsePoints sums;
+  std::vector<int> sights;
+  int gathered = 0;
+  const int begin = centre - (centre - first) / stride * stride;
+  for (int k = begin; k <= last; k += stride) {
+    const Pose centre_from_view = centre_from_world * world_from_view[at(k)];
+    SparsePoints means;
+    for (std::size_t t = 0; t < sums.size(); ++t)
+      means.push_back(sums[t] / sights[t]);
+    const PlaneGrid grid(means);
+    std::vector<char> taken(means.size(), 0);
+    for (const Eigen::Vector3d& point : views[at(k)]) {
+      const Eigen::Vector3d here = centre_from_view * point;
+      const auto found = means.empty() ? PlaneGrid::Neighbour{} : grid.nearest(here, merge_m, 0.0);
+      if (found.index < 0) {
+        sums.push_back(here);
+        sights.push_back(1);
+      } else if (taken[at(found.index)] == 0) {
+        taken[at(found.index)] = 1;
+        sums[at(found.index)] += here;
+        ++sights[at(found.index)];
+      }
+    }
+    ++gathered;
+  }
+  SparsePoints result;
+  for (std::size_t t = 0; t < sums.size(); ++t) {
+    if (gathered >= 3 && sights[t] < 2) continue;
+    result.push_back(sums[t] / sights[t]);
+  }
+  return result;
+}
+
+}  // namespace understory

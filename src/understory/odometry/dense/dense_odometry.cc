@@ -1,0 +1,198 @@
+#include "understory/odometry/dense/dense_odometry.h"
+
+#include <cmath>
+#include <utility>
+
+#include "understory/odometry/imu/imu_smoother.h"
+
+namespace understory {
+namespace {
+
+// Of the accelerations that the motion model allows for between scans: a path that may bend more
+// within one follows the noise of sparse scans.
+constexpr double kBendShare = 1.0 / 3.0;
+
+}  // namespace
+void describe(ConfigTable& table, DenseOdometryConfig& config) {
+  table.section("preprocess", [&] {
+    table.section("voxel", [&] { describe(table, config.voxel); });
+    table.section("isolated", [&] { describe(table, config.isolated); });
+    table.add("machine_boxes_file", config.machine_boxes_file,
+              "YAML of boxes around the machine whose points are dropped; empty: none");
+  });
+  table.section("ndt", [&] {
+    describe(table, config.ndt);
+    table.add(
+        "min_inlier_ratio", config.min_inlier_ratio, {0.0, 1.0}, "",
+        "least share of a scan's points near the map for a match to count; of sparse scans 0.05");
+    table.add("min_inlier_share", config.min_inlier_share, {0.0, 1.0}, "",
+              "a match that finds less of its points than this share of what matches before it "
+              "found does not count");
+    table.add("coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "cells",
+              "prediction error (1 sigma) above which the coarse map is asked first");
+    table.add("prior_weight", config.prior_weight, {0.0, 1.0}, "",
+              "weight of the prediction inside the match");
+  });
+  table.section("motion", [&] {
+    table.add("elastic_scans", config.elastic_scans,
+              "without an IMU: match the first and the last pose of a scan together");
+    table.add("imu_enabled", config.imu_enabled, "use the IMU of the recording");
+    describe(table, config.motion);
+  });
+}
+
+DenseOdometry::DenseOdometry(const DenseOdometryConfig& config, const Rig& rig, StageTimes& times,
+                             Log& log)
+    : config_(config),
+      rig_(rig),
+      times_(times),
+      log_(log),
+      uses_imu_(config.imu_enabled && rig.body_from_imu.has_value()) {
+  motion_ = uses_imu_ ? make_imu_smoother(config.motion, rig, &log)
+                      : make_constant_velocity_model(config.motion, &log);
+  if (!config.machine_boxes_file.empty()) boxes_ = read_machine_boxes(config.machine_boxes_file);
+}
+
+void DenseOdometry::add_imu(const ImuSample& sample) {
+  if (uses_imu_) motion_->add_imu(sample);
+}
+
+DenseEstimate DenseOdometry::process(const Scan& scan, const LocalMapSnapshot& local_map) {
+  DenseEstimate estimate;
+  const double cpu_start = process_cpu_seconds();
+  {
+    const ScopedTimer timer(times_, "odometry");
+    estimate.scan_end = scan.end();
+    const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, estimate.scan_end);
+    preprocess(scan, guess, estimate);
+    if (!local_map.empty()) match(local_map, motion_->predict(scan.stamp), estimate);
+    watch_scan_motion(scan, local_map, guess, estimate);
+    if (config_.elastic_scans && estimate.matched && by_scans_alone())
+      match_elastically(scan, *local_map.back(), guess, estimate);
+    std::optional<LidarFactor> factor;
+    if (estimate.matched) {
+      factor = LidarFactor{estimate.match.target_from_source, estimate.match.fitness_m2,
+                           estimate.match.information};
+    }
+    {
+      const ScopedTimer smoothing(times_, "smoothing");
+      estimate.update = motion_->add_scan(scan.stamp, factor);
+    }
+    estimate.state = estimate.update.state;
+    if (estimate.update.status != MotionStatus::kIgnored) last_scan_ = scan.stamp;
+    last_matched_ = estimate.matched;
+    estimate.wall_ms = timer.wall_ms();
+  }
+  estimate.cpu_ms = 1e3 * (process_cpu_seconds() - cpu_start);
+  return estimate;
+}
+
+void DenseOdometry::preprocess(const Scan& scan, const std::vector<StampedPose>& path,
+                               DenseEstimate& estimate) {
+  const ScopedTimer timer(times_, "preprocess");
+  keep_.clear();
+  if (!boxes_.empty()) keep_ = outside_machine(scan, rig_, boxes_);
+  drop_isolated(scan, config_.isolated, keep_);
+  estimate.cloud = deskew(scan, rig_, path, keep_, config_.deskew).cloud;
+  estimate.thinned = filter_.filter(estimate.cloud, config_.voxel);
+}
+
+bool DenseOdometry::by_scans_alone() const {
+  if (!uses_imu_) return true;
+  const ImuTrust trust = motion_->imu_trust();
+  return !trust.usable || trust.on_probation;
+}
+
+void DenseOdometry::watch_scan_motion(const Scan& scan, const LocalMapSnapshot& local_map,
+                                      const std::vector<StampedPose>& guess,
+                                      const DenseEstimate& estimate) {
+  if (!estimate.matched) return scan_motion_.interrupt();
+  const ScopedTimer timer(times_, "scan_motion");
+  scan_motion_.add(*local_map.back(), estimate.thinned, guess,
+                   {scan.stamp, estimate.match.target_from_source}, estimate.scan_end - scan.stamp,
+                   config_.ndt);
+}
+
+void DenseOdometry::match_elastically(const Scan& scan, const NdtMap& target,
+                                      const std::vector<StampedPose>& guess,
+                                      DenseEstimate& estimate) {
+  const ScopedTimer timer(times_, "matching_elastic");
+  const TimeNs duration = estimate.scan_end - scan.stamp;
+  if (duration <= 0) return;
+  const Pose start = estimate.match.target_from_source;
+  const ScanPathConfig path_config{kBendShare * config_.motion.motion_accel_sigma_m_s2,
+                                   kBendShare * config_.motion.motion_angular_accel_sigma_rad_s2};
+  const ScanPathCorrection correction =
+      match_scan_path(target, estimate.thinned, duration, start, config_.ndt, path_config);
+  if (correction.iterations == 0) return;
+  const std::vector<StampedPose> path = corrected_path(guess, start, duration, correction);
+  preprocess(scan, path, estimate);
+  estimate.match.target_from_source = path.front().world_from_body;
+}
+
+void DenseOdometry::match(const LocalMapSnapshot& local_map, const NavState& predicted,
+                          DenseEstimate& estimate) {
+  const ScopedTimer timer(times_, "matching");
+  const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
+  const double finest = local_map.back()->cell_size();
+  const bool coarse = !last_matched_ || sigma > config_.coarse_above_sigma * finest;
+  std::optional<PosePrior> prior;
+  if (config_.prior_weight > 0.0) {
+    const Matrix6d loose = predicted.pose_covariance + 1e-9 * Matrix6d::Identity();
+    prior = PosePrior{predicted.world_from_body, config_.prior_weight * loose.inverse()};
+  }
+  const std::span<const NdtMapPtr> maps(local_map);
+  estimate.match = register_ndt(coarse ? maps : maps.last(1), estimate.thinned.points,
+                                predicted.world_from_body, prior, config_.ndt);
+  const double found = estimate.match.inlier_ratio;
+  estimate.matched = estimate.match.usable() && found >= config_.min_inlier_ratio;
+  if (!estimate.matched) return;
+  if (found < config_.min_inlier_share * usual_inliers_) {
+    estimate.matched = false;
+    estimate.match.reason = "suddenly much less than before";
+    return;
+  }
+  constexpr double kFollow = 0.1;
+  usual_inliers_ =
+      usual_inliers_ > 0.0 ? (1.0 - kFollow) * usual_inliers_ + kFollow * found : found;
+}
+
+void DenseOdometry::set_initial_motion(const Eigen::Vector3d& velocity_m_s,
+                                       const Eigen::Vector3d& angular_rate_rad_s) {
+  motion_->set_initial_motion(velocity_m_s, angular_rate_rad_s);
+}
+
+void DenseOdometry::take_imu(const Pose& body_from_imu, std::span<const ImuSample> samples) {
+  if (!config_.imu_enabled || uses_imu_) return;
+  rig_.body_from_imu = body_from_imu;
+  const NavState last = motion_->predict(last_scan_);
+  auto smoother = std::make_unique<ImuSmoother>(config_.motion, body_from_imu, &log_);
+  for (const ImuSample& sample : samples)
+    smoother->add_imu(sample);
+  smoother->take_over(last);
+  motion_ = std::move(smoother);
+  uses_imu_ = true;
+}
+
+void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
+  motion_->move_world(new_world_from_old_world);
+  scan_motion_.move_world(new_world_from_old_world);
+}
+
+void DenseOdometry::save(BinaryWriter& writer) const {
+  writer.put(last_matched_);
+  writer.put(usual_inliers_);
+  writer.put(last_scan_);
+  scan_motion_.save(writer);
+  motion_->save(writer);
+}
+
+void DenseOdometry::load(BinaryReader& reader) {
+  last_matched_ = reader.get<bool>();
+  usual_inliers_ = reader.get<double>();
+  last_scan_ = reader.get<TimeNs>();
+  scan_motion_.load(reader);
+  motion_->load(reader);
+}
+
+}  // namespace understory

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "understory/odometry/dense/scan_motion.h"
+#include "understory/odometry/dense/scan_path.h"
+#include "understory/odometry/motion/motion_model.h"
+#include "understory/preprocess/body_cloud.h"
+#include "understory/preprocess/deskew.h"
+#include "understory/preprocess/isolated_points.h"
+#include "understory/preprocess/machine_boxes.h"
+#include "understory/preprocess/voxel_filter.h"
+#include "understory/registration/ndt/ndt.h"
+#include "understory/sensor/rig.h"
+#include "understory/sensor/scan.h"
+#include "understory/util/config.h"
+#include "understory/util/log.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+
+// What scans are matched to: the same map at several cell sizes, coarse to fine.
+using LocalMapSnapshot = std::vector<NdtMapPtr>;
+
+struct DenseOdometryConfig {
+  VoxelFilterConfig voxel;  // thins a scan before matching
+  IsolatedPointsConfig isolated;
+  NdtConfig ndt;
+  DeskewConfig deskew;
+  MotionConfig motion;
+  bool imu_enabled = true;         // false: the IMU of the recording is passed over
+  std::string machine_boxes_file;  // YAML, P4-8; empty: none
+  // A match counts only with this share of the scan's points near the map.
+  double min_inlier_ratio = 0.1;
+  // Nor does one that suddenly finds less than this share of what matches found before it: a jump
+  // of the position, or something before the lidar. (In good runs no scan finds less than 0.8 of
+  // it.)
+  double min_inlier_share = 0.5;
+  // The coarse maps are asked first where the prediction may be off by more than this share of the
+  // finest cell (one sigma), or the last scan found no match.
+  double coarse_above_sigma = 0.25;
+  // Weight of the prediction in the match, 0 = it is only the start. In directions that a scan
+  // leaves undetermined the prior keeps the match from wandering.
+  double prior_weight = 0.0;
+  // Where no IMU tells of the motion: the first and the last pose of a scan are matched together,
+  // see scan_path.h.
+  bool elastic_scans = true;
+};
+void describe(ConfigTable& table, DenseOdometryConfig& config);
+
+// All that is known of one scan once it has a pose.
+struct DenseEstimate {
+  NavState state;  // at the scan's stamp
+  MotionUpdate update;
+  RegistrationResult match;  // status kTooFewPoints where there was no map to match to
+  bool matched = false;      // the match was usable and was offered to the motion model
+  BodyCloud cloud;           // every return outside the machine, deskewed, body frame at the stamp
+  BodyCloud thinned;         // what was matched, of the cloud
+  TimeNs scan_end = 0;       // time of the scan's last point
+  double wall_ms = 0.0;
+  double cpu_ms = 0.0;
+};
+
+// Dense lidar-inertial odometry, P4 F2 (left graph) and P2 section 2: predict, deskew, thin, match
+// to the local map, smooth. The local map is the caller's; one scan after another in order of time.
+// Not thread-safe; parallel inside.
+class DenseOdometry {
+ public:
+  // The rig decides whether there is an IMU (body_from_imu). `times` and `log` must outlive it.
+  DenseOdometry(const DenseOdometryConfig& config, const Rig& rig, StageTimes& times, Log& log);
+
+  void add_imu(const ImuSample& sample);
+  [[nodiscard]] DenseEstimate process(const Scan& scan, const LocalMapSnapshot& local_map);
+  // See MotionModel; before the first scan.
+  void set_initial_motion(const Eigen::Vector3d& velocity_m_s,
+                          const Eigen::Vector3d& angular_rate_rad_s);
+  // The IMU's place has become known, or the IMU has just appeared: it is used from the last scan
+  // on. `samples`: those since shortly before that scan, in order. No change without `imu_enabled`.
+  void take_imu(const Pose& body_from_imu, std::span<const ImuSample> samples);
+  // The local map was moved by this (loop closure): the estimate moves along.
+  void move_world(const Pose& new_world_from_old_world);
+
+  // The position was lost; see MotionModel.
+  void suspect_imu(TimeNs now) { motion_->suspect_imu(now); }
+
+  [[nodiscard]] const MotionModel& motion() const { return *motion_; }
+  [[nodiscard]] bool uses_imu() const { return uses_imu_; }
+  // Whether the times of the points fit the motion from scan to scan.
+  [[nodiscard]] ScanMotion scan_motion() const { return scan_motion_.motion(); }
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  // The cloud deskewed along a path, and thinned.
+  void preprocess(const Scan& scan, const std::vector<StampedPose>& path, DenseEstimate& estimate);
+  // Whether no IMU tells of the motion.
+  [[nodiscard]] bool by_scans_alone() const;
+  void match_elastically(const Scan& scan, const NdtMap& target,
+                         const std::vector<StampedPose>& guess, DenseEstimate& estimate);
+  void watch_scan_motion(const Scan& scan, const LocalMapSnapshot& local_map,
+                         const std::vector<StampedPose>& guess, const DenseEstimate& estimate);
+  void match(const LocalMapSnapshot& local_map, const NavState& predicted, DenseEstimate& estimate);
+
+  DenseOdometryConfig config_;
+  Rig rig_;
+  StageTimes& times_;
+  Log& log_;
+  bool uses_imu_;
+  std::unique_ptr<MotionModel> motion_;
+  std::vector<MachineBox> boxes_;
+  VoxelFilter filter_;
+  bool last_matched_ = false;
+  TimeNs last_scan_ = 0;            // stamp
+  std::vector<std::uint8_t> keep_;  // workspace: points of the scan outside the machine
+  ScanMotionWatch scan_motion_;
+  double usual_inliers_ = 0.0;  // running mean of the inlier ratio of matches; 0: none yet
+};
+
+}  // namespace understory

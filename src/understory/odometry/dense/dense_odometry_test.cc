@@ -1,0 +1,115 @@
+#include "understory/odometry/dense/dense_odometry.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "understory/odometry/test_carrier.h"
+#include "understory/registration/ndt/ndt_map.h"
+#include "understory/registration/test_stand.h"
+
+namespace understory {
+namespace {
+
+constexpr double kPeriod = 0.1;
+
+// Somebody who walks straight on and looks left and right quickly, in a world whose origin is the
+// first pose.
+Pose world_from_walker(double t) {
+  const double soft = 1.0 - std::exp(-2.0 * t * t);  // from rest
+  const Eigen::Vector3d position(0.8 * t * soft, 0.05 * std::sin(5.0 * t) * soft, 0.0);
+  return {so3_exp({0.0, 0.0, 0.6 * std::sin(4.5 * t) * soft}), position};
+}
+
+class LookingAround : public ::testing::Test {
+ protected:
+  LookingAround() {
+    stand_ = testing::make_stand({.half_width_m = 12.0, .crowns = false}, 4);
+    for (testing::Stem& stem : stand_.stems)
+      stem.foot.z() -= kEyes;
+    pattern_ = testing::vlp16();
+    pattern_.columns = 360;
+  }
+
+  // The ground of a stand is at height 0, the walker's eyes are the origin.
+  [[nodiscard]] Points seen_from(const Pose& world_from_body, std::uint64_t seed) const {
+    const Pose ground_from_world(Eigen::Quaterniond::Identity(), {0.0, 0.0, kEyes});
+    testing::Stand stand = stand_;
+    for (testing::Stem& stem : stand.stems)
+      stem.foot.z() += kEyes;
+    return testing::scan_stand(stand, ground_from_world * world_from_body, pattern_, seed);
+  }
+
+  // One turn of the lidar that begins at `t`.
+  [[nodiscard]] Scan scan(double t) const {
+    Scan scan;
+    scan.stamp = TestCarrier::stamp(t);
+    constexpr int kSteps = 8;
+    for (int step = 0; step < kSteps; ++step) {
+      const Pose pose = world_from_walker(t + kPeriod * (step + 0.5) / kSteps);
+      for (const Eigen::Vector3f& p : seen_from(pose, static_cast<std::uint64_t>(1e3 * t) + 7)) {
+        const double turned = std::atan2(p.y(), p.x()) / (2.0 * std::numbers::pi) + 0.5;
+        if (static_cast<int>(turned * kSteps) != step) continue;
+        scan.points.push_back({p.x(), p.y(), p.z(), 1.0F,
+                               static_cast<std::uint32_t>(1e9 * kPeriod * turned), 0, 0, 0});
+      }
+    }
+    return scan;
+  }
+
+  [[nodiscard]] LocalMapSnapshot map() const {
+    NdtMapBuilder builder({.cell_size_m = 0.5});
+    for (int i = -3; i <= 6; ++i) {
+      const Pose pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.4 * i, 0.1 * (i % 3), 0.0));
+      builder.insert(seen_from(pose, static_cast<std::uint64_t>(20 + i)), pose);
+    }
+    return {builder.snapshot()};
+  }
+
+  // RMS error of position over 1.4 seconds, metres.
+  [[nodiscard]] double rms_error(DenseOdometryConfig config, StageTimes& times) const {
+    Log log;
+    DenseOdometry odometry(config, Rig(), times, log);
+    odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+    const LocalMapSnapshot local_map = map();
+    double sum = 0.0;
+    constexpr int kScans = 14;
+    for (int i = 0; i < kScans; ++i) {
+      const double t = kPeriod * i;
+      const Scan turn = scan(t);
+      const DenseEstimate estimate = odometry.process(turn, local_map);
+      EXPECT_EQ(estimate.scan_end, turn.end());
+      const Pose off = world_from_walker(t).inverse() * estimate.state.world_from_body;
+      sum += off.translation().squaredNorm();
+    }
+    return std::sqrt(sum / kScans);
+  }
+
+  static constexpr double kEyes = 1.7;
+  testing::Stand stand_;
+  testing::Pattern pattern_;
+};
+
+bool timed(const StageTimes& times, const std::string& stage) {
+  const std::vector<std::string> stages = times.stages();
+  return std::find(stages.begin(), stages.end(), stage) != stages.end();
+}
+
+TEST_F(LookingAround, ScansWithoutAnImuAreMatchedElastically) {
+  DenseOdometryConfig config;
+  StageTimes rigid_times;
+  config.elastic_scans = false;
+  const double rigid = rms_error(config, rigid_times);
+  StageTimes times;
+  config.elastic_scans = true;
+  const double elastic = rms_error(config, times);
+  EXPECT_FALSE(timed(rigid_times, "matching_elastic"));
+  EXPECT_TRUE(timed(times, "matching_elastic"));
+  EXPECT_LT(elastic, 0.022);
+  EXPECT_LT(elastic, 0.8 * rigid);
+}
+
+}  // namespace
+}  // namespace understory

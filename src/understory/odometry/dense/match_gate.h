@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+
+#include "understory/odometry/motion/motion_prediction.h"
+
+namespace understory {
+
+// Whether a match fits what the motion allows, P2-8.
+struct [[nodiscard]] GateVerdict {
+  std::string reason;            // why not; empty: it fits
+  double velocity_jump_m_s = 0;  // how much the match changes, or would change, the velocity
+};
+
+// `before`: the state at the scan before; `predicted`: at this scan, without the match;
+// `with_match`: with it; `match`: the pose of the IMU that matching gave. Thread-safe.
+GateVerdict judge_match(const MotionConfig& config, const ImuState& before,
+                        const MotionPrediction& predicted, const ImuState& with_match,
+                        const Pose& match);
+
+}  // namespace understory

@@ -1,0 +1,78 @@
+#include "understory/odometry/dense/scan_motion.h"
+
+#include <utility>
+
+#include "understory/geometry/pose_io.h"
+#include "understory/odometry/dense/scan_path.h"
+
+namespace understory {
+namespace {
+
+constexpr double kRangeM = 10.0;        // at which a turn counts as a shift
+constexpr double kLeastMotionM = 0.08;  // within a scan: less tells nothing of its times
+constexpr double kLongestStepS = 0.5;   // between two scans: more is no even motion
+// So loose that the guess hardly binds: what is looked for is a guess that is wrong.
+constexpr ScanPathConfig kLoose{30.0, 60.0, 8, 6.0};
+
+Vector6d in_metres(Vector6d motion) {
+  motion.head<3>() *= kRangeM;
+  return motion;
+}
+
+}  // namespace
+
+void ScanMotionWatch::add(const NdtMap& target, const BodyCloud& source,
+                          const std::vector<StampedPose>& guess, const StampedPose& matched,
+                          TimeNs duration, const NdtConfig& ndt) {
+  const std::optional<StampedPose> before = std::exchange(last_, matched);
+  ++since_probe_;
+  if (!before || since_probe_ < kEvery || duration <= 0 || guess.size() < 2) return;
+  const double between = to_seconds(matched.stamp - before->stamp);
+  if (between <= 0.0 || between > kLongestStepS) return;
+  const Vector6d moved =
+      in_metres((before->world_from_body.inverse() * matched.world_from_body).log() *
+                (to_seconds(duration) / between));
+  if (moved.norm() < kLeastMotionM) return;
+  since_probe_ = 0;
+  const ScanPathCorrection correction =
+      match_scan_path(target, source, duration, matched.world_from_body, ndt, kLoose);
+  if (correction.iterations == 0) return;
+  const Pose guessed = guess.front().world_from_body.inverse() * guess.back().world_from_body;
+  const Vector6d within = in_metres(guessed.log() + correction.at_end - correction.at_start);
+  ++probes_;
+  products_ += within.dot(moved);
+  squares_ += moved.squaredNorm();
+}
+
+void ScanMotionWatch::move_world(const Pose& new_world_from_old_world) {
+  if (last_) last_->world_from_body = new_world_from_old_world * last_->world_from_body;
+}
+
+ScanMotion ScanMotionWatch::motion() const {
+  return {probes_, squares_ > 0.0 ? products_ / squares_ : 0.0};
+}
+
+void ScanMotionWatch::save(BinaryWriter& writer) const {
+  writer.put(last_.has_value());
+  const StampedPose last = last_.value_or(StampedPose{});
+  writer.put(last.stamp);
+  put_pose(writer, last.world_from_body);
+  writer.put(since_probe_);
+  writer.put(probes_);
+  writer.put(products_);
+  writer.put(squares_);
+}
+
+void ScanMotionWatch::load(BinaryReader& reader) {
+  const bool any = reader.get<bool>();
+  StampedPose last;
+  last.stamp = reader.get<TimeNs>();
+  last.world_from_body = get_pose(reader);
+  last_ = any ? std::optional(last) : std::nullopt;
+  since_probe_ = reader.get<int>();
+  probes_ = reader.get<int>();
+  products_ = reader.get<double>();
+  squares_ = reader.get<double>();
+}
+
+}  // namespace understory

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "understory/geometry/stamped_pose.h"
+#include "understory/preprocess/body_cloud.h"
+#include "understory/registration/ndt/ndt.h"
+#include "understory/util/binary_io.h"
+
+namespace understory {
+
+// How far the sensor moves within scans, over how far it moves from scan to scan in the same time:
+// 1 where the times of the points are right, -1 where they run backwards, 0 where the points have
+// been deskewed already or all have the same time, 0.1 where they say that a scan takes ten times
+// as long.
+struct ScanMotion {
+  int probes = 0;
+  double ratio = 0.0;  // by least squares over the probes; 0 before there is one
+};
+
+// Finds out from scans now and then, while the sensor moves: the first and the last pose of a scan
+// are matched each by itself (scan_path.h, hardly bound by what was guessed), and the motion
+// between them is held against that since the scan before. Costs one such match every `kEvery`
+// scans. Not thread-safe.
+class ScanMotionWatch {
+ public:
+  static constexpr int kEvery = 30;
+
+  // A scan that was matched, before its path is corrected by anything else.
+  //   source: deskewed along `guess`, thinned, body frame at its stamp
+  //   matched: its pose by the match; duration: from the stamp to the last point
+  void add(const NdtMap& target, const BodyCloud& source, const std::vector<StampedPose>& guess,
+           const StampedPose& matched, TimeNs duration, const NdtConfig& ndt);
+  // A scan without a match.
+  void interrupt() { last_.reset(); }
+  void move_world(const Pose& new_world_from_old_world);
+
+  [[nodiscard]] ScanMotion motion() const;
+
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  std::optional<StampedPose> last_;  // of the scan before
+  int since_probe_ = 0;
+  int probes_ = 0;
+  double products_ = 0.0;
+  double squares_ = 0.0;
+};
+
+}  // namespace understory

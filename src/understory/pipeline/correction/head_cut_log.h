@@ -1,0 +1,60 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "understory/forest/tree.h"
+#include "understory/forest/tree_fall.h"
+#include "understory/geometry/stamped_pose.h"
+#include "understory/map/head_cuts.h"
+#include "understory/output/run_summary.h"
+#include "understory/util/config.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// What a harvester's computer noted of its head (P1 section 4): where and when it felled trees.
+struct HeadCutLogConfig {
+  std::string head_log;  // CSV (docs/method/sparse.md); empty: none
+  CutMatching cuts;
+};
+void describe(ConfigTable& table, HeadCutLogConfig& config);
+
+// A felling cut as it stands in the log.
+struct LoggedCut {
+  TimeNs stamp = 0;
+  Eigen::Vector3d head_in_body = Eigen::Vector3d::Zero();  // metres
+};
+
+// Reads `timestamp,x,y,z` in the order of time; nothing for no file. Throws InputError with the
+// line where a cell is no number or time goes backwards.
+[[nodiscard]] std::vector<LoggedCut> read_head_log(const std::string& file);
+
+// The cuts where the path says that the machine was. Those before its begin or after its end are
+// left out, with a warning. `path` is in the order of time.
+[[nodiscard]] std::vector<HeadCut> place_cuts(const std::vector<LoggedCut>& cuts,
+                                              const std::vector<StampedPose>& path, Log& log);
+
+// A sparse map and the views that it was made of; `trees` are those of its tree list, one for each
+// stem.
+struct FelledStand {
+  const std::vector<StemView>& views;
+  const std::vector<Pose>& world_from_body;
+  const std::vector<MappedStem>& stems;
+  const std::vector<Tree>& trees;
+};
+
+// Writes felled.csv: the trees that the views saw and then saw no more, and those that the head
+// cut, with its time; with cuts also cuts.csv (`timestamp,x,y,z,tree_id,distance_m`, world frame,
+// the last two empty where no tree of the list stood). Adds its counts to the summary.
+std::vector<TreeFall> write_felled_trees(const std::filesystem::path& folder,
+                                         const FelledStand& stand, const std::vector<HeadCut>& cuts,
+                                         const CutMatching& config, RunSummary& summary);
+
+// cuts.csv of one run to that of another in which everything is moved; nothing where there is none.
+// Throws InputError or OutputError.
+void write_moved_cuts(const std::filesystem::path& from, const std::filesystem::path& to,
+                      const Pose& to_world_from_world);
+
+}  // namespace understory

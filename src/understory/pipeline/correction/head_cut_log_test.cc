@@ -1,0 +1,100 @@
+#include "understory/pipeline/correction/head_cut_log.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "understory/evaluation/tree_falls.h"
+#include "understory/util/error.h"
+#include "understory/util/folder_test_support.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+class HeadLog : public ::testing::Test {
+ protected:
+  std::string log_of(const std::string& rows) const {
+    const fs::path file = folder / "head.csv";
+    std::ofstream(file) << "timestamp,x,y,z\n" << rows;
+    return file.string();
+  }
+  static std::string text_of(const fs::path& file) {
+    std::ifstream stream(file);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+
+  const test::TemporaryFolder folder;
+};
+
+TEST_F(HeadLog, TheLogIsReadStrictly) {
+  EXPECT_TRUE(read_head_log("").empty());
+  const auto cuts = read_head_log(log_of("10.5,1,2,3\n10.5,2,2,3\n"));
+  ASSERT_EQ(cuts.size(), 2U);
+  EXPECT_EQ(cuts[0].stamp, from_seconds(10.5));
+  EXPECT_EQ(cuts[1].head_in_body, Eigen::Vector3d(2.0, 2.0, 3.0));
+  EXPECT_THROW((void)read_head_log(log_of("10,1,2,3\n9,1,2,3\n")), InputError);
+  EXPECT_THROW((void)read_head_log(log_of("10,1,nan,3\n")), InputError);
+  EXPECT_THROW((void)read_head_log(log_of("soon,1,2,3\n")), InputError);
+  EXPECT_THROW((void)read_head_log((folder / "none.csv").string()), InputError);
+}
+
+TEST_F(HeadLog, CutsLieWhereThePathSaysThatTheMachineWas) {
+  const Eigen::Quaterniond left(Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d::UnitZ()));
+  const std::vector<StampedPose> path = {{from_seconds(10.0), Pose(left, {0.0, 0.0, 1.0})},
+                                         {from_seconds(12.0), Pose(left, {4.0, 0.0, 1.0})}};
+  Log log;
+  const auto placed = place_cuts({{from_seconds(9.0), {0.0, 0.0, 0.0}},
+                                  {from_seconds(10.0), {3.0, 0.0, 0.0}},
+                                  {from_seconds(11.0), {3.0, 0.0, 0.0}},
+                                  {from_seconds(12.5), {0.0, 0.0, 0.0}}},
+                                 path, log);
+  ASSERT_EQ(placed.size(), 2U);
+  EXPECT_LT((placed[0].head_in_world - Eigen::Vector3d(0.0, 3.0, 1.0)).norm(), 1e-9);
+  EXPECT_LT((placed[1].head_in_world - Eigen::Vector3d(2.0, 3.0, 1.0)).norm(), 1e-9);
+  ASSERT_EQ(log.warnings().size(), 1U);
+  EXPECT_EQ(log.warnings()[0].count, 2U);
+}
+
+// Two trees seen for a while and no more, too short to tell by the views alone: the head tells.
+TEST_F(HeadLog, TheHeadTellsWhatTheViewsCannot) {
+  std::vector<StemView> views(20);
+  std::vector<Pose> poses(20);
+  for (std::size_t i = 0; i < views.size(); ++i)
+    views[i].stamp = from_seconds(10.0 * static_cast<double>(i));
+  std::vector<MappedStem> stems(2);
+  std::vector<Tree> trees(2);
+  for (std::size_t t = 0; t < stems.size(); ++t) {
+    stems[t].point_in_world = {5.0, 4.0 * static_cast<double>(t), 0.0};
+    stems[t].last_view = 8;
+    trees[t].id = static_cast<int>(t) + 1;
+    trees[t].x = stems[t].point_in_world.x();
+    trees[t].y = stems[t].point_in_world.y();
+  }
+  const std::vector<HeadCut> cuts = {{from_seconds(95.0), {5.2, 4.1, 1.0}},
+                                     {from_seconds(150.0), {-7.0, 0.0, 1.0}}};
+  RunSummary summary;
+  (void)write_felled_trees(folder.path(), {views, poses, stems, trees}, cuts, {}, summary);
+  const auto falls = read_tree_falls(folder / "felled.csv");
+  ASSERT_EQ(falls.size(), 1U);
+  EXPECT_EQ(falls[0].tree_id, 2);
+  EXPECT_EQ(falls[0].seen_until, from_seconds(95.0));
+  EXPECT_EQ(falls[0].gone_since, from_seconds(95.0));
+  EXPECT_EQ(text_of(folder / "cuts.csv"),
+            "timestamp,x,y,z,tree_id,distance_m\n"
+            "95.000000000,5.200,4.100,1.000,2,0.224\n"
+            "150.000000000,-7.000,0.000,1.000,,\n");
+  write_moved_cuts(folder / "cuts.csv", folder / "moved.csv",
+                   Pose(Eigen::Quaterniond::Identity(), {100.0, 0.0, -1.0}));
+  EXPECT_EQ(text_of(folder / "moved.csv"),
+            "timestamp,x,y,z,tree_id,distance_m\n"
+            "95.000000000,105.200,4.100,0.000,2,0.224\n"
+            "150.000000000,93.000,0.000,0.000,,\n");
+  EXPECT_EQ(std::get<std::int64_t>(summary.counts.at("head_cuts_without_tree")), 1);
+}
+
+}  // namespace
+}  // namespace understory

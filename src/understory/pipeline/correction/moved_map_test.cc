@@ -1,0 +1,115 @@
+#include "understory/pipeline/correction/moved_map.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "understory/georeference/terrain_file.h"
+#include "understory/output/geo_files.h"
+#include "understory/output/las_writer.h"
+#include "understory/recording/bags/byte_source.h"
+#include "understory/recording/clouds/las.h"
+#include "understory/util/folder_test_support.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+
+double hill(double x, double y) {
+  return 2.0 * std::sin(0.1 * x) + 0.1 * y;
+}
+
+// Heights above the ground: taller towards the east.
+double trees(double x) {
+  return 10.0 + 0.2 * x;
+}
+
+Raster raster_of(bool ground) {
+  Raster raster;
+  raster.x0 = -20.0;
+  raster.y0 = -10.0;
+  raster.cell_m = 0.5;
+  raster.columns = 80;
+  raster.rows = 40;
+  for (int row = 0; row < raster.rows; ++row) {
+    for (int column = 0; column < raster.columns; ++column) {
+      const double x = raster.x0 + (column + 0.5) * raster.cell_m;
+      const double y = raster.y0 + (row + 0.5) * raster.cell_m;
+      raster.values.push_back(static_cast<float>(ground ? hill(x, y) : trees(x)));
+    }
+  }
+  return raster;
+}
+
+struct Folders {
+  test::TemporaryFolder both;
+  fs::path run = both / "run";
+  fs::path result = both / "result";
+  Folders() {
+    fs::create_directory(run);
+    fs::create_directory(result);
+  }
+};
+
+TEST(MovedMap, CloudAndRastersGoWithThePath) {
+  const Folders folders;
+  constexpr std::int64_t kUnix = 1'780'000'000'250'000'000;
+  {
+    LasWriter writer(folders.run / "map.laz", LasOptions{});
+    for (int k = 0; k < 1000; ++k) {
+      const double x = -20.0 + 0.04 * k;
+      writer.add({x, 3.0, hill(x, 3.0), k < 500 ? kUnix : TimeNs{2'430'500'000'000},
+                  static_cast<std::uint16_t>(k), static_cast<std::uint8_t>(k % 2 == 0 ? 2 : 5)});
+    }
+    writer.commit();
+  }
+  write_geotiff(folders.run / "dtm.tif", raster_of(true), "");
+  write_geotiff(folders.run / "chm.tif", raster_of(false), "");
+
+  const Pose motion(so3_exp(Vector3d(0.0, 0.0, 1.1)) * so3_exp(Vector3d(0.05, -0.03, 0.0)),
+                    Vector3d(300.0, -200.0, 120.0));
+  Log log;
+  write_moved_map(folders.run, folders.result, motion, log);
+
+  const auto before = open_file((folders.run / "map.laz").string());
+  const auto after = open_file((folders.result / "map.laz").string());
+  std::vector<LasPoint> points[2];
+  int which = 0;
+  for (ByteSource* file : {before.get(), after.get()}) {
+    read_las_points(*file, read_las_header(*file), log,
+                    [&](const LasPoint& point) { points[which].push_back(point); });
+    ++which;
+  }
+  ASSERT_EQ(points[0].size(), 1000U);
+  ASSERT_EQ(points[1].size(), 1000U);
+  for (std::size_t k = 0; k < 1000; k += 7) {
+    EXPECT_LT((motion * points[0][k].position - points[1][k].position).norm(), 0.0011);
+    EXPECT_EQ(points[0][k].intensity, points[1][k].intensity);
+    EXPECT_EQ(points[0][k].classification, points[1][k].classification);
+    EXPECT_NEAR(points[0][k].gps_time, points[1][k].gps_time, 1e-6);
+  }
+
+  const PlaneArea area{motion.translation().head<2>().array() - 100.0,
+                       motion.translation().head<2>().array() + 100.0};
+  const Raster ground = read_terrain(folders.result / "dtm.tif", area, std::nullopt);
+  const Raster canopy = read_terrain(folders.result / "chm.tif", area, std::nullopt);
+  int compared = 0;
+  for (double x = -17.0; x < 17.0; x += 1.7) {
+    for (double y = -8.0; y < 8.0; y += 1.3) {
+      const Vector3d at = motion * Vector3d(x, y, hill(x, y));
+      EXPECT_NEAR(ground.interpolate(at.x(), at.y()), at.z(), 0.02) << x << " " << y;
+      EXPECT_NEAR(canopy.interpolate(at.x(), at.y()), trees(x), 0.02) << x << " " << y;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 200);
+  // Nothing is known beyond the edges.
+  const Vector3d beyond = motion * Vector3d(0.0, 14.0, 0.0);
+  EXPECT_TRUE(std::isnan(ground.cell_value(beyond.x(), beyond.y())));
+}
+
+}  // namespace
+}  // namespace understory

@@ -1,0 +1,54 @@
+#include "understory/pipeline/correction/stem_sights.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr double kShare = 0.9;
+
+// The value that a share of all does not exceed; infinite for none.
+double quantile(std::vector<double> values, double of_none) {
+  if (values.empty()) return of_none;
+  const auto at = static_cast<std::ptrdiff_t>(kShare * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+double range_m(const Stem& stem) {
+  return static_cast<double>(stem.point.head<2>().norm());
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, StemSightConfig& config) {
+  table.add("range_share", config.range_share, {0.0, 100.0}, "",
+            "stems that make the map are nearer than that share of the usual range; matching takes "
+            "all");
+  table.add("score_share", config.score_share, {0.0, 1.0}, "",
+            "and surer than that share of a high score in the recording");
+}
+
+std::vector<StemView> map_sights(const std::vector<StemView>& views,
+                                 const StemSightConfig& config) {
+  std::vector<double> ranges;
+  std::vector<double> scores;
+  for (const StemView& view : views) {
+    for (const Stem& stem : view.stems) {
+      ranges.push_back(range_m(stem));
+      if (std::isfinite(stem.score)) scores.push_back(static_cast<double>(stem.score));
+    }
+  }
+  const double farthest = config.range_share * quantile(std::move(ranges), 0.0);
+  const double lowest = config.score_share * quantile(std::move(scores), 0.0);
+  std::vector<StemView> result = views;
+  for (StemView& view : result) {
+    std::erase_if(view.stems, [&](const Stem& stem) {
+      return range_m(stem) > farthest || static_cast<double>(stem.score) < lowest;
+    });
+  }
+  return result;
+}
+
+}  // namespace understory

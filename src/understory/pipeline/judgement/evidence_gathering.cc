@@ -1,0 +1,170 @@
+#include "understory/pipeline/judgement/evidence_gathering.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/recording/finding.h"
+
+namespace understory {
+namespace {
+
+SensorEvidence sensor_of(const EventOrderer::StreamReport& stream) {
+  SensorEvidence sensor;
+  sensor.received = stream.received;
+  sensor.late = stream.late;
+  sensor.glitches = stream.glitches;
+  sensor.duplicates = stream.duplicates;
+  sensor.reordered = stream.reordered;
+  sensor.clock_jumps = stream.clock_jumps;
+  sensor.unheard_s = to_seconds(stream.without_say);
+  sensor.longest_gap_s = to_seconds(stream.longest_gap);
+  if (stream.longest_gap > 0) sensor.after_longest_gap = format_seconds(stream.after_longest_gap);
+  return sensor;
+}
+
+// A topic that has this role, or null.
+const TopicReport* topic_of(const std::vector<TopicReport>& topics, const std::string& role) {
+  const auto found = std::find_if(topics.begin(), topics.end(), [&](const TopicReport& topic) {
+    return topic.role == role && topic.messages > 0;
+  });
+  return found == topics.end() ? nullptr : &*found;
+}
+
+// When the messages of a topic begin and end, by the mended clock of its stream.
+struct Span {
+  TimeNs first = 0;
+  TimeNs last = 0;
+};
+Span span_of(const TopicReport& topic, const EventOrderer::StreamReport& stream) {
+  return {topic.first_stamp + stream.offset, topic.last_stamp + stream.offset};
+}
+
+// Why the IMU had no say, in words.
+std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicReport>& topics,
+                           const SensorEvidence& sensor) {
+  constexpr double kNoticeableS = 0.1;
+  std::string why;
+  const auto add = [&](const std::string& what) { why += (why.empty() ? "" : "; ") + what; };
+  if (facts.imu_hearing.without_place() > 0) {
+    add(fmt::format(
+        "nothing tells where it sits on the carrier for {:.1f} s; give --extrinsics FILE",
+        to_seconds(facts.imu_hearing.without_place())));
+  }
+  if (facts.imu_hearing.unusable() > 0) {
+    add(fmt::format(
+        "its samples are not numbers or beyond its range for {:.1f} s (degrees per second?)",
+        to_seconds(facts.imu_hearing.unusable())));
+  }
+  const TopicReport* imu = topic_of(topics, "imu");
+  const TopicReport* lidar = topic_of(topics, "lidar");
+  if (imu != nullptr && lidar != nullptr) {
+    const auto& streams = facts.time_repair->streams;
+    const Span heard = span_of(*imu, streams[EventOrderer::kImu]);
+    const Span scanned = span_of(*lidar, streams[EventOrderer::kLidar]);
+    const double late = to_seconds(heard.first - scanned.first);
+    if (late > kNoticeableS) add(fmt::format("it begins {:.1f} s after the lidar", late));
+    const double missing = to_seconds(facts.last_scan_end - heard.last);
+    if (missing > kNoticeableS) add(fmt::format("it stops {:.1f} s before the lidar", missing));
+  }
+  if (sensor.longest_gap_s > kNoticeableS) {
+    add(fmt::format("it was silent for {:.1f} s before {} s", sensor.longest_gap_s,
+                    sensor.after_longest_gap));
+  }
+  return why.empty() ? "scans left before its samples came" : why;
+}
+
+// Why another sensor had no say, in words.
+std::string loss_of(const SensorEvidence& sensor) {
+  return fmt::format(
+      "of its {} messages {} came too late, {} had a stamp far off, {} were unreadable",
+      sensor.received + sensor.unreadable, sensor.late, sensor.glitches, sensor.unreadable);
+}
+
+// What the readers have found wrong or missing.
+void gather_findings(const Log& log, RunEvidence& evidence) {
+  const auto take = [&](Finding finding, std::uint64_t& count, std::string& first) {
+    Found of_kind = found(log, finding);
+    count = of_kind.count;
+    first = std::move(of_kind.first);
+  };
+  take(Finding::kDamage, evidence.damaged_places, evidence.first_damage);
+  take(Finding::kDamagedPacket, evidence.damaged_packets, evidence.first_damaged_packet);
+  take(Finding::kOtherSensor, evidence.other_sensor_messages, evidence.first_other_sensor);
+  evidence.late_sensor = found(log, Finding::kLateSensor).first;
+  evidence.where_cut_off = found(log, Finding::kCutOff).first;
+  evidence.cut_off = found(log, Finding::kCutOff).count > 0;
+  evidence.times_assumed = found(log, Finding::kAssumedTimes).count > 0;
+  evidence.why_no_point_times = found(log, Finding::kNoPointTimes).first;
+  evidence.point_times_missing = found(log, Finding::kNoPointTimes).count > 0;
+}
+
+}  // namespace
+
+void gather_reading(const ReadingFacts& facts, RunEvidence& evidence) {
+  static_assert(kSensorRoles.size() == EventOrderer::kStreams);
+  const std::vector<TopicReport> topics = facts.source->topics();
+  for (std::size_t s = 0; s < kSensorRoles.size(); ++s) {
+    SensorEvidence& sensor = evidence.*kSensorRoles[s].evidence;
+    sensor = sensor_of(facts.time_repair->streams[s]);
+    const TopicReport* topic = topic_of(topics, kSensorRoles[s].name);
+    if (topic != nullptr) sensor.unreadable = topic->unreadable;
+    sensor.unheard_why = loss_of(sensor);
+  }
+  if (facts.imu_wanted) {
+    evidence.imu.unheard_s =
+        std::max(evidence.imu.unheard_s, to_seconds(facts.imu_hearing.without_place())) +
+        to_seconds(facts.imu_hearing.unusable());
+    evidence.imu.unheard_why = silence_of_imu(facts, topics, evidence.imu);
+  } else {
+    evidence.imu.unheard_s = 0.0;
+  }
+  gather_findings(*facts.log, evidence);
+}
+
+void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence) {
+  evidence.imu_motion_scale = trust.motion_scale;
+  evidence.imu_motion_correlation = trust.motion_correlation;
+  evidence.imu_motion_spread_m_s2 = trust.motion_spread_m_s2;
+  evidence.imu_motion_windows = trust.motion_windows;
+}
+
+void gather_dense(const MappingSession& session, const RunFacts& facts, const Recording& source,
+                  const Log& log, RunEvidence& evidence) {
+  const bool refused = !session.imu_refused().empty();
+  ReadingFacts reading;
+  reading.source = &source;
+  reading.time_repair = &facts.time_repair;
+  reading.log = &log;
+  reading.last_scan_end = session.last_scan_end();
+  reading.imu_wanted = refused || session.imu_wanted();
+  reading.imu_hearing = session.imu_hearing();
+  gather_reading(reading, evidence);
+  evidence.stopped = facts.stopped;
+  evidence.unreadable = facts.unreadable;
+  evidence.dropped_scans = facts.dropped_scans;
+  evidence.imu_used = session.odometry().uses_imu();
+  const ImuTrust trust = session.odometry().motion().imu_trust();
+  if (refused) {
+    evidence.imu_distrust = imu_refusal(session.imu_refused());
+  } else if (!trust.trusted) {
+    evidence.imu_distrust = trust.reason;
+  }
+  gather_motion_scale(trust, evidence);
+  const ScanMotion scan_motion = session.odometry().scan_motion();
+  evidence.match.scan_motion_ratio = scan_motion.ratio;
+  evidence.match.scan_motion_probes = scan_motion.probes;
+  const MappingCounts& counts = session.counts();
+  MatchEvidence& match = evidence.match;
+  match.scans = counts.scans;
+  match.unmatched = counts.unmatched + counts.gated;
+  match.empty = counts.empty_scans;
+  match.repeated = counts.repeated;
+  match.segments = counts.segments;
+  if (counts.segments > 1) match.first_lost = format_seconds(counts.first_lost);
+}
+
+}  // namespace understory

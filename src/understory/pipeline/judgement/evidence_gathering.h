@@ -1,0 +1,33 @@
+#pragma once
+
+#include "understory/odometry/motion/motion_model.h"
+#include "understory/pipeline/judgement/imu_hearing.h"
+#include "understory/pipeline/judgement/run_evidence.h"
+#include "understory/pipeline/mapping/mapping_session.h"
+#include "understory/pipeline/run_folder/run_writer.h"
+#include "understory/recording/recording.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// What both front ends know of the recording that they have read: what each sensor said, what of it
+// was put in order, dropped or not used, and what was damaged.
+struct ReadingFacts {
+  const Recording* source = nullptr;
+  const EventOrderer::Report* time_repair = nullptr;
+  const Log* log = nullptr;
+  TimeNs last_scan_end = 0;
+  bool imu_wanted = true;  // by the configuration
+  ImuHearing imu_hearing;
+};
+void gather_reading(const ReadingFacts& facts, RunEvidence& evidence);
+
+// Whether the accelerations by matching are those of the accelerometer.
+void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence);
+
+// What the dense front end knows beside; `evidence.motion` and the figures of the finished path in
+// `evidence.match` are there already.
+void gather_dense(const MappingSession& session, const RunFacts& facts, const Recording& source,
+                  const Log& log, RunEvidence& evidence);
+
+}  // namespace understory

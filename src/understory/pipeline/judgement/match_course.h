@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+
+#include "understory/pipeline/judgement/run_evidence.h"
+#include "understory/util/time.h"
+
+namespace understory {
+
+// Follows how well scans fit the map, in windows of two seconds: where they find few of their
+// points in it, and where the points that they find lie no nearer than chance would put them. The
+// first ten seconds do not count: the map is a few scans then. Memory: 40 bytes a window. Not
+// thread-safe.
+class MatchCourse {
+ public:
+  // Edge of the finest cells that scans are matched to, metres. A point anywhere in such a cell is
+  // half an edge (RMS) from its middle.
+  explicit MatchCourse(double finest_cell_m) : finest_cell_m_(finest_cell_m) {}
+
+  // One scan, in order of time. Without a match it found none of its points.
+  //   inlier_ratio: share of its points near the map; fitness_m2: their mean squared distance
+  void add(TimeNs stamp, bool matched, double inlier_ratio, double fitness_m2);
+  // Writes the shares and the growth; see MatchEvidence.
+  void put(MatchEvidence& evidence) const;
+
+ private:
+  struct Window {
+    double inliers = 0.0;  // sums
+    double squares_m2 = 0.0;
+    std::uint64_t scans = 0;
+    std::uint64_t matched = 0;
+  };
+  double finest_cell_m_;
+  TimeNs first_ = 0;
+  std::map<TimeNs, Window> windows_;  // by number
+};
+
+}  // namespace understory

@@ -1,0 +1,83 @@
+#include "understory/pipeline/judgement/run_evidence.h"
+
+namespace understory {
+namespace {
+
+using Figures = std::map<std::string, Figure>;
+
+void put(Figures& figures, const std::string& name, std::uint64_t value) {
+  figures[name] = static_cast<std::int64_t>(value);
+}
+
+void put_sensor(Figures& figures, const std::string& name, const SensorEvidence& sensor) {
+  put(figures, name + "_received", sensor.received);
+  put(figures, name + "_unreadable", sensor.unreadable);
+  put(figures, name + "_late", sensor.late);
+  put(figures, name + "_glitches", sensor.glitches);
+  put(figures, name + "_duplicates", sensor.duplicates);
+  put(figures, name + "_reordered", sensor.reordered);
+  put(figures, name + "_clock_jumps", sensor.clock_jumps);
+  figures[name + "_longest_gap_s"] = sensor.longest_gap_s;
+  figures[name + "_unheard_s"] = sensor.unheard_s;
+}
+
+void put_motion(Figures& figures, const MotionEvidence& motion) {
+  put(figures, "steps", motion.steps);
+  put(figures, "steps_impossible", motion.impossible);
+  figures["speed_p99_m_s"] = motion.speed_p99_m_s;
+  figures["speed_max_m_s"] = motion.fastest_m_s;
+  figures["acceleration_p99_m_s2"] = motion.acceleration_p99_m_s2;
+  figures["acceleration_max_m_s2"] = motion.hardest_m_s2;
+  figures["step_max_s"] = motion.longest_step_s;
+  figures["turn_rate_p99_deg_s"] = motion.turn_rate_p99_deg_s;
+}
+
+void put_match(Figures& figures, const MatchEvidence& match) {
+  put(figures, "scans_mapped", match.scans);
+  put(figures, "scans_unmatched", match.unmatched);
+  put(figures, "scans_empty", match.empty);
+  put(figures, "scans_repeated", match.repeated);
+  put(figures, "segments", match.segments);
+  figures["inliers_mean"] = match.inliers_mean;
+  figures["inliers_low"] = match.inliers_low;
+  figures["fitness_rms_m"] = match.fitness_rms_m;
+  figures["few_share"] = match.few_share;
+  figures["chance_share"] = match.chance_share;
+  figures["blur_growth"] = match.blur_growth;
+  figures["smear_m"] = match.smear_m;
+  figures["scan_motion_ratio"] = match.scan_motion_ratio;
+  figures["scan_motion_probes"] = std::int64_t{match.scan_motion_probes};
+}
+
+void put_stems(Figures& figures, const StemRunEvidence& stems) {
+  put(figures, "views", stems.views);
+  put(figures, "views_doubtful", stems.doubtful);
+  figures["loops_solved"] = stems.loops_solved;
+}
+
+}  // namespace
+
+Figures figures_of(const RunEvidence& evidence) {
+  Figures figures;
+  figures["stopped"] = evidence.stopped;
+  put(figures, "scans_dropped", evidence.dropped_scans);
+  for (const SensorRole& role : kSensorRoles)
+    put_sensor(figures, role.name, evidence.*role.evidence);
+  put(figures, "damaged_places", evidence.damaged_places);
+  put(figures, "damaged_packets", evidence.damaged_packets);
+  figures["cut_off"] = evidence.cut_off;
+  figures["times_assumed"] = evidence.times_assumed;
+  figures["point_times_missing"] = evidence.point_times_missing;
+  figures["imu_used"] = evidence.imu_used;
+  figures["imu_believed"] = evidence.imu_distrust.empty();
+  figures["imu_motion_scale"] = evidence.imu_motion_scale;
+  figures["imu_motion_correlation"] = evidence.imu_motion_correlation;
+  figures["imu_motion_spread_m_s2"] = evidence.imu_motion_spread_m_s2;
+  figures["imu_motion_windows"] = std::int64_t{evidence.imu_motion_windows};
+  put_motion(figures, evidence.motion);
+  put_match(figures, evidence.match);
+  if (evidence.by_stems) put_stems(figures, evidence.stems);
+  return figures;
+}
+
+}  // namespace understory

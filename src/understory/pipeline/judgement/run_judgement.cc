@@ -1,0 +1,344 @@
+#include "understory/pipeline/judgement/run_judgement.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace understory {
+namespace {
+
+double share(std::uint64_t part, std::uint64_t whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+double percent(std::uint64_t part, std::uint64_t whole) {
+  return 100.0 * share(part, whole);
+}
+
+// Gathers reasons for one judgement.
+class Judge {
+ public:
+  Judge(const RunEvidence& evidence, const JudgementConfig& config)
+      : evidence_(evidence), config_(config) {}
+
+  RunJudgement judge() {
+    judge_ending();
+    judge_unheard_scans();
+    judge_unheard_sensors();
+    judge_damage();
+    judge_times();
+    judge_scan_motion();
+    judge_imu();
+    judge_scale();
+    judge_motion();
+    judge_matches();
+    judge_course();
+    judge_outages();
+    judge_stems();
+    return conclude();
+  }
+
+ private:
+  void missing(std::string reason) { missing_.push_back(std::move(reason)); }
+  void hurt(std::string reason) { hurt_.push_back(std::move(reason)); }
+
+  void judge_ending() {
+    if (!evidence_.unreadable.empty()) {
+      missing("the recording could not be read any further: " + evidence_.unreadable +
+              "; once it can be, go on with `understory map --resume RUN`");
+    } else if (evidence_.stopped) {
+      missing(
+          "stopped by the user before the end of the recording; go on with "
+          "`understory map --resume RUN`");
+    }
+    if (evidence_.cut_off) {
+      missing("the recording is cut off; what came after is missing: " + evidence_.where_cut_off);
+    }
+  }
+
+  // Of all that the lidar sent, what never reached the map.
+  void judge_unheard_scans() {
+    const SensorEvidence& lidar = evidence_.lidar;
+    const std::uint64_t all = evidence_.dropped_scans + lidar.received + lidar.unreadable;
+    const std::uint64_t unheard =
+        evidence_.dropped_scans + lidar.unreadable + lidar.late + lidar.glitches;
+    if (share(unheard, all) <= config_.max_unheard_scans) return;
+    std::string parts;
+    const std::array<std::pair<std::uint64_t, const char*>, 4> kinds = {
+        {{evidence_.dropped_scans, "dropped because the machine could not keep up"},
+         {lidar.unreadable, "unreadable"},
+         {lidar.late, "too late to be put in order"},
+         {lidar.glitches, "with a stamp far off"}}};
+    for (const auto& [count, what] : kinds) {
+      if (count == 0) continue;
+      parts += fmt::format("{}{} {}", parts.empty() ? "" : ", ", count, what);
+    }
+    missing(fmt::format("{} of {} scans ({:.1f} %) are not in the map: {}", unheard, all,
+                        percent(unheard, all), parts));
+  }
+
+  void judge_unheard_sensors() {
+    const std::array<std::pair<const char*, const SensorEvidence*>, 3> sensors = {
+        {{"IMU", &evidence_.imu}, {"GNSS", &evidence_.gnss}, {"magnetometer", &evidence_.mag}}};
+    for (const auto& [name, sensor] : sensors) {
+      if (sensor->unheard_s <= config_.max_unheard_s) continue;
+      missing(fmt::format("the {} had no say for {:.1f} s: {}", name, sensor->unheard_s,
+                          sensor->unheard_why));
+    }
+  }
+
+  void judge_damage() {
+    if (evidence_.other_sensor_messages > 0) {
+      missing(fmt::format("{} message(s) of a second sensor had no say: {}",
+                          evidence_.other_sensor_messages, evidence_.first_other_sensor));
+    }
+    if (!evidence_.late_sensor.empty()) missing("a sensor had no say: " + evidence_.late_sensor);
+    if (evidence_.damaged_places > 0) {
+      hurt(fmt::format("the recording is damaged ({} place(s), the first: {})",
+                       evidence_.damaged_places, evidence_.first_damage));
+    }
+    if (evidence_.damaged_packets > evidence_.match.scans) {  // more than one a scan
+      hurt(fmt::format("{} packets of the lidar are damaged, the first: {}",
+                       evidence_.damaged_packets, evidence_.first_damaged_packet));
+    }
+  }
+
+  void judge_times() {
+    const MatchEvidence& match = evidence_.match;
+    if (evidence_.point_times_missing && match.smear_m > config_.max_smear_m) {
+      hurt(fmt::format("{}; the sensor moved so much that points 10 m away are smeared by {:.2f} m",
+                       evidence_.why_no_point_times, match.smear_m));
+    }
+    if (share(match.repeated, match.scans) > config_.max_repeated) {
+      hurt(
+          fmt::format("{} of {} scans hold the same points as the scan before: the driver or the "
+                      "recorder repeats scans, and the path stands still there or jumps",
+                      match.repeated, match.scans));
+    }
+  }
+
+  // What the times of the points say of the motion within a scan.
+  void judge_scan_motion() {
+    const MatchEvidence& match = evidence_.match;
+    if (match.scan_motion_probes < config_.min_scan_motion_probes) return;
+    const double ratio = match.scan_motion_ratio;
+    if (ratio >= config_.min_scan_motion && ratio <= config_.max_scan_motion) return;
+    const char* cause = "they are wrong";
+    if (ratio < -config_.min_scan_motion) {
+      cause = "they run backwards";
+    } else if (ratio < config_.min_scan_motion) {
+      cause = "they are too long, or the points have been deskewed already";
+    }
+    hurt(fmt::format(
+        "the times of points do not fit the motion: within scans the sensor moves {:.1f} "
+        "times as far as from scan to scan; {}",
+        ratio, cause));
+  }
+
+  // Standard deviation of the scale, from the scatter of the accelerations about it.
+  double scale_deviation() const {
+    const double correlation = std::abs(evidence_.imu_motion_correlation);
+    if (correlation <= 0.0) return 0.0;
+    return std::abs(evidence_.imu_motion_scale) / correlation *
+           std::sqrt((1.0 - std::min(1.0, correlation * correlation)) /
+                     static_cast<double>(evidence_.imu_motion_windows));
+  }
+
+  void judge_scale() {
+    if (!evidence_.imu_distrust.empty()) return;  // then the IMU is no witness
+    if (evidence_.imu_motion_windows < config_.min_imu_windows ||
+        evidence_.imu_motion_spread_m_s2 < config_.min_imu_spread_m_s2) {
+      return;
+    }
+    const double scale = evidence_.imu_motion_scale;
+    const double slack = 3.0 * scale_deviation();
+    if (scale + slack >= config_.min_imu_scale && scale - slack <= config_.max_imu_scale) return;
+    hurt(fmt::format(
+        "the path speeds up and slows down {:.2f} times as much as the accelerometer "
+        "tells of: the scale of the clouds (unit), the stamps of the scans, or the IMU's "
+        "unit, clock or lever arm is wrong",
+        scale));
+  }
+
+  void judge_motion() {
+    const MotionEvidence& motion = evidence_.motion;
+    if (share(motion.impossible, motion.steps) <= config_.max_impossible) return;
+    hurt(fmt::format(
+        "{} of {} steps from scan to scan ({:.1f} %) are motions that no carrier makes (up to "
+        "{:.0f} m/s and {:.0f} m/s^2){}",
+        motion.impossible, motion.steps, percent(motion.impossible, motion.steps),
+        motion.fastest_m_s, motion.hardest_m_s2,
+        evidence_.times_assumed
+            ? ": the times of the clouds were assumed and are wrong; give --rate-hz or times.txt"
+            : ": the stamps of the scans or the matches are wrong"));
+  }
+
+  void judge_matches() {
+    const MatchEvidence& match = evidence_.match;
+    const std::uint64_t unmatched = match.unmatched - std::min(match.cut, match.unmatched);
+    const std::uint64_t empty = match.empty - std::min(match.cut, match.empty);
+    if (share(unmatched, match.scans) > config_.max_unmatched) {
+      hurt(
+          fmt::format("{} of {} scans ({:.1f} %) could not be matched to the map; their poses "
+                      "are predictions{}",
+                      unmatched, match.scans, percent(unmatched, match.scans),
+                      evidence_.times_assumed
+                          ? "; the times of the clouds were assumed: if they lie farther apart, "
+                            "give --rate-hz or times.txt"
+                          : ""));
+    }
+    if (share(empty, match.scans) > config_.max_empty) {
+      hurt(fmt::format("{} of {} scans had hardly any usable point", empty, match.scans));
+    }
+    if (match.segments > 1) {
+      hurt(
+          fmt::format("the position was lost {} time(s), first at {} s; the map consists of {} "
+                      "pieces that do not fit together",
+                      match.segments - 1, match.first_lost, match.segments));
+    }
+  }
+
+  // How scans fitted the map as it grew.
+  void judge_course() {
+    const MatchEvidence& match = evidence_.match;
+    if (match.few_share > config_.max_few) {
+      hurt(fmt::format(
+          "over {:.0f} % of the time scans found few of their points in the map: matches by so few "
+          "points may be wrong",
+          100.0 * match.few_share));
+    }
+    if (match.chance_share > config_.max_chance) {
+      hurt(fmt::format(
+          "over {:.0f} % of the time the points that scans found in the map lie no nearer than by "
+          "chance: the map is blurred, or its scans are matched wrongly",
+          100.0 * match.chance_share));
+    }
+    if (match.blur_growth > config_.max_blur_growth) {
+      hurt(fmt::format(
+          "the map blurs as it grows: matched points lie {:.2f} times as far from it in the last "
+          "third of the run as in the first",
+          match.blur_growth));
+    }
+  }
+
+  void judge_outages() {
+    if (evidence_.by_stems) return;
+    const SensorEvidence& lidar = evidence_.lidar;
+    const bool carried = evidence_.imu_used &&
+                         evidence_.imu.longest_gap_s <= config_.longest_lidar_gap_s &&
+                         evidence_.match.segments == 1;
+    const char* way = carried ? "told by the IMU alone" : "guessed";
+    if (lidar.longest_gap_s > config_.longest_lidar_gap_s) {
+      hurt(fmt::format(
+          "the lidar was silent for {:.1f} s before {} s; the way in between was {}, so the map "
+          "before and after may be offset",
+          lidar.longest_gap_s, lidar.after_longest_gap, way));
+    } else if (evidence_.motion.longest_step_s > config_.longest_lidar_gap_s) {
+      hurt(fmt::format("scans lie up to {:.1f} s apart; the way from one to the next was {}",
+                       evidence_.motion.longest_step_s, way));
+    }
+  }
+
+  void judge_imu() {
+    if (!evidence_.imu_distrust.empty()) hurt(evidence_.imu_distrust);
+  }
+
+  void judge_stems() {
+    if (!evidence_.by_stems) return;
+    const StemRunEvidence& stems = evidence_.stems;
+    if (!stems.loops_solved) hurt("the loops were not solved: " + stems.loops_reason);
+    if (stems.trees == 0) {
+      hurt(fmt::format("no stem was seen often enough in {} views to be listed as a tree",
+                       stems.views));
+    }
+    if (stems.doubtful > 0) {
+      hurt(
+          fmt::format("{} of {} views found too few of the stems seen before: the path may be bent "
+                      "or broken there",
+                      stems.doubtful, stems.views));
+    }
+  }
+
+  RunJudgement conclude() {
+    RunJudgement judgement;
+    if (!missing_.empty()) judgement.status = RunStatus::kPartial;
+    if (!hurt_.empty()) judgement.status = RunStatus::kUntrusted;
+    judgement.reasons = std::move(missing_);
+    judgement.reasons.insert(judgement.reasons.end(), hurt_.begin(), hurt_.end());
+    return judgement;
+  }
+
+  const RunEvidence& evidence_;
+  const JudgementConfig& config_;
+  std::vector<std::string> missing_;
+  std::vector<std::string> hurt_;
+};
+
+}  // namespace
+
+void describe(ConfigTable& table, JudgementConfig& config) {
+  const ConfigTable::Range shares{0.0, 1.0};
+  const ConfigTable::Range seconds{0.0, 1e6};
+  table.add(
+      "max_unheard_scans", config.max_unheard_scans, shares, "",
+      "partial: a larger share of the scans was dropped, late, unreadable or far off in time");
+  table.add("max_unheard_s", config.max_unheard_s, seconds, "s",
+            "partial: another sensor had no say for longer");
+  table.add("max_unmatched", config.max_unmatched, shares, "",
+            "untrusted: a larger share of the scans could not be matched");
+  table.add("max_empty", config.max_empty, shares, "",
+            "untrusted: a larger share of the scans had hardly any usable point");
+  table.add(
+      "max_few", config.max_few, shares, "",
+      "untrusted: over a larger share of the time scans found few of their points in the map");
+  table.add(
+      "max_chance", config.max_chance, shares, "",
+      "untrusted: over a larger share of the time matched points lay no nearer than by chance");
+  table.add(
+      "max_blur_growth", config.max_blur_growth, {1.0, 1e6}, "",
+      "untrusted: matched points lie farther off at the end than at the beginning, over this");
+  table.add("longest_lidar_gap_s", config.longest_lidar_gap_s, seconds, "s",
+            "untrusted: the lidar was silent for longer");
+  table.add("max_smear_m", config.max_smear_m, {0.0, 100.0}, "m",
+            "untrusted: points have no times and are smeared by more, 10 m away");
+  table.add("max_repeated", config.max_repeated, shares, "",
+            "untrusted: a larger share of the scans holds the same points as the scan before");
+  table.add("max_impossible", config.max_impossible, shares, "",
+            "untrusted: a larger share of the steps is a motion that no carrier makes");
+  const ConfigTable::Range ratios{-1e6, 1e6};
+  table.add(
+      "min_scan_motion", config.min_scan_motion, ratios, "",
+      "untrusted: within scans the sensor moves less than this share of the motion from scan to "
+      "scan");
+  table.add("max_scan_motion", config.max_scan_motion, ratios, "",
+            "the same: more than this share");
+  table.add("min_scan_motion_probes", config.min_scan_motion_probes, {1, 1000000}, "scans",
+            "fewer scans tell nothing of it");
+  table.add("min_imu_scale", config.min_imu_scale, ratios, "",
+            "untrusted: accelerations by matching are less than this share of the accelerometer's");
+  table.add("max_imu_scale", config.max_imu_scale, ratios, "", "the same: more than this share");
+  table.add("min_imu_windows", config.min_imu_windows, {1, 1000000}, "windows",
+            "fewer thirds of a second tell nothing of it");
+  table.add("min_imu_spread_m_s2", config.min_imu_spread_m_s2, {0.0, 100.0}, "m/s^2",
+            "nor do accelerations with a smaller standard deviation");
+}
+
+double smear_of(const Pose& step) {
+  constexpr double kRangeM = 10.0;
+  return step.translation().norm() + kRangeM * step.angle();
+}
+
+std::string imu_refusal(const std::string& reason) {
+  return reason +
+         "; the recording was mapped without the IMU: check how it is mounted (--extrinsics FILE), "
+         "its axes, units and clock";
+}
+
+RunJudgement judge_run(const RunEvidence& evidence, const JudgementConfig& config) {
+  return Judge(evidence, config).judge();
+}
+
+}  // namespace understory

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+#include "understory/output/run_summary.h"
+#include "understory/pipeline/judgement/run_evidence.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+// Above these a run is not `complete`. How each was found: docs/reference/troubleshooting.md, the
+// limits;
+// `./run accuracy --spoilt --fit` shows what good and wrong maps have of each number.
+struct JudgementConfig {
+  // Partial: what had no say.
+  double max_unheard_scans = 0.01;  // share of the scans
+  double max_unheard_s = 1.0;       // of any other sensor
+  // Untrusted. A prediction bridges a scan or two without harm; beyond these shares the map has
+  // weak places.
+  double max_unmatched = 0.02;
+  double max_empty = 0.10;
+  double max_few = 0.10;     // share of the time after the beginning, see MatchCourse
+  double max_chance = 0.10;  // the same
+  double max_blur_growth = 1.15;
+  double longest_lidar_gap_s = 1.0;
+  double max_smear_m = 0.05;
+  double max_repeated = 0.01;    // share of the scans; no lidar sees the same twice
+  double max_impossible = 0.01;  // share of the steps, see MotionLimits
+  // Motion within scans over motion between them, see ScanMotion: 1 is right.
+  double min_scan_motion = 0.4;
+  double max_scan_motion = 1.8;
+  int min_scan_motion_probes = 6;  // fewer tell nothing
+  // Acceleration by matching over that by the accelerometer, see MotionScale: 1 is right.
+  double min_imu_scale = 0.9;
+  double max_imu_scale = 1.1;
+  int min_imu_windows = 60;          // fewer tell nothing, nor does
+  double min_imu_spread_m_s2 = 0.2;  // an even motion
+};
+void describe(ConfigTable& table, JudgementConfig& config);
+
+struct RunJudgement {
+  RunStatus status = RunStatus::kComplete;
+  std::vector<std::string> reasons;  // for the user, the cause first; empty if complete
+};
+
+// Whether the result of a run is to be trusted, and if not why: a pure function of numbers, for
+// both front ends. Partial: some of the recording had no say (the run was stopped, the recording is
+// cut off, scans were dropped, a sensor was not used). Untrusted, whatever is missing: something
+// hurt the result.
+[[nodiscard]] RunJudgement judge_run(const RunEvidence& evidence, const JudgementConfig& config);
+
+// How far a point 10 m away moves against the sensor on that step from scan to scan, metres.
+[[nodiscard]] double smear_of(const Pose& step);
+
+// What is said of a run that was made without its IMU, for that reason.
+[[nodiscard]] std::string imu_refusal(const std::string& reason);
+
+}  // namespace understory

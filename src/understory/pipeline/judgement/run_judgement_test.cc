@@ -1,0 +1,271 @@
+#include "understory/pipeline/judgement/run_judgement.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace understory {
+namespace {
+
+// A run of 1,000 scans in which nothing was wrong.
+RunEvidence good_run() {
+  RunEvidence evidence;
+  evidence.lidar.received = 1000;
+  evidence.imu.received = 20'000;
+  evidence.imu_used = true;
+  evidence.match.scans = 1000;
+  evidence.motion.steps = 999;
+  evidence.imu_motion_scale = 1.0;
+  evidence.imu_motion_correlation = 1.0;
+  evidence.imu_motion_windows = 300;
+  evidence.imu_motion_spread_m_s2 = 1.0;
+  evidence.match.scan_motion_ratio = 1.0;
+  evidence.match.scan_motion_probes = 40;
+  return evidence;
+}
+
+RunJudgement judged(const RunEvidence& evidence) {
+  return judge_run(evidence, JudgementConfig());
+}
+
+void expect_complete(const RunEvidence& evidence) {
+  const RunJudgement judgement = judged(evidence);
+  EXPECT_EQ(judgement.status, RunStatus::kComplete);
+  EXPECT_TRUE(judgement.reasons.empty()) << judgement.reasons.front();
+}
+
+// One reason, which says this.
+void expect(RunStatus status, const std::string& words, const RunEvidence& evidence) {
+  const RunJudgement judgement = judged(evidence);
+  EXPECT_EQ(judgement.status, status) << words;
+  ASSERT_EQ(judgement.reasons.size(), 1U) << words;
+  EXPECT_NE(judgement.reasons.front().find(words), std::string::npos) << judgement.reasons.front();
+}
+
+// A good run in which `figure` is at its limit is complete; beyond, it has this status and reason.
+template <class Owner, class Value>
+void expect_limit(Owner RunEvidence::*owner, Value Owner::*figure, Value limit, Value beyond,
+                  RunStatus status, const std::string& words) {
+  RunEvidence evidence = good_run();
+  evidence.*owner.*figure = limit;
+  expect_complete(evidence);
+  evidence.*owner.*figure = beyond;
+  expect(status, words, evidence);
+}
+
+TEST(RunJudgement, AGoodRunIsComplete) {
+  expect_complete(good_run());
+  RunEvidence mended = good_run();
+  mended.lidar.duplicates = 500;
+  mended.lidar.reordered = 500;
+  mended.lidar.clock_jumps = 3;
+  mended.times_assumed = true;
+  expect_complete(mended);
+}
+
+TEST(RunJudgement, ScansWithoutASay) {
+  const auto with = [](std::uint64_t dropped, std::uint64_t late, std::uint64_t unreadable,
+                       std::uint64_t glitches) {
+    RunEvidence evidence = good_run();
+    evidence.dropped_scans = dropped;
+    evidence.lidar.late = late;
+    evidence.lidar.unreadable = unreadable;
+    evidence.lidar.glitches = glitches;
+    return evidence;
+  };
+  expect_complete(with(10, 0, 0, 0));
+  expect(RunStatus::kPartial, "11 dropped because the machine could not keep up",
+         with(11, 0, 0, 0));
+  expect_complete(with(0, 10, 0, 0));
+  expect(RunStatus::kPartial, "11 too late", with(0, 11, 0, 0));
+  expect(RunStatus::kPartial, "11 unreadable", with(0, 0, 11, 0));
+  expect(RunStatus::kPartial, "11 with a stamp far off", with(0, 0, 0, 11));
+  expect_complete(with(3, 3, 2, 2));
+  expect(RunStatus::kPartial, "12 of 1006 scans (1.2 %) are not in the map", with(3, 3, 3, 3));
+}
+
+TEST(RunJudgement, SensorsWithoutASay) {
+  for (SensorEvidence RunEvidence::*sensor :
+       {&RunEvidence::imu, &RunEvidence::gnss, &RunEvidence::mag}) {
+    RunEvidence evidence = good_run();
+    (evidence.*sensor).unheard_s = 1.0;
+    (evidence.*sensor).unheard_why = "it stops";
+    expect_complete(evidence);
+    (evidence.*sensor).unheard_s = 1.1;
+    expect(RunStatus::kPartial, "had no say for 1.1 s: it stops", evidence);
+  }
+}
+
+TEST(RunJudgement, WhatIsMissingIsPartialAndWhatIsWrongIsUntrusted) {
+  RunEvidence evidence = good_run();
+  evidence.stopped = true;
+  expect(RunStatus::kPartial, "understory map --resume", evidence);
+  evidence.match.unmatched = 100;
+  EXPECT_EQ(judged(evidence).status, RunStatus::kUntrusted);
+  EXPECT_EQ(judged(evidence).reasons.size(), 2U);
+  RunEvidence cut = good_run();
+  cut.cut_off = true;
+  cut.where_cut_off = "at byte 17";
+  expect(RunStatus::kPartial, "at byte 17", cut);
+}
+
+TEST(RunJudgement, Damage) {
+  RunEvidence evidence = good_run();
+  evidence.damaged_packets = 1000;  // one a scan
+  expect_complete(evidence);
+  evidence.damaged_packets = 1001;
+  expect(RunStatus::kUntrusted, "packets of the lidar are damaged", evidence);
+  RunEvidence places = good_run();
+  places.damaged_places = 1;
+  places.first_damage = "a chunk at byte 5";
+  expect(RunStatus::kUntrusted, "a chunk at byte 5", places);
+}
+
+TEST(RunJudgement, Matches) {
+  constexpr auto kUntrusted = RunStatus::kUntrusted;
+  expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::unmatched, 20, 21,
+                                             kUntrusted,
+                                             "21 of 1000 scans (2.1 %) could not be matched");
+  expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::empty, 100, 101,
+                                             kUntrusted, "hardly any usable point");
+  expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::repeated, 10, 11,
+                                             kUntrusted, "hold the same points as the scan before");
+  expect_limit<MotionEvidence, std::uint64_t>(&RunEvidence::motion, &MotionEvidence::impossible, 9,
+                                              10, kUntrusted,
+                                              "stamps of the scans or the matches are wrong");
+  RunEvidence pieces = good_run();
+  pieces.match.segments = 2;
+  pieces.match.first_lost = "17.5";
+  expect(kUntrusted, "lost 1 time(s), first at 17.5 s", pieces);
+}
+
+// A regression: a good recording of five scans that ends within a turn was untrusted.
+TEST(RunJudgement, ThePartOfATurnAtTheEndIsNoLoss) {
+  RunEvidence evidence = good_run();
+  evidence.match.scans = 5;
+  evidence.match.empty = evidence.match.unmatched = evidence.match.cut = 1;
+  expect_complete(evidence);
+  evidence.match.cut = 0;
+  EXPECT_EQ(judged(evidence).reasons.size(), 2U);
+}
+
+TEST(RunJudgement, AssumedTimesAreNamedAsTheCause) {
+  RunEvidence unmatched = good_run();
+  unmatched.times_assumed = true;
+  unmatched.match.unmatched = 21;
+  expect(RunStatus::kUntrusted, "times of the clouds were assumed", unmatched);
+  RunEvidence impossible = good_run();
+  impossible.times_assumed = true;
+  impossible.motion.impossible = 10;
+  expect(RunStatus::kUntrusted, "times of the clouds were assumed", impossible);
+}
+
+TEST(RunJudgement, TimesOfPoints) {
+  RunEvidence missing = good_run();
+  missing.point_times_missing = true;
+  missing.why_no_point_times = "no time per point";
+  missing.match.smear_m = 0.05;
+  expect_complete(missing);
+  missing.match.smear_m = 0.06;
+  expect(RunStatus::kUntrusted, "smeared by 0.06 m", missing);
+  RunEvidence evidence = good_run();
+  const JudgementConfig limits;
+  const std::vector<std::pair<double, std::string>> wrong = {
+      {-1.0, "backwards"}, {0.1, "too long"}, {limits.max_scan_motion + 0.1, "wrong"}};
+  for (const auto& [ratio, words] : wrong) {
+    evidence.match.scan_motion_ratio = ratio;
+    evidence.match.scan_motion_probes = limits.min_scan_motion_probes;
+    expect(RunStatus::kUntrusted, words, evidence);
+    evidence.match.scan_motion_probes = limits.min_scan_motion_probes - 1;
+    expect_complete(evidence);
+  }
+  evidence.match.scan_motion_probes = 100;
+  evidence.match.scan_motion_ratio = limits.min_scan_motion;
+  expect_complete(evidence);
+  evidence.match.scan_motion_ratio = limits.max_scan_motion;
+  expect_complete(evidence);
+}
+
+TEST(RunJudgement, AccelerationsOfTheImu) {
+  const JudgementConfig limits;
+  RunEvidence evidence = good_run();
+  for (const double scale : {limits.min_imu_scale - 0.01, limits.max_imu_scale + 0.01}) {
+    evidence.imu_motion_scale = scale;
+    expect(RunStatus::kUntrusted, "times as much as the accelerometer tells of", evidence);
+  }
+  evidence.imu_motion_spread_m_s2 = limits.min_imu_spread_m_s2 - 0.01;
+  expect_complete(evidence);
+  evidence.imu_motion_spread_m_s2 = 1.0;
+  evidence.imu_motion_windows = limits.min_imu_windows - 1;
+  expect_complete(evidence);
+  evidence.imu_distrust = "its axes look swapped";
+  expect(RunStatus::kUntrusted, "axes look swapped", evidence);
+}
+
+// A regression: clouds 1.2 times too large made a map 1.2 times too large that was complete.
+TEST(RunJudgement, AScaleThatIsOffByAFifthIsNoticedWhereItIsKnownWell) {
+  RunEvidence evidence = good_run();
+  evidence.imu_motion_scale = 1.2;
+  evidence.imu_motion_correlation = 0.99;  // the scale's standard deviation is 0.01
+  expect(RunStatus::kUntrusted, "1.20 times as much", evidence);
+  evidence.imu_motion_correlation = 0.5;  // 0.12
+  expect_complete(evidence);
+  evidence.imu_motion_scale = 3.3;  // 0.33
+  expect(RunStatus::kUntrusted, "3.30 times as much", evidence);
+}
+
+TEST(RunJudgement, HowScansFittedTheMap) {
+  constexpr auto kUntrusted = RunStatus::kUntrusted;
+  const JudgementConfig limits;
+  expect_limit(&RunEvidence::match, &MatchEvidence::few_share, limits.max_few,
+               limits.max_few + 0.01, kUntrusted, "found few of their points in the map");
+  expect_limit(&RunEvidence::match, &MatchEvidence::chance_share, limits.max_chance,
+               limits.max_chance + 0.01, kUntrusted, "no nearer than by chance");
+  expect_limit(&RunEvidence::match, &MatchEvidence::blur_growth, limits.max_blur_growth,
+               limits.max_blur_growth + 0.01, kUntrusted, "the map blurs as it grows");
+}
+
+TEST(RunJudgement, SilenceOfTheLidar) {
+  RunEvidence evidence = good_run();
+  evidence.lidar.longest_gap_s = 1.0;
+  expect_complete(evidence);
+  evidence.lidar.longest_gap_s = 1.1;
+  expect(RunStatus::kUntrusted, "told by the IMU alone", evidence);
+  evidence.imu.longest_gap_s = 1.1;
+  expect(RunStatus::kUntrusted, "guessed", evidence);
+  evidence.by_stems = true;  // there a step that finds too few stems is judged
+  evidence.stems.trees = 1;
+  expect_complete(evidence);
+}
+
+// A regression: clouds six seconds apart, matched by chance, made a wrong map that was complete.
+TEST(RunJudgement, ScansFarApart) {
+  RunEvidence evidence = good_run();
+  evidence.motion.longest_step_s = 1.0;
+  expect_complete(evidence);
+  evidence.motion.longest_step_s = 5.7;
+  expect(RunStatus::kUntrusted, "scans lie up to 5.7 s apart; the way", evidence);
+  evidence.imu_used = false;
+  expect(RunStatus::kUntrusted, "guessed", evidence);
+  evidence.lidar.longest_gap_s = 5.7;
+  expect(RunStatus::kUntrusted, "the lidar was silent", evidence);
+}
+
+TEST(RunJudgement, Stems) {
+  RunEvidence evidence = good_run();
+  evidence.by_stems = true;
+  expect(RunStatus::kUntrusted, "listed as a tree", evidence);
+  evidence.stems.trees = 5;
+  expect_complete(evidence);
+  evidence.stems.doubtful = 1;
+  expect(RunStatus::kUntrusted, "too few of the stems", evidence);
+  evidence.stems.doubtful = 0;
+  evidence.stems.loops_solved = false;
+  evidence.stems.loops_reason = "no end";
+  expect(RunStatus::kUntrusted, "no end", evidence);
+}
+
+}  // namespace
+}  // namespace understory

@@ -1,0 +1,192 @@
+#include "understory/pipeline/mapping/adaptation.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace understory {
+namespace {
+
+constexpr double kSparseVoxelM = 0.1;
+constexpr double kSparseKeyframeM = 0.3;
+constexpr double kSparseCloudM = 0.1;  // between scans of the finished map
+constexpr int kSparseMinPoints = 4;
+constexpr double kSparseVolumeWeight = 1.0;
+constexpr double kSparseInlierRatio = 0.05;  // few of the map's small cells have enough points yet
+
+// Changes values of a table that nobody set, and notes each change.
+class Changes {
+ public:
+  Changes(ConfigTable table, const ConfigOrigins& origins)
+      : table_(std::move(table)), origins_(origins) {}
+
+  void set(const std::string& key, const std::string& to, const std::string& why,
+           double when_s = 0.0) {
+    if (origins_.count(key) == 0) set_anyway(key, to, why, when_s);
+  }
+  void at_most(const std::string& key, double now, double most, const std::string& why) {
+    if (now > most) set(key, fmt::format("{}", most), why);
+  }
+  void at_least(const std::string& key, double now, double least, const std::string& why) {
+    if (now < least) set(key, fmt::format("{}", least), why);
+  }
+  // Even where the user set it.
+  void set_anyway(const std::string& key, const std::string& to, const std::string& why,
+                  double when_s) {
+    const std::string from = value_of(table_, key);
+    set_value(table_, key, to);
+    if (value_of(table_, key) != from)
+      list_.push_back({key, from, value_of(table_, key), when_s, why});
+  }
+  [[nodiscard]] std::vector<ConfigAdaptation> list() const { return list_; }
+
+ private:
+  ConfigTable table_;
+  const ConfigOrigins& origins_;
+  std::vector<ConfigAdaptation> list_;
+};
+
+// A sparse scan is thinned less, its keyframes lie closer, and all cells of the map count: there
+// are not enough surfaces.
+void suit_sparse_scans(const MappingConfig& config, const SensorTraits& traits, Changes& changes) {
+  if (traits.scan_points == 0 ||
+      traits.scan_points >= static_cast<std::uint64_t>(config.sparse_scan_points))
+    return;
+  const std::string why =
+      fmt::format("sparse scans: {} points, fewer than run.sparse_scan_points", traits.scan_points);
+  const NdtMapConfig& cells = config.keyframe_map.local_map.cells;
+  changes.at_most("preprocess.voxel.voxel_size_m", config.odometry.voxel.voxel_size_m,
+                  kSparseVoxelM, why);
+  changes.at_most("ndt.min_inlier_ratio", config.odometry.min_inlier_ratio, kSparseInlierRatio,
+                  why);
+  changes.at_most("keyframe.distance_m", config.keyframe_map.keyframe.distance_m, kSparseKeyframeM,
+                  why);
+  changes.at_most("local_map.min_points", cells.min_points, kSparseMinPoints, why);
+  changes.at_least("local_map.volume_weight", cells.volume_weight, kSparseVolumeWeight, why);
+  changes.set("local_map.few_rings", "true", why);
+  changes.at_most("map.cloud_distance_m", config.cloud_distance_m, kSparseCloudM, why);
+}
+
+// Without an IMU predictions are often off by more than the finest cells bridge, and the coarsest
+// are too coarse to lead to them: a map in between helps.
+void suit_scans_alone(const MappingConfig& config, const SensorTraits& traits,
+                      const RunConditions& conditions, Changes& changes) {
+  const std::vector<double>& cells = config.keyframe_map.local_map.cell_sizes_m;
+  if (cells.size() != 2) return;
+  std::string why;
+  double when_s = 0.0;
+  if (!config.odometry.imu_enabled) {
+    why = "the IMU is switched off";
+  } else if (!traits.has_imu) {
+    why = "no IMU whose place is known";
+  } else if (!conditions.imu_refused.empty() || conditions.imu_doubted) {
+    why = "the IMU contradicts them";
+    when_s = conditions.imu_judged_s;
+  } else {
+    return;
+  }
+  changes.set("local_map.cell_sizes_m",
+              fmt::format("[{}, {}, {}]", cells[0], std::sqrt(cells[0] * cells[1]), cells[1]),
+              "scans alone: " + why, when_s);
+}
+
+// What is told of keys before their meaning.
+std::map<std::string, std::string> remarks_on(const std::vector<ConfigAdaptation>& changes,
+                                              const ConfigOrigins& origins) {
+  std::map<std::string, std::string> remarks;
+  for (const auto& [key, origin] : origins)
+    remarks[key] = "set by " + origin;
+  for (const ConfigAdaptation& change : changes)
+    remarks[change.key] = "adapted from " + change.from + ": " + change.why;
+  return remarks;
+}
+
+constexpr const char* kLive = "--realtime: each sensor is in order, and waiting costs time";
+
+}  // namespace
+
+Adapted<MappingConfig> adapt(const MappingConfig& asked, const ConfigOrigins& origins,
+                             const SensorTraits& traits, const RunConditions& conditions) {
+  Adapted<MappingConfig> adapted{asked, {}};
+  MappingConfig& config = adapted.config;
+  Changes changes(mapping_table(config), origins);
+  if (conditions.realtime) changes.set("time_repair.window_s", "0", kLive);
+  suit_sparse_scans(asked, traits, changes);
+  suit_scans_alone(asked, traits, conditions, changes);
+  if (!conditions.imu_refused.empty()) {
+    changes.set_anyway("motion.imu_enabled", "false", conditions.imu_refused,
+                       conditions.imu_judged_s);
+  }
+  config.keyframe_map.local_map.cells.viewpoint_in_source = traits.lidar_in_body;
+  adapted.changes = changes.list();
+  return adapted;
+}
+
+Adapted<SparseMappingConfig> adapt(const SparseMappingConfig& asked, const ConfigOrigins& origins,
+                                   const RunConditions& conditions) {
+  Adapted<SparseMappingConfig> adapted{asked, {}};
+  Changes changes(sparse_mapping_table(adapted.config), origins);
+  if (conditions.realtime) {
+    changes.set("time_repair.window_s", "0", kLive);
+    changes.set("stems.pace.longest_gap_s", "0", "--realtime: no scan waits for the next");
+  }
+  if (!conditions.imu_refused.empty()) {
+    changes.set_anyway("stems.imu.use", "false", conditions.imu_refused, conditions.imu_judged_s);
+  }
+  adapted.changes = changes.list();
+  return adapted;
+}
+
+// The table is made of the defaults, which it tells; its values are those of the fields later.
+std::string commented_yaml(const Adapted<MappingConfig>& adapted, const ConfigOrigins& origins) {
+  MappingConfig config;
+  const ConfigTable table = mapping_table(config);
+  config = adapted.config;
+  return yaml_with_remarks(table, remarks_on(adapted.changes, origins));
+}
+
+std::string commented_yaml(const Adapted<SparseMappingConfig>& adapted,
+                           const ConfigOrigins& origins) {
+  SparseMappingConfig config;
+  const ConfigTable table = sparse_mapping_table(config);
+  config = adapted.config;
+  return yaml_with_remarks(table, remarks_on(adapted.changes, origins));
+}
+
+void put_origins(BinaryWriter& writer, const ConfigOrigins& origins) {
+  writer.put(static_cast<std::uint64_t>(origins.size()));
+  for (const auto& [key, origin] : origins) {
+    writer.put(key);
+    writer.put(origin);
+  }
+}
+
+ConfigOrigins get_origins(BinaryReader& reader) {
+  ConfigOrigins origins;
+  const auto count = reader.get<std::uint64_t>();
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const std::string key = reader.get_string();
+    origins[key] = reader.get_string();
+  }
+  return origins;
+}
+
+void put_conditions(BinaryWriter& writer, const RunConditions& conditions) {
+  writer.put(conditions.realtime);
+  writer.put(conditions.imu_doubted);
+  writer.put(conditions.imu_refused);
+  writer.put(conditions.imu_judged_s);
+}
+
+RunConditions get_conditions(BinaryReader& reader) {
+  RunConditions conditions;
+  conditions.realtime = reader.get<bool>();
+  conditions.imu_doubted = reader.get<bool>();
+  conditions.imu_refused = reader.get_string();
+  conditions.imu_judged_s = reader.get<double>();
+  return conditions;
+}
+
+}  // namespace understory

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "understory/pipeline/mapping/mapping_config.h"
+#include "understory/pipeline/mapping/sensor_traits.h"
+#include "understory/pipeline/mapping/sparse_mapping_config.h"
+#include "understory/util/binary_io.h"
+#include "understory/util/config_origins.h"
+
+namespace understory {
+
+// What else than its sensors decides how a recording is mapped.
+struct RunConditions {
+  bool realtime = false;      // at the speed of the sensors
+  bool imu_doubted = false;   // left out until it is clear whether it is right
+  std::string imu_refused;    // why it is left out for good; empty: it is not
+  double imu_judged_s = 0.0;  // when one of the two was found, seconds since the first scan
+};
+void put_origins(BinaryWriter& writer, const ConfigOrigins& origins);
+[[nodiscard]] ConfigOrigins get_origins(BinaryReader& reader);
+void put_conditions(BinaryWriter& writer, const RunConditions& conditions);
+[[nodiscard]] RunConditions get_conditions(BinaryReader& reader);
+
+// The configuration that runs, and what was changed for it.
+template <typename Config>
+struct Adapted {
+  Config config;
+  std::vector<ConfigAdaptation> changes;
+};
+
+// From the configuration asked for to the one that runs. A key that was set (`origins`) is never
+// changed, with one exception: an IMU that was found to be wrong is left out. Pure.
+[[nodiscard]] Adapted<MappingConfig> adapt(const MappingConfig& asked, const ConfigOrigins& origins,
+                                           const SensorTraits& traits,
+                                           const RunConditions& conditions);
+[[nodiscard]] Adapted<SparseMappingConfig> adapt(const SparseMappingConfig& asked,
+                                                 const ConfigOrigins& origins,
+                                                 const RunConditions& conditions);
+
+// Every key with its meaning, what set it (`origins`), and what was changed, from what and why.
+[[nodiscard]] std::string commented_yaml(const Adapted<MappingConfig>& adapted,
+                                         const ConfigOrigins& origins);
+[[nodiscard]] std::string commented_yaml(const Adapted<SparseMappingConfig>& adapted,
+                                         const ConfigOrigins& origins);
+
+}  // namespace understory

@@ -1,0 +1,190 @@
+#include "understory/pipeline/mapping/adaptation.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace understory {
+namespace {
+
+SensorTraits sixteen_rings() {
+  SensorTraits traits;
+  traits.scan_points = 29'000;
+  traits.rings = 16;
+  traits.has_imu = true;
+  return traits;
+}
+
+SensorTraits many_rings() {
+  SensorTraits traits;
+  traits.scan_points = 110'000;
+  traits.rings = 128;
+  traits.has_imu = true;
+  return traits;
+}
+
+std::vector<std::string> keys_of(const std::vector<ConfigAdaptation>& changes) {
+  std::vector<std::string> keys;
+  for (const ConfigAdaptation& change : changes)
+    keys.push_back(change.key);
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+Adapted<MappingConfig> adapt_read(const std::string& profile,
+                                  const std::vector<std::string>& settings,
+                                  const SensorTraits& traits,
+                                  const RunConditions& conditions = {}) {
+  const ReadConfig<MappingConfig> read = read_mapping_config(profile, "", settings);
+  return adapt(read.config, read.origins, traits, conditions);
+}
+
+std::string yaml_of(MappingConfig config) {
+  return mapping_table(config).to_yaml(false);
+}
+
+TEST(Adaptation, ADenseLidarWithAnImuRunsAsAsked) {
+  const auto adapted = adapt_read("", {}, many_rings());
+  EXPECT_TRUE(adapted.changes.empty());
+  EXPECT_EQ(yaml_of(adapted.config), yaml_of(MappingConfig()));
+}
+
+TEST(Adaptation, SparseScansAreThinnedLessAndEachChangeIsTold) {
+  const auto adapted = adapt_read("", {}, sixteen_rings());
+  EXPECT_EQ(adapted.config.odometry.voxel.voxel_size_m, 0.1);
+  EXPECT_EQ(adapted.config.odometry.min_inlier_ratio, 0.05);
+  EXPECT_EQ(adapted.config.keyframe_map.keyframe.distance_m, 0.3);
+  EXPECT_EQ(adapted.config.keyframe_map.local_map.cells.min_points, 4);
+  EXPECT_EQ(adapted.config.keyframe_map.local_map.cells.volume_weight, 1.0);
+  EXPECT_TRUE(adapted.config.keyframe_map.local_map.cells.few_rings);
+  EXPECT_EQ(adapted.config.cloud_distance_m, 0.1);
+  EXPECT_EQ(keys_of(adapted.changes),
+            (std::vector<std::string>{"keyframe.distance_m", "local_map.few_rings",
+                                      "local_map.min_points", "local_map.volume_weight",
+                                      "map.cloud_distance_m", "ndt.min_inlier_ratio",
+                                      "preprocess.voxel.voxel_size_m"}));
+  // Nothing else changed than what is told.
+  MappingConfig back = adapted.config;
+  const ConfigTable table = mapping_table(back);
+  for (const ConfigAdaptation& change : adapted.changes) {
+    EXPECT_EQ(value_of(table, change.key), change.to);
+    EXPECT_NE(change.why.find("29000 points"), std::string::npos) << change.why;
+    set_value(table, change.key, change.from);
+  }
+  EXPECT_EQ(yaml_of(back), yaml_of(MappingConfig()));
+}
+
+// What was set was replaced, also by a value that was the default's anyway.
+TEST(Adaptation, WhatTheUserSetStays) {
+  const auto adapted =
+      adapt_read("",
+                 {"preprocess.voxel.voxel_size_m=0.4", "local_map.volume_weight=0.03",
+                  "local_map.cell_sizes_m=[2, 0.5]"},
+                 [] {
+                   SensorTraits alone = sixteen_rings();
+                   alone.has_imu = false;
+                   return alone;
+                 }());
+  EXPECT_EQ(adapted.config.odometry.voxel.voxel_size_m, 0.4);
+  EXPECT_EQ(adapted.config.keyframe_map.local_map.cells.volume_weight, 0.03);
+  EXPECT_EQ(adapted.config.keyframe_map.local_map.cell_sizes_m, (std::vector<double>{2.0, 0.5}));
+  EXPECT_EQ(keys_of(adapted.changes),
+            (std::vector<std::string>{"keyframe.distance_m", "local_map.few_rings",
+                                      "local_map.min_points", "map.cloud_distance_m",
+                                      "ndt.min_inlier_ratio"}));
+}
+
+TEST(Adaptation, WhatAProfileSetStays) {
+  const ReadConfig<MappingConfig> read = read_mapping_config("paper", "", {});
+  const auto adapted = adapt(read.config, read.origins, sixteen_rings(), {});
+  for (const ConfigAdaptation& change : adapted.changes)
+    EXPECT_EQ(read.origins.count(change.key), 0U) << change.key;
+  EXPECT_EQ(adapted.config.keyframe_map.keyframe.distance_m, 0.2);
+}
+
+TEST(Adaptation, AnUnknownLidarAndAThresholdOfNothingChangeNothing) {
+  SensorTraits unknown;
+  unknown.has_imu = true;
+  EXPECT_TRUE(adapt_read("", {}, unknown).changes.empty());
+  EXPECT_TRUE(adapt_read("", {"run.sparse_scan_points=0"}, sixteen_rings()).changes.empty());
+  EXPECT_FALSE(adapt_read("", {"run.sparse_scan_points=120000"}, many_rings()).changes.empty());
+}
+
+TEST(Adaptation, ScansAloneHaveAMapInBetween) {
+  SensorTraits alone = many_rings();
+  alone.has_imu = false;
+  const std::vector<double> three = {2.0, 1.0, 0.5};
+  RunConditions doubted;
+  doubted.imu_doubted = true;
+  doubted.imu_judged_s = 7.5;
+  for (const auto& adapted :
+       {adapt_read("", {}, alone), adapt_read("", {}, many_rings(), doubted)}) {
+    EXPECT_EQ(adapted.config.keyframe_map.local_map.cell_sizes_m, three);
+    EXPECT_EQ(keys_of(adapted.changes), (std::vector<std::string>{"local_map.cell_sizes_m"}));
+  }
+  EXPECT_EQ(adapt_read("", {}, many_rings(), doubted).changes.front().when_s, 7.5);
+  EXPECT_EQ(adapt_read("", {"motion.imu_enabled=false"}, many_rings())
+                .config.keyframe_map.local_map.cell_sizes_m,
+            three);
+}
+
+TEST(Adaptation, AnImuThatIsWrongIsLeftOutWhoeverAskedForIt) {
+  RunConditions conditions;
+  conditions.imu_refused = "its axes are swapped";
+  conditions.imu_judged_s = 12.0;
+  const auto adapted = adapt_read("", {"motion.imu_enabled=true"}, many_rings(), conditions);
+  EXPECT_FALSE(adapted.config.odometry.imu_enabled);
+  ASSERT_EQ(keys_of(adapted.changes),
+            (std::vector<std::string>{"local_map.cell_sizes_m", "motion.imu_enabled"}));
+  EXPECT_EQ(adapted.changes.back().why, "its axes are swapped");
+  EXPECT_EQ(adapted.changes.back().when_s, 12.0);
+}
+
+TEST(Adaptation, AtTheSpeedOfTheSensorsNothingWaitsUnlessTheUserSaysSo) {
+  RunConditions live;
+  live.realtime = true;
+  const auto adapted = adapt_read("", {}, many_rings(), live);
+  EXPECT_EQ(adapted.config.time_repair.window_s, 0.0);
+  EXPECT_EQ(keys_of(adapted.changes), (std::vector<std::string>{"time_repair.window_s"}));
+  EXPECT_EQ(
+      adapt_read("", {"time_repair.window_s=0.2"}, many_rings(), live).config.time_repair.window_s,
+      0.2);
+  const auto stems = adapt(SparseMappingConfig(), {{"stems.pace.longest_gap_s", "--set"}}, live);
+  EXPECT_EQ(keys_of(stems.changes), (std::vector<std::string>{"time_repair.window_s"}));
+  EXPECT_EQ(adapt(SparseMappingConfig(), {}, live).config.pace.longest_gap_s, 0.0);
+}
+
+TEST(Adaptation, PrintedWithWhatWasSetAndWhatWasChanged) {
+  const ReadConfig<MappingConfig> read = read_mapping_config("", "", {"keyframe.distance_m=0.7"});
+  const std::string text =
+      commented_yaml(adapt(read.config, read.origins, sixteen_rings(), {}), read.origins);
+  EXPECT_NE(text.find("    voxel_size_m: 0.1 "), std::string::npos) << text;
+  EXPECT_NE(text.find(" # adapted from 0.4: sparse scans"), std::string::npos) << text;
+  EXPECT_NE(text.find("  distance_m: 0.7 "), std::string::npos) << text;
+  EXPECT_NE(text.find(" # set by --set. distance after which a scan"), std::string::npos) << text;
+}
+
+// The value asked for stood there as the default.
+TEST(Adaptation, DefaultsArePrintedAsTheyAre) {
+  const ReadConfig<MappingConfig> read = read_mapping_config("", "", {"keyframe.distance_m=0.7"});
+  const std::string text =
+      commented_yaml(adapt(read.config, read.origins, sixteen_rings(), {}), read.origins);
+  EXPECT_NE(text.find("see the next setting (default 0.5, m,"), std::string::npos) << text;
+  EXPECT_NE(text.find("each gives one point (default 0.4, m,"), std::string::npos) << text;
+}
+
+TEST(Adaptation, ACheckpointGivesBackWhatItRestsOn) {
+  BinaryWriter writer;
+  RunConditions conditions{true, false, "wrong", 3.5};
+  put_origins(writer, {{"a.b", "profile x"}, {"c", "--set"}});
+  put_traits(writer, sixteen_rings());
+  put_conditions(writer, conditions);
+  BinaryReader reader(writer.bytes(), "checkpoint");
+  EXPECT_EQ(get_origins(reader), (ConfigOrigins{{"a.b", "profile x"}, {"c", "--set"}}));
+  EXPECT_EQ(get_traits(reader).scan_points, 29'000U);
+  EXPECT_EQ(get_conditions(reader).imu_refused, "wrong");
+  EXPECT_TRUE(reader.at_end());
+}
+
+}  // namespace
+}  // namespace understory

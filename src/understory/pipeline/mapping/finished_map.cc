@@ -1,0 +1,31 @@
+#include "understory/pipeline/mapping/finished_map.h"
+
+#include "understory/util/error.h"
+
+namespace understory {
+
+std::unique_ptr<MapTiles> make_finished_map(const KeyframeClouds& clouds,
+                                            const std::vector<Keyframe>& keyframes,
+                                            const MapTiles::Config& config,
+                                            const std::filesystem::path& folder,
+                                            const ProgressSink& progress) {
+  auto tiles = std::make_unique<MapTiles>(folder, config);
+  for (std::size_t i = 0; i < clouds.size(); ++i) {
+    const KeyframeCloud cloud = clouds.read(i);
+    const auto keyframe = static_cast<std::size_t>(cloud.id);
+    UNDERSTORY_CHECK(keyframe < keyframes.size());
+    const Pose world_from_body = keyframes[keyframe].world_from_body * cloud.keyframe_from_body;
+    for (const KeyframePoint& p : cloud.points) {
+      const Eigen::Vector3d world =
+          world_from_body * Eigen::Vector3d(static_cast<double>(p.x), static_cast<double>(p.y),
+                                            static_cast<double>(p.z));
+      tiles->add({world.x(), world.y(), world.z(),
+                  cloud.stamp + TimeNs{10'000} * static_cast<TimeNs>(p.t_10us), p.intensity});
+    }
+    progress({"gathering the map", static_cast<double>(i + 1), static_cast<double>(clouds.size()),
+              "clouds", ""});
+  }
+  return tiles;
+}
+
+}  // namespace understory

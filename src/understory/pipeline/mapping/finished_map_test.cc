@@ -1,0 +1,44 @@
+#include "understory/pipeline/mapping/finished_map.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+
+#include "understory/util/folder_test_support.h"
+
+namespace understory {
+namespace {
+
+// A cloud of a scan between keyframes goes where its keyframe went.
+TEST(FinishedMap, CloudsMoveWithTheirKeyframes) {
+  const test::TemporaryFolder folder;
+  KeyframeClouds clouds(folder / "clouds.bin");
+  const Pose keyframe_from_body(so3_exp({0.0, 0.0, 0.5}), {0.2, 0.1, 0.0});
+  clouds.append({0, 1'000'000'000, {{1.0F, 0.0F, 0.0F, 5, 0}}, {}});
+  clouds.append({0, 1'100'000'000, {{1.0F, 0.0F, 0.0F, 6, 100}}, keyframe_from_body});
+  clouds.append({1, 1'200'000'000, {{0.0F, 2.0F, 0.0F, 7, 0}}, {}});
+  std::vector<Keyframe> keyframes(2);
+  keyframes[0].world_from_body = Pose(so3_exp({0.1, 0.0, 1.0}), {10.0, 0.0, 1.0});
+  keyframes[1].world_from_body = Pose(so3_exp({0.0, 0.0, 2.0}), {20.0, 5.0, 1.0});
+  MapTiles::Config config;
+  config.thin_m = 0.0;
+  const auto tiles =
+      make_finished_map(clouds, keyframes, config, folder / "tiles", [](const ProgressReport&) {});
+  std::map<std::uint16_t, std::pair<Eigen::Vector3d, TimeNs>> found;
+  tiles->for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+    for (const MapPoint& p : points)
+      found[p.intensity] = {{p.x, p.y, p.z}, p.stamp};
+  });
+  ASSERT_EQ(found.size(), 3U);
+  const Pose& first = keyframes[0].world_from_body;
+  const Eigen::Vector3d ahead = Eigen::Vector3d::UnitX();
+  EXPECT_LT((found[5].first - first * ahead).norm(), 1e-5);
+  EXPECT_LT((found[6].first - first * (keyframe_from_body * ahead)).norm(), 1e-5);
+  EXPECT_LT((found[7].first - keyframes[1].world_from_body * Eigen::Vector3d(0.0, 2.0, 0.0)).norm(),
+            1e-5);
+  EXPECT_EQ(found[6].second, 1'101'000'000);
+}
+
+}  // namespace
+}  // namespace understory

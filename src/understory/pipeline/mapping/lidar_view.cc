@@ -1,0 +1,112 @@
+#include "understory/pipeline/mapping/lidar_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "understory/evaluation/trajectory.h"
+#include "understory/util/error.h"
+#include "understory/util/text_file.h"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kClouds = 60;  // enough to learn a view from
+constexpr double kReach = 60.0;      // metres from which a crown still gives enough returns
+constexpr double kStep = 1.0;        // metres between poses: what is seen hardly changes sooner
+
+std::size_t sector_of(const Eigen::Vector3d& point) {
+  const double turn = std::atan2(point.y(), point.x()) / (2.0 * M_PI) + 0.5;
+  return static_cast<std::size_t>(
+      std::clamp(static_cast<int>(turn * LidarView::kSectors), 0, LidarView::kSectors - 1));
+}
+
+double elevation_deg(const Eigen::Vector3d& point) {
+  return std::atan2(point.z(), point.head<2>().norm()) * 180.0 / M_PI;
+}
+
+}  // namespace
+
+std::array<double, LidarView::kSectors> LidarView::no_returns() {
+  std::array<double, kSectors> none{};
+  none.fill(std::numeric_limits<double>::quiet_NaN());
+  return none;
+}
+
+void LidarView::add(const std::vector<KeyframePoint>& points) {
+  const Pose lidar_from_body = body_from_lidar.inverse();
+  for (const KeyframePoint& p : points) {
+    const Eigen::Vector3d point = lidar_from_body * Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
+    double& highest = highest_deg[sector_of(point)];
+    highest = std::fmax(highest, elevation_deg(point));
+  }
+}
+
+bool LidarView::covers(const Eigen::Vector3d& point_in_lidar) const {
+  return elevation_deg(point_in_lidar) <= highest_deg[sector_of(point_in_lidar)];  // not for NaN
+}
+
+LidarView learn_view(const KeyframeClouds& clouds, const Pose& body_from_lidar) {
+  LidarView view;
+  view.body_from_lidar = body_from_lidar;
+  const std::size_t count = std::min(kClouds, clouds.size());
+  for (std::size_t i = 0; i < count; ++i)
+    view.add(clouds.read(i * clouds.size() / count).points);
+  return view;
+}
+
+SeenTest seen_from(const LidarView& view, const std::vector<Pose>& world_from_body) {
+  std::vector<Pose> lidar_from_world;
+  Eigen::Vector3d last;
+  for (const Pose& pose : world_from_body) {
+    const Pose world_from_lidar = pose * view.body_from_lidar;
+    const Eigen::Vector3d& here = world_from_lidar.translation();
+    if (!lidar_from_world.empty() && (here - last).norm() < kStep) continue;
+    last = here;
+    lidar_from_world.push_back(world_from_lidar.inverse());
+  }
+  return [view, poses = std::move(lidar_from_world)](const Eigen::Vector3d& place) {
+    return std::any_of(poses.begin(), poses.end(), [&](const Pose& lidar_from_here) {
+      const Eigen::Vector3d point = lidar_from_here * place;
+      return point.squaredNorm() < kReach * kReach && view.covers(point);
+    });
+  };
+}
+
+LidarViewFigures figures_of(const LidarView& view) {
+  LidarViewFigures figures;
+  const Eigen::Matrix4d matrix = view.body_from_lidar.matrix();
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column)
+      figures.body_from_lidar.push_back(matrix(row, column));
+  }
+  figures.highest_deg.assign(view.highest_deg.begin(), view.highest_deg.end());
+  return figures;
+}
+
+SeenTest seen_in_run(const std::filesystem::path& run) {
+  if (!std::filesystem::exists(run / "run.json")) return {};
+  const auto json = nlohmann::json::parse(read_text_file(run / "run.json"), nullptr, false);
+  if (!json.is_object() || !json.contains("lidar_view")) return {};
+  if (!std::filesystem::exists(run / "keyframes.tum")) return {};
+  LidarView view;
+  try {
+    const auto& figures = json.at("lidar_view");
+    const auto matrix = figures.at("body_from_lidar").get<std::array<double, 16>>();
+    view.body_from_lidar = Pose::from_matrix(
+        Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix.data()));
+    const auto& highest = figures.at("highest_deg");
+    for (std::size_t i = 0; i < view.highest_deg.size(); ++i) {
+      if (!highest.at(i).is_null()) view.highest_deg[i] = highest.at(i).get<double>();
+    }
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError((run / "run.json").string(), "lidar_view", error.what());
+  }
+  std::vector<Pose> poses;
+  for (const auto& pose : read_trajectory(run / "keyframes.tum"))
+    poses.push_back(pose.world_from_body);
+  return seen_from(view, poses);
+}
+
+}  // namespace understory

@@ -1,0 +1,88 @@
+#include "understory/pipeline/mapping/lidar_view.h"
+
+#include <gtest/gtest.h>
+
+#include "understory/output/run_tables.h"
+#include "understory/util/folder_test_support.h"
+
+namespace understory {
+namespace {
+
+// A lidar 2 m up that sees from -15 to 15 degrees in the front half, mounted turned to the left.
+LidarView view_of_a_machine() {
+  LidarView view;
+  view.body_from_lidar =
+      Pose(so3_exp(Eigen::Vector3d(0.0, 0.0, 0.5 * M_PI)), Eigen::Vector3d(0.0, 0.0, 2.0));
+  std::vector<KeyframePoint> points;
+  for (double azimuth = -88.0; azimuth <= 88.0; azimuth += 1.0) {
+    for (double elevation = -15.0; elevation <= 15.0; elevation += 2.0) {
+      const double a = azimuth * M_PI / 180.0;
+      const double e = elevation * M_PI / 180.0;
+      const Eigen::Vector3d p =
+          view.body_from_lidar * (8.0 * Eigen::Vector3d(std::cos(e) * std::cos(a),
+                                                        std::cos(e) * std::sin(a), std::sin(e)));
+      points.push_back(
+          {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()), 0, 0});
+    }
+  }
+  view.add(points);
+  return view;
+}
+
+TEST(LidarView, KnowsHowHighAndWhereTheLidarLooks) {
+  const LidarView view = view_of_a_machine();
+  const auto front = [](double degrees) {
+    return Eigen::Vector3d(30.0, 0.0, 30.0 * std::tan(degrees * M_PI / 180.0));
+  };
+  EXPECT_TRUE(view.covers(front(14.9)));
+  EXPECT_TRUE(view.covers(front(-40.0)));  // below is no matter of tops
+  EXPECT_FALSE(view.covers(front(15.5)));
+  EXPECT_FALSE(view.covers({-30.0, 0.0, 1.0}));
+}
+
+TEST(LidarView, ATopIsSeenFromFarEnoughAndNotFromTooFar) {
+  const LidarView view = view_of_a_machine();
+  const Eigen::Vector3d low(20.0, 30.0, 6.0);
+  const Eigen::Vector3d top(20.0, 30.0, 12.0);
+  // The lidar looks to the left, along y.
+  const SeenTest near = seen_from(view, {Pose(Eigen::Quaterniond::Identity(), {20.0, 10.0, 0.0})});
+  EXPECT_TRUE(near(low));
+  EXPECT_FALSE(near(top));
+  const SeenTest also_farther =
+      seen_from(view, {Pose(Eigen::Quaterniond::Identity(), {20.0, 10.0, 0.0}),
+                       Pose(Eigen::Quaterniond::Identity(), {20.0, -15.0, 0.0})});
+  EXPECT_TRUE(also_farther(top));
+  const SeenTest too_far =
+      seen_from(view, {Pose(Eigen::Quaterniond::Identity(), {20.0, -35.0, 0.0})});
+  EXPECT_FALSE(too_far(top));
+  EXPECT_FALSE(seen_from(view, {})(low));
+}
+
+TEST(LidarView, IsTheSameFromARunFolder) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path& run = folder.path();
+  const LidarView view = view_of_a_machine();
+  RunSummary summary;
+  summary.lidar_view = figures_of(view);
+  write_run_json(run / "run.json", summary);
+  EXPECT_FALSE(seen_in_run(run));  // without keyframes
+  const Pose pose(Eigen::Quaterniond::Identity(), {20.0, 10.0, 0.0});
+  TumWriter keyframes(run / "keyframes.tum");
+  keyframes.add({0, pose});
+  keyframes.commit();
+  const SeenTest here = seen_from(view, {pose});
+  const SeenTest there = seen_in_run(run);
+  ASSERT_TRUE(there);
+  int seen = 0;
+  for (double x = -10.0; x < 50.0; x += 5.0) {
+    for (double y = -10.0; y < 50.0; y += 5.0) {
+      EXPECT_EQ(here({x, y, 5.0}), there({x, y, 5.0})) << x << " " << y;
+      seen += here({x, y, 5.0}) ? 1 : 0;
+    }
+  }
+  EXPECT_GT(seen, 20);
+  EXPECT_LT(seen, 124);
+}
+
+}  // namespace
+}  // namespace understory

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "understory/forest/inventory.h"
+#include "understory/map/keyframe_map.h"
+#include "understory/map/map_tiles.h"
+#include "understory/odometry/dense/dense_odometry.h"
+#include "understory/pipeline/judgement/path_evidence.h"
+#include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/preprocess/event_orderer.h"
+#include "understory/util/config.h"
+#include "understory/util/config_origins.h"
+
+namespace understory {
+
+// Everything that can be set for `understory map`. Each part is described where it belongs; this is
+// only their sum.
+struct MappingConfig {
+  EventOrderer::Config time_repair;
+  DenseOdometryConfig odometry;
+  KeyframeMap::Config keyframe_map;
+  MapTiles::Config map;
+  double keyframe_thin_m = 0.02;  // thins a scan's cloud before it is stored for the map
+  double map_range_max_m = 60.0;  // farther returns do not enter the finished map
+  bool map_enabled = true;        // write map.laz and what is made from it
+  InventoryConfig inventory;
+  JudgementConfig judgement;
+  MotionLimits motion_limits;
+  double checkpoint_interval_s = 4.0;  // of recording; at most 5 s are processed again
+  double cloud_distance_m = 1.0;       // weighted distance (37) between scans whose clouds are kept
+  // A lidar whose full scans have fewer points than this (16 beams) has what nobody set adapted to
+  // it (adapt()): thinned like dense scans, its scans would leave too few points in a cell.
+  int sparse_scan_points = 60000;
+  int lost_after_scans = 30;  // unmatched scans in a row after which a new segment begins
+  int realtime_queue_scans = 3;
+};
+
+// The table of all keys, bound to `config`.
+[[nodiscard]] ConfigTable mapping_table(MappingConfig& config);
+
+// Names of the shipped profiles, and their YAML text. Throws ConfigError for an unknown name.
+[[nodiscard]] std::vector<std::string> profile_names();
+[[nodiscard]] std::string profile_text(const std::string& name);
+
+// Defaults, then the profile, then the file, then the settings ("key=value"). Empty = none.
+[[nodiscard]] ReadConfig<MappingConfig> read_mapping_config(
+    const std::string& profile, const std::string& file, const std::vector<std::string>& settings);
+
+}  // namespace understory

@@ -1,0 +1,422 @@
+#include "understory/pipeline/mapping/mapping_session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "understory/pipeline/mapping/scan_content.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kMostWaitingImu = 20'000;
+constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
+constexpr double kMostSpeedMS = 100.0;
+// Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
+// and the sigma of a prediction that is no better than staying where one was.
+constexpr double kOutageS = 1.0;
+constexpr double kFoundAgainShare = 0.5;
+constexpr double kWorthlessSigmaM = 10.0;
+// Opening: scans further apart tell nothing of the speed at the first; a smear of the first scan
+// that is smaller does no harm, that of a turn counted at this range.
+constexpr double kLongestOpeningS = 0.5;
+constexpr double kLeastSmearM = 0.005;
+constexpr double kSmearRangeM = 10.0;
+// A first scan that is shorter than that share of the second, or sees less around it, is a part.
+constexpr double kPartShare = 0.75;
+
+std::uint16_t clamp_to_u16(double value) {
+  return static_cast<std::uint16_t>(std::clamp(value, 0.0, 65'535.0));
+}
+
+Points points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) {
+  const auto low = static_cast<float>(config.range_min_m);
+  const auto high = static_cast<float>(config.range_max_m);
+  Points points;
+  points.reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.range[i] >= low && cloud.range[i] <= high) points.push_back(cloud.points[i]);
+  }
+  return points;
+}
+
+// Of the sectors of 10 degrees around the lidar, those with a point.
+int sectors_of(const Scan& scan) {
+  constexpr int kSectors = 36;
+  std::array<bool, kSectors> seen{};
+  for (const ScanPoint& p : scan.points) {
+    const double turn = std::atan2(p.y, p.x) / (2.0 * std::numbers::pi) + 0.5;
+    seen[static_cast<std::size_t>(std::clamp(static_cast<int>(turn * kSectors), 0, 35))] = true;
+  }
+  return static_cast<int>(std::count(seen.begin(), seen.end(), true));
+}
+
+// Whether a recording began within a turn of its lidar. The next scan then comes so soon that a
+// small error between the two is a great speed.
+bool is_part_of_turn(const Scan& first, const Scan& second) {
+  if (!first.has_point_times || !second.has_point_times)
+    return sectors_of(first) < kPartShare * sectors_of(second);
+  const auto turn = static_cast<double>(second.end() - second.stamp);
+  return static_cast<double>(first.end() - first.stamp) < kPartShare * turn &&
+         static_cast<double>(second.stamp - first.stamp) < kPartShare * turn;
+}
+
+}  // namespace
+
+MappingSession::MappingSession(const MappingConfig& config, std::filesystem::path folder, Log& log)
+    : config_(config),
+      folder_(std::move(folder)),
+      log_(log),
+      map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)),
+      opening_(std::make_unique<Opening>()) {}
+
+void MappingSession::refuse_imu(const std::string& reason) {
+  UNDERSTORY_CHECK(!started());
+  imu_refused_ = reason;
+  config_.odometry.imu_enabled = false;
+}
+
+bool MappingSession::imu_is_suspected() const {
+  return started() && !imu_doubted_ && odometry_->uses_imu() &&
+         odometry_->motion().imu_trust().on_probation;
+}
+
+bool MappingSession::imu_is_wrong() const {
+  return started() && odometry_->uses_imu() && !odometry_->motion().imu_trust().usable;
+}
+
+std::optional<TimeNs> MappingSession::last_imu() const {
+  if (recent_imu_.empty()) return std::nullopt;
+  return recent_imu_.back().stamp;
+}
+
+void MappingSession::handle(const Event& event, const Rig& rig) {
+  if (opening_ && started()) opening_->events.push_back(event);
+  if (started() && settled()) complete_rig(rig);
+  if (const auto* sample = std::get_if<ImuSample>(&event)) {
+    take_sample(*sample);
+  } else if (const auto* fix = std::get_if<GnssFix>(&event)) {
+    fixes_.push_back(*fix);
+  } else if (const auto* scan = std::get_if<ScanPtr>(&event)) {
+    if (!started()) {
+      opening_->events.push_back(event);
+      opening_->counts_before = counts_;
+      opening_->hearing_before = imu_hearing_;
+      opening_->imu_before = recent_imu_;
+      opening_->fixes_before = fixes_.size();
+      rig_ = rig;
+      start_anew();
+    }
+    on_scan(**scan);
+  }
+}
+
+void MappingSession::take_sample(const ImuSample& sample) {
+  ++counts_.imu_samples;
+  if (started())
+    imu_hearing_.add(sample, rig_.body_from_imu.has_value(), config_.odometry.motion.imu);
+  recent_imu_.push_back(sample);
+  const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
+  while (recent_imu_.size() > most)
+    recent_imu_.pop_front();
+  if (started()) odometry_->add_imu(sample);
+}
+
+// A sensor that begins late, or whose place is told late, is used from then on.
+void MappingSession::complete_rig(const Rig& rig) {
+  if (!rig_.body_from_gnss && rig.body_from_gnss) {
+    rig_.body_from_gnss = rig.body_from_gnss;
+    rig_.gnss_extrinsic_source = rig.gnss_extrinsic_source;
+  }
+  if (rig_.body_from_imu || !rig.body_from_imu) return;
+  rig_.body_from_imu = rig.body_from_imu;
+  rig_.imu_extrinsic_source = rig.imu_extrinsic_source;
+  const std::vector<ImuSample> recent(recent_imu_.begin(), recent_imu_.end());
+  odometry_->take_imu(*rig_.body_from_imu, recent);
+  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(last_scan_);
+}
+
+void MappingSession::make_odometry(const Rig& rig) {
+  rig_ = rig;
+  odometry_ = std::make_unique<DenseOdometry>(config_.odometry, rig_, times_, log_);
+}
+
+// An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
+void MappingSession::start_anew() {
+  journal_ = std::make_unique<Journal>(folder_ / kJournalFile);
+  clouds_ = std::make_unique<KeyframeClouds>(folder_ / kCloudsFile);
+  map_->start();
+  make_odometry(rig_);
+  if (opening_->rounds > 0) {
+    odometry_->set_initial_motion(opening_->velocity, opening_->angular_rate);
+  }
+  // What came after the first scan comes again.
+  recent_imu_ = opening_->imu_before;
+  fixes_.resize(opening_->fixes_before);
+  counts_ = opening_->counts_before;
+  imu_hearing_ = opening_->hearing_before;
+  last_good_inliers_ = 0.0;
+  for (const ImuSample& waiting : recent_imu_)
+    odometry_->add_imu(waiting);
+  const Scan& first = *std::get<ScanPtr>(opening_->events.front());
+  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(first.stamp);
+}
+
+void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
+  if (counts_.scans < 2) return;
+  const Scan& first = *std::get<ScanPtr>(opening_->events.front());
+  if (counts_.parts == 0 && opening_->rounds == 0 && is_part_of_turn(first, scan)) {
+    leave_out_first();
+    return;
+  }
+  const double between = to_seconds(scan.stamp - first.stamp);
+  const double lasting = to_seconds(first.end() - first.stamp);
+  constexpr int kMostRounds = 6;
+  if (estimate.matched && between > 0.0 && between < kLongestOpeningS &&
+      opening_->rounds < kMostRounds) {
+    const Vector6d turned = right_difference(estimate.match.target_from_source,
+                                             map_->keyframes().front().world_from_body) /
+                            between;
+    // Right differences are along the screw: to first order the velocity at the first scan.
+    const Eigen::Vector3d rate = odometry_->uses_imu() && !imu_doubted_
+                                     ? Eigen::Vector3d(opening_->angular_rate)
+                                     : Eigen::Vector3d(turned.head<3>());
+    const double smear = (turned.tail<3>() - opening_->velocity).norm() * lasting +
+                         (rate - opening_->angular_rate).norm() * lasting * kSmearRangeM;
+    if (smear > kLeastSmearM) {
+      opening_->velocity = turned.tail<3>();
+      opening_->angular_rate = rate;
+      ++opening_->rounds;
+      start_anew();
+      const std::vector<Event> events = std::exchange(opening_->events, {});
+      const Rig rig = rig_;
+      opening_->events.push_back(events.front());
+      on_scan(first);
+      for (std::size_t i = 1; i < events.size(); ++i)
+        handle(events[i], rig);
+      return;
+    }
+  }
+  opening_.reset();
+}
+
+// Begins with the second scan instead.
+void MappingSession::leave_out_first() {
+  const std::vector<Event> events = std::exchange(opening_->events, {});
+  const Scan& first = *std::get<ScanPtr>(events.front());
+  log_.warn("scan.part",
+            fmt::format("the recording begins within a turn of the lidar: its first scan, of {} "
+                        "points at {} s, is left out",
+                        first.points.size(), format_seconds(first.stamp)));
+  recent_imu_ = opening_->imu_before;
+  fixes_.resize(opening_->fixes_before);
+  counts_ = opening_->counts_before;
+  imu_hearing_ = opening_->hearing_before;
+  counts_.parts = 1;
+  opening_ = std::make_unique<Opening>();
+  odometry_.reset();
+  const Rig rig = rig_;
+  for (std::size_t i = 1; i < events.size(); ++i)
+    handle(events[i], rig);
+}
+
+// Lost: unmatched for so long that the prediction is worth nothing, or not even finite any more.
+bool MappingSession::lost(const DenseEstimate& estimate) const {
+  const bool finite = estimate.state.world_from_body.matrix().allFinite() &&
+                      estimate.state.velocity_in_world.allFinite() &&
+                      estimate.state.velocity_in_world.norm() < kMostSpeedMS;
+  const bool matched = estimate.matched && estimate.update.status == MotionStatus::kAccepted;
+  return !finite || (!matched && counts_.lost_in_a_row + 1 >=
+                                     static_cast<std::uint64_t>(config_.lost_after_scans));
+}
+
+// After an outage the prediction may be so far off that a match is one by chance: it finds few of
+// the points again that scans found before. (Right matches after 10 s found 0.87 of that share,
+// wrong ones 0.13.)
+bool MappingSession::lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const {
+  if (to_seconds(scan.stamp - last_scan_) < kOutageS || last_good_inliers_ <= 0.0) return false;
+  return !estimate.matched || estimate.match.inlier_ratio < kFoundAgainShare * last_good_inliers_;
+}
+
+// A new odometry from this scan on, put `about_there`, and an empty local map.
+DenseEstimate MappingSession::begin_segment(const Scan& scan, const Pose& about_there) {
+  log_.warn("map.segment",
+            fmt::format("lost at {} s: a new piece of map begins there, joined to the "
+                        "old one by no more than a guess of the way in between",
+                        format_seconds(scan.stamp)));
+  const bool proven = odometry_->motion().imu_trust().proven;
+  make_odometry(rig_);
+  for (const ImuSample& sample : recent_imu_)
+    odometry_->add_imu(sample);
+  if (odometry_->uses_imu() && !proven) odometry_->suspect_imu(scan.stamp);
+  // A better guess than standing still.
+  odometry_->set_initial_motion(last_good_velocity_, Eigen::Vector3d::Zero());
+  map_->start_segment();
+  if (counts_.segments++ == 1) counts_.first_lost = scan.stamp;
+  counts_.lost_in_a_row = 0;
+  DenseEstimate estimate = odometry_->process(scan, map_->local_map());
+  const Eigen::Vector3d forward = about_there.rotation() * Eigen::Vector3d::UnitX();
+  const Pose placed(so3_exp({0.0, 0.0, std::atan2(forward.y(), forward.x())}),
+                    about_there.translation());
+  odometry_->move_world(placed);
+  estimate.state.world_from_body = placed * estimate.state.world_from_body;
+  estimate.state.velocity_in_world = placed.rotation() * estimate.state.velocity_in_world;
+  return estimate;
+}
+
+void MappingSession::on_scan(const Scan& scan) {
+  const ScopedTimer timer(times_, "scan");
+  const double cpu_start = process_cpu_seconds() - map_->search_cpu_seconds();
+  const bool outage = to_seconds(scan.stamp - last_scan_) > kOutageS;
+  const NavState predicted = outage ? odometry_->motion().predict(scan.stamp) : NavState();
+  DenseEstimate estimate = odometry_->process(scan, map_->local_map());
+  if (estimate.update.status == MotionStatus::kIgnored) return;
+  if (!map_->keyframes().empty() && estimate.thinned.size() >= kFewPoints) {
+    if (lost_over_outage(scan, estimate)) {
+      const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
+      estimate =
+          begin_segment(scan, sigma < kWorthlessSigmaM ? predicted.world_from_body : last_good_);
+    } else if (lost(estimate)) {
+      estimate = begin_segment(scan, last_good_);
+    }
+  }
+  last_scan_ = scan.stamp;
+  const std::uint64_t content = content_of(scan);
+  counts_.repeated += content == counts_.last_content ? 1 : 0;
+  counts_.last_content = content;
+  ScanRecord record;
+  record.stamp = scan.stamp;
+  record.points = static_cast<std::uint32_t>(scan.points.size());
+  record.matched_points = static_cast<std::uint32_t>(estimate.thinned.size());
+  note_outcome(estimate, record);
+  update_map(estimate, record);
+  record.wall_ms = static_cast<float>(timer.wall_ms());
+  record.cpu_ms =
+      static_cast<float>(1e3 * (process_cpu_seconds() - map_->search_cpu_seconds() - cpu_start));
+  journal_->append(record);
+  last_scan_end_ = estimate.scan_end;
+  if (opening_) consider_opening(scan, estimate);
+}
+
+void MappingSession::note_outcome(const DenseEstimate& estimate, ScanRecord& record) {
+  ++counts_.scans;
+  counts_.points += record.points;
+  record.fitness_m2 = static_cast<float>(estimate.match.fitness_m2);
+  record.inlier_ratio = static_cast<float>(estimate.match.inlier_ratio);
+  record.iterations = static_cast<std::uint16_t>(estimate.match.iterations);
+  record.degenerate_directions =
+      static_cast<std::uint8_t>(estimate.match.degenerate_directions.cols());
+  record.set_covariance(estimate.state.pose_covariance);
+  if (estimate.thinned.size() < kFewPoints) {
+    ++counts_.empty_scans;
+    log_.warn("scan.few_points",
+              fmt::format("scan at {} has only {} usable points", format_seconds(record.stamp),
+                          estimate.thinned.size()));
+  }
+  record.outcome = ScanOutcome::kMatched;
+  if (estimate.update.status == MotionStatus::kVelocityGate) {
+    record.outcome = ScanOutcome::kGated;
+    ++counts_.gated;
+    log_.warn("match.velocity_gate",
+              fmt::format("match of the scan at {} dropped: {}", format_seconds(record.stamp),
+                          estimate.update.reason));
+  } else if (!estimate.matched && !map_->local_map().empty()) {
+    record.outcome = ScanOutcome::kUnmatched;
+    ++counts_.unmatched;
+    if (estimate.thinned.size() < kFewPoints) return;
+    log_.warn("match.none",
+              fmt::format("scan at {} could not be matched ({:.0f} % of its points "
+                          "near the map){}",
+                          format_seconds(record.stamp), 100.0 * estimate.match.inlier_ratio,
+                          estimate.match.reason.empty() ? "" : ": " + estimate.match.reason));
+  }
+}
+
+void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& record) {
+  NavState state = estimate.state;
+  if (estimate.update.new_world_from_old_world) {
+    map_->move_world(*estimate.update.new_world_from_old_world);
+  }
+  const bool good =
+      record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
+  counts_.lost_in_a_row = good ? 0 : counts_.lost_in_a_row + 1;
+  if (good) {
+    last_good_ = state.world_from_body;
+    last_good_velocity_ = state.world_from_body.rotation().conjugate() * state.velocity_in_world;
+    if (estimate.matched) last_good_inliers_ = estimate.match.inlier_ratio;
+  }
+  const bool wanted = good && map_->wants(state.world_from_body);
+  // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop
+  // closure, levelling) moves the scans with them.
+  const bool first = map_->keyframes().empty();
+  const Pose reference = first ? state.world_from_body : map_->keyframes().back().world_from_body;
+  record.keyframe = first ? 0 : static_cast<std::int32_t>(map_->keyframes().size()) - 1;
+  const Pose keyframe_from_body = reference.inverse() * state.world_from_body;
+  record.set_pose(keyframe_from_body);
+  const Eigen::Quaterniond keyframe_from_world = reference.rotation().conjugate();
+  Eigen::Map<Eigen::Vector3d>(record.velocity.data()) =
+      keyframe_from_world * state.velocity_in_world;
+  Eigen::Map<Eigen::Vector3d>(record.gyro_bias.data()) = state.gyro_bias;
+  Eigen::Map<Eigen::Vector3d>(record.accel_bias.data()) = state.accel_bias;
+  if (!wanted) {
+    const auto keyframe = static_cast<std::size_t>(record.keyframe);
+    if (good && !first) store_cloud(estimate, keyframe, keyframe_from_body);
+    return;
+  }
+  record.becomes_keyframe = 1;
+  store_cloud(estimate, map_->keyframes().size(), Pose());
+  const auto moved = map_->add(record.stamp, state.world_from_body, map_points(estimate));
+  if (moved) odometry_->move_world(*moved);
+}
+
+// What the map takes from a scan: more than what is matched.
+Points MappingSession::map_points(const DenseEstimate& estimate) {
+  VoxelFilterConfig voxel = config_.odometry.voxel;
+  const double edge = config_.keyframe_map.keyframe.voxel_size_m;
+  if (edge == 0.0) return points_in_range(estimate.cloud, voxel);
+  voxel.voxel_size_m = std::min(voxel.voxel_size_m, edge);
+  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m) return estimate.thinned.points;
+  return cloud_filter_.filter(estimate.cloud, voxel).points;
+}
+
+// Keeps what a scan adds to the finished map.
+void MappingSession::store_cloud(const DenseEstimate& estimate, std::size_t keyframe,
+                                 const Pose& keyframe_from_body) {
+  if (!config_.map_enabled) return;
+  const auto& keyframes = map_->keyframes();
+  if (clouds_->size() > 0) {
+    const Pose world_from_last = keyframes[last_cloud_].world_from_body * keyframe_from_last_cloud_;
+    if (keyframe_distance(world_from_last, estimate.state.world_from_body,
+                          config_.keyframe_map.keyframe) < config_.cloud_distance_m)
+      return;
+  }
+  const ScopedTimer timer(times_, "store");
+  last_cloud_ = keyframe;
+  keyframe_from_last_cloud_ = keyframe_from_body;
+  const BodyCloud& cloud = estimate.cloud;
+  KeyframeCloud stored{static_cast<std::int32_t>(keyframe), cloud.stamp, {}, keyframe_from_body};
+  std::vector<std::uint32_t> kept;
+  if (config_.keyframe_thin_m > 0.0) {
+    kept = cloud_filter_.keep(cloud.points, config_.keyframe_thin_m);
+  } else {
+    kept.resize(cloud.size());
+    std::iota(kept.begin(), kept.end(), 0U);
+  }
+  const auto nearest = static_cast<float>(config_.odometry.voxel.range_min_m);
+  const auto farthest = static_cast<float>(config_.map_range_max_m);
+  stored.points.reserve(kept.size());
+  for (const std::uint32_t i : kept) {
+    if (cloud.range[i] < nearest || cloud.range[i] > farthest) continue;
+    const Eigen::Vector3f& p = cloud.points[i];
+    stored.points.push_back({p.x(), p.y(), p.z(), clamp_to_u16(cloud.intensity[i]),
+                             clamp_to_u16(static_cast<double>(cloud.t_ns[i]) * 1e-4)});
+  }
+  clouds_->append(stored);
+}
+
+}  // namespace understory

@@ -1,0 +1,163 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "understory/map/keyframe_clouds.h"
+#include "understory/map/keyframe_map.h"
+#include "understory/odometry/dense/dense_odometry.h"
+#include "understory/pipeline/judgement/imu_hearing.h"
+#include "understory/pipeline/mapping/mapping_config.h"
+#include "understory/pipeline/run_folder/journal.h"
+#include "understory/pipeline/run_folder/resumable.h"
+#include "understory/preprocess/event_orderer.h"
+#include "understory/recording/recording.h"
+#include "understory/sensor/gnss_fix.h"
+#include "understory/util/log.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+
+// A scan with fewer points after preprocessing tells nothing.
+inline constexpr std::size_t kFewPoints = 100;
+
+// Counts of one run, for run.json and for what to distrust.
+struct MappingCounts {
+  std::uint64_t scans = 0;
+  std::uint64_t unmatched = 0;    // no usable match; the prediction stands in
+  std::uint64_t gated = 0;        // dropped by the velocity gate (P2-8)
+  std::uint64_t empty_scans = 0;  // hardly any point left after preprocessing
+  std::uint64_t segments = 1;     // pieces of map that hang together by predictions only
+  std::uint64_t lost_in_a_row = 0;
+  std::uint64_t parts = 0;  // of a turn, at the beginning of the recording; left out
+  TimeNs first_lost = 0;    // when the second piece began
+  std::uint64_t imu_samples = 0;
+  std::uint64_t points = 0;
+  std::uint64_t repeated = 0;      // scans that hold the same points as the one before
+  std::uint64_t last_content = 0;  // of the last scan, see content_of
+};
+
+// The moving part of a mapping run: takes events in order of time and keeps positioning (first
+// graph), keyframes and local map (second graph) and the journal going. Its whole state can be
+// saved; the files in `folder` belong to it. `config` is adapted to the sensors (adapt()).
+// Not thread-safe.
+class MappingSession : public Resumable {
+ public:
+  MappingSession(const MappingConfig& config, std::filesystem::path folder, Log& log);
+
+  // Before the first event: this run does without the IMU, for this reason.
+  void refuse_imu(const std::string& reason);
+  [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
+  // Before the first event: the IMU is left out from the start until it is clear whether it is
+  // right.
+  void doubt_imu() { imu_doubted_ = true; }
+  // The IMU is contradicted, and this run did not doubt it from the start.
+  [[nodiscard]] bool imu_is_suspected() const;
+  // The IMU has turned out to be wrong: what was positioned with it is better done again without.
+  [[nodiscard]] bool imu_is_wrong() const;
+
+  // `rig` is looked at when the first scan comes, and for the places of sensors that become known
+  // later: they are used from then on.
+  void handle(const Event& event, const Rig& rig);
+
+  // State to go on from.
+  void sync() override;
+  void save(BinaryWriter& writer) const override;
+  [[nodiscard]] std::vector<CountedFile> files() const override;
+  // Instead of `handle`ing from the start.
+  void load(BinaryReader& reader, const Rig& rig) override;
+
+  [[nodiscard]] bool started() const { return odometry_ != nullptr; }
+  // False during the first scans, which may be done again; no state can be saved then.
+  [[nodiscard]] bool settled() const { return opening_ == nullptr; }
+  [[nodiscard]] const Rig& rig() const { return rig_; }
+  [[nodiscard]] const MappingCounts& counts() const { return counts_; }
+  // For how long the IMU's samples could not be used.
+  [[nodiscard]] const ImuHearing& imu_hearing() const { return imu_hearing_; }
+  [[nodiscard]] const KeyframeMap& map() const { return *map_; }
+  [[nodiscard]] KeyframeMap& map() { return *map_; }
+  // Whether the configuration of this run has it use an IMU.
+  [[nodiscard]] bool imu_wanted() const { return config_.odometry.imu_enabled; }
+  [[nodiscard]] const Journal& journal() const { return *journal_; }
+  [[nodiscard]] const KeyframeClouds& clouds() const { return *clouds_; }
+  [[nodiscard]] const std::vector<GnssFix>& fixes() const { return fixes_; }
+  [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
+  // --realtime: loops are taken over as soon as they are found.
+  void take_loops_when_found() {
+    takes_loops_when_found_ = true;
+    map_->take_loops_when_found();
+  }
+  [[nodiscard]] StageTimes& times() { return times_; }
+  // Set after each scan, for progress and latency.
+  [[nodiscard]] TimeNs last_scan_end() const override { return last_scan_end_; }
+  // Of the IMU; nothing if there has been no sample.
+  [[nodiscard]] std::optional<TimeNs> last_imu() const;
+
+ private:
+  static constexpr const char* kJournalFile = "journal.bin";
+  static constexpr const char* kCloudsFile = "clouds.bin";
+
+  // The first two scans. A carrier that is on its way when the recording begins smears its first
+  // scan; the second one tells the speed, and both are done again with it.
+  struct Opening {
+    std::vector<Event> events;
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // assumed, body frame of the first scan
+    Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();
+    int rounds = 0;
+    MappingCounts counts_before;
+    ImuHearing hearing_before;
+    std::deque<ImuSample> imu_before;
+    std::size_t fixes_before = 0;
+  };
+
+  void load_fixes(const RecordCount& known);
+  void make_odometry(const Rig& rig);
+  void complete_rig(const Rig& rig);
+  void take_sample(const ImuSample& sample);
+  void start_anew();
+  void consider_opening(const Scan& scan, const DenseEstimate& estimate);
+  void leave_out_first();
+  void on_scan(const Scan& scan);
+  [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);
+  [[nodiscard]] bool lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const;
+  void update_map(const DenseEstimate& estimate, ScanRecord& record);
+  [[nodiscard]] bool lost(const DenseEstimate& estimate) const;
+  [[nodiscard]] Points map_points(const DenseEstimate& estimate);
+  void store_cloud(const DenseEstimate& estimate, std::size_t keyframe,
+                   const Pose& keyframe_from_body);
+  void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
+
+  MappingConfig config_;
+  std::filesystem::path folder_;
+  Log& log_;
+  StageTimes times_;
+  Rig rig_;
+  std::deque<ImuSample> recent_imu_;  // all before the first scan, then the last ones
+  std::unique_ptr<DenseOdometry> odometry_;
+  std::unique_ptr<KeyframeMap> map_;
+  std::unique_ptr<Journal> journal_;
+  std::unique_ptr<KeyframeClouds> clouds_;
+  VoxelFilter cloud_filter_;
+  std::vector<GnssFix> fixes_;
+  std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced
+  MappingCounts counts_;
+  ImuHearing imu_hearing_;
+  TimeNs last_scan_end_ = 0;
+  Eigen::Vector3d last_good_velocity_ = Eigen::Vector3d::Zero();  // in its body frame
+  double last_good_inliers_ = 0.0;  // share of that scan's points near the map
+  TimeNs last_scan_ = 0;            // stamp
+  std::string imu_refused_;
+  bool imu_doubted_ = false;
+  std::uint64_t last_cloud_ = 0;  // keyframe that the cloud kept last belongs to
+  Pose keyframe_from_last_cloud_;
+  Pose last_good_;  // of the last scan that was matched
+  bool takes_loops_when_found_ = false;
+  std::unique_ptr<Opening> opening_;  // until the first scans are settled
+};
+
+}  // namespace understory

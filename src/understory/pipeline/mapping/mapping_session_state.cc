@@ -1,0 +1,110 @@
+// What of a session lies on the disk, and its state to go on from.
+#include "understory/geometry/pose_io.h"
+#include "understory/pipeline/mapping/mapping_session.h"
+#include "understory/sensor/sensor_io.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr const char* kFixesFile = "fixes.bin";
+
+}  // namespace
+
+void MappingSession::sync() {
+  if (!fixes_file_ && !fixes_.empty())
+    fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile);
+  if (fixes_file_) {
+    for (std::size_t i = fixes_file_->count().records; i < fixes_.size(); ++i) {
+      BinaryWriter record;
+      put_fix(record, fixes_[i]);
+      fixes_file_->append({bytes_of(record.bytes())});
+    }
+    fixes_file_->sync();
+  }
+  if (!started()) return;
+  journal_->sync();
+  clouds_->sync();
+  map_->sync();
+}
+
+std::vector<CountedFile> MappingSession::files() const {
+  std::vector<CountedFile> files;
+  if (started()) {
+    files = map_->files();
+    files.push_back({kJournalFile, journal_->count()});
+    files.push_back({kCloudsFile, clouds_->count()});
+  }
+  if (fixes_file_) files.push_back({kFixesFile, fixes_file_->count()});
+  return files;
+}
+
+void MappingSession::save(BinaryWriter& writer) const {
+  UNDERSTORY_CHECK(settled() || !started());
+  writer.put(imu_refused_);
+  writer.put(imu_doubted_);
+  writer.put(fixes_file_ ? fixes_file_->count() : RecordCount());
+  writer.put(counts_);
+  imu_hearing_.save(writer);
+  writer.put(last_scan_end_);
+  writer.put(last_cloud_);
+  put_pose(writer, keyframe_from_last_cloud_);
+  put_pose(writer, last_good_);
+  writer.put(last_good_inliers_);
+  writer.put_doubles(last_good_velocity_.data(), 3);
+  writer.put(last_scan_);
+  put_optional(writer, rig_.body_from_imu, put_pose);
+  put_optional(writer, rig_.body_from_gnss, put_pose);
+  writer.put(started());
+  writer.put(static_cast<std::uint64_t>(recent_imu_.size()));
+  for (const ImuSample& sample : recent_imu_)
+    put_imu(writer, sample);
+  if (!started()) return;
+  writer.put(journal_->count());
+  writer.put(clouds_->count());
+  map_->save(writer);
+  odometry_->save(writer);
+}
+
+void MappingSession::load_fixes(const RecordCount& known) {
+  fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile, known);
+  fixes_file_->for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
+    BinaryReader record({bytes.begin(), bytes.end()}, fixes_file_->path().string());
+    fixes_.push_back(get_fix(record));
+  });
+}
+
+void MappingSession::load(BinaryReader& reader, const Rig& rig) {
+  const std::string refused = reader.get_string();
+  if (!refused.empty()) refuse_imu(refused);
+  imu_doubted_ = reader.get<bool>();
+  const auto fixes = reader.get<RecordCount>();
+  if (fixes.records > 0) load_fixes(fixes);
+  counts_ = reader.get<MappingCounts>();
+  imu_hearing_.load(reader);
+  last_scan_end_ = reader.get<TimeNs>();
+  last_cloud_ = reader.get<std::uint64_t>();
+  keyframe_from_last_cloud_ = get_pose(reader);
+  last_good_ = get_pose(reader);
+  last_good_inliers_ = reader.get<double>();
+  reader.get_doubles(last_good_velocity_.data(), 3);
+  last_scan_ = reader.get<TimeNs>();
+  const auto body_from_imu = get_optional(reader, get_pose);
+  const auto body_from_gnss = get_optional(reader, get_pose);
+  const bool was_started = reader.get<bool>();
+  const auto waiting = reader.get<std::uint64_t>();
+  for (std::uint64_t i = 0; i < waiting; ++i)
+    recent_imu_.push_back(get_imu(reader));
+  if (!was_started) return;
+  journal_ = std::make_unique<Journal>(folder_ / kJournalFile, reader.get<RecordCount>());
+  clouds_ = std::make_unique<KeyframeClouds>(folder_ / kCloudsFile, reader.get<RecordCount>());
+  opening_.reset();
+  rig_ = rig;
+  rig_.body_from_imu = body_from_imu;
+  rig_.body_from_gnss = body_from_gnss;
+  map_->load(reader);
+  make_odometry(Rig(rig_));
+  odometry_->load(reader);
+}
+
+}  // namespace understory

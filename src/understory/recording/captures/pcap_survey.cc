@@ -1,0 +1,128 @@
+#include "understory/recording/captures/pcap_survey.h"
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "understory/recording/captures/velodyne.h"
+#include "understory/util/read_error.h"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kFrames = 20'000;
+constexpr std::size_t kMostStreams = 256;
+constexpr std::size_t kMostSizes = 16;
+
+// The place where this datagram is counted; null where there are too many streams already.
+PcapSurvey::Stream* stream_of(PcapSurvey& survey, const UdpStream& key, bool is_lidar) {
+  const auto found = survey.streams.find(key);
+  if (found != survey.streams.end()) return &found->second;
+  if (survey.streams.size() >= kMostStreams) {
+    if (!is_lidar) return nullptr;
+    const auto rank = [](const auto& each) {
+      return std::pair(each.second.has_lidar(), each.second.datagrams);
+    };
+    const auto least =
+        std::min_element(survey.streams.begin(), survey.streams.end(),
+                         [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
+    if (least->second.has_lidar()) return nullptr;
+    survey.streams.erase(least);
+  }
+  return &survey.streams[key];
+}
+
+}  // namespace
+
+bool is_velodyne_data(ByteSpan payload) {
+  return payload.size() == VelodyneDecoder::kDataPacketSize && payload[0] == 0xFF &&
+         payload[1] == 0xEE;
+}
+
+bool is_velodyne_position(ByteSpan payload) {
+  constexpr std::size_t kSentence = 206;
+  return payload.size() == VelodyneDecoder::kPositionPacketSize && payload[kSentence] == '$';
+}
+
+std::string PcapSurvey::list() const {
+  constexpr std::size_t kMostListed = 20;
+  std::string text;
+  std::size_t listed = 0;
+  for (const auto& [key, stream] : streams) {
+    for (const auto& [size, count] : stream.by_size) {
+      if (++listed > kMostListed) continue;
+      text += (text.empty() ? "" : ", ") + key.name() + ": " + std::to_string(count) + " x " +
+              std::to_string(size) + " bytes";
+    }
+  }
+  if (listed > kMostListed) text += " and " + std::to_string(listed - kMostListed) + " other kinds";
+  return std::to_string(frames) + (whole ? " frames" : " first frames") + ": " +
+         (text.empty() ? "no UDP packets" : text);
+}
+
+PcapSurvey survey_pcap(PcapFile& file, const PcapWanted& wanted) {
+  PcapSurvey survey;
+  UdpAssembler udp;
+  CapturedFrame frame;
+  std::uint64_t enough = kFrames;
+  bool found = false;
+  while (!found || survey.frames < enough) {
+    try {
+      survey.whole = !file.next(frame);
+    } catch (const ReadError&) {
+      if (!found) throw;
+      break;  // met again when it is read
+    }
+    if (survey.whole) break;
+    ++survey.frames;
+    const auto datagram = udp.add(frame.link_type, frame.bytes, frame.stamp);
+    if (!datagram) continue;
+    if (datagram->has_checksum)
+      ++(datagram->checksum_ok ? survey.good_checksums : survey.bad_checksums);
+    const std::size_t size = datagram->payload.size();
+    const bool velodyne = is_velodyne_data(datagram->payload);
+    const bool ouster = wanted.ouster_packet_size > 0 && size == wanted.ouster_packet_size;
+    const UdpStream key{datagram->source, datagram->port};
+    const bool is_wanted = ((velodyne && wanted.velodyne) || ouster) &&
+                           (wanted.stream.empty() || wanted.stream == key.name());
+    // Where the lidar starts late, as much is looked at from there on.
+    if (is_wanted && !found && survey.frames > kFrames) enough = survey.frames + kFrames;
+    found = found || is_wanted;
+    PcapSurvey::Stream* at = stream_of(survey, key, velodyne || ouster);
+    if (at == nullptr) continue;
+    PcapSurvey::Stream& stream = *at;
+    ++stream.datagrams;
+    stream.velodyne += velodyne ? 1 : 0;
+    stream.ouster += ouster ? 1 : 0;
+    if (is_velodyne_position(datagram->payload)) ++stream.position;
+    if (stream.by_size.size() < kMostSizes || stream.by_size.count(size) > 0)
+      ++stream.by_size[size];
+  }
+  return survey;
+}
+
+std::string find_ouster_metadata(const std::string& capture) {
+  namespace fs = std::filesystem;
+  const fs::path path(capture);
+  const std::string name = path.filename().string();
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  std::vector<std::string> found;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() != ".json") continue;
+    const std::string stem = entry.path().stem().string();
+    if (!stem.empty() && name.rfind(stem, 0) == 0) found.push_back(entry.path().string());
+  }
+  if (found.empty()) return "";
+  std::sort(found.begin(), found.end());
+  if (found.size() > 1) {
+    throw InputError(capture, "",
+                     "several metadata files could belong to it (" + found[0] + ", " + found[1] +
+                         "): name one with --metadata");
+  }
+  return found.front();
+}
+
+}  // namespace understory

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "understory/recording/captures/pcap_file.h"
+#include "understory/recording/captures/udp.h"
+
+namespace understory {
+
+// Where datagrams come from and go to.
+struct UdpStream {
+  std::uint32_t source = 0;
+  std::uint16_t port = 0;
+  auto operator<=>(const UdpStream&) const = default;  // NOLINT(modernize-use-nullptr)
+  [[nodiscard]] std::string name() const { return "udp " + std::to_string(port); }
+};
+
+// What the datagrams of a capture are, as far as they were looked at.
+struct PcapSurvey {
+  struct Stream {
+    std::uint64_t datagrams = 0;
+    std::uint64_t velodyne = 0;                    // Velodyne data packets
+    std::uint64_t ouster = 0;                      // of the size that Ouster's metadata gives
+    std::uint64_t position = 0;                    // Velodyne position packets
+    std::map<std::size_t, std::uint64_t> by_size;  // at most 16 sizes
+    [[nodiscard]] bool has_lidar() const { return velodyne > 0 || ouster > 0; }
+  };
+  std::map<UdpStream, Stream> streams;  // at most 256; of more, those without a lidar are left out
+  std::uint64_t frames = 0;             // looked at
+  bool whole = false;                   // to the end of the capture
+  std::uint64_t good_checksums = 0;
+  std::uint64_t bad_checksums = 0;
+  // Checksums tell of damage only where most are right: a capture made on the sending machine has
+  // none of them filled in.
+  [[nodiscard]] bool trust_checksums() const { return good_checksums > 10 * bad_checksums; }
+  // For messages: "1500 frames: udp 7502: 192 x 8448 bytes, ..."
+  [[nodiscard]] std::string list() const;
+};
+
+[[nodiscard]] bool is_velodyne_data(ByteSpan payload);
+[[nodiscard]] bool is_velodyne_position(ByteSpan payload);
+
+// The lidar that is looked for.
+struct PcapWanted {
+  bool velodyne = true;
+  std::size_t ouster_packet_size = 0;  // of the payload; 0: no Ouster
+  std::string stream;                  // "udp 2368"; empty: any
+};
+
+// Looks at 20 000 frames from where the file stands, and if the lidar is not among them, at as many
+// behind its first packet, wherever in the file that is.
+[[nodiscard]] PcapSurvey survey_pcap(PcapFile& file, const PcapWanted& wanted);
+
+// The path of the only .json file beside a capture whose name the capture's name begins with; empty
+// if there is none. Throws InputError if there are several.
+[[nodiscard]] std::string find_ouster_metadata(const std::string& capture);
+
+}  // namespace understory

@@ -1,0 +1,301 @@
+#include <gtest/gtest.h>
+
+#include "understory/recording/bags/byte_source.h"
+#include "understory/recording/captures/packet_test_support.h"
+#include "understory/recording/captures/pcap_recording.h"
+#include "understory/recording/recording_test_support.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+using test::Bytes;
+
+constexpr TimeNs kHourStart = 1'700'002'800 * kNsPerSecond;
+constexpr int kPackets = 150;  // two turns
+
+Bytes velodyne_udp(int i) {
+  test::VelodynePacket packet;
+  packet.azimuth_cdeg = (480 * i) % 36000;
+  packet.us = static_cast<std::uint32_t>(1327 * i);
+  return test::make_udp(2368, test::make_packet(packet));
+}
+
+TimeNs stamp_of(int i) {
+  return kHourStart + i * 1'327'000LL;
+}
+
+using Wrap = Bytes (*)(const Bytes& ip);
+
+Bytes plain(const Bytes& ip) {
+  return test::make_ethernet(ip);
+}
+
+Bytes make_capture(Wrap wrap = plain, std::uint32_t link_type = 1) {
+  Bytes file = test::pcap_header(link_type);
+  for (int i = 0; i < kPackets; ++i)
+    test::add_record(file, stamp_of(i), wrap(test::make_ip(velodyne_udp(i))));
+  return file;
+}
+
+struct Read {
+  std::size_t scans = 0;
+  std::size_t points = 0;
+  std::string format;
+};
+
+Read read(const Bytes& file, Log& log) {
+  const auto recording = open_pcap(bytes_in_memory(file, "test.pcap"), {}, log);
+  Read result;
+  while (const auto event = recording->next()) {
+    if (const auto* scan = std::get_if<ScanPtr>(&*event)) {
+      ++result.scans;
+      result.points += (*scan)->points.size();
+    }
+  }
+  result.format = recording->format();
+  return result;
+}
+
+void expect_all(const Bytes& file) {
+  Log log;
+  const Read result = read(file, log);
+  EXPECT_EQ(result.scans, 2U);
+  EXPECT_EQ(result.points, kPackets * 384U);
+  EXPECT_TRUE(log.warnings().empty()) << test::all_warnings(log);
+}
+
+TEST(Pcap, ReadsEthernetVlanCookedAndRaw) {
+  expect_all(make_capture());
+  expect_all(make_capture([](const Bytes& ip) { return test::make_ethernet(ip, true); }));
+  expect_all(make_capture(
+      [](const Bytes& ip) {
+        Bytes frame(16, 0);
+        frame[14] = 0x08;
+        test::append(frame, ip);
+        return frame;
+      },
+      113));
+  expect_all(make_capture(
+      [](const Bytes& ip) {
+        Bytes frame(20, 0);
+        frame[0] = 0x08;
+        test::append(frame, ip);
+        return frame;
+      },
+      276));
+  expect_all(make_capture([](const Bytes& ip) { return ip; }, 101));
+}
+
+TEST(Pcap, PutsFragmentsTogetherInAnyOrder) {
+  Bytes file = test::pcap_header();
+  for (int i = 0; i < kPackets; ++i) {
+    const Bytes udp = velodyne_udp(i);
+    const Bytes head(udp.begin(), udp.begin() + 800);
+    const Bytes tail(udp.begin() + 800, udp.end());
+    const auto id = static_cast<std::uint16_t>(i);
+    const Bytes first = test::make_ethernet(test::make_ip(head, 0, true, id));
+    const Bytes second = test::make_ethernet(test::make_ip(tail, 800, false, id));
+    test::add_record(file, stamp_of(i), i % 2 == 0 ? first : second);
+    test::add_record(file, stamp_of(i), i % 2 == 0 ? second : first);
+  }
+  expect_all(file);
+}
+
+Bytes block(std::uint32_t type, Bytes body) {
+  body.resize((body.size() + 3) / 4 * 4, 0);
+  const auto length = static_cast<std::uint32_t>(body.size() + 12);
+  Bytes bytes;
+  test::put(bytes, type);
+  test::put(bytes, length);
+  test::append(bytes, body);
+  test::put(bytes, length);
+  return bytes;
+}
+
+TEST(Pcap, ReadsPcapng) {
+  Bytes section;
+  test::put(section, std::uint32_t{0x1A2B3C4D});
+  test::put(section, std::uint32_t{1});
+  test::put(section, std::int64_t{-1});
+  Bytes file = block(0x0A0D0D0A, section);
+  Bytes interface;
+  test::put(interface, std::uint32_t{1});
+  test::put(interface, std::uint32_t{65535});
+  test::append(interface, {9, 0, 1, 0, 9, 0, 0, 0, 0, 0, 0, 0});  // nanoseconds
+  test::append(file, block(1, interface));
+  for (int i = 0; i < kPackets; ++i) {
+    const Bytes frame = plain(test::make_ip(velodyne_udp(i)));
+    Bytes body;
+    test::put(body, std::uint32_t{0});
+    test::put(body, static_cast<std::uint32_t>(stamp_of(i) >> 32));
+    test::put(body, static_cast<std::uint32_t>(stamp_of(i)));
+    test::put(body, static_cast<std::uint32_t>(frame.size()));
+    test::put(body, static_cast<std::uint32_t>(frame.size()));
+    test::append(body, frame);
+    test::append(file, block(6, body));
+  }
+  expect_all(file);
+  Log log;
+  EXPECT_EQ(read(file, log).format, "PCAPNG (Velodyne VLP-16)");
+}
+
+TEST(Pcap, KeepsWhatComesBeforeTheCut) {
+  Bytes file = make_capture();
+  const std::size_t record = (file.size() - 24) / kPackets;
+  file.resize(24 + 100 * record + 700);
+  Log log;
+  EXPECT_EQ(read(file, log).points, 100U * 384);
+  EXPECT_EQ(test::count_of(log, "recording.truncated"), 1U);
+}
+
+TEST(Pcap, GoesOnBehindADamagedRecordHeader) {
+  Bytes file = make_capture();
+  const std::size_t record = (file.size() - 24) / kPackets;
+  file[24 + 50 * record + 10] = 0xFF;  // its length
+  Log log;
+  EXPECT_EQ(read(file, log).points, (kPackets - 1) * 384U);
+  EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U) << test::all_warnings(log);
+}
+
+TEST(Pcap, LeavesOutARecordWhoseTimeIsDaysOff) {
+  Bytes file = make_capture();
+  const std::size_t record = (file.size() - 24) / kPackets;
+  file[24 + 50 * record + 3] ^= 0x40;  // its seconds
+  Log log;
+  EXPECT_EQ(read(file, log).points, (kPackets - 1) * 384U);
+  EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U) << test::all_warnings(log);
+}
+
+TEST(Pcap, LeavesOutPacketsWhoseChecksumIsWrong) {
+  Bytes file = test::pcap_header();
+  for (int i = 0; i < kPackets; ++i) {
+    Bytes udp = velodyne_udp(i);
+    test::seal_udp(udp);
+    if (i == 70) udp[500] ^= 0x10;
+    test::add_record(file, stamp_of(i), plain(test::make_ip(udp)));
+  }
+  Log log;
+  EXPECT_EQ(read(file, log).points, (kPackets - 1) * 384U);
+  EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 1U) << test::all_warnings(log);
+}
+
+// A capture made on the sending machine: no checksum is filled in yet.
+TEST(Pcap, DoesNotMindChecksumsThatAreAllWrong) {
+  Bytes file = test::pcap_header();
+  for (int i = 0; i < kPackets; ++i) {
+    Bytes udp = velodyne_udp(i);
+    udp[6] = 0x12;
+    test::add_record(file, stamp_of(i), plain(test::make_ip(udp)));
+  }
+  expect_all(file);
+}
+
+TEST(Pcap, RefusesWhatHoldsNoLidar) {
+  Log log;
+  EXPECT_THROW((void)open_pcap(bytes_in_memory({1, 2, 3}, "a.pcap"), {}, log), InputError);
+  EXPECT_THROW((void)open_pcap(bytes_in_memory(test::pcap_header(), "b.pcap"), {}, log),
+               InputError);
+  Bytes file = test::pcap_header();
+  test::add_record(file, kHourStart, plain(test::make_ip(test::make_udp(7502, Bytes(3000, 1)))));
+  try {
+    (void)open_pcap(bytes_in_memory(file, "c.pcap"), {}, log);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("udp 7502: 1 x 3000 bytes"), std::string::npos)
+        << error.what();
+  }
+}
+
+// A small datagram of something else than a lidar, to another port each.
+Bytes other_udp(int i) {
+  return test::make_udp(static_cast<std::uint16_t>(30'000 + i), Bytes(48, 7));
+}
+
+// Bug: only the first 20,000 frames were looked at, and only the first 256 streams.
+TEST(Pcap, FindsALidarThatStartsLate) {
+  constexpr int kOthers = 20'500;
+  Bytes file = test::pcap_header();
+  for (int i = 0; i < kOthers; ++i)
+    test::add_record(file, stamp_of(0), plain(test::make_ip(other_udp(i % 400))));
+  Bytes with_lidar = file;
+  for (int i = 0; i < kPackets; ++i)
+    test::add_record(with_lidar, stamp_of(i), plain(test::make_ip(velodyne_udp(i))));
+  expect_all(with_lidar);
+  Log log;
+  EXPECT_EQ(read(with_lidar, log).format, "PCAP (Velodyne VLP-16)");
+  try {
+    (void)read(file, log);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    const std::string said = error.what();
+    EXPECT_NE(said.find("20500 frames: udp 30000: 52 x 48 bytes"), std::string::npos) << said;
+    EXPECT_NE(said.find("and 236 other kinds"), std::string::npos) << said;
+  }
+}
+
+// Only the lidar that was asked for ends the search.
+TEST(Pcap, FindsTheLidarOfAnOptionThatStartsLate) {
+  Bytes file = test::pcap_header();
+  for (int i = 0; i < 20'500; ++i)
+    test::add_record(file, stamp_of(i), plain(test::make_ip(velodyne_udp(i))));
+  Bytes second = file;
+  for (int i = 0; i < kPackets; ++i) {
+    Bytes udp = velodyne_udp(i);
+    udp[3] = 0x41;  // port 2369
+    test::add_record(second, stamp_of(20'500 + i), plain(test::make_ip(udp)));
+  }
+  OpenOptions options;
+  options.lidar_topic = "udp 2369";
+  Log log;
+  const auto recording = open_pcap(bytes_in_memory(second, "test.pcap"), options, log);
+  std::size_t scans = 0;
+  while (const auto event = recording->next())
+    scans += std::holds_alternative<ScanPtr>(*event) ? 1 : 0;
+  EXPECT_EQ(scans, 2U);
+  // Without the option the second one is left out, and that is said.
+  const auto first = open_pcap(bytes_in_memory(second, "test.pcap"), {}, log);
+  while (first->next()) {
+  }
+  EXPECT_EQ(test::count_of(log, "recording.late_sensor"), 1U) << test::all_warnings(log);
+}
+
+TEST(Pcap, FindsTheMetadataBesideAnOusterCapture) {
+  const test::TemporaryFolder folder;
+  test::write_bytes(folder / "drive_one.pcap", test::pcap_header());
+  Log log;
+  const auto message = [&] {
+    try {
+      (void)open_pcap(folder / "drive_one.pcap", {}, log);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(message().find("--metadata"), std::string::npos);
+  std::ofstream(folder / "other.json") << "{}";
+  EXPECT_NE(message().find("--metadata"), std::string::npos);
+  std::ofstream(folder / "drive.json") << "{}";
+  EXPECT_NE(message().find("drive.json"), std::string::npos) << message();
+  std::ofstream(folder / "drive_one.json") << "{}";
+  EXPECT_NE(message().find("several"), std::string::npos) << message();
+}
+
+// The real captures; what their points must be is checked by tests/recording/packages.py.
+TEST(Pcap, ReadsRealCaptures) {
+  const std::filesystem::path folder = test::data_folder() / "drivers";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no example data";
+  Log log;
+  const auto ouster = open_pcap(folder / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap", {}, log);
+  const auto events = test::read_all(*ouster);
+  EXPECT_EQ(events.size(), 33U);
+  EXPECT_EQ(ouster->format(), "PCAP (Ouster OS-1-128)");
+  EXPECT_EQ(ouster->rig().body_frame, "imu");
+  const auto velodyne = open_pcap(folder / "sample_velodyne_vlp16_gps.pcap", {}, log);
+  EXPECT_EQ(test::read_all(*velodyne).size(), 5U);  // it begins within a turn
+  EXPECT_EQ(velodyne->rig().lidar_model, "VLP-16");
+  EXPECT_EQ(log.warnings().size(), test::count_of(log, "scan.part")) << test::all_warnings(log);
+}
+
+}  // namespace
+}  // namespace understory

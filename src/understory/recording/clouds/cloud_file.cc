@@ -1,0 +1,101 @@
+#include "understory/recording/clouds/cloud_file.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/recording/bags/byte_source.h"
+#include "understory/recording/clouds/cloud_table.h"
+#include "understory/recording/clouds/las.h"
+#include "understory/recording/messages/point_cloud.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+// Beyond this a float keeps less than a tenth of a millimetre.
+constexpr double kFarFromOrigin = 1000.0;
+
+// Appends points and settles the origin with the first one.
+class Collector {
+ public:
+  explicit Collector(PointCloudFile& cloud) : cloud_(cloud) {}
+
+  // False if the point is NaN or infinite.
+  bool add(const Eigen::Vector3d& position) {
+    if (!position.allFinite()) return false;
+    if (cloud_.points.empty() && position.cwiseAbs().maxCoeff() > kFarFromOrigin)
+      cloud_.origin = position.array().round();
+    cloud_.points.push_back((position - cloud_.origin).cast<float>());
+    return true;
+  }
+
+ private:
+  PointCloudFile& cloud_;
+};
+
+PointCloudFile read_las_cloud(ByteSource& file, Log& log) {
+  const LasHeader header = read_las_header(file);
+  PointCloudFile cloud;
+  cloud.coordinate_system = header.coordinate_system;
+  cloud.format = std::string(header.compressed ? "LAZ" : "LAS") + " 1." +
+                 std::to_string(header.version_minor) + ", point format " +
+                 std::to_string(header.point_format);
+  Collector collector(cloud);
+  read_las_points(file, header, log, [&](const LasPoint& point) {
+    if (!collector.add(point.position)) return;
+    cloud.intensity.push_back(point.intensity);
+    cloud.classification.push_back(point.classification);
+    if (header.has_gps_time) cloud.gps_time.push_back(point.gps_time);
+  });
+  return cloud;
+}
+
+PointCloudFile from_table(const CloudTable& table, const std::string& name) {
+  const PointCloud2Message message = table.message(0);
+  const auto layout = CloudLayout::find(message);
+  if (!layout) throw InputError(name, "header", "expected the fields x, y and z");
+  PointCloudFile cloud;
+  cloud.format = table.format;
+  Collector collector(cloud);
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const std::uint8_t* raw = table.data.data() + i * table.point_step;
+    const Eigen::Vector3d position(layout->x().read(raw), layout->y().read(raw),
+                                   layout->z().read(raw));
+    if (!collector.add(position)) continue;
+    if (layout->intensity().size > 0)
+      cloud.intensity.push_back(static_cast<float>(layout->intensity().read(raw)));
+  }
+  return cloud;
+}
+
+}  // namespace
+
+PointCloudFile read_cloud(ByteSource& file, Log& log) {
+  PointCloudFile cloud;
+  switch (cloud_format(file)) {
+    case CloudFormat::kLas:
+      cloud = read_las_cloud(file, log);
+      break;
+    case CloudFormat::kPcd:
+      cloud = from_table(read_pcd(file, log), file.name());
+      break;
+    case CloudFormat::kPly:
+      cloud = from_table(read_ply(file, log), file.name());
+      break;
+    case CloudFormat::kKitti:
+      cloud = from_table(read_kitti(file, log), file.name());
+      break;
+    case CloudFormat::kUnknown:
+      throw InputError(file.name(), "byte 0", "expected a cloud (.las, .laz, .pcd, .ply, .bin)");
+  }
+  if (cloud.points.empty()) throw InputError(file.name(), "", "holds no finite point");
+  return cloud;
+}
+
+PointCloudFile read_cloud(const std::string& path, Log& log) {
+  const auto file = open_file(path);
+  if (file->size() == 0) throw InputError(path, "", "the file is empty");
+  return read_cloud(*file, log);
+}
+
+}  // namespace understory

@@ -1,0 +1,125 @@
+#include "understory/recording/clouds/cloud_table.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "understory/recording/finding.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+template <typename T>
+void store(double value, std::uint8_t* into) {
+  T number{};
+  if constexpr (std::is_floating_point_v<T>) {
+    number = static_cast<T>(value);
+  } else if (!std::isnan(value)) {
+    constexpr auto kLow = static_cast<double>(std::numeric_limits<T>::lowest());
+    constexpr auto kHigh = static_cast<double>(std::numeric_limits<T>::max());
+    number = static_cast<T>(std::clamp(value, kLow, kHigh));
+  }
+  std::memcpy(into, &number, sizeof(T));
+}
+
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+}  // namespace
+
+void store_number(double value, FieldType type, std::uint8_t* into) {
+  visit_field_type(type, [&](auto zero) { store<decltype(zero)>(value, into); });
+}
+
+void CloudTable::add_field(const std::string& name, FieldType type, std::uint32_t count) {
+  fields.push_back({name, point_step, type, count});
+  point_step += field_size(type) * count;
+}
+
+PointCloud2Message CloudTable::message(TimeNs stamp) const {
+  PointCloud2Message message;
+  message.header.stamp = stamp;
+  message.height = height;
+  message.width = width;
+  message.fields = fields;
+  message.big_endian = big_endian;
+  message.point_step = point_step;
+  message.row_step = point_step * width;
+  message.data = ByteSpan(data.data(), data.size());
+  return message;
+}
+
+CloudTable read_kitti(ByteSource& file, Log& log) {
+  CloudTable table;
+  table.format = "KITTI bin";
+  for (const char* name : {"x", "y", "z", "intensity"})
+    table.add_field(name, FieldType::kFloat32);
+  file.read(0, file.size(), table.data);
+  const std::size_t whole = table.data.size() / table.point_step;
+  std::size_t plausible = 0;
+  for (std::size_t i = 0; i < whole; ++i) {
+    std::array<float, 3> xyz;
+    std::memcpy(xyz.data(), table.data.data() + i * table.point_step, sizeof(xyz));
+    plausible += std::all_of(xyz.begin(), xyz.end(), [](float v) { return std::abs(v) < 1e4F; });
+  }
+  if (2 * plausible <= whole) {
+    throw InputError(file.name(), "byte 0",
+                     "expected a KITTI cloud: x, y, z, intensity as 32-bit floats");
+  }
+  if (table.data.size() % table.point_step != 0) {
+    report_finding(log, Finding::kDamage,
+                   file.name() + ": at byte " + std::to_string(whole * table.point_step) +
+                       ": the last point is not whole");
+  }
+  table.data.resize(whole * table.point_step);
+  table.width = static_cast<std::uint32_t>(whole);
+  return table;
+}
+
+CloudFormat cloud_format(ByteSource& file) {
+  std::array<char, 256> head{};
+  const std::size_t got =
+      file.read(0, reinterpret_cast<std::uint8_t*>(head.data()), head.size() - 1);
+  const std::string_view text(head.data(), got);
+  if (text.rfind("LASF", 0) == 0) return CloudFormat::kLas;
+  if (text.rfind("ply\n", 0) == 0 || text.rfind("ply\r", 0) == 0) return CloudFormat::kPly;
+  if (text.rfind("# .PCD", 0) == 0 || text.rfind("VERSION", 0) == 0 ||
+      text.find("\nVERSION") != std::string_view::npos)
+    return CloudFormat::kPcd;
+  return ends_with(file.name(), ".bin") ? CloudFormat::kKitti : CloudFormat::kUnknown;
+}
+
+bool lzf_expand(ByteSpan in, std::vector<std::uint8_t>& out, std::size_t& made) {
+  constexpr std::size_t kLiteralRuns = 32;
+  std::size_t at = 0;
+  made = 0;
+  while (at < in.size()) {
+    const std::size_t control = in[at++];
+    if (control < kLiteralRuns) {
+      const std::size_t run = control + 1;
+      if (run > in.size() - at || run > out.size() - made) return false;
+      std::memcpy(out.data() + made, in.data() + at, run);
+      at += run;
+      made += run;
+      continue;
+    }
+    std::size_t length = control >> 5;
+    if (length == 7) {
+      if (at >= in.size()) return false;
+      length += in[at++];
+    }
+    length += 2;
+    if (at >= in.size()) return false;
+    const std::size_t back = ((control & 0x1F) << 8) + in[at++] + 1;
+    if (back > made || length > out.size() - made) return false;
+    for (std::size_t i = 0; i < length; ++i, ++made)  // source and target may overlap
+      out[made] = out[made - back];
+  }
+  return made == out.size();
+}
+
+}  // namespace understory

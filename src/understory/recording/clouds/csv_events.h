@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/recording/bags/byte_source.h"
+#include "understory/recording/clouds/text_lines.h"
+#include "understory/sensor/gnss_fix.h"
+#include "understory/sensor/imu_sample.h"
+#include "understory/util/binary_io.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// The rows of a CSV file with a header line, as numbers by column name. Rows that cannot be read
+// are passed over with a warning ("recording.damaged"). Not thread-safe.
+class CsvRows {
+ public:
+  CsvRows(std::unique_ptr<ByteSource> file, Log& log);
+
+  // Column names in lower case; several names for one column may be given. Throws InputError if
+  // none of them is there.
+  [[nodiscard]] std::size_t require(const std::vector<std::string>& names) const;
+  [[nodiscard]] std::optional<std::size_t> find(const std::vector<std::string>& names) const;
+  // The next row with as many cells as there are columns; false at the end.
+  [[nodiscard]] bool next();
+  [[nodiscard]] const std::string& cell(std::size_t column) const { return cells_[column]; }
+  // NaN where the cell is empty or no number.
+  [[nodiscard]] double number(std::size_t column) const;
+  // Nanoseconds where the column's name ends with _ns or the number is whole and beyond 1e11, else
+  // seconds.
+  [[nodiscard]] std::optional<TimeNs> time(std::size_t column) const;
+  void damaged(const std::string& what);
+  // Which rows have been read, and back to there.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  std::unique_ptr<ByteSource> file_;
+  TextLines lines_;
+  Log& log_;
+  std::map<std::string, std::size_t> columns_;
+  std::vector<std::string> names_;
+  std::vector<std::string> cells_;
+};
+
+// imu.csv: timestamp, gx, gy, gz (rad/s), ax, ay, az (m/s², +9.81 up at rest).
+class CsvImuReader {
+ public:
+  CsvImuReader(std::unique_ptr<ByteSource> file, Log& log);
+  [[nodiscard]] std::optional<ImuSample> next();
+  void save(BinaryWriter& writer) const { rows_.save(writer); }
+  void load(BinaryReader& reader) { rows_.load(reader); }
+
+ private:
+  CsvRows rows_;
+  std::size_t time_ = 0;
+  std::size_t rate_[3]{};
+  std::size_t force_[3]{};
+};
+
+// gnss.csv: timestamp, latitude_deg, longitude_deg, height_m (above the ellipsoid), and where known
+// hdop, vdop, satellites, quality, track_deg, speed_m_s, sd_east_m, sd_north_m, sd_up_m.
+class CsvGnssReader {
+ public:
+  CsvGnssReader(std::unique_ptr<ByteSource> file, Log& log);
+  [[nodiscard]] std::optional<GnssFix> next();
+  void save(BinaryWriter& writer) const { rows_.save(writer); }
+  void load(BinaryReader& reader) { rows_.load(reader); }
+
+ private:
+  [[nodiscard]] double optional_number(const std::optional<std::size_t>& column) const;
+
+  CsvRows rows_;
+  std::size_t time_ = 0, latitude_ = 0, longitude_ = 0, height_ = 0;
+  std::optional<std::size_t> hdop_, vdop_, satellites_, quality_, track_, speed_;
+  std::optional<std::size_t> sd_[3];
+};
+
+}  // namespace understory

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "understory/recording/bags/byte_source.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+struct LasHeader {
+  int version_minor = 0;
+  int point_format = 0;
+  bool compressed = false;
+  bool has_gps_time = false;
+  std::uint64_t points = 0;
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  Eigen::Vector3d low = Eigen::Vector3d::Zero();  // bounding box as the header states it
+  Eigen::Vector3d high = Eigen::Vector3d::Zero();
+  std::string coordinate_system;  // "EPSG:25832", WKT, or empty
+  std::uint64_t point_position = 0;
+  std::uint32_t record_length = 0;
+};
+
+struct LasPoint {
+  Eigen::Vector3d position;  // in the file's coordinate system
+  float intensity = 0.0F;
+  std::uint8_t classification = 0;
+  double gps_time = 0.0;
+};
+
+// LAS 1.0 to 1.4, point formats 0 to 10. Throws InputError if the header cannot be used.
+[[nodiscard]] LasHeader read_las_header(ByteSource& file);
+
+// Calls `visit` for each point; memory does not depend on their number. Where the points break off
+// there is a warning ("recording.damaged"). Throws InputError if there is not one.
+void read_las_points(ByteSource& file, const LasHeader& header, Log& log,
+                     const std::function<void(const LasPoint&)>& visit);
+
+}  // namespace understory

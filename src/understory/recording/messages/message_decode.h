@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+#include "understory/recording/messages/field_type.h"
+#include "understory/recording/messages/message_reader.h"
+#include "understory/sensor/gnss_fix.h"
+#include "understory/sensor/imu_sample.h"
+
+namespace understory {
+
+// The ROS 1 and ROS 2 messages that recordings hold. Each decoder takes any bytes and returns
+// nothing where they are not a whole message of that type. Pure functions.
+
+struct MessageHeader {
+  TimeNs stamp = 0;
+  std::string frame;
+};
+
+struct CloudField {
+  std::string name;
+  std::uint32_t offset = 0;
+  FieldType type = FieldType::kFloat32;
+  std::uint32_t count = 1;
+};
+
+struct PointCloud2Message {
+  MessageHeader header;
+  std::uint32_t height = 0;
+  std::uint32_t width = 0;
+  std::vector<CloudField> fields;
+  bool big_endian = false;
+  std::uint32_t point_step = 0;
+  std::uint32_t row_step = 0;
+  ByteSpan data;  // part of the message's bytes
+};
+
+struct ImuMessage {
+  MessageHeader header;
+  ImuSample sample;
+};
+
+struct MagMessage {
+  MessageHeader header;
+  MagSample sample;
+};
+
+struct GnssMessage {
+  MessageHeader header;
+  GnssFix fix;
+};
+
+struct TransformMessage {
+  TimeNs stamp = 0;
+  std::string parent;
+  std::string child;
+  Pose parent_from_child;
+};
+
+// velodyne_msgs/VelodyneScan and nebula_msgs/NebulaPackets: packets as the sensor sent them.
+struct SensorPacket {
+  TimeNs stamp = 0;
+  ByteSpan data;
+};
+
+struct PacketsMessage {
+  MessageHeader header;
+  std::vector<SensorPacket> packets;
+};
+
+[[nodiscard]] std::optional<PointCloud2Message> decode_point_cloud2(MessageReader reader);
+[[nodiscard]] std::optional<ImuMessage> decode_imu(MessageReader reader);
+[[nodiscard]] std::optional<MagMessage> decode_magnetic_field(MessageReader reader);
+[[nodiscard]] std::optional<GnssMessage> decode_nav_sat_fix(MessageReader reader);
+[[nodiscard]] std::optional<GnssMessage> decode_gps_fix(MessageReader reader);
+[[nodiscard]] std::optional<std::vector<TransformMessage>> decode_transforms(MessageReader reader);
+[[nodiscard]] std::optional<PacketsMessage> decode_velodyne_scan(MessageReader reader);
+[[nodiscard]] std::optional<PacketsMessage> decode_nebula_packets(MessageReader reader);
+
+}  // namespace understory

@@ -1,0 +1,488 @@
+#include "understory/recording/messages/message_recording.h"
+
+#include <cmath>
+#include <deque>
+#include <map>
+#include <utility>
+
+#include "understory/recording/extrinsics.h"
+#include "understory/recording/finding.h"
+#include "understory/recording/messages/arrival_times.h"
+#include "understory/recording/messages/event_bytes.h"
+#include "understory/recording/messages/fix_joiner.h"
+#include "understory/recording/messages/message_decode.h"
+#include "understory/recording/messages/message_survey.h"
+#include "understory/recording/messages/packet_topic.h"
+#include "understory/recording/messages/point_cloud.h"
+#include "understory/recording/messages/topic_statistics.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr double kGravity = 9.80665;
+constexpr double kSamePlaceM = 0.001;
+constexpr double kSameAngle = 0.001;
+
+// ROS 1 drivers wrote "/velodyne" and "velodyne" alike.
+std::string_view bare_frame(std::string_view frame) {
+  while (!frame.empty() && frame.front() == '/')
+    frame.remove_prefix(1);
+  return frame;
+}
+
+class MessageRecording : public Recording, public ArrivalTimes {
+ public:
+  MessageRecording(std::string file, const MessageSourceFactory& open, const OpenOptions& options,
+                   Log& log)
+      : file_(std::move(file)), log_(log), extrinsics_file_(options.extrinsics_file) {
+    Log quiet;  // the same damage will be met again when reading
+    const auto ahead = open(quiet);
+    survey_ = survey_messages(*ahead);
+    survey_late_topics(*ahead, options, survey_);
+    choice_ = choose_topics(survey_, options, file_, log_);
+    if (!choice_.quality.empty()) fixes_.expect_quality();
+    for (const TopicSurvey& topic : survey_.topics)
+      frame_of_topic_[topic.topic] = topic.frame;
+    source_ = open(log_);
+    note_frames();
+    make_rig(ahead->sensor_metadata());
+    if (lacks_place() && survey_late_transforms(*ahead, survey_)) place_sensors();
+    warn_of_missing_place();
+    judge_lidar();
+    judge_imu();
+    survey_.topics.clear();
+  }
+
+  std::optional<Event> next() override {
+    RawMessage message;
+    while (events_.empty() && !ended_) {
+      if (!source_->next(message)) {
+        ended_ = true;
+        fixes_.flush(events_);
+        if (packets_) packets_->finish(events_);
+        break;
+      }
+      fixes_.pass_time(message.log_time, events_);
+      take(message);
+      last_log_time_ = message.log_time;
+    }
+    if (events_.empty()) return std::nullopt;
+    Event event = std::move(events_.front());
+    events_.pop_front();
+    scan_given_ = scan_given_ || std::holds_alternative<ScanPtr>(event);
+    return event;
+  }
+
+  [[nodiscard]] bool save(BinaryWriter& writer) const override {
+    source_->save(writer);
+    survey_.transforms.save(writer);
+    put_strings(writer, frame_of_topic_);
+    for (const std::string& text : {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality,
+                                    frames_.lidar, frames_.imu, frames_.gnss, imu_text_})
+      writer.put(text);
+    put_rig(writer, rig_);
+    writer.put(scan_given_);
+    writer.put(convention_.has_value());
+    if (convention_) put_convention(writer, *convention_);
+    writer.put(ring_count_);
+    writer.put(imu_scale_);
+    writer.put(static_cast<std::uint64_t>(topics_.size()));
+    for (const auto& [name, statistics] : topics_)
+      statistics.save(writer);
+    put_events(writer, events_);
+    fixes_.save(writer);
+    writer.put(packets_ != nullptr);
+    if (packets_) packets_->save(writer);
+    writer.put(ended_);
+    return true;
+  }
+
+  void load(BinaryReader& reader) override {
+    source_->load(reader);
+    survey_.transforms.load(reader);
+    frame_of_topic_ = get_strings(reader);
+    for (std::string* text : {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality,
+                              &frames_.lidar, &frames_.imu, &frames_.gnss, &imu_text_})
+      *text = reader.get_string();
+    rig_ = get_rig(reader);
+    scan_given_ = reader.get<bool>();
+    convention_.reset();
+    if (reader.get<bool>()) convention_ = get_convention(reader);
+    ring_count_ = reader.get<int>();
+    imu_scale_ = reader.get<double>();
+    topics_.clear();
+    for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+      TopicStatistics statistics;
+      statistics.load(reader);
+      topics_.emplace(statistics.report().name, std::move(statistics));
+    }
+    get_events(reader, events_);
+    fixes_.load(reader);
+    if (reader.get<bool>()) packets().load(reader);
+    ended_ = reader.get<bool>();
+  }
+
+  [[nodiscard]] const Rig& rig() const override { return rig_; }
+  [[nodiscard]] std::vector<TopicReport> topics() const override {
+    std::vector<TopicReport> reports;
+    for (const auto& [name, statistics] : topics_)
+      reports.push_back(statistics.report());
+    return reports;
+  }
+  [[nodiscard]] std::string format() const override { return source_->format(); }
+  [[nodiscard]] double progress() const override { return source_->progress(); }
+  [[nodiscard]] std::optional<TimeNs> arrival() const override { return last_log_time_; }
+
+ private:
+  void note_frames() {
+    const auto frame_of = [&](const std::string& topic) {
+      const TopicSurvey* found = survey_.find(topic);
+      return found == nullptr ? std::string() : found->frame;
+    };
+    frames_ = {frame_of(choice_.lidar), frame_of(choice_.imu), frame_of(choice_.gnss)};
+  }
+
+  void make_rig(const std::map<std::string, std::string>& metadata) {
+    const auto model = metadata.find("lidar_model");
+    if (model != metadata.end()) rig_.lidar_model = model->second;
+    const auto rings = metadata.find("ring_count");
+    if (rings != metadata.end()) ring_count_ = std::atoi(rings->second.substr(0, 6).c_str());
+    place_sensors();
+  }
+
+  // The rig by what is known of frames and transforms. Once a scan has been given the body stays
+  // what it is, and only the places of other sensors are added. True if there was anything new.
+  bool place_sensors() {
+    if (scan_given_)
+      return extrinsics_file_.empty() && complete_rig(survey_.transforms, frames_, rig_);
+    const bool had_imu = rig_.body_from_imu.has_value();
+    const std::string model = rig_.lidar_model;
+    rig_ = rig_from_transforms(survey_.transforms, frames_);
+    rig_.lidar_model = model;
+    apply_extrinsics();
+    return !had_imu && rig_.body_from_imu;
+  }
+
+  // The file speaks of the recording's body by its frame or by the sensor's kind.
+  void apply_extrinsics() {
+    if (extrinsics_file_.empty()) return;
+    const std::string own = rig_.body_frame == "imu"     ? frames_.imu
+                            : rig_.body_frame == "lidar" ? frames_.lidar
+                                                         : rig_.body_frame;
+    Log unheard;
+    apply_extrinsics_file(extrinsics_file_, {own}, rig_, extrinsics_told_ ? unheard : log_);
+    extrinsics_told_ = true;
+  }
+
+  [[nodiscard]] bool lacks_place() const {
+    return (!frames_.imu.empty() && !rig_.body_from_imu) ||
+           (!frames_.gnss.empty() && !rig_.body_from_gnss);
+  }
+
+  void warn_of_missing_place() {
+    if (choice_.imu.empty() || choice_.lidar.empty() || rig_.body_from_imu) return;
+    log_.warn("recording.no_imu_extrinsics",
+              file_ + ": nothing tells where the IMU (" + frames_.imu +
+                  ") sits relative to the lidar (" + frames_.lidar +
+                  "): it is not used until a transform comes that does; give --extrinsics FILE");
+  }
+
+  // A sensor that begins later than the start of the recording was looked at.
+  void note_frame(std::string& known, const std::string& frame) {
+    if (!known.empty() || frame.empty()) return;
+    known = frame;
+    place_sensors();
+    if (&known == &frames_.imu) warn_of_missing_place();
+  }
+
+  void judge_lidar() {
+    const TopicSurvey* lidar = survey_.find(choice_.lidar);
+    if (lidar == nullptr || lidar->role != TopicRole::kCloud) return;
+    const TopicSurvey* imu = survey_.find(choice_.imu);
+    const auto clouds = lidar->clouds.find(lidar->frame);
+    if (clouds == lidar->clouds.end()) return;
+    set_convention(detect_point_times(lidar->time_field, lidar->time_type, clouds->second,
+                                      imu == nullptr ? std::vector<TimeNs>() : imu->delays));
+  }
+
+  void set_convention(TimeConvention convention) {
+    convention_ = std::move(convention);
+    if (convention_->warning.empty()) return;
+    const bool missing = convention_->kind == TimeConvention::Kind::kNone;
+    log_.warn(missing ? key_of(Finding::kNoPointTimes) : "recording.point_times",
+              file_ + ": " + choice_.lidar + ": " + convention_->warning);
+  }
+
+  // Sensors that give multiples of gravity instead of m/s^2 are told by the mean over two seconds,
+  // which no carrier keeps at a tenth of gravity.
+  void judge_imu() {
+    const TopicSurvey* imu = survey_.find(choice_.imu);
+    if (imu == nullptr || imu->late) {
+      imu_text_.clear();
+      return;
+    }
+    if (imu->delays.size() < 20) return;
+    const double mean = imu->specific_force_sum / static_cast<double>(imu->delays.size());
+    imu_text_ = "m/s^2, rad/s";
+    if (mean < 0.5 || mean > 2.0) return;
+    take_imu_in_g();
+  }
+
+  // One that begins later is judged by its first sample.
+  void judge_late_imu(const ImuSample& first) {
+    const double force = first.specific_force.norm();
+    imu_text_ = "m/s^2, rad/s";
+    if (force > 0.5 && force < 2.0) take_imu_in_g();
+  }
+
+  void take_imu_in_g() {
+    imu_scale_ = kGravity;
+    imu_text_ = "accelerations in g, converted to m/s^2; rad/s";
+    log_.warn("imu.in_g", file_ + ": " + choice_.imu +
+                              ": the accelerations are in g; converted to m/s^2 (x 9.80665)");
+  }
+
+  void take(const RawMessage& message) {
+    const TopicRole role = role_of(*message.channel);
+    TopicStatistics& topic = statistics_of(*message.channel, role);
+    if (!is_chosen(message.channel->topic, role)) {
+      topic.add_stamp(message.log_time);
+      return;
+    }
+    const MessageReader reader(message.data, message.channel->serialization);
+    bool decoded = true;
+    switch (role) {
+      case TopicRole::kCloud:
+        decoded = take_cloud(topic, reader, message.log_time);
+        break;
+      case TopicRole::kVelodynePackets:
+        decoded = take_packets(topic, decode_velodyne_scan(reader));
+        break;
+      case TopicRole::kNebulaPackets:
+        decoded = take_packets(topic, decode_nebula_packets(reader));
+        break;
+      case TopicRole::kImu:
+        decoded = take_imu(topic, reader);
+        break;
+      case TopicRole::kMag:
+        decoded = take_mag(topic, reader);
+        break;
+      case TopicRole::kNavSatFix:
+      case TopicRole::kGpsFix:
+        decoded = take_gnss(topic, role, message, reader);
+        break;
+      case TopicRole::kTransforms:
+        decoded = take_transforms(topic, reader, message.log_time);
+        break;
+      default:
+        break;
+    }
+    if (decoded) return;
+    ++topic.report().unreadable;
+    log_.warn("recording.unreadable_message",
+              file_ + ": " + message.channel->topic + ": a message of " +
+                  std::to_string(message.data.size()) + " bytes is no whole " +
+                  message.channel->type + "; passed over");
+  }
+
+  // The first message of a kind that the first seconds did not have makes its topic the one used.
+  bool is_chosen(const std::string& topic, TopicRole role) {
+    const auto adopt = [&](std::string& chosen) {
+      if (chosen.empty()) chosen = topic;
+      return chosen == topic;
+    };
+    switch (role) {
+      case TopicRole::kCloud:
+      case TopicRole::kVelodynePackets:
+      case TopicRole::kNebulaPackets:
+        return adopt(choice_.lidar);
+      case TopicRole::kImu:
+        return adopt(choice_.imu);
+      case TopicRole::kNavSatFix:
+        return adopt(choice_.gnss);
+      case TopicRole::kGpsFix:
+        return choice_.gnss.empty() || choice_.gnss == topic ? adopt(choice_.gnss)
+                                                             : adopt(choice_.quality);
+      case TopicRole::kMag:
+      case TopicRole::kTransforms:
+        return true;
+      default:
+        return false;
+    }
+  }
+
+  TopicStatistics& statistics_of(const MessageChannel& channel, TopicRole role) {
+    const auto found = topics_.find(channel.topic);
+    if (found != topics_.end()) return found->second;
+    TopicReport report;
+    report.name = channel.topic;
+    report.type = channel.type;
+    report.role = is_chosen(channel.topic, role) ? role_name(role) : "ignored";
+    return topics_.emplace(channel.topic, TopicStatistics(report)).first->second;
+  }
+
+  // Whether a message comes from another sensor on the same topic, by its frame. There is one place
+  // for one lidar and one IMU: what comes from a second would be taken to come from there. Frames
+  // that /tf_static puts into the same place are one.
+  bool is_of_another(TopicStatistics& topic, const std::string& frame, const char* what) {
+    std::string& own = frame_of_topic_[topic.report().name];
+    if (own.empty()) own = frame;
+    if (frame.empty() || bare_frame(frame) == bare_frame(own)) return false;
+    const auto own_from_frame = survey_.transforms.find(own, frame);
+    if (own_from_frame && own_from_frame->translation().norm() < kSamePlaceM &&
+        own_from_frame->angle() < kSameAngle)
+      return false;
+    ++topic.report().left_out;
+    report_finding(log_, Finding::kOtherSensor,
+                   file_ + ": " + topic.report().name + ": holds " + what +
+                       " of two sensors (frames " + own + " and " + frame + "); those of " + frame +
+                       " are left out: record each sensor on a topic of its own");
+    return true;
+  }
+
+  bool take_cloud(TopicStatistics& topic, const MessageReader& reader, TimeNs log_time) {
+    const auto cloud = decode_point_cloud2(reader);
+    if (!cloud) return false;
+    if (is_of_another(topic, cloud->header.frame, "clouds")) return true;
+    const auto layout = CloudLayout::find(*cloud);
+    if (!layout) return false;
+    if (!convention_)
+      set_convention(detect_point_times(layout->time_field(), layout->time_type(),
+                                        {measure_times(*cloud, *layout, log_time)}, {}));
+    ConvertedCloud converted = convert_cloud(*cloud, *layout, *convention_);
+    ring_count_ = std::max(ring_count_, converted.scan->ring_count);
+    converted.scan->ring_count = ring_count_;
+    if (converted.bad_times > 0)
+      log_.warn("recording.bad_point_times",
+                file_ + ": " + topic.report().name + ": " + std::to_string(converted.bad_times) +
+                    " points of the scan at " + format_seconds(converted.scan->stamp) +
+                    " have impossible times; dropped");
+    topic.add_stamp(cloud->header.stamp);
+    topic.report().frame = cloud->header.frame;
+    note_frame(frames_.lidar, cloud->header.frame);
+    topic.report().conventions = convention_->text;
+    topic.report().points += converted.scan->points.size();
+    topic.report().empty_points += converted.without_return;
+    events_.emplace_back(ScanPtr(std::move(converted.scan)));
+    return true;
+  }
+
+  // The clouds that go with packets: the ROS 1 driver's calibration has the beams' vertical
+  // offsets, that of nebula for ROS 2 has not.
+  PacketTopic& packets() {
+    if (!packets_) {
+      VelodyneConfig config;
+      config.vertical_offsets = source_->format().rfind("ROS 1", 0) == 0;
+      packets_ = std::make_unique<PacketTopic>(config, file_ + " " + choice_.lidar, log_);
+    }
+    return *packets_;
+  }
+
+  bool take_packets(TopicStatistics& topic, const std::optional<PacketsMessage>& message) {
+    if (!message) return false;
+    if (is_of_another(topic, message->header.frame, "packets")) return true;
+    topic.add_stamp(message->header.stamp);
+    topic.report().frame = message->header.frame;
+    note_frame(frames_.lidar, message->header.frame);
+    topic.report().points += packets().add(*message, events_);
+    topic.report().conventions = packets_->conventions();
+    if (rig_.lidar_model.empty()) rig_.lidar_model = packets_->model();
+    return true;
+  }
+
+  bool take_imu(TopicStatistics& topic, const MessageReader& reader) {
+    auto imu = decode_imu(reader);
+    if (!imu) return false;
+    if (is_of_another(topic, imu->header.frame, "samples")) return true;
+    topic.add_stamp(imu->sample.stamp);
+    topic.report().frame = imu->header.frame;
+    if (imu_text_.empty()) judge_late_imu(imu->sample);
+    note_frame(frames_.imu, imu->header.frame);
+    topic.report().conventions = imu_text_ + (imu->sample.orientation ? "; with orientation" : "");
+    if (!imu->sample.specific_force.allFinite() || !imu->sample.angular_rate.allFinite()) {
+      log_.warn("imu.not_finite", file_ + ": " + topic.report().name + ": a sample at " +
+                                      format_seconds(imu->sample.stamp) +
+                                      " is not finite; dropped");
+      return true;
+    }
+    imu->sample.specific_force *= imu_scale_;
+    events_.emplace_back(imu->sample);
+    return true;
+  }
+
+  // Transforms of the first seconds are known already; what comes later is used from then on.
+  bool take_transforms(TopicStatistics& topic, const MessageReader& reader, TimeNs log_time) {
+    const auto transforms = decode_transforms(reader);
+    if (!transforms) return false;
+    topic.add_stamp(log_time);
+    for (const TransformMessage& each : *transforms) {
+      if (!survey_.transforms.add(each.parent, each.child, each.parent_from_child)) continue;
+      if (!place_sensors()) continue;
+      log_.warn("recording.late_extrinsics",
+                file_ + ": where " + each.child + " sits on " + each.parent + " is told only at " +
+                    format_seconds(log_time) + " s: sensors that hang on it are used from then on");
+    }
+    return true;
+  }
+
+  bool take_mag(TopicStatistics& topic, const MessageReader& reader) {
+    const auto mag = decode_magnetic_field(reader);
+    if (!mag) return false;
+    topic.add_stamp(mag->sample.stamp);
+    topic.report().frame = mag->header.frame;
+    topic.report().conventions = "tesla";
+    if (mag->sample.field.allFinite()) events_.emplace_back(mag->sample);
+    return true;
+  }
+
+  bool take_gnss(TopicStatistics& topic, TopicRole role, const RawMessage& message,
+                 const MessageReader& reader) {
+    const auto gnss =
+        role == TopicRole::kGpsFix ? decode_gps_fix(reader) : decode_nav_sat_fix(reader);
+    if (!gnss) return false;
+    topic.add_stamp(gnss->fix.stamp);
+    topic.report().frame = gnss->header.frame;
+    topic.report().conventions = "WGS 84, height above the ellipsoid";
+    if (role == TopicRole::kGpsFix && message.channel->topic != choice_.gnss) {
+      topic.report().conventions = "quality of the fixes";
+      fixes_.expect_quality();
+      fixes_.add_quality(gnss->fix, events_);
+    } else {
+      note_frame(frames_.gnss, gnss->header.frame);
+      fixes_.add_position(gnss->fix, message.log_time, events_);
+    }
+    return true;
+  }
+
+  std::string file_;
+  Log& log_;
+  MessageSurvey survey_;
+  TopicChoice choice_;
+  std::map<std::string, std::string> frame_of_topic_;  // of the sensor that is used
+  std::unique_ptr<MessageSource> source_;
+  SensorFrames frames_;
+  std::string extrinsics_file_;
+  Rig rig_;
+  bool scan_given_ = false;
+  bool extrinsics_told_ = false;  // what the file leaves open has been warned of
+  std::optional<TimeConvention> convention_;
+  int ring_count_ = 0;
+  double imu_scale_ = 1.0;
+  std::string imu_text_ = "m/s^2, rad/s (assumed)";
+  std::map<std::string, TopicStatistics> topics_;
+  std::deque<Event> events_;
+  std::optional<TimeNs> last_log_time_;  // of the message that the waiting events came with
+  FixJoiner fixes_;
+  std::unique_ptr<PacketTopic> packets_;
+  bool ended_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Recording> open_messages(const std::string& file, const MessageSourceFactory& open,
+                                         const OpenOptions& options, Log& log) {
+  return std::make_unique<MessageRecording>(file, open, options, log);
+}
+
+}  // namespace understory

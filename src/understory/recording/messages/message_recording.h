@@ -1,0 +1,19 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "understory/recording/messages/message_source.h"
+#include "understory/recording/recording.h"
+
+namespace understory {
+
+// A recording made of ROS messages in any container. Looks at the first seconds to find the topics,
+// the conventions of the points' times, the unit of the accelerometer and the extrinsics, then
+// reads from the start. `file` is for messages; the log must outlive the recording. Throws as
+// open_recording does.
+[[nodiscard]] std::unique_ptr<Recording> open_messages(const std::string& file,
+                                                       const MessageSourceFactory& open,
+                                                       const OpenOptions& options, Log& log);
+
+}  // namespace understory

@@ -1,0 +1,113 @@
+#include "understory/registration/icp/icp.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "understory/registration/test_stand.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+using testing::make_stand;
+using testing::scan_stand;
+
+testing::Pattern small_os0() {
+  testing::Pattern pattern = testing::os0_128();
+  pattern.rings = 64;
+  pattern.columns = 512;
+  return pattern;
+}
+
+Pose upright(double x, double y, double z, double yaw = 0.0) {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
+          Eigen::Vector3d(x, y, z)};
+}
+
+// The first point in each cube of 0.25 m.
+Points thin(const Points& points) {
+  std::set<std::array<int, 3>> seen;
+  Points kept;
+  for (const Eigen::Vector3f& p : points) {
+    const auto cube = [](float v) { return static_cast<int>(std::floor(v / 0.25F)); };
+    if (seen.insert({cube(p.x()), cube(p.y()), cube(p.z())}).second) kept.push_back(p);
+  }
+  return kept;
+}
+
+struct Pair {
+  Points target;
+  Points source;
+  Pose truth;  // target_from_source
+};
+
+Pair make_pair(std::uint64_t seed) {
+  const testing::Stand stand = make_stand({.half_width_m = 20.0, .crowns = false}, seed);
+  const Pose a = upright(0, 0, 1.6);
+  const Pose b = upright(0.3, 0.1, 1.65, 0.04);
+  return {thin(scan_stand(stand, a, small_os0(), 1)), thin(scan_stand(stand, b, small_os0(), 2)),
+          a.inverse() * b};
+}
+
+TEST(Icp, RecoversKnownMotionsWithBothMetrics) {
+  const Pair pair = make_pair(3);
+  const Pose guess =
+      pair.truth * Pose::exp((Vector6d() << 0.01, -0.01, 0.02, 0.1, -0.1, 0.05).finished());
+  for (const auto metric : {IcpConfig::Metric::kPointToPlane, IcpConfig::Metric::kPointToPoint}) {
+    IcpConfig config;
+    config.metric = metric;
+    const bool planes = metric == IcpConfig::Metric::kPointToPlane;
+    const IcpTarget target(pair.target, config);
+    const RegistrationResult result =
+        register_icp(target, pair.source, guess, std::nullopt, config);
+    EXPECT_TRUE(result.usable());
+    const Vector6d d = right_difference(result.target_from_source, pair.truth);
+    EXPECT_LT(d.tail<3>().norm(), planes ? 0.025 : 0.05);
+    EXPECT_LT(d.head<3>().norm(), planes ? 0.002 : 0.005);
+    EXPECT_GT(result.inlier_ratio, 0.8);
+    EXPECT_GT(result.information(5, 5), 0.0);
+  }
+}
+
+TEST(Icp, FlatGroundIsUndetermined) {
+  const testing::Stand flat;
+  const Pose a = upright(0, 0, 2.0);
+  const IcpConfig config;
+  const IcpTarget target(thin(scan_stand(flat, a, small_os0(), 1)), config);
+  const RegistrationResult result =
+      register_icp(target, thin(scan_stand(flat, a, small_os0(), 2)), Pose(), std::nullopt, config);
+  ASSERT_TRUE(result.usable());
+  EXPECT_EQ(result.degenerate_directions.cols(), 3);
+}
+
+TEST(Icp, SaysWhyItCannot) {
+  const Pair pair = make_pair(4);
+  const IcpConfig config;
+  const IcpTarget target(pair.target, config);
+  EXPECT_EQ(register_icp(target, Points(5), Pose(), std::nullopt, config).status,
+            RegistrationStatus::kTooFewPoints);
+  EXPECT_EQ(register_icp(IcpTarget({}, config), pair.source, Pose(), std::nullopt, config).status,
+            RegistrationStatus::kTooFewPoints);
+  EXPECT_EQ(register_icp(target, pair.source, upright(300, 0, 0), std::nullopt, config).status,
+            RegistrationStatus::kTooFewMatches);
+}
+
+TEST(Icp, SameBitsForAnyNumberOfThreads) {
+  const Pair pair = make_pair(5);
+  RegistrationResult results[2];
+  for (int i = 0; i < 2; ++i) {
+    with_threads(i + 1, [&] {
+      const IcpConfig config;
+      results[i] =
+          register_icp(IcpTarget(pair.target, config), pair.source, Pose(), std::nullopt, config);
+    });
+  }
+  EXPECT_EQ(results[0].target_from_source.matrix(), results[1].target_from_source.matrix());
+  EXPECT_EQ(results[0].information, results[1].information);
+}
+
+}  // namespace
+}  // namespace understory

@@ -1,0 +1,114 @@
+#include "understory/registration/ndt/ndt.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "understory/registration/judged_match.h"
+#include "understory/util/error.h"
+
+namespace understory {
+
+void describe(ConfigTable& table, NdtConfig& config) {
+  using Search = NdtConfig::Search;
+  table.add_enum("search", config.search,
+                 {{"1", Search::k1}, {"7", Search::k7}, {"8", Search::k8}, {"27", Search::k27}},
+                 "cells looked at for a point: its own, with face neighbours, the 8 around it "
+                 "(weighted by nearness), or all 27");
+  table.add_enum(
+      "hessian", config.hessian,
+      {{"gauss_newton", NdtConfig::Hessian::kGaussNewton}, {"newton", NdtConfig::Hessian::kNewton}},
+      "curvature used for the steps");
+  table.add("outlier_ratio", config.outlier_ratio, {0.01, 0.95}, "",
+            "share of points expected to match nothing");
+  table.add("max_iterations", config.max_iterations, {1, 1000}, "", "most steps of one match");
+  table.add("step_translation_m", config.step_translation_m, {1e-7, 0.1}, "m",
+            "converged when a step is shorter");
+  table.add("step_rotation_rad", config.step_rotation_rad, {1e-8, 0.1}, "rad",
+            "converged when a step turns less");
+  table.add("widening", config.widening, {1.0, 20.0}, "",
+            "the first steps see normals this much wider; 1 = no such steps");
+  table.add("wide_until_m", config.wide_until_m, {1e-4, 1.0}, "m",
+            "the first steps end when one is shorter");
+  table.add("max_step_m", config.max_step_m, {0.01, 10.0}, "m", "longest step");
+  table.add("degenerate_ratio", config.degenerate_ratio, {0.0, 0.5}, "",
+            "a direction with less of the strongest direction's information is undetermined");
+  table.add("min_matches", config.min_matches, {6, 100000}, "",
+            "fewer matched points are no match");
+  table.add("independent_share", config.independent_share, {1e-4, 1.0}, "",
+            "share of matched points that counts as independent");
+}
+
+// The wide steps only look for where the last ones begin: a part of a dense scan is enough.
+constexpr std::size_t kEnoughForWideSteps = 8000;
+constexpr std::size_t kWideEvery = 4;
+
+RegistrationResult register_ndt(const NdtMap& target, const Points& source, const Pose& guess,
+                                const std::optional<PosePrior>& prior, const NdtConfig& config) {
+  if (target.empty())
+    return internal::refused(RegistrationStatus::kTooFewPoints, "empty target", guess);
+  if (source.size() < static_cast<std::size_t>(config.min_matches)) {
+    return internal::refused(RegistrationStatus::kTooFewPoints,
+                             "only " + std::to_string(source.size()) + " source points", guess);
+  }
+  const double range = internal::mean_range(source);
+  double widening = config.widening;
+  MatchSums sums;
+  Pose summed_at;
+  const Points few = thin_evenly(source, kEnoughForWideSteps, kWideEvery);
+  const auto evaluate = [&](const Pose& pose) {
+    sums = ndt_cost(target, widening > 1.0 ? few : source, pose, config, widening);
+    summed_at = pose;
+    const double share = config.independent_share;
+    internal::Quadratic sum{share * sums.cost, share * sums.gradient, share * sums.hessian};
+    if (prior) internal::add_prior(*prior, pose, sum);
+    return sum;
+  };
+  internal::StepLimits limits{config.max_iterations, config.step_translation_m,
+                              config.step_rotation_rad, config.max_step_m, range};
+  internal::Minimum minimum{guess, {}, 0, false};
+  // From far away a narrow normal has no pull: wide ones first, until the steps become short.
+  int wide_iterations = 0;
+  limits.step_translation_m = config.wide_until_m;
+  limits.step_rotation_rad = config.wide_until_m / range;
+  limits.trust_last_step = true;
+  for (; widening > 1.0; widening *= 0.5) {
+    minimum = internal::minimise(evaluate, minimum.pose, limits);
+    wide_iterations += minimum.iterations;
+  }
+  widening = 1.0;
+  limits.step_translation_m = config.step_translation_m;
+  limits.step_rotation_rad = config.step_rotation_rad;
+  limits.trust_last_step = false;
+  minimum = internal::minimise(evaluate, minimum.pose, limits);
+  minimum.iterations += wide_iterations;
+
+  const bool exact = config.hessian == NdtConfig::Hessian::kNewton;
+  if (exact || summed_at.matrix() != minimum.pose.matrix()) {
+    NdtConfig plain = config;  // information has to be positive
+    plain.hessian = NdtConfig::Hessian::kGaussNewton;
+    sums = ndt_cost(target, source, minimum.pose, plain);
+  }
+  return internal::judged_match(minimum, sums, source, range, guess, internal::Judgement(config));
+}
+
+RegistrationResult register_ndt(std::span<const NdtMapPtr> targets, const Points& source,
+                                const Pose& guess, const std::optional<PosePrior>& prior,
+                                const NdtConfig& config) {
+  UNDERSTORY_CHECK(!targets.empty());
+  RegistrationResult result;
+  Pose start = guess;
+  int iterations = 0;
+  for (const NdtMapPtr& target : targets) {
+    result = register_ndt(*target, source, start, prior, config);
+    iterations += result.iterations;
+    if (!result.usable()) {
+      result.target_from_source = guess;
+      break;
+    }
+    start = result.target_from_source;
+  }
+  result.iterations = iterations;
+  return result;
+}
+
+}  // namespace understory

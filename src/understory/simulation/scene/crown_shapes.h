@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "understory/simulation/scene/shapes.h"
+
+namespace understory {
+
+// A grown crown and the size that it was grown for.
+struct GrownCrown {
+  Species species = Species::kPine;
+  CrownSize size;
+  Shape living;
+  Shape dead;  // branches below the crown: a slim thing, looked into far less often
+};
+
+// What the trees and plants of a stand are instances of: for each species five heights of crown
+// that begin at four heights each; three variants of each kind of plant, kind by kind.
+struct GrownShapes {
+  std::vector<GrownCrown> crowns;
+  std::vector<Shape> plants;
+};
+[[nodiscard]] GrownShapes grow_shapes(const StandConfig& config, std::uint64_t seed);
+
+// The crown that resembles a tree's most: in height, then in where it begins.
+[[nodiscard]] std::size_t nearest_crown(const std::vector<GrownCrown>& crowns,
+                                        const GrownTree& tree);
+
+}  // namespace understory

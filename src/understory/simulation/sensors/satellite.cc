@@ -1,0 +1,184 @@
+#include "understory/simulation/sensors/satellite.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace understory {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kSemiMajor = 6378137.0;
+constexpr double kFlattening = 1.0 / 298.257223563;
+constexpr double kEccentricity2 = kFlattening * (2.0 - kFlattening);
+constexpr double kFastSeconds = 2.0;  // correlation of the fast error
+
+Eigen::Vector3d ecef(double latitude, double longitude, double height) {
+  const double s = std::sin(latitude);
+  const double n = kSemiMajor / std::sqrt(1.0 - kEccentricity2 * s * s);
+  return {(n + height) * std::cos(latitude) * std::cos(longitude),
+          (n + height) * std::cos(latitude) * std::sin(longitude),
+          (n * (1.0 - kEccentricity2) + height) * s};
+}
+
+Eigen::Vector3d normal3(CounterNoise& noise) {
+  const double x = noise.normal();
+  const double y = noise.normal();
+  const double z = noise.normal();
+  return {x, y, z};
+}
+
+}  // namespace
+
+Eigen::Vector3d geodetic_from_enu(const OriginConfig& origin, const Eigen::Vector3d& point) {
+  const double lat = origin.latitude_deg * kDegree;
+  const double lon = origin.longitude_deg * kDegree;
+  const Eigen::Vector3d east(-std::sin(lon), std::cos(lon), 0.0);
+  const Eigen::Vector3d up(std::cos(lat) * std::cos(lon), std::cos(lat) * std::sin(lon),
+                           std::sin(lat));
+  const Eigen::Vector3d north = up.cross(east);
+  const Eigen::Vector3d p =
+      ecef(lat, lon, origin.height_m) + point.x() * east + point.y() * north + point.z() * up;
+  const double plane = std::hypot(p.x(), p.y());
+  // Bowring's start and a few fixed-point steps: exact to a nanometre near the ground.
+  double latitude = std::atan2(p.z(), plane * (1.0 - kEccentricity2));
+  double height = 0.0;
+  for (int i = 0; i < 6; ++i) {
+    const double s = std::sin(latitude);
+    const double n = kSemiMajor / std::sqrt(1.0 - kEccentricity2 * s * s);
+    height = plane * std::cos(latitude) + p.z() * s - n * (1.0 - kEccentricity2 * s * s);
+    latitude = std::atan2(p.z(), plane * (1.0 - kEccentricity2 * n / (n + height)));
+  }
+  return {latitude / kDegree, std::atan2(p.y(), p.x()) / kDegree, height};
+}
+
+SatelliteReceiver::SatelliteReceiver(const SiteConfig& config, const CarrierPath& path,
+                                     const ForestScene& scene, TimeNs start)
+    : config_(config.gnss),
+      hold_(config.receiver_hold),
+      origin_(config.origin),
+      path_(path),
+      scene_(scene),
+      start_(start),
+      seed_(hash_numbers(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kGnss),
+                         static_cast<std::uint64_t>(config.carrier.strip_road - 1))) {
+  CounterNoise noise(seed_, 0, 1);
+  slow_ = normal3(noise);
+  fast_ = normal3(noise);
+}
+
+TimeNs SatelliteReceiver::next_stamp() const {
+  return start_ +
+         static_cast<TimeNs>(std::llround(static_cast<double>(count_) * 1e9 / config_.rate_hz));
+}
+
+void SatelliteReceiver::walk(double dt_s) {
+  CounterNoise noise(seed_ + 1, static_cast<std::uint64_t>(count_), 0);
+  const double slow = std::exp(-dt_s / config_.correlation_s);
+  const double fast = std::exp(-dt_s / kFastSeconds);
+  slow_ = slow * slow_ + std::sqrt(1.0 - slow * slow) * normal3(noise);
+  fast_ = fast * fast_ + std::sqrt(1.0 - fast * fast) * normal3(noise);
+}
+
+bool SatelliteReceiver::in_outage(double dt_s, CounterNoise& noise) {
+  const double rate = cover_ * cover_ / config_.outage_interval_s;
+  const bool begins = noise.uniform() < rate * dt_s;
+  const double length = -config_.outage_s * std::log(1.0 - noise.uniform());
+  if (outage_left_s_ > 0.0) {
+    outage_left_s_ -= dt_s;
+    return true;
+  }
+  if (begins && count_ > 0) outage_left_s_ = length;  // a recording starts with a fix
+  return outage_left_s_ > 0.0;
+}
+
+// A burst: the solution runs away to one side and comes back. The receiver does not know of it.
+Eigen::Vector3d SatelliteReceiver::burst(double dt_s) {
+  if (config_.burst_interval_s <= 0.0) return Eigen::Vector3d::Zero();
+  CounterNoise noise(seed_ + 3, static_cast<std::uint64_t>(count_), 0);
+  const bool begins = noise.uniform() < cover_ * cover_ * dt_s / config_.burst_interval_s;
+  const double angle = 2.0 * std::numbers::pi * noise.uniform();
+  const double share = 0.7 + 0.6 * noise.uniform();
+  if (burst_left_s_ <= 0.0 && begins) {
+    burst_s_ = share * config_.burst_s;
+    burst_left_s_ = burst_s_;
+    burst_peak_ =
+        share * config_.burst_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), noise.normal());
+  }
+  if (burst_left_s_ <= 0.0) return Eigen::Vector3d::Zero();
+  burst_left_s_ -= dt_s;
+  const double sine = std::sin(std::numbers::pi * std::max(0.0, burst_left_s_) / burst_s_);
+  return sine * sine * burst_peak_;
+}
+
+// The set of satellites changes: the solution steps aside, and stays there until the next change.
+void SatelliteReceiver::jump(double dt_s) {
+  if (config_.jump_interval_s <= 0.0) return;
+  CounterNoise noise(seed_ + 4, static_cast<std::uint64_t>(count_), 0);
+  if (noise.uniform() >= cover_ * cover_ * dt_s / config_.jump_interval_s) return;
+  jump_ = config_.jump_m * normal3(noise);
+  jump_.z() *= config_.height_factor;
+}
+
+// What the receiver reports of its solution.
+Eigen::Vector3d SatelliteReceiver::hold(const Eigen::Vector3d& solution, double speed_m_s) {
+  if (speed_m_s >= hold_.below_m_s) {
+    held_.reset();
+    return solution;
+  }
+  const bool left = held_ && (solution - *held_).head<2>().norm() > hold_.release_m;
+  if (!held_ || left) held_ = solution;
+  return *held_;
+}
+
+std::optional<GnssFix> SatelliteReceiver::next() {
+  const TimeNs stamp = next_stamp();
+  const double dt = 1.0 / config_.rate_hz;
+  const CarrierState state = path_.state(to_seconds(stamp - start_));
+  const Eigen::Vector3d arm(config_.mount_m[0], config_.mount_m[1], config_.mount_m[2]);
+  const Eigen::Vector3d antenna = state.world_from_body * arm;
+  // The sky changes slowly: a fast receiver looks up ten times a second.
+  const auto every = static_cast<std::int64_t>(std::max(1.0, std::floor(config_.rate_hz / 10.0)));
+  if (count_ % every == 0) cover_now_ = scene_.canopy_cover(antenna);
+  const double cover_now = cover_now_;
+  // A receiver's filter forgets slowly: what hides the sky counts for a second or two.
+  cover_ = count_ == 0 ? cover_now : cover_ + std::min(1.0, dt / 1.5) * (cover_now - cover_);
+  CounterNoise noise(seed_ + 2, static_cast<std::uint64_t>(count_), 0);
+  walk(dt);
+  const bool lost = in_outage(dt, noise);
+  jump(dt);
+  const Eigen::Vector3d runaway = burst(dt) + jump_;
+  ++count_;
+
+  const double sd = config_.open_sd_m + config_.canopy_sd_m * cover_ * cover_;
+  error_ = sd * (slow_ + config_.multipath_share * fast_) + config_.white_sd_m * normal3(noise);
+  error_.z() *= config_.height_factor;
+  error_ += runaway;
+  if (lost) return std::nullopt;
+  error_ = hold(antenna + error_, state.velocity.head<2>().norm()) - antenna;
+
+  const Eigen::Vector3d geodetic = geodetic_from_enu(origin_, antenna + error_);
+  GnssFix fix;
+  fix.stamp = stamp;
+  fix.latitude_deg = geodetic.x();
+  fix.longitude_deg = geodetic.y();
+  fix.height_m = geodetic.z();
+  const double reported = std::max(0.01, config_.reported_factor * sd);
+  fix.covariance = Eigen::Vector3d(1.0, 1.0, std::pow(config_.height_factor, 2.0)).asDiagonal();
+  fix.covariance *= reported * reported;
+  fix.quality = 1;
+  fix.satellites = static_cast<int>(std::lround(24.0 - 15.0 * cover_ + noise.normal()));
+  fix.satellites = std::max(4, fix.satellites);
+  fix.hdop = std::max(0.5, 0.65 + 1.3 * cover_ * cover_ + 0.04 * noise.normal());
+  fix.vdop = std::max(0.6, 1.55 * fix.hdop + 0.05 * noise.normal());
+  const Eigen::Vector3d velocity =
+      state.velocity + state.world_from_body.rotation() * state.angular_rate.cross(arm) +
+      (0.03 + 0.12 * cover_) * normal3(noise);
+  fix.track_deg = std::atan2(velocity.x(), velocity.y()) / kDegree;
+  if (fix.track_deg < 0.0) fix.track_deg += 360.0;
+  fix.speed_m_s = velocity.head<2>().norm();
+  return fix;
+}
+
+}  // namespace understory
