@@ -22,6 +22,7 @@ function(understory_layer name)
     add_library(${target} STATIC ${arg_SOURCES})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE understory_own_code ${arg_PRIVATE_LIBRARIES})
+    understory_precompile(${target})
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
@@ -56,6 +57,7 @@ function(understory_test target)
   add_executable(${target} ${arg_SOURCES})
   target_link_libraries(${target} PRIVATE understory_own_code ${arg_LAYERS} ${arg_LIBRARIES}
                                           GTest::gtest_main)
+  understory_precompile(${target})
   target_compile_definitions(${target} PRIVATE
                              UNDERSTORY_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
                              UNDERSTORY_PROGRAM="${PROJECT_BINARY_DIR}/understory")
@@ -94,6 +96,7 @@ function(understory_program target)
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}/src")
   target_link_libraries(${target} PRIVATE understory_own_code understory_flags ${arg_LAYERS}
                                           ${arg_LIBRARIES})
+  understory_precompile(${target})
   target_compile_definitions(${target} PRIVATE UNDERSTORY_VERSION="${PROJECT_VERSION}")
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}")
   install(TARGETS ${target} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")

@@ -14,7 +14,8 @@ import json, os, shlex, sys
 for entry in json.load(open("build-tidy/compile_commands.json")):
     if os.path.relpath(entry["file"]) == sys.argv[1]:
         words = shlex.split(entry["command"])
-        words = words[1:] if os.path.basename(words[0]) == "ccache" else words
+        compiler = next(i for i, w in enumerate(words) if "clang" in os.path.basename(w))
+        words = words[compiler:]  # without ccache before it
         keep = [w for i, w in enumerate(words) if w not in ("-c", "-o") and words[i - 1] != "-o"]
         print("cd " + shlex.quote(entry["directory"]) + " && " + shlex.join(keep + ["-E", "-P"]))
         break

@@ -42,7 +42,7 @@ std::string out_of_range(const std::string& text, const ConfigTable::Range& rang
   return "is " + text + ", expected " + range_text(range) + (unit.empty() ? "" : " " + unit);
 }
 
-std::string quoted(const std::string& text) {
+std::string in_quotes(const std::string& text) {
   YAML::Emitter out;
   out << YAML::DoubleQuoted << text;
   return out.c_str();
@@ -178,7 +178,7 @@ void ConfigTable::add(const std::string& key, std::string& value, const std::str
     value = text;
     return "";
   };
-  add_field({key, "text", "", "", meaning, "", [&value] { return quoted(value); }, set, nullptr});
+  add_field({key, "text", "", "", meaning, "", [&value] { return in_quotes(value); }, set, nullptr});
 }
 
 void ConfigTable::add(const std::string& key, std::vector<double>& value, const std::string& unit,

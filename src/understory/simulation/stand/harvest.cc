@@ -133,11 +133,11 @@ void lay_out_logs(CarrierPlan& plan, const Stand& stand, const Terrain& terrain)
       return Wood{at(low_m), at(high_m), 0.5 * tree.diameter(low_m), 0.5 * tree.diameter(high_m)};
     };
     double low = kStumpHeight;
-    for (std::size_t i = 0; i < harvester.cuts_m.size(); ++i) {
+    for (std::size_t i = 0; i < felling.cuts_m.size(); ++i) {
       const double cut = felling.cut_s(i);
-      const Wood held = piece(cut, low, harvester.cuts_m[i]);
+      const Wood held = piece(cut, low, felling.cuts_m[i]);
       harvest.logs.push_back({cut, cut + kDrop, held, on_ground(held, terrain)});
-      low = harvester.cuts_m[i];
+      low = felling.cuts_m[i];
     }
     // The top falls with the last log, and its branches and those stripped off lie about it.
     const double end = tree.broken_m > 0.0 ? tree.broken_m : tree.height_m;

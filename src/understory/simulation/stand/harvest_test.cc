@@ -157,7 +157,7 @@ TEST(Harvest, TheTreeIsHeldWhereItGrewThenFallsAndIsFedAndShortens) {
     EXPECT_LE(now.stem_from_m, now.crown_from_m + 1e-9);
     fed = now.crown_from_m;
   }
-  EXPECT_NEAR(fed, harvester.cuts_m.back(), 0.05);
+  EXPECT_NEAR(fed, felling.cuts_m.back(), 0.05);
 }
 
 TEST(Harvest, ScansAcrossAFellingAreTheSameForAnyThreadsAndOrder) {

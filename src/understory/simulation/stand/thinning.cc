@@ -133,7 +133,7 @@ void fell_tree(Work& work, Shift& shift, Random& random, double end_s) {
   felling.fall_s = shift.time_s + 1.5;
   felling.level_s = felling.fall_s + 2.2;
   felling.side = -side;
-  harvester.cuts_m = cuts_of(*tree);
+  felling.cuts_m = cuts_of(*tree);
   shift.time_s = felling.level_s;
   shift.jolts_s.push_back(felling.level_s);
   felling.feed_s = felling.level_s + 2.0;
