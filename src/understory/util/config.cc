@@ -178,7 +178,8 @@ void ConfigTable::add(const std::string& key, std::string& value, const std::str
     value = text;
     return "";
   };
-  add_field({key, "text", "", "", meaning, "", [&value] { return in_quotes(value); }, set, nullptr});
+  add_field(
+      {key, "text", "", "", meaning, "", [&value] { return in_quotes(value); }, set, nullptr});
 }
 
 void ConfigTable::add(const std::string& key, std::vector<double>& value, const std::string& unit,
