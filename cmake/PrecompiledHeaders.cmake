@@ -18,7 +18,11 @@ function(understory_precompile target)
     target_precompile_headers(understory_precompiled PRIVATE ${understory_shared_headers})
     target_compile_options(understory_precompiled PRIVATE -fpch-preprocess)
   endif()
-  # -fPIC: the compiler wants one kind of code for all users of the headers; CMake gives programs -fPIE.
-  target_compile_options(${target} PRIVATE -fpch-preprocess -fPIC)
+  target_compile_options(${target} PRIVATE -fpch-preprocess)
+  # CMake compiles programs with -fPIE, and the compiler takes headers of its own settings only.
+  get_target_property(type ${target} TYPE)
+  if(type STREQUAL "EXECUTABLE")
+    target_compile_options(${target} PRIVATE -fPIC)
+  endif()
   target_precompile_headers(${target} REUSE_FROM understory_precompiled)
 endfunction()
