@@ -20,13 +20,14 @@ int run_demo(const DemoOptions& options, CommandContext& context) {
   MappingRequest request;
   request.recording = "sim:demo";
   request.run_folder = options.folder;
-  ReadConfig<MappingConfig> read = read_mapping_config("handheld", "", {});
+  ReadConfig<FrontEndConfig> read =
+      read_front_end_config(kDenseFrontEnd, "handheld", "", {}, context.log);
   request.config = std::move(read.config);
   request.config_origins = std::move(read.origins);
-  request.config_yaml = mapping_table(request.config).to_yaml(false);
+  request.config_yaml = yaml_of(request.config);
   request.overwrite = options.overwrite;
-  return report_outcome(
-      run_mapping(request, context.log, context.progress, context.stop_requested));
+  return report_outcome(run_mapping(begin_mapping(std::move(request)), context.log,
+                                    context.progress, context.stop_requested));
 }
 
 }  // namespace

@@ -3,14 +3,11 @@
 #include <memory>
 
 #include "understory/cli/command.h"
-#include "understory/cli/map_sparse.h"
 #include "understory/cli/open_options.h"
 #include "understory/cli/outcome.h"
 #include "understory/cli/suggestion.h"
-#include "understory/pipeline/mapping/adaptation.h"
+#include "understory/pipeline/mapping/front_end_config.h"
 #include "understory/pipeline/mapping/mapping.h"
-#include "understory/pipeline/mapping/run_state.h"
-#include "understory/pipeline/mapping/sparse_mapping.h"
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
@@ -26,7 +23,7 @@ struct MapOptions {
   std::string profile;
   std::string config_file;
   std::vector<std::string> settings;
-  std::string front_end = "dense";
+  std::string front_end = kDenseFrontEnd;
   bool realtime = false;
   bool overwrite = false;
   bool print_config = false;
@@ -51,7 +48,7 @@ int with_advice(const std::string& run_folder, const std::function<int()>& work)
 }
 
 // Without a recording the values asked for; with one those that would run on it.
-int print_config(const MapOptions& options, const ReadConfig<MappingConfig>& read,
+int print_config(const MapOptions& options, const ReadConfig<FrontEndConfig>& read,
                  CommandContext& context) {
   SensorTraits traits;
   if (!options.recording.empty()) {
@@ -63,18 +60,9 @@ int print_config(const MapOptions& options, const ReadConfig<MappingConfig>& rea
   }
   RunConditions conditions;
   conditions.realtime = options.realtime;
-  const Adapted<MappingConfig> adapted = adapt(read.config, read.origins, traits, conditions);
+  const auto adapted = adapt_front_end(read.config, read.origins, traits, conditions);
   std::fputs(commented_yaml(adapted, read.origins).c_str(), stdout);
   return kExitDone;
-}
-
-int run_sparse(const MapOptions& options, CommandContext& context) {
-  return with_advice(options.run_folder, [&] {
-    return run_sparse_map(
-        {options.recording, options.run_folder, options.profile, options.config_file,
-         options.settings, options.realtime, options.overwrite, options.print_config, options.open},
-        context);
-  });
 }
 
 // A resumed run keeps what it was begun with.
@@ -89,25 +77,16 @@ void refuse_beside_resume(const CLI::App& command) {
                      given + " (to change it, map the recording anew)"});
 }
 
-// By the front end that the run was begun with.
-int resume(const MapOptions& options, CommandContext& context) {
-  return with_advice(options.resume, [&] {
-    UnfinishedRun run = RunState::reopen(options.resume);
-    if (run.state.front_end() == kSparseFrontEnd) {
-      return report_outcome(resume_sparse_mapping(std::move(run), context.log, context.progress,
-                                                  context.stop_requested));
-    }
-    return report_outcome(
-        resume_mapping(std::move(run), context.log, context.progress, context.stop_requested));
-  });
-}
-
 int run_map(const MapOptions& options, CommandContext& context) {
-  if (!options.resume.empty()) return resume(options, context);
+  const auto run = [&](MappingRun begun) {
+    return report_outcome(
+        run_mapping(std::move(begun), context.log, context.progress, context.stop_requested));
+  };
+  if (!options.resume.empty())
+    return with_advice(options.resume, [&] { return run(reopen_mapping(options.resume)); });
   refuse_cloud(options.recording);
-  if (options.front_end == "sparse") return run_sparse(options, context);
-  ReadConfig<MappingConfig> read =
-      read_mapping_config(options.profile, options.config_file, options.settings);
+  ReadConfig<FrontEndConfig> read = read_front_end_config(
+      options.front_end, options.profile, options.config_file, options.settings, context.log);
   if (options.print_config) return print_config(options, read, context);
   if (options.recording.empty() || options.run_folder.empty()) {
     throw ConfigError({"understory map needs a RECORDING and -o RUN (or --resume RUN)"});
@@ -117,16 +96,14 @@ int run_map(const MapOptions& options, CommandContext& context) {
   request.run_folder = options.run_folder;
   request.config = std::move(read.config);
   request.config_origins = std::move(read.origins);
-  refuse_run_over_inputs(request.run_folder, request.recording, options.open,
-                         {options.config_file, request.config.odometry.machine_boxes_file});
-  request.config_yaml = mapping_table(request.config).to_yaml(false);
+  request.config_yaml = yaml_of(request.config);
+  std::vector<std::string> files = files_named_in(request.config);
+  files.push_back(options.config_file);
+  refuse_run_over_inputs(request.run_folder, request.recording, options.open, files);
   request.open = options.open;
   request.realtime = options.realtime;
   request.overwrite = options.overwrite;
-  return with_advice(options.run_folder, [&] {
-    return report_outcome(
-        run_mapping(request, context.log, context.progress, context.stop_requested));
-  });
+  return with_advice(options.run_folder, [&] { return run(begin_mapping(request)); });
 }
 
 }  // namespace
@@ -147,7 +124,7 @@ void add_map_command(CLI::App& app, Command& chosen) {
   command
       ->add_option("--front-end", options->front_end,
                    "How scans are positioned: all points (dense) or stems alone (sparse)")
-      ->check(CLI::IsMember({"dense", "sparse"}));
+      ->check(CLI::IsMember({kDenseFrontEnd, kSparseFrontEnd}));
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "
                     "(time_repair.window_s is 0, of stems also stems.pace.longest_gap_s)");

@@ -67,9 +67,8 @@ std::vector<std::filesystem::path> inputs_of(const CorrectionRequest& request) {
   return {request.stems, request.config.harvester.head_log};
 }
 
-CorrectionOutcome correct_into_results(const CorrectionRequest& request, Log& log,
-                                       const ProgressSink& progress,
-                                       const StopRequested& stop_requested) {
+RunOutcome correct_into_results(const CorrectionRequest& request, Log& log,
+                                const ProgressSink& progress, const StopRequested& stop_requested) {
   CorrectionRun run;
   {
     const ScopedTimer timer(run.times, "reading");
@@ -114,15 +113,14 @@ void describe(ConfigTable& table, CorrectionConfig& config) {
   });
 }
 
-CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
-                                 const ProgressSink& progress,
-                                 const StopRequested& stop_requested) {
+RunOutcome run_correction(const CorrectionRequest& request, Log& log, const ProgressSink& progress,
+                          const StopRequested& stop_requested) {
   if (!request.results.empty()) return correct_into_results(request, log, progress, stop_requested);
   refuse_input_as_output(request.run_folder, inputs_of(request));
   const RunFolder place = RunFolder::claim(request.run_folder, request.overwrite);
   CorrectionRequest placed = request;
   placed.results = place.begin_results();
-  CorrectionOutcome outcome = correct_into_results(placed, log, progress, stop_requested);
+  RunOutcome outcome = correct_into_results(placed, log, progress, stop_requested);
   place.commit(log, stop_requested && stop_requested());
   place.forget_state();  // of an unfinished run that this one replaces
   return outcome;

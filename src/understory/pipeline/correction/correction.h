@@ -15,6 +15,7 @@
 #include "understory/pipeline/judgement/imu_hearing.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/preprocess/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/sensor/gnss_fix.h"
@@ -85,16 +86,10 @@ struct CorrectionRequest {
   const SparseScans* scans = nullptr;
 };
 
-struct CorrectionOutcome {
-  RunStatus status = RunStatus::kComplete;
-  std::vector<std::string> reasons;
-  std::string summary;  // a few lines for the terminal
-};
-
 // From the stems of a recording to the run folder: odometry, loops, trajectory, tree map.
 // Throws InputError or OutputError.
-[[nodiscard]] CorrectionOutcome run_correction(const CorrectionRequest& request, Log& log,
-                                               const ProgressSink& progress,
-                                               const StopRequested& stop_requested);
+[[nodiscard]] RunOutcome run_correction(const CorrectionRequest& request, Log& log,
+                                        const ProgressSink& progress,
+                                        const StopRequested& stop_requested);
 
 }  // namespace understory

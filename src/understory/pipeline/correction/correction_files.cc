@@ -233,7 +233,7 @@ RunSummary summary_of(const CorrectionRequest& request, const CorrectionRun& run
 
 }  // namespace
 
-CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionRun& run, Log& log) {
+RunOutcome write_correction(const CorrectionRequest& request, CorrectionRun& run, Log& log) {
   const fs::path& folder = request.results;
   const MapViews map = map_views(run);
   std::vector<MappedStem> stems;
@@ -273,7 +273,7 @@ CorrectionOutcome write_correction(const CorrectionRequest& request, CorrectionR
   write_report(folder / "report.html", report);
   summary.wall_s = elapsed_s();  // all of it, the report too
   write_run_json(folder / "run.json", summary);
-  CorrectionOutcome outcome;
+  RunOutcome outcome;
   outcome.status = summary.status;
   outcome.reasons = summary.reasons;
   outcome.summary =

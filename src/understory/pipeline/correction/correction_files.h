@@ -28,7 +28,7 @@ struct CorrectionRun {
 
 // Writes the run folder: odometry.tum, trajectory.tum, loops.csv, trees.csv, felled.csv, run.json,
 // report.html.
-[[nodiscard]] CorrectionOutcome write_correction(const CorrectionRequest& request,
-                                                 CorrectionRun& run, Log& log);
+[[nodiscard]] RunOutcome write_correction(const CorrectionRequest& request, CorrectionRun& run,
+                                          Log& log);
 
 }  // namespace understory

@@ -132,7 +132,7 @@ void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence) {
   evidence.imu_motion_windows = trust.motion_windows;
 }
 
-void gather_dense(const MappingSession& session, const RunFacts& facts, const Recording& source,
+void gather_dense(const DenseFrontEnd& session, const RunFacts& facts, const Recording& source,
                   const Log& log, RunEvidence& evidence) {
   const bool refused = !session.imu_refused().empty();
   ReadingFacts reading;

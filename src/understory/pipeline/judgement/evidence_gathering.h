@@ -3,8 +3,8 @@
 #include "understory/odometry/motion/motion_model.h"
 #include "understory/pipeline/judgement/imu_hearing.h"
 #include "understory/pipeline/judgement/run_evidence.h"
-#include "understory/pipeline/mapping/mapping_session.h"
-#include "understory/pipeline/run_folder/run_writer.h"
+#include "understory/pipeline/mapping/dense_front_end.h"
+#include "understory/pipeline/mapping/run_facts.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 
@@ -27,7 +27,7 @@ void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence);
 
 // What the dense front end knows beside; `evidence.motion` and the figures of the finished path in
 // `evidence.match` are there already.
-void gather_dense(const MappingSession& session, const RunFacts& facts, const Recording& source,
+void gather_dense(const DenseFrontEnd& session, const RunFacts& facts, const Recording& source,
                   const Log& log, RunEvidence& evidence);
 
 }  // namespace understory

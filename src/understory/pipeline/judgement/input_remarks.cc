@@ -16,7 +16,7 @@ TimeNs first_of(const Recording& source, const std::string& role, TimeNs otherwi
   return otherwise;
 }
 
-void remark_on_imu(const MappingSession& session, const Recording& source,
+void remark_on_imu(const DenseFrontEnd& session, const Recording& source,
                    const EventOrderer::Report& repair, const std::string& name, Log& log) {
   const std::optional<TimeNs> last = session.last_imu();
   if (!last) {
@@ -50,7 +50,7 @@ void remark_on_lever_arms(const Rig& rig, const std::string& name, Log& log) {
     log.warn("recording.lever_arm", name + ": " + arm);
 }
 
-void remark_on_input(const MappingSession& session, const Recording& source,
+void remark_on_input(const DenseFrontEnd& session, const Recording& source,
                      const EventOrderer::Report& repair, const std::string& name, Log& log) {
   remark_on_imu(session, source, repair, name, log);
   remark_on_lever_arms(source.rig(), name, log);

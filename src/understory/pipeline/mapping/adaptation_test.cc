@@ -144,11 +144,11 @@ TEST(Adaptation, AtTheSpeedOfTheSensorsNothingWaitsUnlessTheUserSaysSo) {
   RunConditions live;
   live.realtime = true;
   const auto adapted = adapt_read("", {}, many_rings(), live);
-  EXPECT_EQ(adapted.config.time_repair.window_s, 0.0);
+  EXPECT_EQ(adapted.config.loop.time_repair.window_s, 0.0);
   EXPECT_EQ(keys_of(adapted.changes), (std::vector<std::string>{"time_repair.window_s"}));
-  EXPECT_EQ(
-      adapt_read("", {"time_repair.window_s=0.2"}, many_rings(), live).config.time_repair.window_s,
-      0.2);
+  EXPECT_EQ(adapt_read("", {"time_repair.window_s=0.2"}, many_rings(), live)
+                .config.loop.time_repair.window_s,
+            0.2);
   const auto stems = adapt(SparseMappingConfig(), {{"stems.pace.longest_gap_s", "--set"}}, live);
   EXPECT_EQ(keys_of(stems.changes), (std::vector<std::string>{"time_repair.window_s"}));
   EXPECT_EQ(adapt(SparseMappingConfig(), {}, live).config.pace.longest_gap_s, 0.0);

@@ -9,7 +9,7 @@ namespace understory {
 
 ConfigTable mapping_table(MappingConfig& config) {
   ConfigTable table;
-  table.section("time_repair", [&] { EventOrderer::describe(table, config.time_repair); });
+  table.section("time_repair", [&] { EventOrderer::describe(table, config.loop.time_repair); });
   describe(table, config.odometry);
   KeyframeMap::describe(table, config.keyframe_map);
   table.section("map", [&] {
@@ -31,13 +31,13 @@ ConfigTable mapping_table(MappingConfig& config) {
     table.section("motion", [&] { describe(table, config.motion_limits); });
   });
   table.section("run", [&] {
-    table.add("checkpoint_interval_s", config.checkpoint_interval_s, {0.1, 5.0}, "s",
+    table.add("checkpoint_interval_s", config.loop.checkpoint_interval_s, {0.1, 5.0}, "s",
               "of recording between checkpoints");
     table.add("sparse_scan_points", config.sparse_scan_points, {0, 100000000}, "points",
               "a lidar with fewer in a full scan has what nobody set adapted to it; 0: none");
     table.add("lost_after_scans", config.lost_after_scans, {1, 100000}, "scans",
               "unmatched scans in a row after which a new piece of map begins");
-    table.add("realtime_queue_scans", config.realtime_queue_scans, {1, 1000}, "scans",
+    table.add("realtime_queue_scans", config.loop.realtime_queue_scans, {1, 1000}, "scans",
               "--realtime: scans that may wait; older ones are dropped");
   });
   return table;
@@ -80,6 +80,12 @@ ReadConfig<MappingConfig> read_mapping_config(const std::string& profile, const 
   note_settings(table, settings, origins);
   problems.throw_if_any();
   return {config, origins};
+}
+
+void reread(MappingConfig& config, const std::string& yaml, const std::string& origin,
+            const std::function<std::string(const std::string&)>& found) {
+  mapping_table(config).read_yaml(yaml, origin);
+  config.odometry.machine_boxes_file = found(config.odometry.machine_boxes_file);
 }
 
 }  // namespace understory

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -9,7 +10,7 @@
 #include "understory/odometry/dense/dense_odometry.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
-#include "understory/preprocess/event_orderer.h"
+#include "understory/pipeline/mapping/event_loop_config.h"
 #include "understory/util/config.h"
 #include "understory/util/config_origins.h"
 
@@ -18,7 +19,7 @@ namespace understory {
 // Everything that can be set for `understory map`. Each part is described where it belongs; this is
 // only their sum.
 struct MappingConfig {
-  EventOrderer::Config time_repair;
+  EventLoopConfig loop;
   DenseOdometryConfig odometry;
   KeyframeMap::Config keyframe_map;
   MapTiles::Config map;
@@ -28,13 +29,11 @@ struct MappingConfig {
   InventoryConfig inventory;
   JudgementConfig judgement;
   MotionLimits motion_limits;
-  double checkpoint_interval_s = 4.0;  // of recording; at most 5 s are processed again
-  double cloud_distance_m = 1.0;       // weighted distance (37) between scans whose clouds are kept
+  double cloud_distance_m = 1.0;  // weighted distance (37) between scans whose clouds are kept
   // A lidar whose full scans have fewer points than this (16 beams) has what nobody set adapted to
   // it (adapt()): thinned like dense scans, its scans would leave too few points in a cell.
   int sparse_scan_points = 60000;
   int lost_after_scans = 30;  // unmatched scans in a row after which a new segment begins
-  int realtime_queue_scans = 3;
 };
 
 // The table of all keys, bound to `config`.
@@ -47,5 +46,10 @@ struct MappingConfig {
 // Defaults, then the profile, then the file, then the settings ("key=value"). Empty = none.
 [[nodiscard]] ReadConfig<MappingConfig> read_mapping_config(
     const std::string& profile, const std::string& file, const std::vector<std::string>& settings);
+
+// A configuration as `to_yaml` of its table wrote it; `found` says where a file lies now that is
+// named in it. Throws ConfigError.
+void reread(MappingConfig& config, const std::string& yaml, const std::string& origin,
+            const std::function<std::string(const std::string&)>& found);
 
 }  // namespace understory

@@ -9,7 +9,7 @@
 namespace understory {
 namespace {
 
-void put_request(BinaryWriter& writer, const RunRequest& request) {
+void put_request(BinaryWriter& writer, const MappingRequest& request) {
   const OpenOptions& open = request.open;
   for (const std::string& text :
        {std::string(kVersion), request.recording, request.config_yaml, open.metadata_file,
@@ -25,7 +25,7 @@ void put_request(BinaryWriter& writer, const RunRequest& request) {
   writer.put((again ? request.begun_in : std::filesystem::current_path()).string());
 }
 
-void get_request(BinaryReader& reader, const std::filesystem::path& path, RunRequest& request) {
+void get_request(BinaryReader& reader, const std::filesystem::path& path, MappingRequest& request) {
   const std::string version = reader.get_string();
   if (version != kVersion) {
     throw InputError(
@@ -101,18 +101,19 @@ std::string joined(const std::vector<std::string>& problems) {
 
 }  // namespace
 
-RunState RunState::create(const RunRequest& request, const std::string& front_end) {
-  return {RunFolder::claim(request.run_folder, request.overwrite), front_end};
+RunState RunState::create(const MappingRequest& request) {
+  return {RunFolder::claim(request.run_folder, request.overwrite), name_of(request.config)};
 }
 
-void RunState::check_inputs(const RunRequest& request) {
+void RunState::check_inputs(const MappingRequest& request) {
   std::vector<InputIdentity> now = request.identify_inputs();
   if (resumed()) expect_same(inputs_, now);
   inputs_ = std::move(now);
 }
 
 UnfinishedRun RunState::reopen(const std::filesystem::path& run_folder) {
-  UnfinishedRun run{{}, RunState(RunFolder::reclaim(run_folder), "")};
+  RunFolder folder = RunFolder::reclaim(run_folder);
+  UnfinishedRun run{MappingRequest(), RunState(std::move(folder), "")};
   std::vector<std::string> problems;
   for (const Checkpoint& checkpoint : read_checkpoints(run.state.work(), problems)) {
     try {
@@ -127,7 +128,7 @@ UnfinishedRun RunState::reopen(const std::filesystem::path& run_folder) {
   nothing_whole(run_folder, problems);
 }
 
-void RunState::read(const Checkpoint& checkpoint, RunRequest& request) {
+void RunState::read(const Checkpoint& checkpoint, MappingRequest& request) {
   file_ = checkpoint.file.string();
   BinaryReader reader(checkpoint.bytes, file_);
   get_request(reader, checkpoint.file, request);
@@ -176,7 +177,7 @@ void RunState::restore(Resumable& session, EventOrderer& orderer, Log& log, cons
                "): the run goes on from the one before, and maps a few seconds again");
 }
 
-void RunState::save(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
+void RunState::save(const MappingRequest& request, Resumable& session, const EventOrderer& orderer,
                     const Log& log, const Recording& source, std::uint64_t events) {
   session.sync();
   BinaryWriter state;
@@ -206,7 +207,7 @@ void RunState::save(const RunRequest& request, Resumable& session, const EventOr
   write_checkpoint(work(), next_++, writer.bytes());
 }
 
-void RunState::begin_anew(const RunRequest& request, Resumable& session,
+void RunState::begin_anew(const MappingRequest& request, Resumable& session,
                           const EventOrderer& orderer, const Log& log, const Recording& source) {
   for (int generation = 0; generation < 2; ++generation)
     save(request, session, orderer, log, source, 0);

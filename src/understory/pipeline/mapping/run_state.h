@@ -7,17 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "understory/pipeline/mapping/mapping_request.h"
 #include "understory/pipeline/run_folder/checkpoint.h"
 #include "understory/pipeline/run_folder/resumable.h"
 #include "understory/pipeline/run_folder/run_folder.h"
-#include "understory/pipeline/run_request.h"
 #include "understory/preprocess/event_orderer.h"
 
 namespace understory {
-
-// The front ends of `understory map`, as a checkpoint names them.
-constexpr const char* kDenseFrontEnd = "dense";
-constexpr const char* kSparseFrontEnd = "sparse";
 
 struct UnfinishedRun;
 
@@ -32,7 +28,7 @@ class RunState {
  public:
   // Of a run that begins. Claims the run folder and leaves what is in it as it is. Throws
   // OutputError if that is refused (run_folder.h).
-  [[nodiscard]] static RunState create(const RunRequest& request, const std::string& front_end);
+  [[nodiscard]] static RunState create(const MappingRequest& request);
   // Opens that of a killed run and reads back its request, from the newest checkpoint that is whole
   // with all that it counts on. The run folder is claimed before anything in it is read. Throws
   // InputError if there is none, with the state as it was; OutputError as RunFolder::reclaim.
@@ -40,7 +36,7 @@ class RunState {
 
   // Of a run that begins: notes what the inputs are; of one that is resumed: throws InputError if
   // they are not those that it was begun with.
-  void check_inputs(const RunRequest& request);
+  void check_inputs(const MappingRequest& request);
 
   // Forgets the state of an unfinished run that this one replaces: once the recording is open, so
   // that one that cannot be read takes no unfinished run away.
@@ -66,10 +62,10 @@ class RunState {
   // newest (key "run.older_checkpoint").
   void restore(Resumable& session, EventOrderer& orderer, Log& log, const Rig& rig) const;
   // Writes a checkpoint: `events` have been taken from the recording.
-  void save(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
+  void save(const MappingRequest& request, Resumable& session, const EventOrderer& orderer,
             const Log& log, const Recording& source, std::uint64_t events);
   // The same where the recording is begun anew: no older checkpoint is gone back to.
-  void begin_anew(const RunRequest& request, Resumable& session, const EventOrderer& orderer,
+  void begin_anew(const MappingRequest& request, Resumable& session, const EventOrderer& orderer,
                   const Log& log, const Recording& source);
   // The run is finished, or nothing came of it: the work folder goes with this object.
   void remove() { folder_.forget_state(); }
@@ -78,7 +74,7 @@ class RunState {
   RunState(RunFolder folder, std::string front_end)
       : folder_(std::move(folder)), front_end_(std::move(front_end)) {}
 
-  void read(const Checkpoint& checkpoint, RunRequest& request);
+  void read(const Checkpoint& checkpoint, MappingRequest& request);
 
   RunFolder folder_;
   std::string front_end_;
@@ -95,9 +91,10 @@ class RunState {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// A run that was killed, stopped or cut off, with what it was begun with.
+// A run that was killed, stopped or cut off, with what it was begun with; its configuration is read
+// as text (`config_yaml`).
 struct UnfinishedRun {
-  RunRequest request;
+  MappingRequest request;
   RunState state;
 };
 

@@ -25,7 +25,7 @@ void read_boxes(SparseMappingConfig& config) {
 
 ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
   ConfigTable table;
-  table.section("time_repair", [&] { EventOrderer::describe(table, config.time_repair); });
+  table.section("time_repair", [&] { EventOrderer::describe(table, config.loop.time_repair); });
   table.section("preprocess", [&] {
     table.add("machine_boxes_file", config.machine_boxes_file,
               "YAML of boxes around the machine: what lies in them is no stem; empty: none");
@@ -36,9 +36,9 @@ ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
   });
   describe(table, config.correction);
   table.section("run", [&] {
-    table.add("checkpoint_interval_s", config.checkpoint_interval_s, {0.1, 60.0}, "s",
+    table.add("checkpoint_interval_s", config.loop.checkpoint_interval_s, {0.1, 60.0}, "s",
               "of recording between checkpoints");
-    table.add("realtime_queue_scans", config.realtime_queue_scans, {1, 1000}, "scans",
+    table.add("realtime_queue_scans", config.loop.realtime_queue_scans, {1, 1000}, "scans",
               "--realtime: scans that may wait; older ones are dropped");
   });
   return table;

@@ -7,7 +7,7 @@
 #include "understory/odometry/stems/stem_front_end.h"
 #include "understory/odometry/stems/stem_pacer.h"
 #include "understory/pipeline/correction/correction.h"
-#include "understory/preprocess/event_orderer.h"
+#include "understory/pipeline/mapping/event_loop_config.h"
 #include "understory/util/config.h"
 #include "understory/util/config_origins.h"
 #include "understory/util/log.h"
@@ -16,13 +16,11 @@ namespace understory {
 
 // Everything that can be set for `understory map --front-end sparse`.
 struct SparseMappingConfig {
-  EventOrderer::Config time_repair;
+  EventLoopConfig loop{{}, 10.0};
   std::string machine_boxes_file;  // YAML, the same as for the dense front end; empty: none
   StemFrontEndConfig front_end;
   StemPaceConfig pace;
   CorrectionConfig correction;
-  double checkpoint_interval_s = 10.0;
-  int realtime_queue_scans = 3;
 };
 
 // The table of all keys, bound to `config`.

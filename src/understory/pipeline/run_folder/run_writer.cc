@@ -16,11 +16,10 @@
 #include "understory/pipeline/judgement/match_course.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/pipeline/mapping/dense_front_end.h"
 #include "understory/pipeline/mapping/finished_map.h"
 #include "understory/pipeline/mapping/finished_trajectory.h"
 #include "understory/pipeline/mapping/lidar_view.h"
-#include "understory/pipeline/mapping/mapping_session.h"
-#include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/pipeline/run_folder/run_truth.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/median.h"
@@ -65,7 +64,7 @@ double median_period_ms(const std::vector<ReportScan>& scans) {
 }
 
 // trajectory.tum and states.csv.gz.
-TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const MappingSession& session,
+TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const DenseFrontEnd& session,
                                  const MappingConfig& config) {
   TumWriter trajectory(folder / "trajectory.tum");
   StatesWriter states(folder / "states.csv.gz");
@@ -218,7 +217,7 @@ std::uint64_t write_map(const std::filesystem::path& folder, MapTiles& tiles,
   return writer.points();
 }
 
-void fill_counts(RunSummary& summary, const MappingSession& session, const RunFacts& facts) {
+void fill_counts(RunSummary& summary, const DenseFrontEnd& session, const RunFacts& facts) {
   const MappingCounts& counts = session.counts();
   const auto count = [&](const char* name, std::uint64_t value) {
     summary.counts[name] = static_cast<std::int64_t>(value);
@@ -284,7 +283,7 @@ void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const 
   add_latency(distribution_of(facts.latencies_ms), summary);
 }
 
-RunEvidence evidence_of(const MappingSession& session, const RunFacts& facts,
+RunEvidence evidence_of(const DenseFrontEnd& session, const RunFacts& facts,
                         const Recording& source, const TrajectoryFacts& trajectory,
                         const Log& log) {
   RunEvidence evidence;
@@ -294,7 +293,7 @@ RunEvidence evidence_of(const MappingSession& session, const RunFacts& facts,
   return evidence;
 }
 
-RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
+RunSummary summarise_run(const MappingRequest& request, DenseFrontEnd& session,
                          const RunFacts& facts, const TrajectoryFacts& trajectory,
                          const RunEvidence& evidence, Log& log) {
   RunSummary summary;
@@ -308,7 +307,7 @@ RunSummary summarise_run(const MappingRequest& request, MappingSession& session,
   summary.scans = session.counts().scans;
   summary.poses = session.journal().size();
   summary.recording_s = trajectory.duration_s;
-  const RunJudgement judgement = judge_run(evidence, request.config.judgement);
+  const RunJudgement judgement = judge_run(evidence, session.config().judgement);
   summary.status = judgement.status;
   summary.reasons = judgement.reasons;
   summary.evidence = figures_of(evidence);
@@ -337,12 +336,12 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
 
 }  // namespace
 
-MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
-                         MappingSession& session, const RunFacts& facts, const Recording& source,
-                         Log& log, const ProgressSink& progress) {
-  const std::filesystem::path folder = place.begin_results();
+RunOutcome write_run(const ReadRecording& recording, const std::filesystem::path& folder,
+                     DenseFrontEnd& session) {
+  const auto& [request, facts, source, work, log, progress] = recording;
+  const MappingConfig& config = session.config();
   StageTimes& times = session.times();
-  const TrajectoryFacts trajectory = write_trajectory(folder, session, request.config);
+  const TrajectoryFacts trajectory = write_trajectory(folder, session, config);
   write_graph(folder, session.map());
   write_fixes(folder, session.fixes());
   InventoryResult inventory;
@@ -354,17 +353,17 @@ MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
     summary.quality["ape_rmse_m"] = truth->ape_rmse_m;
     summary.quality["drift_percent"] = truth->drift_percent;
   }
-  if (request.config.map_enabled) {
+  if (config.map_enabled) {
     std::unique_ptr<MapTiles> tiles;
     {
       const ScopedTimer timer(times, "finish_gather_map");
-      tiles = make_finished_map(session.clouds(), session.map().keyframes(), request.config.map,
-                                place.work() / "tiles", progress);
+      tiles = make_finished_map(session.clouds(), session.map().keyframes(), config.map,
+                                work / "tiles", progress);
     }
     {
       const ScopedTimer timer(times, "finish_inventory");
       const LidarView view = learn_view(session.clouds(), session.rig().body_from_lidar);
-      inventory = take_inventory(blocks_of(*tiles), request.config.inventory, progress,
+      inventory = take_inventory(blocks_of(*tiles), config.inventory, progress,
                                  seen_from(view, poses_of(session.map().keyframes())));
       summary.lidar_view = figures_of(view);
     }
@@ -391,17 +390,17 @@ MappingOutcome write_run(const MappingRequest& request, const RunFolder& place,
       source.rig().lidar_model.empty() ? "" : source.rig().lidar_model + ", ", summary.scans);
   report.summary = summary;
   if (!picture.empty()) report.picture = &picture;
-  if (request.config.map_enabled) report.inventory = &inventory;
+  if (config.map_enabled) report.inventory = &inventory;
   report.scans = trajectory.scans;
   report.sensor_period_ms = trajectory.period_ms;
   report.loops = report_loops(session.map());
-  report.loop_closure_enabled = request.config.keyframe_map.loop_closure.enabled;
+  report.loop_closure_enabled = config.keyframe_map.loop_closure.enabled;
   report.truth = truth;
   write_report(folder / "report.html", report);
   summary.wall_s = facts.elapsed_s();  // all of it, the report too
   write_run_json(folder / "run.json", summary);
-  return {summary.status, summary.reasons, place.path() / "report.html",
-          terminal_summary(summary, trajectory, inventory, place.path())};
+  return {summary.status, summary.reasons,
+          terminal_summary(summary, trajectory, inventory, request.run_folder)};
 }
 
 }  // namespace understory

@@ -1,6 +1,6 @@
 // What of a session lies on the disk, and its state to go on from.
 #include "understory/geometry/pose_io.h"
-#include "understory/pipeline/mapping/mapping_session.h"
+#include "understory/pipeline/mapping/dense_front_end.h"
 #include "understory/sensor/sensor_io.h"
 #include "understory/util/error.h"
 
@@ -11,7 +11,7 @@ constexpr const char* kFixesFile = "fixes.bin";
 
 }  // namespace
 
-void MappingSession::sync() {
+void DenseFrontEnd::sync() {
   if (!fixes_file_ && !fixes_.empty())
     fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile);
   if (fixes_file_) {
@@ -28,7 +28,7 @@ void MappingSession::sync() {
   map_->sync();
 }
 
-std::vector<CountedFile> MappingSession::files() const {
+std::vector<CountedFile> DenseFrontEnd::files() const {
   std::vector<CountedFile> files;
   if (started()) {
     files = map_->files();
@@ -39,7 +39,7 @@ std::vector<CountedFile> MappingSession::files() const {
   return files;
 }
 
-void MappingSession::save(BinaryWriter& writer) const {
+void DenseFrontEnd::save(BinaryWriter& writer) const {
   UNDERSTORY_CHECK(settled() || !started());
   writer.put(imu_refused_);
   writer.put(imu_doubted_);
@@ -66,7 +66,7 @@ void MappingSession::save(BinaryWriter& writer) const {
   odometry_->save(writer);
 }
 
-void MappingSession::load_fixes(const RecordCount& known) {
+void DenseFrontEnd::load_fixes(const RecordCount& known) {
   fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile, known);
   fixes_file_->for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
     BinaryReader record({bytes.begin(), bytes.end()}, fixes_file_->path().string());
@@ -74,7 +74,7 @@ void MappingSession::load_fixes(const RecordCount& known) {
   });
 }
 
-void MappingSession::load(BinaryReader& reader, const Rig& rig) {
+void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);
   imu_doubted_ = reader.get<bool>();

@@ -1,6 +1,6 @@
-#include "understory/pipeline/mapping/sparse_session.h"
+#include "understory/pipeline/mapping/sparse_front_end.h"
 
-#include <algorithm>
+#include <fmt/format.h>
 
 #include "understory/geometry/pose_io.h"
 #include "understory/pipeline/mapping/scan_content.h"
@@ -13,28 +13,30 @@ constexpr const char* kViewsFile = "views.bin";
 
 }  // namespace
 
-SparseSession::SparseSession(const SparseMappingConfig& config,
-                             const std::filesystem::path& stems_file,
-                             const std::filesystem::path& folder, Log& log)
-    : folder_(folder), pacer_(config.pace, config.front_end, &log), stems_(stems_file) {}
+SparseFrontEnd::SparseFrontEnd(const SparseMappingConfig& config, const RunConditions& conditions,
+                               const std::filesystem::path& folder, Log& log)
+    : config_(config), folder_(folder), pacer_(config.pace, config.front_end, &log) {
+  if (!conditions.imu_refused.empty()) refuse_imu(conditions.imu_refused);
+}
 
-void SparseSession::handle(const Event& event, const Rig& rig) {
+std::vector<TimeNs> SparseFrontEnd::handle(const Event& event, const Rig& rig) {
   if (journal_ == nullptr) journal_ = std::make_unique<ViewJournal>(folder_ / kViewsFile);
-  if (const auto* scan = std::get_if<ScanPtr>(&event)) on_scan(*scan, rig);
+  if (const auto* scan = std::get_if<ScanPtr>(&event)) return on_scan(*scan, rig);
   if (const auto* fix = std::get_if<GnssFix>(&event)) {
     journal_->on_fix(*fix);
     on_fix(*fix);
   }
   if (const auto* sample = std::get_if<ImuSample>(&event)) on_sample(*sample, rig);
+  return {};
 }
 
 // The recording has said so where it does not know the IMU's place; it may learn it later.
-void SparseSession::on_sample(const ImuSample& sample, const Rig& rig) {
+void SparseFrontEnd::on_sample(const ImuSample& sample, const Rig& rig) {
   imu_hearing_.add(sample, rig.body_from_imu.has_value(), ImuNoiseConfig());
   if (rig.body_from_imu) pacer_.add(sample);
 }
 
-void SparseSession::on_scan(const ScanPtr& scan, const Rig& rig) {
+std::vector<TimeNs> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig) {
   const ScopedTimer timer(times_, "scan");
   ++scans_;
   const std::uint64_t content = content_of(*scan);
@@ -42,12 +44,13 @@ void SparseSession::on_scan(const ScanPtr& scan, const Rig& rig) {
   last_content_ = content;
   last_scan_end_ = scan->end();
   waiting_ends_.push_back(last_scan_end_);
-  record(pacer_.add(scan, rig));
+  return record(pacer_.add(scan, rig));
 }
 
-void SparseSession::record(const std::vector<StemScan>& results) {
+std::vector<TimeNs> SparseFrontEnd::record(const std::vector<StemScan>& results) {
+  std::vector<TimeNs> ends;
   for (const StemScan& result : results) {
-    if (tell_settled_) tell_settled_(waiting_ends_.front());
+    ends.push_back(waiting_ends_.front());
     waiting_ends_.pop_front();
     const StampedPose pose{result.view.stamp, result.step.world_from_body};
     journal_->on_pose(pose, result.positioned);
@@ -58,43 +61,52 @@ void SparseSession::record(const std::vector<StemScan>& results) {
     journal_->on_view(result.view, result.step);
     on_view(result.view, result.step);
   }
+  return ends;
 }
 
-void SparseSession::on_pose(const StampedPose& pose, bool positioned) {
+void SparseFrontEnd::on_pose(const StampedPose& pose, bool positioned) {
   path_.push_back(pose);
   positioned_ += positioned ? 1 : 0;
 }
 
-void SparseSession::on_view(const StemView& view, const SparseStep& step) {
-  for (const Stem& stem : view.stems)
-    stems_.add(view.frame, view.stamp, stem);
+void SparseFrontEnd::on_view(const StemView& view, const SparseStep& step) {
+  views_.push_back(view);
   steps_.push_back(step);
 }
 
-void SparseSession::on_fix(const GnssFix& fix) {
+void SparseFrontEnd::on_fix(const GnssFix& fix) {
   fixes_.push_back(fix);
 }
 
-void SparseSession::finish(const Rig& rig) {
-  record(pacer_.finish(rig));
-  if (!steps_.empty()) stems_.commit();
+std::vector<TimeNs> SparseFrontEnd::finish(const Rig& rig) {
+  return record(pacer_.finish(rig));
 }
 
-void SparseSession::refuse_imu(const std::string& reason) {
+ImuFinding SparseFrontEnd::imu_finding() const {
+  const ImuTrust trust = pacer_.imu_trust();
+  if (trust.trusted || !imu_refused_.empty()) return {};
+  return {ImuFinding::Verdict::kWrong, trust.reason};
+}
+
+FrontEndProgress SparseFrontEnd::progress() const {
+  return {"stems", scans_, fmt::format("{} stems", last_stems_)};
+}
+
+void SparseFrontEnd::refuse_imu(const std::string& reason) {
   imu_refused_ = reason;
   pacer_.refuse_imu();
 }
 
-void SparseSession::sync() {
+void SparseFrontEnd::sync() {
   if (journal_ != nullptr) journal_->sync();
 }
 
-std::vector<CountedFile> SparseSession::files() const {
+std::vector<CountedFile> SparseFrontEnd::files() const {
   if (journal_ == nullptr) return {};
   return {{kViewsFile, journal_->count()}};
 }
 
-void SparseSession::save(BinaryWriter& writer) const {
+void SparseFrontEnd::save(BinaryWriter& writer) const {
   writer.put(journal_ != nullptr ? journal_->count() : RecordCount());
   writer.put(last_scan_end_);
   writer.put(imu_refused_);
@@ -104,7 +116,7 @@ void SparseSession::save(BinaryWriter& writer) const {
   pacer_.save(writer);
 }
 
-void SparseSession::load(BinaryReader& reader, const Rig& /*rig*/) {
+void SparseFrontEnd::load(BinaryReader& reader, const Rig& /*rig*/) {
   const auto known = reader.get<RecordCount>();
   ViewSink& again = *this;
   if (known.records > 0)

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "understory/pipeline/mapping/adaptation.h"
+#include "understory/pipeline/mapping/front_end_config.h"
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/run_folder/input_identity.h"
 #include "understory/recording/recording.h"
@@ -12,10 +13,11 @@
 
 namespace understory {
 
-// What one call of `understory map` asks for, whatever the front end.
-struct RunRequest {
+// What one call of `understory map` asks for.
+struct MappingRequest {
   std::string recording;  // file, folder or sim:SITE
   std::filesystem::path run_folder;
+  FrontEndConfig config;         // says which front end; the run adapts it to the sensors
   std::string config_yaml;       // asked for, every key, for run.json and for resuming
   ConfigOrigins config_origins;  // which of them were set, by what
   OpenOptions open;
@@ -27,8 +29,6 @@ struct RunRequest {
   // Made of these and the configuration asked for, for run.json.
   std::string effective_yaml;
   std::vector<ConfigAdaptation> adapted;
-  // Other files that the configuration names: the machine's boxes, the log of the head.
-  std::vector<std::string> more_inputs;
   // Of a resumed run: where it was begun, if that is not the current folder; else empty.
   std::filesystem::path begun_in;
 

@@ -12,10 +12,8 @@
 #include "understory/map/keyframe_map.h"
 #include "understory/odometry/dense/dense_odometry.h"
 #include "understory/pipeline/judgement/imu_hearing.h"
-#include "understory/pipeline/mapping/mapping_config.h"
+#include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/run_folder/journal.h"
-#include "understory/pipeline/run_folder/resumable.h"
-#include "understory/preprocess/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/util/log.h"
@@ -42,28 +40,29 @@ struct MappingCounts {
   std::uint64_t last_content = 0;  // of the last scan, see content_of
 };
 
-// The moving part of a mapping run: takes events in order of time and keeps positioning (first
-// graph), keyframes and local map (second graph) and the journal going. Its whole state can be
-// saved; the files in `folder` belong to it. `config` is adapted to the sensors (adapt()).
+// The front end that matches all points of a scan to a local map: keeps positioning (first graph),
+// keyframes and local map (second graph) and the journal going. The files in `folder` belong to it.
+// `config` is adapted to the sensors (adapt()).
 // Not thread-safe.
-class MappingSession : public Resumable {
+class DenseFrontEnd : public FrontEnd {
  public:
-  MappingSession(const MappingConfig& config, std::filesystem::path folder, Log& log);
-
-  // Before the first event: this run does without the IMU, for this reason.
-  void refuse_imu(const std::string& reason);
-  [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
-  // Before the first event: the IMU is left out from the start until it is clear whether it is
-  // right.
-  void doubt_imu() { imu_doubted_ = true; }
-  // The IMU is contradicted, and this run did not doubt it from the start.
-  [[nodiscard]] bool imu_is_suspected() const;
-  // The IMU has turned out to be wrong: what was positioned with it is better done again without.
-  [[nodiscard]] bool imu_is_wrong() const;
+  // An IMU that `conditions` refuse or doubt is left out, or is left out until it is clear whether
+  // it is right.
+  DenseFrontEnd(const MappingConfig& config, const SensorTraits& traits,
+                const RunConditions& conditions, std::filesystem::path folder, Log& log);
 
   // `rig` is looked at when the first scan comes, and for the places of sensors that become known
   // later: they are used from then on.
-  void handle(const Event& event, const Rig& rig);
+  std::vector<TimeNs> handle(const Event& event, const Rig& rig) override;
+  std::vector<TimeNs> finish(const Rig& /*rig*/) override { return {}; }
+  // Loops are taken over as soon as they are found.
+  void run_in_real_time() override { map_->take_loops_when_found(); }
+  [[nodiscard]] TimeNs first_scan() const override { return traits_.first_scan; }
+  [[nodiscard]] ImuFinding imu_finding() const override;
+  [[nodiscard]] FrontEndProgress progress() const override;
+  [[nodiscard]] bool has_map() const override { return !map_->keyframes().empty(); }
+  [[nodiscard]] std::string why_no_map(const Recording& source) const override;
+  [[nodiscard]] std::unique_ptr<MapMaker> map_maker(const ReadRecording& recording) override;
 
   // State to go on from.
   void sync() override;
@@ -74,7 +73,11 @@ class MappingSession : public Resumable {
 
   [[nodiscard]] bool started() const { return odometry_ != nullptr; }
   // False during the first scans, which may be done again; no state can be saved then.
-  [[nodiscard]] bool settled() const { return opening_ == nullptr; }
+  [[nodiscard]] bool settled() const override { return opening_ == nullptr; }
+  [[nodiscard]] const MappingConfig& config() const { return config_; }
+  [[nodiscard]] const SensorTraits& traits() const { return traits_; }
+  // Why this run does without the IMU; empty if it does not.
+  [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
   [[nodiscard]] const Rig& rig() const { return rig_; }
   [[nodiscard]] const MappingCounts& counts() const { return counts_; }
   // For how long the IMU's samples could not be used.
@@ -87,11 +90,6 @@ class MappingSession : public Resumable {
   [[nodiscard]] const KeyframeClouds& clouds() const { return *clouds_; }
   [[nodiscard]] const std::vector<GnssFix>& fixes() const { return fixes_; }
   [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
-  // --realtime: loops are taken over as soon as they are found.
-  void take_loops_when_found() {
-    takes_loops_when_found_ = true;
-    map_->take_loops_when_found();
-  }
   [[nodiscard]] StageTimes& times() { return times_; }
   // Set after each scan, for progress and latency.
   [[nodiscard]] TimeNs last_scan_end() const override { return last_scan_end_; }
@@ -115,6 +113,8 @@ class MappingSession : public Resumable {
     std::size_t fixes_before = 0;
   };
 
+  void refuse_imu(const std::string& reason);
+  void take(const Event& event, const Rig& rig);
   void load_fixes(const RecordCount& known);
   void make_odometry(const Rig& rig);
   void complete_rig(const Rig& rig);
@@ -133,6 +133,7 @@ class MappingSession : public Resumable {
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
 
   MappingConfig config_;
+  SensorTraits traits_;
   std::filesystem::path folder_;
   Log& log_;
   StageTimes times_;
@@ -155,8 +156,7 @@ class MappingSession : public Resumable {
   bool imu_doubted_ = false;
   std::uint64_t last_cloud_ = 0;  // keyframe that the cloud kept last belongs to
   Pose keyframe_from_last_cloud_;
-  Pose last_good_;  // of the last scan that was matched
-  bool takes_loops_when_found_ = false;
+  Pose last_good_;                    // of the last scan that was matched
   std::unique_ptr<Opening> opening_;  // until the first scans are settled
 };
 

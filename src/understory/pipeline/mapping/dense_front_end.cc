@@ -1,4 +1,4 @@
-#include "understory/pipeline/mapping/mapping_session.h"
+#include "understory/pipeline/mapping/dense_front_end.h"
 
 #include <fmt/format.h>
 
@@ -68,34 +68,51 @@ bool is_part_of_turn(const Scan& first, const Scan& second) {
 
 }  // namespace
 
-MappingSession::MappingSession(const MappingConfig& config, std::filesystem::path folder, Log& log)
+DenseFrontEnd::DenseFrontEnd(const MappingConfig& config, const SensorTraits& traits,
+                             const RunConditions& conditions, std::filesystem::path folder,
+                             Log& log)
     : config_(config),
+      traits_(traits),
       folder_(std::move(folder)),
       log_(log),
       map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)),
-      opening_(std::make_unique<Opening>()) {}
+      imu_doubted_(conditions.imu_doubted),
+      opening_(std::make_unique<Opening>()) {
+  if (!conditions.imu_refused.empty()) refuse_imu(conditions.imu_refused);
+}
 
-void MappingSession::refuse_imu(const std::string& reason) {
+void DenseFrontEnd::refuse_imu(const std::string& reason) {
   UNDERSTORY_CHECK(!started());
   imu_refused_ = reason;
   config_.odometry.imu_enabled = false;
 }
 
-bool MappingSession::imu_is_suspected() const {
-  return started() && !imu_doubted_ && odometry_->uses_imu() &&
-         odometry_->motion().imu_trust().on_probation;
+ImuFinding DenseFrontEnd::imu_finding() const {
+  if (!started() || !odometry_->uses_imu()) return {};
+  const ImuTrust trust = odometry_->motion().imu_trust();
+  if (!trust.usable) return {ImuFinding::Verdict::kWrong, trust.reason};
+  // A run that has doubted it from the start finds out who is right.
+  if (!imu_doubted_ && trust.on_probation) return {ImuFinding::Verdict::kSuspected, trust.reason};
+  return {};
 }
 
-bool MappingSession::imu_is_wrong() const {
-  return started() && odometry_->uses_imu() && !odometry_->motion().imu_trust().usable;
+FrontEndProgress DenseFrontEnd::progress() const {
+  return {"mapping", counts_.scans, fmt::format("{} keyframes", map_->keyframes().size())};
 }
 
-std::optional<TimeNs> MappingSession::last_imu() const {
+std::optional<TimeNs> DenseFrontEnd::last_imu() const {
   if (recent_imu_.empty()) return std::nullopt;
   return recent_imu_.back().stamp;
 }
 
-void MappingSession::handle(const Event& event, const Rig& rig) {
+std::vector<TimeNs> DenseFrontEnd::handle(const Event& event, const Rig& rig) {
+  const TimeNs before = last_scan_end_;
+  take(event, rig);
+  if (last_scan_end_ == before) return {};
+  return {last_scan_end_};
+}
+
+void DenseFrontEnd::take(const Event& event, const Rig& rig) {
   if (opening_ && started()) opening_->events.push_back(event);
   if (started() && settled()) complete_rig(rig);
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
@@ -116,7 +133,7 @@ void MappingSession::handle(const Event& event, const Rig& rig) {
   }
 }
 
-void MappingSession::take_sample(const ImuSample& sample) {
+void DenseFrontEnd::take_sample(const ImuSample& sample) {
   ++counts_.imu_samples;
   if (started())
     imu_hearing_.add(sample, rig_.body_from_imu.has_value(), config_.odometry.motion.imu);
@@ -128,7 +145,7 @@ void MappingSession::take_sample(const ImuSample& sample) {
 }
 
 // A sensor that begins late, or whose place is told late, is used from then on.
-void MappingSession::complete_rig(const Rig& rig) {
+void DenseFrontEnd::complete_rig(const Rig& rig) {
   if (!rig_.body_from_gnss && rig.body_from_gnss) {
     rig_.body_from_gnss = rig.body_from_gnss;
     rig_.gnss_extrinsic_source = rig.gnss_extrinsic_source;
@@ -141,13 +158,13 @@ void MappingSession::complete_rig(const Rig& rig) {
   if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(last_scan_);
 }
 
-void MappingSession::make_odometry(const Rig& rig) {
+void DenseFrontEnd::make_odometry(const Rig& rig) {
   rig_ = rig;
   odometry_ = std::make_unique<DenseOdometry>(config_.odometry, rig_, times_, log_);
 }
 
 // An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
-void MappingSession::start_anew() {
+void DenseFrontEnd::start_anew() {
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile);
   clouds_ = std::make_unique<KeyframeClouds>(folder_ / kCloudsFile);
   map_->start();
@@ -167,7 +184,7 @@ void MappingSession::start_anew() {
   if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(first.stamp);
 }
 
-void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
+void DenseFrontEnd::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
   if (counts_.scans < 2) return;
   const Scan& first = *std::get<ScanPtr>(opening_->events.front());
   if (counts_.parts == 0 && opening_->rounds == 0 && is_part_of_turn(first, scan)) {
@@ -198,7 +215,7 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
       opening_->events.push_back(events.front());
       on_scan(first);
       for (std::size_t i = 1; i < events.size(); ++i)
-        handle(events[i], rig);
+        take(events[i], rig);
       return;
     }
   }
@@ -206,7 +223,7 @@ void MappingSession::consider_opening(const Scan& scan, const DenseEstimate& est
 }
 
 // Begins with the second scan instead.
-void MappingSession::leave_out_first() {
+void DenseFrontEnd::leave_out_first() {
   const std::vector<Event> events = std::exchange(opening_->events, {});
   const Scan& first = *std::get<ScanPtr>(events.front());
   log_.warn("scan.part",
@@ -222,11 +239,11 @@ void MappingSession::leave_out_first() {
   odometry_.reset();
   const Rig rig = rig_;
   for (std::size_t i = 1; i < events.size(); ++i)
-    handle(events[i], rig);
+    take(events[i], rig);
 }
 
 // Lost: unmatched for so long that the prediction is worth nothing, or not even finite any more.
-bool MappingSession::lost(const DenseEstimate& estimate) const {
+bool DenseFrontEnd::lost(const DenseEstimate& estimate) const {
   const bool finite = estimate.state.world_from_body.matrix().allFinite() &&
                       estimate.state.velocity_in_world.allFinite() &&
                       estimate.state.velocity_in_world.norm() < kMostSpeedMS;
@@ -238,13 +255,13 @@ bool MappingSession::lost(const DenseEstimate& estimate) const {
 // After an outage the prediction may be so far off that a match is one by chance: it finds few of
 // the points again that scans found before. (Right matches after 10 s found 0.87 of that share,
 // wrong ones 0.13.)
-bool MappingSession::lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const {
+bool DenseFrontEnd::lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const {
   if (to_seconds(scan.stamp - last_scan_) < kOutageS || last_good_inliers_ <= 0.0) return false;
   return !estimate.matched || estimate.match.inlier_ratio < kFoundAgainShare * last_good_inliers_;
 }
 
 // A new odometry from this scan on, put `about_there`, and an empty local map.
-DenseEstimate MappingSession::begin_segment(const Scan& scan, const Pose& about_there) {
+DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_there) {
   log_.warn("map.segment",
             fmt::format("lost at {} s: a new piece of map begins there, joined to the "
                         "old one by no more than a guess of the way in between",
@@ -269,7 +286,7 @@ DenseEstimate MappingSession::begin_segment(const Scan& scan, const Pose& about_
   return estimate;
 }
 
-void MappingSession::on_scan(const Scan& scan) {
+void DenseFrontEnd::on_scan(const Scan& scan) {
   const ScopedTimer timer(times_, "scan");
   const double cpu_start = process_cpu_seconds() - map_->search_cpu_seconds();
   const bool outage = to_seconds(scan.stamp - last_scan_) > kOutageS;
@@ -303,7 +320,7 @@ void MappingSession::on_scan(const Scan& scan) {
   if (opening_) consider_opening(scan, estimate);
 }
 
-void MappingSession::note_outcome(const DenseEstimate& estimate, ScanRecord& record) {
+void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& record) {
   ++counts_.scans;
   counts_.points += record.points;
   record.fitness_m2 = static_cast<float>(estimate.match.fitness_m2);
@@ -337,7 +354,7 @@ void MappingSession::note_outcome(const DenseEstimate& estimate, ScanRecord& rec
   }
 }
 
-void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& record) {
+void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record) {
   NavState state = estimate.state;
   if (estimate.update.new_world_from_old_world) {
     map_->move_world(*estimate.update.new_world_from_old_world);
@@ -375,7 +392,7 @@ void MappingSession::update_map(const DenseEstimate& estimate, ScanRecord& recor
 }
 
 // What the map takes from a scan: more than what is matched.
-Points MappingSession::map_points(const DenseEstimate& estimate) {
+Points DenseFrontEnd::map_points(const DenseEstimate& estimate) {
   VoxelFilterConfig voxel = config_.odometry.voxel;
   const double edge = config_.keyframe_map.keyframe.voxel_size_m;
   if (edge == 0.0) return points_in_range(estimate.cloud, voxel);
@@ -385,8 +402,8 @@ Points MappingSession::map_points(const DenseEstimate& estimate) {
 }
 
 // Keeps what a scan adds to the finished map.
-void MappingSession::store_cloud(const DenseEstimate& estimate, std::size_t keyframe,
-                                 const Pose& keyframe_from_body) {
+void DenseFrontEnd::store_cloud(const DenseEstimate& estimate, std::size_t keyframe,
+                                const Pose& keyframe_from_body) {
   if (!config_.map_enabled) return;
   const auto& keyframes = map_->keyframes();
   if (clouds_->size() > 0) {

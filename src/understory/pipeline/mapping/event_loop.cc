@@ -1,0 +1,198 @@
+#include "understory/pipeline/mapping/event_loop.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "understory/pipeline/source.h"
+#include "understory/util/read_error.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+
+EventLoop::EventLoop(const MappingRequest& request, RunState& state, Log& log,
+                     const ProgressSink& progress, const StopRequested& stop_requested)
+    : request_(request),
+      asked_(request.config),
+      state_(state),
+      log_(log),
+      progress_(progress),
+      stop_requested_(stop_requested),
+      source_(open_source(request.recording, request.open, log)) {
+  state_.check_inputs(request_);
+  state_.resumed() ? go_on() : begin();
+  if (request_.realtime) play_at_sensor_speed();
+}
+
+void EventLoop::begin() {
+  request_.conditions.realtime = request_.realtime;
+  if (depends_on_sensors(asked_)) source_ = learn_traits(std::move(source_), request_.traits);
+  state_.forget_former();
+  adapt_to_recording();
+  save_state();  // makes the run resumable from the start
+}
+
+void EventLoop::go_on() {
+  adapt_to_recording();
+  state_.find_place(*source_);
+  state_.restore(*front_end_, *orderer_, log_, source_->rig());
+  stamps_believed_ = orderer_->believes_stamps(EventOrderer::kImu);
+  events_ = state_.events();
+}
+
+// Orderer and front end at their beginning, with the configuration that suits the recording.
+void EventLoop::adapt_to_recording() {
+  Adapted<FrontEndConfig> adapted =
+      adapt_front_end(asked_, request_.config_origins, request_.traits, request_.conditions);
+  request_.config = std::move(adapted.config);
+  request_.adapted = std::move(adapted.changes);
+  request_.effective_yaml = yaml_of(request_.config);
+  orderer_.emplace(loop_of(request_.config).time_repair, log_);
+  if (stamps_believed_) orderer_->believe_stamps(EventOrderer::kImu);
+  front_end_.reset();  // lets go of its files
+  front_end_ =
+      make_front_end(request_.config, request_.traits, request_.conditions, state_.work(), log_);
+}
+
+void EventLoop::play_at_sensor_speed() {
+  auto player = std::make_unique<RealtimePlayer>(
+      std::move(source_), static_cast<std::size_t>(loop_of(request_.config).realtime_queue_scans),
+      stop_requested_);
+  player_ = player.get();
+  source_ = std::move(player);
+  front_end_->run_in_real_time();
+}
+
+RunFacts EventLoop::run() {
+  bool ended = false;
+  while (!ended && !stopped()) {
+    std::optional<Event> event = next_event();
+    // At the speed of the sensors there may be nothing yet, and no end of waiting for it.
+    if (!event && (player_ != nullptr || !unreadable_.empty()) && stopped()) break;
+    ended = !event;
+    if (event) {
+      ++events_;
+      orderer_->push(std::move(*event));
+    } else {
+      orderer_->finish();
+    }
+    handle_ready();
+    if (!ended) save_state_if_due();
+    if (start_over_for_imu()) ended = false;
+  }
+  if (stopped_ && front_end_->settled()) save_state();
+  note_positioned(front_end_->finish(source_->rig()));
+  if (player_ != nullptr) player_->stop();
+  return facts();
+}
+
+bool EventLoop::stopped() {
+  stopped_ = stopped_ || !unreadable_.empty() || (stop_requested_ && stop_requested_());
+  return stopped_;
+}
+
+// A recording that the system cannot read any further ends the run there, with what it has.
+std::optional<Event> EventLoop::next_event() {
+  try {
+    return source_->next();
+  } catch (const ReadError& error) {
+    if (!front_end_->has_map()) throw;
+    unreadable_ = error.what();
+    return std::nullopt;
+  }
+}
+
+void EventLoop::handle_ready() {
+  while (const auto ready = orderer_->pop()) {
+    const TimeNs before = front_end_->last_scan_end();
+    note_positioned(front_end_->handle(*ready, source_->rig()));
+    if (front_end_->last_scan_end() == before || !progress_) continue;
+    const FrontEndProgress so_far = front_end_->progress();
+    const double share = source_->progress();
+    const auto done = static_cast<double>(so_far.scans);
+    progress_({so_far.stage, done, share > 0.0 ? done / share : 0.0, "scans", so_far.remark});
+  }
+}
+
+void EventLoop::note_positioned(const std::vector<TimeNs>& scan_ends) {
+  if (player_ == nullptr) return;
+  for (const TimeNs scan_end : scan_ends)
+    latencies_ms_.push_back(player_->latency_ms(scan_end));
+}
+
+void EventLoop::save_state() {
+  state_.save(request_, *front_end_, *orderer_, log_, *source_, events_);
+}
+
+void EventLoop::save_state_if_due() {
+  const TimeNs due =
+      state_.last_checkpoint() + from_seconds(loop_of(request_.config).checkpoint_interval_s);
+  if (!front_end_->settled() || front_end_->last_scan_end() < due) return;
+  save_state();
+  memory_mb_.push_back(resident_memory_mb());
+}
+
+// An IMU that contradicts the scans bends what is positioned with it, the map included, and by that
+// the scans' word against it. So the recording is begun anew: once to find out who is right, with
+// scans alone, and if the IMU is wrong, without it. True if it was; a run at the speed of its
+// sensors cannot, and goes on.
+bool EventLoop::start_over_for_imu() {
+  if (player_ != nullptr) return false;
+  const ImuFinding found = front_end_->imu_finding();
+  if (found.verdict == ImuFinding::Verdict::kBelieved) return false;
+  if (start_over_for_stamps()) return true;
+  const bool wrong = found.verdict == ImuFinding::Verdict::kWrong;
+  log_.forget_all_but(wrong ? "imu.untrusted" : "imu.probation");
+  log_.info(wrong ? "the recording is mapped again from its beginning, without the IMU"
+                  : "the recording is begun anew to find out");
+  RunConditions& conditions = request_.conditions;
+  conditions.imu_judged_s = to_seconds(front_end_->last_scan_end() - front_end_->first_scan());
+  conditions.imu_doubted = !wrong;
+  if (wrong) conditions.imu_refused = found.reason;
+  start_over();
+  return true;
+}
+
+// An IMU whose clock was shifted by its arrival, and that contradicts the scans: perhaps it came
+// late with stamps that are right. True if the recording was begun anew with them.
+bool EventLoop::start_over_for_stamps() {
+  if (orderer_->report().streams[EventOrderer::kImu].offset == 0 || stamps_believed_) return false;
+  stamps_believed_ = true;
+  log_.forget_all_but("");
+  log_.info("the recording is begun anew with the IMU's own stamps");
+  start_over();
+  return true;
+}
+
+void EventLoop::start_over() {
+  adapt_to_recording();
+  source_ = open_source(request_.recording, request_.open, log_);
+  events_ = 0;
+  state_.begin_anew(request_, *front_end_, *orderer_, log_, *source_);
+}
+
+const Recording& EventLoop::recording() const {
+  return player_ != nullptr ? player_->played() : *source_;
+}
+
+RunFacts EventLoop::facts() {
+  RunFacts facts;
+  facts.stopped = stopped_;
+  facts.unreadable = unreadable_;
+  facts.elapsed_s = [this] { return state_.elapsed_s(); };
+  facts.format = source_->format();
+  facts.time_repair = orderer_->report();
+  facts.realtime = player_ != nullptr;
+  facts.latencies_ms = latencies_ms_;
+  facts.memory_mb = memory_mb_;
+  if (player_ == nullptr) return facts;
+  facts.dropped_scans = player_->dropped_scans();
+  if (facts.dropped_scans > 0) {
+    log_.warn("realtime.dropped",
+              fmt::format("{} of {} scans were dropped, because the machine could not keep up",
+                          facts.dropped_scans, facts.dropped_scans + front_end_->progress().scans));
+  }
+  return facts;
+}
+
+}  // namespace understory

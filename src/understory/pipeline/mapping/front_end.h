@@ -1,0 +1,98 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "understory/pipeline/mapping/front_end_config.h"
+#include "understory/pipeline/mapping/mapping_request.h"
+#include "understory/pipeline/mapping/run_facts.h"
+#include "understory/pipeline/run_folder/resumable.h"
+#include "understory/pipeline/run_folder/run_outcome.h"
+#include "understory/recording/recording.h"
+#include "understory/util/log.h"
+#include "understory/util/progress.h"
+
+namespace understory {
+
+// What the scans say of the IMU.
+struct ImuFinding {
+  enum class Verdict {
+    kBelieved,   // or there is none
+    kSuspected,  // contradicted before it ever agreed: who is right is found out without it
+    kWrong,
+  };
+  Verdict verdict = Verdict::kBelieved;
+  std::string reason;
+};
+
+// How far a front end has come.
+struct FrontEndProgress {
+  std::string stage;  // "mapping"
+  std::size_t scans = 0;
+  std::string remark;  // "12 keyframes"
+};
+
+// What is made of a recording once its scans have their poses. The functions are called once each,
+// in this order.
+class MapMaker {
+ public:
+  MapMaker() = default;
+  MapMaker(const MapMaker&) = delete;
+  MapMaker& operator=(const MapMaker&) = delete;
+  virtual ~MapMaker() = default;
+
+  // Poses as all loops together have them.
+  virtual void close_loops() = 0;
+  // Writes the files of the run to `results`. Throws OutputError.
+  [[nodiscard]] virtual RunOutcome write(const std::filesystem::path& results) = 0;
+};
+
+// A recording that was read to its end, or as far as the user or the disk let it. All is the event
+// loop's and lives as long.
+struct ReadRecording {
+  const MappingRequest& request;  // with the configuration that ran
+  const RunFacts& facts;
+  const Recording& source;
+  std::filesystem::path work;  // folder for what does not fit into memory
+  Log& log;
+  const ProgressSink& progress;
+};
+
+// The moving part of a mapping run: takes events in order of time and positions the scans. There
+// are two: the dense one matches all points to a local map, the sparse one stems to stems. Its
+// whole state can be saved while it is settled. Not thread-safe.
+class FrontEnd : public Resumable {
+ public:
+  // Takes one event. `rig`: what is known of the sensors by now. Returns the ends of the scans that
+  // have got their poses by it, in order.
+  virtual std::vector<TimeNs> handle(const Event& event, const Rig& rig) = 0;
+  // No event comes any more: positions what still waits. Returns as `handle`.
+  virtual std::vector<TimeNs> finish(const Rig& rig) = 0;
+  // --realtime, before the first event: what is found beside the scan loop counts at once.
+  virtual void run_in_real_time() = 0;
+
+  // Whether the state can be saved now: no scan waits for its pose or may be positioned again.
+  [[nodiscard]] virtual bool settled() const = 0;
+  // Stamp of the first scan.
+  [[nodiscard]] virtual TimeNs first_scan() const = 0;
+  // What was positioned with an IMU that is not believed is better done again without it.
+  [[nodiscard]] virtual ImuFinding imu_finding() const = 0;
+  [[nodiscard]] virtual FrontEndProgress progress() const = 0;
+
+  // Whether there is anything to make a map of, and why not.
+  [[nodiscard]] virtual bool has_map() const = 0;
+  [[nodiscard]] virtual std::string why_no_map(const Recording& source) const = 0;
+  // What is made of it; `this` must outlive it. Warns of what only the whole recording can show.
+  [[nodiscard]] virtual std::unique_ptr<MapMaker> map_maker(const ReadRecording& recording) = 0;
+};
+
+// The front end that `config` is of, at the beginning of a recording. Its files are in the folder
+// `work`. `log` must outlive it.
+[[nodiscard]] std::unique_ptr<FrontEnd> make_front_end(const FrontEndConfig& config,
+                                                       const SensorTraits& traits,
+                                                       const RunConditions& conditions,
+                                                       const std::filesystem::path& work, Log& log);
+
+}  // namespace understory

@@ -1,0 +1,105 @@
+#include "understory/pipeline/mapping/front_end_config.h"
+
+#include <utility>
+
+namespace understory {
+namespace {
+
+// Of a configuration by value, because a table is bound to what it changes.
+std::string yaml(MappingConfig config) {
+  return mapping_table(config).to_yaml(false);
+}
+std::string yaml(SparseMappingConfig config) {
+  return sparse_mapping_table(config).to_yaml(false);
+}
+
+std::vector<std::string> named_files(const MappingConfig& config) {
+  return {config.odometry.machine_boxes_file};
+}
+std::vector<std::string> named_files(const SparseMappingConfig& config) {
+  return {config.machine_boxes_file, config.correction.harvester.head_log};
+}
+
+Adapted<MappingConfig> adapt_one(const MappingConfig& asked, const ConfigOrigins& origins,
+                                 const SensorTraits& traits, const RunConditions& conditions) {
+  return adapt(asked, origins, traits, conditions);
+}
+Adapted<SparseMappingConfig> adapt_one(const SparseMappingConfig& asked,
+                                       const ConfigOrigins& origins, const SensorTraits& /*traits*/,
+                                       const RunConditions& conditions) {
+  return adapt(asked, origins, conditions);
+}
+
+}  // namespace
+
+std::string name_of(const FrontEndConfig& config) {
+  return std::holds_alternative<SparseMappingConfig>(config) ? kSparseFrontEnd : kDenseFrontEnd;
+}
+
+std::string yaml_of(const FrontEndConfig& config) {
+  return std::visit([](const auto& one) { return yaml(one); }, config);
+}
+
+const EventLoopConfig& loop_of(const FrontEndConfig& config) {
+  return std::visit([](const auto& one) -> const EventLoopConfig& { return one.loop; }, config);
+}
+
+std::vector<std::string> files_named_in(const FrontEndConfig& config) {
+  return std::visit([](const auto& one) { return named_files(one); }, config);
+}
+
+void check_files_named_in(const FrontEndConfig& config) {
+  if (const auto* sparse = std::get_if<SparseMappingConfig>(&config))
+    (void)read_head_log(sparse->correction.harvester.head_log);
+}
+
+bool depends_on_sensors(const FrontEndConfig& config) {
+  return std::holds_alternative<MappingConfig>(config);
+}
+
+ReadConfig<FrontEndConfig> read_front_end_config(const std::string& front_end,
+                                                 const std::string& profile,
+                                                 const std::string& file,
+                                                 const std::vector<std::string>& settings,
+                                                 Log& log) {
+  if (front_end == kSparseFrontEnd) {
+    auto read = read_sparse_mapping_config(profile, file, settings, log);
+    return {std::move(read.config), std::move(read.origins)};
+  }
+  auto read = read_mapping_config(profile, file, settings);
+  return {std::move(read.config), std::move(read.origins)};
+}
+
+FrontEndConfig reread_front_end_config(
+    const std::string& front_end, const std::string& yaml, const std::string& origin,
+    const std::function<std::string(const std::string&)>& found) {
+  if (front_end == kSparseFrontEnd) {
+    SparseMappingConfig config;
+    reread(config, yaml, origin, found);
+    return config;
+  }
+  MappingConfig config;
+  reread(config, yaml, origin, found);
+  return config;
+}
+
+Adapted<FrontEndConfig> adapt_front_end(const FrontEndConfig& asked, const ConfigOrigins& origins,
+                                        const SensorTraits& traits,
+                                        const RunConditions& conditions) {
+  return std::visit(
+      [&](const auto& one) -> Adapted<FrontEndConfig> {
+        auto adapted = adapt_one(one, origins, traits, conditions);
+        return {std::move(adapted.config), std::move(adapted.changes)};
+      },
+      asked);
+}
+
+std::string commented_yaml(const Adapted<FrontEndConfig>& adapted, const ConfigOrigins& origins) {
+  return std::visit(
+      [&](const auto& one) {
+        return commented_yaml(Adapted<std::decay_t<decltype(one)>>{one, adapted.changes}, origins);
+      },
+      adapted.config);
+}
+
+}  // namespace understory

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "understory/odometry/stems/stem_pacer.h"
+#include "understory/pipeline/judgement/imu_hearing.h"
+#include "understory/pipeline/mapping/front_end.h"
+#include "understory/pipeline/run_folder/view_journal.h"
+#include "understory/recording/recording.h"
+
+namespace understory {
+
+// The front end that matches stems to stems: finds the stems of each scan, positions it by them and
+// keeps views of them. Only stems and poses are held in memory. Its state can be saved between gaps
+// of positioning (`settled`).
+class SparseFrontEnd : public FrontEnd, private ViewSink {
+ public:
+  // An IMU that `conditions` refuse is left out. `folder` is the work folder.
+  SparseFrontEnd(const SparseMappingConfig& config, const RunConditions& conditions,
+                 const std::filesystem::path& folder, Log& log);
+
+  std::vector<TimeNs> handle(const Event& event, const Rig& rig) override;
+  std::vector<TimeNs> finish(const Rig& rig) override;
+  void run_in_real_time() override {}
+
+  void sync() override;
+  void save(BinaryWriter& writer) const override;
+  [[nodiscard]] std::vector<CountedFile> files() const override;
+  void load(BinaryReader& reader, const Rig& rig) override;
+  [[nodiscard]] TimeNs last_scan_end() const override { return last_scan_end_; }
+  // Whether no scan waits for its pose.
+  [[nodiscard]] bool settled() const override { return waiting_ends_.empty(); }
+  [[nodiscard]] TimeNs first_scan() const override { return path_.front().stamp; }
+  [[nodiscard]] ImuFinding imu_finding() const override;
+  [[nodiscard]] FrontEndProgress progress() const override;
+  [[nodiscard]] bool has_map() const override { return !views_.empty(); }
+  [[nodiscard]] std::string why_no_map(const Recording& source) const override;
+  [[nodiscard]] std::unique_ptr<MapMaker> map_maker(const ReadRecording& recording) override;
+
+  [[nodiscard]] const SparseMappingConfig& config() const { return config_; }
+  // Of these, how many held the same points as the one before.
+  [[nodiscard]] std::uint64_t repeated() const { return repeated_; }
+  [[nodiscard]] std::size_t positioned() const { return positioned_; }
+  [[nodiscard]] std::vector<StampedPose>& path() { return path_; }   // of every scan
+  [[nodiscard]] std::vector<StemView>& views() { return views_; }    // that are kept
+  [[nodiscard]] std::vector<SparseStep>& steps() { return steps_; }  // of these
+  [[nodiscard]] std::vector<GnssFix>& fixes() { return fixes_; }
+  [[nodiscard]] StageTimes& times() { return times_; }
+  // For how long the IMU's samples could not be used.
+  [[nodiscard]] const ImuHearing& imu_hearing() const { return imu_hearing_; }
+  [[nodiscard]] ImuTrust imu_trust() const { return pacer_.imu_trust(); }
+
+  // Why this run does without the IMU: an earlier pass found it to be wrong; empty if it does not.
+  [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
+
+ private:
+  [[nodiscard]] std::vector<TimeNs> on_scan(const ScanPtr& scan, const Rig& rig);
+  void on_sample(const ImuSample& sample, const Rig& rig);
+  // Returns the ends of these scans.
+  std::vector<TimeNs> record(const std::vector<StemScan>& results);
+  void refuse_imu(const std::string& reason);
+  void on_pose(const StampedPose& pose, bool positioned) override;
+  void on_view(const StemView& view, const SparseStep& step) override;
+  void on_fix(const GnssFix& fix) override;
+
+  SparseMappingConfig config_;
+  std::filesystem::path folder_;
+  StemPacer pacer_;
+  std::unique_ptr<ViewJournal> journal_;  // from the first event on
+  std::deque<TimeNs> waiting_ends_;       // of scans that have no pose yet
+  TimeNs last_scan_end_ = 0;
+  std::string imu_refused_;
+  ImuHearing imu_hearing_;
+  std::size_t scans_ = 0;  // of which the last may still wait
+  std::uint64_t repeated_ = 0;
+  std::uint64_t last_content_ = 0;
+  std::size_t positioned_ = 0;
+  std::size_t last_stems_ = 0;
+  std::vector<StampedPose> path_;
+  std::vector<StemView> views_;
+  std::vector<SparseStep> steps_;
+  std::vector<GnssFix> fixes_;
+  StageTimes times_;
+};
+
+}  // namespace understory
