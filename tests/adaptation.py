@@ -11,7 +11,7 @@ from program import Cases, good_recording, map_recording, program
 cases = Cases()
 RECORDING, _, _ = good_recording(cases.folder, seconds=5)
 VOXEL = "preprocess.voxel.voxel_size_m"
-SETTINGS = ("--set", f"{VOXEL}=0.4", "--set", "local_map.volume_weight=0.03")
+SETTINGS = ("--set", f"{VOXEL}=0.4", "--set", "registration.ndt.volume_weight=0.03")
 
 
 def flat(config, path=""):
@@ -68,11 +68,11 @@ def _(folder):
     plain = map_recording(RECORDING, folder / "plain")
     for name, options in {"settings": SETTINGS, "file": ("--config", folder / "own.yaml")}.items():
         (folder / "own.yaml").write_text("preprocess: {voxel: {voxel_size_m: 0.4}}\n"
-                                         "local_map: {volume_weight: 0.03}\n")
+                                         "registration: {ndt: {volume_weight: 0.03}}\n")
         own = map_recording(RECORDING, folder / name, *options)
         ran = flat(own.run["effective_config"])
-        assert ran[VOXEL] == 0.4 and ran["local_map.volume_weight"] == 0.03, name
-        assert not {VOXEL, "local_map.volume_weight"} & set(changes(own.run)), name
+        assert ran[VOXEL] == 0.4 and ran["registration.ndt.volume_weight"] == 0.03, name
+        assert not {VOXEL, "registration.ndt.volume_weight"} & set(changes(own.run)), name
         assert "keyframe.distance_m" in changes(own.run), "what nobody set is not adapted any more"
         assert own.run["config_origins"][VOXEL] == ("--set" if name == "settings" else str(options[1]))
         assert own.poses != plain.poses, "the setting has had no effect"
@@ -91,8 +91,8 @@ def _(folder):
 def _(folder):
     run = map_recording(RECORDING, folder / "run", "--set", "motion.imu_enabled=false").run
     told = changes(run)
-    assert told["local_map.cell_sizes_m"]["to"] == [2, 1, 0.5], told
-    assert "switched off" in told["local_map.cell_sizes_m"]["why"]
+    assert told["registration.ndt.cell_sizes_m"]["to"] == [2, 1, 0.5], told
+    assert "switched off" in told["registration.ndt.cell_sizes_m"]["why"]
 
 
 @cases.case("print-config of a recording is what runs on it")

@@ -46,7 +46,7 @@ void run(const std::string& target_file, const std::string& source_file, int rou
     map = build_ndt_map({&cloud, 1}, {});
   });
   const double ndt_ms =
-      best_ms(rounds, [&] { result = register_ndt(*map, source_thin, Pose(), std::nullopt, {}); });
+      best_ms(rounds, [&] { result = register_ndt(*map, source_thin, Pose(), {}, {}); });
   const Eigen::Vector3d& t = result.target_from_source.translation();
   std::printf(
       "{\"points\": [%zu, %zu], \"thinned\": [%zu, %zu], \"thin_ms\": %.3f, \"map_ms\": %.3f, "

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
-AS_SEEN = ["local_map.near_side_line=0", "local_map.near_side_volume=0"]
+AS_SEEN = ["registration.ndt.near_side_line=0", "registration.ndt.near_side_volume=0"]
 WITH_FLAKES = ["preprocess.isolated.within_m=0"]
 
 

@@ -10,7 +10,7 @@
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/registration/icp/icp.h"
-#include "understory/registration/ndt/ndt.h"
+#include "understory/registration/matchers.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -19,12 +19,17 @@ namespace {
 struct RegisterConfig {
   double target_voxel_m = 0.1;
   double source_voxel_m = 0.25;
-  std::vector<double> cell_sizes_m = {3.0, 1.0};
-  NdtMapConfig map;
-  NdtConfig ndt;
+  MatcherConfig matcher;
   IcpConfig icp;
   SparseIcpConfig stem_icp;
   GoIcpConfig go_icp;
+
+  // Of two clouds there is less in a cell than of the keyframes of a map.
+  RegisterConfig() {
+    auto& ndt = matcher.get<NdtMatcherConfig>();
+    ndt.cell_sizes_m = {3.0, 1.0};
+    ndt.cells.sigma_floor_m = 0.03;
+  }
 };
 
 void describe(ConfigTable& table, RegisterConfig& config) {
@@ -32,14 +37,7 @@ void describe(ConfigTable& table, RegisterConfig& config) {
             "voxels that thin the target");
   table.add("source_voxel_m", config.source_voxel_m, {0.01, 5.0}, "m",
             "voxels that thin the source (ICP: both)");
-  table.section("ndt", [&] {
-    table.add("cell_sizes_m", config.cell_sizes_m, "m", "cells from coarse to fine");
-    table.add("min_points", config.map.min_points, {3, 1000}, "",
-              "cells with fewer points are not matched");
-    table.add("sigma_floor_m", config.map.sigma_floor_m, {0.001, 1.0}, "m",
-              "no surface is taken to be thinner");
-    describe(table, config.ndt);
-  });
+  describe_settings(table, config.matcher);
   table.section("icp", [&] { describe(table, config.icp); });
   table.section("stem_icp", [&] { describe(table, config.stem_icp); });
   table.section("go_icp", [&] { describe(table, config.go_icp); });
@@ -105,17 +103,11 @@ RegistrationResult match(const RegisterOptions& options, const RegisterConfig& c
   const Points thinned = filter.filter(source, config.source_voxel_m);
   if (options.method == "icp") {
     const IcpTarget tree(filter.filter(target, config.source_voxel_m), config.icp);
-    return register_icp(tree, thinned, guess, std::nullopt, config.icp);
+    return register_icp(tree, thinned, guess, {}, config.icp);
   }
+  const auto matcher = make_matcher(config.matcher, options.method);
   const Points dense = filter.filter(target, config.target_voxel_m);
-  std::vector<NdtMapPtr> maps;
-  for (const double size : config.cell_sizes_m) {
-    NdtMapConfig map = config.map;
-    map.cell_size_m = size;
-    const PlacedCloud cloud{&dense, Pose()};
-    maps.push_back(build_ndt_map({&cloud, 1}, map));
-  }
-  return register_ndt(maps, thinned, guess, std::nullopt, config.ndt);
+  return matcher->make_target(dense)->match(thinned, guess, {}, MatchStart::kFar);
 }
 
 void print_json(const RegistrationResult& result, const Pose& a_from_b) {
@@ -165,10 +157,6 @@ int run_register(const RegisterOptions& options, CommandContext& context) {
   }
   if (options.target.empty() || options.source.empty())
     throw ConfigError({"register: expected two clouds, A and B"});
-  if (config.cell_sizes_m.empty()) throw ConfigError({"ndt.cell_sizes_m: expected at least one"});
-  for (const double size : config.cell_sizes_m) {
-    if (!(size > 0.0)) throw ConfigError({"ndt.cell_sizes_m: expected numbers above 0"});
-  }
   // Both clouds relative to A's origin, so that single precision is enough in any coordinate
   // system.
   const Loaded target = load(options.target, nullptr, context.log);

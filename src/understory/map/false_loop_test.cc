@@ -113,7 +113,7 @@ Walk walk(const Stand& stand, const Eigen::Vector3d& slip,
                              scan_at(stand, truth, static_cast<std::uint64_t>(step)));
     if (now) moved = *now * moved;
   }
-  map.finish({});
+  map.finish();
   Walk result;
   for (std::size_t i = 0; i < map.loops().size(); ++i) {
     if (map.loops()[i].to <= kSteps / 2 + 3) continue;

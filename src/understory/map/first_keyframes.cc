@@ -28,7 +28,7 @@ void describe(ConfigTable& table, FirstKeyframesConfig& config) {
 std::vector<Pose> refine_first_keyframes(
     std::span<const Keyframe> segment,
     const std::function<std::shared_ptr<const Points>(std::size_t)>& points,
-    const LocalMapConfig& map_config, const NdtConfig& ndt, const FirstKeyframesConfig& config) {
+    const LocalMapConfig& map_config, const FirstKeyframesConfig& config) {
   const auto count = static_cast<std::size_t>(config.keyframes);
   const std::size_t known = count + static_cast<std::size_t>(config.map_keyframes);
   if (segment.size() < known) return {};
@@ -42,9 +42,8 @@ std::vector<Pose> refine_first_keyframes(
     const auto cloud = points(i);
     const Pose guess = moved * segment[i].world_from_body;
     const PosePrior prior{guess, segment[i + 1].covariance.inverse()};
-    // The finest map only: nothing is far off.
     const RegistrationResult match =
-        register_ndt(*map.snapshot().back(), *cloud, guess, prior, ndt);
+        map.snapshot()->match(*cloud, guess, {prior}, MatchStart::kNear);
     answer[i] = believable(match, guess, config) ? match.target_from_source : guess;
     moved = answer[i] * segment[i].world_from_body.inverse();
     map.insert({cloud.get(), answer[i]}, false);

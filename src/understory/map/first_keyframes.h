@@ -9,7 +9,6 @@
 #include "understory/geometry/pose.h"
 #include "understory/map/keyframe.h"
 #include "understory/map/local_map.h"
-#include "understory/registration/ndt/ndt.h"
 #include "understory/util/config.h"
 
 namespace understory {
@@ -34,6 +33,6 @@ void describe(ConfigTable& table, FirstKeyframesConfig& config);
 [[nodiscard]] std::vector<Pose> refine_first_keyframes(
     std::span<const Keyframe> segment,
     const std::function<std::shared_ptr<const Points>(std::size_t)>& points,
-    const LocalMapConfig& map_config, const NdtConfig& ndt, const FirstKeyframesConfig& config);
+    const LocalMapConfig& map_config, const FirstKeyframesConfig& config);
 
 }  // namespace understory

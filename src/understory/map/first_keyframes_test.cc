@@ -44,12 +44,13 @@ struct Path {
   [[nodiscard]] std::vector<Pose> refine(const std::vector<Keyframe>& keyframes,
                                          const FirstKeyframesConfig& config) const {
     LocalMapConfig map;  // as for a lidar with few rings
-    map.cell_sizes_m = {1.0};
-    map.cells.volume_weight = 1.0;
-    map.cells.viewpoint_in_source = Eigen::Vector3d::Zero();
-    map.cells.few_rings = true;
+    auto& ndt = map.matcher.get<NdtMatcherConfig>();
+    ndt.cell_sizes_m = {1.0};
+    ndt.cells.volume_weight = 1.0;
+    ndt.cells.few_rings = true;
+    map.viewpoint.lidar_in_source = Eigen::Vector3d::Zero();
     return refine_first_keyframes(
-        keyframes, [&](std::size_t i) { return points[i]; }, map, NdtConfig(), config);
+        keyframes, [&](std::size_t i) { return points[i]; }, map, config);
   }
 };
 

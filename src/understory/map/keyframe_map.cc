@@ -104,8 +104,8 @@ std::optional<Pose> KeyframeMap::add(TimeNs stamp, const Pose& world_from_body,
 // The newest keyframe is not in the local map yet. If the world moves, the map is built anew with
 // it.
 std::optional<Pose> KeyframeMap::close_in_present() {
-  if (snapshot_.empty()) return std::nullopt;
-  PresentMap present{snapshot_, {}};
+  if (snapshot_ == nullptr) return std::nullopt;
+  PresentMap present{*snapshot_, {}};
   for (const LocalMapInsertion& insertion : inserted_)
     present.keyframes.push_back(insertion.keyframe);
   auto outcome = loops_.close_in_present(keyframes_, segment_start(), *points_, present);
@@ -160,7 +160,7 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
   return moved;
 }
 
-void KeyframeMap::finish(const NdtConfig& ndt) {
+void KeyframeMap::finish() {
   if (keyframes_.empty()) return;
   if (auto outcome = loops_.take(keyframes_.size(), true, true)) {
     static_cast<void>(take_over(std::move(*outcome)));
@@ -174,21 +174,21 @@ void KeyframeMap::finish(const NdtConfig& ndt) {
   for (std::size_t i = 0; i < result.world_from_keyframe.size(); ++i) {
     keyframes_[i].world_from_body = result.world_from_keyframe[i];
   }
-  snapshot_.clear();
+  snapshot_.reset();
   local_map_.clear();
-  if (config_.first_keyframes.enabled) refine_first_keyframes_of_segments(ndt);
+  if (config_.first_keyframes.enabled) refine_first_keyframes_of_segments();
   points_->forget();
   give_free_memory_back();
 }
 
-void KeyframeMap::refine_first_keyframes_of_segments(const NdtConfig& ndt) {
+void KeyframeMap::refine_first_keyframes_of_segments() {
   for (std::size_t s = 0; s < segment_starts_.size(); ++s) {
     const std::size_t first = segment_starts_[s];
     const bool is_last = s + 1 == segment_starts_.size();
     const std::size_t end = is_last ? keyframes_.size() : segment_starts_[s + 1];
     const std::vector<Pose> refined = refine_first_keyframes(
         std::span(keyframes_).subspan(first, end - first),
-        [&](std::size_t i) { return points_->get(first + i); }, config_.local_map, ndt,
+        [&](std::size_t i) { return points_->get(first + i); }, config_.local_map,
         config_.first_keyframes);
     if (refined.empty()) continue;
     for (std::size_t i = 0; i < refined.size(); ++i)
@@ -211,7 +211,7 @@ void KeyframeMap::update_local_map(std::size_t keyframe) {
 
 // The old one goes first, so that the new one is written in its place.
 void KeyframeMap::take_snapshot() {
-  snapshot_.clear();
+  snapshot_.reset();
   snapshot_ = local_map_.snapshot();
 }
 
@@ -245,7 +245,7 @@ void KeyframeMap::insert_all() {
     local_map_.insert({points.get(), keyframes_[insertion.keyframe].world_from_body},
                       insertion.forget != 0);
   }
-  snapshot_.clear();
+  snapshot_.reset();
   if (!inserted_.empty()) take_snapshot();
 }
 
@@ -263,7 +263,7 @@ void KeyframeMap::move_world(const Pose& new_world_from_old_world) {
   for (Keyframe& keyframe : keyframes_) {
     keyframe.world_from_body = new_world_from_old_world * keyframe.world_from_body;
   }
-  if (!snapshot_.empty()) rebuild_local_map();
+  if (snapshot_ != nullptr) rebuild_local_map();
 }
 
 void KeyframeMap::sync() {

@@ -74,11 +74,12 @@ class KeyframeMap {
   void start_segment();
   // The recording is over: waits for what is running, optimises, positions the first keyframes of
   // each segment again, and frees what only scans needed: there is no local map any more.
-  void finish(const NdtConfig& ndt);
+  void finish();
   // Moves everything, e.g. to level the world.
   void move_world(const Pose& new_world_from_old_world);
 
-  [[nodiscard]] const std::vector<NdtMapPtr>& local_map() const { return snapshot_; }
+  // Null while it is empty.
+  [[nodiscard]] const MatchTargetPtr& local_map() const { return snapshot_; }
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
   [[nodiscard]] const std::vector<LoopAttempt>& loops() const { return loops_.attempts(); }
   // Which of the verified loops the graph believes in; of the size of loops().
@@ -95,7 +96,7 @@ class KeyframeMap {
   void load(BinaryReader& reader);
 
  private:
-  void refine_first_keyframes_of_segments(const NdtConfig& ndt);
+  void refine_first_keyframes_of_segments();
   [[nodiscard]] std::size_t segment_start() const { return segment_starts_.back(); }
   void update_local_map(std::size_t keyframe);
   void insert(std::size_t keyframe);
@@ -118,7 +119,7 @@ class KeyframeMap {
   LocalMap local_map_;
   std::vector<LocalMapInsertion>
       inserted_;  // since the local map was empty, in order: builds it again
-  std::vector<NdtMapPtr> snapshot_;
+  MatchTargetPtr snapshot_;
   bool takes_loops_when_found_ = false;
   std::vector<char> loops_used_;
   LoopCloser loops_;

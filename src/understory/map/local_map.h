@@ -1,29 +1,29 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/ndt/ndt_map.h"
+#include "understory/registration/matchers.h"
 #include "understory/util/config.h"
 
 namespace understory {
 
 struct LocalMapConfig {
-  // Edges of the cells of the maps that scans are matched to, coarse to fine.
-  std::vector<double> cell_sizes_m = {2.0, 0.5};
-  // cell_size_m is taken from the list above. Many keyframes lie in a cell: what they agree on is
-  // sharper than one scan.
-  NdtMapConfig cells = {.sigma_floor_m = 0.01};
+  // The method that scans are matched to the map by, and what the map is made of for it.
+  MatcherConfig matcher;
+  Viewpoint viewpoint;  // of the keyframes
   // Accumulate: every keyframe within the radius stays, however old; recent: only the last
   // keyframes, thinned by a voxel grid of their positions (P4 section 3.1.1, Local Map).
   enum class Method { kAccumulate, kRecent };
   Method method = Method::kAccumulate;
-  double radius_m = 80.0;         // accumulate: cells farther from the body are forgotten
+  double radius_m = 80.0;         // accumulate: what is farther from the body is forgotten
   int recent_keyframes = 15;      // recent: theta_lm
   double recent_spacing_m = 2.0;  // recent: one keyframe per cube of this edge
 };
+// Without the matcher, whose section stands by itself.
 void describe(ConfigTable& table, LocalMapConfig& config);
 
 // A keyframe's thinned cloud and where it is.
@@ -39,20 +39,21 @@ struct LocalMapInsertion {
   std::uint64_t forget = 0;
 };
 
-// The map around the carrier that scans are matched to, made of keyframes. Hands out immutable
-// snapshots that stay valid while it goes on. Not thread-safe itself.
+// The map around the carrier that scans are matched to: what the matcher makes of keyframes. Hands
+// out immutable snapshots that stay valid while it goes on. Not thread-safe itself.
 class LocalMap {
  public:
+  // Throws ConfigError for settings of the matcher that cannot be.
   explicit LocalMap(const LocalMapConfig& config);
 
-  // Adds a keyframe and, if `forget`, drops the cells that are too far from it.
+  // Adds a keyframe and, if `forget`, drops what is too far from it.
   void insert(const PlacedPoints& keyframe, bool forget);
   void clear();
-  [[nodiscard]] std::vector<NdtMapPtr> snapshot();
+  [[nodiscard]] MatchTargetPtr snapshot();
 
  private:
-  LocalMapConfig config_;
-  std::vector<NdtMapBuilder> builders_;
+  double radius_m_;
+  std::unique_ptr<TargetBuilder> builder_;
 };
 
 // Which of the keyframes at these positions (oldest first) P4's local map is made of: of the most

@@ -109,7 +109,7 @@ LoopAttempt try_in_present(const Search& search, std::size_t query, const LoopCa
   const auto& poses = search.problem.world_from_keyframe;
   const auto from = static_cast<std::size_t>(candidate.keyframe);
   LocalMapLoopInput input;
-  input.local_map = present.cells;
+  input.local_map = &present.target;
   for (const std::size_t i : present.keyframes)
     add_points_seen_from(search, i, query, input.map_points_in_query);
   input.candidate_points =

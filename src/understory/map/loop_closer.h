@@ -13,7 +13,7 @@
 #include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
 #include "understory/map/loop_attempt.h"
-#include "understory/registration/ndt/ndt_map.h"
+#include "understory/registration/matcher.h"
 #include "understory/util/binary_io.h"
 #include "understory/util/config.h"
 #include "understory/util/log.h"
@@ -46,7 +46,7 @@ struct LoopOutcome {
 
 // The map that scans are matched to at present, in the world frame, and the keyframes in it.
 struct PresentMap {
-  const std::vector<NdtMapPtr>& cells;  // coarse to fine
+  const MatchTarget& target;
   std::vector<std::size_t> keyframes;
 };
 

@@ -81,8 +81,10 @@ TEST(PaperProfile, WhatIsNotThePapersIsOff) {
   EXPECT_EQ(config.odometry.isolated.within_m, 0.0);
   EXPECT_EQ(config.odometry.motion.velocity_gate_m_s, 0.0);
   EXPECT_EQ(config.odometry.motion.angular_gate_deg_s, 0.0);
-  EXPECT_EQ(config.keyframe_map.local_map.cells.near_side_line, 0.0);
-  EXPECT_EQ(config.keyframe_map.local_map.cells.near_side_volume, 0.0);
+  EXPECT_EQ(config.keyframe_map.local_map.matcher.get<NdtMatcherConfig>().cells.near_side_line,
+            0.0);
+  EXPECT_EQ(config.keyframe_map.local_map.matcher.get<NdtMatcherConfig>().cells.near_side_volume,
+            0.0);
   EXPECT_FALSE(config.keyframe_map.first_keyframes.enabled);
 }
 

@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <variant>
+#include <vector>
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
@@ -12,6 +14,27 @@ namespace understory {
 struct PosePrior {
   Pose target_from_source;
   Matrix6d information = Matrix6d::Zero();  // of a right perturbation, rotation first
+};
+
+// Where a point of the source is believed to be, e.g. a GNSS antenna; added to the cost as a
+// Gaussian.
+struct PositionPrior {
+  Eigen::Vector3d position_in_target;
+  Eigen::Vector3d point_in_source = Eigen::Vector3d::Zero();  // lever arm
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();      // of the position, 1/m^2
+};
+
+// What counts beside the points. A new kind of term is one more type here and its `add_term` in
+// solve.cc; every matcher then takes it.
+using PoseTerm = std::variant<PosePrior, PositionPrior>;
+using PoseTerms = std::vector<PoseTerm>;
+
+// Cost of a pose (for information) with its gradient and a positive semidefinite (or exact) Hessian
+// with respect to a right perturbation, rotation first.
+struct PoseCost {
+  double cost = 0.0;
+  Vector6d gradient = Vector6d::Zero();
+  Matrix6d hessian = Matrix6d::Zero();
 };
 
 enum class RegistrationStatus {

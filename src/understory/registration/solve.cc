@@ -19,7 +19,7 @@ Vector6d scale_of(double range_m) {
 
 // Solves H step = -g in the basis of H's eigenvectors, so that indefinite and singular Hessians
 // need no special case: negative curvature is turned round, none at all gives no step.
-Vector6d newton_step(const Quadratic& at, const Vector6d& scale) {
+Vector6d newton_step(const PoseCost& at, const Vector6d& scale) {
   const Matrix6d hessian = scale.asDiagonal() * at.hessian * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(hessian);
   const Vector6d curvature = solver.eigenvalues().cwiseAbs();
@@ -63,7 +63,7 @@ Minimum minimise(const Evaluate& evaluate, const Pose& guess, const StepLimits& 
       best.converged = true;
       break;
     }
-    const Quadratic at = evaluate(pose);
+    const PoseCost at = evaluate(pose);
     const double slope_before = best.at.gradient.dot(step);
     const double slope_after = at.gradient.dot(step);
     if (slope_after <= kMostOvershoot * std::abs(slope_before)) {
@@ -82,13 +82,29 @@ Minimum minimise(const Evaluate& evaluate, const Pose& guess, const StepLimits& 
   return best;
 }
 
-void add_prior(const PosePrior& prior, const Pose& pose, Quadratic& to) {
+void add_term(const PosePrior& prior, const Pose& pose, PoseCost& to) {
   const Vector6d difference = right_difference(pose, prior.target_from_source);
   const Matrix6d jacobian = se3_right_jacobian_inverse(difference);
   const Matrix6d weighted = jacobian.transpose() * prior.information;
   to.cost += 0.5 * difference.dot(prior.information * difference);
   to.gradient += weighted * difference;
   to.hessian += weighted * jacobian;
+}
+
+void add_term(const PositionPrior& prior, const Pose& pose, PoseCost& to) {
+  const Eigen::Matrix3d rotation = pose.rotation_matrix();
+  const Eigen::Vector3d difference = pose * prior.point_in_source - prior.position_in_target;
+  Eigen::Matrix<double, 3, 6> jacobian;
+  jacobian << -rotation * skew(prior.point_in_source), rotation;
+  const Eigen::Matrix<double, 6, 3> weighted = jacobian.transpose() * prior.information;
+  to.cost += 0.5 * difference.dot(prior.information * difference);
+  to.gradient += weighted * difference;
+  to.hessian += weighted * jacobian;
+}
+
+void add_terms(const PoseTerms& terms, const Pose& pose, PoseCost& to) {
+  for (const PoseTerm& term : terms)
+    std::visit([&](const auto& each) { add_term(each, pose, to); }, term);
 }
 
 Eigen::Matrix<double, 6, Eigen::Dynamic> degenerate_directions(const Matrix6d& information,

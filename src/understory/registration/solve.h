@@ -1,20 +1,12 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 
 #include "understory/registration/registration.h"
 
 namespace understory::internal {
 
-// Cost of a pose (for information) with its gradient and a positive semidefinite (or exact) Hessian
-// with respect to a right perturbation.
-struct Quadratic {
-  double cost = 0.0;
-  Vector6d gradient = Vector6d::Zero();
-  Matrix6d hessian = Matrix6d::Zero();
-};
-using Evaluate = std::function<Quadratic(const Pose&)>;
+using Evaluate = std::function<PoseCost(const Pose&)>;
 
 struct StepLimits {
   int max_iterations = 30;
@@ -29,7 +21,7 @@ struct StepLimits {
 
 struct Minimum {
   Pose pose;
-  Quadratic at;  // of the pose before, if its last step was trusted
+  PoseCost at;  // of the pose before, if its last step was trusted
   int iterations = 0;
   bool converged = false;
 };
@@ -43,7 +35,10 @@ struct Minimum {
                                const StepLimits& limits);
 
 // Adds 1/2 |log(prior^-1 pose)|^2 in the metric of the prior's information.
-void add_prior(const PosePrior& prior, const Pose& pose, Quadratic& to);
+void add_term(const PosePrior& prior, const Pose& pose, PoseCost& to);
+// Adds 1/2 |pose * point - position|^2 in the metric of the prior's information.
+void add_term(const PositionPrior& prior, const Pose& pose, PoseCost& to);
+void add_terms(const PoseTerms& terms, const Pose& pose, PoseCost& to);
 
 // Unit directions, rotation scaled by `range_m`, whose information is below `ratio` of the largest.
 [[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> degenerate_directions(

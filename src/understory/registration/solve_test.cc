@@ -15,11 +15,11 @@ struct Bowl {
   Pose bottom;
   int asked = 0;
 
-  Quadratic operator()(const Pose& pose) {
+  PoseCost operator()(const Pose& pose) {
     ++asked;
-    Quadratic at;
+    PoseCost at;
     const Vector6d metric = (Vector6d() << 400.0, 300.0, 200.0, 1.0, 4.0, 9.0).finished();
-    add_prior({bottom, metric.asDiagonal()}, pose, at);
+    add_term(PosePrior{bottom, metric.asDiagonal()}, pose, at);
     return at;
   }
 };

@@ -36,13 +36,12 @@ LoopVerification register_to_local_map(const LocalMapLoopInput& input,
   LoopVerification report;
   report.starts = 1;
   report.target_from_source = input.world_from_candidate.inverse() * input.world_from_query;
-  if (input.local_map.empty() || input.map_points_in_query.empty()) {
+  if (input.local_map == nullptr || input.map_points_in_query.empty()) {
     report.reason = "no local map";
     return report;
   }
-  const RegistrationResult match =
-      register_ndt(input.local_map, input.candidate_points, input.world_from_candidate,
-                   std::nullopt, config.ndt);
+  const RegistrationResult match = input.local_map->match(
+      input.candidate_points, input.world_from_candidate, {}, MatchStart::kFar);
   if (!match.usable()) {
     report.reason = "no match to the local map: " + match.reason;
     return report;

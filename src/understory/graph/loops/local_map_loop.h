@@ -1,21 +1,19 @@
 #pragma once
 
-#include <span>
-
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
 #include "understory/graph/loops/loop_closure.h"
-#include "understory/registration/ndt/ndt_map.h"
+#include "understory/registration/matcher.h"
 
 namespace understory {
 
 // A candidate of P4 (38) and the local map of the present. The map's frame is the world.
 struct LocalMapLoopInput {
-  std::span<const NdtMapPtr> local_map;  // coarse to fine, as scans are registered to it
-  Points map_points_in_query;            // the same map as points, body frame of the query
-  Points candidate_points;               // body frame of the candidate, thinned as scans are
-  Pose world_from_candidate;             // as the graph has it
-  Pose world_from_query;                 // of the scan about to be mapped
+  const MatchTarget* local_map = nullptr;  // as scans are registered to it; null: none
+  Points map_points_in_query;              // the same map as points, body frame of the query
+  Points candidate_points;                 // body frame of the candidate, thinned as scans are
+  Pose world_from_candidate;               // as the graph has it
+  Pose world_from_query;                   // of the scan about to be mapped
 };
 
 // Steps 2 and 3 of P4's loop closure (section 3.1.1): the candidate's scan is registered to the

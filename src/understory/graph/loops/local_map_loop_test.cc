@@ -38,7 +38,6 @@ struct Scene {
   Scene(const Pose& query, const Pose& candidate, std::uint64_t seed = 3) {
     const testing::Stand made = stand(seed);
     std::vector<Points> clouds;
-    std::vector<PlacedCloud> placed;
     for (int i = 0; i < 3; ++i) {
       const Pose there = query * Pose(Eigen::Quaterniond::Identity(), {-0.5 - i, 0.0, 0.0});
       clouds.push_back(scan(made, there, 10 + static_cast<std::uint64_t>(i)));
@@ -47,20 +46,17 @@ struct Scene {
             (query.inverse() * there * p.cast<double>()).cast<float>());
       poses.push_back(there);
     }
+    const auto builder = make_matcher(MatcherConfig())->make_builder({});
     for (std::size_t i = 0; i < clouds.size(); ++i)
-      placed.push_back({&clouds[i], poses[i]});
-    for (const double size : {2.0, 0.5}) {
-      NdtMapConfig cells;
-      cells.cell_size_m = size;
-      maps.push_back(build_ndt_map(placed, cells));
-    }
+      builder->insert(clouds[i], poses[i], std::nullopt);
+    map = builder->snapshot();
     input.candidate_points = scan(made, candidate, 77);
-    input.local_map = maps;
+    input.local_map = map.get();
     input.world_from_candidate = candidate;
     input.world_from_query = query;
   }
   std::vector<Pose> poses;
-  std::vector<NdtMapPtr> maps;
+  MatchTargetPtr map;
   LocalMapLoopInput input;
 };
 
@@ -122,7 +118,7 @@ TEST(LocalMapLoop, FitnessIsTheMeanSquaredDistanceOfAllPointsFromTheirNearest) {
 
 TEST(LocalMapLoop, WithoutALocalMapThereIsNone) {
   Scene scene(pose_at(0, 0, 0), pose_at(1, 0, 0));
-  scene.input.local_map = {};
+  scene.input.local_map = nullptr;
   EXPECT_FALSE(register_to_local_map(scene.input, paper()).accepted);
 }
 

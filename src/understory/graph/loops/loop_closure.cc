@@ -22,7 +22,7 @@ constexpr double kSamePlaceRad = 3.0 * kDegree;
 struct Side {
   Points points;
   Pose body_from_level;
-  std::vector<NdtMapPtr> maps;  // coarse to fine
+  MatchTargetPtr target;
 };
 
 Points move_points(const Points& points, const Pose& pose) {
@@ -35,24 +35,13 @@ Points move_points(const Points& points, const Pose& pose) {
   return moved;
 }
 
-std::vector<NdtMapPtr> make_maps(const Points& points, const LoopClosureConfig& config) {
-  std::vector<NdtMapPtr> maps;
-  for (const double size : config.cell_sizes_m) {
-    NdtMapConfig cells = config.cells;
-    cells.cell_size_m = size;
-    const PlacedCloud cloud{&points, Pose()};
-    maps.push_back(build_ndt_map(std::span(&cloud, 1), cells));
-  }
-  return maps;
-}
-
-Side make_side(const Points& points, const Eigen::Vector3d& up, const LoopClosureConfig& config) {
+Side make_side(const Points& points, const Eigen::Vector3d& up, const Matcher& matcher) {
   const Pose level(Eigen::Quaterniond::FromTwoVectors(up.normalized(), Eigen::Vector3d::UnitZ()),
                    Eigen::Vector3d::Zero());
   Side side;
   side.points = move_points(points, level);
   side.body_from_level = level.inverse();
-  side.maps = make_maps(side.points, config);
+  side.target = matcher.make_target(side.points);
   return side;
 }
 
@@ -100,12 +89,12 @@ Points every_nth(const Points& points, std::size_t count) {
 // Starts by their coarse cost, best first; neighbours of better ones left out.
 std::vector<Pose> best_starts(const Side& target, const Side& source,
                               const std::vector<Pose>& starts, const LoopClosureConfig& config) {
-  if (starts.size() == 1) return starts;
+  const MatchCost* coarse = target.target->cost(MatchStart::kFar);
+  if (starts.size() == 1 || coarse == nullptr) return {starts.front()};
   const Points some = every_nth(source.points, kScoringPoints);
   std::vector<double> cost(starts.size());
-  parallel_for(starts.size(), 1, [&](std::size_t i) {
-    cost[i] = ndt_cost(*target.maps.front(), some, starts[i], config.ndt).cost;
-  });
+  parallel_for(starts.size(), 1,
+               [&](std::size_t i) { cost[i] = coarse->at(some, starts[i]).cost; });
   std::vector<std::size_t> order(starts.size());
   for (std::size_t i = 0; i < order.size(); ++i)
     order[i] = i;
@@ -148,7 +137,7 @@ double chance_overlap(const Structure& target, const Points& source, const Pose&
   return sum / 8.0;
 }
 
-// NDT from the best starts, judged by the structure found again; ICP at the best.
+// Matched from the best starts, judged by the structure found again; ICP at the best.
 std::optional<Match> match_sides(const Side& target, const Side& source,
                                  const Structure& target_structure,
                                  const Structure& source_structure, const std::vector<Pose>& starts,
@@ -157,7 +146,7 @@ std::optional<Match> match_sides(const Side& target, const Side& source,
   const auto least = static_cast<std::size_t>(config.min_structure_points);
   for (const Pose& start : best_starts(target, source, starts, config)) {
     Match match;
-    match.result = register_ndt(target.maps, source.points, start, std::nullopt, config.ndt);
+    match.result = target.target->match(source.points, start, {}, MatchStart::kFar);
     if (!match.result.usable()) continue;
     match.overlap =
         target_structure.overlap(source_structure.points(), match.result.target_from_source, least);
@@ -173,8 +162,8 @@ std::optional<Match> match_sides(const Side& target, const Side& source,
   }
   if (config.refine == LoopClosureConfig::Refine::kNdt) return best;
   const IcpTarget icp_target(target.points, config.icp);
-  best.result = register_icp(icp_target, source.points, best.result.target_from_source,
-                             std::nullopt, config.icp);
+  best.result =
+      register_icp(icp_target, source.points, best.result.target_from_source, {}, config.icp);
   if (!best.result.usable()) return std::nullopt;
   best.overlap =
       target_structure.overlap(source_structure.points(), best.result.target_from_source, least);
@@ -184,14 +173,11 @@ std::optional<Match> match_sides(const Side& target, const Side& source,
 // The way back, from where the way there ended.
 void measure_asymmetry(const Side& target, const Side& source, const Pose& target_from_source,
                        const LoopClosureConfig& config, LoopVerification& report) {
-  const NdtMapPtr& fine = source.maps.back();
-  const RegistrationResult ndt =
-      register_ndt(*fine, target.points, target_from_source.inverse(), std::nullopt, config.ndt);
-  RegistrationResult back = ndt;
+  RegistrationResult back =
+      source.target->match(target.points, target_from_source.inverse(), {}, MatchStart::kNear);
   if (config.refine == LoopClosureConfig::Refine::kIcp) {
-    const Pose start = ndt.usable() ? ndt.target_from_source : target_from_source.inverse();
-    back = register_icp(IcpTarget(source.points, config.icp), target.points, start, std::nullopt,
-                        config.icp);
+    const Pose start = back.usable() ? back.target_from_source : target_from_source.inverse();
+    back = register_icp(IcpTarget(source.points, config.icp), target.points, start, {}, config.icp);
   }
   if (!back.usable()) {
     report.asymmetry_m = std::numeric_limits<double>::infinity();
@@ -240,8 +226,9 @@ Matrix6d loop_covariance(const RegistrationResult& result, const LoopClosureConf
 LoopVerification verify_loop(const LoopInput& input, const LoopClosureConfig& config) {
   LoopVerification report;
   report.target_from_source = input.target_from_source;
-  const Side target = make_side(input.target_points, input.up_in_target, config);
-  const Side source = make_side(input.source_points, input.up_in_source, config);
+  const std::unique_ptr<const Matcher> matcher = make_matcher(config.matcher);
+  const Side target = make_side(input.target_points, input.up_in_target, *matcher);
+  const Side source = make_side(input.source_points, input.up_in_source, *matcher);
   const Structure target_structure(target.points, config.structure_low_m, config.structure_high_m,
                                    config.structure_cell_m);
   const Structure source_structure(source.points, config.structure_low_m, config.structure_high_m,
@@ -277,15 +264,15 @@ LoopVerification verify_loop(const LoopInput& input, const LoopClosureConfig& co
 }
 
 void describe(ConfigTable& table, LoopClosureConfig& config) {
-  table.add("cell_sizes_m", config.cell_sizes_m, "m", "cells of NDT, coarse to fine");
-  table.section("ndt", [&] { describe(table, config.ndt); });
+  describe(table, config.matcher);
   table.add_enum(
       "refine", config.refine,
       {{"icp", LoopClosureConfig::Refine::kIcp}, {"ndt", LoopClosureConfig::Refine::kNdt}},
       "what has the last word on the relative pose");
   table.section("icp", [&] { describe(table, config.icp); });
-  table.add("search_sigmas", config.search_sigmas, {0.0, 10.0}, "",
-            "standard deviations of the belief over which NDT starts; 0: from the belief alone");
+  table.add(
+      "search_sigmas", config.search_sigmas, {0.0, 10.0}, "",
+      "standard deviations of the belief over which matching starts; 0: from the belief alone");
   table.add("search_step_m", config.search_step_m, {0.1, 20.0}, "m", "between starts");
   table.add("search_yaw_step_deg", config.search_yaw_step_deg, {0.1, 90.0}, "deg",
             "between starts");

@@ -6,7 +6,7 @@
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
 #include "understory/registration/icp/icp.h"
-#include "understory/registration/ndt/ndt.h"
+#include "understory/registration/matchers.h"
 #include "understory/util/config.h"
 
 namespace understory {
@@ -25,15 +25,13 @@ struct LoopInput {
 };
 
 struct LoopClosureConfig {
-  std::vector<double> cell_sizes_m = {2.0, 0.5};  // of NDT, coarse to fine
-  NdtMapConfig cells = {.sigma_floor_m = 0.01};
-  NdtConfig ndt;
+  MatcherConfig matcher;  // for a first estimate
   // What gives the last word: ICP as in P2-7, or the finest NDT.
   enum class Refine { kIcp, kNdt };
   Refine refine = Refine::kNdt;
   IcpConfig icp;
-  // Where the belief is uncertain, NDT starts from many places: a grid over so many standard
-  // deviations, with steps that the coarsest cells can bridge.
+  // Where the belief is uncertain, matching starts from many places: a grid over so many standard
+  // deviations, with steps that the coarsest steps can bridge.
   double search_sigmas = 2.0;
   double search_step_m = 1.5;
   double search_yaw_step_deg = 4.0;
@@ -74,9 +72,9 @@ struct [[nodiscard]] LoopVerification {
   int starts = 0;
 };
 
-// Decides whether two places are the same, P2-7: NDT for a first estimate, ICP to refine, and
-// checks that a chance match among stems does not pass. Pure function of its inputs; may run in the
-// background. Parallel inside; same bits for any number of threads.
+// Decides whether two places are the same, P2-7: a match for a first estimate, another to refine,
+// and checks that a chance match among stems does not pass. Pure function of its inputs; may run in
+// the background. Parallel inside; same bits for any number of threads.
 LoopVerification verify_loop(const LoopInput& input, const LoopClosureConfig& config);
 
 }  // namespace understory

@@ -13,25 +13,27 @@ namespace {
 constexpr double kBendShare = 1.0 / 3.0;
 
 }  // namespace
+
+void describe(ConfigTable& table, ScanMatchConfig& config) {
+  table.add(
+      "min_inlier_ratio", config.min_inlier_ratio, {0.0, 1.0}, "",
+      "least share of a scan's points near the map for a match to count; of sparse scans 0.05");
+  table.add("min_inlier_share", config.min_inlier_share, {0.0, 1.0}, "",
+            "a match that finds less of its points than this share of what matches before it found "
+            "does not count");
+  table.add("coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "reaches",
+            "prediction error (1 sigma) above which matches begin from far (NDT: coarse cells); "
+            "NDT's reach is its finest cell");
+  table.add("prior_weight", config.prior_weight, {0.0, 1.0}, "",
+            "weight of the prediction inside the match");
+}
+
 void describe(ConfigTable& table, DenseOdometryConfig& config) {
   table.section("preprocess", [&] {
     table.section("voxel", [&] { describe(table, config.voxel); });
     table.section("isolated", [&] { describe(table, config.isolated); });
     table.add("machine_boxes_file", config.machine_boxes_file,
               "YAML of boxes around the machine whose points are dropped; empty: none");
-  });
-  table.section("ndt", [&] {
-    describe(table, config.ndt);
-    table.add(
-        "min_inlier_ratio", config.min_inlier_ratio, {0.0, 1.0}, "",
-        "least share of a scan's points near the map for a match to count; of sparse scans 0.05");
-    table.add("min_inlier_share", config.min_inlier_share, {0.0, 1.0}, "",
-              "a match that finds less of its points than this share of what matches before it "
-              "found does not count");
-    table.add("coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "cells",
-              "prediction error (1 sigma) above which the coarse map is asked first");
-    table.add("prior_weight", config.prior_weight, {0.0, 1.0}, "",
-              "weight of the prediction inside the match");
   });
   table.section("motion", [&] {
     table.add("elastic_scans", config.elastic_scans,
@@ -57,7 +59,7 @@ void DenseOdometry::add_imu(const ImuSample& sample) {
   if (uses_imu_) motion_->add_imu(sample);
 }
 
-DenseEstimate DenseOdometry::process(const Scan& scan, const LocalMapSnapshot& local_map) {
+DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& local_map) {
   DenseEstimate estimate;
   const double cpu_start = process_cpu_seconds();
   {
@@ -65,10 +67,11 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const LocalMapSnapshot& l
     estimate.scan_end = scan.end();
     const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, estimate.scan_end);
     preprocess(scan, guess, estimate);
-    if (!local_map.empty()) match(local_map, motion_->predict(scan.stamp), estimate);
-    watch_scan_motion(scan, local_map, guess, estimate);
-    if (config_.elastic_scans && estimate.matched && by_scans_alone())
-      match_elastically(scan, *local_map.back(), guess, estimate);
+    if (local_map) match(*local_map, motion_->predict(scan.stamp), estimate);
+    const MatchCost* cost = estimate.matched ? local_map->cost(MatchStart::kNear) : nullptr;
+    watch_scan_motion(scan, cost, guess, estimate);
+    if (config_.elastic_scans && cost != nullptr && by_scans_alone())
+      match_elastically(scan, *cost, guess, estimate);
     std::optional<LidarFactor> factor;
     if (estimate.matched) {
       factor = LidarFactor{estimate.match.target_from_source, estimate.match.fitness_m2,
@@ -103,17 +106,16 @@ bool DenseOdometry::by_scans_alone() const {
   return !trust.usable || trust.on_probation;
 }
 
-void DenseOdometry::watch_scan_motion(const Scan& scan, const LocalMapSnapshot& local_map,
+void DenseOdometry::watch_scan_motion(const Scan& scan, const MatchCost* cost,
                                       const std::vector<StampedPose>& guess,
                                       const DenseEstimate& estimate) {
-  if (!estimate.matched) return scan_motion_.interrupt();
+  if (cost == nullptr) return scan_motion_.interrupt();
   const ScopedTimer timer(times_, "scan_motion");
-  scan_motion_.add(*local_map.back(), estimate.thinned, guess,
-                   {scan.stamp, estimate.match.target_from_source}, estimate.scan_end - scan.stamp,
-                   config_.ndt);
+  scan_motion_.add(*cost, estimate.thinned, guess, {scan.stamp, estimate.match.target_from_source},
+                   estimate.scan_end - scan.stamp);
 }
 
-void DenseOdometry::match_elastically(const Scan& scan, const NdtMap& target,
+void DenseOdometry::match_elastically(const Scan& scan, const MatchCost& cost,
                                       const std::vector<StampedPose>& guess,
                                       DenseEstimate& estimate) {
   const ScopedTimer timer(times_, "matching_elastic");
@@ -123,31 +125,30 @@ void DenseOdometry::match_elastically(const Scan& scan, const NdtMap& target,
   const ScanPathConfig path_config{kBendShare * config_.motion.motion_accel_sigma_m_s2,
                                    kBendShare * config_.motion.motion_angular_accel_sigma_rad_s2};
   const ScanPathCorrection correction =
-      match_scan_path(target, estimate.thinned, duration, start, config_.ndt, path_config);
+      match_scan_path(cost, estimate.thinned, duration, start, path_config);
   if (correction.iterations == 0) return;
   const std::vector<StampedPose> path = corrected_path(guess, start, duration, correction);
   preprocess(scan, path, estimate);
   estimate.match.target_from_source = path.front().world_from_body;
 }
 
-void DenseOdometry::match(const LocalMapSnapshot& local_map, const NavState& predicted,
+void DenseOdometry::match(const MatchTarget& local_map, const NavState& predicted,
                           DenseEstimate& estimate) {
   const ScopedTimer timer(times_, "matching");
   const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
-  const double finest = local_map.back()->cell_size();
-  const bool coarse = !last_matched_ || sigma > config_.coarse_above_sigma * finest;
-  std::optional<PosePrior> prior;
-  if (config_.prior_weight > 0.0) {
+  const ScanMatchConfig& config = config_.match;
+  const bool far = !last_matched_ || sigma > config.coarse_above_sigma * local_map.reach_m();
+  PoseTerms terms;
+  if (config.prior_weight > 0.0) {
     const Matrix6d loose = predicted.pose_covariance + 1e-9 * Matrix6d::Identity();
-    prior = PosePrior{predicted.world_from_body, config_.prior_weight * loose.inverse()};
+    terms.push_back(PosePrior{predicted.world_from_body, config.prior_weight * loose.inverse()});
   }
-  const std::span<const NdtMapPtr> maps(local_map);
-  estimate.match = register_ndt(coarse ? maps : maps.last(1), estimate.thinned.points,
-                                predicted.world_from_body, prior, config_.ndt);
+  estimate.match = local_map.match(estimate.thinned.points, predicted.world_from_body, terms,
+                                   far ? MatchStart::kFar : MatchStart::kNear);
   const double found = estimate.match.inlier_ratio;
-  estimate.matched = estimate.match.usable() && found >= config_.min_inlier_ratio;
+  estimate.matched = estimate.match.usable() && found >= config.min_inlier_ratio;
   if (!estimate.matched) return;
-  if (found < config_.min_inlier_share * usual_inliers_) {
+  if (found < config.min_inlier_share * usual_inliers_) {
     estimate.matched = false;
     estimate.match.reason = "suddenly much less than before";
     return;

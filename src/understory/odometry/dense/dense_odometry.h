@@ -14,7 +14,7 @@
 #include "understory/preprocess/isolated_points.h"
 #include "understory/preprocess/machine_boxes.h"
 #include "understory/preprocess/voxel_filter.h"
-#include "understory/registration/ndt/ndt.h"
+#include "understory/registration/matcher.h"
 #include "understory/sensor/rig.h"
 #include "understory/sensor/scan.h"
 #include "understory/util/config.h"
@@ -23,33 +23,37 @@
 
 namespace understory {
 
-// What scans are matched to: the same map at several cell sizes, coarse to fine.
-using LocalMapSnapshot = std::vector<NdtMapPtr>;
-
-struct DenseOdometryConfig {
-  VoxelFilterConfig voxel;  // thins a scan before matching
-  IsolatedPointsConfig isolated;
-  NdtConfig ndt;
-  DeskewConfig deskew;
-  MotionConfig motion;
-  bool imu_enabled = true;         // false: the IMU of the recording is passed over
-  std::string machine_boxes_file;  // YAML, P4-8; empty: none
+// When a match counts, and how it is begun; whatever method makes it.
+struct ScanMatchConfig {
   // A match counts only with this share of the scan's points near the map.
   double min_inlier_ratio = 0.1;
   // Nor does one that suddenly finds less than this share of what matches found before it: a jump
   // of the position, or something before the lidar. (In good runs no scan finds less than 0.8 of
   // it.)
   double min_inlier_share = 0.5;
-  // The coarse maps are asked first where the prediction may be off by more than this share of the
-  // finest cell (one sigma), or the last scan found no match.
+  // The match begins from far (MatchStart) where the prediction may be off by more than this share
+  // of the local map's reach (one sigma), or the last scan found no match.
   double coarse_above_sigma = 0.25;
   // Weight of the prediction in the match, 0 = it is only the start. In directions that a scan
   // leaves undetermined the prior keeps the match from wandering.
   double prior_weight = 0.0;
+};
+void describe(ConfigTable& table, ScanMatchConfig& config);
+
+struct DenseOdometryConfig {
+  VoxelFilterConfig voxel;  // thins a scan before matching
+  IsolatedPointsConfig isolated;
+  ScanMatchConfig match;
+  DeskewConfig deskew;
+  MotionConfig motion;
+  bool imu_enabled = true;         // false: the IMU of the recording is passed over
+  std::string machine_boxes_file;  // YAML, P4-8; empty: none
   // Where no IMU tells of the motion: the first and the last pose of a scan are matched together,
   // see scan_path.h.
+  // A matcher that has no cost (MatchTarget::cost) matches them rigidly.
   bool elastic_scans = true;
 };
+// Without `match`, which stands in the section of the matcher.
 void describe(ConfigTable& table, DenseOdometryConfig& config);
 
 // All that is known of one scan once it has a pose.
@@ -66,15 +70,15 @@ struct DenseEstimate {
 };
 
 // Dense lidar-inertial odometry, P4 F2 (left graph) and P2 section 2: predict, deskew, thin, match
-// to the local map, smooth. The local map is the caller's; one scan after another in order of time.
-// Not thread-safe; parallel inside.
+// to the local map (null: none yet), smooth. The local map is the caller's; one scan after another
+// in order of time. Not thread-safe; parallel inside.
 class DenseOdometry {
  public:
   // The rig decides whether there is an IMU (body_from_imu). `times` and `log` must outlive it.
   DenseOdometry(const DenseOdometryConfig& config, const Rig& rig, StageTimes& times, Log& log);
 
   void add_imu(const ImuSample& sample);
-  [[nodiscard]] DenseEstimate process(const Scan& scan, const LocalMapSnapshot& local_map);
+  [[nodiscard]] DenseEstimate process(const Scan& scan, const MatchTargetPtr& local_map);
   // See MotionModel; before the first scan.
   void set_initial_motion(const Eigen::Vector3d& velocity_m_s,
                           const Eigen::Vector3d& angular_rate_rad_s);
@@ -99,11 +103,11 @@ class DenseOdometry {
   void preprocess(const Scan& scan, const std::vector<StampedPose>& path, DenseEstimate& estimate);
   // Whether no IMU tells of the motion.
   [[nodiscard]] bool by_scans_alone() const;
-  void match_elastically(const Scan& scan, const NdtMap& target,
+  void match_elastically(const Scan& scan, const MatchCost& cost,
                          const std::vector<StampedPose>& guess, DenseEstimate& estimate);
-  void watch_scan_motion(const Scan& scan, const LocalMapSnapshot& local_map,
+  void watch_scan_motion(const Scan& scan, const MatchCost* cost,
                          const std::vector<StampedPose>& guess, const DenseEstimate& estimate);
-  void match(const LocalMapSnapshot& local_map, const NavState& predicted, DenseEstimate& estimate);
+  void match(const MatchTarget& local_map, const NavState& predicted, DenseEstimate& estimate);
 
   DenseOdometryConfig config_;
   Rig rig_;

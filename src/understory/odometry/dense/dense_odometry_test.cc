@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "understory/odometry/test_carrier.h"
-#include "understory/registration/ndt/ndt_map.h"
+#include "understory/registration/ndt/ndt_matcher.h"
 #include "understory/registration/test_stand.h"
 
 namespace understory {
@@ -59,13 +59,14 @@ class LookingAround : public ::testing::Test {
     return scan;
   }
 
-  [[nodiscard]] LocalMapSnapshot map() const {
-    NdtMapBuilder builder({.cell_size_m = 0.5});
+  [[nodiscard]] MatchTargetPtr map() const {
+    const auto builder =
+        make_matcher({.cell_sizes_m = {0.5}, .cells = {}, .steps = {}})->make_builder({});
     for (int i = -3; i <= 6; ++i) {
       const Pose pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.4 * i, 0.1 * (i % 3), 0.0));
-      builder.insert(seen_from(pose, static_cast<std::uint64_t>(20 + i)), pose);
+      builder->insert(seen_from(pose, static_cast<std::uint64_t>(20 + i)), pose, std::nullopt);
     }
-    return {builder.snapshot()};
+    return builder->snapshot();
   }
 
   // RMS error of position over 1.4 seconds, metres.
@@ -73,7 +74,7 @@ class LookingAround : public ::testing::Test {
     Log log;
     DenseOdometry odometry(config, Rig(), times, log);
     odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
-    const LocalMapSnapshot local_map = map();
+    const MatchTargetPtr local_map = map();
     double sum = 0.0;
     constexpr int kScans = 14;
     for (int i = 0; i < kScans; ++i) {

@@ -82,23 +82,20 @@ struct Equations {
 
 }  // namespace
 
-ScanPathCorrection match_scan_path(const NdtMap& target, const BodyCloud& source, TimeNs duration,
-                                   const Pose& start, const NdtConfig& ndt,
-                                   const ScanPathConfig& config) {
+ScanPathCorrection match_scan_path(const MatchCost& cost, const BodyCloud& source, TimeNs duration,
+                                   const Pose& start, const ScanPathConfig& config) {
   UNDERSTORY_CHECK(duration > 0);
   ScanPathCorrection correction;
   const std::vector<Slice> slices = slices_of(source, duration);
   if (slices.size() < 2) return correction;
   const Vector6d information = bend_information(duration, config);
-  NdtConfig plain = ndt;  // the curvature has to be positive
-  plain.hessian = NdtConfig::Hessian::kGaussNewton;
   while (correction.iterations < config.max_iterations) {
     ++correction.iterations;
     Equations sum;
     for (const Slice& slice : slices) {
       const Pose placed = start * Pose::exp(correction_at(correction, slice.share));
-      const MatchSums at = ndt_cost(target, slice.points, placed, plain);
-      sum.add(slice.share, ndt.independent_share * at.hessian, ndt.independent_share * at.gradient);
+      const PoseCost at = cost.at(slice.points, placed);
+      sum.add(slice.share, at.hessian, at.gradient);
     }
     sum.add_bend(information, correction.at_end - correction.at_start);
     // What neither points nor bend say anything about stays where it is.
@@ -109,7 +106,7 @@ ScanPathCorrection match_scan_path(const NdtMap& target, const BodyCloud& source
     correction.at_end += step.tail<6>();
     const double turned = std::max(step.head<3>().norm(), step.segment<3>(6).norm());
     const double moved = std::max(step.segment<3>(3).norm(), step.tail<3>().norm());
-    if (turned < ndt.step_rotation_rad && moved < ndt.step_translation_m) break;
+    if (turned < cost.step_rotation_rad() && moved < cost.step_translation_m()) break;
   }
   const double limit = config.max_sigmas * config.max_sigmas;
   for (const Vector6d& end : {correction.at_start, correction.at_end}) {

@@ -5,7 +5,7 @@
 
 #include "understory/geometry/stamped_pose.h"
 #include "understory/preprocess/body_cloud.h"
-#include "understory/registration/ndt/ndt.h"
+#include "understory/registration/matcher.h"
 
 namespace understory {
 
@@ -31,15 +31,15 @@ struct ScanPathCorrection {
 // Where the motion within a scan is a guess, as it is without an IMU, a rigid match averages over
 // what the guess got wrong. Here the first and the last pose of the scan are matched together, with
 // the points in between moving along in proportion to their time (the elastic scan of Dellenbach et
-// al., CT-ICP, 2022, for the cost P4 (41)).
+// al., CT-ICP, 2022, for any cost of a match).
+//   cost: of the local map that the scan lies in
 //   source: deskewed along the guessed path, body frame at its stamp; thinned
 //   duration: from the stamp to the last point, > 0
 //   start: the pose of the body at the stamp, best from a rigid match
 // The difference of the two corrections is bound by the acceleration the carrier is believed
 // capable of. Deterministic for any number of threads. Thread-safe.
-[[nodiscard]] ScanPathCorrection match_scan_path(const NdtMap& target, const BodyCloud& source,
+[[nodiscard]] ScanPathCorrection match_scan_path(const MatchCost& cost, const BodyCloud& source,
                                                  TimeNs duration, const Pose& start,
-                                                 const NdtConfig& ndt,
                                                  const ScanPathConfig& config);
 
 // The path with the corrections applied; `path.front()` is at the stamp, and the correction of a

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "understory/registration/ndt/ndt_map.h"
+#include "understory/registration/ndt/ndt_matcher.h"
 #include "understory/registration/test_stand.h"
 #include "understory/util/parallel.h"
 
@@ -38,17 +38,21 @@ BodyCloud smeared_scan(const testing::Stand& stand, const Pose& start, const Vec
 class ScanPath : public ::testing::Test {
  protected:
   ScanPath() : stand_(testing::make_stand({.half_width_m = 18.0}, 4)) {
-    NdtMapBuilder builder({.cell_size_m = 0.5});
+    const auto builder =
+        make_matcher({.cell_sizes_m = {0.5}, .cells = {}, .steps = {}})->make_builder({});
     for (int i = -3; i <= 3; ++i) {
       const Pose pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.4 * i, 0.1 * i, 1.6));
-      builder.insert(testing::scan_stand(stand_, pose, testing::vlp16(), 10 + i), pose);
+      builder->insert(testing::scan_stand(stand_, pose, testing::vlp16(), 10 + i), pose,
+                      std::nullopt);
     }
-    map_ = builder.snapshot();
+    map_ = builder->snapshot();
     end_ << 0.01, -0.02, 0.09, 0.12, -0.05, 0.03;  // 5 degrees and 13 cm in a tenth of a second
   }
 
+  [[nodiscard]] const MatchCost& cost() const { return *map_->cost(MatchStart::kNear); }
+
   testing::Stand stand_;
-  NdtMapPtr map_;
+  MatchTargetPtr map_;
   Pose start_{Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.2, 0.0, 1.6)};
   Vector6d end_;
 };
@@ -56,11 +60,10 @@ class ScanPath : public ::testing::Test {
 TEST_F(ScanPath, FindsTheMotionThatARigidMatchAveragesOver) {
   const BodyCloud cloud = smeared_scan(stand_, start_, end_);
   ASSERT_GT(cloud.size(), 5000U);
-  const NdtConfig ndt;
-  const RegistrationResult rigid = register_ndt(*map_, cloud.points, start_, std::nullopt, ndt);
+  const RegistrationResult rigid = map_->match(cloud.points, start_, {}, MatchStart::kNear);
   ASSERT_TRUE(rigid.usable());
   const ScanPathCorrection found =
-      match_scan_path(*map_, cloud, kDuration, rigid.target_from_source, ndt, kAgile);
+      match_scan_path(cost(), cloud, kDuration, rigid.target_from_source, kAgile);
   EXPECT_GT(found.iterations, 1);
   const Pose first = rigid.target_from_source * Pose::exp(found.at_start);
   const Pose last = rigid.target_from_source * Pose::exp(found.at_end);
@@ -73,10 +76,9 @@ TEST_F(ScanPath, FindsTheMotionThatARigidMatchAveragesOver) {
 
 TEST_F(ScanPath, LeavesAScanAloneThatNeedsNoCorrection) {
   const BodyCloud cloud = smeared_scan(stand_, start_, Vector6d::Zero());
-  const NdtConfig ndt;
-  const RegistrationResult rigid = register_ndt(*map_, cloud.points, start_, std::nullopt, ndt);
+  const RegistrationResult rigid = map_->match(cloud.points, start_, {}, MatchStart::kNear);
   const ScanPathCorrection found =
-      match_scan_path(*map_, cloud, kDuration, rigid.target_from_source, ndt, {});
+      match_scan_path(cost(), cloud, kDuration, rigid.target_from_source, {});
   EXPECT_LT((found.at_end - found.at_start).tail<3>().norm(), 0.02);
   EXPECT_LT((found.at_end - found.at_start).head<3>().norm(), 0.002);
 }
@@ -85,14 +87,14 @@ TEST_F(ScanPath, IsTheSameForAnyNumberOfThreads) {
   const BodyCloud cloud = smeared_scan(stand_, start_, end_);
   ScanPathCorrection one;
   ScanPathCorrection two;
-  with_threads(1, [&] { one = match_scan_path(*map_, cloud, kDuration, start_, {}, {}); });
-  with_threads(2, [&] { two = match_scan_path(*map_, cloud, kDuration, start_, {}, {}); });
+  with_threads(1, [&] { one = match_scan_path(cost(), cloud, kDuration, start_, {}); });
+  with_threads(2, [&] { two = match_scan_path(cost(), cloud, kDuration, start_, {}); });
   EXPECT_EQ(one.at_start, two.at_start);
   EXPECT_EQ(one.at_end, two.at_end);
 }
 
 TEST_F(ScanPath, TooLittleToMatchIsNoCorrection) {
-  EXPECT_EQ(match_scan_path(*map_, BodyCloud(), kDuration, start_, {}, {}).iterations, 0);
+  EXPECT_EQ(match_scan_path(cost(), BodyCloud(), kDuration, start_, {}).iterations, 0);
 }
 
 TEST_F(ScanPath, CorrectionsGoAlongInProportionToTime) {

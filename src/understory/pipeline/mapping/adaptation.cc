@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <map>
 #include <utility>
 
@@ -11,9 +10,7 @@ namespace {
 
 constexpr double kSparseVoxelM = 0.1;
 constexpr double kSparseKeyframeM = 0.3;
-constexpr double kSparseCloudM = 0.1;  // between scans of the finished map
-constexpr int kSparseMinPoints = 4;
-constexpr double kSparseVolumeWeight = 1.0;
+constexpr double kSparseCloudM = 0.1;        // between scans of the finished map
 constexpr double kSparseInlierRatio = 0.05;  // few of the map's small cells have enough points yet
 
 // Changes values of a table that nobody set, and notes each change.
@@ -28,9 +25,6 @@ class Changes {
   }
   void at_most(const std::string& key, double now, double most, const std::string& why) {
     if (now > most) set(key, fmt::format("{}", most), why);
-  }
-  void at_least(const std::string& key, double now, double least, const std::string& why) {
-    if (now < least) set(key, fmt::format("{}", least), why);
   }
   // Even where the user set it.
   void set_anyway(const std::string& key, const std::string& to, const std::string& why,
@@ -48,33 +42,33 @@ class Changes {
   std::vector<ConfigAdaptation> list_;
 };
 
-// A sparse scan is thinned less, its keyframes lie closer, and all cells of the map count: there
-// are not enough surfaces.
+// What the matcher itself knows to suit such scans.
+void suit_matcher(const MappingConfig& config, const ScanTraits& scans, const std::string& why,
+                  Changes& changes, double when_s = 0.0) {
+  for (const SuitedSetting& setting : suited_settings(config.keyframe_map.local_map.matcher, scans))
+    changes.set("registration." + setting.key, setting.value, why, when_s);
+}
+
+// A sparse scan is thinned less, its keyframes lie closer, and fewer of its points need a match.
 void suit_sparse_scans(const MappingConfig& config, const SensorTraits& traits, Changes& changes) {
   if (traits.scan_points == 0 ||
       traits.scan_points >= static_cast<std::uint64_t>(config.sparse_scan_points))
     return;
   const std::string why =
       fmt::format("sparse scans: {} points, fewer than run.sparse_scan_points", traits.scan_points);
-  const NdtMapConfig& cells = config.keyframe_map.local_map.cells;
   changes.at_most("preprocess.voxel.voxel_size_m", config.odometry.voxel.voxel_size_m,
                   kSparseVoxelM, why);
-  changes.at_most("ndt.min_inlier_ratio", config.odometry.min_inlier_ratio, kSparseInlierRatio,
-                  why);
+  changes.at_most("registration.min_inlier_ratio", config.odometry.match.min_inlier_ratio,
+                  kSparseInlierRatio, why);
   changes.at_most("keyframe.distance_m", config.keyframe_map.keyframe.distance_m, kSparseKeyframeM,
                   why);
-  changes.at_most("local_map.min_points", cells.min_points, kSparseMinPoints, why);
-  changes.at_least("local_map.volume_weight", cells.volume_weight, kSparseVolumeWeight, why);
-  changes.set("local_map.few_rings", "true", why);
+  suit_matcher(config, {.sparse = true}, why, changes);
   changes.at_most("map.cloud_distance_m", config.cloud_distance_m, kSparseCloudM, why);
 }
 
-// Without an IMU predictions are often off by more than the finest cells bridge, and the coarsest
-// are too coarse to lead to them: a map in between helps.
+// Without an IMU predictions are often far off.
 void suit_scans_alone(const MappingConfig& config, const SensorTraits& traits,
                       const RunConditions& conditions, Changes& changes) {
-  const std::vector<double>& cells = config.keyframe_map.local_map.cell_sizes_m;
-  if (cells.size() != 2) return;
   std::string why;
   double when_s = 0.0;
   if (!config.odometry.imu_enabled) {
@@ -87,9 +81,7 @@ void suit_scans_alone(const MappingConfig& config, const SensorTraits& traits,
   } else {
     return;
   }
-  changes.set("local_map.cell_sizes_m",
-              fmt::format("[{}, {}, {}]", cells[0], std::sqrt(cells[0] * cells[1]), cells[1]),
-              "scans alone: " + why, when_s);
+  suit_matcher(config, {.alone = true}, "scans alone: " + why, changes, when_s);
 }
 
 // What is told of keys before their meaning.
@@ -119,7 +111,7 @@ Adapted<MappingConfig> adapt(const MappingConfig& asked, const ConfigOrigins& or
     changes.set_anyway("motion.imu_enabled", "false", conditions.imu_refused,
                        conditions.imu_judged_s);
   }
-  config.keyframe_map.local_map.cells.viewpoint_in_source = traits.lidar_in_body;
+  config.keyframe_map.local_map.viewpoint.lidar_in_source = traits.lidar_in_body;
   adapted.changes = changes.list();
   return adapted;
 }

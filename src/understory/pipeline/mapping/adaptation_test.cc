@@ -39,6 +39,10 @@ Adapted<MappingConfig> adapt_read(const std::string& profile,
   return adapt(read.config, read.origins, traits, conditions);
 }
 
+const NdtMatcherConfig& ndt_of(const Adapted<MappingConfig>& adapted) {
+  return adapted.config.keyframe_map.local_map.matcher.get<NdtMatcherConfig>();
+}
+
 std::string yaml_of(MappingConfig config) {
   return mapping_table(config).to_yaml(false);
 }
@@ -52,17 +56,17 @@ TEST(Adaptation, ADenseLidarWithAnImuRunsAsAsked) {
 TEST(Adaptation, SparseScansAreThinnedLessAndEachChangeIsTold) {
   const auto adapted = adapt_read("", {}, sixteen_rings());
   EXPECT_EQ(adapted.config.odometry.voxel.voxel_size_m, 0.1);
-  EXPECT_EQ(adapted.config.odometry.min_inlier_ratio, 0.05);
+  EXPECT_EQ(adapted.config.odometry.match.min_inlier_ratio, 0.05);
   EXPECT_EQ(adapted.config.keyframe_map.keyframe.distance_m, 0.3);
-  EXPECT_EQ(adapted.config.keyframe_map.local_map.cells.min_points, 4);
-  EXPECT_EQ(adapted.config.keyframe_map.local_map.cells.volume_weight, 1.0);
-  EXPECT_TRUE(adapted.config.keyframe_map.local_map.cells.few_rings);
+  EXPECT_EQ(ndt_of(adapted).cells.min_points, 4);
+  EXPECT_EQ(ndt_of(adapted).cells.volume_weight, 1.0);
+  EXPECT_TRUE(ndt_of(adapted).cells.few_rings);
   EXPECT_EQ(adapted.config.cloud_distance_m, 0.1);
   EXPECT_EQ(keys_of(adapted.changes),
-            (std::vector<std::string>{"keyframe.distance_m", "local_map.few_rings",
-                                      "local_map.min_points", "local_map.volume_weight",
-                                      "map.cloud_distance_m", "ndt.min_inlier_ratio",
-                                      "preprocess.voxel.voxel_size_m"}));
+            (std::vector<std::string>{
+                "keyframe.distance_m", "map.cloud_distance_m", "preprocess.voxel.voxel_size_m",
+                "registration.min_inlier_ratio", "registration.ndt.few_rings",
+                "registration.ndt.min_points", "registration.ndt.volume_weight"}));
   // Nothing else changed than what is told.
   MappingConfig back = adapted.config;
   const ConfigTable table = mapping_table(back);
@@ -78,20 +82,20 @@ TEST(Adaptation, SparseScansAreThinnedLessAndEachChangeIsTold) {
 TEST(Adaptation, WhatTheUserSetStays) {
   const auto adapted =
       adapt_read("",
-                 {"preprocess.voxel.voxel_size_m=0.4", "local_map.volume_weight=0.03",
-                  "local_map.cell_sizes_m=[2, 0.5]"},
+                 {"preprocess.voxel.voxel_size_m=0.4", "registration.ndt.volume_weight=0.03",
+                  "registration.ndt.cell_sizes_m=[2, 0.5]"},
                  [] {
                    SensorTraits alone = sixteen_rings();
                    alone.has_imu = false;
                    return alone;
                  }());
   EXPECT_EQ(adapted.config.odometry.voxel.voxel_size_m, 0.4);
-  EXPECT_EQ(adapted.config.keyframe_map.local_map.cells.volume_weight, 0.03);
-  EXPECT_EQ(adapted.config.keyframe_map.local_map.cell_sizes_m, (std::vector<double>{2.0, 0.5}));
+  EXPECT_EQ(ndt_of(adapted).cells.volume_weight, 0.03);
+  EXPECT_EQ(ndt_of(adapted).cell_sizes_m, (std::vector<double>{2.0, 0.5}));
   EXPECT_EQ(keys_of(adapted.changes),
-            (std::vector<std::string>{"keyframe.distance_m", "local_map.few_rings",
-                                      "local_map.min_points", "map.cloud_distance_m",
-                                      "ndt.min_inlier_ratio"}));
+            (std::vector<std::string>{"keyframe.distance_m", "map.cloud_distance_m",
+                                      "registration.min_inlier_ratio", "registration.ndt.few_rings",
+                                      "registration.ndt.min_points"}));
 }
 
 TEST(Adaptation, WhatAProfileSetStays) {
@@ -119,13 +123,12 @@ TEST(Adaptation, ScansAloneHaveAMapInBetween) {
   doubted.imu_judged_s = 7.5;
   for (const auto& adapted :
        {adapt_read("", {}, alone), adapt_read("", {}, many_rings(), doubted)}) {
-    EXPECT_EQ(adapted.config.keyframe_map.local_map.cell_sizes_m, three);
-    EXPECT_EQ(keys_of(adapted.changes), (std::vector<std::string>{"local_map.cell_sizes_m"}));
+    EXPECT_EQ(ndt_of(adapted).cell_sizes_m, three);
+    EXPECT_EQ(keys_of(adapted.changes),
+              (std::vector<std::string>{"registration.ndt.cell_sizes_m"}));
   }
   EXPECT_EQ(adapt_read("", {}, many_rings(), doubted).changes.front().when_s, 7.5);
-  EXPECT_EQ(adapt_read("", {"motion.imu_enabled=false"}, many_rings())
-                .config.keyframe_map.local_map.cell_sizes_m,
-            three);
+  EXPECT_EQ(ndt_of(adapt_read("", {"motion.imu_enabled=false"}, many_rings())).cell_sizes_m, three);
 }
 
 TEST(Adaptation, AnImuThatIsWrongIsLeftOutWhoeverAskedForIt) {
@@ -135,7 +138,7 @@ TEST(Adaptation, AnImuThatIsWrongIsLeftOutWhoeverAskedForIt) {
   const auto adapted = adapt_read("", {"motion.imu_enabled=true"}, many_rings(), conditions);
   EXPECT_FALSE(adapted.config.odometry.imu_enabled);
   ASSERT_EQ(keys_of(adapted.changes),
-            (std::vector<std::string>{"local_map.cell_sizes_m", "motion.imu_enabled"}));
+            (std::vector<std::string>{"motion.imu_enabled", "registration.ndt.cell_sizes_m"}));
   EXPECT_EQ(adapted.changes.back().why, "its axes are swapped");
   EXPECT_EQ(adapted.changes.back().when_s, 12.0);
 }

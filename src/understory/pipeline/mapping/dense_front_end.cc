@@ -342,7 +342,7 @@ void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& reco
     log_.warn("match.velocity_gate",
               fmt::format("match of the scan at {} dropped: {}", format_seconds(record.stamp),
                           estimate.update.reason));
-  } else if (!estimate.matched && !map_->local_map().empty()) {
+  } else if (!estimate.matched && map_->local_map() != nullptr) {
     record.outcome = ScanOutcome::kUnmatched;
     ++counts_.unmatched;
     if (estimate.thinned.size() < kFewPoints) return;

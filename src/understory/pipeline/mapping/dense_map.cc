@@ -13,7 +13,7 @@ class DenseMap : public MapMaker {
   DenseMap(DenseFrontEnd& front_end, const ReadRecording& recording)
       : front_end_(front_end), recording_(recording) {}
 
-  void close_loops() override { front_end_.map().finish(front_end_.config().odometry.ndt); }
+  void close_loops() override { front_end_.map().finish(); }
   RunOutcome write(const std::filesystem::path& results) override {
     return write_run(recording_, results, front_end_);
   }

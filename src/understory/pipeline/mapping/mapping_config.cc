@@ -11,6 +11,10 @@ ConfigTable mapping_table(MappingConfig& config) {
   ConfigTable table;
   table.section("time_repair", [&] { EventOrderer::describe(table, config.loop.time_repair); });
   describe(table, config.odometry);
+  table.section("registration", [&] {
+    describe(table, config.odometry.match);
+    describe(table, config.keyframe_map.local_map.matcher);
+  });
   KeyframeMap::describe(table, config.keyframe_map);
   table.section("map", [&] {
     table.add("enabled", config.map_enabled, "write map.laz and what is made from it");

@@ -73,7 +73,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const Dens
   double squares = 0.0;
   std::vector<float> inlier_ratios;
   PathEvidence path(config.motion_limits);
-  MatchCourse course(config.keyframe_map.local_map.cell_sizes_m.back());
+  MatchCourse course(make_matcher(config.keyframe_map.local_map.matcher)->reach_m());
   Pose last;
   std::uint64_t empty_in_a_row = 0;
   for_each_finished_scan(

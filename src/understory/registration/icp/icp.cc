@@ -192,7 +192,7 @@ class Accumulator {
 }  // namespace
 
 RegistrationResult register_icp(const IcpTarget& target, const Points& source, const Pose& guess,
-                                const std::optional<PosePrior>& prior, const IcpConfig& config) {
+                                const PoseTerms& terms, const IcpConfig& config) {
   const IcpTarget::Tree& tree = target.tree();
   const auto least = static_cast<std::size_t>(config.min_matches);
   if (tree.points.size() < least || source.size() < least) {
@@ -206,8 +206,8 @@ RegistrationResult register_icp(const IcpTarget& target, const Points& source, c
     const Accumulator accumulator(tree, source, pose, config);
     at = ordered_sum(source.size(), 64, MatchSums{}, accumulator);
     const double share = config.independent_share;
-    internal::Quadratic sum{share * at.cost, share * at.gradient, share * at.hessian};
-    if (prior) internal::add_prior(*prior, pose, sum);
+    PoseCost sum{share * at.cost, share * at.gradient, share * at.hessian};
+    internal::add_terms(terms, pose, sum);
     return sum;
   };
   const double range = internal::mean_range(source);

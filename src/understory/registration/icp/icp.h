@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 
 #include "understory/registration/registration.h"
 #include "understory/util/config.h"
@@ -45,8 +44,7 @@ class IcpTarget {
 // Iterative closest points with a robust kernel, for the last refinement of loop closures.
 // Parallel; same bits for any number of threads. Thread-safe.
 [[nodiscard]] RegistrationResult register_icp(const IcpTarget& target, const Points& source,
-                                              const Pose& guess,
-                                              const std::optional<PosePrior>& prior,
+                                              const Pose& guess, const PoseTerms& terms,
                                               const IcpConfig& config);
 
 }  // namespace understory

@@ -61,8 +61,7 @@ TEST(Icp, RecoversKnownMotionsWithBothMetrics) {
     config.metric = metric;
     const bool planes = metric == IcpConfig::Metric::kPointToPlane;
     const IcpTarget target(pair.target, config);
-    const RegistrationResult result =
-        register_icp(target, pair.source, guess, std::nullopt, config);
+    const RegistrationResult result = register_icp(target, pair.source, guess, {}, config);
     EXPECT_TRUE(result.usable());
     const Vector6d d = right_difference(result.target_from_source, pair.truth);
     EXPECT_LT(d.tail<3>().norm(), planes ? 0.025 : 0.05);
@@ -78,7 +77,7 @@ TEST(Icp, FlatGroundIsUndetermined) {
   const IcpConfig config;
   const IcpTarget target(thin(scan_stand(flat, a, small_os0(), 1)), config);
   const RegistrationResult result =
-      register_icp(target, thin(scan_stand(flat, a, small_os0(), 2)), Pose(), std::nullopt, config);
+      register_icp(target, thin(scan_stand(flat, a, small_os0(), 2)), Pose(), {}, config);
   ASSERT_TRUE(result.usable());
   EXPECT_EQ(result.degenerate_directions.cols(), 3);
 }
@@ -87,11 +86,11 @@ TEST(Icp, SaysWhyItCannot) {
   const Pair pair = make_pair(4);
   const IcpConfig config;
   const IcpTarget target(pair.target, config);
-  EXPECT_EQ(register_icp(target, Points(5), Pose(), std::nullopt, config).status,
+  EXPECT_EQ(register_icp(target, Points(5), Pose(), {}, config).status,
             RegistrationStatus::kTooFewPoints);
-  EXPECT_EQ(register_icp(IcpTarget({}, config), pair.source, Pose(), std::nullopt, config).status,
+  EXPECT_EQ(register_icp(IcpTarget({}, config), pair.source, Pose(), {}, config).status,
             RegistrationStatus::kTooFewPoints);
-  EXPECT_EQ(register_icp(target, pair.source, upright(300, 0, 0), std::nullopt, config).status,
+  EXPECT_EQ(register_icp(target, pair.source, upright(300, 0, 0), {}, config).status,
             RegistrationStatus::kTooFewMatches);
 }
 
@@ -101,8 +100,7 @@ TEST(Icp, SameBitsForAnyNumberOfThreads) {
   for (int i = 0; i < 2; ++i) {
     with_threads(i + 1, [&] {
       const IcpConfig config;
-      results[i] =
-          register_icp(IcpTarget(pair.target, config), pair.source, Pose(), std::nullopt, config);
+      results[i] = register_icp(IcpTarget(pair.target, config), pair.source, Pose(), {}, config);
     });
   }
   EXPECT_EQ(results[0].target_from_source.matrix(), results[1].target_from_source.matrix());

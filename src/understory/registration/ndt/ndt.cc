@@ -43,7 +43,7 @@ constexpr std::size_t kEnoughForWideSteps = 8000;
 constexpr std::size_t kWideEvery = 4;
 
 RegistrationResult register_ndt(const NdtMap& target, const Points& source, const Pose& guess,
-                                const std::optional<PosePrior>& prior, const NdtConfig& config) {
+                                const PoseTerms& terms, const NdtConfig& config) {
   if (target.empty())
     return internal::refused(RegistrationStatus::kTooFewPoints, "empty target", guess);
   if (source.size() < static_cast<std::size_t>(config.min_matches)) {
@@ -59,8 +59,8 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
     sums = ndt_cost(target, widening > 1.0 ? few : source, pose, config, widening);
     summed_at = pose;
     const double share = config.independent_share;
-    internal::Quadratic sum{share * sums.cost, share * sums.gradient, share * sums.hessian};
-    if (prior) internal::add_prior(*prior, pose, sum);
+    PoseCost sum{share * sums.cost, share * sums.gradient, share * sums.hessian};
+    internal::add_terms(terms, pose, sum);
     return sum;
   };
   internal::StepLimits limits{config.max_iterations, config.step_translation_m,
@@ -92,14 +92,14 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
 }
 
 RegistrationResult register_ndt(std::span<const NdtMapPtr> targets, const Points& source,
-                                const Pose& guess, const std::optional<PosePrior>& prior,
+                                const Pose& guess, const PoseTerms& terms,
                                 const NdtConfig& config) {
   UNDERSTORY_CHECK(!targets.empty());
   RegistrationResult result;
   Pose start = guess;
   int iterations = 0;
   for (const NdtMapPtr& target : targets) {
-    result = register_ndt(*target, source, start, prior, config);
+    result = register_ndt(*target, source, start, terms, config);
     iterations += result.iterations;
     if (!result.usable()) {
       result.target_from_source = guess;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <span>
 
 #include "understory/registration/match_sums.h"
@@ -42,21 +41,19 @@ struct NdtConfig {
 void describe(ConfigTable& table, NdtConfig& config);
 
 // Matches a source cloud to the target, P4 (41): minimises the sum over points of
-// -log(mixture of the cell's normal and a uniform distribution), plus the prior's Mahalanobis
-// distance, by Newton steps to where the gradient vanishes. Source points should be thinned by a
-// voxel filter first. Parallel; same bits for any number of threads. Thread-safe.
+// -log(mixture of the cell's normal and a uniform distribution), plus the terms, by Newton steps to
+// where the gradient vanishes. Source points should be thinned by a voxel filter first. Parallel;
+// same bits for any number of threads. Thread-safe.
 [[nodiscard]] RegistrationResult register_ndt(const NdtMap& target, const Points& source,
-                                              const Pose& guess,
-                                              const std::optional<PosePrior>& prior,
+                                              const Pose& guess, const PoseTerms& terms,
                                               const NdtConfig& config);
 
 // Coarse to fine: each map in turn, the answer of one is the guess of the next.
 [[nodiscard]] RegistrationResult register_ndt(std::span<const NdtMapPtr> targets,
                                               const Points& source, const Pose& guess,
-                                              const std::optional<PosePrior>& prior,
-                                              const NdtConfig& config);
+                                              const PoseTerms& terms, const NdtConfig& config);
 
-// The cost that register_ndt minimises (prior left out), with its gradient and Hessian with respect
+// The cost that register_ndt minimises (terms left out), with its gradient and Hessian with respect
 // to a right perturbation. For tests and for those who optimise it with other terms.
 [[nodiscard]] MatchSums ndt_cost(const NdtMap& target, const Points& source,
                                  const Pose& target_from_source, const NdtConfig& config,

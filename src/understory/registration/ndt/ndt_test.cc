@@ -135,14 +135,14 @@ TEST(Ndt, PriorAgreesWithDifferences) {
   const Matrix6d a = Matrix6d::NullaryExpr([&] { return random.normal(); });
   prior.information = a * a.transpose();
   const Pose pose = prior.target_from_source * Pose::exp(random_step(random, 0.2, 0.5));
-  internal::Quadratic at;
-  internal::add_prior(prior, pose, at);
+  PoseCost at;
+  internal::add_term(prior, pose, at);
   for (int i = 0; i < 6; ++i) {
     const double h = 1e-6;
-    internal::Quadratic up;
-    internal::Quadratic down;
-    internal::add_prior(prior, pose * Pose::exp(h * Vector6d::Unit(i)), up);
-    internal::add_prior(prior, pose * Pose::exp(-h * Vector6d::Unit(i)), down);
+    PoseCost up;
+    PoseCost down;
+    internal::add_term(prior, pose * Pose::exp(h * Vector6d::Unit(i)), up);
+    internal::add_term(prior, pose * Pose::exp(-h * Vector6d::Unit(i)), down);
     EXPECT_NEAR(at.gradient[i], (up.cost - down.cost) / (2.0 * h), 1e-4 * at.gradient.norm());
   }
 }
@@ -160,7 +160,7 @@ TEST(Ndt, RecoversKnownMotions) {
     for (const auto search : {NdtConfig::Search::k1, NdtConfig::Search::k8}) {
       NdtConfig config;
       config.search = search;
-      const RegistrationResult result = register_ndt(*map, source, guess, std::nullopt, config);
+      const RegistrationResult result = register_ndt(*map, source, guess, {}, config);
       EXPECT_EQ(result.status, RegistrationStatus::kConverged) << result.reason;
       const Error error = error_of(result.target_from_source, b);
       EXPECT_LT(error.translation_m, 0.02);
@@ -178,9 +178,9 @@ TEST(Ndt, BothHessiansEndAtTheSamePlace) {
   const Points source = scan_stand(stand, a, small_os0(), 2);
   NdtConfig config;
   const Pose guess = a * Pose::exp((Vector6d() << 0.01, 0, 0.02, 0.1, -0.1, 0.05).finished());
-  const Pose first = register_ndt(*map, source, guess, std::nullopt, config).target_from_source;
+  const Pose first = register_ndt(*map, source, guess, {}, config).target_from_source;
   config.hessian = NdtConfig::Hessian::kNewton;
-  const Pose second = register_ndt(*map, source, guess, std::nullopt, config).target_from_source;
+  const Pose second = register_ndt(*map, source, guess, {}, config).target_from_source;
   EXPECT_LT(error_of(first, second).translation_m, 5e-3);
 }
 
@@ -193,7 +193,7 @@ TEST(Ndt, CoarseToFineComesFromFartherAway) {
   const Pose guess = b * Pose::exp((Vector6d() << 0.03, -0.03, 0.1, 0.6, -0.6, 0.2).finished());
   const std::vector<NdtMapPtr> maps = {map_of(target, a, 3.0), map_of(target, a, 1.0),
                                        map_of(target, a, 0.5)};
-  const RegistrationResult result = register_ndt(maps, source, guess, std::nullopt, {});
+  const RegistrationResult result = register_ndt(maps, source, guess, {}, {});
   EXPECT_TRUE(result.usable());
   EXPECT_LT(error_of(result.target_from_source, b).translation_m, 0.03);
 }
@@ -211,7 +211,7 @@ TEST(Ndt, StandsAThirdOfOutliers) {
             .cast<float>());
   }
   const Pose guess = a * Pose::exp((Vector6d() << 0, 0, 0.01, 0.1, 0.1, 0).finished());
-  const RegistrationResult result = register_ndt(*map, source, guess, std::nullopt, {});
+  const RegistrationResult result = register_ndt(*map, source, guess, {}, {});
   EXPECT_LT(error_of(result.target_from_source, a).translation_m, 0.02);
 }
 
@@ -234,7 +234,7 @@ TEST(Ndt, FollowsTheStemsAndNotTheRingsOnTheGround) {
     const Pose b = upright(0.3 * std::cos(direction), 0.3 * std::sin(direction), 2.0);
     const NdtMapPtr map = map_of(scan_stand(stand, a, testing::vlp16(), 1), a);
     const Points source = scan_stand(stand, b, testing::vlp16(), 2);
-    const RegistrationResult result = register_ndt(*map, source, a, std::nullopt, {});
+    const RegistrationResult result = register_ndt(*map, source, a, {}, {});
     EXPECT_LT(error_of(result.target_from_source, b).translation_m, 0.015) << direction;
   }
 }
@@ -249,7 +249,7 @@ TEST(Ndt, SmoothGroundAloneLeavesItsPlaneUndetermined) {
   const Points source = scan_stand(stand, b, testing::vlp16(), 2);
   const Pose guess = b * Pose::exp((Vector6d() << 0.01, -0.01, 0.0, 0.0, 0.0, 0.1).finished());
   PosePrior prior{guess, Matrix6d::Identity()};  // weak: 1 m, 1 rad
-  const RegistrationResult result = register_ndt(*map, source, guess, prior, {});
+  const RegistrationResult result = register_ndt(*map, source, guess, {prior}, {});
   ASSERT_TRUE(result.usable());
   ASSERT_EQ(result.degenerate_directions.cols(), 3);
   // The three span x, y and yaw: nothing of roll, pitch and z is in them.
@@ -282,7 +282,7 @@ TEST(Ndt, CorridorIsOpenAlongItsAxis) {
   const NdtMapPtr map = map_of(corridor(), upright(100, 200, 50, 0.6));
   const Pose truth = upright(100, 200, 50, 0.6);
   const Pose guess = truth * Pose::exp((Vector6d() << 0.01, 0, 0.01, 0.0, 0.1, 0.1).finished());
-  const RegistrationResult result = register_ndt(*map, corridor(), guess, std::nullopt, {});
+  const RegistrationResult result = register_ndt(*map, corridor(), guess, {}, {});
   ASSERT_TRUE(result.usable());
   ASSERT_EQ(result.degenerate_directions.cols(), 1);
   EXPECT_GT(std::abs(result.degenerate_directions(3, 0)), 0.95);
@@ -300,7 +300,7 @@ TEST(Ndt, APriorHoldsWhatTheMatchLeavesOpen) {
   prior.target_from_source = upright(0.2, -0.1, 2.0, 0.05);
   prior.information = 1e4 * Matrix6d::Identity();
   const Pose guess = upright(0.25, -0.1, 2.05, 0.05);
-  const RegistrationResult result = register_ndt(*map, source, guess, prior, {});
+  const RegistrationResult result = register_ndt(*map, source, guess, {prior}, {});
   const Vector6d d = right_difference(result.target_from_source, prior.target_from_source);
   EXPECT_LT(d.norm(), 0.03);
 }
@@ -316,7 +316,7 @@ TEST(Ndt, InformationIsRealistic) {
     const Pose b = upright(0.3, 0.1, 1.6, 0.03);
     const NdtMapPtr map = map_of(scan_stand(stand, a, small_os0(), seed), a);
     const Points source = scan_stand(stand, b, small_os0(), seed + 100);
-    const RegistrationResult result = register_ndt(*map, source, b, std::nullopt, {});
+    const RegistrationResult result = register_ndt(*map, source, b, {}, {});
     const Vector6d d = right_difference(result.target_from_source, b);
     sum += d.dot(result.information * d) / 6.0;
     ++n;
@@ -328,14 +328,14 @@ TEST(Ndt, InformationIsRealistic) {
 TEST(Ndt, SaysWhyItCannot) {
   const Points few(10, Eigen::Vector3f(1, 1, 1));
   const Pose guess = upright(1, 2, 3);
-  EXPECT_EQ(register_ndt(*map_of(few, Pose()), few, guess, std::nullopt, {}).status,
+  EXPECT_EQ(register_ndt(*map_of(few, Pose()), few, guess, {}, {}).status,
             RegistrationStatus::kTooFewPoints);
-  EXPECT_EQ(register_ndt(*map_of({}, Pose()), few, guess, std::nullopt, {}).status,
+  EXPECT_EQ(register_ndt(*map_of({}, Pose()), few, guess, {}, {}).status,
             RegistrationStatus::kTooFewPoints);
   const Stand stand = make_stand({.half_width_m = 15.0}, 1);
   const Points cloud = scan_stand(stand, upright(0, 0, 1.6), small_os0(), 1);
   const NdtMapPtr map = map_of(cloud, upright(0, 0, 1.6));
-  const RegistrationResult away = register_ndt(*map, cloud, upright(500, 0, 0), std::nullopt, {});
+  const RegistrationResult away = register_ndt(*map, cloud, upright(500, 0, 0), {}, {});
   EXPECT_EQ(away.status, RegistrationStatus::kTooFewMatches);
   EXPECT_FALSE(away.usable());
   EXPECT_FALSE(away.reason.empty());
@@ -352,7 +352,7 @@ TEST(Ndt, WorksFarFromTheOrigin) {
   for (const double away : {0.0, 20'000.0}) {
     const Pose placed = upright(away, -2.0 * away, 0.0) * a;
     const RegistrationResult result =
-        register_ndt(*map_of(target, placed), source, placed * step, std::nullopt, {});
+        register_ndt(*map_of(target, placed), source, placed * step, {}, {});
     const Vector6d d = right_difference(result.target_from_source, placed);
     if (away == 0.0)
       near_difference = d;
@@ -368,8 +368,7 @@ TEST(Ndt, SameBitsForAnyNumberOfThreads) {
   const Points source = scan_stand(stand, upright(0.2, 0, 1.6), small_os0(), 2);
   RegistrationResult results[2];
   for (int i = 0; i < 2; ++i) {
-    with_threads(
-        i + 1, [&] { results[i] = register_ndt(*map_of(target, a), source, a, std::nullopt, {}); });
+    with_threads(i + 1, [&] { results[i] = register_ndt(*map_of(target, a), source, a, {}, {}); });
   }
   EXPECT_EQ(results[0].target_from_source.matrix(), results[1].target_from_source.matrix());
   EXPECT_EQ(results[0].information, results[1].information);

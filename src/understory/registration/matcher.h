@@ -1,0 +1,109 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/points.h"
+#include "understory/geometry/pose.h"
+#include "understory/registration/registration.h"
+
+// The seam between those who match scans (odometry, loops, the command `register`) and the methods
+// that do it. They know only what is here; which methods there are is told by matchers.h.
+namespace understory {
+
+// How good the guess is.
+enum class MatchStart {
+  kFar,   // off by more than the target's reach: search from coarse to fine
+  kNear,  // within its reach: the fine steps alone
+};
+
+// The cost that a match makes small, of the points alone. For those who make it small together with
+// terms of their own, such as the elastic scans of odometry. Immutable, thread-safe.
+class MatchCost {
+ public:
+  virtual ~MatchCost() = default;
+  // At a pose, in the scale in which Gaussian terms can be added; the Hessian is positive
+  // semidefinite. Parallel; same bits for any number of threads.
+  [[nodiscard]] virtual PoseCost at(const Points& source, const Pose& target_from_source) const = 0;
+  // Steps shorter than both change nothing that counts.
+  [[nodiscard]] virtual double step_translation_m() const = 0;
+  [[nodiscard]] virtual double step_rotation_rad() const = 0;
+};
+
+// What a matcher made of a set of clouds, e.g. the local map's keyframes. Immutable for all who
+// hold it, and shared between threads.
+class MatchTarget {
+ public:
+  virtual ~MatchTarget() = default;
+
+  // Matches points, best thinned by a voxel filter, from a guess of target_from_source. `terms`
+  // count beside the points; the information of the answer is that of the points alone. Parallel;
+  // same bits for any number of threads.
+  [[nodiscard]] virtual RegistrationResult match(const Points& source, const Pose& guess,
+                                                 const PoseTerms& terms,
+                                                 MatchStart start) const = 0;
+  // A point farther than about this from all that the target shows matches nothing, metres. If
+  // points lay there by chance, they would be half of it (RMS) from what they match.
+  [[nodiscard]] virtual double reach_m() const = 0;
+  // The cost of the coarsest (kFar) or of the last (kNear) steps; null if the method makes no cost
+  // small that can be told at a pose. It lives as long as the target.
+  [[nodiscard]] virtual const MatchCost* cost(MatchStart start) const {
+    static_cast<void>(start);
+    return nullptr;
+  }
+};
+using MatchTargetPtr = std::shared_ptr<const MatchTarget>;
+
+// Makes targets of clouds that come one after another. Not thread-safe itself; works in parallel
+// inside, with the same bits for any number of threads.
+class TargetBuilder {
+ public:
+  virtual ~TargetBuilder() = default;
+
+  // Adds a cloud. Then, if given, forgets what is farther than `forget_beyond_m` from its origin.
+  virtual void insert(const Points& points_in_source, const Pose& target_from_source,
+                      std::optional<double> forget_beyond_m) = 0;
+  virtual void clear() = 0;
+  // The target as it is now. Quickest if nobody holds the last one any more: its memory may then be
+  // written on.
+  [[nodiscard]] virtual MatchTargetPtr snapshot() = 0;
+};
+
+// How the clouds of a target and those matched to it were seen.
+struct Viewpoint {
+  // Where the lidar is in the frames of the sources, metres; unknown: nothing.
+  std::optional<Eigen::Vector3d> lidar_in_source;
+};
+
+// A method with its settings. Immutable, thread-safe.
+class Matcher {
+ public:
+  virtual ~Matcher() = default;
+
+  [[nodiscard]] virtual std::unique_ptr<TargetBuilder> make_builder(
+      const Viewpoint& viewpoint) const = 0;
+  // Of a single cloud, in its own frame.
+  [[nodiscard]] virtual MatchTargetPtr make_target(const Points& points) const;
+  // See MatchTarget::reach_m; of all its targets.
+  [[nodiscard]] virtual double reach_m() const = 0;
+  // Whether the method sums up the points of a target, so that many tell more than few. If not, it
+  // looks for single points: best is a target that is thinned like the source.
+  [[nodiscard]] virtual bool sums_up_points() const = 0;
+};
+
+// What is known of a recording's scans when the settings of a method are chosen for it.
+struct ScanTraits {
+  bool sparse = false;  // a lidar of few rings: few points, and most of them in traces of rings
+  bool alone = false;   // no IMU: guesses are often off by more than the finest reach
+};
+
+// One setting of a method that suits such scans: key below the method's section, value as YAML.
+struct SuitedSetting {
+  std::string key;
+  std::string value;
+};
+
+}  // namespace understory

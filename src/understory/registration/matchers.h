@@ -1,0 +1,57 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "understory/registration/matcher.h"
+#include "understory/registration/ndt/ndt_matcher.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+// The methods there are, by their configurations: a new one is a line here. A configuration C is an
+// aggregate with
+//   static constexpr const char* kName, kSummary;                  "ndt", and a few words of help
+//   void describe(ConfigTable&, C&);                               the settings in section kName
+//   std::unique_ptr<const Matcher> make_matcher(const C&);         throws ConfigError
+//   std::vector<SuitedSetting> suited_settings(const C&, const ScanTraits&);
+using MatcherConfigs = std::tuple<NdtMatcherConfig  //
+                                  >;
+
+// The method chosen, and the settings of all of them.
+struct MatcherConfig {
+  std::string method = NdtMatcherConfig::kName;
+  MatcherConfigs of;
+
+  template <typename Config>
+  [[nodiscard]] Config& get() {
+    return std::get<Config>(of);
+  }
+  template <typename Config>
+  [[nodiscard]] const Config& get() const {
+    return std::get<Config>(of);
+  }
+};
+
+// Names of the methods, and "name (summary), ..." for help texts.
+[[nodiscard]] std::vector<std::string> matcher_names();
+[[nodiscard]] std::string matcher_summaries();
+
+// The key `method` and one section for each method's settings; or those sections alone.
+void describe(ConfigTable& table, MatcherConfig& config);
+void describe_settings(ConfigTable& table, MatcherConfig& config);
+
+// The chosen method, or another one with its settings. Throws ConfigError for an unknown name or
+// settings that cannot be.
+[[nodiscard]] std::unique_ptr<const Matcher> make_matcher(const MatcherConfig& config);
+[[nodiscard]] std::unique_ptr<const Matcher> make_matcher(const MatcherConfig& config,
+                                                          const std::string& method);
+
+// Settings of the chosen method that suit such scans better than those in `config`; keys begin with
+// the method's section.
+[[nodiscard]] std::vector<SuitedSetting> suited_settings(const MatcherConfig& config,
+                                                         const ScanTraits& traits);
+
+}  // namespace understory

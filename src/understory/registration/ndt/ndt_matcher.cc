@@ -1,0 +1,191 @@
+#include "understory/registration/ndt/ndt_matcher.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "understory/util/error.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+// Cells that are twice as large or more have their shape from a part of a dense cloud's points.
+constexpr std::size_t kEnoughForCoarse = 20000;
+constexpr std::size_t kCoarseEvery = 4;
+
+class NdtCost : public MatchCost {
+ public:
+  NdtCost(NdtMapPtr map, const NdtConfig& config) : map_(std::move(map)), config_(config) {
+    config_.hessian = NdtConfig::Hessian::kGaussNewton;  // the curvature has to be positive
+  }
+  [[nodiscard]] PoseCost at(const Points& source, const Pose& target_from_source) const override {
+    const MatchSums sums = ndt_cost(*map_, source, target_from_source, config_);
+    const double share = config_.independent_share;
+    return {share * sums.cost, share * sums.gradient, share * sums.hessian};
+  }
+  [[nodiscard]] double step_translation_m() const override { return config_.step_translation_m; }
+  [[nodiscard]] double step_rotation_rad() const override { return config_.step_rotation_rad; }
+
+ private:
+  NdtMapPtr map_;
+  NdtConfig config_;
+};
+
+class NdtTarget : public MatchTarget {
+ public:
+  NdtTarget(std::vector<NdtMapPtr> maps, const NdtConfig& config)
+      : maps_(std::move(maps)),
+        config_(config),
+        coarsest_(maps_.front(), config),
+        finest_(maps_.back(), config) {}
+
+  [[nodiscard]] RegistrationResult match(const Points& source, const Pose& guess,
+                                         const PoseTerms& terms, MatchStart start) const override {
+    const std::span<const NdtMapPtr> maps(maps_);
+    return register_ndt(start == MatchStart::kFar ? maps : maps.last(1), source, guess, terms,
+                        config_);
+  }
+  [[nodiscard]] double reach_m() const override { return maps_.back()->cell_size(); }
+  [[nodiscard]] const MatchCost* cost(MatchStart start) const override {
+    return start == MatchStart::kFar ? &coarsest_ : &finest_;
+  }
+
+ private:
+  std::vector<NdtMapPtr> maps_;
+  NdtConfig config_;
+  NdtCost coarsest_;
+  NdtCost finest_;
+};
+
+class NdtTargetBuilder : public TargetBuilder {
+ public:
+  NdtTargetBuilder(const NdtMatcherConfig& config, const Viewpoint& viewpoint) : config_(config) {
+    for (const double size : config.cell_sizes_m) {
+      NdtMapConfig cells = config.cells;
+      cells.cell_size_m = size;
+      cells.viewpoint_in_source = viewpoint.lidar_in_source;
+      builders_.emplace_back(cells);
+    }
+  }
+
+  void insert(const Points& points_in_source, const Pose& target_from_source,
+              std::optional<double> forget_beyond_m) override {
+    const Points part = thin_evenly(points_in_source, kEnoughForCoarse, kCoarseEvery);
+    const double finest = config_.cell_sizes_m.back();
+    parallel_for(builders_.size(), 1, [&](std::size_t i) {
+      NdtMapBuilder& builder = builders_[i];
+      const bool coarse = config_.cell_sizes_m[i] >= 2.0 * finest;
+      builder.insert(coarse ? part : points_in_source, target_from_source);
+      if (forget_beyond_m)
+        builder.remove_beyond(target_from_source.translation(), *forget_beyond_m);
+    });
+  }
+
+  void clear() override {
+    for (NdtMapBuilder& builder : builders_)
+      builder.clear();
+  }
+
+  [[nodiscard]] MatchTargetPtr snapshot() override {
+    std::vector<NdtMapPtr> maps(builders_.size());
+    parallel_for(builders_.size(), 1, [&](std::size_t i) { maps[i] = builders_[i].snapshot(); });
+    return std::make_shared<NdtTarget>(std::move(maps), config_.steps);
+  }
+
+ private:
+  NdtMatcherConfig config_;
+  std::vector<NdtMapBuilder> builders_;
+};
+
+class NdtMatcher : public Matcher {
+ public:
+  explicit NdtMatcher(const NdtMatcherConfig& config) : config_(config) {
+    if (config.cell_sizes_m.empty()) throw ConfigError({"ndt.cell_sizes_m: is empty"});
+    for (const double size : config.cell_sizes_m) {
+      if (!(size >= 0.05 && size <= 20.0))
+        throw ConfigError({"ndt.cell_sizes_m: expected values within 0.05..20 m"});
+    }
+  }
+
+  [[nodiscard]] std::unique_ptr<TargetBuilder> make_builder(
+      const Viewpoint& viewpoint) const override {
+    return std::make_unique<NdtTargetBuilder>(config_, viewpoint);
+  }
+  // One cloud is not so much that its coarse cells had to do with a part of it.
+  [[nodiscard]] MatchTargetPtr make_target(const Points& points) const override {
+    const PlacedCloud cloud{&points, Pose()};
+    std::vector<NdtMapPtr> maps;
+    for (const double size : config_.cell_sizes_m) {
+      NdtMapConfig cells = config_.cells;
+      cells.cell_size_m = size;
+      maps.push_back(build_ndt_map(std::span(&cloud, 1), cells));
+    }
+    return std::make_shared<NdtTarget>(std::move(maps), config_.steps);
+  }
+  [[nodiscard]] double reach_m() const override { return config_.cell_sizes_m.back(); }
+  [[nodiscard]] bool sums_up_points() const override { return true; }
+
+ private:
+  NdtMatcherConfig config_;
+};
+
+void describe_cells(ConfigTable& table, NdtMapConfig& cells) {
+  table.add("min_points", cells.min_points, {3, 1000}, "",
+            "least points of a cell that has a distribution");
+  table.add("growth", cells.growth, {0.0, 1.0}, "",
+            "share of new points at which a cell's distribution is worked out again");
+  table.add("sigma_floor_m", cells.sigma_floor_m, {1e-3, 1.0}, "m",
+            "no surface is taken to be thinner");
+  table.add("second_axis_weight", cells.second_axis_weight, {0.0, 1.0}, "",
+            "weight of a cell's second thinnest direction");
+  table.add("volume_weight", cells.volume_weight, {0.0, 1.0}, "",
+            "weight of cells that are neither surface nor line");
+  table.add(
+      "near_side_line", cells.near_side_line, {0.0, 2.0}, "",
+      "the side of a stem that is seen lies before the middle of its cell by this share of the "
+      "spread; 0: in its middle");
+  table.add("near_side_volume", cells.near_side_volume, {0.0, 2.0}, "",
+            "the same of cells that are neither surface nor line");
+  table.add("few_rings", cells.few_rings,
+            "a surface seen exactly edge-on is the trace of one ring; of sparse scans true");
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, NdtMatcherConfig& config) {
+  table.add("cell_sizes_m", config.cell_sizes_m, "m", "cells of the maps, coarse to fine");
+  describe_cells(table, config.cells);
+  describe(table, config.steps);
+}
+
+std::unique_ptr<const Matcher> make_matcher(const NdtMatcherConfig& config) {
+  return std::make_unique<NdtMatcher>(config);
+}
+
+// Sparse scans leave few surfaces, so all cells of the map count. Guesses of scans alone are off by
+// more than the finest cells bridge, and the coarsest are too coarse to lead to them: a map in
+// between helps.
+std::vector<SuitedSetting> suited_settings(const NdtMatcherConfig& config,
+                                           const ScanTraits& traits) {
+  constexpr int kSparseMinPoints = 4;
+  constexpr double kSparseVolumeWeight = 1.0;
+  std::vector<SuitedSetting> suited;
+  if (traits.sparse) {
+    if (config.cells.min_points > kSparseMinPoints)
+      suited.push_back({"min_points", fmt::format("{}", kSparseMinPoints)});
+    if (config.cells.volume_weight < kSparseVolumeWeight)
+      suited.push_back({"volume_weight", fmt::format("{}", kSparseVolumeWeight)});
+    suited.push_back({"few_rings", "true"});
+  }
+  const std::vector<double>& cells = config.cell_sizes_m;
+  if (traits.alone && cells.size() == 2) {
+    suited.push_back({"cell_sizes_m", fmt::format("[{}, {}, {}]", cells[0],
+                                                  std::sqrt(cells[0] * cells[1]), cells[1])});
+  }
+  return suited;
+}
+
+}  // namespace understory
