@@ -9,7 +9,6 @@
 #include "understory/cli/register_stems.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/recording/clouds/cloud_file.h"
-#include "understory/registration/icp/icp.h"
 #include "understory/registration/matchers.h"
 #include "understory/util/error.h"
 
@@ -20,7 +19,6 @@ struct RegisterConfig {
   double target_voxel_m = 0.1;
   double source_voxel_m = 0.25;
   MatcherConfig matcher;
-  IcpConfig icp;
   SparseIcpConfig stem_icp;
   GoIcpConfig go_icp;
 
@@ -29,6 +27,7 @@ struct RegisterConfig {
     auto& ndt = matcher.get<NdtMatcherConfig>();
     ndt.cell_sizes_m = {3.0, 1.0};
     ndt.cells.sigma_floor_m = 0.03;
+    matcher.get<IcpMatcherConfig>().far_distance_m = 0.0;  // the guess is the user's
   }
 };
 
@@ -36,9 +35,8 @@ void describe(ConfigTable& table, RegisterConfig& config) {
   table.add("target_voxel_m", config.target_voxel_m, {0.01, 5.0}, "m",
             "voxels that thin the target");
   table.add("source_voxel_m", config.source_voxel_m, {0.01, 5.0}, "m",
-            "voxels that thin the source (ICP: both)");
+            "voxels that thin the source; of methods that look for nearest points, both");
   describe_settings(table, config.matcher);
-  table.section("icp", [&] { describe(table, config.icp); });
   table.section("stem_icp", [&] { describe(table, config.stem_icp); });
   table.section("go_icp", [&] { describe(table, config.go_icp); });
 }
@@ -101,13 +99,10 @@ RegistrationResult match(const RegisterOptions& options, const RegisterConfig& c
                          const Points& target, const Points& source, const Pose& guess) {
   VoxelFilter filter;
   const Points thinned = filter.filter(source, config.source_voxel_m);
-  if (options.method == "icp") {
-    const IcpTarget tree(filter.filter(target, config.source_voxel_m), config.icp);
-    return register_icp(tree, thinned, guess, {}, config.icp);
-  }
   const auto matcher = make_matcher(config.matcher, options.method);
-  const Points dense = filter.filter(target, config.target_voxel_m);
-  return matcher->make_target(dense)->match(thinned, guess, {}, MatchStart::kFar);
+  const double voxel_m = matcher->sums_up_points() ? config.target_voxel_m : config.source_voxel_m;
+  return matcher->make_target(filter.filter(target, voxel_m))
+      ->match(thinned, guess, {}, MatchStart::kFar);
 }
 
 void print_json(const RegistrationResult& result, const Pose& a_from_b) {
@@ -190,11 +185,14 @@ void add_register_command(CLI::App& app, Command& chosen) {
   CLI::App* command = app.add_subcommand("register", "Match one point cloud to another");
   command->add_option("A", options->target, "Target cloud (.pcd, .ply, .las, .laz, .bin)");
   command->add_option("B", options->source, "Source cloud");
+  std::vector<std::string> methods = matcher_names();
+  methods.insert(methods.end(), {"stem-icp", "go-icp"});
   command
       ->add_option("--method", options->method,
-                   "ndt, icp; for sparse clouds of stems, z up: stem-icp (trimmed, from the guess) "
-                   "or go-icp (searches)")
-      ->check(CLI::IsMember({"ndt", "icp", "stem-icp", "go-icp"}));
+                   matcher_summaries() +
+                       "; for sparse clouds of stems, z up: stem-icp (trimmed, from the guess) or "
+                       "go-icp (searches)")
+      ->check(CLI::IsMember(methods));
   command
       ->add_option("--guess", options->guess,
                    "a_from_b to start from: x,y,z or x,y,z,qx,qy,qz,qw or 16 numbers row by row")

@@ -20,14 +20,15 @@ enum class MatchStart {
   kNear,  // within its reach: the fine steps alone
 };
 
-// The cost that a match makes small, of the points alone. For those who make it small together with
-// terms of their own, such as the elastic scans of odometry. Immutable, thread-safe.
+// The cost that a match of a source makes small, of the points alone. For those who make it small
+// together with terms of their own, such as the elastic scans of odometry. Immutable, thread-safe;
+// lives no longer than its source and its target.
 class MatchCost {
  public:
   virtual ~MatchCost() = default;
   // At a pose, in the scale in which Gaussian terms can be added; the Hessian is positive
   // semidefinite. Parallel; same bits for any number of threads.
-  [[nodiscard]] virtual PoseCost at(const Points& source, const Pose& target_from_source) const = 0;
+  [[nodiscard]] virtual PoseCost at(const Pose& target_from_source) const = 0;
   // Steps shorter than both change nothing that counts.
   [[nodiscard]] virtual double step_translation_m() const = 0;
   [[nodiscard]] virtual double step_rotation_rad() const = 0;
@@ -48,9 +49,11 @@ class MatchTarget {
   // A point farther than about this from all that the target shows matches nothing, metres. If
   // points lay there by chance, they would be half of it (RMS) from what they match.
   [[nodiscard]] virtual double reach_m() const = 0;
-  // The cost of the coarsest (kFar) or of the last (kNear) steps; null if the method makes no cost
-  // small that can be told at a pose. It lives as long as the target.
-  [[nodiscard]] virtual const MatchCost* cost(MatchStart start) const {
+  // The cost of a source in the coarsest (kFar) or in the last (kNear) steps; null if the method
+  // makes no cost small that can be told at a pose.
+  [[nodiscard]] virtual std::unique_ptr<const MatchCost> cost(const Points& source,
+                                                              MatchStart start) const {
+    static_cast<void>(source);
     static_cast<void>(start);
     return nullptr;
   }

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <vector>
 
+#include "understory/registration/icp/icp_matcher.h"
 #include "understory/registration/matcher.h"
 #include "understory/registration/ndt/ndt_matcher.h"
 #include "understory/util/config.h"
@@ -17,8 +18,8 @@ namespace understory {
 //   void describe(ConfigTable&, C&);                               the settings in section kName
 //   std::unique_ptr<const Matcher> make_matcher(const C&);         throws ConfigError
 //   std::vector<SuitedSetting> suited_settings(const C&, const ScanTraits&);
-using MatcherConfigs = std::tuple<NdtMatcherConfig  //
-                                  >;
+using MatcherConfigs = std::tuple<NdtMatcherConfig,  //
+                                  IcpMatcherConfig>;
 
 // The method chosen, and the settings of all of them.
 struct MatcherConfig {

@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <numbers>
 #include <optional>
 
@@ -89,12 +91,11 @@ Points every_nth(const Points& points, std::size_t count) {
 // Starts by their coarse cost, best first; neighbours of better ones left out.
 std::vector<Pose> best_starts(const Side& target, const Side& source,
                               const std::vector<Pose>& starts, const LoopClosureConfig& config) {
-  const MatchCost* coarse = target.target->cost(MatchStart::kFar);
-  if (starts.size() == 1 || coarse == nullptr) return {starts.front()};
   const Points some = every_nth(source.points, kScoringPoints);
+  const auto coarse = target.target->cost(some, MatchStart::kFar);
+  if (starts.size() == 1 || coarse == nullptr) return {starts.front()};
   std::vector<double> cost(starts.size());
-  parallel_for(starts.size(), 1,
-               [&](std::size_t i) { cost[i] = coarse->at(some, starts[i]).cost; });
+  parallel_for(starts.size(), 1, [&](std::size_t i) { cost[i] = coarse->at(starts[i]).cost; });
   std::vector<std::size_t> order(starts.size());
   for (std::size_t i = 0; i < order.size(); ++i)
     order[i] = i;
@@ -111,6 +112,12 @@ std::vector<Pose> best_starts(const Side& target, const Side& source,
     if (std::none_of(best.begin(), best.end(), near)) best.push_back(starts[i]);
   }
   return best;
+}
+
+// Null if the first method has the last word.
+std::unique_ptr<const Matcher> refining_matcher(const LoopClosureConfig& config) {
+  if (config.refine == LoopClosureConfig::kNoRefinement) return nullptr;
+  return make_matcher(config.matcher, config.refine);
 }
 
 struct Match {
@@ -137,7 +144,7 @@ double chance_overlap(const Structure& target, const Points& source, const Pose&
   return sum / 8.0;
 }
 
-// Matched from the best starts, judged by the structure found again; ICP at the best.
+// Matched from the best starts, judged by the structure found again; refined at the best.
 std::optional<Match> match_sides(const Side& target, const Side& source,
                                  const Structure& target_structure,
                                  const Structure& source_structure, const std::vector<Pose>& starts,
@@ -160,10 +167,10 @@ std::optional<Match> match_sides(const Side& target, const Side& source,
     if (!same_place(other.result.target_from_source, best.result.target_from_source))
       report.runner_up = std::max(report.runner_up, other.overlap);
   }
-  if (config.refine == LoopClosureConfig::Refine::kNdt) return best;
-  const IcpTarget icp_target(target.points, config.icp);
-  best.result =
-      register_icp(icp_target, source.points, best.result.target_from_source, {}, config.icp);
+  const auto refine = refining_matcher(config);
+  if (refine == nullptr) return best;
+  best.result = refine->make_target(target.points)
+                    ->match(source.points, best.result.target_from_source, {}, MatchStart::kNear);
   if (!best.result.usable()) return std::nullopt;
   best.overlap =
       target_structure.overlap(source_structure.points(), best.result.target_from_source, least);
@@ -175,9 +182,9 @@ void measure_asymmetry(const Side& target, const Side& source, const Pose& targe
                        const LoopClosureConfig& config, LoopVerification& report) {
   RegistrationResult back =
       source.target->match(target.points, target_from_source.inverse(), {}, MatchStart::kNear);
-  if (config.refine == LoopClosureConfig::Refine::kIcp) {
+  if (const auto refine = refining_matcher(config)) {
     const Pose start = back.usable() ? back.target_from_source : target_from_source.inverse();
-    back = register_icp(IcpTarget(source.points, config.icp), target.points, start, {}, config.icp);
+    back = refine->make_target(source.points)->match(target.points, start, {}, MatchStart::kNear);
   }
   if (!back.usable()) {
     report.asymmetry_m = std::numeric_limits<double>::infinity();
@@ -265,11 +272,10 @@ LoopVerification verify_loop(const LoopInput& input, const LoopClosureConfig& co
 
 void describe(ConfigTable& table, LoopClosureConfig& config) {
   describe(table, config.matcher);
-  table.add_enum(
-      "refine", config.refine,
-      {{"icp", LoopClosureConfig::Refine::kIcp}, {"ndt", LoopClosureConfig::Refine::kNdt}},
-      "what has the last word on the relative pose");
-  table.section("icp", [&] { describe(table, config.icp); });
+  std::vector<std::string> last = matcher_names();
+  last.insert(last.begin(), LoopClosureConfig::kNoRefinement);
+  table.add_choice("refine", config.refine, last,
+                   "method that has the last word on the relative pose; none: the same");
   table.add(
       "search_sigmas", config.search_sigmas, {0.0, 10.0}, "",
       "standard deviations of the belief over which matching starts; 0: from the belief alone");

@@ -5,7 +5,6 @@
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/icp/icp.h"
 #include "understory/registration/matchers.h"
 #include "understory/util/config.h"
 
@@ -26,10 +25,10 @@ struct LoopInput {
 
 struct LoopClosureConfig {
   MatcherConfig matcher;  // for a first estimate
-  // What gives the last word: ICP as in P2-7, or the finest NDT.
-  enum class Refine { kIcp, kNdt };
-  Refine refine = Refine::kNdt;
-  IcpConfig icp;
+  // The method that has the last word, e.g. ICP as in P2-7, with its settings in `matcher`; none:
+  // the last steps of the first.
+  std::string refine = kNoRefinement;
+  static constexpr const char* kNoRefinement = "none";
   // Where the belief is uncertain, matching starts from many places: a grid over so many standard
   // deviations, with steps that the coarsest steps can bridge.
   double search_sigmas = 2.0;
@@ -38,7 +37,8 @@ struct LoopClosureConfig {
   int max_starts = 600;    // beyond, the steps grow
   int refined_starts = 6;  // of those, the best few are carried through
   // Acceptance.
-  double max_fitness_m2 = 0.3;   // of ICP; grows with the spacing of the points, so it is wide
+  double max_fitness_m2 =
+      0.3;  // of the last match; grows with the spacing of the points, so it is wide
   double structure_low_m = 0.7;  // heights above ground of what is compared
   double structure_high_m = 6.0;
   double structure_cell_m = 0.25;

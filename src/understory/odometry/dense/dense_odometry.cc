@@ -68,10 +68,9 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
     const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, estimate.scan_end);
     preprocess(scan, guess, estimate);
     if (local_map) match(*local_map, motion_->predict(scan.stamp), estimate);
-    const MatchCost* cost = estimate.matched ? local_map->cost(MatchStart::kNear) : nullptr;
-    watch_scan_motion(scan, cost, guess, estimate);
-    if (config_.elastic_scans && cost != nullptr && by_scans_alone())
-      match_elastically(scan, *cost, guess, estimate);
+    watch_scan_motion(scan, local_map, guess, estimate);
+    if (config_.elastic_scans && estimate.matched && by_scans_alone())
+      match_elastically(scan, *local_map, guess, estimate);
     std::optional<LidarFactor> factor;
     if (estimate.matched) {
       factor = LidarFactor{estimate.match.target_from_source, estimate.match.fitness_m2,
@@ -106,16 +105,16 @@ bool DenseOdometry::by_scans_alone() const {
   return !trust.usable || trust.on_probation;
 }
 
-void DenseOdometry::watch_scan_motion(const Scan& scan, const MatchCost* cost,
+void DenseOdometry::watch_scan_motion(const Scan& scan, const MatchTargetPtr& local_map,
                                       const std::vector<StampedPose>& guess,
                                       const DenseEstimate& estimate) {
-  if (cost == nullptr) return scan_motion_.interrupt();
+  if (!estimate.matched) return scan_motion_.interrupt();
   const ScopedTimer timer(times_, "scan_motion");
-  scan_motion_.add(*cost, estimate.thinned, guess, {scan.stamp, estimate.match.target_from_source},
-                   estimate.scan_end - scan.stamp);
+  scan_motion_.add(*local_map, estimate.thinned, guess,
+                   {scan.stamp, estimate.match.target_from_source}, estimate.scan_end - scan.stamp);
 }
 
-void DenseOdometry::match_elastically(const Scan& scan, const MatchCost& cost,
+void DenseOdometry::match_elastically(const Scan& scan, const MatchTarget& target,
                                       const std::vector<StampedPose>& guess,
                                       DenseEstimate& estimate) {
   const ScopedTimer timer(times_, "matching_elastic");
@@ -125,7 +124,7 @@ void DenseOdometry::match_elastically(const Scan& scan, const MatchCost& cost,
   const ScanPathConfig path_config{kBendShare * config_.motion.motion_accel_sigma_m_s2,
                                    kBendShare * config_.motion.motion_angular_accel_sigma_rad_s2};
   const ScanPathCorrection correction =
-      match_scan_path(cost, estimate.thinned, duration, start, path_config);
+      match_scan_path(target, estimate.thinned, duration, start, path_config);
   if (correction.iterations == 0) return;
   const std::vector<StampedPose> path = corrected_path(guess, start, duration, correction);
   preprocess(scan, path, estimate);

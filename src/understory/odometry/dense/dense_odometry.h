@@ -103,9 +103,9 @@ class DenseOdometry {
   void preprocess(const Scan& scan, const std::vector<StampedPose>& path, DenseEstimate& estimate);
   // Whether no IMU tells of the motion.
   [[nodiscard]] bool by_scans_alone() const;
-  void match_elastically(const Scan& scan, const MatchCost& cost,
+  void match_elastically(const Scan& scan, const MatchTarget& target,
                          const std::vector<StampedPose>& guess, DenseEstimate& estimate);
-  void watch_scan_motion(const Scan& scan, const MatchCost* cost,
+  void watch_scan_motion(const Scan& scan, const MatchTargetPtr& local_map,
                          const std::vector<StampedPose>& guess, const DenseEstimate& estimate);
   void match(const MatchTarget& local_map, const NavState& predicted, DenseEstimate& estimate);
 

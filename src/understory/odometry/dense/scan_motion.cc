@@ -21,7 +21,7 @@ Vector6d in_metres(Vector6d motion) {
 
 }  // namespace
 
-void ScanMotionWatch::add(const MatchCost& cost, const BodyCloud& source,
+void ScanMotionWatch::add(const MatchTarget& target, const BodyCloud& source,
                           const std::vector<StampedPose>& guess, const StampedPose& matched,
                           TimeNs duration) {
   const std::optional<StampedPose> before = std::exchange(last_, matched);
@@ -35,7 +35,7 @@ void ScanMotionWatch::add(const MatchCost& cost, const BodyCloud& source,
   if (moved.norm() < kLeastMotionM) return;
   since_probe_ = 0;
   const ScanPathCorrection correction =
-      match_scan_path(cost, source, duration, matched.world_from_body, kLoose);
+      match_scan_path(target, source, duration, matched.world_from_body, kLoose);
   if (correction.iterations == 0) return;
   const Pose guessed = guess.front().world_from_body.inverse() * guess.back().world_from_body;
   const Vector6d within = in_metres(guessed.log() + correction.at_end - correction.at_start);

@@ -28,11 +28,11 @@ class ScanMotionWatch {
   static constexpr int kEvery = 30;
 
   // A scan that was matched, before its path is corrected by anything else.
-  //   cost: of the local map, near
+  //   target: the local map; without a cost nothing is found out
   //   source: deskewed along `guess`, thinned, body frame at its stamp
   //   matched: its pose by the match; duration: from the stamp to the last point
-  void add(const MatchCost& cost, const BodyCloud& source, const std::vector<StampedPose>& guess,
-           const StampedPose& matched, TimeNs duration);
+  void add(const MatchTarget& target, const BodyCloud& source,
+           const std::vector<StampedPose>& guess, const StampedPose& matched, TimeNs duration);
   // A scan without a match.
   void interrupt() { last_.reset(); }
   void move_world(const Pose& new_world_from_old_world);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "understory/util/error.h"
 
@@ -82,20 +83,26 @@ struct Equations {
 
 }  // namespace
 
-ScanPathCorrection match_scan_path(const MatchCost& cost, const BodyCloud& source, TimeNs duration,
-                                   const Pose& start, const ScanPathConfig& config) {
+ScanPathCorrection match_scan_path(const MatchTarget& target, const BodyCloud& source,
+                                   TimeNs duration, const Pose& start,
+                                   const ScanPathConfig& config) {
   UNDERSTORY_CHECK(duration > 0);
   ScanPathCorrection correction;
   const std::vector<Slice> slices = slices_of(source, duration);
   if (slices.size() < 2) return correction;
+  std::vector<std::unique_ptr<const MatchCost>> costs;
+  for (const Slice& slice : slices) {
+    costs.push_back(target.cost(slice.points, MatchStart::kNear));
+    if (costs.back() == nullptr) return correction;
+  }
   const Vector6d information = bend_information(duration, config);
   while (correction.iterations < config.max_iterations) {
     ++correction.iterations;
     Equations sum;
-    for (const Slice& slice : slices) {
-      const Pose placed = start * Pose::exp(correction_at(correction, slice.share));
-      const PoseCost at = cost.at(slice.points, placed);
-      sum.add(slice.share, at.hessian, at.gradient);
+    for (std::size_t i = 0; i < slices.size(); ++i) {
+      const double share = slices[i].share;
+      const PoseCost at = costs[i]->at(start * Pose::exp(correction_at(correction, share)));
+      sum.add(share, at.hessian, at.gradient);
     }
     sum.add_bend(information, correction.at_end - correction.at_start);
     // What neither points nor bend say anything about stays where it is.
@@ -106,7 +113,8 @@ ScanPathCorrection match_scan_path(const MatchCost& cost, const BodyCloud& sourc
     correction.at_end += step.tail<6>();
     const double turned = std::max(step.head<3>().norm(), step.segment<3>(6).norm());
     const double moved = std::max(step.segment<3>(3).norm(), step.tail<3>().norm());
-    if (turned < cost.step_rotation_rad() && moved < cost.step_translation_m()) break;
+    if (turned < costs.front()->step_rotation_rad() && moved < costs.front()->step_translation_m())
+      break;
   }
   const double limit = config.max_sigmas * config.max_sigmas;
   for (const Vector6d& end : {correction.at_start, correction.at_end}) {

@@ -32,13 +32,13 @@ struct ScanPathCorrection {
 // what the guess got wrong. Here the first and the last pose of the scan are matched together, with
 // the points in between moving along in proportion to their time (the elastic scan of Dellenbach et
 // al., CT-ICP, 2022, for any cost of a match).
-//   cost: of the local map that the scan lies in
+//   target: the local map that the scan lies in; without a cost there is no correction
 //   source: deskewed along the guessed path, body frame at its stamp; thinned
 //   duration: from the stamp to the last point, > 0
 //   start: the pose of the body at the stamp, best from a rigid match
 // The difference of the two corrections is bound by the acceleration the carrier is believed
 // capable of. Deterministic for any number of threads. Thread-safe.
-[[nodiscard]] ScanPathCorrection match_scan_path(const MatchCost& cost, const BodyCloud& source,
+[[nodiscard]] ScanPathCorrection match_scan_path(const MatchTarget& target, const BodyCloud& source,
                                                  TimeNs duration, const Pose& start,
                                                  const ScanPathConfig& config);
 

@@ -49,8 +49,6 @@ class ScanPath : public ::testing::Test {
     end_ << 0.01, -0.02, 0.09, 0.12, -0.05, 0.03;  // 5 degrees and 13 cm in a tenth of a second
   }
 
-  [[nodiscard]] const MatchCost& cost() const { return *map_->cost(MatchStart::kNear); }
-
   testing::Stand stand_;
   MatchTargetPtr map_;
   Pose start_{Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.2, 0.0, 1.6)};
@@ -63,7 +61,7 @@ TEST_F(ScanPath, FindsTheMotionThatARigidMatchAveragesOver) {
   const RegistrationResult rigid = map_->match(cloud.points, start_, {}, MatchStart::kNear);
   ASSERT_TRUE(rigid.usable());
   const ScanPathCorrection found =
-      match_scan_path(cost(), cloud, kDuration, rigid.target_from_source, kAgile);
+      match_scan_path(*map_, cloud, kDuration, rigid.target_from_source, kAgile);
   EXPECT_GT(found.iterations, 1);
   const Pose first = rigid.target_from_source * Pose::exp(found.at_start);
   const Pose last = rigid.target_from_source * Pose::exp(found.at_end);
@@ -78,7 +76,7 @@ TEST_F(ScanPath, LeavesAScanAloneThatNeedsNoCorrection) {
   const BodyCloud cloud = smeared_scan(stand_, start_, Vector6d::Zero());
   const RegistrationResult rigid = map_->match(cloud.points, start_, {}, MatchStart::kNear);
   const ScanPathCorrection found =
-      match_scan_path(cost(), cloud, kDuration, rigid.target_from_source, {});
+      match_scan_path(*map_, cloud, kDuration, rigid.target_from_source, {});
   EXPECT_LT((found.at_end - found.at_start).tail<3>().norm(), 0.02);
   EXPECT_LT((found.at_end - found.at_start).head<3>().norm(), 0.002);
 }
@@ -87,14 +85,31 @@ TEST_F(ScanPath, IsTheSameForAnyNumberOfThreads) {
   const BodyCloud cloud = smeared_scan(stand_, start_, end_);
   ScanPathCorrection one;
   ScanPathCorrection two;
-  with_threads(1, [&] { one = match_scan_path(cost(), cloud, kDuration, start_, {}); });
-  with_threads(2, [&] { two = match_scan_path(cost(), cloud, kDuration, start_, {}); });
+  with_threads(1, [&] { one = match_scan_path(*map_, cloud, kDuration, start_, {}); });
+  with_threads(2, [&] { two = match_scan_path(*map_, cloud, kDuration, start_, {}); });
   EXPECT_EQ(one.at_start, two.at_start);
   EXPECT_EQ(one.at_end, two.at_end);
 }
 
 TEST_F(ScanPath, TooLittleToMatchIsNoCorrection) {
-  EXPECT_EQ(match_scan_path(cost(), BodyCloud(), kDuration, start_, {}).iterations, 0);
+  EXPECT_EQ(match_scan_path(*map_, BodyCloud(), kDuration, start_, {}).iterations, 0);
+}
+
+// A method that makes no cost small: scans stay rigid.
+class WithoutCost : public MatchTarget {
+ public:
+  [[nodiscard]] RegistrationResult match(const Points&, const Pose&, const PoseTerms&,
+                                         MatchStart) const override {
+    return {};
+  }
+  [[nodiscard]] double reach_m() const override { return 1.0; }
+};
+
+TEST_F(ScanPath, AMatcherWithoutACostGivesNoCorrection) {
+  const BodyCloud cloud = smeared_scan(stand_, start_, end_);
+  const ScanPathCorrection none = match_scan_path(WithoutCost(), cloud, kDuration, start_, kAgile);
+  EXPECT_EQ(none.iterations, 0);
+  EXPECT_EQ(none.at_end, Vector6d(Vector6d::Zero()));
 }
 
 TEST_F(ScanPath, CorrectionsGoAlongInProportionToTime) {

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "understory/registration/icp/surface.h"
 #include "understory/registration/registration.h"
 #include "understory/util/config.h"
 
@@ -34,10 +35,13 @@ class IcpTarget {
   ~IcpTarget();
   IcpTarget(const IcpTarget&) = delete;
   IcpTarget& operator=(const IcpTarget&) = delete;
-  struct Tree;
-  [[nodiscard]] const Tree& tree() const { return *tree_; }
+
+  [[nodiscard]] std::size_t size() const;
+  // The nearest point within the distance; false if none.
+  [[nodiscard]] bool nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair) const;
 
  private:
+  struct Tree;
   std::unique_ptr<Tree> tree_;
 };
 

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <limits>
 
-#include "understory/registration/ndt/cell_blocks.h"
+#include "understory/registration/cell_blocks.h"
 #include "understory/registration/ndt/ndt_cell.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"

@@ -18,11 +18,12 @@ constexpr std::size_t kCoarseEvery = 4;
 
 class NdtCost : public MatchCost {
  public:
-  NdtCost(NdtMapPtr map, const NdtConfig& config) : map_(std::move(map)), config_(config) {
+  NdtCost(const NdtMap& map, const Points& source, const NdtConfig& config)
+      : map_(map), source_(source), config_(config) {
     config_.hessian = NdtConfig::Hessian::kGaussNewton;  // the curvature has to be positive
   }
-  [[nodiscard]] PoseCost at(const Points& source, const Pose& target_from_source) const override {
-    const MatchSums sums = ndt_cost(*map_, source, target_from_source, config_);
+  [[nodiscard]] PoseCost at(const Pose& target_from_source) const override {
+    const MatchSums sums = ndt_cost(map_, source_, target_from_source, config_);
     const double share = config_.independent_share;
     return {share * sums.cost, share * sums.gradient, share * sums.hessian};
   }
@@ -30,17 +31,15 @@ class NdtCost : public MatchCost {
   [[nodiscard]] double step_rotation_rad() const override { return config_.step_rotation_rad; }
 
  private:
-  NdtMapPtr map_;
+  const NdtMap& map_;
+  const Points& source_;
   NdtConfig config_;
 };
 
 class NdtTarget : public MatchTarget {
  public:
   NdtTarget(std::vector<NdtMapPtr> maps, const NdtConfig& config)
-      : maps_(std::move(maps)),
-        config_(config),
-        coarsest_(maps_.front(), config),
-        finest_(maps_.back(), config) {}
+      : maps_(std::move(maps)), config_(config) {}
 
   [[nodiscard]] RegistrationResult match(const Points& source, const Pose& guess,
                                          const PoseTerms& terms, MatchStart start) const override {
@@ -49,15 +48,15 @@ class NdtTarget : public MatchTarget {
                         config_);
   }
   [[nodiscard]] double reach_m() const override { return maps_.back()->cell_size(); }
-  [[nodiscard]] const MatchCost* cost(MatchStart start) const override {
-    return start == MatchStart::kFar ? &coarsest_ : &finest_;
+  [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
+                                                      MatchStart start) const override {
+    const NdtMapPtr& map = start == MatchStart::kFar ? maps_.front() : maps_.back();
+    return std::make_unique<NdtCost>(*map, source, config_);
   }
 
  private:
   std::vector<NdtMapPtr> maps_;
   NdtConfig config_;
-  NdtCost coarsest_;
-  NdtCost finest_;
 };
 
 class NdtTargetBuilder : public TargetBuilder {

@@ -52,7 +52,8 @@ class CellBlocks {
   void mark_changed(const Place& at);
   void forget_changes();
 
-  // Calls act(cell, x, y, z) for each cell near one that there is, x to z being its steps from it.
+  // Calls act(cell, x, y, z) for each cell near a place, x to z being its steps from it. Quickest
+  // where there are cells in the place's own block.
   template <typename Act>
   void for_each_near(const Place& at, int reach, const Act& act) const;
   // Calls act(cell) for each cell for which reach_of(cell) is above zero and near which, so far,
@@ -111,12 +112,13 @@ class CellBlocks {
 
 template <typename Act>
 void CellBlocks::for_each_near(const Place& at, int reach, const Act& act) const {
-  const std::uint32_t own = index_.find(key_of(block_of(at)));
-  if (own == kNone) return;
+  const Place block_at = block_of(at);
+  const std::uint32_t own = index_.find(key_of(block_at));
   for (std::size_t step = 0; step < 27; ++step) {
     const std::uint64_t near = near_mask(at, step, reach);
     if (near == 0) continue;
-    const std::uint32_t number = blocks_[own].beside[step];
+    const std::uint32_t number =
+        own == kNone ? index_.find(key_of(neighbour(block_at, step))) : blocks_[own].beside[step];
     if (number == kNone) continue;
     const Block& block = blocks_[number];
     for (std::uint64_t left = near & block.present; left != 0; left &= left - 1) {

@@ -1,4 +1,4 @@
-#include "understory/registration/ndt/cell_blocks.h"
+#include "understory/registration/cell_blocks.h"
 
 namespace understory::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "understory/registration/ndt/cell_blocks.h"
+#include "understory/registration/cell_blocks.h"
 
 #include <gtest/gtest.h>
 
@@ -46,8 +46,14 @@ TEST(CellBlocks, FindTheCellsNearAPlace) {
   Random random(4);
   const Pair pair = random_cells(random);
   ASSERT_GT(pair.plain.size(), 500U);
+  std::vector<Place> places;
+  for (const auto& [at, own] : pair.plain)
+    places.push_back(at);
+  // Also where there is none, in a block without any.
+  for (int i = 8; i < 16; ++i)
+    places.push_back({i, 2, -3});
   int reach = 0;
-  for (const auto& [at, own] : pair.plain) {
+  for (const Place& at : places) {
     reach = (reach + 1) % 5;
     std::set<std::uint32_t> expected;
     for (const auto& [place, cell] : pair.plain) {

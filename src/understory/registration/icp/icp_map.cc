@@ -1,0 +1,195 @@
+#include "understory/registration/icp/icp_map.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+
+#include "understory/geometry/voxel_key.h"
+#include "understory/util/error.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+// The surface of a point is that of the points up to so many cubes away.
+constexpr int kSurroundings = 2;
+
+std::uint64_t key_of(const std::array<int, 3>& cube) {
+  return voxel_key(cube[0], cube[1], cube[2]);
+}
+
+// The cube that a point lies in, and where it is from the cube's centre.
+struct InCube {
+  std::array<int, 3> at{};
+  Eigen::Vector3f from_centre;
+};
+
+InCube locate(const Eigen::Vector3d& point, double cube_m) {
+  InCube located;
+  for (int k = 0; k < 3; ++k) {
+    const double scaled = point[k] / cube_m;
+    const double whole = std::floor(scaled);
+    located.at[static_cast<std::size_t>(k)] = static_cast<int>(whole);
+    located.from_centre[k] = static_cast<float>((scaled - whole - 0.5) * cube_m);
+  }
+  return located;
+}
+
+}  // namespace
+
+void IcpMap::look_around(const std::array<int, 3>& cube, const Eigen::Vector3f& from_centre,
+                         int reach, float& best, const Spot*& nearest,
+                         Eigen::Vector3f& offset) const {
+  const auto edge = static_cast<float>(cube_m_);
+  blocks_.for_each_near(cube, reach, [&](std::uint32_t i, int x, int y, int z) {
+    const Spot& spot = spots_[i];
+    const Eigen::Vector3f step(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+    const Eigen::Vector3f apart = from_centre - edge * step - spot.from_centre;
+    const float squared = apart.squaredNorm();
+    if (squared > best || (squared == best && nearest != nullptr)) return;
+    best = squared;
+    nearest = &spot;
+    offset = apart;
+  });
+}
+
+bool IcpMap::nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair) const {
+  const InCube located = locate(at, cube_m_);
+  const int reach =
+      std::min(kMaxReach, static_cast<int>(std::ceil(max_distance_m / cube_m_ - 1e-9)));
+  auto best = static_cast<float>(max_distance_m * max_distance_m);
+  const Spot* found = nullptr;
+  Eigen::Vector3f offset;
+  // What lies within a cube's edge is among the cubes beside the own one.
+  look_around(located.at, located.from_centre, 1, best, found, offset);
+  const auto sure = static_cast<float>(cube_m_ * cube_m_);
+  if (reach > 1 && (found == nullptr || best > sure))
+    look_around(located.at, located.from_centre, reach, best, found, offset);
+  if (found == nullptr) return false;
+  pair = {offset.cast<double>(), found->patch, best};
+  return true;
+}
+
+IcpMapBuilder::IcpMapBuilder(const IcpMapConfig& config) : config_(config) {
+  UNDERSTORY_CHECK(config.cube_m > 0.0);
+  clear();
+}
+
+void IcpMapBuilder::clear() {
+  cubes_.clear();
+  index_.clear();
+  due_.clear();
+  map_ = std::make_shared<IcpMap>();
+  map_->cube_m_ = config_.cube_m;
+}
+
+void IcpMapBuilder::insert(const Points& points_in_source, const Pose& map_from_source) {
+  std::vector<InCube> located(points_in_source.size());
+  parallel_for(located.size(), 4096, [&](std::size_t i) {
+    located[i] = locate(map_from_source * points_in_source[i].cast<double>(), config_.cube_m);
+  });
+  for (const InCube& point : located)
+    add(point.at, point.from_centre);
+}
+
+void IcpMapBuilder::add(const Place& at, const Eigen::Vector3f& from_centre) {
+  const std::uint64_t key = key_of(at);
+  std::uint32_t number = index_.find(key);
+  if (number == VoxelIndex::kNone) {
+    number = static_cast<std::uint32_t>(cubes_.size());
+    index_.set(key, number);
+    cubes_.emplace_back().at = at;
+  }
+  Cube& cube = cubes_[number];
+  for (int k = 0; k < 3; ++k)
+    cube.sum[k] += from_centre[k];
+  cube.count += 1.0F;
+  if (cube.count < cube.due) return;
+  cube.due = std::numeric_limits<float>::infinity();  // once is enough
+  due_.push_back(number);
+}
+
+// Makes the map one that nobody else holds.
+void IcpMapBuilder::own_map() {
+  if (map_.use_count() > 1) {
+    map_ = std::make_shared<IcpMap>(*map_);
+  } else {
+    // What its other holders read is over.
+    std::atomic_thread_fence(std::memory_order_acquire);
+  }
+}
+
+// Takes the means that are due into the map.
+void IcpMapBuilder::settle_due() {
+  own_map();
+  const std::size_t known = map_->spots_.size();
+  map_->spots_.resize(cubes_.size());
+  for (const std::uint32_t number : due_) {
+    Cube& cube = cubes_[number];
+    IcpMap::Spot& spot = map_->spots_[number];
+    if (number >= known) {
+      spot.at = cube.at;
+      map_->blocks_.set(cube.at, number);
+    }
+    spot.from_centre = Eigen::Vector3f(cube.sum[0], cube.sum[1], cube.sum[2]) / cube.count;
+    map_->blocks_.mark_changed(cube.at);
+    cube.due =
+        std::max(cube.count + 1.0F, (1.0F + static_cast<float>(config_.growth)) * cube.count);
+  }
+  due_.clear();
+}
+
+// The last cube takes the place of the one removed.
+void IcpMapBuilder::remove(std::uint32_t cube) {
+  const Place at = cubes_[cube].at;
+  map_->blocks_.mark_changed(at);
+  map_->blocks_.erase(at);
+  index_.erase(key_of(at));
+  const auto last = static_cast<std::uint32_t>(cubes_.size() - 1);
+  if (cube != last) {
+    cubes_[cube] = cubes_[last];
+    map_->spots_[cube] = map_->spots_[last];
+    index_.set(key_of(cubes_[cube].at), cube);
+    map_->blocks_.set(cubes_[cube].at, cube);
+  }
+  cubes_.pop_back();
+  map_->spots_.pop_back();
+}
+
+void IcpMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m) {
+  settle_due();
+  for (std::uint32_t c = 0; c < cubes_.size();) {
+    if ((map_->centre_of(cubes_[c].at) - center).squaredNorm() > radius_m * radius_m) {
+      remove(c);  // another one is here now
+    } else {
+      ++c;
+    }
+  }
+}
+
+SurfacePatch IcpMapBuilder::patch_around(std::uint32_t cube) const {
+  if (!config_.planes) return {Surface::kPoint, Eigen::Vector3f::Zero()};
+  const auto edge = static_cast<float>(config_.cube_m);
+  SurfaceSums sums;
+  map_->blocks_.for_each_near(
+      map_->spots_[cube].at, kSurroundings, [&](std::uint32_t near, int x, int y, int z) {
+        const Eigen::Vector3f step(static_cast<float>(x), static_cast<float>(y),
+                                   static_cast<float>(z));
+        sums.add(edge * step + map_->spots_[near].from_centre);
+      });
+  return surface_of(sums, config_.max_planarity);
+}
+
+IcpMapPtr IcpMapBuilder::snapshot() {
+  settle_due();
+  std::vector<std::uint32_t> affected;
+  map_->blocks_.for_each_affected([](std::uint32_t) { return kSurroundings; },
+                                  [&](std::uint32_t cube) { affected.push_back(cube); });
+  map_->blocks_.forget_changes();
+  parallel_for(affected.size(), 256,
+               [&](std::size_t i) { map_->spots_[affected[i]].patch = patch_around(affected[i]); });
+  return map_;
+}
+
+}  // namespace understory

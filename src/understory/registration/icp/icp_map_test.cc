@@ -1,0 +1,164 @@
+#include "understory/registration/icp/icp_map.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+constexpr double kCube = 0.25;
+
+Points random_points(Random& random, std::size_t n, double half_m) {
+  Points points(n);
+  for (Eigen::Vector3f& p : points) {
+    for (int k = 0; k < 3; ++k)
+      p[k] = static_cast<float>(random.uniform(-half_m, half_m));
+  }
+  return points;
+}
+
+// The mean of the points of each cube, as the map has them.
+std::vector<Eigen::Vector3d> means_of(const Points& points, const Pose& pose) {
+  std::map<std::array<long, 3>, std::pair<Eigen::Vector3d, int>> cubes;
+  for (const Eigen::Vector3f& point : points) {
+    const Eigen::Vector3d p = pose * point.cast<double>();
+    auto& [sum, n] = cubes
+                         .try_emplace({std::lround(std::floor(p.x() / kCube)),
+                                       std::lround(std::floor(p.y() / kCube)),
+                                       std::lround(std::floor(p.z() / kCube))},
+                                      Eigen::Vector3d::Zero(), 0)
+                         .first->second;
+    sum += p;
+    ++n;
+  }
+  std::vector<Eigen::Vector3d> means;
+  for (const auto& [cube, mean] : cubes)
+    means.push_back(mean.first / mean.second);
+  return means;
+}
+
+// Also far from the origin, and where neither the own cube nor its surroundings have a point.
+TEST(IcpMap, FindsTheNearestMean) {
+  Random random(3);
+  const Pose pose(Eigen::Quaterniond::Identity(), {3000.0, -200.0, 40.0});
+  const Points points = random_points(random, 600, 2.0);
+  IcpMapBuilder builder({.cube_m = kCube, .growth = 0.0});
+  builder.insert(points, pose);
+  const IcpMapPtr map = builder.snapshot();
+  const std::vector<Eigen::Vector3d> means = means_of(points, pose);
+  ASSERT_EQ(map->size(), means.size());
+  int far = 0;
+  int none = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector3d at =
+        pose * Eigen::Vector3d(random.uniform(-3.0, 3.0), random.uniform(-3.0, 3.0),
+                               random.uniform(-3.0, 3.0));
+    double best = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector3d& mean : means)
+      best = std::min(best, (at - mean).squaredNorm());
+    IcpPair pair;
+    const double most = i % 2 == 0 ? 0.5 : 1.0;
+    const bool found = map->nearest(at, most, pair);
+    EXPECT_EQ(found, best <= most * most);
+    if (!found) {
+      ++none;
+      continue;
+    }
+    EXPECT_NEAR(static_cast<double>(pair.squared_m2), best, 1e-4);
+    EXPECT_NEAR(pair.offset.squaredNorm(), best, 1e-4);
+    if (best > kCube * kCube) ++far;
+  }
+  EXPECT_GT(far, 200);
+  EXPECT_GT(none, 200);
+}
+
+// A floor, a pole and a ring's trace, each metres from the others.
+Points scene(Random& random) {
+  Points points;
+  const auto noise = [&] { return static_cast<float>(random.normal(0.0, 0.005)); };
+  for (int i = 0; i < 4000; ++i)
+    points.emplace_back(static_cast<float>(random.uniform(-2.0, 2.0)),
+                        static_cast<float>(random.uniform(-2.0, 2.0)), noise());
+  for (int i = 0; i < 400; ++i)
+    points.emplace_back(10.0F + noise(), noise(), static_cast<float>(random.uniform(1.0, 4.0)));
+  for (int i = 0; i < 400; ++i)
+    points.emplace_back(static_cast<float>(random.uniform(-2.0, 2.0)), 20.0F + noise(), noise());
+  return points;
+}
+
+void expect_surfaces(const IcpMap& map, const Eigen::Matrix3d& turned) {
+  int planes = 0;
+  int poles = 0;
+  map.for_each([&](const Eigen::Vector3d& at, const SurfacePatch& patch) {
+    const Eigen::Vector3d place = turned.transpose() * at;
+    const Eigen::Vector3d direction = turned.transpose() * patch.direction.cast<double>();
+    if (place.y() > 15.0) {
+      EXPECT_EQ(patch.surface, Surface::kNothing);
+    } else if (place.x() > 5.0) {
+      EXPECT_EQ(patch.surface, Surface::kPole);
+      EXPECT_GT(std::abs(direction.z()), 0.99);
+      ++poles;
+    } else {
+      EXPECT_EQ(patch.surface, Surface::kPlane);
+      EXPECT_GT(std::abs(direction.z()), 0.99);
+      ++planes;
+    }
+  });
+  EXPECT_GT(planes, 200);
+  EXPECT_GT(poles, 8);
+}
+
+TEST(IcpMap, KnowsTheSurfaceAroundEachPoint) {
+  Random random(4);
+  IcpMapBuilder builder({.cube_m = kCube});
+  const Pose pose(Eigen::Quaterniond(Eigen::AngleAxisd(0.6, Eigen::Vector3d::UnitZ())),
+                  Eigen::Vector3d::Zero());
+  builder.insert(scene(random), pose);
+  expect_surfaces(*builder.snapshot(), pose.rotation_matrix());
+}
+
+// What changes step by step ends up as if it were made at once: surfaces near a change are
+// worked out again, and the cubes that were forgotten leave no trace.
+TEST(IcpMap, IsTheSameMadeInStepsOrAtOnce) {
+  Random random(5);
+  const Points floor = random_points(random, 3000, 3.0);
+  const Points far = random_points(random, 500, 2.0);
+  const Pose away(Eigen::Quaterniond::Identity(), {50.0, 0.0, 0.0});
+  const IcpMapConfig config{.cube_m = kCube, .growth = 0.0};
+  IcpMapBuilder at_once(config);
+  at_once.insert(floor, Pose());
+  IcpMapBuilder in_steps(config);
+  in_steps.insert(far, away);
+  IcpMapPtr held = in_steps.snapshot();
+  const std::size_t size = held->size();
+  for (std::size_t i = 0; i < 3; ++i) {
+    in_steps.insert({floor.begin() + static_cast<std::ptrdiff_t>(1000 * i),
+                     floor.begin() + static_cast<std::ptrdiff_t>(1000 * (i + 1))},
+                    Pose());
+    if (i == 1) in_steps.remove_beyond(Eigen::Vector3d::Zero(), 20.0);
+    static_cast<void>(in_steps.snapshot());
+  }
+  EXPECT_EQ(held->size(), size);
+  std::map<std::array<double, 3>, SurfacePatch> expected;
+  at_once.snapshot()->for_each([&](const Eigen::Vector3d& at, const SurfacePatch& patch) {
+    expected[{at.x(), at.y(), at.z()}] = patch;
+  });
+  std::size_t same = 0;
+  in_steps.snapshot()->for_each([&](const Eigen::Vector3d& at, const SurfacePatch& patch) {
+    const auto found = expected.find({at.x(), at.y(), at.z()});
+    ASSERT_NE(found, expected.end());
+    EXPECT_EQ(found->second.surface, patch.surface);
+    EXPECT_LT((found->second.direction - patch.direction).norm(), 1e-3F);
+    ++same;
+  });
+  EXPECT_EQ(same, expected.size());
+}
+
+}  // namespace
+}  // namespace understory
