@@ -66,8 +66,8 @@ IcpTarget::IcpTarget(const Points& points, const IcpConfig& config)
   const bool planes = config.metric == IcpConfig::Metric::kPointToPlane;
   tree_->points = points;
   tree_->adaptor.points = &tree_->points;
-  tree_->patches.assign(points.size(),
-                        {planes ? Surface::kNothing : Surface::kPoint, Eigen::Vector3f::Zero()});
+  tree_->patches.assign(points.size(), {planes ? SurfaceKind::kNothing : SurfaceKind::kPoint,
+                                        Eigen::Vector3f::Zero()});
   if (points.empty()) return;
   tree_->kd =
       std::make_unique<KdTree>(3, tree_->adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(10));

@@ -169,7 +169,7 @@ void IcpMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m
 }
 
 SurfacePatch IcpMapBuilder::patch_around(std::uint32_t cube) const {
-  if (!config_.planes) return {Surface::kPoint, Eigen::Vector3f::Zero()};
+  if (!config_.planes) return {SurfaceKind::kPoint, Eigen::Vector3f::Zero()};
   const auto edge = static_cast<float>(config_.cube_m);
   SurfaceSums sums;
   map_->blocks_.for_each_near(

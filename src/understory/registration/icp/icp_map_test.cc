@@ -99,13 +99,13 @@ void expect_surfaces(const IcpMap& map, const Eigen::Matrix3d& turned) {
     const Eigen::Vector3d place = turned.transpose() * at;
     const Eigen::Vector3d direction = turned.transpose() * patch.direction.cast<double>();
     if (place.y() > 15.0) {
-      EXPECT_EQ(patch.surface, Surface::kNothing);
+      EXPECT_EQ(patch.surface, SurfaceKind::kNothing);
     } else if (place.x() > 5.0) {
-      EXPECT_EQ(patch.surface, Surface::kPole);
+      EXPECT_EQ(patch.surface, SurfaceKind::kPole);
       EXPECT_GT(std::abs(direction.z()), 0.99);
       ++poles;
     } else {
-      EXPECT_EQ(patch.surface, Surface::kPlane);
+      EXPECT_EQ(patch.surface, SurfaceKind::kPlane);
       EXPECT_GT(std::abs(direction.z()), 0.99);
       ++planes;
     }

@@ -37,14 +37,14 @@ class IcpAccumulator {
     }
     ++sums.matched;
     sums.nearest_squared += static_cast<double>(pair.squared_m2);
-    if (pair.patch.surface == Surface::kNothing) return;
+    if (pair.patch.surface == SurfaceKind::kNothing) return;
     const Eigen::Vector3d direction = pair.patch.direction.cast<double>();
     Eigen::Matrix<double, 3, 6> jacobian;
     jacobian << -rotation_ * skew(point), rotation_;
-    if (pair.patch.surface == Surface::kPlane) {
+    if (pair.patch.surface == SurfaceKind::kPlane) {
       add<1>(direction.transpose() * jacobian,
              Eigen::Matrix<double, 1, 1>(direction.dot(pair.offset)), sums);
-    } else if (pair.patch.surface == Surface::kPole) {
+    } else if (pair.patch.surface == SurfaceKind::kPole) {
       const Eigen::Matrix3d across =
           Eigen::Matrix3d::Identity() - direction * direction.transpose();
       add<3>(across * jacobian, across * pair.offset, sums);

@@ -24,10 +24,10 @@ SurfacePatch surface_of(const SurfaceSums& sums, double max_planarity) {
   if (variance[1] < kLineRatio * variance[2]) {
     const Eigen::Vector3d axis = solver.eigenvectors().col(2);
     if (std::abs(axis.z()) < kPoleCosine) return {};
-    return {Surface::kPole, axis.cast<float>()};
+    return {SurfaceKind::kPole, axis.cast<float>()};
   }
   if (variance[0] < max_planarity * variance[1])
-    return {Surface::kPlane, solver.eigenvectors().col(0).cast<float>()};
+    return {SurfaceKind::kPlane, solver.eigenvectors().col(0).cast<float>()};
   return {};
 }
 

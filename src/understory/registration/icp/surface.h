@@ -7,7 +7,7 @@
 namespace understory {
 
 // What the neighbourhood of a target point constrains.
-enum class Surface : std::uint8_t {
+enum class SurfaceKind : std::uint8_t {
   kPoint,    // all three directions (point to point)
   kPlane,    // along the normal
   kPole,     // across the axis
@@ -30,7 +30,7 @@ struct SurfaceSums {
 // The surface through a neighbourhood, and its direction (unit; normal of a plane, axis of a pole).
 // `max_planarity`: smallest through middle variance of what still is a plane.
 struct SurfacePatch {
-  Surface surface = Surface::kNothing;
+  SurfaceKind surface = SurfaceKind::kNothing;
   Eigen::Vector3f direction = Eigen::Vector3f::Zero();
 };
 [[nodiscard]] SurfacePatch surface_of(const SurfaceSums& sums, double max_planarity);
