@@ -81,7 +81,8 @@ std::size_t IcpTarget::size() const {
   return tree_->points.size();
 }
 
-bool IcpTarget::nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair) const {
+bool IcpTarget::nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair,
+                        Known& /*known*/) const {
   const Eigen::Vector3f query = at.cast<float>();
   std::uint32_t index = 0;
   const bool found = tree_->kd->knnSearch(query.data(), 1, &index, &pair.squared_m2) == 1;

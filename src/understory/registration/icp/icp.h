@@ -38,7 +38,9 @@ class IcpTarget {
 
   [[nodiscard]] std::size_t size() const;
   // The nearest point within the distance; false if none.
-  [[nodiscard]] bool nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair) const;
+  struct Known {};  // nothing of a search helps the next
+  [[nodiscard]] bool nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair,
+                             Known& known) const;
 
  private:
   struct Tree;

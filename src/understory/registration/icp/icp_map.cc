@@ -38,37 +38,48 @@ InCube locate(const Eigen::Vector3d& point, double cube_m) {
 
 }  // namespace
 
-void IcpMap::look_around(const std::array<int, 3>& cube, const Eigen::Vector3f& from_centre,
-                         int reach, float& best, const Spot*& nearest,
-                         Eigen::Vector3f& offset) const {
+IcpMap::Nearest IcpMap::look_around(const std::array<int, 3>& cube,
+                                    const Eigen::Vector3f& from_centre, int reach) const {
   const auto edge = static_cast<float>(cube_m_);
+  constexpr float kNone = std::numeric_limits<float>::infinity();
+  Nearest found{kNone, kNone, 0};
   blocks_.for_each_near(cube, reach, [&](std::uint32_t i, int x, int y, int z) {
-    const Spot& spot = spots_[i];
     const Eigen::Vector3f step(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
-    const Eigen::Vector3f apart = from_centre - edge * step - spot.from_centre;
-    const float squared = apart.squaredNorm();
-    if (squared > best || (squared == best && nearest != nullptr)) return;
-    best = squared;
-    nearest = &spot;
-    offset = apart;
+    const float squared = (from_centre - edge * step - spots_[i].from_centre).squaredNorm();
+    if (squared < found.best) {
+      found = {squared, found.best, i};
+    } else {
+      found.second = std::min(found.second, squared);
+    }
   });
+  return found;
 }
 
-bool IcpMap::nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair) const {
-  const InCube located = locate(at, cube_m_);
-  const int reach =
-      std::min(kMaxReach, static_cast<int>(std::ceil(max_distance_m / cube_m_ - 1e-9)));
-  auto best = static_cast<float>(max_distance_m * max_distance_m);
-  const Spot* found = nullptr;
-  Eigen::Vector3f offset;
-  // What lies within a cube's edge is among the cubes beside the own one.
-  look_around(located.at, located.from_centre, 1, best, found, offset);
-  const auto sure = static_cast<float>(cube_m_ * cube_m_);
-  if (reach > 1 && (found == nullptr || best > sure))
-    look_around(located.at, located.from_centre, reach, best, found, offset);
-  if (found == nullptr) return false;
-  pair = {offset.cast<double>(), found->patch, best};
-  return true;
+bool IcpMap::nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair,
+                     Known& known) const {
+  if (!(known.slack_m > 0.0 &&
+        (at - known.searched_at).squaredNorm() < known.slack_m * known.slack_m)) {
+    const InCube located = locate(at, cube_m_);
+    const int reach =
+        std::min(kMaxReach, static_cast<int>(std::ceil(max_distance_m / cube_m_ - 1e-9)));
+    // What lies within a cube's edge is among the cubes beside the own one.
+    Nearest found = look_around(located.at, located.from_centre, 1);
+    double sure_m = cube_m_;
+    if (reach > 1 && static_cast<double>(found.best) > sure_m * sure_m) {
+      found = look_around(located.at, located.from_centre, reach);
+      sure_m = reach * cube_m_;
+    }
+    known.slack_m = 0.0;
+    if (!(static_cast<double>(found.best) <= max_distance_m * max_distance_m)) return false;
+    const double others_m = std::min(sure_m, std::sqrt(static_cast<double>(found.second)));
+    // A tenth of a millimetre for what rounding does to the squares.
+    known = {at, 0.5 * (others_m - std::sqrt(static_cast<double>(found.best))) - 1e-4, found.spot};
+  }
+  const Spot& spot = spots_[known.spot];
+  pair.offset = at - centre_of(spot.at) - spot.from_centre.cast<double>();
+  pair.squared_m2 = static_cast<float>(pair.offset.squaredNorm());
+  pair.patch = spot.patch;
+  return static_cast<double>(pair.squared_m2) <= max_distance_m * max_distance_m;
 }
 
 IcpMapBuilder::IcpMapBuilder(const IcpMapConfig& config) : config_(config) {
@@ -132,8 +143,11 @@ void IcpMapBuilder::settle_due() {
       spot.at = cube.at;
       map_->blocks_.set(cube.at, number);
     }
-    spot.from_centre = Eigen::Vector3f(cube.sum[0], cube.sum[1], cube.sum[2]) / cube.count;
-    map_->blocks_.mark_changed(cube.at);
+    const Eigen::Vector3f mean =
+        Eigen::Vector3f(cube.sum[0], cube.sum[1], cube.sum[2]) / cube.count;
+    const bool moved = (mean - spot.from_centre).norm() >= static_cast<float>(config_.moved_m);
+    if (number >= known || moved) map_->blocks_.mark_changed(cube.at);
+    spot.from_centre = mean;
     cube.due =
         std::max(cube.count + 1.0F, (1.0F + static_cast<float>(config_.growth)) * cube.count);
   }

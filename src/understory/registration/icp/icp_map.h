@@ -19,6 +19,8 @@ struct IcpMapConfig {
   double cube_m = 0.25;
   // A cube's mean is taken anew once its points have grown by this share; 0: always.
   double growth = 0.5;
+  // The surfaces around a point are worked out again once its mean has moved by this; 0: always.
+  double moved_m = 0.01;
   bool planes = true;          // the surface around each point; false: points alone
   double max_planarity = 0.1;  // see IcpConfig
 };
@@ -31,8 +33,17 @@ class IcpMap {
   static constexpr int kMaxReach = 4;
 
   [[nodiscard]] std::size_t size() const { return spots_.size(); }
-  // The nearest point within the distance, at most kMaxReach cubes; false if none.
-  [[nodiscard]] bool nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair) const;
+  // What a search found for a point that moves step by step: as long as it stays within `slack_m`
+  // of where it was searched, no other point of the map can have become nearer.
+  struct Known {
+    Eigen::Vector3d searched_at = Eigen::Vector3d::Zero();
+    double slack_m = 0.0;
+    std::uint32_t spot = 0;
+  };
+  // The nearest point within the distance, at most kMaxReach cubes; false if none. `known` is that
+  // of the same point and distance before, or new.
+  [[nodiscard]] bool nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair,
+                             Known& known) const;
   // Calls act(point in the map frame, surface) for each point, in no order that means anything.
   template <typename Act>
   void for_each(const Act& act) const {
@@ -50,9 +61,14 @@ class IcpMap {
   [[nodiscard]] Eigen::Vector3d centre_of(const std::array<int, 3>& cube) const {
     return cube_m_ * (Eigen::Vector3d(cube[0], cube[1], cube[2]) + Eigen::Vector3d::Constant(0.5));
   }
-  // Takes over spots nearer than `best` among the cubes within `reach` of a cube.
-  void look_around(const std::array<int, 3>& cube, const Eigen::Vector3f& from_centre, int reach,
-                   float& best, const Spot*& nearest, Eigen::Vector3f& offset) const;
+  // The two nearest of the spots looked at, squared metres.
+  struct Nearest {
+    float best = 0.0F;
+    float second = 0.0F;
+    std::uint32_t spot = 0;
+  };
+  [[nodiscard]] Nearest look_around(const std::array<int, 3>& cube,
+                                    const Eigen::Vector3f& from_centre, int reach) const;
 
   double cube_m_ = 1.0;
   std::vector<Spot> spots_;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <vector>
 
 #include "understory/registration/icp/icp.h"
 #include "understory/registration/icp/surface.h"
@@ -11,7 +12,8 @@
 
 // What all targets of ICP share, whatever they find nearest points by. A target T has
 //   std::size_t size() const;
-//   bool nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair) const;
+//   struct Known;  what it knows of a source point from the search before
+//   bool nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair, Known&) const;
 namespace understory::internal {
 
 // Adds what one source point says at a pose.
@@ -19,9 +21,10 @@ template <typename Target>
 class IcpAccumulator {
  public:
   IcpAccumulator(const Target& target, const Points& source, const Pose& pose,
-                 const IcpConfig& config)
+                 const IcpConfig& config, std::vector<typename Target::Known>& known)
       : target_(target),
         source_(source),
+        known_(known),
         pose_(pose),
         rotation_(pose.rotation_matrix()),
         max_distance_m_(config.max_distance_m),
@@ -31,7 +34,7 @@ class IcpAccumulator {
   void operator()(MatchSums& sums, std::size_t i) const {
     const Eigen::Vector3d point = source_[i].cast<double>();
     IcpPair pair;
-    if (!target_.nearest(pose_ * point, max_distance_m_, pair)) {
+    if (!target_.nearest(pose_ * point, max_distance_m_, pair, known_[i])) {
       sums.cost += 0.5 * kernel_ * precision_;  // as much as the worst match: leaving is no gain
       return;
     }
@@ -71,6 +74,7 @@ class IcpAccumulator {
 
   const Target& target_;
   const Points& source_;
+  std::vector<typename Target::Known>& known_;  // each element belongs to one point
   const Pose& pose_;
   Eigen::Matrix3d rotation_;
   double max_distance_m_;
@@ -80,8 +84,9 @@ class IcpAccumulator {
 
 template <typename Target>
 [[nodiscard]] MatchSums icp_sums(const Target& target, const Points& source, const Pose& pose,
-                                 const IcpConfig& config) {
-  const IcpAccumulator<Target> accumulator(target, source, pose, config);
+                                 const IcpConfig& config,
+                                 std::vector<typename Target::Known>& known) {
+  const IcpAccumulator<Target> accumulator(target, source, pose, config, known);
   return ordered_sum(source.size(), 64, MatchSums{}, accumulator);
 }
 
@@ -102,9 +107,10 @@ template <typename Target>
                        std::to_string(target.size()) + " target points",
                    guess);
   }
+  std::vector<typename Target::Known> known(source.size());
   MatchSums at;
   const auto evaluate = [&](const Pose& pose) {
-    at = icp_sums(target, source, pose, config);
+    at = icp_sums(target, source, pose, config, known);
     PoseCost sum = icp_cost(at, config);
     add_terms(terms, pose, sum);
     return sum;
@@ -113,7 +119,7 @@ template <typename Target>
   const Minimum minimum = minimise(evaluate, guess,
                                    {config.max_iterations, config.step_translation_m,
                                     config.step_rotation_rad, config.max_step_m, range});
-  at = icp_sums(target, source, minimum.pose, config);
+  at = icp_sums(target, source, minimum.pose, config, known);
   return judged_match(minimum, at, source, range, guess, Judgement(config));
 }
 

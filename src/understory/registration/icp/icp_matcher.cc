@@ -31,8 +31,9 @@ class IcpCost : public MatchCost {
   IcpCost(const Target& target, const Points& source, const IcpConfig& steps)
       : target_(target), source_(source), steps_(steps) {}
   [[nodiscard]] PoseCost at(const Pose& target_from_source) const override {
-    return internal::icp_cost(internal::icp_sums(target_, source_, target_from_source, steps_),
-                              steps_);
+    std::vector<typename Target::Known> known(source_.size());
+    return internal::icp_cost(
+        internal::icp_sums(target_, source_, target_from_source, steps_, known), steps_);
   }
   [[nodiscard]] double step_translation_m() const override { return steps_.step_translation_m; }
   [[nodiscard]] double step_rotation_rad() const override { return steps_.step_rotation_rad; }
