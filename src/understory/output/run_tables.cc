@@ -2,8 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <iterator>
+#include <limits>
+#include <string_view>
 
 namespace understory {
 namespace {
@@ -14,6 +19,13 @@ std::string cell(double value, int decimals) {
   std::string text = fmt::format("{:.{}f}", value, decimals);
   if (text.front() == '-' && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
   return text;
+}
+
+// What a reader gets of a cell that was written with `cell` or by a format.
+double read_back(std::string_view text) {
+  double value = std::numeric_limits<double>::quiet_NaN();
+  std::from_chars(text.data(), text.data() + text.size(), value);
+  return value;
 }
 
 std::string seven_numbers(const Pose& pose) {
@@ -47,8 +59,17 @@ std::string quoted(const std::string& text) {
 
 TumWriter::TumWriter(const std::filesystem::path& path) : file_(path) {}
 
-void TumWriter::add(const StampedPose& pose) {
-  file_.write(format_seconds(pose.stamp) + " " + seven_numbers(pose.world_from_body) + "\n");
+StampedPose TumWriter::add(const StampedPose& pose) {
+  const std::string numbers = seven_numbers(pose.world_from_body);
+  file_.write(format_seconds(pose.stamp) + " " + numbers + "\n");
+  std::array<double, 7> v{};
+  std::string_view rest = numbers;
+  for (double& value : v) {
+    const std::size_t end = std::min(rest.find(' '), rest.size());
+    value = read_back(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  return {pose.stamp, Pose(Eigen::Quaterniond(v[6], v[3], v[4], v[5]), {v[0], v[1], v[2]})};
 }
 
 StatesWriter::StatesWriter(const std::filesystem::path& path) : file_(path) {
@@ -151,23 +172,44 @@ StemsWriter::StemsWriter(const std::filesystem::path& path) : file_(path) {
       "yy,zz\n");
 }
 
-void StemsWriter::add(int frame, TimeNs stamp, const Stem& stem) {
+Stem StemsWriter::add(int frame, TimeNs stamp, const Stem& stem) {
   std::string line = fmt::format("{},{}", frame, format_seconds(stamp));
-  const auto add_cell = [&](float value, int decimals) {
-    line += "," + cell(static_cast<double>(value), decimals);
+  const auto add_cell = [&](const std::string& text) {
+    line += "," + text;
+    return static_cast<float>(read_back(text));
   };
+  const auto fixed = [&](float value, int decimals) {
+    return add_cell(cell(static_cast<double>(value), decimals));
+  };
+  // Two figures tell a spread.
+  const auto spread = [&](float value) {
+    return add_cell(std::isnan(value) ? std::string() : fmt::format("{:.2g}", value));
+  };
+  Stem read;
   // A sight errs by centimetres and by a degree; further digits are noise that does not compress.
   for (int i = 0; i < 3; ++i)
-    add_cell(stem.point[i], 3);
-  for (int i = 0; i < 3; ++i)
-    add_cell(stem.axis[i], 4);
-  add_cell(stem.length_m, 2);
-  for (const float value : {stem.dbh_m, stem.score, stem.radius_m, stem.radius_sd_m})
-    add_cell(value, 3);
-  // Two figures tell a spread.
-  for (const float value : {stem.xx, stem.xy, stem.yy, stem.zz})
-    line += std::isnan(value) ? std::string(",") : fmt::format(",{:.2g}", value);
+    read.point[i] = fixed(stem.point[i], 3);
+  Eigen::Vector3d axis;
+  for (int i = 0; i < 3; ++i) {
+    const std::string text = cell(static_cast<double>(stem.axis[i]), 4);
+    axis[i] = read_back(text);
+    line += "," + text;
+  }
+  // Readers bring axes to unit length.
+  read.axis = axis.array().isNaN().all()
+                  ? Eigen::Vector3f(Eigen::Vector3f::Constant(Stem::kUnknown))
+                  : Eigen::Vector3f((axis / axis.norm()).cast<float>());
+  read.length_m = fixed(stem.length_m, 2);
+  read.dbh_m = fixed(stem.dbh_m, 3);
+  read.score = fixed(stem.score, 3);
+  read.radius_m = fixed(stem.radius_m, 3);
+  read.radius_sd_m = fixed(stem.radius_sd_m, 3);
+  read.xx = spread(stem.xx);
+  read.xy = spread(stem.xy);
+  read.yy = spread(stem.yy);
+  read.zz = spread(stem.zz);
   file_.write(line + "\n");
+  return read;
 }
 
 }  // namespace understory

@@ -24,7 +24,8 @@ namespace understory {
 class TumWriter {
  public:
   explicit TumWriter(const std::filesystem::path& path);
-  void add(const StampedPose& pose);
+  // Returns the pose as a reader of the file gets it.
+  StampedPose add(const StampedPose& pose);
   void commit() { file_.commit(); }
 
  private:
@@ -100,7 +101,8 @@ void write_tree_falls(const std::filesystem::path& path, const std::vector<TreeF
 class StemsWriter {
  public:
   explicit StemsWriter(const std::filesystem::path& path);
-  void add(int frame, TimeNs stamp, const Stem& stem);
+  // Returns the stem as a reader of the file gets it.
+  Stem add(int frame, TimeNs stamp, const Stem& stem);
   void commit() { file_.commit(); }
 
  private:

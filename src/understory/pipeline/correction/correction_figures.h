@@ -1,7 +1,7 @@
 #pragma once
 
 #include "understory/output/report.h"
-#include "understory/pipeline/correction/correction_files.h"
+#include "understory/pipeline/correction/correction_run.h"
 
 namespace understory {
 

@@ -1,26 +1,12 @@
 #include "understory/pipeline/correction/correction_report.h"
 
-#include <fmt/format.h>
-#include <algorithm>
-#include <cmath>
-#include <numeric>
-#include <system_error>
+#include <vector>
 
-#include "understory/map/stem_map.h"
-#include "understory/output/report.h"
-#include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/correction_figures.h"
-#include "understory/pipeline/correction/spread_corrections.h"
-#include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/pipeline/run_folder/run_truth.h"
-#include "understory/pipeline/source.h"
-#include "understory/util/error.h"
-#include "understory/util/version.h"
 
 namespace understory {
 namespace {
-
-namespace fs = std::filesystem;
 
 ReportCorrection correction_of(const SelfCorrectionResult& self) {
   ReportCorrection report;
@@ -37,53 +23,22 @@ ReportCorrection correction_of(const SelfCorrectionResult& self) {
   return report;
 }
 
-// Of each view: what its scan took, or its step where stems were all there was. 0: unknown.
-std::vector<float> scan_times_ms(const CorrectionRequest& request, const CorrectionRun& run) {
-  std::vector<float> times_ms(run.views.size(), 0.0F);
-  const bool of_scans = request.scans != nullptr;
-  const StageTimes* times = of_scans ? request.scans->times : &run.times;
-  const auto samples = times->samples("scan");
-  // A stage that ran very often keeps a part of its samples: then they belong to no view.
-  if (samples.size() != (of_scans ? request.scans->path.size() : run.views.size())) return times_ms;
-  for (std::size_t i = 0; i < run.views.size(); ++i)
-    times_ms[i] = samples[of_scans ? static_cast<std::size_t>(run.views[i].frame) : i].wall_ms;
-  return times_ms;
-}
-
-}  // namespace
-
-ReportInput correction_report(const CorrectionRequest& request, const CorrectionRun& run,
-                              const RunSummary& summary, const std::vector<Tree>& trees) {
-  ReportInput report;
-  report.trees = &trees;
-  if (!run.stopped) {
-    report.correction = correction_of(run.correction.self);
-    add_correction_figures(run, request.config.stems, trees, *report.correction);
-  }
-  report.title = request.stems.filename().string();
-  report.made_from = fmt::format("stems of {} views", run.views.size());
-  if (request.scans != nullptr) {
-    report.title = fs::path(request.scans->recording).filename().string();
-    report.made_from =
-        fmt::format("{}, {} scans, stems of {} views", request.scans->source->format(),
-                    request.scans->path.size(), run.views.size());
-    report.truth = compare_with_truth(request.run_folder, request.results, *request.scans->source);
-  }
-  report.summary = summary;
-  report.remarks.push_back(
-      "Up is known from the stems alone: over a long way the map may tilt by degrees, and heights "
-      "far apart not hold. Distances in the plane do.");
-  const std::vector<float> times_ms = scan_times_ms(request, run);
+std::vector<ReportScan> scans_of(const CorrectionRun& run) {
+  std::vector<ReportScan> scans;
   for (std::size_t i = 0; i < run.views.size(); ++i) {
     ReportScan scan;
     scan.stamp = run.views[i].stamp;
     scan.position = run.correction.world_from_body[i].translation().cast<float>();
-    scan.wall_ms = times_ms[i];
+    scan.wall_ms = run.scan_ms[i];
     scan.inlier_ratio = static_cast<float>(i == 0 ? 1.0 : run.steps[i].overlap);
     scan.weak = run.steps[i].status == SparseStepStatus::kWeak ||
                 run.steps[i].status == SparseStepStatus::kUnmatched;
-    report.scans.push_back(scan);
+    scans.push_back(scan);
   }
+  return scans;
+}
+
+void add_loops(const CorrectionRun& run, ReportInput& report) {
   for (std::size_t k = 0; k < run.correction.loops.size(); ++k) {
     const StemLoop& found = run.correction.loops[k];
     if (!found.verified) {
@@ -102,7 +57,28 @@ ReportInput correction_report(const CorrectionRequest& request, const Correction
     if (!loop.accepted) loop.reason = "contradicts the other loops";
     report.loops.push_back(loop);
   }
-  report.loop_closure_enabled = request.config.stems.close_loops;
+}
+
+}  // namespace
+
+ReportInput correction_report(const StemCorrectionConfig& config, const CorrectionRun& run,
+                              const Trajectory& trajectory, const RunSummary& summary) {
+  ReportInput report;
+  report.trees = &run.trees;
+  if (!run.stopped) {
+    report.correction = correction_of(run.correction.self);
+    add_correction_figures(run, config, run.trees, *report.correction);
+  }
+  report.title = run.title;
+  report.made_from = run.made_from;
+  if (run.truth) report.truth = compare_with_truth(trajectory, *run.truth);
+  report.summary = summary;
+  report.remarks.push_back(
+      "Up is known from the stems alone: over a long way the map may tilt by degrees, and heights "
+      "far apart not hold. Distances in the plane do.");
+  report.scans = scans_of(run);
+  add_loops(run, report);
+  report.loop_closure_enabled = config.close_loops;
   return report;
 }
 

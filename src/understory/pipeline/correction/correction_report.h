@@ -1,16 +1,17 @@
 #pragma once
 
-#include <vector>
-
-#include "understory/forest/tree.h"
+#include "understory/evaluation/trajectory.h"
 #include "understory/output/report.h"
-#include "understory/pipeline/correction/correction_files.h"
+#include "understory/output/run_summary.h"
+#include "understory/pipeline/correction/correction_run.h"
+#include "understory/pipeline/correction/stem_correction.h"
 
 namespace understory {
 
-// What report.html shows of a correction run. `trees` must outlive the result.
-[[nodiscard]] ReportInput correction_report(const CorrectionRequest& request,
-                                            const CorrectionRun& run, const RunSummary& summary,
-                                            const std::vector<Tree>& trees);
+// What report.html shows of a correction run, whose corrected path is `trajectory`. `run` must
+// outlive the result.
+[[nodiscard]] ReportInput correction_report(const StemCorrectionConfig& config,
+                                            const CorrectionRun& run, const Trajectory& trajectory,
+                                            const RunSummary& summary);
 
 }  // namespace understory

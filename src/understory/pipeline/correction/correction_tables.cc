@@ -10,16 +10,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void write_tum(const fs::path& path, const std::vector<StampedPose>& poses) {
+// Returns the poses as a reader of the file gets them.
+Trajectory write_tum(const fs::path& path, const std::vector<StampedPose>& poses) {
   TumWriter writer(path);
+  Trajectory written;
   for (const StampedPose& pose : poses)
-    writer.add(pose);
+    written.push_back(writer.add(pose));
   writer.commit();
+  return written;
 }
 
 // The chained odometry and the corrected path: of every scan where they are known, else of the
 // views.
-void write_paths(const CorrectionRequest& request, const CorrectionRun& run) {
+Trajectory write_paths(const fs::path& folder, const CorrectionRun& run) {
   std::vector<StampedPose> corrected;
   std::vector<StampedPose> chained;
   for (std::size_t i = 0; i < run.views.size(); ++i) {
@@ -30,8 +33,8 @@ void write_paths(const CorrectionRequest& request, const CorrectionRun& run) {
     chained = run.path;
     corrected = spread_corrections(chained, corrected);
   }
-  write_tum(request.results / "odometry.tum", chained);
-  write_tum(request.results / "trajectory.tum", corrected);
+  (void)write_tum(folder / "odometry.tum", chained);
+  return write_tum(folder / "trajectory.tum", corrected);
 }
 
 // How each view was matched to those before it: P0's e and lambda, P1's outlier ratio. Of the first
@@ -86,12 +89,12 @@ void write_corrections(const fs::path& path, const CorrectionRun& run) {
 
 }  // namespace
 
-void write_correction_tables(const CorrectionRequest& request, const CorrectionRun& run) {
-  const fs::path& folder = request.results;
-  write_paths(request, run);
+Trajectory write_correction_tables(const fs::path& folder, const CorrectionRun& run) {
+  Trajectory trajectory = write_paths(folder, run);
   write_steps(folder / "steps.csv", run);
   write_loops(folder / "loops.csv", run);
   write_corrections(folder / "corrections.csv", run);
+  return trajectory;
 }
 
 }  // namespace understory

@@ -5,6 +5,7 @@
 #include "understory/pipeline/judgement/run_evidence.h"
 #include "understory/pipeline/mapping/dense_front_end.h"
 #include "understory/pipeline/mapping/run_facts.h"
+#include "understory/pipeline/mapping/sparse_front_end.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 
@@ -29,5 +30,9 @@ void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence);
 // `evidence.match` are there already.
 void gather_dense(const DenseFrontEnd& session, const RunFacts& facts, const Recording& source,
                   const Log& log, RunEvidence& evidence);
+
+// What the sparse front end knows beside, the figures of the path included.
+void gather_sparse(const SparseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
+                   const Log& log, RunEvidence& evidence);
 
 }  // namespace understory

@@ -103,20 +103,16 @@ TEST(EvidenceGathering, SamplesThatCannotBeUsedHaveNoSay) {
 
 // By stems, too: what is 1.3 times too large was complete.
 TEST(EvidenceGathering, AScaleThatTheAccelerometerContradictsCountsByStems) {
-  const ReadRecording recording({topic("lidar", 100.0, 160.0), topic("imu", 100.0, 160.0)});
-  SparseScans scans;
-  scans.source = &recording;
-  scans.imu_trust.motion_correlation = 0.99;
-  scans.imu_trust.motion_spread_m_s2 = 1.0;
-  scans.imu_trust.motion_windows = 200;
-  CorrectionRequest request;
-  request.scans = &scans;
   CorrectionRun run;
-  run.correction.converged = true;
-  const Log log;
+  run.trees.resize(5);
+  ImuTrust trust;
+  trust.motion_correlation = 0.99;
+  trust.motion_spread_m_s2 = 1.0;
+  trust.motion_windows = 200;
   for (const double scale : {1.0, 1.3}) {
-    scans.imu_trust.motion_scale = scale;
-    const RunJudgement judgement = judge_run(evidence_of(request, run, 5, log), JudgementConfig());
+    trust.motion_scale = scale;
+    gather_motion_scale(trust, run.evidence);
+    const RunJudgement judgement = judge_run(correction_evidence(run), JudgementConfig());
     EXPECT_EQ(judgement.status, scale == 1.0 ? RunStatus::kComplete : RunStatus::kUntrusted);
   }
 }

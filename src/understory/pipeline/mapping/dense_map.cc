@@ -14,9 +14,9 @@ class DenseMap : public MapMaker {
       : front_end_(front_end), recording_(recording) {}
 
   void close_loops() override { front_end_.map().finish(); }
-  RunOutcome write(const std::filesystem::path& results) override {
-    return write_run(recording_, results, front_end_);
-  }
+  void finish_map() override {}
+  void list_trees() override {}
+  RunOutcome write() override { return write_run(recording_, front_end_); }
 
  private:
   DenseFrontEnd& front_end_;

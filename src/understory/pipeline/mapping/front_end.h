@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "understory/pipeline/mapping/front_end_config.h"
+#include "understory/pipeline/mapping/map_maker.h"
 #include "understory/pipeline/mapping/mapping_request.h"
 #include "understory/pipeline/mapping/run_facts.h"
 #include "understory/pipeline/run_folder/resumable.h"
-#include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
@@ -34,28 +34,14 @@ struct FrontEndProgress {
   std::string remark;  // "12 keyframes"
 };
 
-// What is made of a recording once its scans have their poses. The functions are called once each,
-// in this order.
-class MapMaker {
- public:
-  MapMaker() = default;
-  MapMaker(const MapMaker&) = delete;
-  MapMaker& operator=(const MapMaker&) = delete;
-  virtual ~MapMaker() = default;
-
-  // Poses as all loops together have them.
-  virtual void close_loops() = 0;
-  // Writes the files of the run to `results`. Throws OutputError.
-  [[nodiscard]] virtual RunOutcome write(const std::filesystem::path& results) = 0;
-};
-
 // A recording that was read to its end, or as far as the user or the disk let it. All is the event
 // loop's and lives as long.
 struct ReadRecording {
   const MappingRequest& request;  // with the configuration that ran
   const RunFacts& facts;
   const Recording& source;
-  std::filesystem::path work;  // folder for what does not fit into memory
+  std::filesystem::path work;     // folder for what does not fit into memory
+  std::filesystem::path results;  // folder that the files of the run are written to
   Log& log;
   const ProgressSink& progress;
 };
@@ -84,7 +70,8 @@ class FrontEnd : public Resumable {
   // Whether there is anything to make a map of, and why not.
   [[nodiscard]] virtual bool has_map() const = 0;
   [[nodiscard]] virtual std::string why_no_map(const Recording& source) const = 0;
-  // What is made of it; `this` must outlive it. Warns of what only the whole recording can show.
+  // Once, after `finish`: what is made of it; `this` must outlive it. Warns of what only the whole
+  // recording can show.
   [[nodiscard]] virtual std::unique_ptr<MapMaker> map_maker(const ReadRecording& recording) = 0;
 };
 

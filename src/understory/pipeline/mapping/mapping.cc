@@ -33,10 +33,13 @@ RunOutcome run_mapping(MappingRun run, Log& log, const ProgressSink& progress,
 
   // Make the map of them.
   const RunFolder& folder = run.state.folder();
-  const auto map =
-      front_end.map_maker({loop.request(), facts, loop.recording(), folder.work(), log, progress});
+  const std::filesystem::path results = folder.begin_results();
+  const auto map = front_end.map_maker(
+      {loop.request(), facts, loop.recording(), folder.work(), results, log, progress});
   map->close_loops();
-  RunOutcome outcome = map->write(folder.begin_results());
+  map->finish_map();
+  map->list_trees();
+  RunOutcome outcome = map->write();
 
   // Put the results in place. What a stopped run has so far is no successor of a former run.
   folder.commit(log, facts.stopped && !run.state.resumed());

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "understory/geometry/pose_io.h"
 #include "understory/pipeline/mapping/scan_content.h"
 #include "understory/util/timing.h"
@@ -90,6 +92,14 @@ ImuFinding SparseFrontEnd::imu_finding() const {
 
 FrontEndProgress SparseFrontEnd::progress() const {
   return {"stems", scans_, fmt::format("{} stems", last_stems_)};
+}
+
+void SparseFrontEnd::hand_over(std::vector<StemView>& views, std::vector<SparseStep>& steps,
+                               std::vector<StampedPose>& path, std::vector<GnssFix>& fixes) {
+  views = std::move(views_);
+  steps = std::move(steps_);
+  path = std::move(path_);
+  fixes = std::move(fixes_);
 }
 
 void SparseFrontEnd::refuse_imu(const std::string& reason) {

@@ -44,11 +44,12 @@ class SparseFrontEnd : public FrontEnd, private ViewSink {
   // Of these, how many held the same points as the one before.
   [[nodiscard]] std::uint64_t repeated() const { return repeated_; }
   [[nodiscard]] std::size_t positioned() const { return positioned_; }
-  [[nodiscard]] std::vector<StampedPose>& path() { return path_; }   // of every scan
-  [[nodiscard]] std::vector<StemView>& views() { return views_; }    // that are kept
-  [[nodiscard]] std::vector<SparseStep>& steps() { return steps_; }  // of these
-  [[nodiscard]] std::vector<GnssFix>& fixes() { return fixes_; }
-  [[nodiscard]] StageTimes& times() { return times_; }
+  [[nodiscard]] const std::vector<StampedPose>& path() const { return path_; }  // of every scan
+  [[nodiscard]] const std::vector<StemView>& views() const { return views_; }   // that are kept
+  [[nodiscard]] const StageTimes& times() const { return times_; }
+  // At the end: what was found, which is here no more then. `steps` are those of the views.
+  void hand_over(std::vector<StemView>& views, std::vector<SparseStep>& steps,
+                 std::vector<StampedPose>& path, std::vector<GnssFix>& fixes);
   // For how long the IMU's samples could not be used.
   [[nodiscard]] const ImuHearing& imu_hearing() const { return imu_hearing_; }
   [[nodiscard]] ImuTrust imu_trust() const { return pacer_.imu_trust(); }

@@ -4,76 +4,82 @@
 #include <utility>
 
 #include "understory/output/run_tables.h"
-#include "understory/pipeline/correction/correction.h"
+#include "understory/pipeline/correction/stem_map_maker.h"
+#include "understory/pipeline/judgement/evidence_gathering.h"
 #include "understory/pipeline/judgement/input_remarks.h"
-#include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/pipeline/mapping/sparse_front_end.h"
+#include "understory/pipeline/run_folder/run_truth.h"
+#include "understory/pipeline/source.h"
+#include "understory/util/version.h"
 
 namespace understory {
 namespace {
 
-void write_stems(const std::filesystem::path& file, const std::vector<StemView>& views) {
+// Writes stems.csv.gz, and leaves in the views what a reader of that file gets: `understory
+// correct` makes the same of it.
+void write_stems(const std::filesystem::path& file, std::vector<StemView>& views) {
   StemsWriter writer(file);
-  for (const StemView& view : views) {
-    for (const Stem& stem : view.stems)
-      writer.add(view.frame, view.stamp, stem);
+  for (StemView& view : views) {
+    for (Stem& stem : view.stems)
+      stem = writer.add(view.frame, view.stamp, stem);
+    view.stems.shrink_to_fit();
   }
   writer.commit();
 }
 
-// What the correction needs to know of the recording.
-SparseScans scans_of(SparseFrontEnd& front_end, const ReadRecording& recording) {
-  const RunFacts& facts = recording.facts;
-  SparseScans scans;
-  scans.recording = recording.request.recording;
-  scans.source = &recording.source;
-  scans.path = std::move(front_end.path());
-  scans.steps = std::move(front_end.steps());
-  scans.times = &front_end.times();
-  scans.positioned = front_end.positioned();
-  scans.wall_s = facts.elapsed_s();
-  scans.stopped = facts.stopped;
-  scans.time_repair = facts.time_repair;
-  scans.last_scan_end = front_end.last_scan_end();
-  scans.repeated = front_end.repeated();
-  scans.imu_hearing = front_end.imu_hearing();
-  scans.imu_trust = front_end.imu_trust();
-  scans.imu_wanted = front_end.config().front_end.imu.use;
-  scans.unreadable = facts.unreadable;
-  const std::string& refused = front_end.imu_refused();
-  scans.imu_distrust = refused.empty() ? scans.imu_trust.reason : imu_refusal(refused);
-  scans.fixes = std::move(front_end.fixes());
-  if (facts.realtime) scans.realtime = {facts.dropped_scans, distribution_of(facts.latencies_ms)};
-  return scans;
+// What run.json says of the reading.
+RunSummary summary_of(const SparseFrontEnd& front_end, const ReadRecording& recording) {
+  const MappingRequest& request = recording.request;
+  RunSummary summary;
+  summary.command = "map";
+  summary.version = kVersion;
+  summary.config_yaml = request.config_yaml;
+  summary.config_origins = request.config_origins;
+  summary.effective_yaml = request.effective_yaml;
+  summary.adapted = request.adapted;
+  summary.inputs = hash_inputs(request.recording, recording.log);
+  const std::string& head_log = front_end.config().correction.harvester.head_log;
+  if (!head_log.empty()) summary.inputs.push_back(hash_input(head_log));
+  const std::vector<StampedPose>& path = front_end.path();
+  summary.recording_s = to_seconds(path.back().stamp - path.front().stamp);
+  summary.counts["views"] = static_cast<std::int64_t>(front_end.views().size());
+  summary.counts["scans_positioned"] = static_cast<std::int64_t>(front_end.positioned());
+  if (recording.facts.realtime) {
+    summary.counts["scans_dropped"] = static_cast<std::int64_t>(recording.facts.dropped_scans);
+    add_latency(distribution_of(recording.facts.latencies_ms), summary);
+  }
+  return summary;
 }
 
-class SparseMap : public MapMaker {
- public:
-  SparseMap(SparseFrontEnd& front_end, const ReadRecording& recording)
-      : front_end_(front_end), recording_(recording) {}
+// Milliseconds of work on the scan of each view; 0 where unknown.
+std::vector<float> scan_times_ms(const SparseFrontEnd& front_end) {
+  std::vector<float> times_ms(front_end.views().size(), 0.0F);
+  const auto samples = front_end.times().samples("scan");
+  // A stage that ran very often keeps a part of its samples: then they belong to no view.
+  if (samples.size() != front_end.path().size()) return times_ms;
+  for (std::size_t i = 0; i < times_ms.size(); ++i)
+    times_ms[i] = samples[static_cast<std::size_t>(front_end.views()[i].frame)].wall_ms;
+  return times_ms;
+}
 
-  void close_loops() override {}
-  RunOutcome write(const std::filesystem::path& results) override {
-    CorrectionRequest correction;
-    correction.stems = results / "stems.csv.gz";
-    write_stems(correction.stems, front_end_.views());
-    const SparseScans scans = scans_of(front_end_, recording_);
-    correction.run_folder = recording_.request.run_folder;
-    correction.results = results;
-    correction.config = front_end_.config().correction;
-    correction.config_yaml = recording_.request.config_yaml;
-    correction.config_origins = recording_.request.config_origins;
-    correction.effective_yaml = recording_.request.effective_yaml;
-    correction.adapted = recording_.request.adapted;
-    correction.scans = &scans;
-    // What was seen until the user stopped it is still corrected.
-    return run_correction(correction, recording_.log, recording_.progress, {});
-  }
-
- private:
-  SparseFrontEnd& front_end_;
-  ReadRecording recording_;
-};
+CorrectionInput correction_input(SparseFrontEnd& front_end, const ReadRecording& recording) {
+  const Recording& source = recording.source;
+  CorrectionInput input;
+  input.summary = summary_of(front_end, recording);
+  gather_sparse(front_end, recording.facts, source, recording.log, input.evidence);
+  input.scan_ms = scan_times_ms(front_end);
+  input.title = std::filesystem::path(recording.request.recording).filename().string();
+  input.made_from = fmt::format("{}, {} scans, stems of {} views", source.format(),
+                                front_end.path().size(), front_end.views().size());
+  input.truth = write_truth(recording.request.run_folder, source);
+  if (const auto& antenna = source.rig().body_from_gnss)
+    input.antenna_in_body = antenna->translation();
+  input.head_cuts = read_head_log(front_end.config().correction.harvester.head_log);
+  input.elapsed_s = recording.facts.elapsed_s;
+  front_end.hand_over(input.views, input.steps, input.path, input.fixes);
+  write_stems(recording.results / "stems.csv.gz", input.views);
+  return input;
+}
 
 }  // namespace
 
@@ -90,7 +96,10 @@ std::string SparseFrontEnd::why_no_map(const Recording& source) const {
 
 std::unique_ptr<MapMaker> SparseFrontEnd::map_maker(const ReadRecording& recording) {
   remark_on_lever_arms(recording.source.rig(), recording.request.recording, recording.log);
-  return std::make_unique<SparseMap>(*this, recording);
+  CorrectionInput input = correction_input(*this, recording);
+  const StemMapPlace place{recording.request.run_folder, recording.results, times_, recording.log,
+                           recording.progress};
+  return std::make_unique<StemMapMaker>(std::move(input), config_.correction, place);
 }
 
 }  // namespace understory

@@ -6,7 +6,7 @@
 
 #include "understory/odometry/stems/stem_front_end.h"
 #include "understory/odometry/stems/stem_pacer.h"
-#include "understory/pipeline/correction/correction.h"
+#include "understory/pipeline/correction/correction_config.h"
 #include "understory/pipeline/mapping/event_loop_config.h"
 #include "understory/util/config.h"
 #include "understory/util/config_origins.h"

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "understory/evaluation/trajectory.h"
 #include "understory/evaluation/trajectory_errors.h"
 #include "understory/pipeline/mapping/read_ahead.h"
 #include "understory/simulation/simulator.h"
@@ -26,17 +25,18 @@ std::vector<std::pair<double, double>> errors_over_time(const Trajectory& estima
 
 }  // namespace
 
-std::optional<ReportTruth> compare_with_truth(const std::filesystem::path& run_folder,
-                                              const std::filesystem::path& results,
-                                              const Recording& source) {
+std::optional<Trajectory> write_truth(const std::filesystem::path& run_folder,
+                                      const Recording& source) {
   const auto* ahead = dynamic_cast<const ReadAhead*>(&source);
   const auto* simulator =
       dynamic_cast<const Simulator*>(ahead != nullptr ? &ahead->source() : &source);
   if (simulator == nullptr) return std::nullopt;
   const std::filesystem::path folder = run_folder.string() + ".truth";
   simulator->write_truth(folder.string());
-  const Trajectory estimate = read_trajectory(results / "trajectory.tum");
-  const Trajectory truth = read_trajectory(folder / "trajectory.tum");
+  return read_trajectory(folder / "trajectory.tum");
+}
+
+std::optional<ReportTruth> compare_with_truth(const Trajectory& estimate, const Trajectory& truth) {
   EvaluationOptions options;
   options.alignment = Alignment::kFirst;  // the two world frames differ by the first pose
   const auto errors = evaluate_trajectory(estimate, truth, options);

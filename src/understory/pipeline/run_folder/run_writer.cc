@@ -30,6 +30,7 @@ namespace {
 
 // What walking through the finished trajectory yields for report and run.json.
 struct TrajectoryFacts {
+  Trajectory trajectory;  // as a reader of trajectory.tum gets it
   std::vector<ReportScan> scans;
   std::vector<float> cpu_ms;  // of each scan, see ScanRecord
   std::vector<float> wall_ms;
@@ -79,7 +80,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const Dens
   for_each_finished_scan(
       session.journal(), session.map().keyframes(), [&](const FinishedScan& scan) {
         const ScanRecord& record = *scan.record;
-        trajectory.add({record.stamp, scan.world_from_body});
+        facts.trajectory.push_back(trajectory.add({record.stamp, scan.world_from_body}));
         states.add({record.stamp, scan.velocity_in_world,
                     Eigen::Vector3d::Map(record.gyro_bias.data()),
                     Eigen::Vector3d::Map(record.accel_bias.data()), record.pose_covariance()});
@@ -336,9 +337,8 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
 
 }  // namespace
 
-RunOutcome write_run(const ReadRecording& recording, const std::filesystem::path& folder,
-                     DenseFrontEnd& session) {
-  const auto& [request, facts, source, work, log, progress] = recording;
+RunOutcome write_run(const ReadRecording& recording, DenseFrontEnd& session) {
+  const auto& [request, facts, source, work, folder, log, progress] = recording;
   const MappingConfig& config = session.config();
   StageTimes& times = session.times();
   const TrajectoryFacts trajectory = write_trajectory(folder, session, config);
@@ -348,7 +348,9 @@ RunOutcome write_run(const ReadRecording& recording, const std::filesystem::path
   MapPicture picture;
   RunSummary summary = summarise_run(request, session, facts, trajectory,
                                      evidence_of(session, facts, source, trajectory, log), log);
-  const std::optional<ReportTruth> truth = compare_with_truth(request.run_folder, folder, source);
+  std::optional<ReportTruth> truth;
+  if (const auto known = write_truth(request.run_folder, source))
+    truth = compare_with_truth(trajectory.trajectory, *known);
   if (truth) {
     summary.quality["ape_rmse_m"] = truth->ape_rmse_m;
     summary.quality["drift_percent"] = truth->drift_percent;

@@ -1,0 +1,23 @@
+#pragma once
+
+#include "understory/map/stem_map.h"
+#include "understory/odometry/stems/sparse_odometry.h"
+#include "understory/pipeline/correction/head_cut_log.h"
+#include "understory/pipeline/correction/stem_correction.h"
+#include "understory/pipeline/judgement/path_evidence.h"
+#include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/util/config.h"
+
+namespace understory {
+
+struct CorrectionConfig {
+  SparseOdometryConfig odometry;
+  StemCorrectionConfig stems;
+  StemMapConfig tree_list = tree_list_config();
+  HeadCutLogConfig harvester;
+  JudgementConfig judgement;
+  MotionLimits motion_limits;
+};
+void describe(ConfigTable& table, CorrectionConfig& config);
+
+}  // namespace understory

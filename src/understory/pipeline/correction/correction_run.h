@@ -1,0 +1,55 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/evaluation/trajectory.h"
+#include "understory/forest/tree.h"
+#include "understory/geometry/stamped_pose.h"
+#include "understory/map/stem_map.h"
+#include "understory/odometry/stems/sparse_odometry.h"
+#include "understory/output/run_summary.h"
+#include "understory/pipeline/correction/head_cut_log.h"
+#include "understory/pipeline/correction/stem_correction.h"
+#include "understory/pipeline/judgement/inherited_trust.h"
+#include "understory/pipeline/judgement/run_evidence.h"
+#include "understory/sensor/gnss_fix.h"
+#include "understory/sensor/stem_view.h"
+
+namespace understory {
+
+// Stems that have been positioned: what a correction begins with, whether a recording was read just
+// now or a file of stems. Poses are in the world of the first one.
+struct CorrectionInput {
+  std::vector<StemView> views;
+  std::vector<SparseStep> steps;  // the chained odometry, one a view
+  // Of every scan, before any correction, in order of time; empty: the views are all there is.
+  std::vector<StampedPose> path;
+  std::vector<float> scan_ms;  // work on the scan of each view; 0: unknown
+  bool stopped = false;        // before all views had their steps: they are not corrected
+  std::vector<LoggedCut> head_cuts;
+  std::vector<GnssFix> fixes;  // of the recording; compared with, not used
+  Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();  // metres; zero where unknown
+  std::optional<Trajectory> truth;                            // of a simulated recording
+  // What is known of the reading: for run.json, for the judgement and for the report.
+  RunSummary summary;
+  RunEvidence evidence;
+  InheritedTrust trust;  // of the run that the stems come from
+  std::string title;
+  std::string made_from;              // in words
+  std::function<double()> elapsed_s;  // seconds that the run has taken so far
+};
+
+// What a correction has found beside.
+struct CorrectionRun : CorrectionInput {
+  StemCorrection correction;    // the answer
+  std::vector<StemView> seen;   // the views that make the map: those that hurt it may be left out
+  std::vector<Pose> seen_from;  // world from body, of these
+  std::vector<MappedStem> stems;
+  std::vector<Tree> trees;  // one for each stem
+};
+
+}  // namespace understory

@@ -1,0 +1,130 @@
+#include "understory/pipeline/correction/correction_summary.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/pipeline/correction/correction_evidence.h"
+#include "understory/pipeline/judgement/inherited_trust.h"
+#include "understory/pipeline/judgement/run_judgement.h"
+
+namespace understory {
+namespace {
+
+std::size_t count_of(const std::vector<SparseStep>& steps, SparseStepStatus status) {
+  return static_cast<std::size_t>(std::count_if(
+      steps.begin(), steps.end(), [&](const SparseStep& step) { return step.status == status; }));
+}
+
+// Root mean square distance of a tree's sights from their mean: the noise of the map, without
+// truth.
+double sight_noise_m(const std::vector<MappedStem>& stems) {
+  double sum = 0.0;
+  double sights = 0.0;
+  for (const MappedStem& stem : stems) {
+    sum += stem.variance_m2.sum() * (stem.sights - 1);
+    sights += stem.sights;
+  }
+  return sights > 0.0 ? std::sqrt(sum / sights) : std::nan("");
+}
+
+// Root mean square angle between the axis of a sight and that of its tree: the vertical angular
+// noise of P1 table 1.
+double axis_noise_deg(const std::vector<MappedStem>& stems) {
+  double sum = 0.0;
+  double sights = 0.0;
+  for (const MappedStem& stem : stems) {
+    if (!std::isfinite(stem.axis_noise_rad)) continue;
+    sum += stem.axis_noise_rad * stem.axis_noise_rad * (stem.axis_sights - 1);
+    sights += stem.axis_sights - 1;
+  }
+  return sights > 0.0 ? std::sqrt(sum / sights) * 180.0 / M_PI : std::nan("");
+}
+
+void add_sharpness(const std::string& when, const MapSharpness& map, RunSummary& summary) {
+  summary.quality["beta_" + when] = map.beta;
+  summary.quality["beta_3d_" + when] = map.beta_3d;
+  summary.quality["box_dimension_" + when] = map.dimension;
+  summary.quality["box_dimension_3d_" + when] = map.dimension_3d;
+  summary.quality["registration_noise_" + when + "_m"] = map.noise_m;
+  summary.quality["registration_noise_mean_" + when + "_m"] = map.noise_mean_m;
+}
+
+// beta, d and e_C of P0 before and after, and how many corrections it took.
+void add_self_correction(const CorrectionRun& run, RunSummary& summary) {
+  if (run.stopped) return;
+  const SelfCorrectionResult& self = run.correction.self;
+  add_sharpness("before", self.before, summary);
+  add_sharpness("after", self.after, summary);
+  summary.counts["corrections"] = self.kept;
+  summary.counts["corrections_tried"] = static_cast<std::int64_t>(self.tried.size());
+  summary.counts["corrections_by_go_icp"] = self.go_icp_calls;
+  summary.counts["promising_pairs"] = static_cast<std::int64_t>(self.promising);
+  summary.counts["views_eliminated"] =
+      static_cast<std::int64_t>(std::count(self.use.begin(), self.use.end(), 0));
+  summary.quality["corrections_share"] =
+      static_cast<double>(self.kept) / static_cast<double>(run.views.size());
+  summary.quality["correction_ended"] = self.stopped_because;
+}
+
+// Means over the steps that found a match, P1 table 1's way of telling how well views fit.
+void add_matching(const CorrectionRun& run, RunSummary& summary) {
+  double error = 0.0;
+  double overlap = 0.0;
+  double steps = 0.0;
+  for (const SparseStep& step : run.steps) {
+    if (step.status == SparseStepStatus::kFirst || step.status == SparseStepStatus::kUnmatched)
+      continue;
+    error += step.error_m;
+    overlap += step.overlap;
+    ++steps;
+  }
+  if (steps == 0.0) return;
+  summary.quality["match_error_mean_m"] = error / steps;
+  summary.quality["match_outlier_ratio_mean"] = 1.0 - overlap / steps;
+}
+
+void add_loops(const StemCorrection& correction, RunSummary& summary) {
+  summary.counts["loops_found"] = static_cast<std::int64_t>(correction.loops.size());
+  summary.counts["loops_verified"] =
+      std::count_if(correction.loops.begin(), correction.loops.end(),
+                    [](const StemLoop& loop) { return loop.verified; });
+  summary.counts["loops_accepted"] = static_cast<std::int64_t>(
+      std::count(correction.accepted.begin(), correction.accepted.end(), 1));
+}
+
+}  // namespace
+
+double length_through(const std::vector<Pose>& poses) {
+  double length = 0.0;
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    length += (poses[i].translation() - poses[i - 1].translation()).norm();
+  return length;
+}
+
+RunSummary correction_summary(const CorrectionConfig& config, const CorrectionRun& run,
+                              const Log& log) {
+  RunSummary summary = run.summary;
+  summary.scans = run.path.empty() ? run.views.size() : run.path.size();
+  summary.poses = summary.scans;
+  summary.counts["trees"] = static_cast<std::int64_t>(run.stems.size());
+  summary.counts["steps_searched"] =
+      static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kSearched));
+  summary.counts["steps_weak"] =
+      static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kWeak));
+  add_loops(run.correction, summary);
+  summary.quality["path_length_m"] = length_through(run.correction.world_from_body);
+  add_matching(run, summary);
+  summary.quality["sight_noise_m"] = sight_noise_m(run.stems);
+  summary.quality["axis_noise_deg"] = axis_noise_deg(run.stems);
+  add_self_correction(run, summary);
+  summary.warnings = log.warnings();
+  const RunEvidence evidence = correction_evidence(run);
+  const RunJudgement judgement = judge_run(evidence, config.judgement);
+  summary.status = judgement.status;
+  summary.reasons = judgement.reasons;
+  summary.evidence = figures_of(evidence);
+  inherit(run.trust, summary.status, summary.reasons);
+  return summary;
+}
+
+}  // namespace understory

@@ -1,0 +1,142 @@
+#include "understory/pipeline/correction/stem_map_maker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "understory/output/run_tables.h"
+#include "understory/pipeline/correction/correction_report.h"
+#include "understory/pipeline/correction/correction_summary.h"
+#include "understory/pipeline/correction/correction_tables.h"
+#include "understory/pipeline/georeferencing/gnss_fit.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
+  std::vector<Tree> trees;
+  for (const MappedStem& stem : stems) {
+    Tree tree;
+    tree.id = static_cast<int>(trees.size()) + 1;
+    tree.x = stem.point_in_world.x();
+    tree.y = stem.point_in_world.y();
+    tree.z = stem.point_in_world.z();
+    tree.dbh_m = stem.dbh_m;
+    tree.dbh_sd_m = stem.dbh_sd_m;
+    tree.lean_deg = std::acos(std::clamp(stem.axis_in_world.z(), -1.0, 1.0)) * 180.0 / M_PI;
+    tree.observations = stem.sights;
+    tree.x_sd_m = std::sqrt(stem.variance_m2.x() / stem.sights);
+    tree.y_sd_m = std::sqrt(stem.variance_m2.y() / stem.sights);
+    trees.push_back(tree);
+  }
+  return trees;
+}
+
+// By a motion in the plane; a height that is not known stays so, and alone.
+Eigen::Vector3d moved(const Pose& motion, const Eigen::Vector3d& point) {
+  Eigen::Vector3d result = motion * Eigen::Vector3d(point.x(), point.y(), 0.0);
+  result.z() += point.z();
+  return result;
+}
+
+}  // namespace
+
+StemMapMaker::StemMapMaker(CorrectionInput input, const CorrectionConfig& config,
+                           const StemMapPlace& place)
+    : run_{std::move(input), {}, {}, {}, {}, {}}, config_(config), place_(place) {
+  UNDERSTORY_CHECK(run_.steps.size() == run_.views.size());
+}
+
+void StemMapMaker::close_loops() {
+  if (run_.stopped) {
+    for (const SparseStep& step : run_.steps)
+      run_.correction.world_from_body.push_back(step.world_from_body);
+    return;
+  }
+  if (place_.progress) place_.progress({"correction", 0.0, 0.0, "", ""});
+  run_.correction = correct_stems(run_.views, run_.steps, config_.stems, place_.times);
+}
+
+void StemMapMaker::finish_map() {
+  const ScopedTimer timer(place_.times, "tree_map");
+  const std::vector<char>& use = run_.correction.self.use;  // P0 (33)
+  for (std::size_t i = 0; i < run_.views.size(); ++i) {
+    if (!use.empty() && use[i] == 0) continue;
+    run_.seen.push_back(run_.views[i]);
+    run_.seen_from.push_back(run_.correction.world_from_body[i]);
+  }
+  run_.stems = build_stem_map(run_.seen, run_.seen_from, config_.tree_list);
+}
+
+void StemMapMaker::list_trees() {
+  run_.trees = trees_of(run_.stems);
+}
+
+// The recording's own GNSS path beside the path: how well they lie on each other, P1 (6), and
+// gnss.csv in the run's frame. The fixes have no say in the path.
+std::vector<ReportFix> StemMapMaker::compare_with_gnss(const Trajectory& trajectory,
+                                                       RunSummary& summary) const {
+  std::vector<ReportFix> drawn;
+  const ScopedTimer timer(place_.times, "gnss_fit");
+  if (run_.fixes.empty()) return drawn;
+  const GnssFit fit = fit_to_gnss(trajectory, run_.antenna_in_body, run_.fixes, {});
+  summary.quality.merge(figures_of(fit));
+  GnssWriter writer(place_.results / "gnss.csv");
+  const Pose world_from_enu = fit.enu_from_world.inverse();
+  for (GnssRow row : fit.rows) {
+    row.position_in_world = moved(world_from_enu, row.position_in_world);
+    row.residual = moved(Pose(world_from_enu.rotation(), Eigen::Vector3d::Zero()), row.residual);
+    drawn.push_back({row.position_in_world.cast<float>(), row.used});
+    row.used = false;
+    row.reason = "compared with, not used";
+    writer.add(row);
+  }
+  for (std::size_t k = 0; fit.rows.empty() && k < run_.fixes.size(); ++k) {
+    GnssRow row;
+    row.fix = run_.fixes[k];
+    row.reason = fit.path.reason;
+    writer.add(row);
+  }
+  writer.commit();
+  return drawn;
+}
+
+RunOutcome StemMapMaker::write() {
+  const std::filesystem::path& folder = place_.results;
+  Trajectory trajectory;
+  std::vector<HeadCut> cuts;
+  {
+    const ScopedTimer timer(place_.times, "writing");
+    trajectory = write_correction_tables(folder, run_);
+    write_trees_csv(folder / "trees.csv", run_.trees);
+    cuts = place_cuts(run_.head_cuts, trajectory, place_.log);
+  }
+  RunSummary summary = correction_summary(config_, run_, place_.log);
+  std::vector<TreeFall> falls =
+      write_felled_trees(folder, {run_.seen, run_.seen_from, run_.stems, run_.trees}, cuts,
+                         config_.harvester.cuts, summary);
+  std::vector<ReportFix> fixes = compare_with_gnss(trajectory, summary);
+  summary.stages = summarise(place_.times);
+  summary.wall_s = run_.elapsed_s();
+  summary.cpu_s = process_cpu_seconds();
+  summary.peak_memory_mb = peak_memory_mb();
+  ReportInput report = correction_report(config_.stems, run_, trajectory, summary);
+  report.fixes = std::move(fixes);
+  report.falls = std::move(falls);
+  write_report(folder / "report.html", report);
+  summary.wall_s = run_.elapsed_s();  // all of it, the report too
+  write_run_json(folder / "run.json", summary);
+  RunOutcome outcome;
+  outcome.status = summary.status;
+  outcome.reasons = summary.reasons;
+  outcome.summary =
+      fmt::format("{} views over {:.0f} m, {} trees, in {:.1f} s; see {}", run_.views.size(),
+                  length_through(run_.correction.world_from_body), run_.stems.size(),
+                  summary.wall_s, (place_.run_folder / "report.html").string());
+  return outcome;
+}
+
+}  // namespace understory

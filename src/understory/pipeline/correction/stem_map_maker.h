@@ -1,0 +1,47 @@
+#pragma once
+
+#include <filesystem>
+
+#include "understory/output/report.h"
+#include "understory/pipeline/correction/correction_config.h"
+#include "understory/pipeline/correction/correction_run.h"
+#include "understory/pipeline/mapping/map_maker.h"
+#include "understory/util/log.h"
+#include "understory/util/progress.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+
+// Where a map of stems is written, and who hears of it.
+struct StemMapPlace {
+  std::filesystem::path run_folder;  // as the user named it
+  std::filesystem::path results;     // where its files are written
+  StageTimes& times;                 // of the run so far; further stages are added
+  Log& log;
+  const ProgressSink& progress;
+};
+
+// Map, trees and files of positioned stems: of `understory correct`, and of `understory map` by the
+// sparse front end. Stages "loops", "self_correction", "tree_map", "writing", "gnss_fit".
+class StemMapMaker : public MapMaker {
+ public:
+  StemMapMaker(CorrectionInput input, const CorrectionConfig& config, const StemMapPlace& place);
+
+  // Loops, and the correction of the map by itself; not where positioning was stopped.
+  void close_loops() override;
+  void finish_map() override;
+  void list_trees() override;
+  // odometry.tum, trajectory.tum, steps.csv, loops.csv, corrections.csv, trees.csv, felled.csv,
+  // gnss.csv, run.json, report.html.
+  [[nodiscard]] RunOutcome write() override;
+
+ private:
+  [[nodiscard]] std::vector<ReportFix> compare_with_gnss(const Trajectory& trajectory,
+                                                         RunSummary& summary) const;
+
+  CorrectionRun run_;
+  CorrectionConfig config_;
+  StemMapPlace place_;
+};
+
+}  // namespace understory
