@@ -3,10 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <numbers>
-#include <numeric>
 
 #include "understory/pipeline/mapping/scan_content.h"
 #include "understory/util/error.h"
@@ -16,23 +12,6 @@ namespace {
 
 constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
-constexpr double kMostSpeedMS = 100.0;
-// Outage: a longer time between scans, the share of the usual inliers that a match needs after it,
-// and the sigma of a prediction that is no better than staying where one was.
-constexpr double kOutageS = 1.0;
-constexpr double kFoundAgainShare = 0.5;
-constexpr double kWorthlessSigmaM = 10.0;
-// Opening: scans further apart tell nothing of the speed at the first; a smear of the first scan
-// that is smaller does no harm, that of a turn counted at this range.
-constexpr double kLongestOpeningS = 0.5;
-constexpr double kLeastSmearM = 0.005;
-constexpr double kSmearRangeM = 10.0;
-// A first scan that is shorter than that share of the second, or sees less around it, is a part.
-constexpr double kPartShare = 0.75;
-
-std::uint16_t clamp_to_u16(double value) {
-  return static_cast<std::uint16_t>(std::clamp(value, 0.0, 65'535.0));
-}
 
 Points points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) {
   const auto low = static_cast<float>(config.range_min_m);
@@ -45,27 +24,6 @@ Points points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) 
   return points;
 }
 
-// Of the sectors of 10 degrees around the lidar, those with a point.
-int sectors_of(const Scan& scan) {
-  constexpr int kSectors = 36;
-  std::array<bool, kSectors> seen{};
-  for (const ScanPoint& p : scan.points) {
-    const double turn = std::atan2(p.y, p.x) / (2.0 * std::numbers::pi) + 0.5;
-    seen[static_cast<std::size_t>(std::clamp(static_cast<int>(turn * kSectors), 0, 35))] = true;
-  }
-  return static_cast<int>(std::count(seen.begin(), seen.end(), true));
-}
-
-// Whether a recording began within a turn of its lidar. The next scan then comes so soon that a
-// small error between the two is a great speed.
-bool is_part_of_turn(const Scan& first, const Scan& second) {
-  if (!first.has_point_times || !second.has_point_times)
-    return sectors_of(first) < kPartShare * sectors_of(second);
-  const auto turn = static_cast<double>(second.end() - second.stamp);
-  return static_cast<double>(first.end() - first.stamp) < kPartShare * turn &&
-         static_cast<double>(second.stamp - first.stamp) < kPartShare * turn;
-}
-
 }  // namespace
 
 DenseFrontEnd::DenseFrontEnd(const MappingConfig& config, const SensorTraits& traits,
@@ -76,6 +34,7 @@ DenseFrontEnd::DenseFrontEnd(const MappingConfig& config, const SensorTraits& tr
       folder_(std::move(folder)),
       log_(log),
       map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)),
+      recovery_(config.lost_after_scans),
       imu_doubted_(conditions.imu_doubted),
       opening_(std::make_unique<Opening>()) {
   if (!conditions.imu_refused.empty()) refuse_imu(conditions.imu_refused);
@@ -155,7 +114,7 @@ void DenseFrontEnd::complete_rig(const Rig& rig) {
   rig_.imu_extrinsic_source = rig.imu_extrinsic_source;
   const std::vector<ImuSample> recent(recent_imu_.begin(), recent_imu_.end());
   odometry_->take_imu(*rig_.body_from_imu, recent);
-  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(last_scan_);
+  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(recovery_.last_scan());
 }
 
 void DenseFrontEnd::make_odometry(const Rig& rig) {
@@ -166,24 +125,26 @@ void DenseFrontEnd::make_odometry(const Rig& rig) {
 // An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
 void DenseFrontEnd::start_anew() {
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile);
-  clouds_ = std::make_unique<KeyframeClouds>(folder_ / kCloudsFile);
+  clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, times_);
   map_->start();
   make_odometry(rig_);
   if (opening_->rounds > 0) {
-    odometry_->set_initial_motion(opening_->velocity, opening_->angular_rate);
+    odometry_->set_initial_motion(opening_->motion.velocity_m_s,
+                                  opening_->motion.angular_rate_rad_s);
   }
   // What came after the first scan comes again.
   recent_imu_ = opening_->imu_before;
   fixes_.resize(opening_->fixes_before);
   counts_ = opening_->counts_before;
   imu_hearing_ = opening_->hearing_before;
-  last_good_inliers_ = 0.0;
+  recovery_.forget_matches();
   for (const ImuSample& waiting : recent_imu_)
     odometry_->add_imu(waiting);
   const Scan& first = *std::get<ScanPtr>(opening_->events.front());
   if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(first.stamp);
 }
 
+// Whether the first scan was a smear or a part: then the recording's first scans are done again.
 void DenseFrontEnd::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
   if (counts_.scans < 2) return;
   const Scan& first = *std::get<ScanPtr>(opening_->events.front());
@@ -191,35 +152,26 @@ void DenseFrontEnd::consider_opening(const Scan& scan, const DenseEstimate& esti
     leave_out_first();
     return;
   }
-  const double between = to_seconds(scan.stamp - first.stamp);
-  const double lasting = to_seconds(first.end() - first.stamp);
   constexpr int kMostRounds = 6;
-  if (estimate.matched && between > 0.0 && between < kLongestOpeningS &&
-      opening_->rounds < kMostRounds) {
-    const Vector6d turned = right_difference(estimate.match.target_from_source,
-                                             map_->keyframes().front().world_from_body) /
-                            between;
-    // Right differences are along the screw: to first order the velocity at the first scan.
-    const Eigen::Vector3d rate = odometry_->uses_imu() && !imu_doubted_
-                                     ? Eigen::Vector3d(opening_->angular_rate)
-                                     : Eigen::Vector3d(turned.head<3>());
-    const double smear = (turned.tail<3>() - opening_->velocity).norm() * lasting +
-                         (rate - opening_->angular_rate).norm() * lasting * kSmearRangeM;
-    if (smear > kLeastSmearM) {
-      opening_->velocity = turned.tail<3>();
-      opening_->angular_rate = rate;
-      ++opening_->rounds;
-      start_anew();
-      const std::vector<Event> events = std::exchange(opening_->events, {});
-      const Rig rig = rig_;
-      opening_->events.push_back(events.front());
-      on_scan(first);
-      for (std::size_t i = 1; i < events.size(); ++i)
-        take(events[i], rig);
-      return;
-    }
+  std::optional<AssumedMotion> better;
+  if (estimate.matched && opening_->rounds < kMostRounds) {
+    better = better_start(first, scan, map_->keyframes().front().world_from_body,
+                          estimate.match.target_from_source, opening_->motion,
+                          odometry_->uses_imu() && !imu_doubted_);
   }
-  opening_.reset();
+  better ? begin_again(*better) : opening_.reset();
+}
+
+void DenseFrontEnd::begin_again(const AssumedMotion& motion) {
+  opening_->motion = motion;
+  ++opening_->rounds;
+  start_anew();
+  const std::vector<Event> events = std::exchange(opening_->events, {});
+  const Rig rig = rig_;
+  opening_->events.push_back(events.front());
+  on_scan(*std::get<ScanPtr>(events.front()));
+  for (std::size_t i = 1; i < events.size(); ++i)
+    take(events[i], rig);
 }
 
 // Begins with the second scan instead.
@@ -242,24 +194,6 @@ void DenseFrontEnd::leave_out_first() {
     take(events[i], rig);
 }
 
-// Lost: unmatched for so long that the prediction is worth nothing, or not even finite any more.
-bool DenseFrontEnd::lost(const DenseEstimate& estimate) const {
-  const bool finite = estimate.state.world_from_body.matrix().allFinite() &&
-                      estimate.state.velocity_in_world.allFinite() &&
-                      estimate.state.velocity_in_world.norm() < kMostSpeedMS;
-  const bool matched = estimate.matched && estimate.update.status == MotionStatus::kAccepted;
-  return !finite || (!matched && counts_.lost_in_a_row + 1 >=
-                                     static_cast<std::uint64_t>(config_.lost_after_scans));
-}
-
-// After an outage the prediction may be so far off that a match is one by chance: it finds few of
-// the points again that scans found before. (Right matches after 10 s found 0.87 of that share,
-// wrong ones 0.13.)
-bool DenseFrontEnd::lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const {
-  if (to_seconds(scan.stamp - last_scan_) < kOutageS || last_good_inliers_ <= 0.0) return false;
-  return !estimate.matched || estimate.match.inlier_ratio < kFoundAgainShare * last_good_inliers_;
-}
-
 // A new odometry from this scan on, put `about_there`, and an empty local map.
 DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_there) {
   log_.warn("map.segment",
@@ -272,37 +206,30 @@ DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_t
     odometry_->add_imu(sample);
   if (odometry_->uses_imu() && !proven) odometry_->suspect_imu(scan.stamp);
   // A better guess than standing still.
-  odometry_->set_initial_motion(last_good_velocity_, Eigen::Vector3d::Zero());
+  odometry_->set_initial_motion(recovery_.last_velocity_in_body(), Eigen::Vector3d::Zero());
   map_->start_segment();
   if (counts_.segments++ == 1) counts_.first_lost = scan.stamp;
   counts_.lost_in_a_row = 0;
   DenseEstimate estimate = odometry_->process(scan, map_->local_map());
-  const Eigen::Vector3d forward = about_there.rotation() * Eigen::Vector3d::UnitX();
-  const Pose placed(so3_exp({0.0, 0.0, std::atan2(forward.y(), forward.x())}),
-                    about_there.translation());
-  odometry_->move_world(placed);
-  estimate.state.world_from_body = placed * estimate.state.world_from_body;
-  estimate.state.velocity_in_world = placed.rotation() * estimate.state.velocity_in_world;
+  put_at(about_there, *odometry_, estimate);
   return estimate;
 }
 
 void DenseFrontEnd::on_scan(const Scan& scan) {
   const ScopedTimer timer(times_, "scan");
   const double cpu_start = process_cpu_seconds() - map_->search_cpu_seconds();
-  const bool outage = to_seconds(scan.stamp - last_scan_) > kOutageS;
-  const NavState predicted = outage ? odometry_->motion().predict(scan.stamp) : NavState();
+  const NavState predicted =
+      recovery_.is_outage(scan.stamp) ? odometry_->motion().predict(scan.stamp) : NavState();
   DenseEstimate estimate = odometry_->process(scan, map_->local_map());
   if (estimate.update.status == MotionStatus::kIgnored) return;
   if (!map_->keyframes().empty() && estimate.thinned.size() >= kFewPoints) {
-    if (lost_over_outage(scan, estimate)) {
-      const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
-      estimate =
-          begin_segment(scan, sigma < kWorthlessSigmaM ? predicted.world_from_body : last_good_);
-    } else if (lost(estimate)) {
-      estimate = begin_segment(scan, last_good_);
+    if (recovery_.lost_over_outage(scan.stamp, estimate)) {
+      estimate = begin_segment(scan, recovery_.place_after_outage(predicted));
+    } else if (recovery_.lost(estimate, counts_.lost_in_a_row)) {
+      estimate = begin_segment(scan, recovery_.last_good());
     }
   }
-  last_scan_ = scan.stamp;
+  recovery_.note_scan(scan.stamp);
   const std::uint64_t content = content_of(scan);
   counts_.repeated += content == counts_.last_content ? 1 : 0;
   counts_.last_content = content;
@@ -362,11 +289,7 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   const bool good =
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
   counts_.lost_in_a_row = good ? 0 : counts_.lost_in_a_row + 1;
-  if (good) {
-    last_good_ = state.world_from_body;
-    last_good_velocity_ = state.world_from_body.rotation().conjugate() * state.velocity_in_world;
-    if (estimate.matched) last_good_inliers_ = estimate.match.inlier_ratio;
-  }
+  if (good) recovery_.note_good(estimate);
   const bool wanted = good && map_->wants(state.world_from_body);
   // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop
   // closure, levelling) moves the scans with them.
@@ -382,11 +305,11 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   Eigen::Map<Eigen::Vector3d>(record.accel_bias.data()) = state.accel_bias;
   if (!wanted) {
     const auto keyframe = static_cast<std::size_t>(record.keyframe);
-    if (good && !first) store_cloud(estimate, keyframe, keyframe_from_body);
+    if (good && !first) offer_cloud(estimate, keyframe, keyframe_from_body);
     return;
   }
   record.becomes_keyframe = 1;
-  store_cloud(estimate, map_->keyframes().size(), Pose());
+  offer_cloud(estimate, map_->keyframes().size(), Pose());
   const auto moved = map_->add(record.stamp, state.world_from_body, map_points(estimate));
   if (moved) odometry_->move_world(*moved);
 }
@@ -401,39 +324,22 @@ Points DenseFrontEnd::map_points(const DenseEstimate& estimate) {
   return cloud_filter_.filter(estimate.cloud, voxel).points;
 }
 
-// Keeps what a scan adds to the finished map.
-void DenseFrontEnd::store_cloud(const DenseEstimate& estimate, std::size_t keyframe,
+ScanCloudsConfig DenseFrontEnd::clouds_config() const {
+  ScanCloudsConfig clouds;
+  clouds.enabled = config_.map_enabled;
+  clouds.distance_m = config_.cloud_distance_m;
+  clouds.thin_m = config_.keyframe_thin_m;
+  clouds.range_min_m = config_.odometry.voxel.range_min_m;
+  clouds.range_max_m = config_.map_range_max_m;
+  clouds.keyframe = config_.keyframe_map.keyframe;
+  return clouds;
+}
+
+// Perhaps keeps what a scan adds to the finished map.
+void DenseFrontEnd::offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
                                 const Pose& keyframe_from_body) {
-  if (!config_.map_enabled) return;
-  const auto& keyframes = map_->keyframes();
-  if (clouds_->size() > 0) {
-    const Pose world_from_last = keyframes[last_cloud_].world_from_body * keyframe_from_last_cloud_;
-    if (keyframe_distance(world_from_last, estimate.state.world_from_body,
-                          config_.keyframe_map.keyframe) < config_.cloud_distance_m)
-      return;
-  }
-  const ScopedTimer timer(times_, "store");
-  last_cloud_ = keyframe;
-  keyframe_from_last_cloud_ = keyframe_from_body;
-  const BodyCloud& cloud = estimate.cloud;
-  KeyframeCloud stored{static_cast<std::int32_t>(keyframe), cloud.stamp, {}, keyframe_from_body};
-  std::vector<std::uint32_t> kept;
-  if (config_.keyframe_thin_m > 0.0) {
-    kept = cloud_filter_.keep(cloud.points, config_.keyframe_thin_m);
-  } else {
-    kept.resize(cloud.size());
-    std::iota(kept.begin(), kept.end(), 0U);
-  }
-  const auto nearest = static_cast<float>(config_.odometry.voxel.range_min_m);
-  const auto farthest = static_cast<float>(config_.map_range_max_m);
-  stored.points.reserve(kept.size());
-  for (const std::uint32_t i : kept) {
-    if (cloud.range[i] < nearest || cloud.range[i] > farthest) continue;
-    const Eigen::Vector3f& p = cloud.points[i];
-    stored.points.push_back({p.x(), p.y(), p.z(), clamp_to_u16(cloud.intensity[i]),
-                             clamp_to_u16(static_cast<double>(cloud.t_ns[i]) * 1e-4)});
-  }
-  clouds_->append(stored);
+  clouds_->offer(estimate.cloud, estimate.state.world_from_body, keyframe, keyframe_from_body,
+                 map_->keyframes());
 }
 
 }  // namespace understory

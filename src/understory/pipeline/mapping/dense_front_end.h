@@ -8,9 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "understory/map/keyframe_clouds.h"
 #include "understory/map/keyframe_map.h"
+#include "understory/map/scan_clouds.h"
 #include "understory/odometry/dense/dense_odometry.h"
+#include "understory/odometry/dense/recovery.h"
+#include "understory/odometry/dense/start_in_motion.h"
 #include "understory/pipeline/judgement/imu_hearing.h"
 #include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/run_folder/journal.h"
@@ -87,7 +89,7 @@ class DenseFrontEnd : public FrontEnd {
   // Whether the configuration of this run has it use an IMU.
   [[nodiscard]] bool imu_wanted() const { return config_.odometry.imu_enabled; }
   [[nodiscard]] const Journal& journal() const { return *journal_; }
-  [[nodiscard]] const KeyframeClouds& clouds() const { return *clouds_; }
+  [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_->clouds(); }
   [[nodiscard]] const std::vector<GnssFix>& fixes() const { return fixes_; }
   [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
   [[nodiscard]] StageTimes& times() { return times_; }
@@ -100,12 +102,11 @@ class DenseFrontEnd : public FrontEnd {
   static constexpr const char* kJournalFile = "journal.bin";
   static constexpr const char* kCloudsFile = "clouds.bin";
 
-  // The first two scans. A carrier that is on its way when the recording begins smears its first
-  // scan; the second one tells the speed, and both are done again with it.
+  // The first two scans, which may be done again (odometry/dense/start_in_motion.h), and what there
+  // was before them.
   struct Opening {
     std::vector<Event> events;
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // assumed, body frame of the first scan
-    Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();
+    AssumedMotion motion;
     int rounds = 0;
     MappingCounts counts_before;
     ImuHearing hearing_before;
@@ -121,14 +122,14 @@ class DenseFrontEnd : public FrontEnd {
   void take_sample(const ImuSample& sample);
   void start_anew();
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
+  void begin_again(const AssumedMotion& motion);
   void leave_out_first();
   void on_scan(const Scan& scan);
   [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);
-  [[nodiscard]] bool lost_over_outage(const Scan& scan, const DenseEstimate& estimate) const;
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
-  [[nodiscard]] bool lost(const DenseEstimate& estimate) const;
   [[nodiscard]] Points map_points(const DenseEstimate& estimate);
-  void store_cloud(const DenseEstimate& estimate, std::size_t keyframe,
+  [[nodiscard]] ScanCloudsConfig clouds_config() const;
+  void offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
                    const Pose& keyframe_from_body);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
 
@@ -142,21 +143,16 @@ class DenseFrontEnd : public FrontEnd {
   std::unique_ptr<DenseOdometry> odometry_;
   std::unique_ptr<KeyframeMap> map_;
   std::unique_ptr<Journal> journal_;
-  std::unique_ptr<KeyframeClouds> clouds_;
+  std::unique_ptr<ScanClouds> clouds_;
   VoxelFilter cloud_filter_;
   std::vector<GnssFix> fixes_;
   std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced
   MappingCounts counts_;
   ImuHearing imu_hearing_;
   TimeNs last_scan_end_ = 0;
-  Eigen::Vector3d last_good_velocity_ = Eigen::Vector3d::Zero();  // in its body frame
-  double last_good_inliers_ = 0.0;  // share of that scan's points near the map
-  TimeNs last_scan_ = 0;            // stamp
+  Recovery recovery_;
   std::string imu_refused_;
   bool imu_doubted_ = false;
-  std::uint64_t last_cloud_ = 0;  // keyframe that the cloud kept last belongs to
-  Pose keyframe_from_last_cloud_;
-  Pose last_good_;                    // of the last scan that was matched
   std::unique_ptr<Opening> opening_;  // until the first scans are settled
 };
 

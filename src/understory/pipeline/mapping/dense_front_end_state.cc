@@ -33,7 +33,7 @@ std::vector<CountedFile> DenseFrontEnd::files() const {
   if (started()) {
     files = map_->files();
     files.push_back({kJournalFile, journal_->count()});
-    files.push_back({kCloudsFile, clouds_->count()});
+    files.push_back({kCloudsFile, clouds_->clouds().count()});
   }
   if (fixes_file_) files.push_back({kFixesFile, fixes_file_->count()});
   return files;
@@ -47,12 +47,10 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   writer.put(counts_);
   imu_hearing_.save(writer);
   writer.put(last_scan_end_);
-  writer.put(last_cloud_);
-  put_pose(writer, keyframe_from_last_cloud_);
-  put_pose(writer, last_good_);
-  writer.put(last_good_inliers_);
-  writer.put_doubles(last_good_velocity_.data(), 3);
-  writer.put(last_scan_);
+  const ScanClouds::Last last_cloud = clouds_ ? clouds_->last() : ScanClouds::Last();
+  writer.put(last_cloud.keyframe);
+  put_pose(writer, last_cloud.keyframe_from_body);
+  recovery_.save(writer);
   put_optional(writer, rig_.body_from_imu, put_pose);
   put_optional(writer, rig_.body_from_gnss, put_pose);
   writer.put(started());
@@ -61,7 +59,7 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
     put_imu(writer, sample);
   if (!started()) return;
   writer.put(journal_->count());
-  writer.put(clouds_->count());
+  writer.put(clouds_->clouds().count());
   map_->save(writer);
   odometry_->save(writer);
 }
@@ -83,12 +81,10 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   counts_ = reader.get<MappingCounts>();
   imu_hearing_.load(reader);
   last_scan_end_ = reader.get<TimeNs>();
-  last_cloud_ = reader.get<std::uint64_t>();
-  keyframe_from_last_cloud_ = get_pose(reader);
-  last_good_ = get_pose(reader);
-  last_good_inliers_ = reader.get<double>();
-  reader.get_doubles(last_good_velocity_.data(), 3);
-  last_scan_ = reader.get<TimeNs>();
+  ScanClouds::Last last_cloud;
+  last_cloud.keyframe = reader.get<std::uint64_t>();
+  last_cloud.keyframe_from_body = get_pose(reader);
+  recovery_.load(reader);
   const auto body_from_imu = get_optional(reader, get_pose);
   const auto body_from_gnss = get_optional(reader, get_pose);
   const bool was_started = reader.get<bool>();
@@ -97,7 +93,9 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
     recent_imu_.push_back(get_imu(reader));
   if (!was_started) return;
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile, reader.get<RecordCount>());
-  clouds_ = std::make_unique<KeyframeClouds>(folder_ / kCloudsFile, reader.get<RecordCount>());
+  const auto clouds = reader.get<RecordCount>();
+  clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, clouds, last_cloud,
+                                         times_);
   opening_.reset();
   rig_ = rig;
   rig_.body_from_imu = body_from_imu;

@@ -3,10 +3,32 @@
 
 #include "understory/pipeline/judgement/input_remarks.h"
 #include "understory/pipeline/mapping/dense_front_end.h"
+#include "understory/pipeline/mapping/finished_map.h"
+#include "understory/pipeline/mapping/lidar_view.h"
 #include "understory/pipeline/run_folder/run_writer.h"
 
 namespace understory {
 namespace {
+
+// The finished cloud as the forest layer wants it.
+PointBlocks blocks_of(MapTiles& tiles) {
+  return [&tiles](const PointVisitor& visit) {
+    std::vector<Eigen::Vector3d> block;
+    tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+      block.clear();
+      for (const MapPoint& p : points)
+        block.emplace_back(p.x, p.y, p.z);
+      visit(block);
+    });
+  };
+}
+
+std::vector<Pose> poses_of(const std::vector<Keyframe>& keyframes) {
+  std::vector<Pose> poses;
+  for (const Keyframe& keyframe : keyframes)
+    poses.push_back(keyframe.world_from_body);
+  return poses;
+}
 
 class DenseMap : public MapMaker {
  public:
@@ -14,13 +36,30 @@ class DenseMap : public MapMaker {
       : front_end_(front_end), recording_(recording) {}
 
   void close_loops() override { front_end_.map().finish(); }
-  void finish_map() override {}
-  void list_trees() override {}
-  RunOutcome write() override { return write_run(recording_, front_end_); }
+  void finish_map() override {
+    if (!front_end_.config().map_enabled) return;
+    const ScopedTimer timer(front_end_.times(), "finish_gather_map");
+    made_.tiles =
+        make_finished_map(front_end_.clouds(), front_end_.map().keyframes(),
+                          front_end_.config().map, recording_.work / "tiles", recording_.progress);
+  }
+
+  void list_trees() override {
+    if (!made_.tiles) return;
+    const ScopedTimer timer(front_end_.times(), "finish_inventory");
+    const LidarView view = learn_view(front_end_.clouds(), front_end_.rig().body_from_lidar);
+    made_.inventory =
+        take_inventory(blocks_of(*made_.tiles), front_end_.config().inventory, recording_.progress,
+                       seen_from(view, poses_of(front_end_.map().keyframes())));
+    made_.lidar_view = figures_of(view);
+  }
+
+  RunOutcome write() override { return write_run(recording_, front_end_, made_); }
 
  private:
   DenseFrontEnd& front_end_;
   ReadRecording recording_;
+  DenseProducts made_;
 };
 
 }  // namespace

@@ -17,9 +17,7 @@
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/pipeline/mapping/dense_front_end.h"
-#include "understory/pipeline/mapping/finished_map.h"
 #include "understory/pipeline/mapping/finished_trajectory.h"
-#include "understory/pipeline/mapping/lidar_view.h"
 #include "understory/pipeline/run_folder/run_truth.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/median.h"
@@ -179,30 +177,10 @@ void write_fixes(const std::filesystem::path& folder, const std::vector<GnssFix>
   writer.commit();
 }
 
-// The finished cloud as the forest layer wants it.
-PointBlocks blocks_of(MapTiles& tiles) {
-  return [&tiles](const PointVisitor& visit) {
-    std::vector<Eigen::Vector3d> block;
-    tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
-      block.clear();
-      for (const MapPoint& p : points)
-        block.emplace_back(p.x, p.y, p.z);
-      visit(block);
-    });
-  };
-}
-
-std::vector<Pose> poses_of(const std::vector<Keyframe>& keyframes) {
-  std::vector<Pose> poses;
-  for (const Keyframe& keyframe : keyframes)
-    poses.push_back(keyframe.world_from_body);
-  return poses;
-}
-
-std::uint64_t write_map(const std::filesystem::path& folder, MapTiles& tiles,
-                        const GroundModel& ground, MapPicture& picture,
-                        const ProgressSink& progress) {
-  LasWriter writer(folder / "map.laz", LasOptions{});
+std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
+                          const GroundModel& ground, MapPicture& picture,
+                          const ProgressSink& progress) {
+  LasWriter writer(file, LasOptions{});
   double done = 0.0;
   tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
     for (const MapPoint& p : points) {
@@ -216,6 +194,20 @@ std::uint64_t write_map(const std::filesystem::path& folder, MapTiles& tiles,
   });
   writer.commit();
   return writer.points();
+}
+
+// map.laz, trees.csv, dtm.tif and chm.tif. Returns the number of points.
+std::uint64_t write_map(const std::filesystem::path& folder, DenseProducts& made,
+                        MapPicture& picture, const ProgressSink& progress) {
+  const InventoryResult& inventory = made.inventory;
+  const std::uint64_t points =
+      write_cloud(folder / "map.laz", *made.tiles, inventory.ground, picture, progress);
+  write_trees_csv(folder / "trees.csv", inventory.trees);
+  if (!inventory.ground.terrain.empty()) {
+    write_geotiff(folder / "dtm.tif", inventory.ground.terrain, "");
+    write_geotiff(folder / "chm.tif", inventory.canopy, "");
+  }
+  return points;
 }
 
 void fill_counts(RunSummary& summary, const DenseFrontEnd& session, const RunFacts& facts) {
@@ -335,16 +327,29 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
   return text + "report: " + (folder / "report.html").string();
 }
 
+ReportInput report_of(const ReadRecording& recording, const DenseFrontEnd& session,
+                      const TrajectoryFacts& trajectory, const RunSummary& summary) {
+  ReportInput report;
+  report.title = std::filesystem::path(recording.request.recording).filename().string();
+  const std::string& model = recording.source.rig().lidar_model;
+  report.made_from = fmt::format("{}, {}{} scans", recording.facts.format,
+                                 model.empty() ? "" : model + ", ", summary.scans);
+  report.summary = summary;
+  report.scans = trajectory.scans;
+  report.sensor_period_ms = trajectory.period_ms;
+  report.loops = report_loops(session.map());
+  report.loop_closure_enabled = session.config().keyframe_map.loop_closure.enabled;
+  return report;
+}
+
 }  // namespace
 
-RunOutcome write_run(const ReadRecording& recording, DenseFrontEnd& session) {
+RunOutcome write_run(const ReadRecording& recording, DenseFrontEnd& session, DenseProducts& made) {
   const auto& [request, facts, source, work, folder, log, progress] = recording;
-  const MappingConfig& config = session.config();
   StageTimes& times = session.times();
-  const TrajectoryFacts trajectory = write_trajectory(folder, session, config);
+  const TrajectoryFacts trajectory = write_trajectory(folder, session, session.config());
   write_graph(folder, session.map());
   write_fixes(folder, session.fixes());
-  InventoryResult inventory;
   MapPicture picture;
   RunSummary summary = summarise_run(request, session, facts, trajectory,
                                      evidence_of(session, facts, source, trajectory, log), log);
@@ -355,54 +360,27 @@ RunOutcome write_run(const ReadRecording& recording, DenseFrontEnd& session) {
     summary.quality["ape_rmse_m"] = truth->ape_rmse_m;
     summary.quality["drift_percent"] = truth->drift_percent;
   }
-  if (config.map_enabled) {
-    std::unique_ptr<MapTiles> tiles;
-    {
-      const ScopedTimer timer(times, "finish_gather_map");
-      tiles = make_finished_map(session.clouds(), session.map().keyframes(), config.map,
-                                work / "tiles", progress);
-    }
-    {
-      const ScopedTimer timer(times, "finish_inventory");
-      const LidarView view = learn_view(session.clouds(), session.rig().body_from_lidar);
-      inventory = take_inventory(blocks_of(*tiles), config.inventory, progress,
-                                 seen_from(view, poses_of(session.map().keyframes())));
-      summary.lidar_view = figures_of(view);
-    }
+  if (made.tiles) {
     const ScopedTimer timer(times, "finish_write_map");
     summary.counts["map_points"] =
-        static_cast<std::int64_t>(write_map(folder, *tiles, inventory.ground, picture, progress));
-    write_trees_csv(folder / "trees.csv", inventory.trees);
-    if (!inventory.ground.terrain.empty()) {
-      write_geotiff(folder / "dtm.tif", inventory.ground.terrain, "");
-      write_geotiff(folder / "chm.tif", inventory.canopy, "");
-    }
+        static_cast<std::int64_t>(write_map(folder, made, picture, progress));
   }
-  summary.counts["trees"] = static_cast<std::int64_t>(inventory.trees.size());
+  summary.lidar_view = made.lidar_view;
+  summary.counts["trees"] = static_cast<std::int64_t>(made.inventory.trees.size());
   summary.warnings = log.warnings();
   summary.stages = summarise(times);
   summary.wall_s = facts.elapsed_s();
   summary.cpu_s = process_cpu_seconds();
   summary.peak_memory_mb = peak_memory_mb();
-
-  ReportInput report;
-  report.title = std::filesystem::path(request.recording).filename().string();
-  report.made_from = fmt::format(
-      "{}, {}{} scans", facts.format,
-      source.rig().lidar_model.empty() ? "" : source.rig().lidar_model + ", ", summary.scans);
-  report.summary = summary;
+  ReportInput report = report_of(recording, session, trajectory, summary);
   if (!picture.empty()) report.picture = &picture;
-  if (config.map_enabled) report.inventory = &inventory;
-  report.scans = trajectory.scans;
-  report.sensor_period_ms = trajectory.period_ms;
-  report.loops = report_loops(session.map());
-  report.loop_closure_enabled = config.keyframe_map.loop_closure.enabled;
+  if (made.tiles) report.inventory = &made.inventory;
   report.truth = truth;
   write_report(folder / "report.html", report);
   summary.wall_s = facts.elapsed_s();  // all of it, the report too
   write_run_json(folder / "run.json", summary);
   return {summary.status, summary.reasons,
-          terminal_summary(summary, trajectory, inventory, request.run_folder)};
+          terminal_summary(summary, trajectory, made.inventory, request.run_folder)};
 }
 
 }  // namespace understory

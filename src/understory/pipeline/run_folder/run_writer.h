@@ -1,13 +1,26 @@
 #pragma once
 
+#include <memory>
+
+#include "understory/forest/inventory.h"
+#include "understory/map/map_tiles.h"
+#include "understory/output/run_summary.h"
 #include "understory/pipeline/mapping/dense_front_end.h"
 #include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
 
 namespace understory {
 
+// What is made of the clouds of a run; empty where no map is wanted.
+struct DenseProducts {
+  std::unique_ptr<MapTiles> tiles;  // of the finished cloud
+  InventoryResult inventory;
+  LidarViewFigures lidar_view;
+};
+
 // Writes what the dense front end has found: trajectory, states, keyframes, graph, fixes, map,
 // trees, terrain, run.json, report.
-[[nodiscard]] RunOutcome write_run(const ReadRecording& recording, DenseFrontEnd& session);
+[[nodiscard]] RunOutcome write_run(const ReadRecording& recording, DenseFrontEnd& session,
+                                   DenseProducts& made);
 
 }  // namespace understory

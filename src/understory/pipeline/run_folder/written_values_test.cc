@@ -35,10 +35,9 @@ Stem any_stem(Random& random) {
 
 std::vector<std::uint32_t> bits_of(const Stem& stem) {
   std::vector<std::uint32_t> bits;
-  for (const float value :
-       {stem.point.x(), stem.point.y(), stem.point.z(), stem.axis.x(), stem.axis.y(), stem.axis.z(),
-        stem.length_m, stem.dbh_m, stem.score, stem.radius_m, stem.radius_sd_m, stem.xx, stem.xy,
-        stem.yy, stem.zz})
+  for (const float value : {stem.point.x(), stem.point.y(), stem.point.z(), stem.axis.x(),
+                            stem.axis.y(), stem.axis.z(), stem.length_m, stem.dbh_m, stem.score,
+                            stem.radius_m, stem.radius_sd_m, stem.xx, stem.xy, stem.yy, stem.zz})
     bits.push_back(std::isnan(value) ? 0x7FC00000U : std::bit_cast<std::uint32_t>(value));
   return bits;
 }

@@ -1,0 +1,69 @@
+#include "understory/odometry/dense/recovery.h"
+
+#include <cmath>
+
+#include "understory/geometry/pose_io.h"
+
+namespace understory {
+namespace {
+
+constexpr double kOutageS = 1.0;
+constexpr double kFoundAgainShare = 0.5;    // of the usual inliers, needed after an outage
+constexpr double kWorthlessSigmaM = 10.0;   // no better than staying where one was
+constexpr double kHighestSpeedM_S = 100.0;  // no carrier is faster
+
+}  // namespace
+
+bool Recovery::is_outage(TimeNs stamp) const {
+  return to_seconds(stamp - last_scan_) > kOutageS;
+}
+
+bool Recovery::lost_over_outage(TimeNs stamp, const DenseEstimate& estimate) const {
+  if (to_seconds(stamp - last_scan_) < kOutageS || last_inliers_ <= 0.0) return false;
+  return !estimate.matched || estimate.match.inlier_ratio < kFoundAgainShare * last_inliers_;
+}
+
+bool Recovery::lost(const DenseEstimate& estimate, std::uint64_t unmatched_in_a_row) const {
+  const bool finite = estimate.state.world_from_body.matrix().allFinite() &&
+                      estimate.state.velocity_in_world.allFinite() &&
+                      estimate.state.velocity_in_world.norm() < kHighestSpeedM_S;
+  const bool matched = estimate.matched && estimate.update.status == MotionStatus::kAccepted;
+  return !finite ||
+         (!matched && unmatched_in_a_row + 1 >= static_cast<std::uint64_t>(lost_after_scans_));
+}
+
+Pose Recovery::place_after_outage(const NavState& predicted) const {
+  const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
+  return sigma < kWorthlessSigmaM ? predicted.world_from_body : last_good_;
+}
+
+void Recovery::note_good(const DenseEstimate& estimate) {
+  last_good_ = estimate.state.world_from_body;
+  last_velocity_ = last_good_.rotation().conjugate() * estimate.state.velocity_in_world;
+  if (estimate.matched) last_inliers_ = estimate.match.inlier_ratio;
+}
+
+void Recovery::save(BinaryWriter& writer) const {
+  put_pose(writer, last_good_);
+  writer.put(last_inliers_);
+  writer.put_doubles(last_velocity_.data(), 3);
+  writer.put(last_scan_);
+}
+
+void Recovery::load(BinaryReader& reader) {
+  last_good_ = get_pose(reader);
+  last_inliers_ = reader.get<double>();
+  reader.get_doubles(last_velocity_.data(), 3);
+  last_scan_ = reader.get<TimeNs>();
+}
+
+void put_at(const Pose& world_from_body, DenseOdometry& odometry, DenseEstimate& estimate) {
+  const Eigen::Vector3d forward = world_from_body.rotation() * Eigen::Vector3d::UnitX();
+  const Pose placed(so3_exp({0.0, 0.0, std::atan2(forward.y(), forward.x())}),
+                    world_from_body.translation());
+  odometry.move_world(placed);
+  estimate.state.world_from_body = placed * estimate.state.world_from_body;
+  estimate.state.velocity_in_world = placed.rotation() * estimate.state.velocity_in_world;
+}
+
+}  // namespace understory

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "understory/geometry/pose.h"
+#include "understory/odometry/dense/dense_odometry.h"
+#include "understory/util/binary_io.h"
+#include "understory/util/time.h"
+
+namespace understory {
+
+// Notices where the position is lost, and tells where a new piece of map had best begin. Not
+// thread-safe.
+class Recovery {
+ public:
+  // Lost after so many scans in a row without a match.
+  explicit Recovery(int lost_after_scans) : lost_after_scans_(lost_after_scans) {}
+
+  // Whether so much time has passed since the last scan that a match may be one by chance.
+  [[nodiscard]] bool is_outage(TimeNs stamp) const;
+  // After an outage: whether the match finds few of the points that matches found before it. (Right
+  // matches after 10 s found 0.87 of that share, wrong ones 0.13.)
+  [[nodiscard]] bool lost_over_outage(TimeNs stamp, const DenseEstimate& estimate) const;
+  // Unmatched for so long that the prediction is worth nothing, or not even finite any more.
+  // `unmatched_in_a_row`: scans before this one.
+  [[nodiscard]] bool lost(const DenseEstimate& estimate, std::uint64_t unmatched_in_a_row) const;
+  // About where the carrier is by a prediction over an outage; where it was last, if that is worth
+  // nothing. World from body.
+  [[nodiscard]] Pose place_after_outage(const NavState& predicted) const;
+
+  void note_scan(TimeNs stamp) { last_scan_ = stamp; }
+  // Of a scan whose pose is good.
+  void note_good(const DenseEstimate& estimate);
+  // The first scan is done again.
+  void forget_matches() { last_inliers_ = 0.0; }
+
+  [[nodiscard]] TimeNs last_scan() const { return last_scan_; }  // stamp
+  [[nodiscard]] const Pose& last_good() const { return last_good_; }
+  [[nodiscard]] const Eigen::Vector3d& last_velocity_in_body() const { return last_velocity_; }
+
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  int lost_after_scans_;
+  Pose last_good_;                                           // of the last scan that was matched
+  Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero();  // of it, in its body frame
+  double last_inliers_ = 0.0;  // share of its points near the map; 0: there was no match
+  TimeNs last_scan_ = 0;
+};
+
+// Puts a new odometry and the estimate of its first scan to a pose: to its position and heading;
+// the vertical stays that of the odometry.
+void put_at(const Pose& world_from_body, DenseOdometry& odometry, DenseEstimate& estimate);
+
+}  // namespace understory
