@@ -12,7 +12,7 @@
 #include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/strip_roads.h"
 #include "understory/evaluation/trajectory.h"
-#include "understory/pipeline/correction/stem_correction.h"
+#include "understory/graph/self_correction/stem_correction.h"
 #include "understory/recording/clouds/stems_file.h"
 #include "understory/util/error.h"
 

@@ -1,9 +1,9 @@
 #pragma once
 
+#include "understory/graph/self_correction/stem_correction.h"
 #include "understory/map/stem_map.h"
 #include "understory/odometry/stems/sparse_odometry.h"
 #include "understory/pipeline/correction/head_cut_log.h"
-#include "understory/pipeline/correction/stem_correction.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/util/config.h"

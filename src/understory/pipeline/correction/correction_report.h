@@ -1,10 +1,10 @@
 #pragma once
 
 #include "understory/evaluation/trajectory.h"
+#include "understory/graph/self_correction/stem_correction.h"
 #include "understory/output/report.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/correction/correction_run.h"
-#include "understory/pipeline/correction/stem_correction.h"
 
 namespace understory {
 

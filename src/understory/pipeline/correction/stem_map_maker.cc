@@ -10,7 +10,7 @@
 #include "understory/pipeline/correction/correction_report.h"
 #include "understory/pipeline/correction/correction_summary.h"
 #include "understory/pipeline/correction/correction_tables.h"
-#include "understory/pipeline/georeferencing/gnss_fit.h"
+#include "understory/pipeline/georeferencing/gnss_fixes.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -86,7 +86,7 @@ std::vector<ReportFix> StemMapMaker::compare_with_gnss(const Trajectory& traject
   summary.quality.merge(figures_of(fit));
   GnssWriter writer(place_.results / "gnss.csv");
   const Pose world_from_enu = fit.enu_from_world.inverse();
-  for (GnssRow row : fit.rows) {
+  for (GnssRow row : rows_of(fit)) {
     row.position_in_world = moved(world_from_enu, row.position_in_world);
     row.residual = moved(Pose(world_from_enu.rotation(), Eigen::Vector3d::Zero()), row.residual);
     drawn.push_back({row.position_in_world.cast<float>(), row.used});
@@ -94,7 +94,7 @@ std::vector<ReportFix> StemMapMaker::compare_with_gnss(const Trajectory& traject
     row.reason = "compared with, not used";
     writer.add(row);
   }
-  for (std::size_t k = 0; fit.rows.empty() && k < run_.fixes.size(); ++k) {
+  for (std::size_t k = 0; fit.fixes.empty() && k < run_.fixes.size(); ++k) {
     GnssRow row;
     row.fix = run_.fixes[k];
     row.reason = fit.path.reason;

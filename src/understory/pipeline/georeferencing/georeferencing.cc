@@ -18,7 +18,7 @@
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/head_cut_log.h"
 #include "understory/pipeline/correction/moved_map.h"
-#include "understory/pipeline/georeferencing/gnss_fit.h"
+#include "understory/pipeline/georeferencing/gnss_fixes.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/pipeline/source.h"
@@ -105,8 +105,8 @@ Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log
              fmt::format("the antenna is said to be {:.1f} m from the body's origin (--antenna-m): "
                          "check that these are metres and not a place on the earth",
                          request.antenna_in_body.norm()));
-  GnssFit fit = fit_to_gnss(run.trajectory, request.antenna_in_body, read_fixes(file.string(), log),
-                            request.path);
+  const GnssFit fit = fit_to_gnss(run.trajectory, request.antenna_in_body,
+                                  read_fixes(file.string(), log), request.path);
   if (!fit.path.found) throw InputError(file.string(), "", fit.path.reason);
   Motion motion;
   motion.target_from_world = fit.enu_from_world;
@@ -115,7 +115,7 @@ Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log
   motion.outcome.summary = fmt::format(
       "{} fixes; fit {:.2f} m (symmetric, root mean square); fixes off the path by {:.2f} m in the "
       "median, {:.2f} m in the mean",
-      fit.rows.size(), fit.path.symmetric_rms_m, fit.path.fixes_median_m, fit.path.fixes_mean_m);
+      fit.fixes.size(), fit.path.symmetric_rms_m, fit.path.fixes_median_m, fit.path.fixes_mean_m);
   if (fit.fixes_in_time > 0 && std::isfinite(fit.along_rms_m))
     motion.outcome.summary += fmt::format("; {:.2f} m along and {:.2f} m across the way by time",
                                           fit.along_rms_m, fit.across_rms_m);
@@ -130,7 +130,7 @@ Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log
         "most): the path is too short, too straight or too round for fixes that are {:.1f} m off "
         "it; a longer way with bends is needed, or a better receiver",
         fit.path.heading_sd_deg, kMostHeadingSdDeg, fit.path.fixes_rms_m));
-  motion.gnss = std::move(fit.rows);
+  motion.gnss = rows_of(fit);
   return motion;
 }
 

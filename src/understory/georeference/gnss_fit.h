@@ -1,26 +1,26 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <filesystem>
-#include <map>
+#include <limits>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "understory/evaluation/trajectory.h"
+#include "understory/geometry/stamped_pose.h"
 #include "understory/georeference/geodetic.h"
 #include "understory/georeference/path_fit.h"
-#include "understory/output/run_summary.h"
-#include "understory/output/run_tables.h"
 #include "understory/sensor/gnss_fix.h"
-#include "understory/util/log.h"
 
 namespace understory {
 
-// The fixes of a file: an NMEA log, a table with timestamp, latitude_deg and longitude_deg
-// (gnss.csv of a run or of a folder of clouds), or any recording. Those without a position are left
-// out. Throws InputError where there are none.
-[[nodiscard]] std::vector<GnssFix> read_fixes(const std::string& file, Log& log);
+// A fix and the path that was laid on it. Frame east, north, up at the first fix, metres.
+struct FittedFix {
+  GnssFix fix;
+  Eigen::Vector3d position_in_enu =
+      Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  // Fix minus antenna at its time; NaN where the path does not tell.
+  Eigen::Vector3d residual = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  bool used = false;  // false: too far from the path to have a say
+};
 
 // A path laid on a GNSS path, P1 (6), in the frame east, north, up at the first fix.
 struct GnssFit {
@@ -33,15 +33,16 @@ struct GnssFit {
   std::size_t fixes_in_time = 0;
   double along_rms_m = 0.0;
   double across_rms_m = 0.0;
-  std::vector<GnssRow> rows;  // for gnss.csv, positions in the frame east, north, up
+  std::vector<FittedFix> fixes;  // all of them; none where no fit was found
 };
 
-// `antenna_in_body` is the lever arm, zero where unknown.
-[[nodiscard]] GnssFit fit_to_gnss(const Trajectory& trajectory,
+// `trajectory` is in order of time; `antenna_in_body` is the lever arm, zero where unknown.
+// Deterministic; thread-safe. Not found (`path.found`) as fit_path.
+[[nodiscard]] GnssFit fit_to_gnss(const std::vector<StampedPose>& trajectory,
                                   const Eigen::Vector3d& antenna_in_body,
                                   const std::vector<GnssFix>& fixes, const PathFitConfig& config);
 
-// For run.json: gnss_fit_rms_m and the like; empty if there was no fit.
-[[nodiscard]] std::map<std::string, Figure> figures_of(const GnssFit& fit);
+// Heading of a motion's x axis about z, radians.
+[[nodiscard]] double yaw_of(const Pose& pose);
 
 }  // namespace understory

@@ -1,74 +1,19 @@
-#include "understory/pipeline/georeferencing/gnss_fit.h"
+#include "understory/georeference/gnss_fit.h"
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 
-#include "understory/evaluation/table_reader.h"
-#include "understory/pipeline/source.h"
-#include "understory/recording/captures/nmea.h"
-#include "understory/util/error.h"
 #include "understory/util/median.h"
-#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {
 
-namespace fs = std::filesystem;
 using Eigen::Vector3d;
 
-bool is_position(const GnssFix& fix) {
-  return std::isfinite(fix.latitude_deg) && std::isfinite(fix.longitude_deg) &&
-         std::abs(fix.latitude_deg) <= 90.0 && std::abs(fix.longitude_deg) <= 360.0;
-}
-
-// The first byte that is no white space of a plain file; 0 if there is none.
-char first_letter(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  char letter = 0;
-  stream >> letter;
-  check_readable(stream, file, "at its beginning");
-  return stream ? letter : '\0';
-}
-
-std::vector<GnssFix> read_nmea(const std::string& file, Log& log) {
-  std::ifstream ahead(file, std::ios::binary);
-  std::ifstream stream(file, std::ios::binary);
-  NmeaLogReader reader(stream, file, first_nmea_day(ahead, file), log);
-  std::vector<GnssFix> fixes;
-  while (auto fix = reader.next())
-    fixes.push_back(*fix);
-  return fixes;
-}
-
-std::vector<GnssFix> read_table(const std::string& file) {
-  CsvReader table(file, {"timestamp", "latitude_deg", "longitude_deg"});
-  std::vector<GnssFix> fixes;
-  while (table.next()) {
-    GnssFix fix;
-    fix.stamp = from_seconds(table.finite("timestamp"));
-    fix.latitude_deg = table.number("latitude_deg");
-    fix.longitude_deg = table.number("longitude_deg");
-    fix.height_m = table.number("height_m");
-    fix.hdop = table.number("hdop");
-    fix.vdop = table.number("vdop");
-    fixes.push_back(fix);
-  }
-  return fixes;
-}
-
-std::vector<GnssFix> read_recording(const std::string& name, Log& log) {
-  const auto recording = open_source(name, {}, log);
-  std::vector<GnssFix> fixes;
-  while (const auto event = recording->next()) {
-    if (const auto* fix = std::get_if<GnssFix>(&*event)) fixes.push_back(*fix);
-  }
-  return fixes;
-}
-
 // Position at a time, linear between poses; nothing outside.
-std::optional<Vector3d> place_at(const Trajectory& trajectory, const Vector3d& arm, TimeNs stamp) {
+std::optional<Vector3d> place_at(const std::vector<StampedPose>& trajectory, const Vector3d& arm,
+                                 TimeNs stamp) {
   const auto after =
       std::lower_bound(trajectory.begin(), trajectory.end(), stamp,
                        [](const StampedPose& pose, TimeNs t) { return pose.stamp < t; });
@@ -84,7 +29,7 @@ std::optional<Vector3d> place_at(const Trajectory& trajectory, const Vector3d& a
 }
 
 // Where the antenna was at the time of each fix, world frame.
-std::vector<std::optional<Vector3d>> places_in_time(const Trajectory& trajectory,
+std::vector<std::optional<Vector3d>> places_in_time(const std::vector<StampedPose>& trajectory,
                                                     const Vector3d& arm,
                                                     const std::vector<GnssFix>& fixes) {
   std::vector<std::optional<Vector3d>> places;
@@ -128,26 +73,21 @@ void tell_along_and_across(const std::vector<std::optional<Vector3d>>& places,
   fit.across_rms_m = std::sqrt(across / count);
 }
 
-std::vector<GnssRow> rows_of(const std::vector<GnssFix>& fixes, const std::vector<Vector3d>& enu,
-                             const std::vector<std::optional<Vector3d>>& places,
-                             const GnssFit& fit) {
-  std::vector<GnssRow> rows;
+std::vector<FittedFix> fixes_on_path(const std::vector<GnssFix>& fixes,
+                                     const std::vector<Vector3d>& enu,
+                                     const std::vector<std::optional<Vector3d>>& places,
+                                     const GnssFit& fit) {
+  std::vector<FittedFix> fitted;
   for (std::size_t k = 0; k < fixes.size(); ++k) {
-    GnssRow row;
-    row.fix = fixes[k];
-    row.position_in_world = enu[k];
-    if (!std::isfinite(fixes[k].height_m)) row.position_in_world.z() = std::nan("");
-    if (places[k]) row.residual = row.position_in_world - fit.enu_from_world * *places[k];
-    row.used = fit.path.fix_used[k] != 0;
-    if (!row.used) row.reason = "too far from the path";
-    rows.push_back(row);
+    FittedFix one;
+    one.fix = fixes[k];
+    one.position_in_enu = enu[k];
+    if (!std::isfinite(fixes[k].height_m)) one.position_in_enu.z() = std::nan("");
+    if (places[k]) one.residual = one.position_in_enu - fit.enu_from_world * *places[k];
+    one.used = fit.path.fix_used[k] != 0;
+    fitted.push_back(one);
   }
-  return rows;
-}
-
-double yaw_of(const Pose& pose) {
-  const Vector3d heading = pose.rotation() * Vector3d::UnitX();
-  return std::atan2(heading.y(), heading.x());
+  return fitted;
 }
 
 // Which of two motions that fit alike, from the clocks.
@@ -175,25 +115,12 @@ void decide_by_time(const std::vector<Vector3d>& path,
 
 }  // namespace
 
-std::vector<GnssFix> read_fixes(const std::string& file, Log& log) {
-  const bool plain = fs::is_regular_file(file);
-  if (!plain && !is_simulation(file) && !fs::exists(file))
-    throw InputError(file, "", "expected GNSS fixes: no such file");
-  std::vector<GnssFix> fixes;
-  const std::string name = fs::path(file).filename().string();
-  if (plain && first_letter(file) == '$') {
-    fixes = read_nmea(file, log);
-  } else if (plain && (name.ends_with(".csv") || name.ends_with(".csv.gz"))) {
-    fixes = read_table(file);
-  } else {
-    fixes = read_recording(file, log);
-  }
-  std::erase_if(fixes, [](const GnssFix& fix) { return !is_position(fix); });
-  if (fixes.empty()) throw InputError(file, "", "expected GNSS fixes with a position: none there");
-  return fixes;
+double yaw_of(const Pose& pose) {
+  const Vector3d heading = pose.rotation() * Vector3d::UnitX();
+  return std::atan2(heading.y(), heading.x());
 }
 
-GnssFit fit_to_gnss(const Trajectory& trajectory, const Vector3d& antenna_in_body,
+GnssFit fit_to_gnss(const std::vector<StampedPose>& trajectory, const Vector3d& antenna_in_body,
                     const std::vector<GnssFix>& fixes, const PathFitConfig& config) {
   GnssFit fit;
   if (fixes.empty()) return fit;
@@ -222,30 +149,8 @@ GnssFit fit_to_gnss(const Trajectory& trajectory, const Vector3d& antenna_in_bod
   if (!up.empty()) shift.z() = upper_median(std::move(up)) - upper_median(std::move(path_up));
   fit.enu_from_world = Pose(fit.path.target_from_source.rotation(), shift);
   tell_along_and_across(places, enu, fit);
-  fit.rows = rows_of(fixes, enu, places, fit);
+  fit.fixes = fixes_on_path(fixes, enu, places, fit);
   return fit;
-}
-
-std::map<std::string, Figure> figures_of(const GnssFit& fit) {
-  if (!fit.path.found) return {};
-  std::map<std::string, Figure> figures{
-      {"gnss_fit_rms_m", fit.path.symmetric_rms_m},
-      {"gnss_fit_turned_rms_m", fit.path.turned_rms_m},
-      {"gnss_fixes_rms_m", fit.path.fixes_rms_m},
-      {"gnss_fixes_mean_m", fit.path.fixes_mean_m},
-      {"gnss_fixes_median_m", fit.path.fixes_median_m},
-      {"gnss_path_rms_m", fit.path.path_rms_m},
-      {"gnss_path_mean_m", fit.path.path_mean_m},
-      {"gnss_fixes_used_share",
-       static_cast<double>(std::count(fit.path.fix_used.begin(), fit.path.fix_used.end(), 1)) /
-           static_cast<double>(fit.path.fix_used.size())},
-      {"gnss_heading_sd_deg", fit.path.heading_sd_deg},
-      {"gnss_yaw_deg", yaw_of(fit.enu_from_world) * 180.0 / M_PI}};
-  if (fit.fixes_in_time > 0) {
-    figures["gnss_along_rms_m"] = fit.along_rms_m;
-    figures["gnss_across_rms_m"] = fit.across_rms_m;
-  }
-  return figures;
 }
 
 }  // namespace understory

@@ -1,4 +1,4 @@
-#include "understory/pipeline/correction/stem_correction.h"
+#include "understory/graph/self_correction/stem_correction.h"
 
 #include <algorithm>
 #include <cmath>

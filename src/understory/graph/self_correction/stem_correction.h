@@ -5,8 +5,8 @@
 #include "understory/graph/loops/stem_loops.h"
 #include "understory/graph/pose_graph.h"
 #include "understory/graph/self_correction/self_correction.h"
+#include "understory/graph/self_correction/stem_sights.h"
 #include "understory/odometry/stems/sparse_odometry.h"
-#include "understory/pipeline/correction/stem_sights.h"
 #include "understory/sensor/stem_view.h"
 #include "understory/util/timing.h"
 

@@ -1,4 +1,4 @@
-#include "understory/pipeline/correction/stem_sights.h"
+#include "understory/graph/self_correction/stem_sights.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "understory/georeference/gnss_fit.h"
+#include "understory/output/run_summary.h"
+#include "understory/output/run_tables.h"
+#include "understory/sensor/gnss_fix.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// The fixes of a file: an NMEA log, a table with timestamp, latitude_deg and longitude_deg
+// (gnss.csv of a run or of a folder of clouds), or any recording. Those without a position are left
+// out. Throws InputError where there are none.
+[[nodiscard]] std::vector<GnssFix> read_fixes(const std::string& file, Log& log);
+
+// For gnss.csv, positions in the frame east, north, up.
+[[nodiscard]] std::vector<GnssRow> rows_of(const GnssFit& fit);
+// For run.json: gnss_fit_rms_m and the like; empty if there was no fit.
+[[nodiscard]] std::map<std::string, Figure> figures_of(const GnssFit& fit);
+
+}  // namespace understory
