@@ -5,6 +5,7 @@
 #include <tuple>
 #include <vector>
 
+#include "understory/registration/gicp/gicp_matcher.h"
 #include "understory/registration/icp/icp_matcher.h"
 #include "understory/registration/matcher.h"
 #include "understory/registration/ndt/ndt_matcher.h"
@@ -19,7 +20,8 @@ namespace understory {
 //   std::unique_ptr<const Matcher> make_matcher(const C&);         throws ConfigError
 //   std::vector<SuitedSetting> suited_settings(const C&, const ScanTraits&);
 using MatcherConfigs = std::tuple<NdtMatcherConfig,  //
-                                  IcpMatcherConfig>;
+                                  IcpMatcherConfig,  //
+                                  GicpMatcherConfig>;
 
 // The method chosen, and the settings of all of them.
 struct MatcherConfig {

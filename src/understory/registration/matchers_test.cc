@@ -88,7 +88,8 @@ TEST_P(AnyMatcher, FindsAScanInAMapOfKeyframesFromNearAndFromFar) {
   ASSERT_GT(target->reach_m(), 0.0);
   expect_truth(
       target->match(source_, truth_ * Pose::exp(step(0.005, 0.05)), {}, MatchStart::kNear));
-  expect_truth(target->match(source_, truth_ * Pose::exp(step(0.03, 0.4)), {}, MatchStart::kFar));
+  // Three metres off, where NDT's finest cells alone do not lead back.
+  expect_truth(target->match(source_, truth_ * Pose::exp(step(0.05, 2.0)), {}, MatchStart::kFar));
 }
 
 TEST_P(AnyMatcher, FindsAScanInASingleCloud) {

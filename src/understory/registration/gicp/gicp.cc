@@ -1,0 +1,170 @@
+#include "understory/registration/gicp/gicp.h"
+
+#include <Eigen/LU>
+#include <array>
+#include <string>
+
+#include "understory/geometry/kd_tree.h"
+#include "understory/registration/judged_match.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kMaxNeighbours = 100;
+
+class Accumulator {
+ public:
+  Accumulator(const IcpMap& target, const Points& source, const std::vector<SurfacePatch>& surfaces,
+              const Pose& pose, const GicpConfig& config, std::vector<IcpMap::Known>& known)
+      : target_(target),
+        source_(source),
+        known_(known),
+        surfaces_(surfaces),
+        pose_(pose),
+        rotation_(pose.rotation_matrix()),
+        config_(config),
+        kernel_(config.kernel_sigmas * config.kernel_sigmas) {}
+
+  void operator()(MatchSums& sums, std::size_t i) const {
+    const Eigen::Vector3d point = source_[i].cast<double>();
+    IcpPair pair;
+    if (!target_.nearest(pose_ * point, config_.max_distance_m, pair, known_[i])) {
+      sums.cost += 0.5 * kernel_;  // as much as the worst match: leaving is no gain
+      return;
+    }
+    ++sums.matched;
+    sums.nearest_squared += static_cast<double>(pair.squared_m2);
+    const Eigen::Matrix3d covariance =
+        surface_covariance(pair.patch, config_) +
+        rotation_ * surface_covariance(surfaces_[i], config_) * rotation_.transpose();
+    const Eigen::Matrix3d information = covariance.inverse();
+    const Eigen::Vector3d pull = information * pair.offset;
+    const double squared = pair.offset.dot(pull);
+    const double share = kernel_ / (kernel_ + squared);  // Geman-McClure
+    const double weight = share * share;
+    Eigen::Matrix<double, 3, 6> jacobian;
+    jacobian << -rotation_ * skew(point), rotation_;
+    sums.cost += 0.5 * share * squared;
+    sums.hessian += weight * jacobian.transpose() * information * jacobian;
+    sums.gradient += weight * jacobian.transpose() * pull;
+    sums.weight += weight;
+    sums.weighted_residual += weight * squared;
+    // Directions that the pair constrains: 1 of two planes, none of what has no surface.
+    const double variance = 2.0 * config_.sigma_m * config_.sigma_m;
+    sums.weighted_rows += weight * variance * information.trace();
+    sums.surface_squared += weight * squared * variance;
+  }
+
+ private:
+  const IcpMap& target_;
+  const Points& source_;
+  std::vector<IcpMap::Known>& known_;  // each element belongs to one point
+  const std::vector<SurfacePatch>& surfaces_;
+  const Pose& pose_;
+  Eigen::Matrix3d rotation_;
+  const GicpConfig& config_;
+  double kernel_;
+};
+
+}  // namespace
+
+void describe(ConfigTable& table, GicpConfig& config) {
+  table.add("max_distance_m", config.max_distance_m, {0.05, 20.0}, "m",
+            "farther neighbours are no match");
+  table.add("sigma_m", config.sigma_m, {0.001, 1.0}, "m", "noise of a point across its surface");
+  table.add("along_sigma_m", config.along_sigma_m, {0.001, 100.0}, "m",
+            "how far along its surface a point may lie from what it matches");
+  table.add("kernel_sigmas", config.kernel_sigmas, {0.1, 100.0}, "",
+            "scale of the Geman-McClure kernel: matches much farther apart hardly count");
+  table.add("source_neighbours", config.source_neighbours, {4, 100}, "",
+            "points from which the surface of a source point is found");
+  table.add("max_planarity", config.max_planarity, {0.0, 1.0}, "",
+            "smallest through middle variance of a neighbourhood that still has a normal");
+  table.add("independent_share", config.independent_share, {1e-4, 1.0}, "",
+            "share of matched points that counts as independent");
+  table.add("max_iterations", config.max_iterations, {1, 1000}, "", "most steps of one match");
+  table.add("max_step_m", config.max_step_m, {0.01, 10.0}, "m", "longest step");
+  table.add("step_translation_m", config.step_translation_m, {1e-7, 0.1}, "m",
+            "converged when a step is shorter");
+  table.add("step_rotation_rad", config.step_rotation_rad, {1e-8, 0.1}, "rad",
+            "converged when a step turns less");
+  table.add("degenerate_ratio", config.degenerate_ratio, {0.0, 0.5}, "",
+            "a direction with less of the strongest direction's information is undetermined");
+  table.add("min_matches", config.min_matches, {6, 100000}, "",
+            "fewer matched points are no match");
+}
+
+Eigen::Matrix3d surface_covariance(const SurfacePatch& patch, const GicpConfig& config) {
+  const double across = config.sigma_m * config.sigma_m;
+  const double along = config.along_sigma_m * config.along_sigma_m;
+  const Eigen::Vector3d direction = patch.direction.cast<double>();
+  const Eigen::Matrix3d axis = direction * direction.transpose();
+  switch (patch.surface) {
+    case SurfaceKind::kPlane:
+      return along * Eigen::Matrix3d::Identity() + (across - along) * axis;
+    case SurfaceKind::kPole:
+      return across * Eigen::Matrix3d::Identity() + (along - across) * axis;
+    case SurfaceKind::kPoint:
+      return across * Eigen::Matrix3d::Identity();
+    case SurfaceKind::kNothing:
+      break;
+  }
+  return along * Eigen::Matrix3d::Identity();
+}
+
+std::vector<SurfacePatch> source_surfaces(const Points& source, const GicpConfig& config) {
+  std::vector<SurfacePatch> surfaces(source.size());
+  if (source.empty()) return surfaces;
+  const KdTreePoints adaptor{&source};
+  const KdTree tree(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(10));
+  parallel_for(source.size(), 256, [&](std::size_t i) {
+    std::array<std::uint32_t, kMaxNeighbours> index;
+    std::array<float, kMaxNeighbours> squared;
+    const std::size_t n =
+        tree.knnSearch(source[i].data(), static_cast<std::size_t>(config.source_neighbours),
+                       index.data(), squared.data());
+    SurfaceSums sums;
+    for (std::size_t k = 0; k < n; ++k)
+      sums.add(source[index[k]] - source[i]);
+    surfaces[i] = surface_of(sums, config.max_planarity);
+  });
+  return surfaces;
+}
+
+MatchSums gicp_cost(const IcpMap& target, const Points& source,
+                    const std::vector<SurfacePatch>& surfaces, const Pose& target_from_source,
+                    const GicpConfig& config, std::vector<IcpMap::Known>& known) {
+  const Accumulator accumulator(target, source, surfaces, target_from_source, config, known);
+  return ordered_sum(source.size(), 64, MatchSums{}, accumulator);
+}
+
+RegistrationResult register_gicp(const IcpMap& target, const Points& source,
+                                 const std::vector<SurfacePatch>& surfaces, const Pose& guess,
+                                 const PoseTerms& terms, const GicpConfig& config) {
+  const auto least = static_cast<std::size_t>(config.min_matches);
+  if (target.size() < least || source.size() < least) {
+    return internal::refused(RegistrationStatus::kTooFewPoints,
+                             "only " + std::to_string(source.size()) + " source and " +
+                                 std::to_string(target.size()) + " target points",
+                             guess);
+  }
+  std::vector<IcpMap::Known> known(source.size());
+  MatchSums at;
+  const auto evaluate = [&](const Pose& pose) {
+    at = gicp_cost(target, source, surfaces, pose, config, known);
+    const double share = config.independent_share;
+    PoseCost sum{share * at.cost, share * at.gradient, share * at.hessian};
+    internal::add_terms(terms, pose, sum);
+    return sum;
+  };
+  const double range = internal::mean_range(source);
+  const internal::Minimum minimum =
+      internal::minimise(evaluate, guess,
+                         {config.max_iterations, config.step_translation_m,
+                          config.step_rotation_rad, config.max_step_m, range});
+  at = gicp_cost(target, source, surfaces, minimum.pose, config, known);
+  return internal::judged_match(minimum, at, source, range, guess, internal::Judgement(config));
+}
+
+}  // namespace understory

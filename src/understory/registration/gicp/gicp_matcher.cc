@@ -1,0 +1,134 @@
+#include "understory/registration/gicp/gicp_matcher.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+class GicpMatchCost : public MatchCost {
+ public:
+  GicpMatchCost(const IcpMap& target, const Points& source, const GicpConfig& steps)
+      : target_(target),
+        source_(source),
+        steps_(steps),
+        surfaces_(source_surfaces(source, steps)) {}
+  [[nodiscard]] PoseCost at(const Pose& target_from_source) const override {
+    std::vector<IcpMap::Known> known(source_.size());
+    const MatchSums sums =
+        gicp_cost(target_, source_, surfaces_, target_from_source, steps_, known);
+    const double share = steps_.independent_share;
+    return {share * sums.cost, share * sums.gradient, share * sums.hessian};
+  }
+  [[nodiscard]] double step_translation_m() const override { return steps_.step_translation_m; }
+  [[nodiscard]] double step_rotation_rad() const override { return steps_.step_rotation_rad; }
+
+ private:
+  const IcpMap& target_;
+  const Points& source_;
+  GicpConfig steps_;
+  std::vector<SurfacePatch> surfaces_;
+};
+
+class GicpTarget : public MatchTarget {
+ public:
+  GicpTarget(IcpMapPtr map, const GicpMatcherConfig& config)
+      : map_(std::move(map)), near_(config.steps), far_(config.steps) {
+    far_.max_distance_m = std::max(config.far_distance_m, near_.max_distance_m);
+    far_.kernel_sigmas = std::max(config.far_kernel_sigmas, near_.kernel_sigmas);
+  }
+
+  [[nodiscard]] RegistrationResult match(const Points& source, const Pose& guess,
+                                         const PoseTerms& terms, MatchStart start) const override {
+    const std::vector<SurfacePatch> surfaces = source_surfaces(source, near_);
+    if (start == MatchStart::kNear || far_.max_distance_m <= near_.max_distance_m)
+      return register_gicp(*map_, source, surfaces, guess, terms, near_);
+    const RegistrationResult far = register_gicp(*map_, source, surfaces, guess, terms, far_);
+    if (!far.usable()) return far;
+    RegistrationResult result =
+        register_gicp(*map_, source, surfaces, far.target_from_source, terms, near_);
+    result.iterations += far.iterations;
+    if (!result.usable()) result.target_from_source = guess;
+    return result;
+  }
+  [[nodiscard]] double reach_m() const override { return near_.max_distance_m; }
+  [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
+                                                      MatchStart start) const override {
+    return std::make_unique<GicpMatchCost>(*map_, source, start == MatchStart::kFar ? far_ : near_);
+  }
+
+ private:
+  IcpMapPtr map_;
+  GicpConfig near_;
+  GicpConfig far_;
+};
+
+IcpMapConfig map_config(const GicpMatcherConfig& config) {
+  IcpMapConfig map = config.map;
+  map.max_planarity = config.steps.max_planarity;
+  return map;
+}
+
+class GicpTargetBuilder : public TargetBuilder {
+ public:
+  explicit GicpTargetBuilder(const GicpMatcherConfig& config)
+      : config_(config), builder_(map_config(config)) {}
+
+  void insert(const Points& points_in_source, const Pose& target_from_source,
+              std::optional<double> forget_beyond_m) override {
+    builder_.insert(points_in_source, target_from_source);
+    if (forget_beyond_m) builder_.remove_beyond(target_from_source.translation(), *forget_beyond_m);
+  }
+  void clear() override { builder_.clear(); }
+  [[nodiscard]] MatchTargetPtr snapshot() override {
+    return std::make_shared<GicpTarget>(builder_.snapshot(), config_);
+  }
+
+ private:
+  GicpMatcherConfig config_;
+  IcpMapBuilder builder_;
+};
+
+class GicpMatcher : public Matcher {
+ public:
+  explicit GicpMatcher(const GicpMatcherConfig& config) : config_(config) {
+    const double most = IcpMap::kMaxReach * config.map.cube_m;
+    if (std::max(config.steps.max_distance_m, config.far_distance_m) > most + 1e-9)
+      throw ConfigError({"gicp: max_distance_m and far_distance_m: expected at most " +
+                         std::to_string(IcpMap::kMaxReach) + " times map_cube_m"});
+  }
+  [[nodiscard]] std::unique_ptr<TargetBuilder> make_builder(const Viewpoint&) const override {
+    return std::make_unique<GicpTargetBuilder>(config_);
+  }
+  [[nodiscard]] double reach_m() const override { return config_.steps.max_distance_m; }
+  [[nodiscard]] bool sums_up_points() const override { return true; }
+
+ private:
+  GicpMatcherConfig config_;
+};
+
+}  // namespace
+
+void describe(ConfigTable& table, GicpMatcherConfig& config) {
+  describe(table, config.steps);
+  table.add("far_distance_m", config.far_distance_m, {0.0, 20.0}, "m",
+            "max_distance_m of the first steps where the guess may be far off; 0: no such steps");
+  table.add("far_kernel_sigmas", config.far_kernel_sigmas, {0.1, 1000.0}, "",
+            "kernel_sigmas of those steps");
+  table.add("map_cube_m", config.map.cube_m, {0.05, 5.0}, "m",
+            "a target has one point per cube of this edge");
+  table.add("map_growth", config.map.growth, {0.0, 10.0}, "",
+            "share of new points at which that point is worked out again");
+}
+
+std::unique_ptr<const Matcher> make_matcher(const GicpMatcherConfig& config) {
+  return std::make_unique<GicpMatcher>(config);
+}
+
+std::vector<SuitedSetting> suited_settings(const GicpMatcherConfig&, const ScanTraits&) {
+  return {};
+}
+
+}  // namespace understory
