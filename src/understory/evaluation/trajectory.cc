@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "understory/evaluation/table_reader.h"
+#include "understory/util/csv.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -27,8 +27,7 @@ bool parse_stamp(std::string_view text, TimeNs& stamp) {
 StampedPose parse_pose(const std::vector<std::string_view>& cells, const LineReader& lines) {
   constexpr std::size_t kColumns = 8;
   const auto fail = [&](const std::string& what) {
-    throw InputError(lines.file(), lines.position(),
-                     "expected 'timestamp_s x y z qx qy qz qw', " + what);
+    lines.fail("expected 'timestamp_s x y z qx qy qz qw', " + what);
   };
   if (cells.size() != kColumns) fail("found " + std::to_string(cells.size()) + " columns");
   StampedPose pose;
@@ -37,9 +36,10 @@ StampedPose parse_pose(const std::vector<std::string_view>& cells, const LineRea
   }
   std::array<double, kColumns> v{};
   for (std::size_t i = 1; i < kColumns; ++i) {
-    if (!parse_number(cells[i], v[i]) || !std::isfinite(v[i])) {
+    const std::optional<double> value = to_number(cells[i]);
+    if (!value || !std::isfinite(*value))
       fail("found '" + std::string(cells[i]) + "' for a finite number");
-    }
+    v[i] = *value;
   }
   const Eigen::Quaterniond rotation(v[7], v[4], v[5], v[6]);
   if (rotation.norm() < 1e-6) fail("found a quaternion of length zero");
@@ -77,8 +77,7 @@ std::vector<StampedVelocity> read_velocities(const std::filesystem::path& path) 
   while (table.next()) {
     StampedVelocity row;
     if (!parse_stamp(table.text("timestamp"), row.stamp)) {
-      throw InputError(path.string(), table.lines().position(),
-                       "expected seconds in column 'timestamp'");
+      table.fail("expected seconds in column 'timestamp'");
     }
     row.velocity_in_world = {table.number("vx"), table.number("vy"), table.number("vz")};
     if (row.velocity_in_world.allFinite()) rows.push_back(row);
@@ -93,8 +92,7 @@ std::vector<StampedPoint> read_points(const std::filesystem::path& path) {
   while (table.next()) {
     StampedPoint row;
     if (!parse_stamp(table.text("timestamp"), row.stamp)) {
-      throw InputError(path.string(), table.lines().position(),
-                       "expected seconds in column 'timestamp'");
+      table.fail("expected seconds in column 'timestamp'");
     }
     row.point = {table.finite("x"), table.finite("y"), table.finite("z")};
     rows.push_back(row);

@@ -6,7 +6,7 @@
 #include <optional>
 #include <tuple>
 
-#include "understory/evaluation/table_reader.h"
+#include "understory/util/csv.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -17,9 +17,17 @@ std::optional<int> whole_number(const CsvReader& table, const std::string& colum
   const double value = table.number(column);
   if (!std::isfinite(value)) return std::nullopt;
   if (std::abs(value) > std::numeric_limits<int>::max())
-    throw InputError(table.lines().file(), table.lines().position(),
-                     "expected a smaller number in column '" + column + "'");
+    table.fail("expected a smaller number in column '" + column + "'");
   return static_cast<int>(value);
+}
+
+// Stays as it is where the cell is empty: an unknown number, or no observations.
+void read_cell(const CsvReader& table, const TreeColumn& column, Tree& tree) {
+  if (const auto* number = std::get_if<double Tree::*>(&column.member)) {
+    tree.*(*number) = table.number(column.name);
+  } else if (const auto value = whole_number(table, column.name)) {
+    tree.*std::get<int Tree::*>(column.member) = *value;
+  }
 }
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -63,18 +71,12 @@ std::vector<Tree> read_trees(const std::filesystem::path& path) {
   std::vector<Tree> trees;
   while (table.next()) {
     Tree tree;
-    tree.id = whole_number(table, "id").value_or(static_cast<int>(trees.size()) + 1);
+    for (const TreeColumn& column : kTreeColumns)
+      read_cell(table, column, tree);
+    if (!std::isfinite(table.number("id"))) tree.id = static_cast<int>(trees.size()) + 1;
     tree.x = table.finite("x");
     tree.y = table.finite("y");
-    const double z = table.number("z");
-    tree.z = std::isfinite(z) ? z : 0.0;
-    tree.dbh_m = table.number("dbh_m");
-    tree.dbh_sd_m = table.number("dbh_sd_m");
-    tree.height_m = table.number("height_m");
-    tree.lean_deg = table.number("lean_deg");
-    tree.observations = whole_number(table, "observations").value_or(0);
-    tree.x_sd_m = table.number("x_sd_m");
-    tree.y_sd_m = table.number("y_sd_m");
+    if (!std::isfinite(tree.z)) tree.z = 0.0;
     tree.felled = !table.text("felled_at").empty();
     trees.push_back(tree);
   }

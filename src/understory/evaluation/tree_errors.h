@@ -8,7 +8,7 @@
 
 #include "understory/evaluation/alignment.h"
 #include "understory/evaluation/trajectory.h"
-#include "understory/forest/tree.h"
+#include "understory/sensor/tree.h"
 
 namespace understory {
 

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "understory/evaluation/table_reader.h"
+#include "understory/util/csv.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -13,8 +13,7 @@ namespace {
 TimeNs time_in(const CsvReader& table, const std::string& column) {
   TimeNs time = 0;
   if (!parse_seconds(std::string(table.text(column)), time))
-    throw InputError(table.lines().file(), table.lines().position(),
-                     "expected seconds in column '" + column + "'");
+    table.fail("expected seconds in column '" + column + "'");
   return time;
 }
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "understory/evaluation/tree_merge.h"
-#include "understory/forest/tree.h"
+#include "understory/sensor/tree.h"
 
 namespace understory {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "understory/forest/tree.h"
+#include "understory/sensor/tree.h"
 
 namespace understory {
 

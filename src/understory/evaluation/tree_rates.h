@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/forest/tree.h"
+#include "understory/sensor/tree.h"
 
 namespace understory {
 

@@ -7,8 +7,8 @@
 
 #include "understory/forest/ground.h"
 #include "understory/forest/stem_detector.h"
-#include "understory/forest/tree.h"
 #include "understory/forest/tree_segments.h"
+#include "understory/sensor/tree.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
 

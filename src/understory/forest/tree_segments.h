@@ -5,7 +5,7 @@
 
 #include "understory/forest/ground.h"
 #include "understory/forest/point_blocks.h"
-#include "understory/forest/tree.h"
+#include "understory/sensor/tree.h"
 
 namespace understory {
 

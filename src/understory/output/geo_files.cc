@@ -61,6 +61,16 @@ void set_system(OGRSpatialReference& system, const std::string& wkt) {
   }
 }
 
+// Left null where the value is not known.
+void set_field(OGRFeature& feature, const TreeColumn& column, const Tree& tree) {
+  if (const auto* whole = std::get_if<int Tree::*>(&column.member)) {
+    feature.SetField(column.name, tree.*(*whole));
+    return;
+  }
+  const double value = tree.*std::get<double Tree::*>(column.member);
+  if (std::isfinite(value)) feature.SetField(column.name, value);
+}
+
 }  // namespace
 
 void write_geotiff(const std::filesystem::path& path, const Raster& raster,
@@ -116,28 +126,17 @@ void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>
   OGRLayer* layer =
       dataset->CreateLayer("trees", crs_wkt.empty() ? nullptr : &system, wkbPoint25D, nullptr);
   if (layer == nullptr) fail(path);
-  using Column = std::pair<const char*, double Tree::*>;
-  constexpr std::array<Column, 6> kColumns = {{{"dbh_m", &Tree::dbh_m},
-                                               {"dbh_sd_m", &Tree::dbh_sd_m},
-                                               {"height_m", &Tree::height_m},
-                                               {"lean_deg", &Tree::lean_deg},
-                                               {"x_sd_m", &Tree::x_sd_m},
-                                               {"y_sd_m", &Tree::y_sd_m}}};
-  OGRFieldDefn id("id", OFTInteger);
-  OGRFieldDefn observations("observations", OFTInteger);
-  if (layer->CreateField(&id) != OGRERR_NONE) fail(path);
-  for (const Column& column : kColumns) {
-    OGRFieldDefn field(column.first, OFTReal);
+  for (const TreeColumn& column : kTreeColumns) {
+    if (column.place) continue;
+    const bool whole = std::holds_alternative<int Tree::*>(column.member);
+    OGRFieldDefn field(column.name, whole ? OFTInteger : OFTReal);
     if (layer->CreateField(&field) != OGRERR_NONE) fail(path);
   }
-  if (layer->CreateField(&observations) != OGRERR_NONE) fail(path);
   dataset->StartTransaction();
   for (const Tree& tree : trees) {
     const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer->GetLayerDefn()));
-    feature->SetField("id", tree.id);
-    feature->SetField("observations", tree.observations);
-    for (const auto& [name, member] : kColumns) {
-      if (std::isfinite(tree.*member)) feature->SetField(name, tree.*member);
+    for (const TreeColumn& column : kTreeColumns) {
+      if (!column.place) set_field(*feature, column, tree);
     }
     OGRPoint point(tree.x, tree.y, tree.z);
     feature->SetGeometry(&point);

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "understory/forest/tree.h"
 #include "understory/geometry/raster.h"
+#include "understory/sensor/tree.h"
 
 namespace understory {
 

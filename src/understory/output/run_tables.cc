@@ -10,18 +10,12 @@
 #include <limits>
 #include <string_view>
 
+#include "understory/util/csv.h"
+
 namespace understory {
 namespace {
 
-// A number with `decimals` decimals, nothing where it is not known; never "-0.000".
-std::string cell(double value, int decimals) {
-  if (!std::isfinite(value)) return "";
-  std::string text = fmt::format("{:.{}f}", value, decimals);
-  if (text.front() == '-' && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
-  return text;
-}
-
-// What a reader gets of a cell that was written with `cell` or by a format.
+// What a reader gets of a cell that was written with `csv_cell` or by a format.
 double read_back(std::string_view text) {
   double value = std::numeric_limits<double>::quiet_NaN();
   std::from_chars(text.data(), text.data() + text.size(), value);
@@ -99,7 +93,7 @@ GnssWriter::GnssWriter(const std::filesystem::path& path) : file_(path) {
 
 void GnssWriter::add(const GnssRow& row) {
   std::string line = format_seconds(row.fix.stamp);
-  const auto put = [&](double value, int decimals) { line += "," + cell(value, decimals); };
+  const auto put = [&](double value, int decimals) { line += "," + csv_cell(value, decimals); };
   for (int i = 0; i < 3; ++i)
     put(row.position_in_world[i], 4);
   put(row.fix.latitude_deg, 9);
@@ -146,13 +140,9 @@ void write_g2o(const std::filesystem::path& path, const std::vector<GraphVertex>
 
 void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>& trees) {
   AtomicTextFile file(path);
-  file.write("id,x,y,z,dbh_m,dbh_sd_m,height_m,lean_deg,observations,x_sd_m,y_sd_m\n");
-  for (const Tree& tree : trees) {
-    file.write(fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", tree.id, cell(tree.x, 3),
-                           cell(tree.y, 3), cell(tree.z, 3), cell(tree.dbh_m, 4),
-                           cell(tree.dbh_sd_m, 4), cell(tree.height_m, 2), cell(tree.lean_deg, 2),
-                           tree.observations, cell(tree.x_sd_m, 4), cell(tree.y_sd_m, 4)));
-  }
+  file.write(tree_csv_header() + "\n");
+  for (const Tree& tree : trees)
+    file.write(tree_csv_row(tree) + "\n");
   file.commit();
 }
 
@@ -179,7 +169,7 @@ Stem StemsWriter::add(int frame, TimeNs stamp, const Stem& stem) {
     return static_cast<float>(read_back(text));
   };
   const auto fixed = [&](float value, int decimals) {
-    return add_cell(cell(static_cast<double>(value), decimals));
+    return add_cell(csv_cell(static_cast<double>(value), decimals));
   };
   // Two figures tell a spread.
   const auto spread = [&](float value) {
@@ -191,7 +181,7 @@ Stem StemsWriter::add(int frame, TimeNs stamp, const Stem& stem) {
     read.point[i] = fixed(stem.point[i], 3);
   Eigen::Vector3d axis;
   for (int i = 0; i < 3; ++i) {
-    const std::string text = cell(static_cast<double>(stem.axis[i]), 4);
+    const std::string text = csv_cell(static_cast<double>(stem.axis[i]), 4);
     axis[i] = read_back(text);
     line += "," + text;
   }

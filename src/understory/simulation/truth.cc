@@ -13,6 +13,7 @@
 #include <fstream>
 #include <map>
 
+#include "understory/sensor/tree.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -102,6 +103,20 @@ void write_returns(const std::string& path, const TruthLog& log) {
 }
 
 // Trees that were felled while the recording ran say when, by its clock.
+// As it grew: nothing of it is uncertain.
+Tree truth_of(const GrownTree& grown) {
+  Tree tree;
+  tree.id = grown.id;
+  tree.x = grown.foot.x();
+  tree.y = grown.foot.y();
+  tree.z = grown.foot.z();
+  tree.dbh_m = grown.dbh_m;
+  tree.height_m = grown.height_m;
+  tree.lean_deg = grown.lean_deg();
+  tree.dbh_sd_m = tree.x_sd_m = tree.y_sd_m = 0.0;
+  return tree;
+}
+
 std::string trees_text(const SimulatedWorld& world, TimeNs start, const TruthLog& log) {
   const std::vector<ScanTruth>& scans = log.scans();
   std::map<int, int> observations;
@@ -114,15 +129,14 @@ std::string trees_text(const SimulatedWorld& world, TimeNs start, const TruthLog
     const TimeNs time = start + from_seconds(felling.grab_s);
     if (!scans.empty() && time < scans.back().stamp) felled[felling.tree] = format_seconds(time);
   }
-  std::string text =
-      "id,x,y,z,dbh_m,dbh_sd_m,height_m,lean_deg,observations,x_sd_m,y_sd_m,species,felled_at\n";
-  for (const GrownTree& tree : world.stand.trees) {
-    const auto seen = observations.find(tree.id);
-    const auto cut = felled.find(tree.id);
-    text += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.4f},0,{:.3f},{:.3f},{},0,0,{},{}\n", tree.id,
-                        tree.foot.x(), tree.foot.y(), tree.foot.z(), tree.dbh_m, tree.height_m,
-                        tree.lean_deg(), seen == observations.end() ? 0 : seen->second,
-                        species_name(tree.species), cut == felled.end() ? "" : cut->second);
+  std::string text = tree_csv_header() + ",species,felled_at\n";
+  for (const GrownTree& grown : world.stand.trees) {
+    const auto seen = observations.find(grown.id);
+    const auto cut = felled.find(grown.id);
+    Tree tree = truth_of(grown);
+    tree.observations = seen == observations.end() ? 0 : seen->second;
+    text += fmt::format("{},{},{}\n", tree_csv_row(tree, 1), species_name(grown.species),
+                        cut == felled.end() ? "" : cut->second);
   }
   return text;
 }

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/forest/tree.h"
+#include "understory/sensor/tree.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/graph/self_correction/stem_correction.h"
 #include "understory/map/stem_map.h"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <map>
 
-#include "understory/evaluation/table_reader.h"
 #include "understory/output/run_tables.h"
 #include "understory/util/atomic_file.h"
+#include "understory/util/csv.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -40,8 +40,7 @@ void write_cuts(const std::filesystem::path& path, const std::vector<PlacedCut>&
 TimeNs stamp_in(const CsvReader& table) {
   TimeNs stamp = 0;
   if (!parse_seconds(std::string(table.text("timestamp")), stamp))
-    throw InputError(table.lines().file(), table.lines().position(),
-                     "expected seconds in column 'timestamp'");
+    table.fail("expected seconds in column 'timestamp'");
   return stamp;
 }
 

@@ -266,12 +266,12 @@ class CloudFolder : public Recording {
     std::error_code error;
     const fs::path imu = folder_ / "imu.csv";
     if (fs::is_regular_file(imu, error)) {
-      imu_ = std::make_unique<CsvImuReader>(open_file(imu.string()), log_);
+      imu_ = std::make_unique<CsvImuReader>(imu, log_);
       imu_statistics_ = side_report("imu.csv", "csv", "imu", "rad/s, m/s²; with gravity");
     }
     const fs::path fixes = folder_ / "gnss.csv";
     if (fs::is_regular_file(fixes, error)) {
-      fixes_ = std::make_unique<CsvGnssReader>(open_file(fixes.string()), log_);
+      fixes_ = std::make_unique<CsvGnssReader>(fixes, log_);
       fix_statistics_ = side_report("gnss.csv", "csv", "gnss", "WGS 84, ellipsoidal height");
       return;
     }

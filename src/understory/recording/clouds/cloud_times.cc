@@ -8,6 +8,7 @@
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/clouds/text_lines.h"
 #include "understory/recording/finding.h"
+#include "understory/util/csv.h"
 #include "understory/util/error.h"
 
 namespace understory {

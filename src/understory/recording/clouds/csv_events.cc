@@ -1,7 +1,5 @@
 #include "understory/recording/clouds/csv_events.h"
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
 
@@ -11,74 +9,24 @@ namespace understory {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kMostColumns = 256;
 constexpr std::uint64_t kBeyondSeconds = 100'000'000'000;
-
-std::string lower(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
 
 }  // namespace
 
-CsvRows::CsvRows(std::unique_ptr<ByteSource> file, Log& log)
-    : file_(std::move(file)), lines_(*file_), log_(log) {
-  std::string_view line;
-  while (lines_.next(line)) {
-    if (line.empty() || line.front() == '#') {
-      // "# timestamp,gx,..." is a header as well.
-      if (line.find(',') == std::string_view::npos) continue;
-      line.remove_prefix(1);
-    }
-    break;
-  }
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (line.rfind(kByteOrderMark, 0) == 0) line.remove_prefix(kByteOrderMark.size());
-  for (const std::string_view cell : split_cells(line, ',')) {
-    if (names_.size() == kMostColumns) break;
-    names_.push_back(lower(cell));
-    columns_.emplace(names_.back(), names_.size() - 1);
-  }
+EventRows::EventRows(const std::filesystem::path& path, Log& log)
+    : log_(log),
+      table_(path, {},
+             {.any_case = true,
+              .header_in_comment = true,
+              .on_short_row = [this](const std::string& problem) { damaged(problem); }}) {}
+
+double EventRows::number(std::size_t column) const {
+  return to_number(table_.text(column)).value_or(kUnknown);
 }
 
-std::optional<std::size_t> CsvRows::find(const std::vector<std::string>& names) const {
-  for (const std::string& name : names) {
-    const auto column = columns_.find(name);
-    if (column != columns_.end()) return column->second;
-  }
-  return std::nullopt;
-}
-
-std::size_t CsvRows::require(const std::vector<std::string>& names) const {
-  if (const auto column = find(names)) return *column;
-  throw InputError(file_->name(), "line 1", "expected a header with the column " + names.front());
-}
-
-bool CsvRows::next() {
-  std::string_view line;
-  while (lines_.next(line)) {
-    if (line.empty() || line.front() == '#') continue;
-    const std::vector<std::string_view> cells = split_cells(line, ',');
-    if (cells.size() < names_.size()) {
-      damaged("expected " + std::to_string(names_.size()) + " cells, found " +
-              std::to_string(cells.size()));
-      continue;
-    }
-    cells_.assign(cells.begin(), cells.begin() + static_cast<std::ptrdiff_t>(names_.size()));
-    return true;
-  }
-  return false;
-}
-
-double CsvRows::number(std::size_t column) const {
-  return to_number(cells_[column]).value_or(kUnknown);
-}
-
-std::optional<TimeNs> CsvRows::time(std::size_t column) const {
-  const std::string& text = cells_[column];
-  const std::string& name = names_[column];
+std::optional<TimeNs> EventRows::time(std::size_t column) const {
+  const std::string text(table_.text(column));
+  const std::string& name = table_.names()[column];
   const auto whole = to_count(text);
   const bool says_ns = name.size() > 3 && name.compare(name.size() - 3, 3, "_ns") == 0;
   if (whole && (says_ns || *whole > kBeyondSeconds))
@@ -92,23 +40,12 @@ std::optional<TimeNs> CsvRows::time(std::size_t column) const {
   return from_seconds(*value);
 }
 
-void CsvRows::damaged(const std::string& what) {
+void EventRows::damaged(const std::string& what) {
   log_.warn("recording.damaged_line",
-            file_->name() + ": line " + std::to_string(lines_.number()) + ": " + what);
+            table_.lines().file() + ": " + table_.lines().position() + ": " + what);
 }
 
-void CsvRows::save(BinaryWriter& writer) const {
-  writer.put(lines_.position());
-  writer.put(lines_.number());
-}
-
-void CsvRows::load(BinaryReader& reader) {
-  const auto position = reader.get<std::uint64_t>();
-  lines_.go_to(position, reader.get<std::uint64_t>());
-}
-
-CsvImuReader::CsvImuReader(std::unique_ptr<ByteSource> file, Log& log)
-    : rows_(std::move(file), log) {
+CsvImuReader::CsvImuReader(const std::filesystem::path& path, Log& log) : rows_(path, log) {
   time_ = rows_.require({"timestamp", "time", "t", "timestamp_ns", "timestamp_s", "stamp"});
   const char* axes[] = {"x", "y", "z"};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -136,8 +73,7 @@ std::optional<ImuSample> CsvImuReader::next() {
   return std::nullopt;
 }
 
-CsvGnssReader::CsvGnssReader(std::unique_ptr<ByteSource> file, Log& log)
-    : rows_(std::move(file), log) {
+CsvGnssReader::CsvGnssReader(const std::filesystem::path& path, Log& log) : rows_(path, log) {
   time_ = rows_.require({"timestamp", "time", "t", "timestamp_ns", "timestamp_s", "stamp"});
   latitude_ = rows_.require({"latitude_deg", "latitude", "lat"});
   longitude_ = rows_.require({"longitude_deg", "longitude", "lon"});

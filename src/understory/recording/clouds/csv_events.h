@@ -1,34 +1,35 @@
 #pragma once
 
-#include <cstdint>
-#include <map>
-#include <memory>
+#include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "understory/recording/bags/byte_source.h"
-#include "understory/recording/clouds/text_lines.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/imu_sample.h"
 #include "understory/util/binary_io.h"
+#include "understory/util/csv.h"
 #include "understory/util/log.h"
 
 namespace understory {
 
-// The rows of a CSV file with a header line, as numbers by column name. Rows that cannot be read
-// are passed over with a warning ("recording.damaged"). Not thread-safe.
-class CsvRows {
+// The rows of imu.csv or gnss.csv. Rows that cannot be read are passed over with a warning
+// ("recording.damaged_line"). Not thread-safe.
+class EventRows {
  public:
-  CsvRows(std::unique_ptr<ByteSource> file, Log& log);
+  EventRows(const std::filesystem::path& path, Log& log);
 
   // Column names in lower case; several names for one column may be given. Throws InputError if
   // none of them is there.
-  [[nodiscard]] std::size_t require(const std::vector<std::string>& names) const;
-  [[nodiscard]] std::optional<std::size_t> find(const std::vector<std::string>& names) const;
+  [[nodiscard]] std::size_t require(const std::vector<std::string>& names) const {
+    return table_.require(names);
+  }
+  [[nodiscard]] std::optional<std::size_t> find(const std::vector<std::string>& names) const {
+    return table_.find(names);
+  }
   // The next row with as many cells as there are columns; false at the end.
-  [[nodiscard]] bool next();
-  [[nodiscard]] const std::string& cell(std::size_t column) const { return cells_[column]; }
+  [[nodiscard]] bool next() { return table_.next(); }
   // NaN where the cell is empty or no number.
   [[nodiscard]] double number(std::size_t column) const;
   // Nanoseconds where the column's name ends with _ns or the number is whole and beyond 1e11, else
@@ -36,28 +37,24 @@ class CsvRows {
   [[nodiscard]] std::optional<TimeNs> time(std::size_t column) const;
   void damaged(const std::string& what);
   // Which rows have been read, and back to there.
-  void save(BinaryWriter& writer) const;
-  void load(BinaryReader& reader);
+  void save(BinaryWriter& writer) const { table_.save(writer); }
+  void load(BinaryReader& reader) { table_.load(reader); }
 
  private:
-  std::unique_ptr<ByteSource> file_;
-  TextLines lines_;
   Log& log_;
-  std::map<std::string, std::size_t> columns_;
-  std::vector<std::string> names_;
-  std::vector<std::string> cells_;
+  CsvReader table_;
 };
 
 // imu.csv: timestamp, gx, gy, gz (rad/s), ax, ay, az (m/s², +9.81 up at rest).
 class CsvImuReader {
  public:
-  CsvImuReader(std::unique_ptr<ByteSource> file, Log& log);
+  CsvImuReader(const std::filesystem::path& path, Log& log);
   [[nodiscard]] std::optional<ImuSample> next();
   void save(BinaryWriter& writer) const { rows_.save(writer); }
   void load(BinaryReader& reader) { rows_.load(reader); }
 
  private:
-  CsvRows rows_;
+  EventRows rows_;
   std::size_t time_ = 0;
   std::size_t rate_[3]{};
   std::size_t force_[3]{};
@@ -67,7 +64,7 @@ class CsvImuReader {
 // hdop, vdop, satellites, quality, track_deg, speed_m_s, sd_east_m, sd_north_m, sd_up_m.
 class CsvGnssReader {
  public:
-  CsvGnssReader(std::unique_ptr<ByteSource> file, Log& log);
+  CsvGnssReader(const std::filesystem::path& path, Log& log);
   [[nodiscard]] std::optional<GnssFix> next();
   void save(BinaryWriter& writer) const { rows_.save(writer); }
   void load(BinaryReader& reader) { rows_.load(reader); }
@@ -75,7 +72,7 @@ class CsvGnssReader {
  private:
   [[nodiscard]] double optional_number(const std::optional<std::size_t>& column) const;
 
-  CsvRows rows_;
+  EventRows rows_;
   std::size_t time_ = 0, latitude_ = 0, longitude_ = 0, height_ = 0;
   std::optional<std::size_t> hdop_, vdop_, satellites_, quality_, track_, speed_;
   std::optional<std::size_t> sd_[3];

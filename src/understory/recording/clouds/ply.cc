@@ -6,6 +6,7 @@
 #include "understory/recording/clouds/cloud_table.h"
 #include "understory/recording/clouds/text_lines.h"
 #include "understory/recording/finding.h"
+#include "understory/util/csv.h"
 #include "understory/util/error.h"
 
 namespace understory {

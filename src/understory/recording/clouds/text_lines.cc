@@ -8,14 +8,6 @@ namespace {
 constexpr std::size_t kWindow = 1U << 16;
 constexpr std::size_t kLongestLine = 1U << 16;
 
-std::string_view trim(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t'))
-    text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
-    text.remove_suffix(1);
-  return text;
-}
-
 }  // namespace
 
 bool TextLines::next(std::string_view& line) {
@@ -60,17 +52,6 @@ std::vector<std::string_view> split_words(std::string_view line) {
   std::vector<std::string_view> words;
   split_words(line, words);
   return words;
-}
-
-std::vector<std::string_view> split_cells(std::string_view line, char separator) {
-  std::vector<std::string_view> cells;
-  std::size_t begin = 0;
-  while (true) {
-    const std::size_t end = line.find(separator, begin);
-    cells.push_back(trim(line.substr(begin, end - begin)));
-    if (end == std::string_view::npos) return cells;
-    begin = end + 1;
-  }
 }
 
 }  // namespace understory

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <charconv>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -42,25 +40,4 @@ class TextLines {
 // The words between blanks, tabs (and nothing else).
 [[nodiscard]] std::vector<std::string_view> split_words(std::string_view line);
 void split_words(std::string_view line, std::vector<std::string_view>& words);
-// The cells between separators, without the blanks around them.
-[[nodiscard]] std::vector<std::string_view> split_cells(std::string_view line, char separator);
-
-// A whole text as a number ("nan" and "inf" included); nothing if it is none.
-[[nodiscard]] inline std::optional<double> to_number(std::string_view text) {
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (end != text.data() + text.size() || text.empty()) return std::nullopt;
-  if (error == std::errc::result_out_of_range) return value;
-  if (error != std::errc()) return std::nullopt;
-  return value;
-}
-
-[[nodiscard]] inline std::optional<std::uint64_t> to_count(std::string_view text) {
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
 }  // namespace understory

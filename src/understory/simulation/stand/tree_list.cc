@@ -3,76 +3,49 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <string>
 
 #include "understory/simulation/sensors/counter_noise.h"
 #include "understory/simulation/stand/stand_drawing.h"
 #include "understory/simulation/stand/tree_cloud.h"
-#include "understory/util/error.h"
-#include "understory/util/text_file.h"
+#include "understory/util/csv.h"
 
 namespace understory {
 namespace {
 
 constexpr int kLargestId = 10'000'000;
 
-std::vector<std::string> fields_of(std::string line) {
-  while (!line.empty() && (line.back() == '\r' || line.back() == ' '))
-    line.pop_back();
-  std::vector<std::string> fields(1);
-  for (const char c : line) {
-    if (c == ',') {
-      fields.emplace_back();
-    } else if (c != '"') {
-      fields.back() += c;
-    }
-  }
-  return fields;
-}
-
-// One line of the list, by the names of its columns.
-class Row {
+// The list of trees; `fail` of a row names its line.
+class TreeTable {
  public:
-  Row(const std::string& path, std::size_t line, const std::map<std::string, std::size_t>& columns,
-      std::vector<std::string> fields)
-      : path_(path), line_(line), columns_(columns), fields_(std::move(fields)) {}
+  explicit TreeTable(const std::string& path) : table_(path, {"x", "y", "dbh_m"}) {}
 
+  [[nodiscard]] bool next() { return table_.next(); }
+  [[nodiscard]] std::uint64_t line() const { return table_.lines().line_number(); }
   [[nodiscard]] std::string text(const std::string& name) const {
-    const auto found = columns_.find(name);
-    return found == columns_.end() || found->second >= fields_.size() ? "" : fields_[found->second];
+    return std::string(table_.text(name));
   }
-  [[nodiscard]] bool has(const std::string& name) const { return !text(name).empty(); }
-
+  [[nodiscard]] bool has(const std::string& name) const { return !table_.text(name).empty(); }
   [[nodiscard]] double number(const std::string& name, double low, double high) const {
-    const std::string value = text(name);
-    double parsed = 0.0;
-    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), parsed);
-    const bool whole = error == std::errc() && end == value.data() + value.size();
-    if (!whole || !(parsed >= low && parsed <= high)) {
-      fail(fmt::format("{} is \"{}\", expected a number in {}..{}", name, value, low, high));
+    const std::optional<double> value = to_number(table_.text(name));
+    if (!value || !(*value >= low && *value <= high)) {
+      fail(fmt::format("{} is \"{}\", expected a number in {}..{}", name, text(name), low, high));
     }
-    return parsed;
+    return *value;
   }
-
-  [[noreturn]] void fail(const std::string& what) const {
-    throw InputError(path_, fmt::format("line {}", line_), what);
-  }
+  [[noreturn]] void fail(const std::string& what) const { table_.fail(what); }
 
  private:
-  const std::string& path_;
-  std::size_t line_;
-  const std::map<std::string, std::size_t>& columns_;
-  std::vector<std::string> fields_;
+  CsvReader table_;
 };
 
-Species species_of(const Row& row, Species drawn) {
+Species species_of(const TreeTable& row, Species drawn) {
   const std::string name = row.text("species");
   if (name.empty()) return drawn;
   for (const Species species : {Species::kPine, Species::kSpruce, Species::kBirch}) {
@@ -81,8 +54,8 @@ Species species_of(const Row& row, Species drawn) {
   row.fail("species is \"" + name + "\", expected pine, spruce or birch");
 }
 
-GrownTree read_tree(const std::string& list, const Row& row, int number, const StandConfig& config,
-                    const Terrain& terrain, Random& random) {
+GrownTree read_tree(const std::string& list, const TreeTable& row, int number,
+                    const StandConfig& config, const Terrain& terrain, Random& random) {
   GrownTree tree = draw_tree(config, random);
   tree.species = species_of(row, tree.species);
   const double x = row.number("x", -0.5 * config.size_x_m, 0.5 * config.size_x_m);
@@ -126,50 +99,23 @@ void measure_clouds(std::vector<GrownTree>& trees) {
 }  // namespace
 
 std::vector<std::string> tree_cloud_files(const std::string& list) {
-  std::ifstream file(list);
-  std::string line;
+  if (!std::filesystem::is_regular_file(list)) return {};
   std::set<std::string> files;
-  if (!read_line(file, line, list, 1)) return {};
-  const std::vector<std::string> names = fields_of(line);
-  const auto column = static_cast<std::size_t>(
-      std::distance(names.begin(), std::find(names.begin(), names.end(), "cloud")));
-  for (std::uint64_t number = 2; read_line(file, line, list, number); ++number) {
-    const std::vector<std::string> fields = fields_of(line);
-    if (column < fields.size() && !fields[column].empty()) {
-      files.insert((std::filesystem::path(list).parent_path() / fields[column]).string());
-    }
+  CsvReader table(list);
+  while (table.next()) {
+    const std::string cloud(table.text("cloud"));
+    if (!cloud.empty()) files.insert((std::filesystem::path(list).parent_path() / cloud).string());
   }
   return {files.begin(), files.end()};
 }
 
 std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& config,
                                   const Terrain& terrain, std::uint64_t seed) {
-  std::ifstream file(path);
-  std::string line;
-  if (!file) throw InputError(path, "", "the list of trees cannot be opened");
-  if (!read_line(file, line, path, 1)) {
-    throw InputError(path, "", "expected a list of trees: a CSV with the columns x, y, dbh_m");
-  }
-  std::map<std::string, std::size_t> columns;
-  const std::vector<std::string> names = fields_of(line);
-  for (std::size_t i = 0; i < names.size(); ++i)
-    columns.emplace(names[i], i);
-  for (const char* needed : {"x", "y", "dbh_m"}) {
-    if (!columns.count(needed)) {
-      throw InputError(path, "line 1",
-                       fmt::format("no column {}, expected at least x, y, dbh_m", needed));
-    }
-  }
+  TreeTable row(path);
   std::vector<GrownTree> trees;
   std::set<int> ids;
-  for (std::size_t number = 2; read_line(file, line, path, number); ++number) {
-    std::vector<std::string> fields = fields_of(line);
-    if (fields.size() == 1 && fields[0].empty()) continue;
-    const std::size_t held = fields.size();
-    const Row row(path, number, columns, std::move(fields));
-    if (held < names.size())
-      row.fail(fmt::format("holds {} of {} columns: is the list cut off?", held, names.size()));
-    Random random(hash_numbers(seed, stream_of(NoiseStream::kStand), number));
+  while (row.next()) {
+    Random random(hash_numbers(seed, stream_of(NoiseStream::kStand), row.line()));
     trees.push_back(
         read_tree(path, row, static_cast<int>(trees.size()) + 1, config, terrain, random));
     if (!ids.insert(trees.back().id).second) {

@@ -1,4 +1,4 @@
-#include "understory/cli/inventory_cloud.h"
+#include "understory/pipeline/inventory/stand_cloud.h"
 
 #include <fmt/format.h>
 
@@ -99,20 +99,8 @@ std::string suspicion_of(const CloudShape& shape, const std::string& system,
 
 }  // namespace
 
-void add_cloud_frame_options(CLI::App& command, CloudFrame& frame) {
-  command
-      .add_option("--unit-m", frame.unit_m,
-                  "Metres per unit of the cloud: 0.001 for millimetres, 0.3048 for feet (metres "
-                  "if not given, and it is checked that they can be)")
-      ->check(CLI::Range(1e-6, 1e6));
-  command
-      .add_option("--up", frame.up,
-                  "The cloud's direction that points up: x, y, z, -x, -y, -z or =X,Y,Z (z if not "
-                  "given, and it is checked that it can be)")
-      ->check([](const std::string& text) {
-        return upright_from(text) ? std::string()
-                                  : "expected x, y, z, -x, -y, -z or three numbers X,Y,Z";
-      });
+bool is_direction(const std::string& up) {
+  return upright_from(up).has_value();
 }
 
 PointBlocks blocks_of(const PointCloudFile& cloud) {

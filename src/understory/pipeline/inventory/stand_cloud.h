@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
 
@@ -17,7 +16,8 @@ struct CloudFrame {
   // speaks against it.
   std::string up;
 };
-void add_cloud_frame_options(CLI::App& command, CloudFrame& frame);
+// Whether a text names a direction for CloudFrame::up.
+[[nodiscard]] bool is_direction(const std::string& up);
 
 // All points of a cloud, file frame.
 [[nodiscard]] PointBlocks blocks_of(const PointCloudFile& cloud);

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "understory/forest/inventory.h"
+#include "understory/output/run_summary.h"
+#include "understory/pipeline/inventory/stand_cloud.h"
+#include "understory/util/log.h"
+#include "understory/util/progress.h"
+
+namespace understory {
+
+// One call of `understory inventory`.
+struct InventoryRequest {
+  std::string cloud;  // a point cloud, or a run folder: then its map.laz
+  std::filesystem::path run_folder;
+  bool overwrite = false;  // what an earlier run left in the folder
+  CloudFrame frame;
+  InventoryConfig config;
+  std::string config_yaml;  // every key, for run.json
+  std::string config_file;  // that the user named; not to be overwritten
+};
+
+struct InventoryOutcome {
+  RunStatus status = RunStatus::kComplete;
+  std::vector<std::string> reasons;  // why partial or untrusted
+  std::string summary;               // a line for the terminal
+};
+
+// From a point cloud to the run folder: ground, trees, rasters, report. Throws InputError where the
+// cloud cannot be read or is neither in metres nor upright, OutputError.
+[[nodiscard]] InventoryOutcome run_inventory(const InventoryRequest& request, Log& log,
+                                             const ProgressSink& progress);
+
+}  // namespace understory

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <variant>
+
+namespace understory {
+
+// One tree of a stand, world frame. NaN where unknown: never a guess that looks like a measurement.
+struct Tree {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  int id = 0;
+  double x = 0.0;  // centre line of the stem at the ground, metres
+  double y = 0.0;
+  double z = 0.0;              // ground at the stem, metres
+  double dbh_m = kUnknown;     // diameter 1.3 m above the ground
+  double dbh_sd_m = kUnknown;  // its standard deviation
+  double height_m = kUnknown;  // highest point above the ground
+  double lean_deg = kUnknown;  // from the vertical
+  int observations = 0;        // returns (or views, in a sparse map) that support the stem
+  double x_sd_m = kUnknown;    // standard deviation of x
+  double y_sd_m = kUnknown;
+  bool felled = false;  // of a truth: cut down while it was scanned, so it may be listed or not
+};
+
+// One column of a tree list. trees.csv, trees.gpkg, the truth of simulations and every reader of
+// them take their columns from kTreeColumns; docs/reference/outputs.md explains each to the user.
+struct TreeColumn {
+  const char* name;
+  std::variant<int Tree::*, double Tree::*> member;
+  int decimals;  // of the number in trees.csv
+  bool place;    // x, y and z: in a GeoPackage they are the point
+};
+inline constexpr std::array kTreeColumns = {
+    TreeColumn{"id", &Tree::id, 0, false},
+    TreeColumn{"x", &Tree::x, 3, true},
+    TreeColumn{"y", &Tree::y, 3, true},
+    TreeColumn{"z", &Tree::z, 3, true},
+    TreeColumn{"dbh_m", &Tree::dbh_m, 4, false},
+    TreeColumn{"dbh_sd_m", &Tree::dbh_sd_m, 4, false},
+    TreeColumn{"height_m", &Tree::height_m, 2, false},
+    TreeColumn{"lean_deg", &Tree::lean_deg, 2, false},
+    TreeColumn{"observations", &Tree::observations, 0, false},
+    TreeColumn{"x_sd_m", &Tree::x_sd_m, 4, false},
+    TreeColumn{"y_sd_m", &Tree::y_sd_m, 4, false},
+};
+
+// The names of the columns, and the cells of one tree, separated by commas, without the end of the
+// line. A cell is empty where the value is not known. A truth has `more_decimals`.
+[[nodiscard]] std::string tree_csv_header();
+[[nodiscard]] std::string tree_csv_row(const Tree& tree, int more_decimals = 0);
+
+}  // namespace understory
