@@ -91,7 +91,7 @@ for seconds in (0.5, 2, 5, -0.5, -2, -5) if FRONT_END == "dense" else (2, -0.5):
         assert outcome.code == 0, outcome.run["reasons"]
         if FRONT_END == "dense":
             assert abs(quality(outcome, "imu_clock_offset_s") + seconds) < 0.02
-            assert quality(outcome, "imu_without_say_s") < 0.5
+            assert quality(outcome, "imu_unused_s") < 0.5
         said = f"imu: its stamps are {abs(seconds)}"[:-2]
         assert said in outcome.said and "imu.late" not in outcome.warnings, outcome.said
         return near_undisturbed(outcome, "time.clock_offset")
@@ -116,7 +116,7 @@ for indexed in (False, True):
         outcome = mapped(folder, [m for m in messages if m.topic != "/imu" or second(m) > 4], write=write)
         if FRONT_END == "dense":
             assert "imu.late" in outcome.warnings
-            assert 3.5 < quality(outcome, "imu_without_say_s") < 4.5
+            assert 3.5 < quality(outcome, "imu_unused_s") < 4.5
             assert quality(outcome, "imu_without_place_s") == 0
         assert "recording.no_imu_extrinsics" not in outcome.warnings
         used_like_undisturbed(outcome)
@@ -202,8 +202,8 @@ def imu_dies(folder):
     outcome = mapped(folder, [m for m in messages if heard(m)])
     if FRONT_END == "dense":
         assert outcome.run["counts"]["lidar_gaps"] >= 3 and outcome.run["counts"]["lidar_clock_jumps"] == 0
-        assert quality(outcome, "imu_without_say_s") > SECONDS - 6
-        assert quality(outcome, "lidar_without_say_s") > 1
+        assert quality(outcome, "imu_unused_s") > SECONDS - 6
+        assert quality(outcome, "lidar_unused_s") > 1
         assert "imu.stopped" in outcome.warnings
     assert outcome.error < 3 * max(BEST, WITHOUT_IMU) + 0.02, outcome.error
     return f"exit {outcome.code}, {100 * outcome.error:.1f} cm"

@@ -43,7 +43,7 @@ def expect(outcome, code, error_below, *said, pairs=ALL):
 
 
 def expect_partial(outcome, *said):
-    """Whoever reads only status and reasons knows what had no say."""
+    """Whoever reads only status and reasons knows what was not used."""
     assert outcome.run["status"] == "partial", outcome.run["reasons"]
     for words in said:
         assert words in "; ".join(outcome.run["reasons"]), outcome.run["reasons"]
@@ -86,7 +86,7 @@ def no_imu(folder):
 def imu_stops(folder):
     path, outcome = mapped(folder, [m for m in short if m.topic != "/imu" or m.stamp < start + 6e9])
     assert "imu.stopped" in outcome.warnings
-    expect_partial(outcome, "the IMU had no say for", "it stops 6.")
+    expect_partial(outcome, "the IMU was not used for", "it stops 6.")
     return expect(outcome, 4, 0.06, f"{path}: the IMU stopped at {(start + 6e9) / 1e9:.0f}"[:-1])
 
 
@@ -94,10 +94,10 @@ def imu_stops(folder):
 def imu_late(folder):
     path, outcome = mapped(folder, [m for m in short if m.topic != "/imu" or m.stamp > start + 4e9])
     assert outcome.run["quality"]["imu_without_place_s"] == 0
-    assert 3.5 < outcome.run["quality"]["imu_without_say_s"] < 4.5  # and then it is used: biases
+    assert 3.5 < outcome.run["quality"]["imu_unused_s"] < 4.5  # and then it is used: biases
     last = gzip.open(outcome.folder / "states.csv.gz", "rt").read().splitlines()[-1].split(",")
     assert any(abs(float(v)) > 1e-6 for v in last[4:10]), last
-    expect_partial(outcome, "the IMU had no say for", "it begins 4.0 s after the lidar")
+    expect_partial(outcome, "the IMU was not used for", "it begins 4.0 s after the lidar")
     return expect(outcome, 4, 0.1, f"{path}: the IMU begins 4.0 s after the lidar")
 
 
@@ -112,7 +112,7 @@ def imu_hardly_late(folder):
 def imu_hole(folder):
     _, outcome = mapped(folder, [m for m in short if m.topic != "/imu" or
                                  not start + 4e9 < m.stamp < start + 7e9])
-    expect_partial(outcome, "the IMU had no say for", "it was silent for 3.0 s")
+    expect_partial(outcome, "the IMU was not used for", "it was silent for 3.0 s")
     return expect(outcome, 4, 0.06, "imu: nothing for 3.0")
 
 
@@ -176,7 +176,7 @@ def wrong_extrinsics(folder):
 @cases.case("extrinsics that are not known")
 def no_extrinsics(folder):
     path, outcome = mapped(folder, [m for m in short if m.topic != "/tf_static"])
-    expect_partial(outcome, "the IMU had no say for 1", "nothing tells where it sits")
+    expect_partial(outcome, "the IMU was not used for 1", "nothing tells where it sits")
     return expect(outcome, 4, 0.1, f"{path}: nothing tells where the IMU", "it is not used")
 
 

@@ -33,7 +33,7 @@ struct PathFit {
   double path_rms_m = 0.0;  // of the path's points to their nearest fix
   double path_mean_m = 0.0;
   std::vector<double> fix_distance_m;  // one per fix
-  std::vector<char> fix_used;          // 0: so far off that it had no say (robust only)
+  std::vector<char> fix_used;          // 0: so far off that it was not used (robust only)
   // Root of (6) at the best motion that is turned by more than 20 degrees from this one: a path
   // that is straight fits the other way round as well.
   double turned_rms_m = 0.0;

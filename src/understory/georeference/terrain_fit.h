@@ -32,7 +32,7 @@ struct TerrainFit {
   std::string reason;  // if not
   Pose terrain_from_world;
   std::size_t points = 0;     // with terrain below them
-  std::size_t used = 0;       // of these, not so far off that they had no say
+  std::size_t used = 0;       // of these, not so far off that they were not used
   double rms_before_m = 0.0;  // heights above the terrain, of all of them, the mean taken off
   double mean_before_m = 0.0;
   double rms_m = 0.0;     // after

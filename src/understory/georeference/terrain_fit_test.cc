@@ -87,7 +87,7 @@ TEST(TerrainFit, LevelsAMapThatStandsWhereItShould) {
   EXPECT_LT(fit.rms_m, 0.40);  // the hidden ones are in it
   EXPECT_LT(fit.median_m, 0.10);
   EXPECT_GT(fit.used, 500U);
-  EXPECT_LT(fit.used, 560U);  // the hidden ones had no say
+  EXPECT_LT(fit.used, 560U);  // the hidden ones were not used
   EXPECT_LT(fit.place_sd_m, 1e-6);
   // Kept: place and heading.
   const Vector3d pivot = fit.terrain_from_world * points.front().point_in_world;

@@ -157,7 +157,7 @@ std::string falls_svg(const std::vector<TreeFall>& falls, const View& view) {
   return svg + "</g>";
 }
 
-// The receiver's path, at most 2,000 fixes of it, those that had no say paler.
+// The receiver's path, at most 2,000 fixes of it, those that were not used paler.
 std::string fixes_svg(const std::vector<ReportFix>& fixes, const View& view) {
   const std::size_t step = fixes.size() / 2000 + 1;
   std::string svg = "<g class=\"fixes\" fill=\"#d98200\">";

@@ -73,7 +73,7 @@ void EventOrderer::push(Event event) {
     note_scan();
     return;
   }
-  if (stream == kImu) report.without_say = uncovered_;
+  if (stream == kImu) report.unused = uncovered_;
   weigh(stream, stamp_of(event));
   if (clocks_[stream].arrival.verdict() != StreamOffset::Verdict::kOpen) {
     let_go(stream);
@@ -125,7 +125,7 @@ void EventOrderer::take(Event event, Stream stream) {
 void EventOrderer::note_glitches(Stream stream, TimeNs raw, std::size_t count) {
   StreamReport& report = report_.streams[stream];
   report.glitches += count;
-  if (stream != kImu) report.without_say += static_cast<TimeNs>(count) * clocks_[stream].period;
+  if (stream != kImu) report.unused += static_cast<TimeNs>(count) * clocks_[stream].period;
   log_->warn("time.glitch", std::string(kNames[stream]) + ": stamp " + seconds(raw) +
                                 " is far from its neighbours; message dropped");
 }
@@ -189,7 +189,7 @@ void EventOrderer::note_step(Stream stream, TimeNs stamp) {
                      : static_cast<TimeNs>(config_.gap_scans * static_cast<double>(clock.period));
   if ((stream == kLidar || stream == kImu) && clock.period > 0 && step > limit) {
     ++report.gaps;
-    if (stream == kLidar) report.without_say += step - clock.period;
+    if (stream == kLidar) report.unused += step - clock.period;
     if (step > report.longest_gap) {
       report.longest_gap = step;
       report.after_longest_gap = stamp;
@@ -219,7 +219,7 @@ bool EventOrderer::drop(const Pending& pending) {
   const bool late = clock.any_released && pending.stamp < clock.released;
   if (late) {
     ++report.late;
-    if (pending.stream != kImu) report.without_say += clock.period;
+    if (pending.stream != kImu) report.unused += clock.period;
     log_->warn("time.late", std::string(kNames[pending.stream]) + ": message at " +
                                 seconds(pending.stamp) + " came too late to be used");
   }
@@ -289,14 +289,14 @@ std::optional<std::size_t> EventOrderer::next_to_leave() {
   return covered(pending_.front()) ? std::optional<std::size_t>(0) : std::nullopt;
 }
 
-// A scan leaves: for its time since the one before the IMU had no say unless it covers its end.
+// A scan leaves: for its time since the one before the IMU was not used unless it covers its end.
 void EventOrderer::note_uncovered(const Pending& scan) {
   const Clock& imu = clocks_[kImu];
   if (imu.any_released && imu.released >= scan.time && imu.unbroken_since <= scan.time) return;
   const Clock& lidar = clocks_[kLidar];
   uncovered_ += std::min(scan.stamp - lidar.released, 2 * lidar.period);
   StreamReport& report = report_.streams[kImu];
-  if (report.received > 0) report.without_say = uncovered_;
+  if (report.received > 0) report.unused = uncovered_;
 }
 
 std::optional<Event> EventOrderer::pop() {

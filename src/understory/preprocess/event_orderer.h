@@ -62,10 +62,10 @@ class EventOrderer {
     TimeNs longest_gap = 0;
     TimeNs after_longest_gap = 0;  // stamp of the message that ended it
     TimeNs offset = 0;             // constant, added to its stamps to mend its clock
-    // Time of the recording in which the sensor had no say although the recording holds messages of
-    // it. Lidar: gaps, and scans that were dropped. IMU: scans that left without it, for whatever
-    // reason. Others: messages that were dropped, by their usual step.
-    TimeNs without_say = 0;
+    // Time of the recording in which the sensor was not used although the recording holds messages
+    // of it. Lidar: gaps, and scans that were dropped. IMU: scans that left without it, for
+    // whatever reason. Others: messages that were dropped, by their usual step.
+    TimeNs unused = 0;
   };
   struct Report {
     std::array<StreamReport, kStreams> streams;

@@ -97,7 +97,7 @@ TEST(EventOrderer, AnImuWhoseClockRunsAheadOrBehindIsShiftedFromItsFirstSample) 
       const auto& report = outcome.report.streams[EventOrderer::kImu];
       EXPECT_EQ(report.released, report.received);
       EXPECT_LE(std::llabs(report.offset + from_seconds(offset)), 10 * kMs);
-      EXPECT_LT(report.without_say, 200 * kMs);
+      EXPECT_LT(report.unused, 200 * kMs);
       EXPECT_EQ(outcome.warnings.size(), 1U);
       EXPECT_EQ(stamps_of(outcome.events, EventOrderer::kLidar),
                 stamps_of(expected.events, EventOrderer::kLidar));
@@ -168,7 +168,7 @@ TEST(EventOrderer, ASensorThatStartsLateIsShiftedAsWell) {
   EXPECT_LE(std::llabs(outcome.report.streams[EventOrderer::kImu].offset + 2000 * kMs), 10 * kMs);
   EXPECT_EQ(outcome.events.size(), events.size());
   // The first four seconds had no IMU.
-  EXPECT_NEAR(to_seconds(outcome.report.streams[EventOrderer::kImu].without_say), 4.0, 0.3);
+  EXPECT_NEAR(to_seconds(outcome.report.streams[EventOrderer::kImu].unused), 4.0, 0.3);
 }
 
 // Stamps of which nothing can be made are taken as they are, in the end, and none is lost.

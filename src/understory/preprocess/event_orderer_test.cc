@@ -210,8 +210,8 @@ TEST(EventOrderer, AGapOfTheLidarIsSeenAtOnceWhereTheImuHasDied) {
     EXPECT_LE(most, window > 0.0 ? 8U : 4U);
     EXPECT_EQ(orderer.report().streams[EventOrderer::kLidar].clock_jumps, 0U);
     EXPECT_GE(orderer.report().streams[EventOrderer::kLidar].gaps, 3U);
-    EXPECT_GT(orderer.report().streams[EventOrderer::kLidar].without_say, 8000 * kMs);
-    EXPECT_GT(orderer.report().streams[EventOrderer::kImu].without_say, 10'000 * kMs);
+    EXPECT_GT(orderer.report().streams[EventOrderer::kLidar].unused, 8000 * kMs);
+    EXPECT_GT(orderer.report().streams[EventOrderer::kImu].unused, 10'000 * kMs);
   }
 }
 

@@ -29,7 +29,7 @@ class TrustMonitor {
   void add_force(const Eigen::Quaterniond& world_from_imu, const Eigen::Vector3d& force_in_imu,
                  double duration_s);
 
-  // The matches insist against what the IMU predicts, now.
+  // The scan matches keep contradicting what the IMU predicts, now.
   void suspect(TimeNs now);
   // Time goes on: a probation that comes to no verdict ends, for the IMU.
   void pass_time(TimeNs now);

@@ -169,7 +169,7 @@ void ImuSmoother::watch_imu(TimeNs stamp, const MotionInterval& interval,
   if (buffer_.ever_filled()) watch_.note_samples(!interval.samples.empty(), latest().stamp, stamp);
 }
 
-// After matches have insisted against the prediction for long, or the IMU turned out to be
+// After scan matches kept contradicting the prediction for long, or the IMU turned out to be
 // unusable, nothing that the estimate says of the motion is worth keeping.
 void ImuSmoother::restart_at(TimeNs stamp, const PoseFactor& lidar,
                              const Eigen::Vector3d& velocity) {
@@ -220,7 +220,7 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
     update.reason.clear();
     if (log_ != nullptr)
       log_->warn("odometry.restart",
-                 "the matches insist against the prediction; the estimate of "
+                 "scan matching keeps contradicting the prediction; the estimate of "
                  "the motion starts anew at " +
                      format_seconds(stamp) + " s");
     return update;

@@ -26,7 +26,7 @@ class ImuWatch {
   [[nodiscard]] bool on_probation() const { return monitor_.on_probation(); }
   [[nodiscard]] ImuTrust trust() const;
 
-  // The matches insist against what the IMU predicts, now.
+  // The scan matches keep contradicting what the IMU predicts, now.
   void suspect(TimeNs now);
   // Time goes on to the scan at `now`; to be called before compare() and note_samples().
   void pass_time(TimeNs now);

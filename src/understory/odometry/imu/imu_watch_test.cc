@@ -83,7 +83,7 @@ TEST_F(ImuWatchTest, AgreementEndsProbationAndProves) {
   EXPECT_TRUE(watch_.trust().trusted);
 }
 
-// Bug: when the matches insisted against an IMU that had passed its probation, it lost trust
+// Bug: when the scan matches keep contradicting an IMU that had passed its probation, it lost trust
 // without a word in the log.
 TEST_F(ImuWatchTest, SuspicionAfterProbationIsSaid) {
   watch_.suspect(0);

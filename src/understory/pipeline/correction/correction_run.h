@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/sensor/tree.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/graph/self_correction/stem_correction.h"
 #include "understory/map/stem_map.h"
@@ -18,6 +17,7 @@
 #include "understory/pipeline/judgement/run_evidence.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/stem_view.h"
+#include "understory/sensor/tree.h"
 
 namespace understory {
 

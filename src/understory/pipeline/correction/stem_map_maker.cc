@@ -76,7 +76,7 @@ void StemMapMaker::list_trees() {
 }
 
 // The recording's own GNSS path beside the path: how well they lie on each other, P1 (6), and
-// gnss.csv in the run's frame. The fixes have no say in the path.
+// gnss.csv in the run's frame. The fixes do not change the path.
 std::vector<ReportFix> StemMapMaker::compare_with_gnss(const Trajectory& trajectory,
                                                        RunSummary& summary) const {
   std::vector<ReportFix> drawn;

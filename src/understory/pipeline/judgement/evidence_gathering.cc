@@ -21,7 +21,7 @@ SensorEvidence sensor_of(const EventOrderer::StreamReport& stream) {
   sensor.duplicates = stream.duplicates;
   sensor.reordered = stream.reordered;
   sensor.clock_jumps = stream.clock_jumps;
-  sensor.unheard_s = to_seconds(stream.without_say);
+  sensor.unheard_s = to_seconds(stream.unused);
   sensor.longest_gap_s = to_seconds(stream.longest_gap);
   if (stream.longest_gap > 0) sensor.after_longest_gap = format_seconds(stream.after_longest_gap);
   return sensor;
@@ -44,7 +44,7 @@ Span span_of(const TopicReport& topic, const EventOrderer::StreamReport& stream)
   return {topic.first_stamp + stream.offset, topic.last_stamp + stream.offset};
 }
 
-// Why the IMU had no say, in words.
+// Why the IMU was not used, in words.
 std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicReport>& topics,
                            const SensorEvidence& sensor) {
   constexpr double kNoticeableS = 0.1;
@@ -78,7 +78,7 @@ std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicRep
   return why.empty() ? "scans left before its samples came" : why;
 }
 
-// Why another sensor had no say, in words.
+// Why another sensor was not used, in words.
 std::string loss_of(const SensorEvidence& sensor) {
   return fmt::format(
       "of its {} messages {} came too late, {} had a stamp far off, {} were unreadable",

@@ -20,7 +20,7 @@ struct SensorEvidence {
   std::uint64_t clock_jumps = 0;  // stamps shifted from there on
   double longest_gap_s = 0.0;
   std::string after_longest_gap;  // stamp of the message that ended it, seconds
-  // How long the sensor had no say although it belongs to the recording: it began late, stopped,
+  // How long the sensor was not used although it belongs to the recording: it began late, stopped,
   // was silent, or was not used; and why, in words.
   double unheard_s = 0.0;
   std::string unheard_why;

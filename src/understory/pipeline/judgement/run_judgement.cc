@@ -85,17 +85,17 @@ class Judge {
         {{"IMU", &evidence_.imu}, {"GNSS", &evidence_.gnss}, {"magnetometer", &evidence_.mag}}};
     for (const auto& [name, sensor] : sensors) {
       if (sensor->unheard_s <= config_.max_unheard_s) continue;
-      missing(fmt::format("the {} had no say for {:.1f} s: {}", name, sensor->unheard_s,
+      missing(fmt::format("the {} was not used for {:.1f} s: {}", name, sensor->unheard_s,
                           sensor->unheard_why));
     }
   }
 
   void judge_damage() {
     if (evidence_.other_sensor_messages > 0) {
-      missing(fmt::format("{} message(s) of a second sensor had no say: {}",
+      missing(fmt::format("{} message(s) of a second sensor were not used: {}",
                           evidence_.other_sensor_messages, evidence_.first_other_sensor));
     }
-    if (!evidence_.late_sensor.empty()) missing("a sensor had no say: " + evidence_.late_sensor);
+    if (!evidence_.late_sensor.empty()) missing("a sensor was not used: " + evidence_.late_sensor);
     if (evidence_.damaged_places > 0) {
       hurt(fmt::format("the recording is damaged ({} place(s), the first: {})",
                        evidence_.damaged_places, evidence_.first_damage));
@@ -286,7 +286,7 @@ void describe(ConfigTable& table, JudgementConfig& config) {
       "max_unheard_scans", config.max_unheard_scans, shares, "",
       "partial: a larger share of the scans was dropped, late, unreadable or far off in time");
   table.add("max_unheard_s", config.max_unheard_s, seconds, "s",
-            "partial: another sensor had no say for longer");
+            "partial: another sensor was not used for longer");
   table.add("max_unmatched", config.max_unmatched, shares, "",
             "untrusted: a larger share of the scans could not be matched");
   table.add("max_empty", config.max_empty, shares, "",

@@ -14,7 +14,7 @@ namespace understory {
 // limits;
 // `./run accuracy --spoilt --fit` shows what good and wrong maps have of each number.
 struct JudgementConfig {
-  // Partial: what had no say.
+  // Partial: what was not used.
   double max_unheard_scans = 0.01;  // share of the scans
   double max_unheard_s = 1.0;       // of any other sensor
   // Untrusted. A prediction bridges a scan or two without harm; beyond these shares the map has
@@ -46,8 +46,8 @@ struct RunJudgement {
 };
 
 // Whether the result of a run is to be trusted, and if not why: a pure function of numbers, for
-// both front ends. Partial: some of the recording had no say (the run was stopped, the recording is
-// cut off, scans were dropped, a sensor was not used). Untrusted, whatever is missing: something
+// both front ends. Partial: some of the recording was not used (the run was stopped, the recording
+// is cut off, scans were dropped, a sensor was not used). Untrusted, whatever is missing: something
 // hurt the result.
 [[nodiscard]] RunJudgement judge_run(const RunEvidence& evidence, const JudgementConfig& config);
 

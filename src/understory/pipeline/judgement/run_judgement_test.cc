@@ -94,7 +94,7 @@ TEST(RunJudgement, SensorsWithoutASay) {
     (evidence.*sensor).unheard_why = "it stops";
     expect_complete(evidence);
     (evidence.*sensor).unheard_s = 1.1;
-    expect(RunStatus::kPartial, "had no say for 1.1 s: it stops", evidence);
+    expect(RunStatus::kPartial, "was not used for 1.1 s: it stops", evidence);
   }
 }
 

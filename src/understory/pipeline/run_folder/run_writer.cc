@@ -238,7 +238,7 @@ void fill_counts(RunSummary& summary, const DenseFrontEnd& session, const RunFac
     if (stream.received == 0) continue;
     count((name + "_received").c_str(), stream.received);
     count((name + "_released").c_str(), stream.released);
-    summary.quality[name + "_without_say_s"] = to_seconds(stream.without_say);
+    summary.quality[name + "_unused_s"] = to_seconds(stream.unused);
     summary.quality[name + "_clock_offset_s"] = to_seconds(stream.offset);
   }
   summary.quality["imu_without_place_s"] = to_seconds(session.imu_hearing().without_place());

@@ -14,7 +14,7 @@ namespace understory {
 enum class Species { kPine, kSpruce, kBirch };
 [[nodiscard]] std::string species_name(Species species);
 
-// One standing tree, in the world frame. (forest/tree.h has the Tree that is measured; two types of
+// One standing tree, in the world frame. (sensor/tree.h has the Tree that is measured; two types of
 // one name in a namespace would share the code of their containers.)
 struct GrownTree {
   int id = 0;                                      // 1, 2, ...
