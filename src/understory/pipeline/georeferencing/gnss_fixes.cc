@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "understory/evaluation/table_reader.h"
 #include "understory/pipeline/source.h"
 #include "understory/recording/captures/nmea.h"
+#include "understory/util/csv.h"
 #include "understory/util/error.h"
 #include "understory/util/text_file.h"
 
