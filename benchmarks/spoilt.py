@@ -13,6 +13,12 @@ not count; it is listed as not spoilt enough, and the next one takes its place. 
 without a result (exit 3): there is no map that could deceive. Ways that never made a wrong map of seeds 1 and 2,
 because the program found them out and did without the IMU, are left out (`withstood` in spoil.py).
 
+Good: a recording as it is whose map is not wrong by the same measure. One without its IMU is compared with
+the same recording with its IMU. Any other has nothing to be compared with: its error is 20 cm at most. A
+recording as it is whose map is wrong was lost without being spoilt: it counts as a map that must not
+be called complete. The table also tells how many of all recordings as they are were called untrusted, which
+is how good ones were counted before.
+
 Floors: no wrong map is called complete, no good one untrusted, and in nine of ten wrong ones a reason
 names the cause.
 """
@@ -185,8 +191,18 @@ def by_place(plan, lap):
     return sorted(plan[:lap], key=lambda case: (case[2].of_imu_alone, case[1], case[0]))
 
 
+def is_wrong(error, reference):
+    """Of a map with that error against the one with the reference's; None: there is none."""
+    return error is not None and error > WRONG_M and \
+        (reference is None or error > WRONG_TIMES * reference)
+
+
+def base_key(site, seed, imu):
+    return f"{site} {seed} {'' if imu else 'without IMU '}as it is"
+
+
 def undisturbed(work, site, seed, imu):
-    key = f"{site} {seed} {'' if imu else 'without IMU '}as it is"
+    key = base_key(site, seed, imu)
     if key not in work.rows:
         walk, truth = work.walk(site, seed, SPOILT_SITES[site])
         if not imu:
@@ -194,6 +210,9 @@ def undisturbed(work, site, seed, imu):
         result = map_walk(work, key, walk)
         work.put(row_of(key, result, *error_m(result[3], truth, walk.true_time), kind="base",
                         site=site, seed=seed, imu=imu))
+    error = work.rows[key]["error_m"]
+    if not imu and error is not None and error > WRONG_M:
+        undisturbed(work, site, seed, True)  # what it is compared with
     return work.rows[key]
 
 
@@ -214,8 +233,7 @@ def measure_spoilt(work, site, seed, way, imu):
     spoilt = way.spoil(walk, draw, *extra)
     result = map_walk(work, key, spoilt, spoilt.options)
     error, pairs = error_m(result[3], truth, spoilt.true_time)
-    wrong = error is not None and error > WRONG_M and base["error_m"] is not None and \
-        error > WRONG_TIMES * base["error_m"]
+    wrong = base["error_m"] is not None and is_wrong(error, base["error_m"])
     named = is_named(way, result)
     row = row_of(key, result, error, pairs, kind="spoilt", site=site, seed=seed, imu=imu,
                  way=way.name, base_m=base["error_m"], wrong=wrong, named=named)
@@ -289,21 +307,34 @@ def error_of_clouds(folder, truth):
 
 
 def split(rows):
-    """(wrong, not spoilt enough, without result, good) rows."""
+    """(wrong, not spoilt enough, without result, good, lost) rows; lost: wrong as it is."""
     spoilt = [r for r in rows if r["kind"] == "spoilt"]
     none = [r for r in spoilt if r["status"] == "none"]
     wrong = [r for r in spoilt if r["wrong"]]
     mild = [r for r in spoilt if not r["wrong"] and r["status"] != "none"]
-    good = [r for r in rows if r["kind"] in ("good", "base")]
-    return wrong, mild, none, good
+    errors = {r["key"]: r["error_m"] for r in rows}
+
+    def was_lost(row):
+        compared = row["kind"] == "base" and not row["imu"]
+        reference = errors.get(base_key(row["site"], row["seed"], True)) if compared else None
+        return is_wrong(row["error_m"], reference)
+
+    as_is = [r for r in rows if r["kind"] in ("good", "base")]
+    lost = [r for r in as_is if was_lost(r)]
+    return wrong, mild, none, [r for r in as_is if r not in lost], lost
+
+
+def of_status(status, rows):
+    return [r for r in rows if r["status"] == status]
 
 
 def render(rows, seconds):
-    wrong, mild, none, good = split(rows)
-    deceived = [r for r in wrong if r["status"] == "complete"]
+    wrong, mild, none, good, lost = split(rows)
+    deceived, deceived_as_is = (of_status("complete", group) for group in (wrong, lost))
+    half = of_status("partial", wrong + lost)
     named = [r for r in wrong if r["named"]]
-    refused = [r for r in good if r["status"] == "untrusted"]
-    partial = [r for r in good if r["status"] == "partial"]
+    refused, partial = (of_status(status, good) for status in ("untrusted", "partial"))
+    left_out = [way.name for way in WAYS if way.withstood]
     seeds = sorted({r["seed"] for r in rows if r["seed"]})
     text = [f"{version()}, {time.strftime('%Y-%m-%d')}, {machine()}; seeds "
             f"{', '.join(map(str, seeds))}; {DURATION_S} s each; {seconds / 60:.0f} minutes.", "",
@@ -313,9 +344,17 @@ def render(rows, seconds):
             f"| wrong maps called complete | {len(deceived)} | floor 0 |",
             f"| wrong maps with a reason that names the cause | {len(named)} | "
             f"{100 * len(named) / max(1, len(wrong)):.0f} %, floor 90 % |",
-            f"| good ones | {len(good)} | |",
+            f"| wrong maps called partial | {len(half)} | |",
+            f"| recordings as they are | {len(good) + len(lost)} | with and without their IMU |",
+            f"| of these lost without being spoilt: the map is wrong | {len(lost)} | "
+            f"called complete: {len(deceived_as_is)}, floor 0 |",
+            f"| good ones: as they are, the map is not wrong | {len(good)} | |",
             f"| good ones called untrusted | {len(refused)} | floor 0 |",
+            f"| recordings as they are called untrusted | {len(refused + of_status('untrusted', lost))} | "
+            "formerly counted as good ones |",
             f"| good ones called partial | {len(partial)} | |", "",
+            f"{len(WAYS) - len(left_out)} of {len(WAYS)} ways are in the plan. Left out, as they made no wrong map of "
+            f"seeds 1 and 2: {'; '.join(left_out)}.", "",
             "| spoilt by | wrong | complete | cause named | not spoilt enough | error of the wrong ones m |",
             "|---|---|---|---|---|---|"]
     for way in WAYS + [APART]:
@@ -327,15 +366,22 @@ def render(rows, seconds):
         spread = f"{errors[0]:.1f} to {errors[-1]:.1f}" if errors else ""
         text.append(f"| {way.name} | {len(mine[0])} | {len(mine[1])} | {len(mine[2])} | "
                     f"{len(mine[3])} | {spread} |")
-    for title, group in (("wrong and called complete", deceived), ("good and called untrusted", refused),
+    for title, group in (("wrong and called complete", deceived + deceived_as_is),
+                         ("wrong and called partial", half),
+                         ("wrong and the cause is not named", [r for r in wrong if not r["named"]]),
+                         ("not spoilt enough, called complete, and off by over 20 cm",
+                          [r for r in of_status("complete", mild) if r["error_m"] > WRONG_M]),
+                         ("lost without being spoilt", lost),
+                         ("good and called untrusted", refused),
                          ("good and called partial", partial)):
         text += [""] * bool(group) + [f"- {title}: {r['key']}: {'; '.join(r['reasons'])}" for r in group]
-    return "\n".join(text) + "\n", deceived, refused, len(named) / max(1, len(wrong))
+    return ("\n".join(text) + "\n", deceived + deceived_as_is, refused,
+            len(named) / max(1, len(wrong)))
 
 
 def fit(rows):
     """For each number of the evidence: where good and wrong runs lie."""
-    wrong, mild, _, good = split(rows)
+    wrong, _, _, good, _ = split(rows)
     names = sorted({n for r in rows for n, v in r["evidence"].items() if isinstance(v, (int, float))})
     text = ["| evidence | good: median | 99 % | largest | wrong: 10 % | median | 90 % |",
             "|---|---|---|---|---|---|---|"]

@@ -36,6 +36,7 @@ void KeyframeMap::describe(ConfigTable& table, Config& config) {
   table.section("local_map", [&] { understory::describe(table, config.local_map); });
   table.section("loop_closure", [&] { understory::describe(table, config.loop_closure); });
   table.section("first_keyframes", [&] { understory::describe(table, config.first_keyframes); });
+  table.section("range_check", [&] { understory::describe(table, config.range_check); });
   table.section("odometry_edge", [&] {
     table.add("rotation_deg", config.edge_rotation_deg, {0.0, 10.0}, "deg",
               "noise of the odometry between keyframes, however near");
@@ -253,6 +254,14 @@ void KeyframeMap::start_segment() {
   if (segment_start() != keyframes_.size()) segment_starts_.push_back(keyframes_.size());
   inserted_.clear();
   insert_all();
+}
+
+RangeCheck KeyframeMap::check_ranges(const Eigen::Vector3d& lidar_in_body) const {
+  const RangeCheck check = understory::check_ranges(
+      keyframes_, segment_starts_, [this](std::size_t i) { return points_->get(i); }, lidar_in_body,
+      config_.range_check);
+  points_->forget();
+  return check;
 }
 
 void KeyframeMap::move_world(const Pose& new_world_from_old_world) {

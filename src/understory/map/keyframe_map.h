@@ -14,6 +14,7 @@
 #include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
 #include "understory/map/loop_closer.h"
+#include "understory/map/range_check.h"
 #include "understory/util/binary_io.h"
 #include "understory/util/config.h"
 #include "understory/util/log.h"
@@ -48,6 +49,7 @@ class KeyframeMap {
     LocalMapConfig local_map;
     LoopCloserConfig loop_closure;
     FirstKeyframesConfig first_keyframes;
+    RangeCheckConfig range_check;
     // Noise of the odometry between keyframes: that of any edge (P4: that of a match, (36)), and
     // what grows with the square root of the distance.
     double edge_rotation_deg = 0.0;
@@ -75,6 +77,9 @@ class KeyframeMap {
   // The recording is over: waits for what is running, optimises, positions the first keyframes of
   // each segment again, and frees what only scans needed: there is no local map any more.
   void finish();
+  // Of the finished map: whether its clouds tell of ranges that are all too long or too short.
+  //   lidar_in_body: where the beams begin, metres
+  [[nodiscard]] RangeCheck check_ranges(const Eigen::Vector3d& lidar_in_body) const;
   // Moves everything, e.g. to level the world.
   void move_world(const Pose& new_world_from_old_world);
 

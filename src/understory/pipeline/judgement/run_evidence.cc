@@ -44,6 +44,9 @@ void put_match(Figures& figures, const MatchEvidence& match) {
   figures["few_share"] = match.few_share;
   figures["chance_share"] = match.chance_share;
   figures["blur_growth"] = match.blur_growth;
+  figures["range_offset_m"] = match.range_offset_m;
+  figures["range_offset_error_m"] = match.range_offset_error_m;
+  figures["range_pairs"] = std::int64_t{match.range_pairs};
   figures["smear_m"] = match.smear_m;
   figures["scan_motion_ratio"] = match.scan_motion_ratio;
   figures["scan_motion_probes"] = std::int64_t{match.scan_motion_probes};

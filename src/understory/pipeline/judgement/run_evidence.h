@@ -61,6 +61,11 @@ struct MatchEvidence {
   // Motion within scans over motion between them, and on how many scans that rests; see ScanMotion.
   double scan_motion_ratio = 0.0;
   int scan_motion_probes = 0;
+  // By how much all ranges seem to be too long, how sure that is, and how many pairs of views tell
+  // it; see RangeCheck.
+  double range_offset_m = 0.0;
+  double range_offset_error_m = 0.0;
+  int range_pairs = 0;
   double smear_m = 0.0;  // how far a point 10 m away moves during a scan, on average
 };
 

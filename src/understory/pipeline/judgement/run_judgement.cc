@@ -18,6 +18,9 @@ double percent(std::uint64_t part, std::uint64_t whole) {
   return 100.0 * share(part, whole);
 }
 
+// So many standard errors are no chance, even where pairs of views that overlap say the same.
+constexpr double kSureErrors = 5.0;
+
 // Gathers reasons for one judgement.
 class Judge {
  public:
@@ -33,6 +36,7 @@ class Judge {
     judge_scan_motion();
     judge_imu();
     judge_scale();
+    judge_ranges();
     judge_motion();
     judge_matches();
     judge_course();
@@ -161,6 +165,20 @@ class Judge {
         "tells of: the scale of the clouds (unit), the stamps of the scans, or the IMU's "
         "unit, clock or lever arm is wrong",
         scale));
+  }
+
+  // What surfaces say that were seen from two sides.
+  void judge_ranges() {
+    const MatchEvidence& match = evidence_.match;
+    if (match.range_pairs < config_.min_range_pairs) return;
+    const double off = std::abs(match.range_offset_m);
+    if (off <= config_.max_range_offset_m || off <= kSureErrors * match.range_offset_error_m)
+      return;
+    hurt(fmt::format(
+        "ranges seem to be {:.2f} m too {} (± {:.2f} m): only so do surfaces lie on each other that "
+        "were seen from two places; the lidar's range offset, or how the driver counts, is wrong",
+        off, match.range_offset_m > 0.0 ? "long" : "short",
+        std::max(0.01, match.range_offset_error_m)));
   }
 
   void judge_motion() {
@@ -324,6 +342,10 @@ void describe(ConfigTable& table, JudgementConfig& config) {
             "fewer thirds of a second tell nothing of it");
   table.add("min_imu_spread_m_s2", config.min_imu_spread_m_s2, {0.0, 100.0}, "m/s^2",
             "nor do accelerations with a smaller standard deviation");
+  table.add("max_range_offset_m", config.max_range_offset_m, {0.0, 1000.0}, "m",
+            "untrusted: all ranges seem to be too long or too short by more");
+  table.add("min_range_pairs", config.min_range_pairs, {1, 1000000}, "pairs",
+            "fewer pairs of views tell nothing of it");
 }
 
 double smear_of(const Pose& step) {

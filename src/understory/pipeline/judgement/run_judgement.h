@@ -37,6 +37,10 @@ struct JudgementConfig {
   double max_imu_scale = 1.1;
   int min_imu_windows = 60;          // fewer tell nothing, nor does
   double min_imu_spread_m_s2 = 0.2;  // an even motion
+  // All ranges too long or too short, see RangeCheck. Tall grass that hides the ground from afar
+  // looks like ranges that are too long by its height.
+  double max_range_offset_m = 0.4;
+  int min_range_pairs = 4;  // fewer tell nothing
 };
 void describe(ConfigTable& table, JudgementConfig& config);
 

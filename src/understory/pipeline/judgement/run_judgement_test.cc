@@ -23,6 +23,9 @@ RunEvidence good_run() {
   evidence.imu_motion_spread_m_s2 = 1.0;
   evidence.match.scan_motion_ratio = 1.0;
   evidence.match.scan_motion_probes = 40;
+  evidence.match.range_pairs = 20;
+  evidence.match.range_offset_m = 0.02;
+  evidence.match.range_offset_error_m = 0.02;
   return evidence;
 }
 
@@ -265,6 +268,22 @@ TEST(RunJudgement, Stems) {
   evidence.stems.loops_solved = false;
   evidence.stems.loops_reason = "no end";
   expect(RunStatus::kUntrusted, "no end", evidence);
+}
+
+// A regression: ranges that were all 1 m too long made a wrong map that was complete.
+TEST(RunJudgement, RangesThatAreAllTooLong) {
+  expect_limit(&RunEvidence::match, &MatchEvidence::range_offset_m, 0.4, 0.41,
+               RunStatus::kUntrusted, "0.41 m too long (± 0.02 m)");
+  expect_limit(&RunEvidence::match, &MatchEvidence::range_offset_m, -0.4, -0.9,
+               RunStatus::kUntrusted, "0.90 m too short");
+  RunEvidence evidence = good_run();
+  evidence.match.range_offset_m = 0.9;
+  evidence.match.range_offset_error_m = 0.19;  // may be chance
+  expect_complete(evidence);
+  evidence.match.range_offset_error_m = 0.17;
+  expect(RunStatus::kUntrusted, "0.90 m too long (± 0.17 m)", evidence);
+  evidence.match.range_pairs = 3;
+  expect_complete(evidence);
 }
 
 }  // namespace

@@ -276,12 +276,20 @@ void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const 
   add_latency(distribution_of(facts.latencies_ms), summary);
 }
 
-RunEvidence evidence_of(const DenseFrontEnd& session, const RunFacts& facts,
-                        const Recording& source, const TrajectoryFacts& trajectory,
-                        const Log& log) {
+void check_ranges(DenseFrontEnd& session, MatchEvidence& evidence) {
+  const ScopedTimer timer(session.times(), "finish_check_ranges");
+  const RangeCheck check = session.map().check_ranges(session.rig().body_from_lidar.translation());
+  evidence.range_offset_m = check.offset_m;
+  evidence.range_offset_error_m = check.standard_error_m;
+  evidence.range_pairs = check.pairs;
+}
+
+RunEvidence evidence_of(DenseFrontEnd& session, const RunFacts& facts, const Recording& source,
+                        const TrajectoryFacts& trajectory, const Log& log) {
   RunEvidence evidence;
   evidence.motion = trajectory.motion;
   evidence.match = trajectory.match;
+  check_ranges(session, evidence.match);
   gather_dense(session, facts, source, log, evidence);
   return evidence;
 }
