@@ -40,7 +40,7 @@ struct JudgementConfig {
   // All ranges too long or too short, see RangeCheck. Tall grass that hides the ground from afar
   // looks like ranges that are too long by its height.
   double max_range_offset_m = 0.4;
-  int min_range_pairs = 4;  // fewer tell nothing
+  int min_range_pairs = 5;  // fewer tell nothing
 };
 void describe(ConfigTable& table, JudgementConfig& config);
 

@@ -282,7 +282,7 @@ TEST(RunJudgement, RangesThatAreAllTooLong) {
   expect_complete(evidence);
   evidence.match.range_offset_error_m = 0.17;
   expect(RunStatus::kUntrusted, "0.90 m too long (± 0.17 m)", evidence);
-  evidence.match.range_pairs = 3;
+  evidence.match.range_pairs = 4;
   expect_complete(evidence);
 }
 
