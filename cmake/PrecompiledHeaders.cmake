@@ -12,7 +12,10 @@ function(understory_precompile target)
     return()
   endif()
   if(NOT TARGET understory_precompiled)
-    file(WRITE "${PROJECT_BINARY_DIR}/precompiled/precompiled.cc" "// The headers alone.\n")
+    # Unlike WRITE, this leaves a file as it is that holds the same: else every configuration would
+    # make all files be compiled again.
+    file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/precompiled/precompiled.cc"
+         CONTENT "// The headers alone.\n" @ONLY)
     add_library(understory_precompiled OBJECT "${PROJECT_BINARY_DIR}/precompiled/precompiled.cc")
     target_link_libraries(understory_precompiled PRIVATE understory_own_code understory_flags Eigen3::Eigen)
     target_precompile_headers(understory_precompiled PRIVATE ${understory_shared_headers})
