@@ -151,6 +151,15 @@ class Judge {
                      static_cast<double>(evidence_.imu_motion_windows));
   }
 
+  // Standard deviation of the accelerations by matching about what the accelerometer explains of
+  // them, m/s^2.
+  double scatter_m_s2() const {
+    const double correlation = std::abs(evidence_.imu_motion_correlation);
+    if (correlation <= 0.0) return 0.0;
+    return evidence_.imu_motion_spread_m_s2 * std::abs(evidence_.imu_motion_scale) / correlation *
+           std::sqrt(1.0 - std::min(1.0, correlation * correlation));
+  }
+
   void judge_scale() {
     if (!evidence_.imu_distrust.empty()) return;  // then the IMU is no witness
     if (evidence_.imu_motion_windows < config_.min_imu_windows ||
@@ -159,12 +168,22 @@ class Judge {
     }
     const double scale = evidence_.imu_motion_scale;
     const double slack = 3.0 * scale_deviation();
-    if (scale + slack >= config_.min_imu_scale && scale - slack <= config_.max_imu_scale) return;
-    hurt(fmt::format(
-        "the path speeds up and slows down {:.2f} times as much as the accelerometer "
-        "tells of: the scale of the clouds (unit), the stamps of the scans, or the IMU's "
-        "unit, clock or lever arm is wrong",
-        scale));
+    if (scale + slack < config_.min_imu_scale || scale - slack > config_.max_imu_scale) {
+      hurt(fmt::format(
+          "the path speeds up and slows down {:.2f} times as much as the accelerometer "
+          "tells of: the scale of the clouds (unit), the stamps of the scans, or the IMU's "
+          "unit, clock or lever arm is wrong",
+          scale));
+    } else if (evidence_.imu_motion_correlation < config_.min_imu_correlation &&
+               scatter_m_s2() > config_.max_imu_scatter_m_s2) {
+      hurt(
+          fmt::format("the path speeds up and slows down otherwise than the accelerometer tells of "
+                      "(correlation "
+                      "{:.2f}): scans are matched wrongly, or their stamps, or the IMU's clock or "
+                      "lever arm, are "
+                      "wrong",
+                      evidence_.imu_motion_correlation));
+    }
   }
 
   // What surfaces say that were seen from two sides.
@@ -175,7 +194,8 @@ class Judge {
     if (off <= config_.max_range_offset_m || off <= kSureErrors * match.range_offset_error_m)
       return;
     hurt(fmt::format(
-        "ranges seem to be {:.2f} m too {} (± {:.2f} m): only so do surfaces lie on each other that "
+        "ranges seem to be {:.2f} m too {} (± {:.2f} m): only so do surfaces lie on each other "
+        "that "
         "were seen from two places; the lidar's range offset, or how the driver counts, is wrong",
         off, match.range_offset_m > 0.0 ? "long" : "short",
         std::max(0.01, match.range_offset_error_m)));
@@ -342,6 +362,10 @@ void describe(ConfigTable& table, JudgementConfig& config) {
             "fewer thirds of a second tell nothing of it");
   table.add("min_imu_spread_m_s2", config.min_imu_spread_m_s2, {0.0, 100.0}, "m/s^2",
             "nor do accelerations with a smaller standard deviation");
+  table.add("min_imu_correlation", config.min_imu_correlation, {-1.0, 1.0}, "",
+            "untrusted: accelerations by matching and by the accelerometer go together by less");
+  table.add("max_imu_scatter_m_s2", config.max_imu_scatter_m_s2, {0.0, 1000.0}, "m/s^2",
+            "and differ by more");
   table.add("max_range_offset_m", config.max_range_offset_m, {0.0, 1000.0}, "m",
             "untrusted: all ranges seem to be too long or too short by more");
   table.add("min_range_pairs", config.min_range_pairs, {1, 1000000}, "pairs",

@@ -37,6 +37,10 @@ struct JudgementConfig {
   double max_imu_scale = 1.1;
   int min_imu_windows = 60;          // fewer tell nothing, nor does
   double min_imu_spread_m_s2 = 0.2;  // an even motion
+  // The same accelerations have nothing to do with each other: their correlation is less, and they
+  // differ by more than matching is uncertain (2 cm of a scan make 0.4 m/s^2).
+  double min_imu_correlation = 0.7;
+  double max_imu_scatter_m_s2 = 0.8;
   // All ranges too long or too short, see RangeCheck. Tall grass that hides the ground from afar
   // looks like ranges that are too long by its height.
   double max_range_offset_m = 0.4;

@@ -214,6 +214,7 @@ TEST(RunJudgement, AScaleThatIsOffByAFifthIsNoticedWhereItIsKnownWell) {
   evidence.imu_motion_correlation = 0.99;  // the scale's standard deviation is 0.01
   expect(RunStatus::kUntrusted, "1.20 times as much", evidence);
   evidence.imu_motion_correlation = 0.5;  // 0.12
+  evidence.imu_motion_spread_m_s2 = 0.3;
   expect_complete(evidence);
   evidence.imu_motion_scale = 3.3;  // 0.33
   expect(RunStatus::kUntrusted, "3.30 times as much", evidence);
@@ -268,6 +269,28 @@ TEST(RunJudgement, Stems) {
   evidence.stems.loops_solved = false;
   evidence.stems.loops_reason = "no end";
   expect(RunStatus::kUntrusted, "no end", evidence);
+}
+
+// A lever arm that is wrong by 3 m: the matches that it spoilt were said, and not why.
+TEST(RunJudgement, APathThatIsNotTheAccelerometers) {
+  RunEvidence evidence = good_run();
+  evidence.imu_motion_spread_m_s2 = 0.42;
+  evidence.imu_motion_scale = 0.82;
+  evidence.imu_motion_correlation = 0.25;
+  expect(RunStatus::kUntrusted, "lever arm", evidence);
+  // Noise of matching in a motion that is nearly even.
+  evidence.imu_motion_spread_m_s2 = 0.21;
+  evidence.imu_motion_scale = 1.0;
+  evidence.imu_motion_correlation = 0.5;
+  expect_complete(evidence);
+  // Vibrations: large, and of both.
+  evidence.imu_motion_spread_m_s2 = 5.0;
+  evidence.imu_motion_correlation = 0.97;
+  expect_complete(evidence);
+  evidence.imu_motion_correlation = 0.0;  // nothing is known
+  evidence.imu_motion_scale = 1.0;
+  evidence.imu_motion_windows = 0;
+  expect_complete(evidence);
 }
 
 // A regression: ranges that were all 1 m too long made a wrong map that was complete.
