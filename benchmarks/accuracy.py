@@ -271,6 +271,8 @@ def arguments():
     parser.add_argument("--spoilt", action="store_true", help="spoilt recordings beside good ones")
     parser.add_argument("--wanted", type=int, default=100, metavar="N",
                         help="with --spoilt: so many wrong maps and so many good ones")
+    parser.add_argument("--way", default="",
+                        help="with --spoilt: only ways of spoiling with this in their names")
     parser.add_argument("--fit", action="store_true",
                         help="with --spoilt --keep: only what good and wrong runs there are like")
     return parser.parse_args()
@@ -302,7 +304,8 @@ def main():
     work.mkdir(parents=True, exist_ok=True)
     if options.spoilt:
         from spoilt import measure_spoilt_runs
-        good = measure_spoilt_runs(work, options.seeds, options.wanted, options.write, options.fit)
+        good = measure_spoilt_runs(work, options.seeds, options.wanted, options.write, options.fit,
+                                   options.way)
         return 0 if good else 1
     table, begin, failure = Table(), time.perf_counter(), None
     ran = True

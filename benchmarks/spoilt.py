@@ -2,6 +2,7 @@
 
   ./run accuracy --spoilt                       100 wrong and 100 good ones, seeds 41 on
   ./run accuracy --spoilt --seeds 1 2           seeds to tune on (1 to 19)
+  ./run accuracy --spoilt --way ranges          only ways with this in their names
   ./run accuracy --spoilt --keep DIR            results.jsonl stays there; run again, it goes on where it was
   ./run accuracy --spoilt --keep DIR --fit      from the results there: what each number of the evidence is
                                                 in good and in wrong runs, beside the limits
@@ -177,10 +178,16 @@ def imu_kinds(way):
     return {"with": [True], "without": [False], "both": [True, False]}[way.imu]
 
 
-def spoilt_plan(seeds):
+def ways_and_imu(name):
+    """(way, with its IMU) of those in the plan with `name` in their names."""
+    return [(way, imu) for way in WAYS if not way.withstood and name in way.name
+            for imu in imu_kinds(way)]
+
+
+def spoilt_plan(seeds, name=""):
     """(site, seed, way, imu) one after another: ways go through sites and seeds in turn."""
     places = [(site, seed) for seed in seeds for site in SPOILT_SITES]
-    cases = [(way, imu) for way in WAYS if not way.withstood for imu in imu_kinds(way)]
+    cases = ways_and_imu(name)
     for lap in range(len(places)):
         yield from ((*places[(lap + 3 * i) % len(places)], way, imu)
                     for i, (way, imu) in enumerate(cases))
@@ -400,7 +407,7 @@ def write_results(text):
     RESULTS.write_text(f"{head}{BEGIN}\n{text}{END}{tail}")
 
 
-def measure_spoilt_runs(folder, seeds, wanted, write, only_fit):
+def measure_spoilt_runs(folder, seeds, wanted, write, only_fit, way=""):
     """True if the floors are met."""
     begin = time.perf_counter()
     work = Work(folder)
@@ -408,8 +415,8 @@ def measure_spoilt_runs(folder, seeds, wanted, write, only_fit):
     if only_fit:
         print(fit(list(work.rows.values())))
         return True
-    plan = list(spoilt_plan(seeds))
-    lap = sum(len(imu_kinds(way)) for way in WAYS if not way.withstood)
+    plan = list(spoilt_plan(seeds, way))
+    lap = len(ways_and_imu(way))
     measure_real(work)
     goods, wrong = good_plan(seeds), 0
     for at in range(0, len(plan), lap):
@@ -417,7 +424,7 @@ def measure_spoilt_runs(folder, seeds, wanted, write, only_fit):
             if wrong >= wanted:
                 break
             wrong += measure_spoilt(work, *case)["wrong"]
-    while sum(r["kind"] in ("good", "base") for r in work.rows.values()) < wanted:
+    while not way and sum(r["kind"] in ("good", "base") for r in work.rows.values()) < wanted:
         good = next(goods, None)
         if good is None:
             break

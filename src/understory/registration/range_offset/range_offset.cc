@@ -84,12 +84,12 @@ class Solver {
   Sums gather(double kernel_m) const {
     Sums sums;
     const Eigen::Matrix3d rotation = pose_.rotation_matrix();
-    for (const SurfacePatch& patch : source_.patches()) {
+    for (const FlatPatch& patch : source_.patches()) {
       const Eigen::Vector3d corrected = patch.mean - offset_ * patch.ray;
       const Eigen::Vector3d placed = pose_ * corrected;
       // Where the target's lidar would have measured it, with its wrong ranges.
       const Eigen::Vector3d seen = placed + offset_ * (placed - lidar_).normalized();
-      const SurfacePatch* match = target_.nearest(seen);
+      const FlatPatch* match = target_.nearest(seen);
       if (match == nullptr) continue;
       if ((match->mean - seen).squaredNorm() > config_.max_distance_m * config_.max_distance_m)
         continue;

@@ -37,7 +37,7 @@ TEST(SurfaceView, APatchOfGroundLooksAtTheLidar) {
   const Points points = square(4.0, 0.01);
   const SurfaceView view = view_of(points);
   ASSERT_EQ(view.patches().size(), 16U);
-  const SurfacePatch* patch = view.nearest({0.4, 2.6, 0.5});
+  const FlatPatch* patch = view.nearest({0.4, 2.6, 0.5});
   ASSERT_NE(patch, nullptr);
   EXPECT_NEAR((patch->mean - Eigen::Vector3d(0.5, 2.5, 0.5)).norm(), 0.0, 0.01);
   EXPECT_GT(patch->normal.z(), 0.999);

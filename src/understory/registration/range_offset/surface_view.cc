@@ -80,7 +80,7 @@ class Cells {
 };
 
 // The patch of a cell; nothing if its points are few, or lie on no plane.
-std::optional<SurfacePatch> patch_of(const Sums& sums, const SurfaceViewConfig& config) {
+std::optional<FlatPatch> patch_of(const Sums& sums, const SurfaceViewConfig& config) {
   if (sums.count < config.min_points) return std::nullopt;
   const double share = 1.0 / sums.count;
   const Eigen::Vector3d mean = share * sums.point.cast<double>();
@@ -92,7 +92,7 @@ std::optional<SurfacePatch> patch_of(const Sums& sums, const SurfaceViewConfig& 
       solver.eigenvalues()[1] < width * width) {
     return std::nullopt;
   }
-  SurfacePatch patch;
+  FlatPatch patch;
   patch.mean = mean + config.cell_m * Eigen::Vector3d(sums.at[0], sums.at[1], sums.at[2]);
   patch.normal = solver.eigenvectors().col(0);
   patch.ray = share * sums.ray.cast<double>();
@@ -109,7 +109,7 @@ SurfaceView::SurfaceView(std::span<const ViewCloud> clouds, const Eigen::Vector3
   for (const ViewCloud& cloud : clouds)
     cells.add(cloud, lidar_in_body.cast<float>());
   for (const Sums& sums : cells.all()) {
-    const std::optional<SurfacePatch> patch = patch_of(sums, config);
+    const std::optional<FlatPatch> patch = patch_of(sums, config);
     if (!patch) continue;
     index_.set(voxel_key(sums.at[0], sums.at[1], sums.at[2]),
                static_cast<std::uint32_t>(patches_.size()));
@@ -117,11 +117,11 @@ SurfaceView::SurfaceView(std::span<const ViewCloud> clouds, const Eigen::Vector3
   }
 }
 
-const SurfacePatch* SurfaceView::nearest(const Eigen::Vector3d& point_in_view) const {
+const FlatPatch* SurfaceView::nearest(const Eigen::Vector3d& point_in_view) const {
   const std::array<int, 3> at = {voxel_floor(point_in_view.x() / cell_m_),
                                  voxel_floor(point_in_view.y() / cell_m_),
                                  voxel_floor(point_in_view.z() / cell_m_)};
-  const SurfacePatch* best = nullptr;
+  const FlatPatch* best = nullptr;
   double best_m2 = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 27; ++i) {
     const std::uint32_t found =

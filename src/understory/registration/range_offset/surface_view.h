@@ -23,7 +23,7 @@ struct SurfaceViewConfig {
 void describe(ConfigTable& table, SurfaceViewConfig& config);
 
 // A flat piece of ground, wall or stem, and how the lidar saw it; view frame.
-struct SurfacePatch {
+struct FlatPatch {
   Eigen::Vector3d mean;    // of its points, metres
   Eigen::Vector3d normal;  // unit, towards the lidar
   Eigen::Vector3d ray;     // mean of the unit vectors from the lidar to its points
@@ -43,14 +43,14 @@ class SurfaceView {
   SurfaceView(std::span<const ViewCloud> clouds, const Eigen::Vector3d& lidar_in_body,
               const SurfaceViewConfig& config);
 
-  [[nodiscard]] const std::vector<SurfacePatch>& patches() const { return patches_; }
+  [[nodiscard]] const std::vector<FlatPatch>& patches() const { return patches_; }
   // The patch with the nearest mean of those in the cell around a point and the 26 cells beside;
   // null: there is none.
-  [[nodiscard]] const SurfacePatch* nearest(const Eigen::Vector3d& point_in_view) const;
+  [[nodiscard]] const FlatPatch* nearest(const Eigen::Vector3d& point_in_view) const;
 
  private:
   double cell_m_;
-  std::vector<SurfacePatch> patches_;
+  std::vector<FlatPatch> patches_;
   VoxelIndex index_;  // of their cells
 };
 
