@@ -82,7 +82,7 @@ def check_refusals(folder):
     trees = folder / "trees.csv"
     bare = ("--set", f"stand.trees={trees}", "--set", "duration_s=1", "--set", "stand.size_x_m=60",
             "--set", "stand.size_y_m=60")
-    for text, word in ((None, "opened"), ("x,y,dbh_m\n1,2,0.3\n3,4", "line 3: holds 2 of 3"),
+    for text, word in ((None, "no such file"), ("x,y,dbh_m\n1,2,0.3\n3,4", "line 3: expected 3 cells"),
                        ("x,y,dbh_m\n1,nan,0.3\n", "line 2: y")):
         if text is not None:
             trees.write_text(text)
