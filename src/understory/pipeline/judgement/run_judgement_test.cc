@@ -278,6 +278,11 @@ TEST(RunJudgement, APathThatIsNotTheAccelerometers) {
   evidence.imu_motion_scale = 0.82;
   evidence.imu_motion_correlation = 0.25;
   expect(RunStatus::kUntrusted, "lever arm", evidence);
+  // Steps by stems err by more than the motion of a good run.
+  evidence.by_stems = true;
+  evidence.stems.trees = 5;
+  expect_complete(evidence);
+  evidence.by_stems = false;
   // Noise of matching in a motion that is nearly even.
   evidence.imu_motion_spread_m_s2 = 0.21;
   evidence.imu_motion_scale = 1.0;
