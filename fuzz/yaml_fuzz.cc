@@ -4,7 +4,7 @@
 #include "fuzz_file.h"
 #include "understory/preprocess/machine_boxes.h"
 #include "understory/recording/extrinsics.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 #include "understory/util/error.h"
 
 namespace {

@@ -17,8 +17,8 @@
 #include "understory/recording/clouds/cloud_folder_writer.h"
 #include "understory/recording/messages/arrival_times.h"
 #include "understory/util/error.h"
-#include "understory/util/output_guard.h"
-#include "understory/util/staged_output.h"
+#include "understory/util/files/output_guard.h"
+#include "understory/util/files/staged_output.h"
 
 namespace understory {
 namespace {

@@ -12,7 +12,7 @@
 #include "understory/pipeline/source.h"
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
-#include "understory/util/staged_output.h"
+#include "understory/util/files/staged_output.h"
 
 namespace understory {
 namespace {

@@ -5,7 +5,7 @@
 #include "understory/cli/outcome.h"
 #include "understory/pipeline/correction/correction.h"
 #include "understory/util/error.h"
-#include "understory/util/output_guard.h"
+#include "understory/util/files/output_guard.h"
 
 namespace understory {
 namespace {

@@ -11,8 +11,8 @@
 #include "understory/cli/suggestion.h"
 #include "understory/cli/terminal.h"
 #include "understory/util/error.h"
+#include "understory/util/files/staged_output.h"
 #include "understory/util/parallel.h"
-#include "understory/util/staged_output.h"
 #include "understory/util/version.h"
 
 namespace understory {

@@ -11,7 +11,7 @@
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
-#include "understory/util/output_guard.h"
+#include "understory/util/files/output_guard.h"
 
 namespace understory {
 namespace {

@@ -19,9 +19,9 @@
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/run_folder/run_folder.h"
-#include "understory/util/atomic_file.h"
 #include "understory/util/error.h"
-#include "understory/util/output_guard.h"
+#include "understory/util/files/atomic_file.h"
+#include "understory/util/files/output_guard.h"
 #include "understory/util/version.h"
 
 namespace understory {

@@ -1,7 +1,7 @@
 #include "understory/cli/open_options.h"
 
 #include "understory/pipeline/source.h"
-#include "understory/util/output_guard.h"
+#include "understory/util/files/output_guard.h"
 
 namespace understory {
 

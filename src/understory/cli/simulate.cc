@@ -10,8 +10,8 @@
 #include "understory/simulation/simulator.h"
 #include "understory/simulation/truth.h"
 #include "understory/util/error.h"
-#include "understory/util/output_guard.h"
-#include "understory/util/staged_output.h"
+#include "understory/util/files/output_guard.h"
+#include "understory/util/files/staged_output.h"
 
 namespace understory {
 namespace {

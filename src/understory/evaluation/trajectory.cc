@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <string>
 
-#include "understory/util/csv.h"
 #include "understory/util/error.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

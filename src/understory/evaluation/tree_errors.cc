@@ -6,8 +6,8 @@
 #include <optional>
 #include <tuple>
 
-#include "understory/util/csv.h"
 #include "understory/util/error.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

@@ -4,8 +4,8 @@
 #include <map>
 #include <string>
 
-#include "understory/util/csv.h"
 #include "understory/util/error.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

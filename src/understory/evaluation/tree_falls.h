@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "understory/evaluation/tree_merge.h"
-#include "understory/forest/tree_fall.h"
+#include "understory/forest/trees/tree_fall.h"
 
 namespace understory {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "understory/forest/ground.h"
-#include "understory/forest/standing_direction.h"
+#include "understory/forest/ground/ground.h"
+#include "understory/forest/stems/standing_direction.h"
 
 namespace understory {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "understory/forest/inventory.h"
-#include "understory/forest/stem_fit.h"
+#include "understory/forest/stems/stem_fit.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 

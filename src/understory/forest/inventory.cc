@@ -6,11 +6,11 @@
 #include <cmath>
 #include <limits>
 
-#include "understory/forest/canopy.h"
 #include "understory/forest/cell_grid.h"
-#include "understory/forest/slice_thinner.h"
-#include "understory/forest/stem_fit.h"
-#include "understory/forest/tree_heights.h"
+#include "understory/forest/ground/canopy.h"
+#include "understory/forest/stems/slice_thinner.h"
+#include "understory/forest/stems/stem_fit.h"
+#include "understory/forest/trees/tree_heights.h"
 
 namespace understory {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "understory/forest/ground.h"
-#include "understory/forest/stem_detector.h"
-#include "understory/forest/tree_segments.h"
+#include "understory/forest/ground/ground.h"
+#include "understory/forest/stems/stem_detector.h"
+#include "understory/forest/trees/tree_segments.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"

@@ -4,7 +4,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/geometry/stamped_pose.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 

@@ -17,7 +17,7 @@
 #include "understory/geometry/quiet_gdal.h"
 #include "understory/georeference/coordinate_system.h"
 #include "understory/util/error.h"
-#include "understory/util/text_file.h"
+#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {

@@ -10,7 +10,7 @@
 #include "understory/georeference/coordinate_system.h"
 #include "understory/georeference/terrain_file.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

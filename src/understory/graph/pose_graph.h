@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

@@ -8,7 +8,7 @@
 
 #include "understory/map/keyframe_map.h"
 #include "understory/registration/test_stand.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

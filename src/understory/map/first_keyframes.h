@@ -9,7 +9,7 @@
 #include "understory/geometry/pose.h"
 #include "understory/map/keyframe.h"
 #include "understory/map/local_map.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

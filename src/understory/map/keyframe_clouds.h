@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
-#include "understory/util/record_file.h"
+#include "understory/util/files/record_file.h"
 #include "understory/util/time.h"
 
 namespace understory {

@@ -7,8 +7,8 @@
 #include "understory/map/keyframe.h"
 #include "understory/map/local_map.h"
 #include "understory/map/loop_attempt.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/record_file.h"
+#include "understory/util/files/binary_io.h"
+#include "understory/util/files/record_file.h"
 
 namespace understory {
 

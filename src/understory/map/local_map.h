@@ -7,7 +7,7 @@
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
 #include "understory/registration/matchers.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

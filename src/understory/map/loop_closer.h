@@ -14,8 +14,8 @@
 #include "understory/map/local_map.h"
 #include "understory/map/loop_attempt.h"
 #include "understory/registration/matcher.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/timing.h"
 

@@ -10,7 +10,7 @@
 #include "understory/map/local_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 #include "understory/util/random.h"
 
 namespace understory {

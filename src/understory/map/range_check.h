@@ -10,7 +10,7 @@
 #include "understory/geometry/points.h"
 #include "understory/map/keyframe.h"
 #include "understory/registration/range_offset/range_offset.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

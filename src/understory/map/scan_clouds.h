@@ -7,7 +7,7 @@
 #include "understory/map/keyframe_map.h"
 #include "understory/preprocess/body_cloud.h"
 #include "understory/preprocess/voxel_filter.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/timing.h"
 
 namespace understory {

@@ -15,8 +15,8 @@
 #include <utility>
 
 #include "understory/geometry/quiet_gdal.h"
-#include "understory/util/atomic_file.h"
 #include "understory/util/error.h"
+#include "understory/util/files/atomic_file.h"
 
 namespace understory {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "understory/output/run_summary.h"
 #include "understory/util/error.h"
-#include "understory/util/text_file.h"
+#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {

@@ -14,8 +14,8 @@
 
 #include <laszip/laszip_api.h>
 
-#include "understory/util/atomic_file.h"
 #include "understory/util/error.h"
+#include "understory/util/files/atomic_file.h"
 
 namespace understory {
 namespace {

@@ -21,7 +21,7 @@
 #include "understory/output/run_summary.h"
 #include "understory/output/run_tables.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 #include "understory/util/random.h"
 
 namespace understory {

@@ -2,7 +2,7 @@
 
 #include "understory/output/report_parts.h"
 #include "understory/output/svg_plot.h"
-#include "understory/util/atomic_file.h"
+#include "understory/util/files/atomic_file.h"
 
 namespace understory {
 

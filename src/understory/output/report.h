@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "understory/forest/inventory.h"
-#include "understory/forest/tree_fall.h"
+#include "understory/forest/trees/tree_fall.h"
 #include "understory/output/map_picture.h"
 #include "understory/output/run_summary.h"
 #include "understory/util/time.h"

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "understory/util/atomic_file.h"
+#include "understory/util/files/atomic_file.h"
 
 namespace understory {
 namespace {

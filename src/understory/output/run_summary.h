@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "understory/util/config_origins.h"
+#include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
 #include "understory/util/timing.h"
 

@@ -10,7 +10,7 @@
 #include <limits>
 #include <string_view>
 
-#include "understory/util/csv.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "understory/forest/tree_fall.h"
+#include "understory/forest/trees/tree_fall.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/stem_view.h"
 #include "understory/sensor/tree.h"
-#include "understory/util/atomic_file.h"
+#include "understory/util/files/atomic_file.h"
 
 namespace understory {
 

@@ -10,7 +10,7 @@
 #include "understory/pipeline/run_folder/checkpoint.h"
 #include "understory/pipeline/run_folder/journal.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

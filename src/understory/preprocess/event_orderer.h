@@ -9,8 +9,8 @@
 
 #include "understory/preprocess/stream_offset.h"
 #include "understory/recording/recording.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 
 namespace understory {

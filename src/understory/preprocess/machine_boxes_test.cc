@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 #include "understory/util/random.h"
 
 namespace understory {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "understory/preprocess/body_cloud.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

@@ -11,7 +11,7 @@
 
 #include "understory/geometry/pose_io.h"
 #include "understory/util/error.h"
-#include "understory/util/text_file.h"
+#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {

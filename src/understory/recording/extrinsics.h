@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "understory/sensor/rig.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 
 namespace understory {

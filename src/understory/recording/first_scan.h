@@ -5,7 +5,7 @@
 #include <string>
 
 #include "understory/sensor/scan.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 
 namespace understory {

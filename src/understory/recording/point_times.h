@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {

@@ -11,7 +11,7 @@
 #include "understory/sensor/imu_sample.h"
 #include "understory/sensor/rig.h"
 #include "understory/sensor/scan.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 

@@ -11,7 +11,7 @@
 
 #include "understory/recording/bags/mcap_writer.h"
 #include "understory/recording/recording.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 #include "understory/util/random.h"
 
 namespace understory::test {

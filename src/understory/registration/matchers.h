@@ -9,7 +9,7 @@
 #include "understory/registration/icp/icp_matcher.h"
 #include "understory/registration/matcher.h"
 #include "understory/registration/ndt/ndt_matcher.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

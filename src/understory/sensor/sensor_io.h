@@ -2,7 +2,7 @@
 
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/imu_sample.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 

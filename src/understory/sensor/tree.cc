@@ -1,6 +1,6 @@
 #include "understory/sensor/tree.h"
 
-#include "understory/util/csv.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

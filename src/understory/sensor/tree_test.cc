@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "understory/util/csv.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "understory/simulation/sensors/satellite.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 #include "understory/util/parallel.h"
 
 namespace understory {

@@ -7,8 +7,8 @@
 #include "understory/simulation/presets.h"
 #include "understory/simulation/stand/stand.h"
 #include "understory/util/error.h"
+#include "understory/util/files/text_file.h"
 #include "understory/util/random.h"
-#include "understory/util/text_file.h"
 
 namespace understory {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

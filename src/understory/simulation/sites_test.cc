@@ -12,7 +12,7 @@
 #include "understory/simulation/simulator.h"
 #include "understory/simulation/stand/stand.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

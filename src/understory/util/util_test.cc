@@ -5,7 +5,7 @@
 #include <numeric>
 #include <thread>
 
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"

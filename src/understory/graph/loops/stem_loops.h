@@ -4,7 +4,7 @@
 
 #include "understory/graph/stem_matching/tree_pattern.h"
 #include "understory/registration/stems/sparse_icp.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 #include "understory/util/progress.h"
 
 namespace understory {

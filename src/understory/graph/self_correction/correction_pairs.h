@@ -7,7 +7,7 @@
 #include "understory/geometry/pose.h"
 #include "understory/graph/loops/view_cone.h"
 #include "understory/registration/stems/sparse_icp.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

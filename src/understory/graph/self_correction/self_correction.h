@@ -11,7 +11,7 @@
 #include "understory/graph/self_correction/power_correction.h"
 #include "understory/registration/stems/go_icp.h"
 #include "understory/registration/stems/sparse_icp.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "understory/sensor/stem_view.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

@@ -17,7 +17,7 @@
 #include "understory/registration/matcher.h"
 #include "understory/sensor/rig.h"
 #include "understory/sensor/scan.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 #include "understory/util/log.h"
 #include "understory/util/timing.h"
 

@@ -5,7 +5,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/odometry/dense/dense_odometry.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {

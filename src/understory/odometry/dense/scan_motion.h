@@ -6,7 +6,7 @@
 #include "understory/geometry/stamped_pose.h"
 #include "understory/preprocess/body_cloud.h"
 #include "understory/registration/matcher.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "understory/geometry/pose.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {

@@ -9,8 +9,8 @@
 #include "understory/geometry/stamped_pose.h"
 #include "understory/sensor/imu_sample.h"
 #include "understory/sensor/rig.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 

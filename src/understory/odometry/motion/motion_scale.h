@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 

@@ -12,8 +12,8 @@
 #include "understory/registration/stems/sparse_icp.h"
 #include "understory/registration/stems/yaw_vote.h"
 #include "understory/sensor/stem_view.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 

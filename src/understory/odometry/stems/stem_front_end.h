@@ -13,7 +13,7 @@
 #include "understory/sensor/rig.h"
 #include "understory/sensor/scan.h"
 #include "understory/sensor/stem_view.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

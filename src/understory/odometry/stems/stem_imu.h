@@ -6,8 +6,8 @@
 #include "understory/odometry/imu/imu_buffer.h"
 #include "understory/odometry/stems/stem_levelling.h"
 #include "understory/sensor/scan.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 

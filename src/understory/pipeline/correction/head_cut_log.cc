@@ -6,9 +6,9 @@
 #include <map>
 
 #include "understory/output/run_tables.h"
-#include "understory/util/atomic_file.h"
-#include "understory/util/csv.h"
 #include "understory/util/error.h"
+#include "understory/util/files/atomic_file.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "understory/forest/tree_fall.h"
+#include "understory/forest/trees/tree_fall.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/map/head_cuts.h"
 #include "understory/output/run_summary.h"
 #include "understory/sensor/tree.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 #include "understory/util/log.h"
 
 namespace understory {

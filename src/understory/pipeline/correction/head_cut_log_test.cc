@@ -8,7 +8,7 @@
 
 #include "understory/evaluation/tree_falls.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

@@ -10,7 +10,7 @@
 #include "understory/output/las_writer.h"
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/clouds/las.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

@@ -23,8 +23,8 @@
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
-#include "understory/util/output_guard.h"
-#include "understory/util/text_file.h"
+#include "understory/util/files/output_guard.h"
+#include "understory/util/files/text_file.h"
 #include "understory/util/version.h"
 
 namespace understory {

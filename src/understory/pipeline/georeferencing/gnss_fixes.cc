@@ -7,9 +7,9 @@
 
 #include "understory/pipeline/source.h"
 #include "understory/recording/captures/nmea.h"
-#include "understory/util/csv.h"
 #include "understory/util/error.h"
-#include "understory/util/text_file.h"
+#include "understory/util/files/csv.h"
+#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {

@@ -12,7 +12,7 @@
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/recording/finding.h"
 #include "understory/util/error.h"
-#include "understory/util/output_guard.h"
+#include "understory/util/files/output_guard.h"
 #include "understory/util/timing.h"
 #include "understory/util/version.h"
 

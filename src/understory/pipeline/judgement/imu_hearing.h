@@ -4,7 +4,7 @@
 
 #include "understory/odometry/motion/motion_model.h"
 #include "understory/sensor/imu_sample.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {

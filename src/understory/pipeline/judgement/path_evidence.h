@@ -5,7 +5,7 @@
 
 #include "understory/geometry/stamped_pose.h"
 #include "understory/pipeline/judgement/run_evidence.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

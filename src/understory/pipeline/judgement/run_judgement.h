@@ -6,7 +6,7 @@
 #include "understory/geometry/pose.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/judgement/run_evidence.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

@@ -6,8 +6,8 @@
 #include "understory/pipeline/mapping/mapping_config.h"
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/mapping/sparse_mapping_config.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/config_origins.h"
+#include "understory/util/config/config_origins.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "understory/pipeline/source.h"
-#include "understory/util/read_error.h"
+#include "understory/util/files/read_error.h"
 #include "understory/util/timing.h"
 
 namespace understory {

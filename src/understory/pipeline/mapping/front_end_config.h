@@ -8,7 +8,7 @@
 #include "understory/pipeline/mapping/adaptation.h"
 #include "understory/pipeline/mapping/mapping_config.h"
 #include "understory/pipeline/mapping/sparse_mapping_config.h"
-#include "understory/util/config_origins.h"
+#include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
 
 namespace understory {

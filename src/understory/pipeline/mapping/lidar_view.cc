@@ -7,7 +7,7 @@
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/util/error.h"
-#include "understory/util/text_file.h"
+#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {

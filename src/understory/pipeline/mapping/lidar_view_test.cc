@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "understory/output/run_tables.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

@@ -11,8 +11,8 @@
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/pipeline/mapping/event_loop_config.h"
-#include "understory/util/config.h"
-#include "understory/util/config_origins.h"
+#include "understory/util/config/config.h"
+#include "understory/util/config/config_origins.h"
 
 namespace understory {
 

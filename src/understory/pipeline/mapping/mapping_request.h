@@ -9,7 +9,7 @@
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/run_folder/input_identity.h"
 #include "understory/recording/recording.h"
-#include "understory/util/config_origins.h"
+#include "understory/util/config/config_origins.h"
 
 namespace understory {
 

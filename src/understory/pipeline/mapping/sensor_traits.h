@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "understory/recording/recording.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {

@@ -8,8 +8,8 @@
 #include "understory/odometry/stems/stem_pacer.h"
 #include "understory/pipeline/correction/correction_config.h"
 #include "understory/pipeline/mapping/event_loop_config.h"
-#include "understory/util/config.h"
-#include "understory/util/config_origins.h"
+#include "understory/util/config/config.h"
+#include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
 
 namespace understory {

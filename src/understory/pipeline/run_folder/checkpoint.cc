@@ -6,11 +6,11 @@
 #include <system_error>
 #include <utility>
 
-#include "understory/util/atomic_file.h"
-#include "understory/util/durable.h"
 #include "understory/util/error.h"
-#include "understory/util/output_file.h"
-#include "understory/util/record_file.h"
+#include "understory/util/files/atomic_file.h"
+#include "understory/util/files/durable.h"
+#include "understory/util/files/output_file.h"
+#include "understory/util/files/record_file.h"
 
 namespace understory {
 namespace {

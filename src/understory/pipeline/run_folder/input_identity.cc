@@ -11,9 +11,9 @@
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/bags/ros2_bag.h"
 #include "understory/util/error.h"
-#include "understory/util/output_file.h"
-#include "understory/util/read_error.h"
-#include "understory/util/record_file.h"
+#include "understory/util/files/output_file.h"
+#include "understory/util/files/read_error.h"
+#include "understory/util/files/record_file.h"
 
 namespace understory {
 namespace {

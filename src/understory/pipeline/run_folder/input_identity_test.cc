@@ -9,7 +9,7 @@
 
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 #include "understory/util/log.h"
 
 namespace understory {

@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "understory/geometry/pose.h"
-#include "understory/util/record_file.h"
+#include "understory/util/files/record_file.h"
 #include "understory/util/time.h"
 
 namespace understory {

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "understory/sensor/rig.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/record_file.h"
+#include "understory/util/files/binary_io.h"
+#include "understory/util/files/record_file.h"
 #include "understory/util/time.h"
 
 namespace understory {

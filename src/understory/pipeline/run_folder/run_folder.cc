@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "understory/pipeline/run_folder/run_results.h"
-#include "understory/util/atomic_file.h"
-#include "understory/util/durable.h"
 #include "understory/util/error.h"
-#include "understory/util/file_lock.h"
-#include "understory/util/output_guard.h"
+#include "understory/util/files/atomic_file.h"
+#include "understory/util/files/durable.h"
+#include "understory/util/files/file_lock.h"
+#include "understory/util/files/output_guard.h"
 
 namespace understory {
 

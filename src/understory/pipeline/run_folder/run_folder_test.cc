@@ -9,8 +9,8 @@
 #include <string>
 
 #include "understory/pipeline/run_folder/run_results.h"
-#include "understory/util/folder_test_support.h"
-#include "understory/util/output_guard.h"
+#include "understory/util/files/folder_test_support.h"
+#include "understory/util/files/output_guard.h"
 
 namespace understory {
 namespace {

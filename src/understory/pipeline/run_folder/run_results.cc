@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
-#include "understory/util/atomic_file.h"
 #include "understory/util/error.h"
+#include "understory/util/files/atomic_file.h"
 
 namespace understory {
 namespace {

@@ -7,8 +7,8 @@
 #include "understory/odometry/stems/sparse_odometry.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/stem_view.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/record_file.h"
+#include "understory/util/files/binary_io.h"
+#include "understory/util/files/record_file.h"
 
 namespace understory {
 

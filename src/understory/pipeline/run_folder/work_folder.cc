@@ -9,10 +9,10 @@
 #include <system_error>
 #include <vector>
 
-#include "understory/util/atomic_file.h"
-#include "understory/util/durable.h"
 #include "understory/util/error.h"
-#include "understory/util/output_guard.h"
+#include "understory/util/files/atomic_file.h"
+#include "understory/util/files/durable.h"
+#include "understory/util/files/output_guard.h"
 #include "understory/util/version.h"
 
 namespace understory {

@@ -6,7 +6,7 @@ namespace understory {
 
 // The part of a run folder that belongs to the command at work: RUN/.understory. Its content:
 //   marker        a text that names this program and the version of the format
-//   lock          held by the process at work; it falls with the process (util/file_lock.h)
+//   lock          held by the process at work; it falls with the process (util/files/file_lock.h)
 //   results/      results until they are put in place
 //   placed        names of the results in the run folder that are this program's, while they are
 //                 being put in place

@@ -7,7 +7,7 @@
 #include "understory/evaluation/trajectory.h"
 #include "understory/output/run_tables.h"
 #include "understory/recording/clouds/stems_file.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 #include "understory/util/random.h"
 
 namespace understory {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "understory/util/error.h"
-#include "understory/util/read_error.h"
+#include "understory/util/files/read_error.h"
 
 namespace understory {
 namespace {

@@ -5,7 +5,7 @@
 #include <array>
 #include <filesystem>
 
-#include "understory/util/read_error.h"
+#include "understory/util/files/read_error.h"
 
 namespace understory {
 namespace {

@@ -12,7 +12,7 @@
 #include "understory/recording/bags/sqlite_source.h"
 #include "understory/recording/finding.h"
 #include "understory/util/error.h"
-#include "understory/util/read_error.h"
+#include "understory/util/files/read_error.h"
 
 namespace understory {
 namespace {

@@ -11,7 +11,7 @@
 #include "understory/recording/messages/event_bytes.h"
 #include "understory/recording/messages/message_merger.h"
 #include "understory/util/error.h"
-#include "understory/util/output_file.h"
+#include "understory/util/files/output_file.h"
 
 namespace understory {
 namespace {

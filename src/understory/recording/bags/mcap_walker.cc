@@ -5,8 +5,8 @@
 
 #include "understory/recording/finding.h"
 #include "understory/util/error.h"
-#include "understory/util/output_file.h"
-#include "understory/util/read_error.h"
+#include "understory/util/files/output_file.h"
+#include "understory/util/files/read_error.h"
 
 namespace understory::mcap {
 namespace {

@@ -10,7 +10,7 @@
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/bags/mcap_format.h"
 #include "understory/recording/messages/message_source.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory::mcap {
 

@@ -12,7 +12,7 @@
 #include "understory/recording/messages/message_encode.h"
 #include "understory/recording/messages/message_schemas.h"
 #include "understory/util/error.h"
-#include "understory/util/output_file.h"
+#include "understory/util/files/output_file.h"
 #include "understory/util/version.h"
 
 namespace understory {

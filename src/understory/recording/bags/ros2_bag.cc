@@ -12,8 +12,8 @@
 #include "understory/recording/bags/mcap_reader.h"
 #include "understory/recording/finding.h"
 #include "understory/util/error.h"
-#include "understory/util/read_error.h"
-#include "understory/util/text_file.h"
+#include "understory/util/files/read_error.h"
+#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {

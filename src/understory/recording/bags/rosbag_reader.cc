@@ -11,7 +11,7 @@
 #include "understory/recording/finding.h"
 #include "understory/recording/messages/message_merger.h"
 #include "understory/util/error.h"
-#include "understory/util/read_error.h"
+#include "understory/util/files/read_error.h"
 
 namespace understory {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <sstream>
 
-#include "understory/util/read_error.h"
+#include "understory/util/files/read_error.h"
 
 namespace understory {
 namespace {

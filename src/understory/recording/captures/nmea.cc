@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "understory/recording/messages/event_bytes.h"
-#include "understory/util/text_file.h"
+#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {

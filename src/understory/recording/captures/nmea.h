@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "understory/sensor/gnss_fix.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 

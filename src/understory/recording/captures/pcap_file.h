@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "understory/recording/bags/byte_source.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 

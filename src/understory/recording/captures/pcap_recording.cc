@@ -18,7 +18,7 @@
 #include "understory/recording/messages/event_bytes.h"
 #include "understory/recording/messages/topic_statistics.h"
 #include "understory/util/error.h"
-#include "understory/util/read_error.h"
+#include "understory/util/files/read_error.h"
 
 namespace understory {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "understory/recording/captures/velodyne.h"
-#include "understory/util/read_error.h"
+#include "understory/util/files/read_error.h"
 
 namespace understory {
 namespace {

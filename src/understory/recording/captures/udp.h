@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "understory/recording/bytes.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {

@@ -12,7 +12,7 @@
 #include "understory/recording/first_scan.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/scan.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/time.h"
 
 namespace understory {

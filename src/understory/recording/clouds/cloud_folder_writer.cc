@@ -9,7 +9,7 @@
 
 #include "understory/recording/bytes.h"
 #include "understory/util/error.h"
-#include "understory/util/output_file.h"
+#include "understory/util/files/output_file.h"
 
 namespace understory {
 namespace {

@@ -8,8 +8,8 @@
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/clouds/text_lines.h"
 #include "understory/recording/finding.h"
-#include "understory/util/csv.h"
 #include "understory/util/error.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/imu_sample.h"
-#include "understory/util/binary_io.h"
-#include "understory/util/csv.h"
+#include "understory/util/files/binary_io.h"
+#include "understory/util/files/csv.h"
 #include "understory/util/log.h"
 
 namespace understory {

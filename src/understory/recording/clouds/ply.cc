@@ -6,8 +6,8 @@
 #include "understory/recording/clouds/cloud_table.h"
 #include "understory/recording/clouds/text_lines.h"
 #include "understory/recording/finding.h"
-#include "understory/util/csv.h"
 #include "understory/util/error.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

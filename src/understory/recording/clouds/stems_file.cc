@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "understory/util/csv.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

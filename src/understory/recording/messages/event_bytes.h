@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "understory/recording/recording.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 

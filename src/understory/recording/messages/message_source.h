@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "understory/recording/messages/message_reader.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
 #include "understory/util/time.h"
 

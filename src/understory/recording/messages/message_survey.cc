@@ -9,7 +9,7 @@
 #include "understory/recording/messages/message_decode.h"
 #include "understory/recording/messages/point_cloud.h"
 #include "understory/util/error.h"
-#include "understory/util/read_error.h"
+#include "understory/util/files/read_error.h"
 
 namespace understory {
 namespace {

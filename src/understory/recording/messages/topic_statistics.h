@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "understory/recording/recording.h"
-#include "understory/util/binary_io.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 

@@ -6,7 +6,7 @@
 #include "understory/registration/gicp/gicp.h"
 #include "understory/registration/icp/icp_map.h"
 #include "understory/registration/matcher.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

@@ -4,7 +4,7 @@
 
 #include "understory/registration/icp/surface.h"
 #include "understory/registration/registration.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "understory/registration/describe_steps.h"
 #include "understory/registration/judged_match.h"
 #include "understory/util/error.h"
 
@@ -20,22 +21,11 @@ void describe(ConfigTable& table, NdtConfig& config) {
       "curvature used for the steps");
   table.add("outlier_ratio", config.outlier_ratio, {0.01, 0.95}, "",
             "share of points expected to match nothing");
-  table.add("max_iterations", config.max_iterations, {1, 1000}, "", "most steps of one match");
-  table.add("step_translation_m", config.step_translation_m, {1e-7, 0.1}, "m",
-            "converged when a step is shorter");
-  table.add("step_rotation_rad", config.step_rotation_rad, {1e-8, 0.1}, "rad",
-            "converged when a step turns less");
   table.add("widening", config.widening, {1.0, 20.0}, "",
             "the first steps see normals this much wider; 1 = no such steps");
   table.add("wide_until_m", config.wide_until_m, {1e-4, 1.0}, "m",
             "the first steps end when one is shorter");
-  table.add("max_step_m", config.max_step_m, {0.01, 10.0}, "m", "longest step");
-  table.add("degenerate_ratio", config.degenerate_ratio, {0.0, 0.5}, "",
-            "a direction with less of the strongest direction's information is undetermined");
-  table.add("min_matches", config.min_matches, {6, 100000}, "",
-            "fewer matched points are no match");
-  table.add("independent_share", config.independent_share, {1e-4, 1.0}, "",
-            "share of matched points that counts as independent");
+  internal::describe_steps(table, config);
 }
 
 // The wide steps only look for where the last ones begin: a part of a dense scan is enough.

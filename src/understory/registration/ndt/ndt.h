@@ -5,7 +5,7 @@
 #include "understory/registration/match_sums.h"
 #include "understory/registration/ndt/ndt_map.h"
 #include "understory/registration/registration.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

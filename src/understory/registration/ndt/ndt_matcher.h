@@ -6,7 +6,7 @@
 #include "understory/registration/matcher.h"
 #include "understory/registration/ndt/ndt.h"
 #include "understory/registration/ndt/ndt_map.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

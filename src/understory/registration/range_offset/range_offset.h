@@ -2,7 +2,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/registration/range_offset/surface_view.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

@@ -6,7 +6,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/registration/ndt/plane_grid.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "understory/registration/stems/sparse_icp.h"
-#include "understory/util/config.h"
+#include "understory/util/config/config.h"
 
 namespace understory {
 

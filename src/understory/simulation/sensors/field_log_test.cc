@@ -9,7 +9,7 @@
 #include "understory/recording/extrinsics.h"
 #include "understory/simulation/simulator.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "understory/simulation/simulator.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 
 namespace understory {
 namespace {

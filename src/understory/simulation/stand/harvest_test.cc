@@ -13,7 +13,7 @@
 #include "understory/simulation/sensors/scanner.h"
 #include "understory/simulation/simulator.h"
 #include "understory/simulation/world.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 #include "understory/util/parallel.h"
 
 namespace understory {

@@ -15,7 +15,7 @@
 #include "understory/simulation/stand/stand.h"
 #include "understory/simulation/stand/tree_cloud.h"
 #include "understory/util/error.h"
-#include "understory/util/folder_test_support.h"
+#include "understory/util/files/folder_test_support.h"
 #include "understory/util/random.h"
 #include "understory/util/timing.h"
 

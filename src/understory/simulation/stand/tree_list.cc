@@ -14,7 +14,7 @@
 #include "understory/simulation/sensors/counter_noise.h"
 #include "understory/simulation/stand/stand_drawing.h"
 #include "understory/simulation/stand/tree_cloud.h"
-#include "understory/util/csv.h"
+#include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {

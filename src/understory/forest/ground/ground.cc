@@ -1,0 +1,265 @@
+#include "understory/forest/ground/ground.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "understory/forest/cell_grid.h"
+#include "understory/forest/ground/cloth.h"
+#include "understory/forest/ground/low_noise.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+// The lowest heights in a cell, in ascending order.
+struct LowCell {
+  std::array<float, 4> z = {kNan, kNan, kNan, kNan};
+  void add(float height) {
+    for (float& kept : z) {
+      if (!(kept <= height)) std::swap(kept, height);
+      if (std::isnan(height)) return;
+    }
+  }
+};
+
+struct MeanCell {
+  double sum = 0.0;
+  std::uint32_t count = 0;
+};
+
+// The lowest point of a cell that another one lies near above; the lowest if there is none.
+float supported_height(const LowCell& cell) {
+  constexpr float kNear = 0.4F;
+  for (std::size_t i = 0; i + 1 < cell.z.size(); ++i) {
+    if (cell.z[i + 1] - cell.z[i] <= kNear) return cell.z[i];
+  }
+  return cell.z[0];
+}
+
+// The lowest height of each cell that is no stray point below the ground: one far under its
+// neighbours gives way to the next.
+std::vector<float> floor_heights(const Raster& grid, const std::vector<LowCell>& low) {
+  constexpr float kStrayDepth = 0.8F;
+  std::vector<float> supported(low.size());
+  std::transform(low.begin(), low.end(), supported.begin(), supported_height);
+  std::vector<float> result(low.size(), kNan);
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      std::vector<float> around;
+      for (int j = -2; j <= 2; ++j) {
+        for (int i = -2; i <= 2; ++i) {
+          if ((i == 0 && j == 0) || !grid.contains(column + i, row + j)) continue;
+          const float z = supported[grid.index(column + i, row + j)];
+          if (std::isfinite(z)) around.push_back(z);
+        }
+      }
+      const std::size_t here = grid.index(column, row);
+      float chosen = supported[here];
+      if (around.size() >= 4) {
+        // The third lowest around: a slope has lower neighbours, a stray point has none.
+        std::nth_element(around.begin(), around.begin() + 2, around.end());
+        const float floor = around[2] - kStrayDepth;
+        for (const float z : low[here].z) {
+          if (z < supported[here]) continue;
+          chosen = z;
+          if (std::isnan(z) || z >= floor) break;
+        }
+      }
+      result[here] = chosen;
+    }
+  }
+  return result;
+}
+
+// Heights of unknown cells from the known ones around, ring by ring up to `rings` cells away: the
+// mean of a plane's worth of neighbours weighted by distance. Then a light smoothing of the filled
+// cells only.
+void fill_gaps(Raster& grid, int rings) {
+  std::vector<char> known(grid.values.size());
+  for (std::size_t i = 0; i < known.size(); ++i)
+    known[i] = std::isfinite(grid.values[i]) ? 1 : 0;
+  std::vector<float> next = grid.values;
+  std::vector<char> filled(known.size(), 0);
+  const auto mean_around = [&](int column, int row) {
+    float sum = 0.0F;
+    float weights = 0.0F;
+    for (int j = -1; j <= 1; ++j) {
+      for (int i = -1; i <= 1; ++i) {
+        if ((i == 0 && j == 0) || !grid.contains(column + i, row + j)) continue;
+        const float z = grid.values[grid.index(column + i, row + j)];
+        if (!std::isfinite(z)) continue;
+        const float weight = i == 0 || j == 0 ? 1.0F : 0.5F;
+        sum += weight * z;
+        weights += weight;
+      }
+    }
+    return weights > 0.0F ? sum / weights : kNan;
+  };
+  const auto sweep = [&](bool only_unknown) {
+    parallel_for(static_cast<std::size_t>(grid.rows), 16, [&](std::size_t r) {
+      const int row = static_cast<int>(r);
+      for (int column = 0; column < grid.columns; ++column) {
+        const std::size_t i = grid.index(column, row);
+        if (known[i] != 0 || (!only_unknown && filled[i] == 0)) continue;
+        if (only_unknown && std::isfinite(grid.values[i])) continue;
+        next[i] = mean_around(column, row);
+        if (std::isfinite(next[i])) filled[i] = 1;
+      }
+    });
+    grid.values = next;
+  };
+  for (int ring = 0; ring < rings; ++ring)
+    sweep(true);
+  for (int i = 0; i < 4 * rings; ++i)
+    sweep(false);
+}
+
+// Ground heights that stick out of the plane through their neighbours (a stump, a low branch that
+// the cloth touched) are dropped: robust local planes over 5 x 5 cells, only upwards.
+void drop_bumps(Raster& grid, float most) {
+  const std::vector<float> values = grid.values;
+  parallel_for(static_cast<std::size_t>(grid.rows), 16, [&](std::size_t r) {
+    const int row = static_cast<int>(r);
+    for (int column = 0; column < grid.columns; ++column) {
+      const float here = values[grid.index(column, row)];
+      if (!std::isfinite(here)) continue;
+      // Opposite neighbours cancel the slope: the median of their means is the plane's height.
+      std::array<float, 12> means{};
+      std::size_t count = 0;
+      for (int j = 0; j <= 2; ++j) {
+        for (int i = (j == 0 ? 1 : -2); i <= 2; ++i) {
+          if (!grid.contains(column + i, row + j) || !grid.contains(column - i, row - j)) continue;
+          const float a = values[grid.index(column + i, row + j)];
+          const float b = values[grid.index(column - i, row - j)];
+          if (std::isfinite(a) && std::isfinite(b)) means[count++] = 0.5F * (a + b);
+        }
+      }
+      if (count < 3) continue;
+      std::nth_element(means.begin(), means.begin() + static_cast<std::ptrdiff_t>(count / 2),
+                       means.begin() + static_cast<std::ptrdiff_t>(count));
+      if (here - means[count / 2] > most) grid.values[grid.index(column, row)] = kNan;
+    }
+  });
+}
+
+// Passes 1 and 2: the lowest points on the grid of the cloth, which is also that of the terrain.
+std::vector<LowCell> lowest_points(const PointBlocks& cloud, double cell_m, Raster& grid) {
+  const LowNoise noise(cloud);
+  CellGrid<LowCell> cells(cell_m);
+  bool first = true;
+  double z0 = 0.0;
+  cloud([&](std::span<const Eigen::Vector3d> points) {
+    for (const Eigen::Vector3d& point : points) {
+      if (first) z0 = std::floor(point.z());
+      first = false;
+      if (noise.holds(point)) continue;
+      cells.at(point.x(), point.y()).add(static_cast<float>(point.z() - z0));
+    }
+  });
+  std::vector<LowCell> low;
+  grid =
+      raster_over(cells, 0.0, 0.0, [&](const Raster& raster, std::size_t at, const LowCell& cell) {
+        low.resize(raster.values.size());
+        low[at] = cell;
+      });
+  grid.z0 = z0;
+  return low;
+}
+
+void heights_over(const Raster& terrain, std::span<const Eigen::Vector3d> points,
+                  std::vector<double>& heights) {
+  heights.resize(points.size());
+  parallel_for(points.size(), 4096, [&](std::size_t i) {
+    heights[i] = points[i].z() - terrain.interpolate(points[i].x(), points[i].y());
+  });
+}
+
+// Pass 3: the mean of the points in a thin layer around the provisional terrain. The lowest point
+// of a cell lies below the ground by the noise of the ranges; the mean does not.
+double refine(const PointBlocks& cloud, const GroundConfig& config, Raster& terrain) {
+  std::vector<MeanCell> cells(terrain.values.size());
+  std::vector<double> heights;
+  cloud([&](std::span<const Eigen::Vector3d> points) {
+    heights_over(terrain, points, heights);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Vector3d& point = points[i];
+      const double height = heights[i];
+      if (!(std::abs(height) <= config.class_m)) continue;
+      const int column = terrain.column_of(point.x());
+      const int row = terrain.row_of(point.y());
+      if (!terrain.contains(column, row)) continue;
+      MeanCell& cell = cells[terrain.index(column, row)];
+      // Relative to the surface, so that slope and place within the cell do not matter.
+      cell.sum += height;
+      ++cell.count;
+    }
+  });
+  std::size_t known = 0;
+  std::size_t measured = 0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (!std::isfinite(terrain.values[i])) continue;
+    ++known;
+    if (cells[i].count < 3) continue;
+    ++measured;
+    terrain.values[i] += static_cast<float>(cells[i].sum / cells[i].count);
+  }
+  return known == 0 ? 0.0 : static_cast<double>(measured) / static_cast<double>(known);
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, GroundConfig& config) {
+  table.add("cell_m", config.cell_m, {0.1, 10.0}, "m", "cell of the terrain model and the cloth");
+  table.add("stiffness", config.stiffness, {1, 5}, "",
+            "of the cloth: 1 steep terrain, 2 rolling, 3 flat");
+  table.add("steps", config.steps, {10, 10'000}, "", "of the cloth, at most");
+  table.add("touch_m", config.touch_m, {0.05, 5.0}, "m",
+            "lowest points this near to the cloth are ground");
+  table.add("class_m", config.class_m, {0.02, 2.0}, "m",
+            "points this near to the terrain get the class ground");
+  table.add("max_gap_m", config.max_gap_m, {0.0, 1000.0}, "m",
+            "how far terrain is filled in from the nearest ground point");
+}
+
+double GroundModel::height_above(const Eigen::Vector3d& point) const {
+  return point.z() - terrain.interpolate(point.x(), point.y());
+}
+
+void GroundModel::heights_above(std::span<const Eigen::Vector3d> points,
+                                std::vector<double>& heights) const {
+  heights_over(terrain, points, heights);
+}
+
+std::uint8_t GroundModel::las_class(double height_above_ground) const {
+  if (std::isnan(height_above_ground)) return 1;
+  if (height_above_ground < -1.0) return 7;
+  if (height_above_ground <= config.class_m) return 2;
+  if (height_above_ground <= 0.5) return 3;
+  return height_above_ground <= 2.0 ? 4 : 5;
+}
+
+GroundModel estimate_ground(const PointBlocks& cloud, const GroundConfig& config) {
+  GroundModel model;
+  model.config = config;
+  Raster& terrain = model.terrain;
+  const std::vector<LowCell> low = lowest_points(cloud, config.cell_m, terrain);
+  if (low.empty()) return model;
+  const std::vector<float> floor = floor_heights(terrain, low);
+  const std::vector<float> cloth =
+      settle_cloth(floor, terrain.columns, terrain.rows, {config.stiffness, config.steps});
+  terrain.values.assign(floor.size(), kNan);
+  for (std::size_t i = 0; i < floor.size(); ++i) {
+    if (floor[i] - cloth[i] <= static_cast<float>(config.touch_m)) terrain.values[i] = floor[i];
+  }
+  drop_bumps(terrain, static_cast<float>(0.3 * config.cell_m));
+  drop_bumps(terrain, static_cast<float>(0.3 * config.cell_m));
+  fill_gaps(terrain, static_cast<int>(std::ceil(config.max_gap_m / config.cell_m)));
+  model.measured_share = refine(cloud, config, terrain);
+  return model;
+}
+
+}  // namespace understory

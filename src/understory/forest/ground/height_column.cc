@@ -1,0 +1,57 @@
+#include "understory/forest/ground/height_column.h"
+
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr double kLeastShare = 0.01;  // of the fullest metre: less is a gap or a few ghosts
+constexpr double kDrop = 5.0;         // times the points of any metre in the sky above: a top
+constexpr int kSky = 8;               // metres that tell how many ghosts there are above a tip
+constexpr double kSigmas = 4.0;       // by which a tip's points are more than those
+
+}  // namespace
+
+double HeightColumn::most(int begin, int end) const {
+  double most = 0.0;
+  for (int metre = begin; metre < std::min(end, kMetres); ++metre)
+    most = std::max(most, at(metre));
+  return most;
+}
+
+int HeightColumn::connected_end(int first, int largest_gap) const {
+  const double least = std::max(1.0, kLeastShare * most(first, kMetres));
+  int last = first - 1;
+  for (int metre = first; metre < kMetres && metre - last <= largest_gap; ++metre) {
+    if (at(metre) >= least) last = metre;
+  }
+  return last + 1;
+}
+
+// The highest metre after which the points drop clearly, else the one after which they drop most.
+int HeightColumn::clearest_drop(int first, int end) const {
+  int clearest = first;
+  double largest = 0.0;
+  const double least = kLeastShare * most(first, kMetres);
+  for (int metre = end - 1; metre >= first; --metre) {
+    if (at(metre) < least) continue;
+    // The next metre may hold the end of the tip.
+    const double drop = at(metre) / (1.0 + most(metre + 2, metre + 2 + kSky));
+    if (drop >= kDrop) return metre;
+    if (drop <= largest) continue;
+    largest = drop;
+    clearest = metre;
+  }
+  return clearest;
+}
+
+int HeightColumn::top(int first, int end) const {
+  int top = clearest_drop(first, end);
+  for (; top + 1 < end; ++top) {
+    const double ghosts = most(top + 3, top + 3 + kSky);
+    if (at(top + 1) <= ghosts + kSigmas * std::sqrt(ghosts)) break;
+  }
+  return top;
+}
+
+}  // namespace understory

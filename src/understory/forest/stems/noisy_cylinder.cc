@@ -1,0 +1,294 @@
+#include "understory/forest/stems/noisy_cylinder.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "understory/forest/stems/stem_axis.h"
+
+namespace understory {
+namespace {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+constexpr double kLeastScatter = 0.004;
+constexpr double kMostScatter = 0.06;
+constexpr int kViews = 24;           // directions from which a stem may have been seen
+constexpr double kLeastView = 1e-4;  // share of a direction that gave nothing
+
+// exp(x) for x <= 0 to nine digits, a quarter of the library's time: the fit is made of these.
+double quick_exp(double x) {
+  constexpr double kLog2e = 1.4426950408889634;
+  constexpr double kLn2 = 0.6931471805599453;
+  if (x < -60.0) return 0.0;
+  const double whole = std::floor(x * kLog2e + 0.5);
+  const double r = x - whole * kLn2;  // at most 0.35
+  double sum = 1.0 / 40320.0;
+  for (const double term :
+       {1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0})
+    sum = sum * r + term;
+  const auto exponent = static_cast<std::uint64_t>(static_cast<std::int64_t>(whole) + 1023);
+  return sum * std::bit_cast<double>(exponent << 52);
+}
+
+// A point seen along the stem: place in the plane across it, relative to the start's centre line.
+struct FlatPoint {
+  Eigen::Vector2d place;
+  double rise = 0.0;  // over breast height
+  double weight = 1.0;
+};
+
+class Estimator {
+ public:
+  Estimator(const std::vector<SlicePoint>& points, const StemFit& start,
+            const NoisyCylinderConfig& config)
+      : config_(config), start_(start) {
+    // A leaning stem's horizontal section is an ellipse: squeeze the plane along the lean.
+    const double lean = start.slope.norm();
+    squeeze_ = Eigen::Matrix2d::Identity();
+    if (lean > 1e-9) {
+      const Eigen::Vector2d along = start.slope / lean;
+      squeeze_ -= (1.0 - 1.0 / std::sqrt(1.0 + lean * lean)) * along * along.transpose();
+    }
+    const auto most = static_cast<std::size_t>(config.max_points);
+    const std::size_t stride = std::max<std::size_t>(1, (points.size() + most - 1) / most);
+    for (std::size_t i = 0; i < points.size(); i += stride) {
+      const SlicePoint& p = points[i];
+      const double rise = static_cast<double>(p.height_m) - kBreastHeight;
+      const Eigen::Vector2d q(static_cast<double>(p.x), static_cast<double>(p.y));
+      flat_.push_back({squeeze_ * (q - start.centre - rise * start.slope), rise,
+                       static_cast<double>(p.returns)});
+      total_ += flat_.back().weight;
+    }
+    radius_ = start.radius_m;
+    taper_ = start.taper;
+    scatter_ = std::clamp(start.rms_m, 0.01, 0.03);
+    const double reach = radius_ + 0.1;
+    stray_density_ = 1.0 / (M_PI * reach * reach);
+  }
+
+  NoisyCylinder run() {
+    NoisyCylinder result;
+    if (flat_.size() < 8) return result;
+    spread_bins();
+    for (int cycle = 0; cycle < config_.cycles; ++cycle) {
+      const Vector6 start = parameters();
+      if (!step(result)) return result;
+      const Vector6 first = parameters() - start;
+      if (first.norm() < 4e-5) break;
+      const Vector6 once = parameters();
+      if (!step(result)) return result;
+      extrapolate(start, first, parameters() - once);
+    }
+    result.converged = true;
+    const Eigen::Matrix2d back = squeeze_.inverse();
+    result.centre = start_.centre + back * centre_;
+    result.slope = start_.slope + back * slope_;
+    result.radius_m = radius_;
+    result.taper = taper_;
+    result.scatter_m = scatter_;
+    result.strays = strays_;
+    Matrix6 unsqueeze = Matrix6::Identity();
+    unsqueeze.topLeftCorner<2, 2>() = back;
+    unsqueeze.block<2, 2>(2, 2) = back;
+    result.covariance = unsqueeze * result.covariance * unsqueeze.transpose();
+    return result;
+  }
+
+ private:
+  [[nodiscard]] Vector6 parameters() const {
+    Vector6 all;
+    all << centre_, slope_, radius_, taper_;
+    return all;
+  }
+
+  // Expectation maximisation creeps where little is known. Squared extrapolation of two steps
+  // (Varadhan and Roland, Scand. J. Stat. 35, 2008, scheme S3) takes it there.
+  void extrapolate(const Vector6& start, const Vector6& first, const Vector6& second) {
+    const Vector6 change = second - first;
+    if (change.norm() < 1e-12) return;
+    const double length = std::clamp(first.norm() / change.norm(), 1.0, 6.0);
+    const Vector6 found = start + 2.0 * length * first + length * length * change;
+    if (found[4] < 0.5 * radius_ || found[4] > 2.0 * radius_) return;
+    centre_ = found.head<2>();
+    slope_ = found.segment<2>(2);
+    radius_ = found[4];
+    taper_ = found[5];
+  }
+
+  // Places on the circumference, near enough to each other that the scatter blurs the gaps.
+  void spread_bins() {
+    const double wanted = 2.0 * M_PI * radius_ / (0.8 * scatter_);
+    const auto count = static_cast<std::size_t>(std::clamp(wanted, 24.0, 160.0));
+    visible_.assign(count, 1.0 / static_cast<double>(count));
+    views_.assign(kViews, 1.0 / kViews);
+    lobes_.assign(kViews, std::vector<double>(count));
+    for (std::size_t b = 0; b < count; ++b) {
+      const double turn = 2.0 * M_PI * (static_cast<double>(b) + 0.5) / static_cast<double>(count);
+      outward_.emplace_back(std::cos(turn), std::sin(turn));
+    }
+    for (int k = 0; k < kViews; ++k) {
+      const double turn = 2.0 * M_PI * k / kViews;
+      const Eigen::Vector2d towards(std::cos(turn), std::sin(turn));
+      std::vector<double>& lobe = lobes_[static_cast<std::size_t>(k)];
+      double sum = 0.0;
+      for (std::size_t b = 0; b < count; ++b)
+        sum += lobe[b] = std::max(0.0, outward_[b].dot(towards));
+      for (double& share : lobe)
+        share /= sum;
+    }
+  }
+
+  // Sums over the points, each weighted with the chance that it came from each place.
+  struct Sums {
+    Matrix6 normal = Matrix6::Zero();
+    Vector6 right = Vector6::Zero();
+    double weight = 0.0;
+    double square = 0.0;
+    double log_likelihood = 0.0;
+  };
+
+  void add_point(const FlatPoint& point, Sums& sums, std::vector<double>& seen) {
+    const Eigen::Vector2d q = point.place - centre_ - point.rise * slope_;
+    const double r = radius_ + taper_ * point.rise;
+    const double inverse = 1.0 / (scatter_ * scatter_);
+    const double distance = q.norm();
+    // Only places near the point's own angle can have given it.
+    const auto count = static_cast<int>(visible_.size());
+    const double width = 3.5 * scatter_ / std::sqrt(std::max(1e-8, r * distance));
+    const int reach =
+        width >= M_PI ? count / 2 : static_cast<int>(width / (2.0 * M_PI) * count) + 1;
+    const int middle =
+        static_cast<int>(std::floor((std::atan2(q.y(), q.x()) / (2.0 * M_PI) + 1.0) * count));
+    const int first = middle - std::min(reach, (count - 1) / 2);
+    const int last = middle + std::min(reach, count / 2);
+    shares_.clear();
+    double density = 0.0;
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    double square = 0.0;
+    for (int b = first; b <= last; ++b) {
+      const auto at = static_cast<std::size_t>(((b % count) + count) % count);
+      const double d2 = (q - r * outward_[at]).squaredNorm();
+      const double p = visible_[at] * quick_exp(-0.5 * d2 * inverse);
+      shares_.emplace_back(at, p);
+      density += p;
+      mean += p * outward_[at];
+      square += p * d2;
+    }
+    const double scale = (1.0 - strays_) * inverse / (2.0 * M_PI);
+    const double all = scale * density + strays_ * stray_density_;
+    const double w = point.weight * scale / all;
+    sums.log_likelihood += point.weight * std::log(all);
+    sums.square += w * square;
+    for (const auto& [at, p] : shares_)
+      seen[at] += w * p;
+    add_to_system(point, w * density, w * mean, sums);
+  }
+
+  // The model q = centre + rise slope + (radius + rise taper) outward is linear in its parameters.
+  static void add_to_system(const FlatPoint& point, double weight, const Eigen::Vector2d& outward,
+                            Sums& sums) {
+    const double h = point.rise;
+    sums.weight += weight;
+    for (int k = 0; k < 2; ++k) {
+      sums.normal(k, k) += weight;
+      sums.normal(k, 2 + k) += weight * h;
+      sums.normal(2 + k, 2 + k) += weight * h * h;
+      sums.normal(k, 4) += outward[k];
+      sums.normal(k, 5) += h * outward[k];
+      sums.normal(2 + k, 4) += h * outward[k];
+      sums.normal(2 + k, 5) += h * h * outward[k];
+      sums.right[k] += weight * point.place[k];
+      sums.right[2 + k] += weight * h * point.place[k];
+    }
+    sums.normal(4, 4) += weight;
+    sums.normal(4, 5) += weight * h;
+    sums.normal(5, 5) += weight * h * h;
+    const double out = outward.dot(point.place);
+    sums.right[4] += out;
+    sums.right[5] += h * out;
+  }
+
+  bool step(NoisyCylinder& result) {
+    Sums sums;
+    std::vector<double> seen(visible_.size(), 0.0);
+    for (const FlatPoint& point : flat_)
+      add_point(point, sums, seen);
+    if (sums.weight < 0.2 * total_) return false;
+    result.log_likelihood = sums.log_likelihood / total_;
+    const double s2 = scatter_ * scatter_;
+    const auto prior = [&](int i, double value, double sd) {
+      sums.normal(i, i) += s2 / (sd * sd);
+      sums.right[i] += s2 / (sd * sd) * value;
+    };
+    prior(2, 0.0, config_.slope_sd);
+    prior(3, 0.0, config_.slope_sd);
+    prior(5, config_.usual_taper, config_.taper_sd);
+    const Matrix6 normal = sums.normal.selfadjointView<Eigen::Upper>();
+    const Eigen::LDLT<Matrix6> solver(normal);
+    const Vector6 found = solver.solve(sums.right);
+    if (!found.allFinite() || found[4] < 0.008 || found.head<2>().norm() > 0.5) return false;
+    centre_ = found.head<2>();
+    slope_ = found.segment<2>(2);
+    radius_ = found[4];
+    taper_ = found[5];
+    result.covariance = s2 * solver.solve(Matrix6::Identity());
+    scatter_ = std::clamp(std::sqrt(0.5 * sums.square / sums.weight), kLeastScatter, kMostScatter);
+    strays_ = std::clamp(1.0 - sums.weight / total_, 0.005, 0.5);
+    learn_views(seen);
+    return true;
+  }
+
+  // Beams from one direction fall evenly over the stem's width, so they hit places in proportion to
+  // the cosine of their angle to it, and none beyond a right angle: what is seen is a sum of such
+  // lobes. That ties the radius to the width seen where the side away from the scanner is unknown.
+  void learn_views(const std::vector<double>& seen) {
+    constexpr int kRounds = 4;
+    for (int round = 0; round < kRounds; ++round) {
+      double sum = 0.0;
+      for (std::size_t k = 0; k < views_.size(); ++k) {
+        double gain = 0.0;
+        for (std::size_t b = 0; b < seen.size(); ++b)
+          gain += visible_[b] > 1e-12 ? lobes_[k][b] * seen[b] / visible_[b] : 0.0;
+        sum += views_[k] *= gain;
+      }
+      std::fill(visible_.begin(), visible_.end(), 0.0);
+      for (std::size_t k = 0; k < views_.size(); ++k) {
+        views_[k] = std::max(kLeastView, views_[k] / sum);
+        for (std::size_t b = 0; b < visible_.size(); ++b)
+          visible_[b] += views_[k] * lobes_[k][b];
+      }
+    }
+  }
+
+  const NoisyCylinderConfig& config_;
+  const StemFit& start_;
+  Eigen::Matrix2d squeeze_;
+  std::vector<FlatPoint> flat_;
+  double total_ = 0.0;
+  // Relative to the start's centre line, in the squeezed plane.
+  Eigen::Vector2d centre_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d slope_ = Eigen::Vector2d::Zero();
+  double radius_ = 0.0;
+  double taper_ = 0.0;
+  double scatter_ = 0.0;
+  double strays_ = 0.05;
+  double stray_density_ = 1.0;
+  std::vector<double> visible_;  // share of the returns that come from each place
+  std::vector<Eigen::Vector2d> outward_;
+  std::vector<double> views_;               // share of the returns from each direction
+  std::vector<std::vector<double>> lobes_;  // what each direction sees of each place
+  std::vector<std::pair<std::size_t, double>> shares_;
+};
+
+}  // namespace
+
+NoisyCylinder fit_noisy_cylinder(const std::vector<SlicePoint>& points, const StemFit& start,
+                                 const NoisyCylinderConfig& config) {
+  return Estimator(points, start, config).run();
+}
+
+}  // namespace understory

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "understory/forest/stems/stem_detector.h"
+
+namespace understory {
+
+// A slowly tapering cylinder through points that scatter about its surface to all sides. Fitting
+// distances makes a stem too thick where the scatter is no longer small beside the radius: a point
+// displaced along the surface lies outside of it, and the side that was not seen holds nothing
+// against a larger circle. Here the place on the surface from which a point came is unknown and is
+// averaged over (expectation maximisation; Dempster, Laird and Rubin, J. R. Stat. Soc. B 39, 1977):
+// a point's density is the mean of round Gaussians along the circumference, weighted by how much of
+// the stem the directions from which it was seen, found along the way, show of each place.
+struct NoisyCylinder {
+  bool converged = false;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  // at breast height
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+  double radius_m = 0.0;  // at breast height
+  double taper = 0.0;
+  double scatter_m = 0.0;       // of the points about the surface, in each direction
+  double strays = 0.0;          // share of the returns that belong to something else
+  double log_likelihood = 0.0;  // mean over the returns; compares fits to the same points
+  // Of centre, slope, radius, taper: what it would be if returns were independent and each place on
+  // the surface known.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+struct NoisyCylinderConfig {
+  double usual_taper = -0.008;  // of the radius per metre of height
+  double taper_sd = 0.006;      // how far stems differ from it
+  double slope_sd = 0.03;       // how far the slope may leave that of the start
+  int max_points = 400;         // every n-th where there are more
+  int cycles = 20;              // of two steps and an extrapolation, at most
+};
+
+// Points should be those within about 10 cm of the stem's surface. Deterministic.
+[[nodiscard]] NoisyCylinder fit_noisy_cylinder(const std::vector<SlicePoint>& points,
+                                               const StemFit& start,
+                                               const NoisyCylinderConfig& config);
+
+}  // namespace understory

@@ -1,0 +1,106 @@
+#include "understory/forest/stems/noisy_cylinder.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+#include <cmath>
+
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+// Points of a stem seen from one side, as far beams with a wide footprint give them: evenly over
+// its width, displaced to all sides.
+std::vector<SlicePoint> seen_from_one_side(double radius, double noise, int count, Random& random) {
+  std::vector<SlicePoint> points;
+  for (int i = 0; i < count; ++i) {
+    const double h = random.uniform(0.5, 3.5);
+    const double r = radius - 0.008 * (h - 1.3);
+    const double across = random.uniform(-r, r);
+    const double x = across + random.normal(0.0, noise) + 0.02 * (h - 1.3);
+    const double y = -std::sqrt(r * r - across * across) + random.normal(0.0, noise);
+    points.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(h), 1});
+  }
+  return points;
+}
+
+StemFit start_of(double radius, double x, double y) {
+  StemFit start;
+  start.centre = {x, y};
+  start.slope = {0.02, 0.0};
+  start.radius_m = radius;
+  start.taper = -0.008;
+  start.rms_m = 0.02;
+  return start;
+}
+
+TEST(NoisyCylinder, ScatterAsLargeAsAThirdOfTheRadiusDoesNotMakeTheStemThicker) {
+  Random random(1);
+  double sum = 0.0;
+  constexpr int kStems = 40;
+  for (int i = 0; i < kStems; ++i) {
+    const std::vector<SlicePoint> points = seen_from_one_side(0.075, 0.025, 400, random);
+    // Distances alone lead there: a circle that is too large and too far back.
+    const NoisyCylinder fit = fit_noisy_cylinder(points, start_of(0.1, 0.0, 0.02), {});
+    ASSERT_TRUE(fit.converged);
+    EXPECT_NEAR(fit.radius_m, 0.075, 0.03);
+    EXPECT_NEAR(fit.scatter_m, 0.025, 0.006);
+    sum += fit.radius_m;
+  }
+  // From one side the fit is a fifth of the scatter too thin: neighbouring directions share the
+  // view.
+  EXPECT_NEAR(sum / kStems, 0.075, 0.006);
+}
+
+TEST(NoisyCylinder, LittleScatterLeavesPlaceAndRadiusToMillimetres) {
+  Random random(2);
+  Eigen::Vector2d centre(0.0, 0.0);
+  double radius = 0.0;
+  constexpr int kStems = 20;
+  for (int i = 0; i < kStems; ++i) {
+    const std::vector<SlicePoint> points = seen_from_one_side(0.2, 0.01, 500, random);
+    const NoisyCylinder fit = fit_noisy_cylinder(points, start_of(0.18, 0.02, -0.02), {});
+    ASSERT_TRUE(fit.converged);
+    EXPECT_NEAR(fit.slope.x(), 0.02, 0.005);
+    EXPECT_NEAR(fit.taper, -0.008, 0.006);
+    centre += fit.centre / kStems;
+    radius += fit.radius_m / kStems;
+  }
+  EXPECT_NEAR(radius, 0.2, 0.0025);
+  EXPECT_NEAR(centre.x(), 0.0, 0.001);
+  EXPECT_NEAR(centre.y(), 0.0, 0.003);
+}
+
+TEST(NoisyCylinder, ALeaningStemIsMeasuredAcrossItsAxis) {
+  // A steep lean: the horizontal section is 15 % longer than the diameter.
+  Random random(3);
+  const Eigen::Vector3d axis = Eigen::Vector3d(0.57, 0.0, 1.0).normalized();
+  const Eigen::Vector3d u = axis.cross(Eigen::Vector3d::UnitY()).normalized();
+  std::vector<SlicePoint> points;
+  for (int i = 0; i < 500; ++i) {
+    const double turn = random.uniform(0.0, 2.0 * M_PI);
+    const double r = 0.15 + random.normal(0.0, 0.004);
+    const Eigen::Vector3d p = random.uniform(-1.0, 2.5) * axis +
+                              r * (std::cos(turn) * u + std::sin(turn) * Eigen::Vector3d::UnitY());
+    points.push_back(
+        {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z() + 1.3), 1});
+  }
+  StemFit start = start_of(0.14, 0.0, 0.01);
+  start.slope = {0.57, 0.0};
+  NoisyCylinderConfig config;
+  config.usual_taper = 0.0;
+  const NoisyCylinder fit = fit_noisy_cylinder(points, start, config);
+  ASSERT_TRUE(fit.converged);
+  EXPECT_NEAR(fit.radius_m, 0.15, 0.002);
+}
+
+TEST(NoisyCylinder, TooFewPointsDoNotConverge) {
+  Random random(4);
+  EXPECT_FALSE(fit_noisy_cylinder(seen_from_one_side(0.1, 0.01, 5, random), start_of(0.1, 0, 0), {})
+                   .converged);
+}
+
+}  // namespace
+}  // namespace understory

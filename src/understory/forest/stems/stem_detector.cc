@@ -1,0 +1,298 @@
+#include "understory/forest/stems/stem_detector.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/forest/stems/circle_search.h"
+#include "understory/forest/stems/ring_linker.h"
+#include "understory/forest/stems/stem_fit.h"
+#include "understory/util/parallel.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+// Points by square of the ground, to gather those around a stem: sorts them, so that those of a
+// square, and of squares side by side, follow each other.
+class PointIndex {
+ public:
+  explicit PointIndex(std::vector<SlicePoint>& points) : end_(points.size()) {
+    std::sort(points.begin(), points.end(), [](const SlicePoint& a, const SlicePoint& b) {
+      const std::uint64_t cell_a = key(a);
+      const std::uint64_t cell_b = key(b);
+      if (cell_a != cell_b) return cell_a < cell_b;
+      if (a.x != b.x) return a.x < b.x;
+      if (a.y != b.y) return a.y < b.y;
+      return a.height_m != b.height_m ? a.height_m < b.height_m : a.returns < b.returns;
+    });
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::uint64_t cell = key(points[i]);
+      if (cells_.empty() || cells_.back().key != cell) cells_.push_back({cell, i});
+    }
+  }
+
+  // Calls visit(index) for the points of all squares within `reach` along either axis.
+  template <typename Visit>
+  void near(const Eigen::Vector2d& centre, double reach, const Visit& visit) const {
+    const int r1 = cell(static_cast<float>(centre.y() + reach));
+    const int c0 = cell(static_cast<float>(centre.x() - reach));
+    const int c1 = cell(static_cast<float>(centre.x() + reach));
+    for (int r = cell(static_cast<float>(centre.y() - reach)); r <= r1; ++r) {
+      const std::size_t end = first_from(key(c1, r) + 1);
+      for (std::size_t i = first_from(key(c0, r)); i < end; ++i)
+        visit(i);
+    }
+  }
+
+ private:
+  struct Cell {
+    std::uint64_t key;
+    std::size_t first;  // of its points
+  };
+  [[nodiscard]] std::size_t first_from(std::uint64_t wanted) const {
+    const auto found =
+        std::lower_bound(cells_.begin(), cells_.end(), wanted,
+                         [](const Cell& a, std::uint64_t value) { return a.key < value; });
+    return found == cells_.end() ? end_ : found->first;
+  }
+  static int cell(float value) { return static_cast<int>(std::floor(value / 0.5F)); }
+  static std::uint64_t key(int column, int row) {
+    return static_cast<std::uint64_t>(static_cast<std::int64_t>(row) + (1LL << 31)) << 32 |
+           static_cast<std::uint64_t>(static_cast<std::int64_t>(column) + (1LL << 31));
+  }
+  static std::uint64_t key(const SlicePoint& point) { return key(cell(point.x), cell(point.y)); }
+
+  std::vector<Cell> cells_;
+  std::size_t end_;
+};
+
+// One way of cutting the points: thin slices for dense clouds, thick ones for what is left of
+// sparse clouds.
+struct Cut {
+  double thickness_m = 0.25;
+  int min_slices = 3;
+  double reach_m = 0.08;
+  double band_m = 0.02;
+};
+
+std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
+                             const std::vector<char>& explained, const Cut& cut,
+                             const StemDetectorConfig& config) {
+  const double span = config.highest_m - config.lowest_m;
+  const auto count = static_cast<std::size_t>(std::max(1.0, std::round(span / cut.thickness_m)));
+  std::vector<std::vector<Eigen::Vector2f>> slices(count);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (explained[i] != 0) continue;
+    const double above = static_cast<double>(points[i].height_m) - config.lowest_m;
+    if (above < 0.0 || above >= span) continue;
+    const auto slice =
+        std::min(count - 1, static_cast<std::size_t>(above / span * static_cast<double>(count)));
+    slices[slice].emplace_back(points[i].x, points[i].y);
+  }
+  CircleSearchConfig search;
+  search.min_radius_m = 0.4 * config.min_dbh_m;
+  search.max_radius_m = 0.5 * config.max_dbh_m;
+  search.reach_m = cut.reach_m;
+  search.band_m = cut.band_m;
+  std::vector<Ring> rings;
+  const std::vector<std::vector<Circle>> circles =
+      find_circles(slices, search, hash_numbers(count, 0));
+  for (std::size_t s = 0; s < count; ++s) {
+    const double middle =
+        config.lowest_m + (static_cast<double>(s) + 0.5) * span / static_cast<double>(count);
+    for (const Circle& circle : circles[s])
+      rings.push_back({circle, middle, static_cast<int>(s)});
+  }
+  return rings;
+}
+
+// How much may lie beside the surface, as the sum of both ratios of StemEvidence, for it still to
+// be a stem. In a thicket it takes many slices that agree to believe in one; a steep lean is what a
+// line through scattered points has.
+double max_clutter(const StemFitResult& fit, double lean_deg) {
+  const auto rings = static_cast<double>(fit.stem.slices.size());
+  if (lean_deg > 8.0) return 0.25;
+  const double limit = std::min(0.65, 0.34 + 0.085 * std::max(0.0, rings - 2.0));
+  return fit.evidence.scatter_m > 0.029 && rings < 6.0 ? std::min(limit, 0.4) : limit;
+}
+
+// A slim column of points that stands alone: with a thin stem and noisy ranges its inside fills up,
+// but nothing else looks like that.
+bool stands_alone(const StemFitResult& fit, double slices_between, double lean_deg) {
+  const StemEvidence& e = fit.evidence;
+  return fit.stem.radius_m <= 0.1 && e.outside_ratio <= 0.12 && lean_deg <= 10.0 &&
+         fit.stem.highest_m - fit.stem.lowest_m >= 1.5 && e.slices >= 0.85 * slices_between &&
+         e.even_arc_deg >= 90.0 && e.scatter_m <= 0.4 * fit.stem.radius_m + 0.006;
+}
+
+// Is it a stem, or a bush that a cone happens to fit?
+bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig& config) {
+  if (!fit.converged) return false;
+  const StemFit& stem = fit.stem;
+  const StemEvidence& e = fit.evidence;
+  const double dbh = 2.0 * stem.radius_m;
+  const double dbh_sd = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
+  const double lean_deg = std::atan(stem.slope.norm()) * 180.0 / M_PI;
+  const double extent = stem.highest_m - stem.lowest_m;
+  // Steep leans are rare, and a line through scattered points leans as it likes: they have to be
+  // better supported.
+  const double wanted_returns = config.min_returns * (1.0 + std::pow(lean_deg / 8.0, 2));
+  const double slices_between = std::floor(stem.highest_m / config.slice_m) -
+                                std::floor(stem.lowest_m / config.slice_m) + 1.0;
+  if (dbh < config.min_dbh_m || dbh > config.max_dbh_m || lean_deg > config.max_lean_deg ||
+      e.returns < wanted_returns || e.slices < config.min_slices ||
+      e.slices < 0.6 * slices_between || extent < std::max(0.7, 2.0 * cut.thickness_m) ||
+      stem.lowest_m > kBreastHeight + 0.3 ||  // a branch or a crown, not a stem
+      stem.arc_deg < config.min_arc_deg ||
+      e.even_arc_deg < std::max(0.8 * config.min_arc_deg, 0.35 * stem.arc_deg) ||
+      dbh_sd > 0.01 + 0.08 * dbh) {
+    return false;
+  }
+  if (stands_alone(fit, slices_between, lean_deg)) return true;
+  // Where points are many, a stem shows in thin slices; what only thick ones show has to be clean.
+  const double clutter = e.inside_ratio + e.outside_ratio;
+  const bool dense = e.on > 12 * e.slices;
+  if (cut.min_slices < config.min_slices && dense && (clutter > 0.25 || e.scatter_m > 0.025)) {
+    return false;
+  }
+  return 4 * e.inside <= e.on && e.inside_ratio <= 0.35 && clutter <= max_clutter(fit, lean_deg) &&
+         e.scatter_m <= std::max(0.012, 0.2 * stem.radius_m) + 0.008;
+}
+
+// After the refined fit, which may have found a much thinner stem in the circle's edge. What shows
+// another side in each slice is a piece of a machine or a heap of branches (a stem's pieces were
+// filled to 0.67 and more on the tuning maps); what shows in few slices has to stand clear, and
+// must not be cut off where it was seen well.
+bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
+  constexpr double kLeastFill = 0.65;
+  constexpr double kWellSeen = 50.0;  // returns a slice
+  const StemFit& stem = fit.stem;
+  const StemEvidence& e = fit.evidence;
+  if (!fit.converged || 2.0 * stem.radius_m < config.min_dbh_m ||
+      2.0 * stem.radius_m > config.max_dbh_m || e.returns < config.min_returns ||
+      std::atan(stem.slope.norm()) * 180.0 / M_PI > config.max_lean_deg ||
+      stem.arc_deg < config.min_arc_deg || e.fill < kLeastFill) {
+    return false;
+  }
+  const double all = (config.highest_m - config.lowest_m) / config.slice_m;
+  if (e.slices >= 0.8 * all) return true;
+  const double sd = std::sqrt(std::max(0.0, stem.covariance(2, 2)));
+  return e.inside_ratio + e.outside_ratio <= 0.25 && sd <= 0.35 * stem.radius_m &&
+         (e.slices >= 0.4 * all || e.returns < kWellSeen * e.slices);
+}
+
+bool same_stem(const StemFit& a, const StemFit& b) {
+  const double larger = std::max(a.radius_m, b.radius_m);
+  const double smaller = std::min(a.radius_m, b.radius_m);
+  // Stems do not overlap; what does so by more than the fits' errors is one stem.
+  return (a.centre - b.centre).norm() < std::max(0.85 * (larger + smaller), larger + 0.3 * smaller);
+}
+
+// Best supported first: many returns, evenly on the parts that were seen.
+void sort_by_support(std::vector<StemFitResult>& fits) {
+  std::stable_sort(fits.begin(), fits.end(), [](const StemFitResult& a, const StemFitResult& b) {
+    const double qa = a.evidence.patches * a.evidence.fill;
+    const double qb = b.evidence.patches * b.evidence.fill;
+    if (qa != qb) return qa > qb;
+    const Eigen::Vector2d& ca = a.stem.centre;
+    const Eigen::Vector2d& cb = b.stem.centre;
+    return ca.x() != cb.x() ? ca.x() < cb.x() : ca.y() < cb.y();
+  });
+}
+
+// Returns on the stem's surface that no better stem has taken.
+int unclaimed_returns(const StemFitResult& fit, const PointIndex& index,
+                      const std::vector<SlicePoint>& points, const std::vector<char>& explained) {
+  const StemAxis axis(fit.stem);
+  const double band = std::max(2.5 * fit.evidence.scatter_m, 0.015);
+  std::uint64_t returns = 0;
+  index.near(fit.stem.centre, fit.stem.radius_m + 1.2, [&](std::size_t i) {
+    if (explained[i] == 0 && std::abs(axis.surface_error(points[i])) <= band)
+      returns += points[i].returns;
+  });
+  return static_cast<int>(returns);
+}
+
+// Marks what belongs to a stem: surface, inside, and a margin.
+void mark_explained(const StemFit& stem, const PointIndex& index,
+                    const std::vector<SlicePoint>& points, std::vector<char>& explained) {
+  const StemAxis axis(stem);
+  index.near(stem.centre, stem.radius_m + 1.2, [&](std::size_t i) {
+    if (axis.place(points[i]).distance_m <= stem.radius_m + 0.06) explained[i] = 1;
+  });
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, StemDetectorConfig& config) {
+  table.add("lowest_m", config.lowest_m, {0.1, 5.0}, "m", "stems are looked for from this height");
+  table.add("highest_m", config.highest_m, {1.5, 20.0}, "m", "and up to this height");
+  table.add("slice_m", config.slice_m, {0.05, 1.0}, "m", "thickness of a slice");
+  table.add("thin_m", config.thin_m, {0.0, 0.1}, "m",
+            "one point is kept in each cube of this size");
+  table.add("min_dbh_m", config.min_dbh_m, {0.02, 1.0}, "m", "smallest diameter looked for");
+  table.add("max_dbh_m", config.max_dbh_m, {0.1, 5.0}, "m", "largest diameter looked for");
+  table.add("min_returns", config.min_returns, {5, 100'000}, "", "on a stem's surface");
+  table.add("min_arc_deg", config.min_arc_deg, {20.0, 360.0}, "deg",
+            "of the circumference that has to be seen");
+  table.add("min_slices", config.min_slices, {2, 50}, "", "in which the surface has to be seen");
+  table.add("max_lean_deg", config.max_lean_deg, {0.0, 60.0}, "deg", "from the vertical");
+}
+
+std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
+                                  const StemDetectorConfig& config) {
+  const PointIndex index(points);
+  std::vector<char> explained(points.size(), 0);
+  std::vector<StemFit> stems;
+  const std::vector<Cut> cuts = {{config.slice_m, config.min_slices, 0.08, 0.02},
+                                 {3.0 * config.slice_m, 2, 0.12, 0.025}};
+  for (const Cut& cut : cuts) {
+    const std::vector<Ring> rings = find_rings(points, explained, cut, config);
+    const std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
+    std::vector<StemFitResult> fits(starts.size());
+    std::vector<char> accepted(starts.size(), 0);
+    parallel_for(starts.size(), 1, [&](std::size_t i) {
+      const StemFit& start = starts[i];
+      const double reach =
+          start.radius_m + 0.4 + start.slope.norm() * (config.highest_m - kBreastHeight);
+      std::vector<SlicePoint> near;
+      const StemAxis axis(start);
+      const double within = start.radius_m + 0.35;
+      index.near(start.centre, reach, [&](std::size_t k) {
+        if (explained[k] == 0 && axis.may_be_within(points[k], within) &&
+            axis.place(points[k]).distance_m < within) {
+          near.push_back(points[k]);
+        }
+      });
+      fits[i] = fit_stem(near, start, config);
+      accepted[i] = is_stem(fits[i], cut, config) ? 1 : 0;
+      if (accepted[i] != 0) {
+        fits[i] = refine_stem(near, fits[i], config);
+        accepted[i] = is_stem_still(fits[i], config) ? 1 : 0;
+      }
+    });
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < fits.size(); ++i) {
+      if (accepted[i] != 0) fits[kept++] = fits[i];
+    }
+    fits.resize(kept);
+    sort_by_support(fits);
+    for (const StemFitResult& fit : fits) {
+      const auto overlaps = [&](const StemFit& other) { return same_stem(fit.stem, other); };
+      if (std::any_of(stems.begin(), stems.end(), overlaps)) continue;
+      // A stem beside another must not live on the other's points.
+      if (unclaimed_returns(fit, index, points, explained) <
+          std::max(config.min_returns, fit.evidence.returns * 2 / 3)) {
+        continue;
+      }
+      stems.push_back(fit.stem);
+      mark_explained(fit.stem, index, points, explained);
+    }
+  }
+  std::sort(stems.begin(), stems.end(), [](const StemFit& a, const StemFit& b) {
+    return a.centre.x() != b.centre.x() ? a.centre.x() < b.centre.x() : a.centre.y() < b.centre.y();
+  });
+  return stems;
+}
+
+}  // namespace understory

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "understory/util/config/config.h"
+
+namespace understory {
+
+// A point near breast height: metres relative to `origin` of the search, and above the ground.
+struct SlicePoint {
+  float x = 0.0F;
+  float y = 0.0F;
+  float height_m = 0.0F;
+  std::uint32_t returns = 1;  // points of the cloud that this one stands for
+};
+
+struct StemDetectorConfig {
+  double lowest_m = 0.5;   // above ground: slices from here ...
+  double highest_m = 3.5;  // ... to here
+  double slice_m = 0.25;   // thickness of a slice
+  double thin_m = 0.015;   // one point per cube of this size
+  double min_dbh_m = 0.05;
+  double max_dbh_m = 1.2;
+  int min_returns = 25;       // of the cloud on the stem's surface
+  double min_arc_deg = 60.0;  // of the circle that points cover, over all slices
+  int min_slices = 3;         // with a good circle
+  double max_lean_deg = 25.0;
+};
+void describe(ConfigTable& table, StemDetectorConfig& config);
+
+// A circle in one slice, as accepted.
+struct StemSlice {
+  float height_m = 0.0F;
+  float x = 0.0F;
+  float y = 0.0F;
+  float radius_m = 0.0F;
+  float rms_m = 0.0F;
+  float arc_deg = 0.0F;
+};
+
+// A stem: a slowly tapering, leaning cone through the points around breast height.
+struct StemFit {
+  // Centre line at breast height (1.3 m), relative to the origin of the search; and its slope: what
+  // x and y gain per metre of height.
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+  double radius_m = 0.0;  // at breast height
+  double taper = 0.0;     // of the radius per metre of height (negative: thinner upwards)
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();       // of centre x, y and radius
+  Eigen::Matrix2d foot_covariance = Eigen::Matrix2d::Zero();  // of the centre line at the ground
+  double rms_m = 0.0;                                         // of the points on the surface
+  double arc_deg = 0.0;                                       // covered by points
+  int returns = 0;                                            // of the cloud
+  double lowest_m = 0.0;  // first and last height with points on the surface
+  double highest_m = 0.0;
+  std::vector<StemSlice> slices;
+};
+
+// Stems among the points of the slices. Points may be in any order, and come back sorted by place:
+// there are too many for a second copy. The same points give the same stems for any number of
+// threads. Stems come sorted by x, then y.
+[[nodiscard]] std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
+                                                const StemDetectorConfig& config);
+
+}  // namespace understory

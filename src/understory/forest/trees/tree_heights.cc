@@ -1,0 +1,72 @@
+#include "understory/forest/trees/tree_heights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace understory {
+namespace {
+
+constexpr double kCrownReach = 1.5;  // metres around the stem in which a top is looked for
+constexpr double kCell = 1.0;        // of the squares that know the stems nearby
+constexpr int kLargestGap = 3;       // metres without points that a crown may begin after
+constexpr double kLeastAbove = 1.5;  // metres over the slices: less is no tree top
+
+Eigen::Vector2i cell_of(const Eigen::Vector2d& place) {
+  return (place / kCell).array().floor().cast<int>();
+}
+
+std::uint64_t key(const Eigen::Vector2i& cell) {
+  return static_cast<std::uint64_t>(static_cast<std::uint32_t>(cell.x())) << 32 |
+         static_cast<std::uint32_t>(cell.y());
+}
+
+}  // namespace
+
+Eigen::Vector2d stem_place_at(const StemFit& stem, double height_m) {
+  return stem.centre + std::min(height_m - 1.3, 6.0) * stem.slope;
+}
+
+TreeColumns::TreeColumns(const std::vector<StemFit>& stems)
+    : stems_(stems), columns_(stems.size()) {
+  const Eigen::Vector2d reach(kCrownReach, kCrownReach);
+  for (std::size_t i = 0; i < stems.size(); ++i) {
+    const Eigen::Vector2d foot = stem_place_at(stems[i], 0.0);
+    const Eigen::Vector2d end = stem_place_at(stems[i], std::numeric_limits<double>::infinity());
+    const Eigen::Vector2i low = cell_of(foot.cwiseMin(end) - reach);
+    const Eigen::Vector2i high = cell_of(foot.cwiseMax(end) + reach);
+    for (int y = low.y(); y <= high.y(); ++y) {
+      for (int x = low.x(); x <= high.x(); ++x)
+        near_[key({x, y})].push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+}
+
+void TreeColumns::add(const Eigen::Vector2d& place, double height_m) {
+  const auto near = near_.find(key(cell_of(place)));
+  if (near == near_.end()) return;
+  Column* nearest = nullptr;
+  double least = kCrownReach * kCrownReach;
+  for (const std::uint32_t i : near->second) {
+    const double distance = (stem_place_at(stems_[i], height_m) - place).squaredNorm();
+    if (distance >= least) continue;
+    least = distance;
+    nearest = &columns_[i];
+  }
+  if (nearest == nullptr) return;
+  const std::size_t metre = HeightColumn::metre_of(height_m);
+  ++nearest->points[metre];
+  nearest->highest_m[metre] = std::max(nearest->highest_m[metre], static_cast<float>(height_m));
+}
+
+double TreeColumns::top(std::size_t stem, double slices_end_m) const {
+  const Column& column = columns_[stem];
+  const int first = static_cast<int>(slices_end_m);
+  const int end = column.connected_end(first, kLargestGap);
+  if (end <= first) return std::numeric_limits<double>::quiet_NaN();
+  const auto height =
+      static_cast<double>(column.highest_m[static_cast<std::size_t>(column.top(first, end))]);
+  return height >= slices_end_m + kLeastAbove ? height : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace understory

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "understory/forest/ground/height_column.h"
+#include "understory/forest/stems/stem_detector.h"
+
+namespace understory {
+
+// Place of a stem at a height; the lean near the ground is not carried far up, trees straighten.
+[[nodiscard]] Eigen::Vector2d stem_place_at(const StemFit& stem, double height_m);
+
+// What a cloud holds around each stem, nearer to it than to any other, by metres above the ground.
+class TreeColumns {
+ public:
+  // `stems` outlive this; their frame is that of `add`.
+  explicit TreeColumns(const std::vector<StemFit>& stems);
+  void add(const Eigen::Vector2d& place, double height_m);  // height >= 0
+
+  // Height of a tree's top above the ground: the highest point that hangs together with its stem
+  // (gaps of at most 3 m) and is nearer to it than to any other stem, ghosts of other pulses aside
+  // (see HeightColumn). NaN where nothing is seen above the stem's slices, or where the points end
+  // as if cut off just above them: that is no tree top.
+  [[nodiscard]] double top(std::size_t stem, double slices_end_m) const;
+
+ private:
+  struct Column : HeightColumn {
+    std::array<float, kMetres> highest_m{};  // within each metre
+  };
+  const std::vector<StemFit>& stems_;
+  // Stems by the squares that they or their reach come to at any height.
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> near_;
+  std::vector<Column> columns_;
+};
+
+}  // namespace understory
