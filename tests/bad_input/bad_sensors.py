@@ -66,6 +66,7 @@ def covered(folder):
     _, outcome = mapped(folder, spoilt)
     assert outcome.code == 4 and "lidar.unknown" in outcome.warnings, (outcome.code, outcome.said)
     assert not any("sparse" in change["why"] for change in outcome.run["adapted"]), outcome.run["adapted"]
+    assert outcome.run["evidence"]["scans_repeated"] == 0, outcome.run["evidence"]
     message = outcome.warnings["lidar.unknown"]["message"]
     assert "nothing was adapted" in message, message
     (folder / "seen").mkdir()

@@ -231,7 +231,7 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
   }
   recovery_.note_scan(scan.stamp);
   const std::uint64_t content = content_of(scan);
-  counts_.repeated += content == counts_.last_content ? 1 : 0;
+  counts_.repeated += is_repetition(content, counts_.last_content) ? 1 : 0;
   counts_.last_content = content;
   ScanRecord record;
   record.stamp = scan.stamp;

@@ -6,6 +6,7 @@
 namespace understory {
 
 std::uint64_t content_of(const Scan& scan) {
+  if (scan.points.empty()) return 0;
   constexpr std::size_t kEvery = 8;
   constexpr std::uint64_t kFactor = 0x9E3779B97F4A7C15U;
   std::uint64_t sum = scan.points.size() + 1;
@@ -17,6 +18,10 @@ std::uint64_t content_of(const Scan& scan) {
     sum = (std::rotl(sum, 29) ^ std::bit_cast<std::uint32_t>(p.z)) * kFactor;
   }
   return sum;
+}
+
+bool is_repetition(std::uint64_t content, std::uint64_t content_before) {
+  return content != 0 && content == content_before;
 }
 
 }  // namespace understory

@@ -42,7 +42,7 @@ std::vector<TimeNs> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig)
   const ScopedTimer timer(times_, "scan");
   ++scans_;
   const std::uint64_t content = content_of(*scan);
-  repeated_ += content == last_content_ ? 1 : 0;
+  repeated_ += is_repetition(content, last_content_) ? 1 : 0;
   last_content_ = content;
   last_scan_end_ = scan->end();
   waiting_ends_.push_back(last_scan_end_);
