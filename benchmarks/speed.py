@@ -105,8 +105,8 @@ def render(rounds, what):
             cell(errors.get("drift_percent"), 2)]) + " |")
     whole = statistics.median(r["understory"]["whole_cpu_ms"] for r in rounds)
     lines += ["", f"- The whole of `understory map` (reading, decoding, map, trees and report "
-              f"included) takes {whole:.0f} ms of CPU a scan; the peers' figures leave their "
-              "reading out, as the row above does."]
+              f"included) takes {whole:.0f} ms of CPU a scan.",
+              "- The peers' figures leave their reading out, and so does the row of this program."]
     return "\n".join(lines) + "\n"
 
 

@@ -360,8 +360,8 @@ def render(rows, seconds):
             f"| recordings as they are called untrusted | {len(refused + of_status('untrusted', lost))} | "
             "formerly counted as good ones |",
             f"| good ones called partial | {len(partial)} | |", "",
-            f"{len(WAYS) - len(left_out)} of {len(WAYS)} ways are in the plan. Left out, as they made no wrong map of "
-            f"seeds 1 and 2: {'; '.join(left_out)}.", "",
+            f"{len(WAYS) - len(left_out)} of {len(WAYS)} ways are in the plan. The others are left out, because they made "
+            "no wrong map of seeds 1 and 2:", *(f"- {name}" for name in left_out), "",
             "| spoilt by | wrong | complete | cause named | not spoilt enough | error of the wrong ones m |",
             "|---|---|---|---|---|---|"]
     for way in WAYS + [APART]:
@@ -381,7 +381,9 @@ def render(rows, seconds):
                          ("lost without being spoilt", lost),
                          ("good and called untrusted", refused),
                          ("good and called partial", partial)):
-        text += [""] * bool(group) + [f"- {title}: {r['key']}: {'; '.join(r['reasons'])}" for r in group]
+        text += [""] * bool(group)
+        for r in group:  # a reason a line, so that each can be read
+            text += [f"- {title}: {r['key']}", *(f"  - {reason}" for reason in r["reasons"])]
     return ("\n".join(text) + "\n", deceived + deceived_as_is, refused,
             len(named) / max(1, len(wrong)))
 

@@ -1,5 +1,5 @@
-"""Pages that a user reads: links lead somewhere, every page is reached, commands and options exist,
-and no sentence of README and guides has more than 25 words."""
+"""Pages: links lead somewhere, every page is reached, commands and options exist, no sentence has more
+than 25 words, and pages for users name papers by their titles."""
 
 import os
 import re
@@ -82,10 +82,19 @@ def check_command(page, words, helps, keys):
                 wrong.append(f"{page.name}: {name} has no key {key}")
 
 
-def sentences(page):
-    text = re.sub(r"^    .*$|<!--.*?-->", "", page.read_text(), flags=re.M)
-    for block in re.split(r"\n\s*\n|\n(?=[-|#*\d])|\|", text):
-        yield from re.split(r"(?<=[.!?:;])\s+", " ".join(block.split()))
+def text_of(page):
+    """Without code; of the changes, those of the newest version."""
+    text = page.read_text()
+    if page.name == "CHANGELOG.md":
+        text = text.split("\n## ")[1]
+    return re.sub(r"^    .*$|<!--.*?-->", "", text, flags=re.M)
+
+
+def sentences(text):
+    """A heading, an item of a list and a cell of a table end a sentence; colon and semicolon do not."""
+    text = re.sub(r"^(#+ .*)$", r"\n\1\n", text, flags=re.M)
+    for block in re.split(r"\n\s*\n|\n(?=\s*(?:[-*] |\d+\. |\|))|\|", text):
+        yield from re.split(r"(?<=[.!?])[*)\"]*\s+", " ".join(block.split()))
 
 
 def words_of(sentence):
@@ -109,10 +118,20 @@ for page in [first, TOP / "docs" / "reference" / "configuration.md", *guides]:
     for words in commands(page):
         check_command(page, words, helps, keys)
         checked += 1
-    for sentence in sentences(page):
-        if len(words_of(sentence)) > LONGEST_SENTENCE:
-            wrong.append(f"{page.name}: {len(words_of(sentence))} words: {sentence}")
 assert checked > 20, checked
+
+counted = 0
+for page in sorted(pages | {TOP / "CHANGELOG.md"}):
+    for sentence in sentences(text_of(page)):
+        counted += 1
+        if len(words_of(sentence)) > LONGEST_SENTENCE:
+            wrong.append(f"{page.relative_to(TOP)}: {len(words_of(sentence))} words: {sentence}")
+assert counted > 3000, counted
+
+# P0 to P4 are keys of docs/method: a user meets the papers by their titles, without their equations.
+for page in [first, *guides, *sorted((TOP / "docs" / "reference").glob("*.md"))]:
+    for found in re.finditer(r"\bP[0-4]\b.{0,20}", text_of(page)):
+        wrong.append(f"{page.relative_to(TOP)}: a paper without its title: {found[0]}")
 
 # The settings that a page lists in tables, first column, exist.
 settings = TOP / "docs" / "reference" / "configuration.md"
@@ -120,4 +139,4 @@ listed = re.findall(r"^\| ([a-z_]+(?:\.[a-z_]+)+) \|", settings.read_text(), re.
 assert len(listed) == 20, len(listed)
 wrong += [f"{settings.name}: no key {key}" for key in listed if key not in keys["map"] | keys["map by stems"]]
 assert not wrong, "\n".join(wrong)
-print(f"{len(reached)} pages, {checked} commands")
+print(f"{len(reached)} pages, {counted} sentences, {checked} commands")

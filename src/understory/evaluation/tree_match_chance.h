@@ -32,7 +32,7 @@ struct MatchChance {
 
 // `s` and `l` as they are merged. `searched`: `l` was first laid on `s` by the trees alone
 // (align_trees by heading), so each copy is, too. Deterministic. Thresholds:
-// docs/reference/outputs.md.
+// docs/method/sparse.md.
 [[nodiscard]] MatchChance match_chance(const std::vector<Tree>& s, const std::vector<Tree>& l,
                                        const MergedTrees& merged, double weight,
                                        const TreeMergeConfig& config, bool searched);
