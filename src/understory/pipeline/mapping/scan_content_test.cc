@@ -8,7 +8,8 @@ namespace {
 Scan scan_of(std::size_t points, float first_x) {
   Scan scan;
   scan.points.resize(points);
-  for (std::size_t i = 0; i < points; ++i) scan.points[i].x = first_x + static_cast<float>(i);
+  for (std::size_t i = 0; i < points; ++i)
+    scan.points[i].x = first_x + static_cast<float>(i);
   return scan;
 }
 
