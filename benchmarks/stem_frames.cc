@@ -1,6 +1,6 @@
 // Stems of single frames against the truth of the simulator: recall over range, precision, errors
 // of the centre, the foot and the radius, time a frame (docs/method/sparse.md).
-//   stem_frames SITE SEED [EVERY] [key=value ...] [--traits FILE] [--repeats N] [--map FRAMES]
+//   stem_frames SITE SEED [EVERY] [key=value ...] [--traits FILE] [--repeats N]
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -21,7 +21,6 @@ struct Options {
   int every = 300;  // of the sensor's revolutions each so-manieth
   int repeats = 1;
   std::FILE* traits = nullptr;
-  int map_frames = 0;  // 0: single frames; else that many put together by the true poses
 };
 
 Options parse(int argc, char** argv) {
@@ -34,8 +33,6 @@ Options parse(int argc, char** argv) {
       options.traits = std::fopen(argv[++i], "w");
     } else if (text == "--repeats" && i + 1 < argc) {
       options.repeats = std::max(1, std::atoi(argv[++i]));
-    } else if (text == "--map" && i + 1 < argc) {
-      options.map_frames = std::max(1, std::atoi(argv[++i]));
     } else if (text.find('=') != std::string::npos) {
       options.settings.push_back(text);
     } else {
@@ -96,26 +93,6 @@ void run(const Options& options) {
               segments / frames, 1e3 * seconds / frames);
 }
 
-void run_map(const Options& options) {
-  TestFrames site(load_site(options.site, options.settings));
-  const TestMap map = put_together(site, options.map_frames, options.every);
-  StemSegmentConfig config;
-  if (options.traits != nullptr) config.min_score = 0.0;
-  const double start = process_cpu_seconds();
-  const StemSegments found = find_stem_segments(map.cloud, config);
-  const double seconds = process_cpu_seconds() - start;
-  const StemBand band = compare_map_stems(site.stand, map, found, 15.0, options.traits);
-  std::printf(
-      "%zu points, step %.3f m, %d levels: %d of %d stems with 30 returns found within 15 m, "
-      "%d of %d segments right, centre %.1f cm, foot %.1f cm, radius %.1f cm (bias %.1f), "
-      "%.2f s\n",
-      map.cloud.size(), found.step, found.levels, band.clear_found, band.clear, band.right,
-      band.segments, 100.0 * band.centre_rmse_m(),
-      100.0 * std::sqrt(band.foot_squares / std::max(1, band.feet)),
-      100.0 * std::sqrt(band.radius_squares / std::max(1, band.right)),
-      100.0 * band.radius / std::max(1, band.right), seconds);
-}
-
 }  // namespace
 }  // namespace understory
 
@@ -125,8 +102,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   const understory::Options options = understory::parse(argc, argv);
-  understory::with_threads(
-      1, [&] { options.map_frames > 0 ? understory::run_map(options) : understory::run(options); });
+  understory::with_threads(1, [&] { understory::run(options); });
   if (options.traits != nullptr) std::fclose(options.traits);
   return 0;
 }

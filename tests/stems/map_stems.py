@@ -262,7 +262,7 @@ def converted(folder):
 
 @cases.case("stems of a real map")
 def real_map(folder):
-    """A scanned pine plot: the stems of single-frame code against those of the inventory."""
+    """A scanned pine plot: the same stems as in the list of trees."""
     data = Path(os.environ.get("UNDERSTORY_DATA", Path(__file__).resolve().parents[2] / "../shared/data"))
     cloud = data / "treels" / "pine_plot.laz"
     if not cloud.exists():
@@ -273,10 +273,11 @@ def real_map(folder):
     assert done.returncode == 0, done.stderr
     trees = list(csv.DictReader((folder / "inventory" / "trees.csv").open()))
     stems = rows_of(folder / "plot.csv.gz")
-    both = sum(any(math.hypot(float(a["x"]) - float(b["x"]), float(a["y"]) - float(b["y"])) < 0.4
-                   for b in stems) for a in trees)
-    assert both >= 0.5 * len(trees) and both >= 0.6 * len(stems), (both, len(trees), len(stems))
-    return f"{both} of {len(stems)} segments among the inventory's {len(trees)} trees"
+    assert len(stems) == len(trees) > 10, (len(stems), len(trees))
+    for tree, stem in zip(trees, stems):
+        for column, most in (("x", 0.002), ("y", 0.002), ("z", 0.002), ("dbh_m", 0.001)):
+            assert abs(float(tree[column]) - float(stem[column])) < most, (column, tree, stem)
+    return f"{len(stems)} stems, those of the list of trees"
 
 
 @cases.case("what stands on the machine is no stem")

@@ -8,9 +8,10 @@
 #include <optional>
 
 #include "understory/features/stem_segments.h"
+#include "understory/forest/inventory.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/inventory/stand_cloud.h"
 #include "understory/pipeline/source.h"
-#include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
 #include "understory/util/files/staged_output.h"
 
@@ -33,21 +34,24 @@ void write(const StemSegments& found, const Pose& body_from_points, int frame, T
 }
 
 int convert_cloud_to_stems(const std::string& input, StagedFile& staged, CommandContext& context) {
-  const PointCloudFile cloud = read_cloud(input, context.log);
-  const StemSegments found = find_stem_segments(cloud.points, {});
+  const StandCloud stand = read_stand(input, {}, context.log);
+  if (!stand.doubt.empty()) throw InputError(input, "", "expected metres and z up: " + stand.doubt);
+  InventoryConfig config;
+  config.segments = 0;
+  const InventoryResult found = take_inventory(blocks_of(stand.cloud), config, context.progress);
   if (found.stems.empty())
-    throw InputError(input, "",
-                     fmt::format("no upright stems among its {} points", cloud.points.size()));
+    throw InputError(input, "", fmt::format("no upright stems among its {} points", found.points));
   // Positions of a table of stems lie within 10 km of its zero.
   constexpr double kNear = 9000.0;
-  Eigen::Vector3d shift = cloud.origin;
-  if (shift.cwiseAbs().maxCoeff() > kNear) {
-    context.log.info(
-        fmt::format("stems are told from {:.3f} {:.3f} {:.3f}", shift.x(), shift.y(), shift.z()));
-    shift.setZero();
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  if (stand.cloud.origin.cwiseAbs().maxCoeff() > kNear) {
+    origin = stand.cloud.origin;
+    context.log.info(fmt::format("positions are relative to {:.3f} {:.3f} {:.3f}", origin.x(),
+                                 origin.y(), origin.z()));
   }
   StemsWriter writer(staged.part());
-  write(found, Pose(Eigen::Quaterniond::Identity(), shift), 0, 0, writer);
+  for (const Stem& stem : stems_of(found, origin))
+    writer.add(0, 0, stem);
   writer.commit();
   staged.commit();
   return kExitDone;

@@ -7,7 +7,6 @@
 
 #include "understory/features/ground_guess.h"
 #include "understory/features/ring_view.h"
-#include "understory/features/slice_view.h"
 #include "understory/features/stem_chain.h"
 #include "understory/features/stem_score.h"
 #include "understory/util/median.h"
@@ -251,21 +250,6 @@ StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& confi
     result.stems = segments_of(view, all, view.points(), level, config.min_score);
     return result;
   }
-}
-
-StemSegments find_stem_segments(const Points& cloud, const StemSegmentConfig& config) {
-  StemSegments result;
-  const SliceView view(cloud);
-  result.levels = view.levels();
-  result.step = view.spacing_m();
-  if (view.sections().empty()) return result;
-  Chains all = chains_of(view, config.min_score);
-  result.usual_radius_m = all.config.usual_radius_m;
-  result.stems = segments_of(view, all, cloud, Eigen::Matrix3d::Identity(), config.min_score);
-  std::stable_sort(
-      result.stems.begin(), result.stems.end(),
-      [](const StemSegment& a, const StemSegment& b) { return a.foot.x() < b.foot.x(); });
-  return result;
 }
 
 }  // namespace understory

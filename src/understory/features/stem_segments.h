@@ -76,10 +76,6 @@ struct StemSegments {
 [[nodiscard]] StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config,
                                               const std::vector<std::uint8_t>& use = {});
 
-// The same in a map: points from all sides, z up, in level slices of 25 cm in place of rings. Times
-// are 0, the step is in metres. Stems come by increasing x.
-[[nodiscard]] StemSegments find_stem_segments(const Points& cloud, const StemSegmentConfig& config);
-
 // A segment as a row of a view, in the body's frame. Its covariance leaves out what the height has
 // in common with the place. Diameters with a greater error than 2.5 cm are left out.
 [[nodiscard]] Stem stem_of(const StemSegment& segment, const Pose& body_from_points,

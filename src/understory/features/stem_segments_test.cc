@@ -199,17 +199,6 @@ TEST(StemSegments, AreFoundByTheSameCodeInFramesOf128Rings) {
   EXPECT_LT(near.centre_rmse_m(), 0.06);
 }
 
-TEST(StemSegments, AreFoundByTheSameCodeInAMap) {
-  TestFrames site(load_site("lieksa2", {"seed=5"}));
-  const TestMap map = put_together(site, 40, 150);
-  const StemSegments found = find_stem_segments(map.cloud, {});
-  const StemBand band = compare_map_stems(site.stand, map, found, 15.0);
-  EXPECT_GT(band.clear, 25);
-  EXPECT_GT(band.recall(), 0.85);
-  EXPECT_GT(band.precision(), 0.9);
-  EXPECT_LT(band.centre_rmse_m(), 0.03);
-}
-
 // Where nothing shows the ground, a foot is guessed, and its error is told.
 TEST(StemSegments, SayHowWellTheirFeetAreKnown) {
   TestFrames site(load_site("lieksa2", {"seed=5"}));
@@ -267,11 +256,6 @@ TEST(StemSegments, BecomeRowsInTheBodysFrame) {
   const Pose fallen(so3_exp({0.5 * std::numbers::pi, 0.0, 0.0}), Eigen::Vector3d::Zero());
   stem = stem_of(segment, fallen, fallen.rotation().inverse() * Eigen::Vector3d::UnitZ());
   EXPECT_NEAR(stem.zz, 0.09F, 1e-6F);
-}
-
-TEST(StemSegments, OfACloudNeedPoints) {
-  EXPECT_TRUE(find_stem_segments(Points{}, {}).stems.empty());
-  EXPECT_TRUE(find_stem_segments(Points(100, Eigen::Vector3f(1.0F, 2.0F, 3.0F)), {}).stems.empty());
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <set>
-#include <unordered_set>
 
 namespace understory {
 namespace {
@@ -116,56 +115,6 @@ void compare_stems(const TestFrames& site, const SimulatedScan& frame, const Ste
     ++band.clear;
     band.clear_found += was_found;
   }
-}
-
-TestMap put_together(TestFrames& site, int frames, int every) {
-  TestMap map;
-  std::unordered_set<std::int64_t> taken;
-  for (int k = 0; k < frames; ++k) {
-    const SimulatedScan frame = site.scanner.cast(static_cast<std::int64_t>(k) * every);
-    if (k == 0) map.origin = site.world_from_lidar(*frame.scan, 0.0).translation();
-    for (const StemReturns& stem : frame.stems)
-      map.returns[stem.tree] += stem.returns;
-    for (const ScanPoint& point : frame.scan->points) {
-      const Pose world_from_lidar = site.world_from_lidar(*frame.scan, 1e-9 * point.t_ns);
-      const Eigen::Vector3d at = world_from_lidar * Eigen::Vector3d(static_cast<double>(point.x),
-                                                                    static_cast<double>(point.y),
-                                                                    static_cast<double>(point.z)) -
-                                 map.origin;
-      if (at.head<2>().norm() > 20.0) continue;
-      const Eigen::Vector3i cell = (50.0 * at.array()).floor().cast<int>();
-      const auto key = ((static_cast<std::int64_t>(cell.x()) & 0x1fffff) << 42) ^
-                       ((static_cast<std::int64_t>(cell.y()) & 0x1fffff) << 21) ^
-                       (static_cast<std::int64_t>(cell.z()) & 0x1fffff);
-      if (taken.insert(key).second) map.cloud.emplace_back(at.cast<float>());
-    }
-  }
-  return map;
-}
-
-StemBand compare_map_stems(const Stand& stand, const TestMap& map, const StemSegments& found,
-                           double within_m, std::FILE* traits) {
-  StemBand band;
-  std::set<int> hit;
-  for (const StemSegment& stem : found.stems) {
-    const Eigen::Vector3d middle = stem.foot + 0.5 * (stem.lowest_m + stem.highest_m) * stem.axis;
-    const double range = middle.head<2>().norm();
-    if (range > within_m) continue;
-    ++band.segments;
-    const auto [tree, off] = nearest_tree(stand, middle + map.origin);
-    if (traits != nullptr) write_traits(traits, tree != nullptr && off < 0.2, range, stem);
-    if (tree == nullptr) continue;
-    hit.insert(tree->id);
-    add_right(band, stem, *tree, middle + map.origin, stem.foot + map.origin, middle);
-  }
-  for (const GrownTree& tree : stand.trees) {
-    const auto returns = map.returns.find(tree.id);
-    if (returns == map.returns.end() || returns->second < 30) continue;
-    if ((tree.foot - map.origin).head<2>().norm() > within_m) continue;
-    ++band.clear;
-    band.clear_found += hit.count(tree.id) > 0 ? 1 : 0;
-  }
-  return band;
 }
 
 }  // namespace understory

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -52,20 +51,5 @@ struct StemBand {
 // 5 m. Writes the traits of each segment and whether it is right to `traits`, if given.
 void compare_stems(const TestFrames& site, const SimulatedScan& frame, const StemSegments& found,
                    std::vector<StemBand>& bands, std::FILE* traits = nullptr);
-
-// Frames put together by their true poses, thinned to one point a cube of 2 cm, within 20 m of the
-// first frame's lidar, which is the origin; axes of the world.
-struct TestMap {
-  Points cloud;
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  std::map<int, int> returns;  // of each tree's stem, over all frames
-};
-[[nodiscard]] TestMap put_together(TestFrames& site, int frames, int every);
-
-// Holds the segments of a map within a distance of its origin against the truth; a stem with 30
-// returns or more counts as clear.
-[[nodiscard]] StemBand compare_map_stems(const Stand& stand, const TestMap& map,
-                                         const StemSegments& found, double within_m,
-                                         std::FILE* traits = nullptr);
 
 }  // namespace understory

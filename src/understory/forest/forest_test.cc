@@ -182,6 +182,28 @@ TEST(Inventory, DiametersPositionsAndHeightsOfAStand) {
   }
 }
 
+TEST(Inventory, StemsOfAnInventoryAreItsTreesAsOneView) {
+  Plot plot(4);
+  plot.slope_x = 0.25;
+  plot.add_ground(24.0, 40);
+  Plot::Stem stem{12.0, 9.0, 0.3};
+  stem.lean_x = 0.05;
+  plot.add_stem(stem);
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  ASSERT_EQ(result.trees.size(), 1U);
+  const Eigen::Vector3d origin(10.0, 10.0, -1.0);
+  const std::vector<Stem> stems = stems_of(result, origin);
+  ASSERT_EQ(stems.size(), 1U);
+  EXPECT_NEAR(stems[0].point.x(), 12.0 - origin.x(), 0.02);
+  EXPECT_NEAR(stems[0].point.y(), 9.0 - origin.y(), 0.02);
+  EXPECT_NEAR(stems[0].point.z(), plot.ground(12.0, 9.0) - origin.z(), 0.06);
+  EXPECT_NEAR(stems[0].axis.x() / stems[0].axis.z(), 0.05, 0.01);
+  EXPECT_NEAR(stems[0].axis.norm(), 1.0, 1e-6);
+  EXPECT_NEAR(stems[0].dbh_m, 0.3, 0.012);
+  EXPECT_GT(stems[0].xx, 0.0);
+  EXPECT_TRUE(std::isnan(stems[0].zz));
+}
+
 TEST(Inventory, StemsSeenFromOneSideKeepTheirDiameter) {
   Plot plot(5);
   plot.add_ground(20.0, 40);

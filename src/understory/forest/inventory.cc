@@ -206,4 +206,24 @@ InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& 
   return result;
 }
 
+std::vector<Stem> stems_of(const InventoryResult& inventory, const Eigen::Vector3d& origin) {
+  std::vector<Stem> stems;
+  for (std::size_t i = 0; i < inventory.stems.size(); ++i) {
+    const StemFit& fit = inventory.stems[i];
+    const Tree& tree = inventory.trees[i];
+    Stem stem;
+    stem.point = (Eigen::Vector3d(tree.x, tree.y, tree.z) - origin).cast<float>();
+    stem.axis = Eigen::Vector3d(fit.slope.x(), fit.slope.y(), 1.0).normalized().cast<float>();
+    stem.length_m = static_cast<float>(fit.highest_m - fit.lowest_m);
+    stem.dbh_m = static_cast<float>(tree.dbh_m);
+    stem.radius_m = static_cast<float>(fit.radius_m);
+    stem.radius_sd_m = static_cast<float>(0.5 * tree.dbh_sd_m);
+    stem.xx = static_cast<float>(fit.foot_covariance(0, 0));
+    stem.xy = static_cast<float>(fit.foot_covariance(0, 1));
+    stem.yy = static_cast<float>(fit.foot_covariance(1, 1));
+    stems.push_back(stem);
+  }
+  return stems;
+}
+
 }  // namespace understory

@@ -8,6 +8,7 @@
 #include "understory/forest/ground/ground.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/trees/tree_segments.h"
+#include "understory/sensor/stem_view.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
@@ -47,5 +48,10 @@ using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
                                              const InventoryConfig& config,
                                              const ProgressSink& progress = {},
                                              const SeenTest& in_view = {});
+
+// The stems of an inventory as one view of them: foot and centre line, world frame without its
+// `origin` (metres, world frame), so that single precision is enough. In the order of the trees.
+[[nodiscard]] std::vector<Stem> stems_of(const InventoryResult& inventory,
+                                         const Eigen::Vector3d& origin);
 
 }  // namespace understory
