@@ -74,15 +74,9 @@ std::optional<GroundGuess::Height> GroundGuess::at(const Eigen::Vector2d& place)
                 std::clamp(kLeastSd + kGrowth * (fit - kFitSd), kLeastSd, kMostSd)};
 }
 
-// A plane that what stands on the ground does not lift: what lies above it counts ever less.
-GroundGuess::Plane GroundGuess::fit(const Eigen::Vector2d& middle) const {
-  struct Low {
-    double x, y, z;
-    double sharpness;  // 1 / spread
-  };
+std::vector<GroundGuess::Low> GroundGuess::lows_near(const Eigen::Vector2d& middle) const {
   std::vector<Low> near;
   near.reserve(static_cast<std::size_t>((2 * kReach + 1) * (2 * kReach + 1)));
-  double lowest = std::numeric_limits<double>::max();
   const int middle_column = cell(middle.x()) - column0_;
   const int middle_row = cell(middle.y()) - row0_;
   for (int row = std::max(0, middle_row - kReach); row <= std::min(rows_ - 1, middle_row + kReach);
@@ -94,11 +88,19 @@ GroundGuess::Plane GroundGuess::fit(const Eigen::Vector2d& middle) const {
       Low low{static_cast<double>(point.x()) - middle.x(),
               static_cast<double>(point.y()) - middle.y(), static_cast<double>(point.z()), 0.0};
       low.sharpness = 1.0 / (kRelief + 0.05 * std::sqrt(low.x * low.x + low.y * low.y));
-      lowest = std::min(lowest, low.z);
       near.push_back(low);
     }
   }
+  return near;
+}
+
+// A plane that what stands on the ground does not lift: what lies above it counts ever less.
+GroundGuess::Plane GroundGuess::fit(const Eigen::Vector2d& middle) const {
+  const std::vector<Low> near = lows_near(middle);
   if (near.size() < 3) return {};
+  double lowest = std::numeric_limits<double>::max();
+  for (const Low& low : near)
+    lowest = std::min(lowest, low.z);
   Plane plane;
   plane.known = true;
   plane.height_and_slope.x() = lowest;

@@ -27,6 +27,12 @@ class GroundGuess {
     Eigen::Vector3d height_and_slope = Eigen::Vector3d::Zero();  // at the middle of the patch
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   };
+  // A cell's lowest return, from the middle of a patch.
+  struct Low {
+    double x, y, z;
+    double sharpness;  // 1 / spread
+  };
+  [[nodiscard]] std::vector<Low> lows_near(const Eigen::Vector2d& middle) const;
   [[nodiscard]] Plane fit(const Eigen::Vector2d& middle) const;
 
   int columns_ = 0;

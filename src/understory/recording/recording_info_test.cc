@@ -132,20 +132,14 @@ TEST(RecordingInfo, AGoodRecordingHasNoWarnings) {
   EXPECT_NEAR(info.duration_s, 20.0, 0.02);
 }
 
-TEST(RecordingInfo, WarnsOfWhatWouldSpoilARun) {
-  const std::vector<Event> good = carried_drive(20);
-  const auto changed = [&](const std::function<void(std::vector<Event>&)>& change) {
-    std::vector<Event> events = good;
-    change(events);
-    return info_of(events, imu_rig());
-  };
-  const auto each_sample = [](const std::function<void(ImuSample&)>& change) {
-    return [change](std::vector<Event>& events) {
-      for (Event& event : events) {
-        if (auto* sample = std::get_if<ImuSample>(&event)) change(*sample);
-      }
-    };
-  };
+// What is said of a good recording after `change`.
+RecordingInfo changed(const std::function<void(std::vector<Event>&)>& change) {
+  std::vector<Event> events = carried_drive(20);
+  change(events);
+  return info_of(events, imu_rig());
+}
+
+TEST(RecordingInfo, WarnsOfEventsThatAreMissingOrTwice) {
   const auto drop = [](const std::function<bool(const Event&)>& wanted) {
     return [wanted](std::vector<Event>& events) { std::erase_if(events, wanted); };
   };
@@ -162,6 +156,22 @@ TEST(RecordingInfo, WarnsOfWhatWouldSpoilARun) {
                          return is_scan(e) && std::abs(event_time(e) - middle) < kNsPerSecond;
                        })),
                        "lidar: 1 gaps, the longest of 2.10 s"));
+  // Reading by log time puts the one that came late back beside its twin.
+  EXPECT_TRUE(warns_of(changed([](std::vector<Event>& events) {
+                         events.insert(events.begin() + 50, events[40]);
+                         events.insert(events.begin() + 400, events[399]);
+                       }),
+                       "imu: 2 messages repeat"));
+}
+
+TEST(RecordingInfo, WarnsOfSamplesInOtherUnitsOrAxes) {
+  const auto each_sample = [](const std::function<void(ImuSample&)>& change) {
+    return [change](std::vector<Event>& events) {
+      for (Event& event : events) {
+        if (auto* sample = std::get_if<ImuSample>(&event)) change(*sample);
+      }
+    };
+  };
   EXPECT_TRUE(warns_of(changed(each_sample([](ImuSample& s) { s.specific_force /= 9.80665; })),
                        "in g; converted"));
   EXPECT_TRUE(warns_of(changed(each_sample([](ImuSample& s) {
@@ -179,12 +189,9 @@ TEST(RecordingInfo, WarnsOfWhatWouldSpoilARun) {
         s.angular_rate = {s.angular_rate.z(), s.angular_rate.x(), s.angular_rate.y()};
       })),
       "not along z"));
-  // Reading by log time puts the one that came late back beside its twin.
-  EXPECT_TRUE(warns_of(changed([](std::vector<Event>& events) {
-                         events.insert(events.begin() + 50, events[40]);
-                         events.insert(events.begin() + 400, events[399]);
-                       }),
-                       "imu: 2 messages repeat"));
+}
+
+TEST(RecordingInfo, WarnsOfPointsWithoutTimes) {
   EXPECT_TRUE(warns_of(changed([](std::vector<Event>& events) {
                          for (Event& event : events) {
                            auto* scan = std::get_if<ScanPtr>(&event);

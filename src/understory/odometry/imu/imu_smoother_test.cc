@@ -46,6 +46,34 @@ struct Play {
   std::vector<NavState>* states = nullptr;
 };
 
+void add_error(const NavState& state, const NavState& predicted, const Pose& truth,
+               const Eigen::Vector3d& velocity, Outcome& run) {
+  const Vector6d error = right_difference(state.world_from_body, truth);
+  run.rotation_rmse_deg += error.head<3>().squaredNorm() / (kDegree * kDegree);
+  run.last_position_error = error.tail<3>().norm();
+  run.position_rmse += error.tail<3>().squaredNorm();
+  run.velocity_rmse += (state.velocity_in_world - velocity).squaredNorm();
+  run.prediction_rmse += right_difference(predicted.world_from_body, truth).tail<3>().squaredNorm();
+}
+
+// Sums of `n` squares to roots of their means, and what the model knows at the end.
+void finish(const MotionModel& model, const Eigen::Vector3d& up, int n, Outcome& run) {
+  for (double* sum :
+       {&run.position_rmse, &run.rotation_rmse_deg, &run.velocity_rmse, &run.prediction_rmse})
+    *sum = std::sqrt(*sum / n);
+  run.how = model.initialisation();
+  run.trust = model.imu_trust();
+  // The true vertical in the model's world, as the model's own levelling sees it.
+  run.tilt_deg = std::acos(std::min(1.0, (model.level_from_world() * up).z())) / kDegree;
+  BinaryWriter writer;
+  model.save(writer);
+  run.bytes = writer.bytes();
+  if (std::getenv("UNDERSTORY_PRINT") != nullptr)
+    std::printf("pos %.4f m rot %.4f deg vel %.4f m/s pred %.4f m tilt %.3f deg gated %d\n",
+                run.position_rmse, run.rotation_rmse_deg, run.velocity_rmse, run.prediction_rmse,
+                run.tilt_deg, run.gated);
+}
+
 Outcome play(const Play& setup) {
   TestCarrier carrier(setup.carrier);
   Log log;
@@ -92,34 +120,11 @@ Outcome play(const Play& setup) {
     }
     run.last = update.state;
     if (t < 6.0) continue;
-    const Pose truth = model_from_truth * carrier.world_from_body(t);
-    const Vector6d error = right_difference(update.state.world_from_body, truth);
-    run.rotation_rmse_deg += error.head<3>().squaredNorm() / (kDegree * kDegree);
-    run.last_position_error = error.tail<3>().norm();
-    run.position_rmse += error.tail<3>().squaredNorm();
-    run.velocity_rmse +=
-        (update.state.velocity_in_world - model_from_truth.rotation() * carrier.velocity(t))
-            .squaredNorm();
-    run.prediction_rmse +=
-        right_difference(predicted.world_from_body, truth).tail<3>().squaredNorm();
+    add_error(update.state, predicted, model_from_truth * carrier.world_from_body(t),
+              model_from_truth.rotation() * carrier.velocity(t), run);
     ++n;
   }
-  for (double* sum :
-       {&run.position_rmse, &run.rotation_rmse_deg, &run.velocity_rmse, &run.prediction_rmse})
-    *sum = std::sqrt(*sum / n);
-  run.how = model->initialisation();
-  run.trust = model->imu_trust();
-  // The true vertical in the model's world, as the model's own levelling sees it.
-  const Eigen::Vector3d up =
-      model->level_from_world() * (model_from_truth.rotation() * Eigen::Vector3d::UnitZ());
-  run.tilt_deg = std::acos(std::min(1.0, up.z())) / kDegree;
-  BinaryWriter writer;
-  model->save(writer);
-  run.bytes = writer.bytes();
-  if (std::getenv("UNDERSTORY_PRINT") != nullptr)
-    std::printf("pos %.4f m rot %.4f deg vel %.4f m/s pred %.4f m tilt %.3f deg gated %d\n",
-                run.position_rmse, run.rotation_rmse_deg, run.velocity_rmse, run.prediction_rmse,
-                run.tilt_deg, run.gated);
+  finish(*model, model_from_truth.rotation() * Eigen::Vector3d::UnitZ(), n, run);
   return run;
 }
 

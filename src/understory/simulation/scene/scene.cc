@@ -97,20 +97,19 @@ class ForestScene::Impl : private SceneContent {
   void cast_held(const HeldTree& held, const Ray& ray, float near_m, float far_m, Hit& hit) const {
     const FelledTree& tree = felled_.at(held.tree);
     const Pose tree_from_world = held.world_from_tree.inverse();
-    const Eigen::Vector3f origin = (tree_from_world * ray.origin.cast<double>()).cast<float>();
-    const Eigen::Vector3f direction =
-        (tree_from_world.rotation() * ray.direction.cast<double>()).cast<float>();
+    Ray in_tree = ray;
+    in_tree.origin = (tree_from_world * ray.origin.cast<double>()).cast<float>();
+    in_tree.direction = (tree_from_world.rotation() * ray.direction.cast<double>()).cast<float>();
     // Past the round column that holds the tree.
-    const Eigen::Vector2f aside = direction.head<2>();
-    const float miss = std::abs(origin.x() * aside.y() - origin.y() * aside.x());
+    const Eigen::Vector2f aside = in_tree.direction.head<2>();
+    const float miss = std::abs(in_tree.origin.x() * aside.y() - in_tree.origin.y() * aside.x());
     if (miss > tree.reach_m * aside.norm()) return;
     for (const auto& [instance, from_m] : {std::pair(tree.stem, held.stem_from_m),
                                            {tree.living, held.crown_from_m},
                                            {tree.dead, held.crown_from_m}}) {
       if (instance == kNone) continue;
       const float limit = hit.surface == Surface::kNone ? far_m : hit.range_m;
-      meet_part(instance, tree.foot, origin, direction, static_cast<float>(from_m), near_m, limit,
-                hit);
+      meet_part({instance, tree.foot, static_cast<float>(from_m)}, in_tree, near_m, limit, hit);
     }
   }
 
@@ -155,10 +154,19 @@ class ForestScene::Impl : private SceneContent {
     });
   }
 
-  // A part of a felled tree, met in the tree's frame above a height.
-  void meet_part(unsigned instance, const Eigen::Vector3f& foot, const Eigen::Vector3f& origin,
-                 const Eigen::Vector3f& direction, float from_m, float near_m, float far_m,
+  // A part of a felled tree: its shape, where the tree stood, the height above which it is there.
+  struct FelledPart {
+    unsigned instance;
+    Eigen::Vector3f foot;
+    float from_m;
+  };
+
+  // The first hit of a ray in the tree's frame, between near_m and far_m along it.
+  void meet_part(const FelledPart& part, const Ray& in_tree, float near_m, float far_m,
                  Hit& hit) const {
+    const auto& [instance, foot, from_m] = part;
+    const Eigen::Vector3f& origin = in_tree.origin;
+    const Eigen::Vector3f& direction = in_tree.direction;
     if (std::abs(direction.z()) > 1e-9F) {
       const float cut = (from_m - origin.z()) / direction.z();
       direction.z() > 0.0F ? near_m = std::max(near_m, cut) : far_m = std::min(far_m, cut);

@@ -99,8 +99,18 @@ double lit_share(Species species, double u, Random& random) {
   return light * random.uniform(1.6 * light - 0.6, 1.0 + 0.6 * (1.0 - light));
 }
 
-void add_living_branch(Shape& shape, const Habit& habit, const Vector& root, double azimuth,
-                       double slope, double length, double foliage, Random& random) {
+// A branch with leaves: where it begins, metres, where it points, rad, and the share of its leaves.
+struct LivingBranch {
+  Vector root;
+  double azimuth;
+  double slope;
+  double length;
+  double foliage;
+};
+
+void add_living_branch(Shape& shape, const Habit& habit, const LivingBranch& branch,
+                       Random& random) {
+  const auto& [root, azimuth, slope, length, foliage] = branch;
   const Vector out(std::cos(azimuth) * std::cos(slope), std::sin(azimuth) * std::cos(slope),
                    std::sin(slope));
   const Vector tip = root + length * out;
@@ -133,9 +143,10 @@ Shape grow_crown(Species species, const CrownSize& size, Random& random) {
       const double radius =
           size.crown_radius_m * crown_profile(species, u) * random.uniform(0.65, 1.1);
       const double reach = std::max(0.12, radius / std::max(0.5, std::cos(slope)));
-      add_living_branch(shape, habit, Vector(0.0, 0.0, size.crown_base_m + z), azimuth, slope,
-                        std::min(reach, 0.8 * (length - z) + 0.3),
-                        size.foliage * std::max(0.0, lit_share(species, u, random)), random);
+      const LivingBranch branch{Vector(0.0, 0.0, size.crown_base_m + z), azimuth, slope,
+                                std::min(reach, 0.8 * (length - z) + 0.3),
+                                size.foliage * std::max(0.0, lit_share(species, u, random))};
+      add_living_branch(shape, habit, branch, random);
     }
   }
   return shape;

@@ -53,19 +53,18 @@ bool echo_of_all(std::span<const Hit> hits, float pulse_m, BeamEcho& echo) {
   return echo.energy / (echo.range_m * echo.range_m) > 0.0F;
 }
 
-}  // namespace
+// What one ray of a beam brings back.
+struct Piece {
+  float range_m;
+  float energy;
+  const Hit* hit;
+};
 
-BeamEcho strongest_echo(std::span<const Hit> hits, double pulse_m, BeamEcho* second) {
-  struct Piece {
-    float range_m;
-    float energy;
-    const Hit* hit;
-  };
+constexpr std::size_t kMostPieces = 64;  // rays of a beam
+
+// The rays of a beam that met something, by range. Returns how many.
+std::size_t pieces_of(std::span<const Hit> hits, Piece (&pieces)[kMostPieces]) {
   const std::size_t count = hits.size();
-  if (count == 1) return echo_of(hits[0]);
-  BeamEcho whole;
-  if (count >= kBundleRays && echo_of_all(hits, static_cast<float>(pulse_m), whole)) return whole;
-  Piece pieces[64];
   std::size_t used = 0;
   for (std::size_t k = 0; k < count; ++k) {
     if (hits[k].surface == Surface::kNone) continue;
@@ -76,9 +75,34 @@ BeamEcho strongest_echo(std::span<const Hit> hits, double pulse_m, BeamEcho* sec
     std::sort(pieces, pieces + used,
               [](const Piece& a, const Piece& b) { return a.range_m < b.range_m; });
   }
+  return used;
+}
+
+// The strongest of `echoes` that can be told apart from `first`.
+void find_second(std::span<const BeamEcho> echoes, const BeamEcho& first, double pulse_m,
+                 BeamEcho& second) {
+  float second_signal = 0.0F;
+  for (const BeamEcho& echo : echoes) {
+    const float signal = echo.energy / (echo.range_m * echo.range_m);
+    // What lies nearer to the first than a pulse cannot be told apart from it.
+    if (std::abs(echo.range_m - first.range_m) < pulse_m || signal <= second_signal) continue;
+    second_signal = signal;
+    second = echo;
+  }
+}
+
+}  // namespace
+
+BeamEcho strongest_echo(std::span<const Hit> hits, double pulse_m, BeamEcho* second) {
+  if (hits.size() == 1) return echo_of(hits[0]);
+  BeamEcho whole;
+  if (hits.size() >= kBundleRays && echo_of_all(hits, static_cast<float>(pulse_m), whole))
+    return whole;
+  Piece pieces[kMostPieces];
+  const std::size_t used = pieces_of(hits, pieces);
   BeamEcho best;
   float best_signal = 0.0F;
-  BeamEcho echoes[64];
+  BeamEcho echoes[kMostPieces];
   std::size_t echo_count = 0;
   for (std::size_t k = 0; k < used;) {
     BeamEcho echo;
@@ -106,16 +130,7 @@ BeamEcho strongest_echo(std::span<const Hit> hits, double pulse_m, BeamEcho* sec
     echoes[echo_count++] = echo;
     k = last;
   }
-  if (second == nullptr) return best;
-  float second_signal = 0.0F;
-  for (std::size_t k = 0; k < echo_count; ++k) {
-    const BeamEcho& echo = echoes[k];
-    const float signal = echo.energy / (echo.range_m * echo.range_m);
-    // What lies nearer to the first than a pulse cannot be told apart from it.
-    if (std::abs(echo.range_m - best.range_m) < pulse_m || signal <= second_signal) continue;
-    second_signal = signal;
-    *second = echo;
-  }
+  if (second != nullptr) find_second({echoes, echo_count}, best, pulse_m, *second);
   return best;
 }
 

@@ -70,6 +70,20 @@ struct Scanner::Look {
 namespace {
 
 // Directions and origins of the rays of a firing, number by number.
+// Random bits of the place of one ray of each beam within its footprint.
+struct Drawn {
+  std::array<std::uint32_t, kMostBeams> far;
+  std::array<std::uint32_t, kMostBeams> around;
+};
+
+void draw(std::array<CounterNoise, kMostBeams>& noise, std::size_t count, Drawn& drawn) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint64_t bits = noise[i].next();
+    drawn.far[i] = static_cast<std::uint32_t>(bits >> 40);
+    drawn.around[i] = static_cast<std::uint32_t>(bits) & 0xffffffU;
+  }
+}
+
 struct Made {
   std::array<float, kMostBeams> x, y, z, from_x, from_y, from_z;
 };
@@ -406,8 +420,7 @@ void Scanner::look_out(const Look& look, std::int64_t firing,
   std::array<CounterNoise, kMostBeams> noise;
   for (std::size_t i = 0; i < count; ++i)
     noise[i] = row.at(begin + i);
-  std::array<std::uint32_t, kMostBeams> far;
-  std::array<std::uint32_t, kMostBeams> around;
+  Drawn drawn;
   Made made;
   const float* bx = &beams_.near_x[begin];
   const float* by = &beams_.near_y[begin];
@@ -415,13 +428,9 @@ void Scanner::look_out(const Look& look, std::int64_t firing,
   const float* side_x = &beams_.near_side_x[begin];
   const float* side_y = &beams_.near_side_y[begin];
   for (std::size_t k = 0; k < rays_per_beam; ++k) {
+    draw(noise, count, drawn);
     for (std::size_t i = 0; i < count; ++i) {
-      const std::uint64_t bits = noise[i].next();
-      far[i] = static_cast<std::uint32_t>(bits >> 40);
-      around[i] = static_cast<std::uint32_t>(bits) & 0xffffffU;
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto [u, v] = CounterNoise::normal_pair_of(far[i], around[i]);
+      const auto [u, v] = CounterNoise::normal_pair_of(drawn.far[i], drawn.around[i]);
       const float cx = cosine * bx[i] - sine * by[i];
       const float cy = sine * bx[i] + cosine * by[i];
       const float cz = bz[i];

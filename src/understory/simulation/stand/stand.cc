@@ -201,16 +201,24 @@ void add_dead_wood(const StandConfig& config, const CarrierConfig& carrier, cons
   }
 }
 
-void add_plants(PlantKind kind, double per_ha, double low_m, double high_m, double clearance_m,
-                const StandConfig& config, const Terrain& terrain, const Route& route,
-                Random& random, std::vector<Plant>& plants) {
-  for (std::size_t i = 0; i < count_of(per_ha, config); ++i) {
+// Plants of one kind: how many a hectare, how tall, and how far from the route.
+struct PlantLayer {
+  PlantKind kind = PlantKind::kShrub;
+  double per_ha = 0.0;
+  double low_m = 0.0;  // heights are drawn evenly between low_m and high_m
+  double high_m = 0.0;
+  double clearance_m = 0.0;
+};
+
+void add_plants(const PlantLayer& layer, const StandConfig& config, const Terrain& terrain,
+                const Route& route, Random& random, std::vector<Plant>& plants) {
+  for (std::size_t i = 0; i < count_of(layer.per_ha, config); ++i) {
     const Eigen::Vector2d place = draw_place(config, random);
-    const double height = random.uniform(low_m, high_m);
+    const double height = random.uniform(layer.low_m, layer.high_m);
     const double yaw = random.uniform(0.0, kTau);
-    if (outside(config, route, place) || route.distance_to(place) < clearance_m) continue;
+    if (outside(config, route, place) || route.distance_to(place) < layer.clearance_m) continue;
     plants.push_back(
-        {kind, {place.x(), place.y(), terrain.height(place.x(), place.y())}, height, yaw});
+        {layer.kind, {place.x(), place.y(), terrain.height(place.x(), place.y())}, height, yaw});
   }
 }
 
@@ -376,12 +384,12 @@ Stand grow_stand(const StandConfig& config, const CarrierConfig& carrier, const 
   for (GrownTree& tree : stand.trees)
     draw_damage(config, tree, damage);
   add_dead_wood(config, carrier, terrain, route, random, stand.dead_wood);
-  add_plants(PlantKind::kSeedling, config.seedlings_per_ha, 0.4, 2.2, 0.8, config, terrain, route,
-             random, stand.plants);
-  add_plants(PlantKind::kShrub, config.shrubs_per_ha, 0.5, 1.8, 0.8, config, terrain, route, random,
-             stand.plants);
-  add_plants(PlantKind::kGroundPlants, config.ground_plants_per_ha, 0.15, 0.45, 0.0, config,
-             terrain, route, random, stand.plants);
+  for (const PlantLayer& layer :
+       {PlantLayer{PlantKind::kSeedling, config.seedlings_per_ha, 0.4, 2.2, 0.8},
+        PlantLayer{PlantKind::kShrub, config.shrubs_per_ha, 0.5, 1.8, 0.8},
+        PlantLayer{PlantKind::kGroundPlants, config.ground_plants_per_ha, 0.15, 0.45, 0.0}}) {
+    add_plants(layer, config, terrain, route, random, stand.plants);
+  }
   add_boulders(config, terrain, route, seed, stand.boulders);
   add_buildings(config, carrier, terrain, route, stand);
   return stand;
