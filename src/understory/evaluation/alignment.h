@@ -21,6 +21,7 @@ enum class Alignment {
 // Throws ConfigError on any other name.
 [[nodiscard]] Alignment alignment_from_name(const std::string& name);
 
+// The motion that lays the estimate on the truth, and what is known of it.
 struct AlignmentResult {
   Pose target_from_source;
   // False where the points do not fix the motion (all in one place, or for SE(3) on a line, or so

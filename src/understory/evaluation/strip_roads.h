@@ -32,6 +32,7 @@ struct StripRoad {
 [[nodiscard]] std::vector<StripRoad> find_strip_roads(const std::vector<Pose>& world_from_body,
                                                       const StripRoadConfig& config);
 
+// How well the trees seen from two neighbouring roads agree, P1 (10).
 struct RoadConsistency {
   std::size_t road = 0;  // numbers of the two roads, in the order of the path
   std::size_t other = 0;

@@ -17,6 +17,7 @@ using Trajectory = std::vector<StampedPose>;
 // eight finite numbers or the quaternion is zero, and if there is no pose at all.
 [[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& path);
 
+// The velocity of the body at one time, in the world frame.
 struct StampedVelocity {
   TimeNs stamp = 0;
   Eigen::Vector3d velocity_in_world = Eigen::Vector3d::Zero();  // m/s

@@ -11,6 +11,7 @@
 
 namespace understory {
 
+// How two trajectories are paired, aligned and compared.
 struct EvaluationOptions {
   Alignment alignment = Alignment::kNone;
   double tolerance_s = 0.01;                  // of the times of a pair; > 0
@@ -47,6 +48,7 @@ struct SegmentError {
   double rotation_deg_per_m = 0.0;
 };
 
+// What a trajectory errs by against the truth. Metres and degrees unless a name says otherwise.
 struct TrajectoryErrors {
   std::size_t pairs = 0;
   Alignment alignment = Alignment::kNone;

@@ -33,6 +33,7 @@ using TreePair = std::pair<std::size_t, std::size_t>;
                                               const std::vector<Tree>& b, Alignment alignment,
                                               double radius_m);
 
+// The trees' feet and leans after a motion; sizes stay.
 [[nodiscard]] std::vector<Tree> moved(const std::vector<Tree>& trees,
                                       const Pose& target_from_source);
 

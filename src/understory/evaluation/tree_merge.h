@@ -8,6 +8,7 @@
 
 namespace understory {
 
+// How the trees of two maps become one list, P1 section 2.4.
 struct TreeMergeConfig {
   double reach_m = 1.5;      // the same tree lies that near in the other map, before it is moved
   double duplicate_m = 0.6;  // trees that near after it are one, P1 section 2.4

@@ -45,6 +45,7 @@ struct MapConsistency {
   double in_parts = 0.0;  // after a motion for each part, all matches together
 };
 
+// How the maps of two drives are compared, P1 section 2.5.
 struct MapConsistencyConfig {
   double pairing_m = 0.3;  // of trees that count as the same
   double within_m = 20.0;  // the mapping range of P1

@@ -33,6 +33,7 @@ struct StemChain {
   int blank = 0;  // ... that have no beam there
 };
 
+// What is known of stems before a frame is looked at. Metres; slopes as tangents.
 struct StemChainConfig {
   double slope_sd = 0.06;        // of the stems against up, about 3 degrees
   double usual_radius_m = 0.08;  // of the stems, until their own widths are known

@@ -12,6 +12,7 @@
 
 namespace understory {
 
+// Which stems of a frame are given.
 struct StemSegmentConfig {
   // Which way is up in the frame of the points, within 25 degrees; what the stems themselves say
   // replaces it.

@@ -15,6 +15,7 @@
 
 namespace understory {
 
+// Settings of `understory inventory` and of the trees of a map.
 struct InventoryConfig {
   GroundConfig ground;
   StemDetectorConfig stems;

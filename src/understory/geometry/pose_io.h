@@ -14,6 +14,7 @@ inline void put_pose(BinaryWriter& writer, const Pose& pose) {
   writer.put_doubles(pose.translation().data(), 3);
 }
 
+// Reads what put_pose has written. Throws InputError at the end of the bytes.
 [[nodiscard]] inline Pose get_pose(BinaryReader& reader) {
   Eigen::Quaterniond rotation;
   Eigen::Vector3d translation;
@@ -22,11 +23,13 @@ inline void put_pose(BinaryWriter& writer, const Pose& pose) {
   return Pose::from_unit(rotation, translation);
 }
 
+// A pose with its time, in the bytes of checkpoints; get_stamped_pose reads it.
 inline void put_stamped_pose(BinaryWriter& writer, const StampedPose& pose) {
   writer.put(pose.stamp);
   put_pose(writer, pose.world_from_body);
 }
 
+// Reads what put_stamped_pose has written.
 [[nodiscard]] inline StampedPose get_stamped_pose(BinaryReader& reader) {
   const auto stamp = reader.get<TimeNs>();
   return {stamp, get_pose(reader)};

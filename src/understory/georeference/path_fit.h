@@ -21,6 +21,7 @@ struct PathFitConfig {
   double about_yaw_rad = std::numeric_limits<double>::quiet_NaN();
 };
 
+// The motion in the plane between a path and GNSS fixes, P1 (6), and how well it fits. Metres.
 struct PathFit {
   bool found = false;
   std::string reason;  // if not

@@ -27,6 +27,7 @@ struct GroundPoint {
   double sd_m = 0.1;
 };
 
+// The rigid motion that lays ground points on a terrain model, and how well they lie on it. Metres.
 struct TerrainFit {
   bool found = false;
   std::string reason;  // if not

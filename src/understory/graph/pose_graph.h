@@ -16,6 +16,7 @@ struct PoseEdge {
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation, rotation first
 };
 
+// Which loops a pose graph believes, and when its solution ends.
 struct PoseGraphConfig {
   bool robust_loops = true;  // graduated non-convexity over the loops, truncated least squares
   // Probability with which a right loop lies within the truncation (6 degrees of freedom).
@@ -46,6 +47,7 @@ struct PoseGraphProblem {
   std::vector<TiltPrior> tilts;           // believed
 };
 
+// The poses that a pose graph comes to, and what it thinks of its edges.
 struct [[nodiscard]] PoseGraphResult {
   bool converged = false;
   std::string reason;  // if not converged

@@ -16,6 +16,7 @@ struct FelledTree {
   int missed = 0;  // views near enough, nothing before it, that should have seen it and did not
 };
 
+// When a tree that is no longer seen counts as felled. Metres.
 struct FelledConfig {
   double reach_m = 15.0;     // farther sights and misses tell nothing
   double nearest_m = 1.5;    // nor do those that the machine itself may hide

@@ -13,6 +13,7 @@
 
 namespace understory {
 
+// How the first keyframes are positioned again in a map of later ones.
 struct FirstKeyframesConfig {
   bool enabled = true;
   int keyframes = 25;      // at the beginning that are positioned again

@@ -19,6 +19,7 @@ struct CutTree {
   double distance_m = 0.0;
 };
 
+// When a cut of the harvester's head belongs to a tree.
 struct CutMatching {
   double reach_m = 1.0;    // from the head to the tree's axis, in the plane
   double settle_s = 30.0;  // a cut tree may be seen at its place for so long, held by the head

@@ -19,6 +19,7 @@ struct KeyframePoint {
   std::uint16_t t_10us = 0;  // since the cloud's stamp, in steps of 10 microseconds
 };
 
+// Points of one scan, in the body frame, metres, at a pose relative to their keyframe.
 struct KeyframeCloud {
   std::int32_t id = 0;  // of a keyframe, which takes the cloud along when it is moved
   TimeNs stamp = 0;

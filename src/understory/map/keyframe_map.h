@@ -23,6 +23,7 @@
 
 namespace understory {
 
+// When a scan becomes a keyframe, and how its points are thinned.
 struct KeyframeConfig {
   // P4 (37): a scan becomes a keyframe when |theta * (X_L^-1 X_k)| reaches `distance_m`, where
   // theta weighs a rotation of `rotation_as_metre_deg` like one metre. In the paper 0.2 m and 20.

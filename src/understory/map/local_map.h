@@ -11,6 +11,7 @@
 
 namespace understory {
 
+// Which keyframes make the map that scans are matched to.
 struct LocalMapConfig {
   // The method that scans are matched to the map by, and what the map is made of for it.
   MatcherConfig matcher;

@@ -21,6 +21,7 @@
 
 namespace understory {
 
+// Loop closure of the dense front end: search, verification and pose graph.
 struct LoopCloserConfig {
   bool enabled = true;
   LoopSearchConfig search;

@@ -14,6 +14,7 @@
 
 namespace understory {
 
+// How views of one place are paired to tell whether all ranges are wrong by a constant.
 struct RangeCheckConfig {
   bool enabled = true;
   int max_pairs = 40;        // of views; more cost time and tell little more

@@ -12,6 +12,7 @@
 
 namespace understory {
 
+// Which points of which scans enter the finished map.
 struct ScanCloudsConfig {
   bool enabled = true;
   double distance_m = 1.0;  // weighted distance (37) between scans whose clouds are kept

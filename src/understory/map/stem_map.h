@@ -29,6 +29,7 @@ struct MappedStem {
   double presence = 0.0;
 };
 
+// How sights of stems become trees, and which trees are listed.
 struct StemMapConfig {
   double merge_m = 0.6;  // sights nearer than this to a tree's mean in the plane are of that tree
   // Above 0: trees are the alpha shapes of all sights with that radius instead (P1 section 2.3;

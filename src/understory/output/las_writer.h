@@ -20,6 +20,7 @@ struct LasRecord {
   std::uint8_t classification = 1;  // LAS: 1 unclassified, 2 ground, 3-5 vegetation
 };
 
+// How points are written to LAS and LAZ.
 struct LasOptions {
   // Written into the header; choose a round number of metres near the data. Coordinates further
   // than 2,147 km from it do not fit and are an OutputError.

@@ -14,9 +14,13 @@
 
 namespace understory {
 
+// The verdict on a run. Partial: a part of the recording has no say; untrusted: the map is probably
+// wrong.
 enum class RunStatus { kComplete, kPartial, kUntrusted };
+// The name of a status in run.json.
 [[nodiscard]] std::string to_string(RunStatus status);
 
+// An input file of a run, as run.json names it.
 struct InputHash {
   std::string file;
   std::uint64_t bytes = 0;
@@ -26,6 +30,7 @@ struct InputHash {
 // SHA-256 of a file's bytes, lower-case hexadecimal. Throws InputError if it cannot be read.
 [[nodiscard]] InputHash hash_input(const std::filesystem::path& path);
 
+// Time that one stage took, over all its runs.
 struct StageSummary {
   Distribution wall_ms;
   Distribution cpu_ms;

@@ -41,6 +41,8 @@ struct StateRow {
   Matrix6d pose_covariance = Matrix6d::Zero();  // right perturbation, rotation first, body frame
 };
 
+// Writes states.csv.gz, one row a positioned scan. The file appears whole at `commit` or not at
+// all.
 class StatesWriter {
  public:
   explicit StatesWriter(const std::filesystem::path& path);
@@ -61,6 +63,7 @@ struct GnssRow {
   std::string reason;  // why not used
 };
 
+// Writes gnss.csv, one row a fix. The file appears whole at `commit` or not at all.
 class GnssWriter {
  public:
   explicit GnssWriter(const std::filesystem::path& path);

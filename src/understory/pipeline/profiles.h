@@ -5,6 +5,7 @@
 
 namespace understory {
 
+// A file of configs/ that the program carries with it.
 struct ShippedProfile {
   std::string_view name;
   std::string_view yaml;

@@ -10,6 +10,7 @@
 
 namespace understory {
 
+// How finely the poses within a scan are taken.
 struct DeskewConfig {
   // Points whose times fall into the same step share one pose. 20 us at 1 rad/s moves a point 100 m
   // away by at most 1 mm.
@@ -18,6 +19,7 @@ struct DeskewConfig {
   double max_extrapolation_s = 0.02;
 };
 
+// A scan whose points lie where they were at one time, in the body frame, metres.
 struct DeskewResult {
   BodyCloud cloud;
   std::size_t extrapolated = 0;  // points measured before the first or after the last pose

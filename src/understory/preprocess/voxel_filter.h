@@ -10,12 +10,14 @@
 
 namespace understory {
 
+// Which point stands for a voxel.
 enum class VoxelPoint {
   kMean,           // mean of the points of the voxel, P4 section 3.1.1
   kNearestToMean,  // the measured point nearest to that mean
   kFirst,          // the first point that fell into the voxel
 };
 
+// A grid that leaves one point a voxel. Ranges are measured from the sensor.
 struct VoxelFilterConfig {
   double voxel_size_m = 0.4;
   double range_min_m = 0.5;

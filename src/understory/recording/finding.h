@@ -25,10 +25,12 @@ enum class Finding {
 // Warns of it and counts it; a checkpoint keeps the count together with the warnings.
 void report_finding(Log& log, Finding finding, const std::string& message);
 
+// How often a kind of damage was found, and where first.
 struct Found {
   std::uint64_t count = 0;
   std::string first;  // message; empty where there is none
 };
+// What a log has kept of one kind of damage.
 [[nodiscard]] Found found(const Log& log, Finding finding);
 
 }  // namespace understory

@@ -29,6 +29,7 @@ struct TimeConvention {
   std::string warning;  // empty if there is nothing to worry about
 };
 
+// A convention of times in the bytes of checkpoints, and back.
 void put_convention(BinaryWriter& writer, const TimeConvention& convention);
 [[nodiscard]] TimeConvention get_convention(BinaryReader& reader);
 

@@ -75,6 +75,7 @@ class Recording {
   [[nodiscard]] virtual double progress() const = 0;
 };
 
+// What the user tells of a recording that it does not tell itself.
 struct OpenOptions {
   double rate_hz = 0.0;       // scans per second of a folder of clouds; 0 = not given
   std::string metadata_file;  // Ouster metadata JSON; empty = look beside the capture

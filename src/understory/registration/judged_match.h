@@ -22,6 +22,7 @@ struct Judgement {
         degenerate_ratio(config.degenerate_ratio) {}
 };
 
+// A result without a match: the pose is the guess, the information 0.
 [[nodiscard]] RegistrationResult refused(RegistrationStatus status, std::string reason,
                                          const Pose& guess);
 

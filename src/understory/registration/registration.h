@@ -37,6 +37,7 @@ struct PoseCost {
   Matrix6d hessian = Matrix6d::Zero();
 };
 
+// How a match ended. Only the first two gave a pose of their own.
 enum class RegistrationStatus {
   kConverged,
   kIterationLimit,  // the step had not become small; the pose is still the best found
@@ -44,6 +45,7 @@ enum class RegistrationStatus {
   kTooFewPoints,    // source or target too small to match; pose = guess
   kTooFewMatches,   // hardly any source point near the target; pose = guess
 };
+// The name of a status in messages and tables.
 [[nodiscard]] std::string to_string(RegistrationStatus status);
 
 // The answer of every matcher.

@@ -8,6 +8,7 @@ namespace understory::internal {
 
 using Evaluate = std::function<PoseCost(const Pose&)>;
 
+// When the steps of a match end.
 struct StepLimits {
   int max_iterations = 30;
   double step_translation_m = 5e-4;
@@ -19,6 +20,7 @@ struct StepLimits {
   bool trust_last_step = false;
 };
 
+// Where the steps of a match ended.
 struct Minimum {
   Pose pose;
   PoseCost at;  // of the pose before, if its last step was trusted

@@ -15,6 +15,7 @@ inline void put_imu(BinaryWriter& writer, const ImuSample& sample) {
   if (sample.orientation) writer.put_doubles(sample.orientation->coeffs().data(), 4);
 }
 
+// Reads what put_imu has written. Throws InputError at the end of the bytes.
 [[nodiscard]] inline ImuSample get_imu(BinaryReader& reader) {
   ImuSample sample;
   sample.stamp = reader.get<TimeNs>();
@@ -27,6 +28,7 @@ inline void put_imu(BinaryWriter& writer, const ImuSample& sample) {
   return sample;
 }
 
+// A fix in the bytes of checkpoints; get_fix reads it.
 inline void put_fix(BinaryWriter& writer, const GnssFix& fix) {
   writer.put(fix.stamp);
   const double numbers[] = {fix.latitude_deg, fix.longitude_deg, fix.height_m, fix.hdop,
@@ -37,6 +39,7 @@ inline void put_fix(BinaryWriter& writer, const GnssFix& fix) {
   writer.put(fix.satellites);
 }
 
+// Reads what put_fix has written.
 [[nodiscard]] inline GnssFix get_fix(BinaryReader& reader) {
   GnssFix fix;
   fix.stamp = reader.get<TimeNs>();

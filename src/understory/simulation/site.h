@@ -18,6 +18,7 @@ struct OriginConfig {  // where the east-north-up frame of the truth has its zer
   double start_time_s = 1'700'000'000.0;
 };
 
+// The ground of a site.
 struct TerrainConfig {
   double cell_m = 0.4;              // of the triangle grid
   double relief_m = 1.2;            // standard deviation of the hills
@@ -33,6 +34,7 @@ struct TerrainConfig {
   double track_depth = 0.0;  // share of the snow that the carrier presses down on its way
 };
 
+// The trees and plants of a site. Per hectare, metres.
 struct StandConfig {
   double size_x_m = 140.0;  // the stand's rectangle around the origin
   double size_y_m = 140.0;
@@ -73,6 +75,7 @@ struct StandConfig {
   int buildings = 0;  // beside the route: the first at its start, the second at its end
 };
 
+// What carries the sensors, and how it moves.
 struct CarrierConfig {
   std::string kind = "walk";
   std::string body = "imu";  // frame of the path: imu or base_link
@@ -109,6 +112,7 @@ struct CarrierConfig {
 // otherwise (scene.h).
 constexpr int kBundleRays = 4;
 
+// The lidar and its faults.
 struct LidarConfig {
   std::string model = "OS0-128";
   double rate_hz = 10.0;
@@ -141,6 +145,7 @@ struct LidarConfig {
   std::vector<double> error_rpy_deg = {0.0, 0.0, 0.0};
 };
 
+// The IMU and its faults. Noise densities as data sheets give them.
 struct ImuConfig {
   bool enabled = true;
   double rate_hz = 200.0;
@@ -172,6 +177,7 @@ struct ImuConfig {
   double time_offset_s = 0.0;   // of the IMU's clock: stamps are late by this much
 };
 
+// The GNSS receiver and its faults.
 struct GnssConfig {
   double jump_interval_s = 0.0;  // mean time between jumps under closed canopy, 0 = none
   double jump_m = 1.5;           // standard deviation of a jump in the plane
@@ -198,6 +204,7 @@ struct ReceiverHoldConfig {  // a receiver that holds its position while the car
   double release_m = 3.0;    // until its solution lies so far away in the plane
 };
 
+// The magnetometer and its faults; microtesla.
 struct MagnetometerConfig {
   bool enabled = false;
   double rate_hz = 100.0;
@@ -229,6 +236,7 @@ struct HeadLogConfig {  // what a harvester's computer notes at each felling cut
   double missed = 0.02;     // share of the cuts that are not in the log
 };
 
+// All that a site is made of: the keys of configs/sites/*.yaml.
 struct SiteConfig {
   int seed = 1;
   double duration_s = 0.0;  // 0: as long as the route takes

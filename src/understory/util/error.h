@@ -51,8 +51,9 @@ class InternalError : public Error {
 };
 
 namespace internal {
+// Throws the error of a broken invariant, for UNDERSTORY_CHECK.
 [[noreturn]] void check_failed(const char* condition, const char* file, int line);
-}
+}  // namespace internal
 
 // Throws InternalError if the condition does not hold. Stays on in release builds.
 #define UNDERSTORY_CHECK(condition)                                         \

@@ -8,6 +8,7 @@
 
 namespace understory {
 
+// How urgent a message is.
 enum class LogLevel { kDebug, kInfo, kWarning, kError };
 
 // Where the library's messages go. The library never prints; a Log is passed to whatever may have

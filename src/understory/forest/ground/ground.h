@@ -23,6 +23,7 @@ struct GroundConfig {
 };
 void describe(ConfigTable& table, GroundConfig& config);
 
+// The ground under a cloud, as a raster in the frame of the cloud, metres.
 struct GroundModel {
   Raster terrain;  // z of the ground
   GroundConfig config;

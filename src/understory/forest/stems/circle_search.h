@@ -17,6 +17,7 @@ struct Circle {
   int inside = 0;         // points well within: a stem has none, foliage has many
 };
 
+// Which circles count as cross sections of stems. Metres and degrees.
 struct CircleSearchConfig {
   double min_radius_m = 0.025;
   double max_radius_m = 0.6;

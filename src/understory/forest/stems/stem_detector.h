@@ -17,6 +17,7 @@ struct SlicePoint {
   std::uint32_t returns = 1;  // points of the cloud that this one stands for
 };
 
+// Which slices of a cloud are searched, and what counts as a stem there.
 struct StemDetectorConfig {
   double lowest_m = 0.5;   // above ground: slices from here ...
   double highest_m = 3.5;  // ... to here

@@ -23,6 +23,7 @@ struct LoopInput {
   Eigen::Vector3d up_in_source = Eigen::Vector3d::UnitZ();
 };
 
+// How a loop is matched, and when a match is believed.
 struct LoopClosureConfig {
   MatcherConfig matcher;  // for a first estimate
   // The method that has the last word, e.g. ICP as in P2-7, with its settings in `matcher`; none:
@@ -58,6 +59,7 @@ struct LoopClosureConfig {
 };
 void describe(ConfigTable& table, LoopClosureConfig& config);
 
+// What a loop's match came to, with the numbers that decided.
 struct [[nodiscard]] LoopVerification {
   bool accepted = false;
   std::string reason;  // why not

@@ -9,6 +9,7 @@
 
 namespace understory {
 
+// Which keyframes are asked whether their place is seen again.
 struct LoopSearchConfig {
   // Paper: P4 (38) as it stands: the nearest keyframe but the recent ones, within a fixed gate.
   // Uncertainty: every place that could be seen again given the drift, best overlap first.
@@ -32,6 +33,7 @@ struct LoopSearchConfig {
 };
 void describe(ConfigTable& table, LoopSearchConfig& config);
 
+// A keyframe whose place may be seen again.
 struct LoopCandidate {
   int keyframe = 0;
   double distance_m = 0.0;

@@ -9,6 +9,7 @@
 
 namespace understory {
 
+// How loops are found among views of stems. L0 is the mean distance between neighbouring stems.
 struct StemLoopConfig {
   TreePatternConfig pattern;
   SparseIcpConfig icp;

@@ -13,6 +13,7 @@ namespace understory {
 
 // Which pairs of views are matched again, and in which order: P0 section 2.4, P1 section 2.3.
 
+// Two views that may be matched again.
 struct CorrectionPair {
   int j = 0;  // the earlier view
   int i = 0;
@@ -29,6 +30,7 @@ enum class PairRule {
   kDelaunayStars
 };
 
+// How pairs of views are drawn and chosen, P0 section 2.4.
 struct PairConfig {
   PairRule rule = PairRule::kPoissonDisks;
   int tested = 100'000;    // pairs of views drawn at random

@@ -22,6 +22,7 @@ struct PathObservation {
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation
 };
 
+// The Gaussian process over a path, P1 section 5; lengths are counted in views.
 struct PathProcessConfig {
   // Length and scale are those under which the observations are most likely; or given here (>= 0).
   double length_views = -1.0;
@@ -30,6 +31,7 @@ struct PathProcessConfig {
   double largest_chi2 = 16.27;
 };
 
+// The path after the regression, and what the process learnt.
 struct [[nodiscard]] PathProcessResult {
   std::vector<Pose> world_from_view;
   std::vector<char> used;     // per observation

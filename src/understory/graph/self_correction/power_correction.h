@@ -28,6 +28,7 @@ enum class PowerForm {
   kCorrected
 };
 
+// How a correction is spread over the views between.
 struct PowerConfig {
   PowerCoefficient coefficient = PowerCoefficient::kPathLength;
   PowerForm form = PowerForm::kCorrected;

@@ -28,12 +28,14 @@ enum class CorrectionMethod {
                  // once, matched again from the better poses
 };
 
+// The lattice of pairs of P1 section 2.3. Counted in views.
 struct LatticeConfig {
   int spacing = 30;
   int longest_gap = 300;
   double largest_outlier_ratio = 0.6;  // as in the text of P1; 0.4 in its figure 5
 };
 
+// The choice of pairs by expected information. L0 is the mean distance between neighbouring stems.
 struct GainConfig {
   int pool = 3000;               // pairs among which the next one is chosen
   double window_l0 = 0.8;        // views that far along the way, to each side, are gathered
@@ -44,6 +46,7 @@ struct GainConfig {
   double largest_step_l0 = 1.0;  // a match that moves the views farther apart is not believed
 };
 
+// Settings of `understory correct` below `correction`; the method decides which of them count.
 struct SelfCorrectionConfig {
   CorrectionMethod method = CorrectionMethod::kExpectedGain;
   PairConfig pairs;
@@ -91,6 +94,7 @@ struct TriedCorrection {
   double beta = 0.0;   // of the map after it, if accepted (powers and lattice)
 };
 
+// The corrected poses, every pair that was tried, and how sharp the map was before and after.
 struct [[nodiscard]] SelfCorrectionResult {
   std::vector<Pose> world_from_view;
   std::vector<char> use;  // 0: the map is better without this view

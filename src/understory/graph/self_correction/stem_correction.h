@@ -12,6 +12,7 @@
 
 namespace understory {
 
+// Loops, pose graph and self-correction of a map of stems, in this order.
 struct StemCorrectionConfig {
   bool close_loops = true;
   StemLoopConfig loops;

@@ -17,6 +17,7 @@ struct StarView {
 };
 [[nodiscard]] StarView stars_of(const SparsePoints& level_view);
 
+// What differs between two views of the same neighbourhood.
 struct StarNoise {
   double stem_sd_m = 0.1;  // of a stem's place within a view, per axis
   double seen = 0.6;  // probability that a neighbour is seen, and is one, in the other view too

@@ -22,6 +22,7 @@ struct TreePatternConfig {
 };
 void describe(ConfigTable& table, TreePatternConfig& config);
 
+// A place whose pattern of trees is like that of a query.
 struct PatternCandidate {
   int place = 0;
   Pose place_from_query;  // level frames: yaw and translation

@@ -40,6 +40,7 @@ struct ScanMatchConfig {
 };
 void describe(ConfigTable& table, ScanMatchConfig& config);
 
+// Settings of the positioning of scans, one section for each of its steps.
 struct DenseOdometryConfig {
   VoxelFilterConfig voxel;  // thins a scan before matching
   IsolatedPointsConfig isolated;

@@ -27,6 +27,7 @@ struct ImuState {
 // Derivative of local(from, retract(to, d)) by d at d = 0.
 [[nodiscard]] Matrix15d local_jacobian(const ImuState& from, const ImuState& to);
 
+// A state in the bytes of checkpoints, and back; reading past the end throws InputError.
 void put_state(BinaryWriter& writer, const ImuState& state);
 [[nodiscard]] ImuState get_state(BinaryReader& reader);
 

@@ -19,6 +19,7 @@ struct MotionInterval {
   Preintegration motion;
 };
 
+// What the IMU measured between two states in the bytes of checkpoints, and back.
 void put_interval(BinaryWriter& writer, const MotionInterval& interval);
 [[nodiscard]] MotionInterval get_interval(BinaryReader& reader);
 

@@ -33,6 +33,7 @@ struct LidarFactor {
   Matrix6d information = Matrix6d::Zero();  // of a right perturbation, as the matcher gives it
 };
 
+// What became of one scan's match.
 enum class MotionStatus {
   kAccepted,      // the lidar factor is in the estimate
   kPredicted,     // no lidar factor was given; the state is the prediction
@@ -52,6 +53,7 @@ struct [[nodiscard]] MotionUpdate {
   std::optional<Pose> new_world_from_old_world;
 };
 
+// How the model found its first state: at rest, while moving, or without an IMU.
 enum class Initialisation { kNone, kStill, kInMotion, kNoImu };
 
 // Agreement between the IMU and the lidar, judged over the run.
@@ -131,6 +133,7 @@ enum class LidarNoise {
   kBoth,         // the information matrix with the floor of (36)
 };
 
+// What the match of a scan is believed, P4 (36).
 struct LidarNoiseConfig {
   LidarNoise source = LidarNoise::kBoth;
   double sigma_rotation_deg = 0.05;   // floor of one match
@@ -158,9 +161,12 @@ struct ImuNoiseConfig {
   double max_gap_s = 0.06;           // longer: constant velocity stands in, with a warning
 };
 
+// How the last states are smoothed: a window of them, or GTSAM's iSAM2.
 enum class SmootherMethod { kFixedLag, kIsam2 };
+// What a match's velocity is compared with.
 enum class VelocityGateReference { kPrediction, kPreviousState };
 
+// Settings of the motion model, with IMU and without.
 struct MotionConfig {
   SmootherMethod method = SmootherMethod::kFixedLag;
   int window = 15;          // states in the fixed lag

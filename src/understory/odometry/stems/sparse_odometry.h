@@ -17,6 +17,7 @@
 
 namespace understory {
 
+// How views of stems are positioned one after another.
 struct SparseOdometryConfig {
   // Frame: each view to the one before, P0 (16). Map: to the stems of the views before, gathered.
   enum class Target { kFrame, kMap };
@@ -39,6 +40,7 @@ struct SparseOdometryConfig {
 };
 void describe(ConfigTable& table, SparseOdometryConfig& config);
 
+// What became of one view.
 enum class SparseStepStatus {
   kFirst,
   kTracked,   // matched from the prediction
@@ -47,8 +49,10 @@ enum class SparseStepStatus {
   kUnmatched  // too few stems: the pose is the prediction
 };
 
+// The name of a status in steps.csv.
 [[nodiscard]] const char* to_string(SparseStepStatus status);
 
+// One view's pose and how well it fits.
 struct SparseStep {
   SparseStepStatus status = SparseStepStatus::kFirst;
   Pose world_from_body;

@@ -32,6 +32,7 @@ struct ViewChoiceConfig {
 };
 void describe(ConfigTable& table, ViewChoiceConfig& config);
 
+// Which stems of which scans are positioned. Settings below `stems`.
 struct StemFrontEndConfig {
   double min_score = 0.5;     // of a stem to be used
   double max_range_m = 42.0;  // of a stem's returns

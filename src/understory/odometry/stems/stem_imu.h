@@ -11,6 +11,7 @@
 
 namespace understory {
 
+// What the IMU tells the positioning by stems: turns and the vertical.
 struct StemImuConfig {
   bool use = true;
   // Specific force is averaged over that time, carried along by the gyroscope: what the body

@@ -6,6 +6,7 @@
 
 namespace understory {
 
+// How often a scan is positioned by its stems; those between are interpolated.
 struct StemPaceConfig {
   double longest_gap_s = 1.0;  // between positioned scans; 0: every scan is positioned
   // How far a scan between two others may err, in standard deviations of a match. A match knows

@@ -10,6 +10,7 @@
 
 namespace understory {
 
+// All settings of `understory correct`.
 struct CorrectionConfig {
   SparseOdometryConfig odometry;
   StemCorrectionConfig stems;

@@ -15,6 +15,7 @@
 
 namespace understory {
 
+// What a map is laid on.
 enum class GeoreferenceMethod {
   kGnssPath,  // one motion in the plane between two paths, P1 (6)
   kTerrain    // one rigid motion that lays ground points on a terrain model, P1 table 1
@@ -37,6 +38,7 @@ struct GeoreferenceRequest {
   std::string coordinate_system;  // of trees.gpkg; empty: the UTM zone
 };
 
+// What `understory georeference` tells when it is done.
 struct GeoreferenceOutcome {
   RunStatus status = RunStatus::kComplete;
   std::vector<std::string> reasons;

@@ -23,6 +23,7 @@ struct InventoryRequest {
   std::string config_file;  // that the user named; not to be overwritten
 };
 
+// What `understory inventory` tells when it is done.
 struct InventoryOutcome {
   RunStatus status = RunStatus::kComplete;
   std::vector<std::string> reasons;  // why partial or untrusted

@@ -48,6 +48,7 @@ struct JudgementConfig {
 };
 void describe(ConfigTable& table, JudgementConfig& config);
 
+// The verdict on a run, for run.json and the terminal.
 struct RunJudgement {
   RunStatus status = RunStatus::kComplete;
   std::vector<std::string> reasons;  // for the user, the cause first; empty if complete

@@ -20,6 +20,7 @@ inline constexpr const char* kSparseFrontEnd = "sparse";
 // Everything that can be set for `understory map`. Which of the two it is says which front end.
 using FrontEndConfig = std::variant<MappingConfig, SparseMappingConfig>;
 
+// The name of the front end that a configuration belongs to: dense or sparse.
 [[nodiscard]] std::string name_of(const FrontEndConfig& config);
 // Every key, without comments.
 [[nodiscard]] std::string yaml_of(const FrontEndConfig& config);

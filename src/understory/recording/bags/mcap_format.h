@@ -9,6 +9,7 @@ inline constexpr std::uint8_t kMagic[8] = {0x89, 'M', 'C', 'A', 'P', '0', '\r', 
 inline constexpr std::size_t kRecordHead = 9;  // opcode and length
 inline constexpr std::size_t kFooterContent = 20;
 
+// Kinds of records of MCAP (mcap.dev/spec, "Records").
 enum Opcode : std::uint8_t {
   kHeader = 0x01,
   kFooter = 0x02,

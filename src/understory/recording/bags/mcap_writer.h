@@ -8,8 +8,10 @@
 
 namespace understory {
 
+// How the chunks of an MCAP file are compressed.
 enum class McapCompression { kNone, kLz4, kZstd };
 
+// How an MCAP file is written.
 struct McapWriterOptions {
   McapCompression compression = McapCompression::kZstd;
   int zstd_level = 1;  // 1..19

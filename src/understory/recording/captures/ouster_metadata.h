@@ -10,6 +10,7 @@
 
 namespace understory {
 
+// Layouts of Ouster's lidar packets (Ouster, "Sensor Data", UDP profiles).
 enum class OusterProfile {
   kLegacy,
   kRng19,  // RNG19_RFL8_SIG16_NIR16: single return

@@ -39,6 +39,7 @@ struct PcapSurvey {
   [[nodiscard]] std::string list() const;
 };
 
+// Whether a datagram is one of Velodyne's, by its length and its first bytes.
 [[nodiscard]] bool is_velodyne_data(ByteSpan payload);
 [[nodiscard]] bool is_velodyne_position(ByteSpan payload);
 

@@ -18,6 +18,7 @@
 
 namespace understory {
 
+// How packets of Velodyne become scans.
 struct VelodyneConfig {
   // Azimuth (clockwise from above) at which a scan ends and the next begins.
   double scan_start_deg = 0.0;

@@ -6,6 +6,7 @@
 
 namespace understory {
 
+// Models of Velodyne that packets are decoded of.
 enum class VelodyneModel { kUnknown, kVlp16, kHdl32e, kPuckHiRes, kVlp32c };
 
 // Geometry and timing of one Velodyne model, from its user manual.

@@ -42,6 +42,7 @@ void store_number(double value, FieldType type, std::uint8_t* into);
 // x, y, z, intensity as float32 without a header, as the KITTI data sets have it.
 [[nodiscard]] CloudTable read_kitti(ByteSource& file, Log& log);
 
+// Formats of files that hold one cloud.
 enum class CloudFormat { kUnknown, kPcd, kPly, kLas, kKitti };
 // By the first bytes; KITTI, which has no header, by the name's end (.bin).
 [[nodiscard]] CloudFormat cloud_format(ByteSource& file);

@@ -10,6 +10,7 @@
 
 namespace understory {
 
+// What the header of a LAS or LAZ file tells.
 struct LasHeader {
   int version_minor = 0;
   int point_format = 0;
@@ -25,6 +26,7 @@ struct LasHeader {
   std::uint32_t record_length = 0;
 };
 
+// A point of a LAS or LAZ file.
 struct LasPoint {
   Eigen::Vector3d position;  // in the file's coordinate system
   float intensity = 0.0F;

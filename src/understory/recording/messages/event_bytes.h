@@ -18,9 +18,12 @@ void put_event(BinaryWriter& writer, const Event& event);
 void put_scan(BinaryWriter& writer, const ScanPtr& scan);
 [[nodiscard]] ScanPtr get_scan(BinaryReader& reader);
 
+// Parts of recordings in the bytes of checkpoints, and back; reading past the end throws
+// InputError.
 void put_rig(BinaryWriter& writer, const Rig& rig);
 [[nodiscard]] Rig get_rig(BinaryReader& reader);
 
+// Whether there is a value, and the value; for types that are copied byte by byte.
 template <typename T>
 void put_optional(BinaryWriter& writer, const std::optional<T>& value) {
   writer.put(value.has_value());
@@ -32,9 +35,11 @@ template <typename T>
   return reader.get<T>();
 }
 
+// A list of flags, one byte each, and back.
 void put_flags(BinaryWriter& writer, const std::vector<bool>& flags);
 [[nodiscard]] std::vector<bool> get_flags(BinaryReader& reader);
 
+// A table of strings in the order of its keys, and back.
 void put_strings(BinaryWriter& writer, const std::map<std::string, std::string>& strings);
 [[nodiscard]] std::map<std::string, std::string> get_strings(BinaryReader& reader);
 

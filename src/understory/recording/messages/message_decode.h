@@ -16,11 +16,13 @@ namespace understory {
 // The ROS 1 and ROS 2 messages that recordings hold. Each decoder takes any bytes and returns
 // nothing where they are not a whole message of that type. Pure functions.
 
+// std_msgs/Header.
 struct MessageHeader {
   TimeNs stamp = 0;
   std::string frame;
 };
 
+// sensor_msgs/PointField.
 struct CloudField {
   std::string name;
   std::uint32_t offset = 0;
@@ -28,6 +30,7 @@ struct CloudField {
   std::uint32_t count = 1;
 };
 
+// sensor_msgs/PointCloud2; the data point into the message.
 struct PointCloud2Message {
   MessageHeader header;
   std::uint32_t height = 0;
@@ -39,21 +42,25 @@ struct PointCloud2Message {
   ByteSpan data;  // part of the message's bytes
 };
 
+// sensor_msgs/Imu; rad/s and m/s^2 as it has them.
 struct ImuMessage {
   MessageHeader header;
   ImuSample sample;
 };
 
+// sensor_msgs/MagneticField.
 struct MagMessage {
   MessageHeader header;
   MagSample sample;
 };
 
+// sensor_msgs/NavSatFix or gps_msgs/GPSFix.
 struct GnssMessage {
   MessageHeader header;
   GnssFix fix;
 };
 
+// geometry_msgs/TransformStamped.
 struct TransformMessage {
   TimeNs stamp = 0;
   std::string parent;
@@ -67,11 +74,13 @@ struct SensorPacket {
   ByteSpan data;
 };
 
+// Packets of a lidar in one message.
 struct PacketsMessage {
   MessageHeader header;
   std::vector<SensorPacket> packets;
 };
 
+// Nothing where the bytes are no whole message of the type.
 [[nodiscard]] std::optional<PointCloud2Message> decode_point_cloud2(MessageReader reader);
 [[nodiscard]] std::optional<ImuMessage> decode_imu(MessageReader reader);
 [[nodiscard]] std::optional<MagMessage> decode_magnetic_field(MessageReader reader);

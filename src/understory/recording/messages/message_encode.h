@@ -34,6 +34,7 @@ class CdrWriter {
   ByteBuffer buffer_;
 };
 
+// A fixed transform between two named frames.
 struct NamedTransform {
   std::string parent;
   std::string child;

@@ -23,12 +23,14 @@ struct MessageChannel {
   bool readable = true;  // false: an encoding other than CDR or ROS 1
 };
 
+// A channel in the bytes of checkpoints; get_channel reads it.
 inline void put_channel(BinaryWriter& writer, const MessageChannel& channel) {
   writer.put(channel.topic);
   writer.put(channel.type);
   writer.put(channel.serialization);
   writer.put(channel.readable);
 }
+// Reads what put_channel has written.
 [[nodiscard]] inline std::shared_ptr<const MessageChannel> get_channel(BinaryReader& reader) {
   auto channel = std::make_shared<MessageChannel>();
   channel->topic = reader.get_string();
@@ -45,6 +47,7 @@ inline constexpr TimeNs kLatestTime = 4'600'000'000'000'000'000;
   return std::clamp(time, -kLatestTime, kLatestTime);
 }
 
+// A message as it lies in the file.
 struct RawMessage {
   std::shared_ptr<const MessageChannel> channel;
   TimeNs log_time = 0;  // when it was recorded

@@ -12,6 +12,7 @@
 
 namespace understory {
 
+// What a topic is read for.
 enum class TopicRole {
   kIgnored,
   kCloud,            // sensor_msgs/PointCloud2
@@ -46,6 +47,7 @@ struct TopicSurvey {
   bool late = false;                                      // first seen behind the start
 };
 
+// What a first look at a file found.
 struct MessageSurvey {
   std::vector<TopicSurvey> topics;  // in the order of appearance
   TransformTree transforms;

@@ -44,6 +44,7 @@ class CloudLayout {
 [[nodiscard]] CloudTimes measure_times(const PointCloud2Message& cloud, const CloudLayout& layout,
                                        TimeNs log_time);
 
+// A scan made of a message, and how many of its points were dropped.
 struct ConvertedCloud {
   std::shared_ptr<Scan> scan;
   std::size_t without_return = 0;  // NaN or range zero: dropped

@@ -10,6 +10,7 @@
 
 namespace understory {
 
+// Settings of generalised ICP, Segal et al. 2009.
 struct GicpConfig {
   double max_distance_m = 0.5;  // farther neighbours are no match
   // A point is believed to lie on its surface to `sigma_m`, and anywhere along it to

@@ -8,6 +8,7 @@
 
 namespace understory {
 
+// Settings of ICP.
 struct IcpConfig {
   enum class Metric { kPointToPoint, kPointToPlane };
 

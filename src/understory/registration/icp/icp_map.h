@@ -14,6 +14,7 @@
 
 namespace understory {
 
+// The map of points with surfaces that ICP and GICP match to.
 struct IcpMapConfig {
   // One point per cube of this edge: the mean of all that fell into it.
   double cube_m = 0.25;

@@ -82,6 +82,8 @@ class IcpAccumulator {
   double kernel_;
 };
 
+// Normal equations of all matches at a pose. `known` holds the partners of the pose before, by
+// point.
 template <typename Target>
 [[nodiscard]] MatchSums icp_sums(const Target& target, const Points& source, const Pose& pose,
                                  const IcpConfig& config,
@@ -96,6 +98,7 @@ template <typename Target>
   return {share * at.cost, share * at.gradient, share * at.hessian};
 }
 
+// Matches a source to a target, Gauss-Newton steps from a guess. The result tells why it ended.
 template <typename Target>
 [[nodiscard]] RegistrationResult icp_match(const Target& target, const Points& source,
                                            const Pose& guess, const PoseTerms& terms,

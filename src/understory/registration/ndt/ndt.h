@@ -9,6 +9,7 @@
 
 namespace understory {
 
+// Settings of the match to normal distributions, P4 (40).
 struct NdtConfig {
   enum class Search {
     k1,

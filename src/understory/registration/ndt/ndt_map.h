@@ -13,6 +13,7 @@
 
 namespace understory {
 
+// The cells of a map of normal distributions.
 struct NdtMapConfig {
   double cell_size_m = 1.0;  // edge of a cell
   int min_points = 5;        // cells with fewer have no distribution

@@ -6,6 +6,7 @@
 
 namespace understory {
 
+// How surfaces seen from two places are matched to tell a constant error of all ranges.
 struct RangeOffsetConfig {
   SurfaceViewConfig view;
   double kernel_m = 0.05;       // scale of the Geman-McClure kernel at the end; at first ten times

@@ -11,6 +11,7 @@
 
 namespace understory {
 
+// Which patches of a view count as flat surfaces.
 struct SurfaceViewConfig {
   double cell_m = 1.0;        // edge of the cells; each has one patch at most
   double range_max_m = 30.0;  // farther points are left out: there the beams are all but parallel

@@ -42,9 +42,12 @@ struct GoIcpConfig {
 };
 void describe(ConfigTable& table, GoIcpConfig& config);
 
+// How the search ended: certified, by the paper's own rule, out of nodes, or without a start.
 enum class GoIcpStatus { kCertified, kConverged, kNodeLimit, kTooFewPoints };
+// The name of a status in messages and tables.
 [[nodiscard]] std::string to_string(GoIcpStatus status);
 
+// The best motion that branch and bound found, P0 (22), and what is certain of it.
 struct [[nodiscard]] GoIcpResult {
   GoIcpStatus status = GoIcpStatus::kTooFewPoints;
   std::string reason;        // empty if certified (or, in the paper's mode, converged)

@@ -32,6 +32,7 @@ struct GoIcpBox {
   [[nodiscard]] static Sides sides_of(const Pose& target_from_source, const Pose& guess);
 };
 
+// What one box of motions comes to.
 struct GoIcpErrors {
   double at_middle_m;  // trimmed root mean square error at the middle of the box
   double bound_m;      // no motion in the box has a smaller one

@@ -29,9 +29,12 @@ struct SparseIcpConfig {
 };
 void describe(ConfigTable& table, SparseIcpConfig& config);
 
+// How a match of stems ended.
 enum class SparseIcpStatus { kConverged, kIterationLimit, kTooFewPoints };
+// The name of a status in messages and tables.
 [[nodiscard]] std::string to_string(SparseIcpStatus status);
 
+// The pose of a match of stems, and how well it fits.
 struct [[nodiscard]] SparseIcpResult {
   SparseIcpStatus status = SparseIcpStatus::kTooFewPoints;
   std::string reason;  // empty if converged

@@ -19,6 +19,7 @@ struct YawVoteConfig {
 };
 void describe(ConfigTable& table, YawVoteConfig& config);
 
+// A motion in the plane that many pairs of stems agree on.
 struct YawVoteCandidate {
   Pose target_from_source;
   double votes = 0.0;  // about the number of pairs that agree

@@ -42,6 +42,7 @@ class CarrierPath {
 // Where a harvester's boom is, in the body frame: reach and height of its tip, metres.
 using BoomPath = QuinticSpline<2>;
 
+// All that a carrier does in a recording.
 struct CarrierPlan {
   CarrierPath path;
   BoomPath boom;

@@ -69,10 +69,12 @@ class Moves {
   std::vector<Move> moves_;  // in order, not overlapping
 };
 
+// Seconds of a turn that begins and ends at rest with the peak rate given; half a second at least.
 inline double turn_time(double angle_rad, double peak_rate_deg_s) {
   return std::max(0.5, 1.875 * std::abs(angle_rad) / (peak_rate_deg_s * kDegree));
 }
 
+// Steps of a path of that duration.
 inline std::size_t steps_of(double duration_s) {
   return static_cast<std::size_t>(std::ceil(duration_s / kStep)) + 4;
 }
@@ -110,10 +112,13 @@ inline Lie lie_on(const Terrain& terrain, const Eigen::Vector2d& place, double h
           std::atan2(left - right, width_m)};
 }
 
+// The path of one kind of carrier along a route, from rest to rest; deterministic in the seed.
 [[nodiscard]] CarrierPlan plan_thinning(const SiteConfig& config, const Route& route,
                                         const Terrain& terrain, const Stand& stand);
+// The flight along a route; deterministic in the seed.
 [[nodiscard]] CarrierPlan plan_uav(const SiteConfig& config, const Route& route,
                                    const Terrain& terrain);
+// The flight with the sensor on a line below the drone; deterministic in the seed.
 [[nodiscard]] CarrierPlan plan_sleigh(const SiteConfig& config, const Route& route,
                                       const Terrain& terrain);
 

@@ -26,11 +26,13 @@ using LaneRegister = std::array<float, kLanes>;
 using MaskRegister = unsigned;
 #endif
 
+// A truth value for each of eight lanes.
 struct LaneMask {
   [[nodiscard]] unsigned bits() const;
   MaskRegister v;
 };
 
+// Eight floats, one a lane; all operations act lane by lane.
 struct Lanes {
   Lanes() = default;
   Lanes(float all);
@@ -77,18 +79,23 @@ inline LaneMask operator<(Lanes a, Lanes b) {
 inline LaneMask operator<=(Lanes a, Lanes b) {
   return {_mm256_cmp_ps(a.v, b.v, _CMP_LE_OQ)};
 }
+// The smaller value, lane by lane.
 inline Lanes min(Lanes a, Lanes b) {
   return Lanes(_mm256_min_ps(a.v, b.v));
 }
+// The larger value, lane by lane.
 inline Lanes max(Lanes a, Lanes b) {
   return Lanes(_mm256_max_ps(a.v, b.v));
 }
+// The root, lane by lane.
 inline Lanes sqrt(Lanes a) {
   return Lanes(_mm256_sqrt_ps(a.v));
 }
+// a where the mask is true, b elsewhere.
 inline Lanes select(LaneMask where, Lanes a, Lanes b) {
   return Lanes(_mm256_blendv_ps(b.v, a.v, where.v));
 }
+// The largest of the eight values.
 inline float largest(Lanes a) {
   const __m128 four = _mm_max_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
   const __m128 two = _mm_max_ps(four, _mm_movehl_ps(four, four));
@@ -164,6 +171,8 @@ inline LaneMask operator|(LaneMask a, LaneMask b) {
   return {a.v | b.v};
 }
 
+// From here to the end of the branch: the same operations one lane after another, for machines
+// without AVX.
 template <class Function>
 Lanes lane_by_lane(const Lanes& a, const Lanes& b, Function function) {
   Lanes result;
@@ -255,9 +264,11 @@ inline unsigned taken(const std::uint32_t* numbers) {
 
 #endif
 
+// Eight vectors.
 struct Lanes3 {
   Lanes x, y, z;
 };
+// The inner products of eight pairs of vectors.
 inline Lanes dot(const Lanes3& a, const Lanes3& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }

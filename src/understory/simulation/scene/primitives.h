@@ -73,6 +73,7 @@ struct Triangle {
   }
 };
 
+// A flat round plate.
 struct Disc {
   Eigen::Vector3f centre;
   Eigen::Vector3f axis;

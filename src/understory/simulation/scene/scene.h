@@ -12,6 +12,7 @@
 
 namespace understory {
 
+// What a ray has met.
 enum class Surface : std::uint8_t {
   kNone,
   kGround,
@@ -29,12 +30,14 @@ enum class Surface : std::uint8_t {
 // of up to three rays in ten thousand differs: of those that graze what they meet.
 enum class Casting : std::uint8_t { kRays, kBundles };
 
+// A ray of light, cast into the scene.
 struct Ray {
   Eigen::Vector3f origin = Eigen::Vector3f::Zero();     // world frame
   Eigen::Vector3f direction = Eigen::Vector3f::Zero();  // unit length
   float time_s = 0.0F;  // after the moment to which the scene was brought, for the wind
 };
 
+// What a ray has met, and where along it.
 struct Hit {
   float range_m = 0.0F;
   float cosine = 1.0F;  // of the angle of incidence, 0..1

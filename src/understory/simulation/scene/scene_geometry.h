@@ -13,6 +13,7 @@
 // attaches and releases them.
 namespace understory {
 
+// A place and a radius, as the ray caster takes them.
 struct Vertex4 {
   float x, y, z, radius;
 };
@@ -28,6 +29,7 @@ struct Cones {
   void join() { first.push_back(static_cast<unsigned>(points.size()) - 1); }  // to the next point
 };
 
+// Geometries of the ray caster. The caller owns what is returned and releases it.
 [[nodiscard]] RTCGeometry cone_geometry(RTCDevice device, const Cones& cones);
 [[nodiscard]] RTCGeometry shape_geometry(RTCDevice device, const Shape& shape);
 [[nodiscard]] RTCGeometry disc_geometry(RTCDevice device,

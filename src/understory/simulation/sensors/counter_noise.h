@@ -118,6 +118,7 @@ enum class NoiseStream : std::uint64_t {
   kHeadLog,
 };
 
+// The number of a stream, for seeds.
 [[nodiscard]] inline std::uint64_t stream_of(NoiseStream stream) {
   return static_cast<std::uint64_t>(stream);
 }

@@ -39,6 +39,7 @@ struct LidarModel {
   [[nodiscard]] TimeNs firing_time(std::int64_t firing) const;  // since the first revolution
 };
 
+// The beams and firing times of a model. Throws ConfigError where the name is unknown.
 [[nodiscard]] LidarModel make_lidar_model(const LidarConfig& config);
 
 }  // namespace understory

@@ -30,6 +30,7 @@ struct ScanReadings {
   std::vector<StemReturns> stems;  // by increasing id
 };
 
+// A scan and which stems its returns came from.
 struct SimulatedScan {
   ScanPtr scan;
   std::vector<StemReturns> stems;  // by increasing id

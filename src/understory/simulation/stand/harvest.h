@@ -58,6 +58,7 @@ struct Brash {
   Plant plant;
 };
 
+// All that a thinning cuts and leaves behind.
 struct Harvest {
   std::vector<Felling> fellings;  // one after another
   std::vector<FallenLog> logs;    // by their time

@@ -11,7 +11,9 @@
 
 namespace understory {
 
+// Species that differ in crown, bark and branches.
 enum class Species { kPine, kSpruce, kBirch };
+// The name of a species in lists of trees and in the truth.
 [[nodiscard]] std::string species_name(Species species);
 
 // One standing tree, in the world frame. (sensor/tree.h has the Tree that is measured; two types of
@@ -59,7 +61,9 @@ struct Wood {
   double radius_to_m = 0.1;
 };
 
+// Kinds of undergrowth.
 enum class PlantKind { kSeedling, kShrub, kGroundPlants };
+// A plant of the undergrowth, world frame.
 struct Plant {
   PlantKind kind = PlantKind::kShrub;
   Eigen::Vector3d foot = Eigen::Vector3d::Zero();
@@ -74,6 +78,7 @@ struct Building {
   Eigen::Vector3d size_m = Eigen::Vector3d(9.0, 6.0, 3.0);  // length, width, height of the walls
 };
 
+// All that grows and lies in a site.
 struct Stand {
   std::vector<GrownTree> trees;
   std::vector<Wood> dead_wood;  // stumps and logs

@@ -69,10 +69,12 @@ class RecordFile {
 void for_each_record(const std::filesystem::path& path, const RecordCount& known,
                      const RecordFile::Visit& visit);
 
+// The bytes of a value that can be copied byte by byte.
 template <typename T>
 [[nodiscard]] RecordFile::Bytes bytes_of(const T& value) {
   return {reinterpret_cast<const std::uint8_t*>(&value), sizeof(T)};
 }
+// The bytes of a text, without its length.
 [[nodiscard]] inline RecordFile::Bytes bytes_of(const std::string& text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
