@@ -5,21 +5,12 @@
 #include <cmath>
 #include <limits>
 
+#include "understory/features/features_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kCell = 1.5;      // with one lowest return
-constexpr double kPatch = 3.0;     // with one plane
-constexpr int kReach = 4;          // cells to each side of a patch's middle
-constexpr double kSlopeSd = 0.15;  // of the ground
-constexpr double kRelief = 0.08;   // metres, of the lowest returns about a plane
-// Held against the truth of lieksa1 to lieksa3 (seed 5), feet are 10 to 13 cm off where the fit
-// leaves 5 cm open, and from there on six times as much more: lowest returns that are no ground
-// lift the plane beyond what they scatter.
-constexpr double kLeastSd = 0.1;
-constexpr double kFitSd = 0.05;
-constexpr double kGrowth = 6.0;
-constexpr double kMostSd = 1.0;
+using namespace features_constants::ground_guess;
 
 std::int64_t key(int column, int row) {
   return (static_cast<std::int64_t>(column) << 32) ^

@@ -4,17 +4,15 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/features/features_constants.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
+using namespace features_constants::ring_view;
+
 constexpr double kPi = std::numbers::pi;
-constexpr double kWidest = 1.0;       // of a section, metres
-constexpr double kRoughDepth = 0.5;   // what lies no farther behind is part of the same thicket
-constexpr double kDepthMargin = 0.3;  // returns that near to a place are at it
-constexpr float kGap = 1.6F;          // in steps: a return is missing
-constexpr float kBridged = 2.6F;      // in steps: one lost return does not cut a run
 
 double median_of(std::vector<double>& values, double share = 0.5) {
   const auto at =

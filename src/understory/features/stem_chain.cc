@@ -6,17 +6,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/features/features_constants.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
 
-constexpr double kGate = 12.0;       // of a squared Mahalanobis distance in the plane
-constexpr double kLongestGap = 3.0;  // metres along a stem without a section
-constexpr double kMeanDepth = std::numbers::pi / 4.0;  // of a round surface, in radii
-// Of the radius per metre of height: stems lose a centimetre of diameter in a metre. Of a stem seen
-// from one side the surface leans back by pi/4 of that, 0.22 degrees.
-constexpr double kUsualTaper = -0.005;
+using namespace features_constants::stem_chain;
 
 // A section's centre with its error, given a radius.
 struct Centre {
@@ -143,7 +139,6 @@ class Grower {
   // The unused section of a level that lies best on the line.
   [[nodiscard]] int best_in(int level, const Eigen::Vector2d& place, double height_m) const {
     // Far enough for the gate, given how well the line is known and how badly a section can be.
-    constexpr double kWorstSection = 0.06;
     const Eigen::Matrix2d known = chain_.line.covariance_at(height_m);
     const double reach =
         std::sqrt(kGate * (known.diagonal().maxCoeff() + kWorstSection * kWorstSection)) +

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "understory/features/features_constants.h"
 #include "understory/features/ground_guess.h"
 #include "understory/features/ring_view.h"
 #include "understory/features/stem_chain.h"
@@ -14,13 +15,7 @@
 namespace understory {
 namespace {
 
-constexpr double kLeanSd = 0.05;  // of stems against up
-// Diameters are told where returns are nearer to each other than this share of the usual radius:
-// where fewer than three fall on a stem, its edges are lost more often than not, and it looks thin.
-constexpr double kFineSpacing = 0.7;
-// Above this error a diameter says more about the spacing of the beams than about the stem.
-constexpr double kDiameterKnown = 0.025;
-constexpr double kUpMatters = 0.03;  // radians: levels differ enough to look again
+using namespace features_constants::stem_segments;
 
 // The smallest turn that makes `up` the z axis.
 Eigen::Matrix3d level_from(const Eigen::Vector3d& up) {
@@ -137,7 +132,6 @@ struct Chains {
 
 // Most chains are branches whatever the ground is like under them.
 double score_without_ground(const SectionView& view, const Chains& all, const StemChain& chain) {
-  constexpr double kUsualStart = 0.3;
   return stem_score(stem_traits(view, chain, all.config, kUsualStart));
 }
 

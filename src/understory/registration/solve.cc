@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/registration/registration_constants.h"
 #include "understory/util/parallel.h"
 
 namespace understory::internal {
 namespace {
+
+using namespace registration_constants::solve;
 
 // Units in which a step of 1 is one metre for rotations too.
 Vector6d scale_of(double range_m) {
@@ -36,10 +39,6 @@ void shorten(Vector6d& step, const StepLimits& limits) {
   const double length = std::max(step.tail<3>().norm(), limits.range_m * step.head<3>().norm());
   if (length > limits.max_step_m) step *= limits.max_step_m / length;
 }
-
-// A step is taken back and halved if it ends on a rise steeper than this share of the fall at its
-// start.
-constexpr double kMostOvershoot = 0.9;
 
 bool small(const Vector6d& step, const StepLimits& limits) {
   return step.tail<3>().norm() < limits.step_translation_m &&

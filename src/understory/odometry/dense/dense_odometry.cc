@@ -4,13 +4,12 @@
 #include <utility>
 
 #include "understory/odometry/imu/imu_smoother.h"
+#include "understory/odometry/odometry_constants.h"
 
 namespace understory {
 namespace {
 
-// Of the accelerations that the motion model allows for between scans: a path that may bend more
-// within one follows the noise of sparse scans.
-constexpr double kBendShare = 1.0 / 3.0;
+using namespace odometry_constants::dense_odometry;
 
 }  // namespace
 
@@ -152,7 +151,6 @@ void DenseOdometry::match(const MatchTarget& local_map, const NavState& predicte
     estimate.match.reason = "suddenly much less than before";
     return;
   }
-  constexpr double kFollow = 0.1;
   usual_inliers_ =
       usual_inliers_ > 0.0 ? (1.0 - kFollow) * usual_inliers_ + kFollow * found : found;
 }

@@ -3,14 +3,12 @@
 #include <cmath>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/odometry/odometry_constants.h"
 
 namespace understory {
 namespace {
 
-constexpr double kOutageS = 1.0;
-constexpr double kFoundAgainShare = 0.5;    // of the usual inliers, needed after an outage
-constexpr double kWorthlessSigmaM = 10.0;   // no better than staying where one was
-constexpr double kHighestSpeedM_S = 100.0;  // no carrier is faster
+using namespace odometry_constants::recovery;
 
 }  // namespace
 

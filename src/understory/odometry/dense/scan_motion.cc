@@ -4,13 +4,13 @@
 
 #include "understory/geometry/pose_io.h"
 #include "understory/odometry/dense/scan_path.h"
+#include "understory/odometry/odometry_constants.h"
 
 namespace understory {
 namespace {
 
-constexpr double kRangeM = 10.0;        // at which a turn counts as a shift
-constexpr double kLeastMotionM = 0.08;  // within a scan: less tells nothing of its times
-constexpr double kLongestStepS = 0.5;   // between two scans: more is no even motion
+using namespace odometry_constants::scan_motion;
+
 // So loose that the guess hardly binds: what is looked for is a guess that is wrong.
 constexpr ScanPathConfig kLoose{30.0, 60.0, 8, 6.0};
 

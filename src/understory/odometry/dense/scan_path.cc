@@ -6,14 +6,13 @@
 #include <cmath>
 #include <memory>
 
+#include "understory/odometry/odometry_constants.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
-// A scan in slices of time: within one, all points share a correction.
-constexpr std::size_t kSlices = 8;
-constexpr std::size_t kFewestPoints = 20;  // of a slice that counts
+using namespace odometry_constants::scan_path;
 
 using Vector12d = Eigen::Matrix<double, 12, 1>;
 using Matrix12d = Eigen::Matrix<double, 12, 12>;

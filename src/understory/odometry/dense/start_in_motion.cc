@@ -5,16 +5,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/odometry/odometry_constants.h"
 #include "understory/util/time.h"
 
 namespace understory {
 namespace {
 
-constexpr double kLongestBetweenS = 0.5;
-constexpr double kLeastSmearM = 0.005;
-constexpr double kSmearRangeM = 10.0;  // at which a turn is counted
-// A first scan that is shorter than that share of the second, or sees less around it, is a part.
-constexpr double kPartShare = 0.75;
+using namespace odometry_constants::start_in_motion;
 
 // Of the sectors of 10 degrees around the lidar, those with a point.
 int sectors_of(const Scan& scan) {

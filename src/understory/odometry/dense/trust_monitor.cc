@@ -7,34 +7,14 @@
 #include <numbers>
 #include <string>
 
+#include "understory/odometry/odometry_constants.h"
+
 namespace understory {
 namespace {
 
+using namespace odometry_constants::trust_monitor;
+
 constexpr double kDegree = std::numbers::pi / 180.0;
-// A verdict on the axes needs this much turning in all, over turns that stand out from the noise of
-// matching.
-constexpr double kSmallestTurn = 0.3 * kDegree;
-constexpr double kEnoughTurning = 30.0 * kDegree;
-constexpr int kEnoughTurns = 10;
-constexpr double kEnoughUnexplained = 120.0 * kDegree;  // before a verdict without a cause
-constexpr double kLongestProbationS = 20.0;
-constexpr double kProbationTurnS = 0.5;
-constexpr double kLargestBias = 0.06;  // rad/s
-// Share of the turning that is unexplained: below kGood all is well; above kBad something is wrong.
-constexpr double kBad = 0.4;
-constexpr double kGood = 0.25;
-constexpr double kLooksLikeDegrees = 20.0;  // times the lidar's turning, which has noise of its own
-constexpr double kGoodOnProbation = 0.3;    // a lidar alone is less sure of its turns
-constexpr double kSurelyTurned = 20.0 * kDegree;
-constexpr double kMuchBetter = 0.25;  // of the squares
-constexpr double kAsGood = 1.5;       // of the squares
-// Gravity over whole seconds: walking and driving swing it by a few degrees.
-constexpr int kEnoughSeconds = 10;
-constexpr int kEnoughForLength = 3;
-constexpr int kEnoughForProbation = 4;
-constexpr double kForceSpread = 15.0 * kDegree;
-constexpr double kSuspectSpread = 5.0 * kDegree;  // of an accelerometer that was suspected before
-constexpr double kLengthTolerance = 0.15;
 
 // What is left of the turns' squares if the gyroscope's axes are turned by `lidar_from_gyro`. A
 // constant difference may be its bias, up to what a bias can be, and is taken out.

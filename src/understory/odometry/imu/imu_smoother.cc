@@ -8,17 +8,15 @@
 #include "understory/odometry/dense/match_gate.h"
 #include "understory/odometry/imu/imu_sums.h"
 #include "understory/odometry/imu/initial_state.h"
+#include "understory/odometry/odometry_constants.h"
 
 namespace understory {
 namespace {
 
+using namespace odometry_constants::imu_smoother;
+
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr TimeNs kHistory = 2 * kNsPerSecond;  // of the IMU, kept before the first scan
-// The world is levelled once its tilt is known this well, or after this long.
-constexpr double kLevelSigma = 0.1 * kDegree;
-constexpr double kLevelFirstS = 1.0;
-constexpr double kLevelLastS = 3.0;
-constexpr double kLevelSmallest = 0.02 * kDegree;
 
 }  // namespace
 

@@ -2,15 +2,13 @@
 
 #include <cmath>
 
+#include "understory/odometry/odometry_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kShortestStillS = 0.3;
-// Scatter beyond the noise that a tripod, a harness or an idling engine adds.
-constexpr double kVibrationRate = 0.02;   // rad/s
-constexpr double kVibrationForce = 0.25;  // m/s^2
-constexpr double kLargestGyroBias = 0.1;  // rad/s, mean rate at rest
-constexpr double kForceTolerance = 0.5;   // m/s^2, of the mean's length against gravity
+using namespace odometry_constants::initial_state;
+
 constexpr TimeNs kMotionHalfWindow = 300'000'000;
 
 struct Statistics {

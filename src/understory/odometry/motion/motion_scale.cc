@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/odometry/odometry_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kWindowS = 0.29;  // three scans at 10 Hz
+using namespace odometry_constants::motion_scale;
 
 }  // namespace
 

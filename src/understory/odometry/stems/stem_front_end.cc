@@ -5,12 +5,12 @@
 #include <numbers>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/odometry/odometry_constants.h"
 
 namespace understory {
 namespace {
 
-// A pause of the recording: what moved before it says nothing about now.
-constexpr double kLongestStep = 2.0;
+using namespace odometry_constants::stem_front_end;
 
 double reach_of(const StemView& view) {
   std::vector<double> ranges;

@@ -4,11 +4,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/odometry/odometry_constants.h"
+
 namespace understory {
 namespace {
 
+using namespace odometry_constants::stem_imu;
+
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kLargestBias = 0.1;  // rad/s
 
 }  // namespace
 
@@ -63,7 +66,6 @@ Eigen::Vector3d StemImu::force_after(const Motion& motion) const {
 }
 
 StemUp StemImu::up(const StemUp& by_stems, const Motion& motion) const {
-  constexpr double kStandLeans = 0.3 * kDegree;
   const double seconds = std::min(force_seconds_ + motion.seconds, config_.gravity_time_s);
   const double gravity_sd =
       config_.gravity_sd_deg * kDegree * std::sqrt(config_.gravity_time_s / seconds);

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/odometry/odometry_constants.h"
+
 namespace understory {
 namespace {
+
+using namespace odometry_constants::stem_levelling;
 
 constexpr int kIterations = 20;
 
@@ -24,7 +28,6 @@ StemUp stem_up(const StemView& view) {
     up += axis;
   up.normalize();
   // Student's t with 3 degrees of freedom; the spread is found along.
-  constexpr double kFreedom = 3.0;
   double variance = 0.01;
   for (int i = 0; i < kIterations; ++i) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();

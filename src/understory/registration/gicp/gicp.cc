@@ -7,12 +7,13 @@
 #include "understory/geometry/kd_tree.h"
 #include "understory/registration/describe_steps.h"
 #include "understory/registration/judged_match.h"
+#include "understory/registration/registration_constants.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
-constexpr std::size_t kMaxNeighbours = 100;
+using namespace registration_constants::gicp;
 
 class Accumulator {
  public:

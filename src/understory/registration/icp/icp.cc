@@ -5,6 +5,7 @@
 #include "understory/geometry/kd_tree.h"
 #include "understory/registration/describe_steps.h"
 #include "understory/registration/icp/icp_match.h"
+#include "understory/registration/registration_constants.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -28,7 +29,7 @@ void describe(ConfigTable& table, IcpConfig& config) {
 
 namespace {
 
-constexpr std::size_t kMaxNeighbours = 100;
+using namespace registration_constants::icp;
 
 }  // namespace
 

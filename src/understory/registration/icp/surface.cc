@@ -3,12 +3,12 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "understory/registration/registration_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr std::size_t kFewestPoints = 4;
-constexpr double kLineRatio = 0.05;  // middle through largest variance
-constexpr double kPoleCosine = 0.7;  // 45 degrees
+using namespace registration_constants::surface;
 
 }  // namespace
 

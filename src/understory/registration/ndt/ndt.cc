@@ -5,9 +5,12 @@
 
 #include "understory/registration/describe_steps.h"
 #include "understory/registration/judged_match.h"
+#include "understory/registration/registration_constants.h"
 #include "understory/util/error.h"
 
 namespace understory {
+
+using namespace registration_constants::ndt;
 
 void describe(ConfigTable& table, NdtConfig& config) {
   using Search = NdtConfig::Search;
@@ -27,10 +30,6 @@ void describe(ConfigTable& table, NdtConfig& config) {
             "the first steps end when one is shorter");
   internal::describe_steps(table, config);
 }
-
-// The wide steps only look for where the last ones begin: a part of a dense scan is enough.
-constexpr std::size_t kEnoughForWideSteps = 8000;
-constexpr std::size_t kWideEvery = 4;
 
 RegistrationResult register_ndt(const NdtMap& target, const Points& source, const Pose& guess,
                                 const PoseTerms& terms, const NdtConfig& config) {

@@ -4,19 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/registration/registration_constants.h"
+
 namespace understory::internal {
 namespace {
 
-// Ratios of variances, beyond what noise makes of them: a short piece of a ring is as wide as the
-// noise and would pass for a patch that is known in all directions.
-constexpr double kLineRatio = 0.05;   // middle / largest below it: a line
-constexpr double kPlaneRatio = 0.15;  // smallest / middle below it: a surface
-constexpr double kPoleCosine = 0.7;   // lines steeper than 45 degrees are stems, not rings
-constexpr double kOneSide = 0.9;      // length of the mean of unit rays
-constexpr double kGrazing = 0.1;      // sine of the angle between a surface and the rays
-// In units of the squared floor of sigma.
-constexpr double kLineNoise = 1.0;
-constexpr double kPlaneNoise = 0.25;
+using namespace registration_constants::ndt_cell;
 
 struct Shape {
   Eigen::Vector3d variance;  // ascending

@@ -6,15 +6,14 @@
 #include <span>
 #include <utility>
 
+#include "understory/registration/registration_constants.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
-// Cells that are twice as large or more have their shape from a part of a dense cloud's points.
-constexpr std::size_t kEnoughForCoarse = 20000;
-constexpr std::size_t kCoarseEvery = 4;
+using namespace registration_constants::ndt_matcher;
 
 class NdtCost : public MatchCost {
  public:
@@ -169,8 +168,6 @@ std::unique_ptr<const Matcher> make_matcher(const NdtMatcherConfig& config) {
 // between helps.
 std::vector<SuitedSetting> suited_settings(const NdtMatcherConfig& config,
                                            const ScanTraits& traits) {
-  constexpr int kSparseMinPoints = 4;
-  constexpr double kSparseVolumeWeight = 1.0;
   std::vector<SuitedSetting> suited;
   if (traits.sparse) {
     if (config.cells.min_points > kSparseMinPoints)

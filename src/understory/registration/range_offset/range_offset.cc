@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/registration/registration_constants.h"
+
 namespace understory {
 
 void describe(ConfigTable& table, RangeOffsetConfig& config) {
@@ -25,15 +27,10 @@ void describe(ConfigTable& table, RangeOffsetConfig& config) {
 
 namespace {
 
+using namespace registration_constants::range_offset;
+
 using Vector7d = Eigen::Matrix<double, 7, 1>;
 using Matrix7d = Eigen::Matrix<double, 7, 7>;
-
-// Noise of a patch's mean along its normal, metres: sets what the guess weighs against surfaces.
-constexpr double kPatchNoise = 0.03;
-// Nothing is known of the offset: this keeps the equations regular where no surface tells it.
-constexpr double kOffsetSd = 10.0;
-constexpr double kWidest = 10.0;      // of the kernel, times its last scale
-constexpr double kLongestStep = 0.5;  // of the offset, metres
 
 struct Sums {
   Matrix7d information = Matrix7d::Zero();

@@ -8,11 +8,14 @@
 
 #include "understory/geometry/delaunay.h"
 #include "understory/registration/icp/nearest_pairs.h"
+#include "understory/registration/registration_constants.h"
 #include "understory/util/error.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
+
+using namespace registration_constants::sparse_icp;
 
 constexpr double kNoLimit = 1e9;
 
@@ -41,7 +44,6 @@ struct Heights {
 };
 
 double height_weight(const SparseIcpConfig& config, const Heights& heights) {
-  constexpr double kUnsure = 0.05;  // a foot that is a metre too high still finds its stem
   if (config.metric == SparseIcpConfig::Metric::kPlane) return 0.0;
   return heights.known ? kUnsure : 1.0;
 }
@@ -105,9 +107,6 @@ Pose fit(const SparsePoints& target, const SparsePoints& source, const std::vect
   }
   return Pose(turn, shift) * now;
 }
-
-// Student's t with this many degrees of freedom: heavy tails for stems that are not the same.
-constexpr double kFreedom = 3.0;
 
 // The refinement's state: pairs, their weights and the noise that they show.
 struct Refinement {

@@ -1,0 +1,155 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+
+// The fitted and chosen numbers of the layer `odometry` that are no settings, which stand in the
+// Config structs. One namespace for each file that uses them. A comment gives the unit (none: a
+// plain number), the meaning, and in brackets where the number comes from:
+//   chosen   by judgement, fitted to nothing
+//   bound    by physics, geometry, statistics, memory or time
+//   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+// or real clouds and measurements by their page.
+namespace understory::odometry_constants {
+
+// rad a degree [mathematics]
+inline constexpr double kRadPerDegree = std::numbers::pi / 180.0;
+
+namespace trust_monitor {  // odometry/dense/trust_monitor.cc
+// rad of one turn that stands out from the noise of matching [chosen]
+inline constexpr double kSmallestTurn = 0.3 * kRadPerDegree;
+// rad in all before a verdict on the axes [chosen]
+inline constexpr double kEnoughTurning = 30.0 * kRadPerDegree;
+// Turns before a verdict on the axes [chosen]
+inline constexpr int kEnoughTurns = 10;
+// rad in all before a verdict without a cause [chosen]
+inline constexpr double kEnoughUnexplained = 120.0 * kRadPerDegree;
+// s that an IMU stays on probation [chosen]
+inline constexpr double kLongestProbationS = 20.0;
+// s of a turn while on probation [chosen]
+inline constexpr double kProbationTurnS = 0.5;
+// rad/s of a gyroscope's bias that is taken out [bound: data sheets of MEMS gyroscopes]
+inline constexpr double kLargestBias = 0.06;
+// Share of the turning that is unexplained: above it something is wrong [chosen]
+inline constexpr double kBad = 0.4;
+// Share of the turning that is unexplained: below it all is well [chosen]
+inline constexpr double kGood = 0.25;
+// Times the lidar's turning, which has noise of its own; 57.3 is exact [chosen]
+inline constexpr double kLooksLikeDegrees = 20.0;
+// The same as kGood on probation: a lidar alone is less sure of its turns [chosen]
+inline constexpr double kGoodOnProbation = 0.3;
+// rad between axes beyond any noise [chosen]
+inline constexpr double kSurelyTurned = 20.0 * kRadPerDegree;
+// Of the squares that other axes leave: they are the right ones [chosen]
+inline constexpr double kMuchBetter = 0.25;
+// Times the squares of the best axes: as good as these [chosen]
+inline constexpr double kAsGood = 1.5;
+// s of gravity before a verdict: walking and driving swing it by a few degrees [chosen]
+inline constexpr int kEnoughSeconds = 10;
+// s before a verdict on the length of gravity [chosen]
+inline constexpr int kEnoughForLength = 3;
+// s before a verdict while on probation [chosen]
+inline constexpr int kEnoughForProbation = 4;
+// rad between the gravity of seconds: more is no gravity [chosen]
+inline constexpr double kForceSpread = 15.0 * kRadPerDegree;
+// rad: the same of an accelerometer that was suspected before [chosen]
+inline constexpr double kSuspectSpread = 5.0 * kRadPerDegree;
+// Share by which gravity's length may be off [bound: scale errors of accelerometers are below 2
+// %]
+inline constexpr double kLengthTolerance = 0.15;
+}  // namespace trust_monitor
+
+namespace recovery {  // odometry/dense/recovery.cc
+// s without a scan that are an outage [chosen]
+inline constexpr double kOutageS = 1.0;
+// Of the usual inliers, needed after an outage [chosen]
+inline constexpr double kFoundAgainShare = 0.5;
+// m: a prediction less certain is no better than staying where one was [chosen]
+inline constexpr double kWorthlessSigmaM = 10.0;
+// m/s: no carrier is faster [bound: carriers]
+inline constexpr double kHighestSpeedM_S = 100.0;
+}  // namespace recovery
+
+namespace scan_path {  // odometry/dense/scan_path.cc
+// Slices of a scan's time; within one, all points share a correction [chosen]
+inline constexpr std::size_t kSlices = 8;
+// points of a slice that counts [chosen]
+inline constexpr std::size_t kFewestPoints = 20;
+}  // namespace scan_path
+
+namespace scan_motion {  // odometry/dense/scan_motion.cc
+// m at which a turn counts as a shift [chosen]
+inline constexpr double kRangeM = 10.0;
+// m within a scan: less tells nothing of its times [chosen]
+inline constexpr double kLeastMotionM = 0.08;
+// s between two scans: more is no even motion [chosen]
+inline constexpr double kLongestStepS = 0.5;
+}  // namespace scan_motion
+
+namespace dense_odometry {  // odometry/dense/dense_odometry.cc
+// Of the accelerations that the motion model allows for between scans: a path that may bend more
+// within one follows the noise of sparse scans [chosen]
+inline constexpr double kBendShare = 1.0 / 3.0;
+// Share of a new scan in the running mean of inliers [chosen]
+inline constexpr double kFollow = 0.1;
+}  // namespace dense_odometry
+
+namespace start_in_motion {  // odometry/dense/start_in_motion.cc
+// s between the two first scans at most [chosen]
+inline constexpr double kLongestBetweenS = 0.5;
+// m of motion within a scan: less needs no start [chosen]
+inline constexpr double kLeastSmearM = 0.005;
+// m at which a turn is counted [chosen]
+inline constexpr double kSmearRangeM = 10.0;
+// Of the second scan's duration or sectors: a first scan with less is a part [chosen]
+inline constexpr double kPartShare = 0.75;
+}  // namespace start_in_motion
+
+namespace imu_smoother {  // odometry/imu/imu_smoother.cc
+// rad: the world is levelled once its tilt is known this well [chosen]
+inline constexpr double kLevelSigma = 0.1 * kRadPerDegree;
+// s: not before [chosen]
+inline constexpr double kLevelFirstS = 1.0;
+// s: or after this long [chosen]
+inline constexpr double kLevelLastS = 3.0;
+// rad: smaller tilts stay [chosen]
+inline constexpr double kLevelSmallest = 0.02 * kRadPerDegree;
+}  // namespace imu_smoother
+
+namespace initial_state {  // odometry/imu/initial_state.cc
+// s at rest that give a first state [chosen]
+inline constexpr double kShortestStillS = 0.3;
+// rad/s that a tripod, a harness or an idling engine adds to the noise [chosen]
+inline constexpr double kVibrationRate = 0.02;
+// m/s^2 that they add [chosen]
+inline constexpr double kVibrationForce = 0.25;
+// rad/s: mean rate at rest at most [bound: data sheets of MEMS gyroscopes]
+inline constexpr double kLargestGyroBias = 0.1;
+// m/s^2 of the mean's length against gravity [bound: biases of MEMS accelerometers]
+inline constexpr double kForceTolerance = 0.5;
+}  // namespace initial_state
+
+namespace motion_scale {  // odometry/motion/motion_scale.cc
+// s over which accelerations are compared: three scans at 10 Hz [chosen]
+inline constexpr double kWindowS = 0.29;
+}  // namespace motion_scale
+
+namespace stem_front_end {  // odometry/stems/stem_front_end.cc
+// s: a longer pause, and what moved before says nothing about now [chosen]
+inline constexpr double kLongestStep = 2.0;
+}  // namespace stem_front_end
+
+namespace stem_imu {  // odometry/stems/stem_imu.cc
+// rad/s of the gyroscope [bound: data sheets of MEMS gyroscopes]
+inline constexpr double kLargestBias = 0.1;
+// rad by which a stand leans as a whole, one standard deviation [chosen]
+inline constexpr double kStandLeans = 0.3 * kRadPerDegree;
+}  // namespace stem_imu
+
+namespace stem_levelling {  // odometry/stems/stem_levelling.cc
+// degrees of freedom of Student's t, for stems that lean [chosen: heavy tails]
+inline constexpr double kFreedom = 3.0;
+}  // namespace stem_levelling
+
+}  // namespace understory::odometry_constants

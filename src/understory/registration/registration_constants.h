@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// The fitted and chosen numbers of the layer `registration` that are no settings, which stand in
+// the Config structs. One namespace for each file that uses them. A comment gives the unit (none:
+// a plain number), the meaning, and in brackets where the number comes from:
+//   chosen   by judgement, fitted to nothing
+//   bound    by physics, geometry, statistics, memory or time
+//   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+// or real clouds and measurements by their page.
+namespace understory::registration_constants {
+
+namespace ndt_cell {  // registration/ndt/ndt_cell.cc
+// Middle over largest variance: below, a line. Beyond what noise makes of ratios: a short piece
+// of a ring is as wide as the noise [chosen]
+inline constexpr double kLineRatio = 0.05;
+// Smallest over middle variance: below, a surface [chosen]
+inline constexpr double kPlaneRatio = 0.15;
+// Of a line against z: steeper ones are stems, not rings; 45 degrees [chosen]
+inline constexpr double kPoleCosine = 0.7;
+// Length of the mean of unit rays: longer, a cell was seen from one side only [chosen; measured
+// on harvester seeds 3 and 11, docs/method/registration.md]
+inline constexpr double kOneSide = 0.9;
+// Sine of the angle between a surface and the rays: smaller, the rays lie in it [chosen; measured
+// on harvester seeds 3 and 11, docs/method/registration.md]
+inline constexpr double kGrazing = 0.1;
+// Squared floors of sigma added to the limit of a line [chosen]
+inline constexpr double kLineNoise = 1.0;
+// Squared floors of sigma added to the limit of a surface [chosen]
+inline constexpr double kPlaneNoise = 0.25;
+}  // namespace ndt_cell
+
+namespace ndt {  // registration/ndt/ndt.cc
+// points that the wide steps take: they only look for where the last ones begin [chosen; measured
+// on handheld and harvester seed 4, docs/method/registration.md]
+inline constexpr std::size_t kEnoughForWideSteps = 8000;
+// Every so many points of a scan that has more [as kEnoughForWideSteps]
+inline constexpr std::size_t kWideEvery = 4;
+}  // namespace ndt
+
+namespace ndt_matcher {  // registration/ndt/ndt_matcher.cc
+// points that shape cells twice as large or larger [as kEnoughForWideSteps]
+inline constexpr std::size_t kEnoughForCoarse = 20000;
+// Every so many points of a cloud that has more [as kEnoughForWideSteps]
+inline constexpr std::size_t kCoarseEvery = 4;
+// Registration.ndt.min_points of a sparse lidar [chosen]
+inline constexpr int kSparseMinPoints = 4;
+// Registration.ndt.volume_weight of a sparse lidar: sparse scans leave few surfaces, so all cells
+// count [chosen]
+inline constexpr double kSparseVolumeWeight = 1.0;
+}  // namespace ndt_matcher
+
+namespace icp {  // registration/icp/icp.cc
+// Neighbours of a normal at most [bound: time]
+inline constexpr std::size_t kMaxNeighbours = 100;
+}  // namespace icp
+
+namespace surface {  // registration/icp/surface.cc
+// points of a surface at least [bound: a plane has three parameters]
+inline constexpr std::size_t kFewestPoints = 4;
+// Middle over largest variance: below, a line [chosen, as in NDT]
+inline constexpr double kLineRatio = 0.05;
+// Of a line against z: steeper ones are stems, not rings; 45 degrees [chosen, as in NDT]
+inline constexpr double kPoleCosine = 0.7;
+}  // namespace surface
+
+namespace gicp {  // registration/gicp/gicp.cc
+// Neighbours of a surface at most [bound: time]
+inline constexpr std::size_t kMaxNeighbours = 100;
+}  // namespace gicp
+
+namespace solve {  // registration/solve.cc
+// A step is taken back and halved if it ends on a rise steeper than this share of the fall at its
+// start [chosen]
+inline constexpr double kMostOvershoot = 0.9;
+}  // namespace solve
+
+namespace range_offset {  // registration/range_offset/range_offset.cc
+// m: noise of a patch's mean along its normal; sets what the guess weighs against surfaces
+// [chosen]
+inline constexpr double kPatchNoise = 0.03;
+// m: nothing is known of the offset; keeps the equations regular where no surface tells it
+// [bound: none]
+inline constexpr double kOffsetSd = 10.0;
+// Last scales: width of the kernel at first [chosen]
+inline constexpr double kWidest = 10.0;
+// m of the offset in one step [chosen]
+inline constexpr double kLongestStep = 0.5;
+}  // namespace range_offset
+
+namespace sparse_icp {  // registration/stems/sparse_icp.cc
+// degrees of freedom of Student's t: heavy tails for stems that are not the same [chosen]
+inline constexpr double kFreedom = 3.0;
+// Weight of heights against the plane where their errors are known: a foot that is a metre too
+// high still finds its stem [chosen]
+inline constexpr double kUnsure = 0.05;
+}  // namespace sparse_icp
+
+}  // namespace understory::registration_constants
