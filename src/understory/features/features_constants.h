@@ -11,8 +11,8 @@
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
 // or real clouds and measurements by their page.
-// The weights of the stems' score stand in stem_score.cc, where benchmarks/stem_score.py, which fits
-// them, writes them.
+// The weights of the score of stems stand in stem_score.cc: benchmarks/stem_score.py fits them and
+// writes them there.
 namespace understory::features_constants {
 
 namespace ground_guess {  // features/ground_guess.cc
