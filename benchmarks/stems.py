@@ -233,7 +233,7 @@ def search_page(write):
         TILT_PICTURE.write_text(convergence_picture(tilt, "tilt", TILT_REACH))
     text = (f"{version()}, {yaw['stands']} stands, delta0 {yaw['delta0_m']:.2f} m, theta0 "
             f"{yaw['turn_deg']:.1f}°: of the starts within (26) {100 * in_yaw[0]:.1f} % "
-            f"come home (at the worst place of the grid {100 * in_yaw[1]:.0f} %), of those beyond 1.2 "
+            f"converge (at the worst place of the grid {100 * in_yaw[1]:.0f} %), of those beyond 1.2 "
             f"times its size {100 * in_yaw[2]:.0f} %. With tilt instead of yaw, phi0 8.2°: "
             f"{100 * in_tilt[0]:.1f} % ({100 * in_tilt[1]:.0f} %); without a shift "
             f"{100 * min(tilt['share'][0]):.0f} % from every tilt up to "

@@ -133,6 +133,14 @@ for page in [first, *guides, *sorted((TOP / "docs" / "reference").glob("*.md"))]
     for found in re.finditer(r"\bP[0-4]\b.{0,20}", text_of(page)):
         wrong.append(f"{page.relative_to(TOP)}: a paper without its title: {found[0]}")
 
+# So do help texts and the meanings of settings.
+said = {f"{name} --help": text for name, text in helps.items()}
+for words in (["map"], ["map", "--front-end", "sparse"], ["correct"], ["inventory"], ["register"]):
+    said[" ".join(words) + " --print-config"] = printed(*words, "--print-config")
+for where, text in said.items():
+    for found in re.finditer(r"\bP[0-4]\b.{0,20}|.{0,20}[ (]\(\d+\)", text):
+        wrong.append(f"{where}: a paper without its title, or an equation: {found[0]}")
+
 # The settings that a page lists in tables, first column, exist.
 settings = TOP / "docs" / "reference" / "configuration.md"
 listed = re.findall(r"^\| ([a-z_]+(?:\.[a-z_]+)+) \|", settings.read_text(), re.M)

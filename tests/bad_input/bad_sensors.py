@@ -68,7 +68,7 @@ def covered(folder):
     assert not any("sparse" in change["why"] for change in outcome.run["adapted"]), outcome.run["adapted"]
     assert outcome.run["evidence"]["scans_repeated"] == 0, outcome.run["evidence"]
     message = outcome.warnings["lidar.unknown"]["message"]
-    assert "nothing was adapted" in message, message
+    assert "no setting was adapted" in message, message
     (folder / "seen").mkdir()
     _, outcome = mapped(folder / "seen", short)
     assert "lidar.unknown" not in outcome.warnings, outcome.warnings
@@ -146,7 +146,7 @@ def no_gravity(folder):
 @cases.case("gyroscope in degrees")
 def degrees(folder):
     _, outcome = mapped(folder, with_imu(lambda r, f: ([math.degrees(v) for v in r], f)))
-    return expect(outcome, 4, 0.1, "its rates look like degrees per second",
+    return expect(outcome, 4, 0.1, "Its rates look like degrees per second",
                   "mapped without the IMU")
 
 
@@ -177,8 +177,8 @@ def wrong_extrinsics(folder):
 @cases.case("extrinsics that are not known")
 def no_extrinsics(folder):
     path, outcome = mapped(folder, [m for m in short if m.topic != "/tf_static"])
-    expect_partial(outcome, "the IMU was not used for 1", "nothing tells where it sits")
-    return expect(outcome, 4, 0.1, f"{path}: nothing tells where the IMU", "it is not used")
+    expect_partial(outcome, "the IMU was not used for 1", "its place on the carrier is not known")
+    return expect(outcome, 4, 0.1, f"{path}: the place of the IMU", "it is not used")
 
 
 @cases.case("times of points that run backwards")

@@ -15,8 +15,8 @@ from pathlib import Path
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 VOID = {"meta", "br", "hr", "img", "input", "link"}
-RUN_SECTIONS = ["The map from above", "What to distrust", "Trees", "How well the scans matched",
-                "Places seen again", "Time"]
+RUN_SECTIONS = ["The map from above", "What to distrust", "Trees", "The files of this folder",
+                "Errors against the known truth", "Places seen again", "How well the scans matched", "Time"]
 
 
 class Page(HTMLParser):
@@ -165,8 +165,8 @@ def run(code, *words):
 def check_run(folder):
     run(0, "map", "sim:demo?duration_s=8&seed=4", "-o", folder)
     page, facts = read_page(folder)
-    expected = ["Complete", *RUN_SECTIONS[:-1], "Errors against the known truth", "Time"]
-    assert page.headings[1:] == expected, page.headings
+    assert page.headings[1:] == ["Complete", *RUN_SECTIONS], page.headings
+    check_files(page, folder)
     assert page.tiles["scans"] == f"{facts['scans']:,}"
     assert page.tiles["length of the path"] == f"{facts['quality']['length_m']:.0f} m"
     assert page.tiles["of recording"] == f"{facts['recording_s']:.1f} s"
@@ -182,9 +182,16 @@ def check_inventory(run_folder, folder):
     run(0, "inventory", run_folder, "-o", folder)
     page, facts = read_page(folder)
     assert page.headings[:2] == ["map.laz", "Complete"], page.headings
-    assert page.headings[2:] == RUN_SECTIONS[:3] + ["Time"] * ("Time" in page.headings)
+    assert page.headings[2:] == RUN_SECTIONS[:4] + ["Time"] * ("Time" in page.headings)
+    check_files(page, folder)
     check_stand(page, folder)
     check_made(page, facts)
+
+
+def check_files(page, folder):
+    """The list of files is what lies in the folder."""
+    table = next(t for t in page.tables if t[0][0] == "file" and t[0][1] == "what it holds")
+    assert sorted(row[0] for row in table[1:]) == sorted(p.name for p in folder.iterdir()), table
 
 
 def check_untrusted(recording, folder):

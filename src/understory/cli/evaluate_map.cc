@@ -95,10 +95,10 @@ std::string to_text(const Placed& placed, const MapSharpness& map, const MapShar
                     const std::vector<RoadConsistency>& roads) {
   std::string text = fmt::format(
       "views               {} placed, {} without a pose\n"
-      "blur ratio beta     {:.4f} from above, {:.6f} in space\n"
-      "box dimension d     {:.2f} from above, {:.2f} in space\n"
-      "noise e_C           {}, of {} trees\n"
-      "of all stems, also far and doubtful ones: beta {:.4f}, d {:.2f}, e_C {}\n",
+      "blurred area        {:.4f} of the map from above, {:.6f} in space (beta)\n"
+      "box dimension       {:.2f} from above, {:.2f} in space (d)\n"
+      "spread of sights    {}, of {} trees (e_C)\n"
+      "with far and doubtful stems: beta {:.4f}, d {:.2f}, e_C {}\n",
       placed.views.size(), placed.without, map.beta, map.beta_3d, map.dimension, map.dimension_3d,
       noise_text(map), map.trees, all.beta, all.dimension, noise_text(all));
   for (const RoadConsistency& road : roads) {
@@ -149,7 +149,11 @@ void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
   command->add_option("--tolerance-s", options->tolerance_s, "Largest difference of times")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--json", options->json, "Print one JSON object");
-  command->footer("Example:\n  understory evaluate map stems.csv.gz forest");
+  command->footer(
+      "All three figures are small for a sharp map: the share of its area that is blurred, its\n"
+      "box dimension (0 points, 1 lines, 2 areas), and how far the sights of a tree lie from "
+      "their\n"
+      "mean.\n\nExample:\n  understory evaluate map stems.csv.gz forest");
   command->callback([&chosen, options] {
     chosen = [options](CommandContext& context) { return evaluate_map(*options, context); };
   });

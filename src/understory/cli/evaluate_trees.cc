@@ -109,8 +109,8 @@ std::string to_text(const Comparison& result, const TreeOptions& options) {
   const auto tell = [&](double figure, const std::string& line) {
     if (std::isfinite(figure)) text += line;
   };
-  tell(e.recall, fmt::format("recall              {:.4f}\n", e.recall));
-  tell(e.precision, fmt::format("precision           {:.4f}\n", e.precision));
+  tell(e.recall, fmt::format("recall              {:.4f} (matched share of B)\n", e.recall));
+  tell(e.precision, fmt::format("precision           {:.4f} (matched share of A)\n", e.precision));
   tell(e.position_rmse_m,
        fmt::format("position            rmse {:.4f} m (horizontal)\n", e.position_rmse_m));
   tell(e.dbh_rmse_m, fmt::format("diameter            rmse {:.4f} m, bias {:+.4f} m (A minus B)\n",
@@ -223,7 +223,9 @@ void add_evaluate_trees_command(CLI::App& evaluate, Command& chosen) {
       ->check(CLI::IsMember({"none", "yaw", "se3"}));
   command->add_option("--truth-returns", options->returns,
                       "returns.csv.gz of the truth: expect only trees that gave returns");
-  command->add_option("--min-returns", options->min_returns, "Returns that make a tree visible")
+  command
+      ->add_option("--min-returns", options->min_returns,
+                   "Fewest returns of a tree that counts as visible")
       ->capture_default_str();
   command->add_option("--path", options->path,
                       "The scanner's trajectory in B's frame: also the agreement of both maps near "

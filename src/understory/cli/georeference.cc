@@ -103,12 +103,12 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
       ->expected(3);
   command
       ->add_option("--place-sd-m", options->terrain.place_sd_m,
-                   "How far off the place may be: the relief then moves it too (0 keeps it)")
+                   "Standard deviation of the place: the relief moves it, too (0 keeps it)")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
   command
       ->add_option("--yaw-sd-deg", options->terrain.yaw_sd_deg,
-                   "How far off the heading may be (0 keeps it)")
+                   "Standard deviation of the heading: the relief turns it, too (0 keeps it)")
       ->check(CLI::Range(0.0, 45.0))
       ->capture_default_str();
   command->add_option("--crs", options->coordinate_system,

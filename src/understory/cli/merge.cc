@@ -232,14 +232,16 @@ void add_merge_command(CLI::App& app, Command& chosen) {
       "and shifted");
   command
       ->add_option("--reference", options->reference,
-                   "Tree list to be near to: tells the best weight")
+                   "Tree list of the truth: prints the weight that comes nearest to it")
       ->check(CLI::ExistingPath);
-  command->add_option("--reach-m", options->merge.reach_m, "The same tree lies that near in both")
+  command
+      ->add_option("--reach-m", options->merge.reach_m,
+                   "Largest distance of one tree in the two maps")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
   command
       ->add_option("--duplicate-m", options->merge.duplicate_m,
-                   "Trees that near once moved are one")
+                   "Trees nearer than this after the move are one")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
   command

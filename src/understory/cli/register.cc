@@ -35,7 +35,7 @@ void describe(ConfigTable& table, RegisterConfig& config) {
   table.add("target_voxel_m", config.target_voxel_m, {0.01, 5.0}, "m",
             "voxels that thin the target");
   table.add("source_voxel_m", config.source_voxel_m, {0.01, 5.0}, "m",
-            "voxels that thin the source; of methods that look for nearest points, both");
+            "voxels that thin the source; of icp and gicp both clouds");
   describe_settings(table, config.matcher);
   table.section("stem_icp", [&] { describe(table, config.stem_icp); });
   table.section("go_icp", [&] { describe(table, config.go_icp); });

@@ -166,7 +166,8 @@ void describe(ConfigTable& table, InventoryConfig& config) {
   table.section("ground", [&] { describe(table, config.ground); });
   table.section("stems", [&] { describe(table, config.stems); });
   table.add("canopy_cell_m", config.canopy_cell_m, {0.1, 10.0}, "m", "cell of the canopy model");
-  table.add("segments", config.segments, {0, 50}, "", "trees shown one by one in the report");
+  table.add("segments", config.segments, {0, 50}, "",
+            "number of trees that the report shows one by one");
 }
 
 InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& config,

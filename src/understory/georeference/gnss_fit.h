@@ -19,7 +19,7 @@ struct FittedFix {
       Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   // Fix minus antenna at its time; NaN where the path does not tell.
   Eigen::Vector3d residual = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  bool used = false;  // false: too far from the path to have a say
+  bool used = false;  // false: too far from the path, without a weight
 };
 
 // A path laid on a GNSS path, P1 (6), in the frame east, north, up at the first fix.

@@ -18,11 +18,14 @@ bool believable(const RegistrationResult& match, const Pose& before,
 
 void describe(ConfigTable& table, FirstKeyframesConfig& config) {
   table.add("enabled", config.enabled, "position the first keyframes again in the finished map");
-  table.add("keyframes", config.keyframes, {1, 1000}, "", "how many are positioned again");
+  table.add("keyframes", config.keyframes, {1, 1000}, "",
+            "number of keyframes that are positioned again");
   table.add("map_keyframes", config.map_keyframes, {1, 1000}, "",
-            "keyframes after those that the map begins with");
-  table.add("max_m", config.max_m, {0.0, 10.0}, "m", "larger corrections are not believed");
-  table.add("max_deg", config.max_deg, {0.0, 180.0}, "deg", "larger corrections are not believed");
+            "number of keyframes after them that make the first map");
+  table.add("max_m", config.max_m, {0.0, 10.0}, "m",
+            "largest shift of a keyframe; a larger one is refused");
+  table.add("max_deg", config.max_deg, {0.0, 180.0}, "deg",
+            "largest turn of a keyframe; a larger one is refused");
 }
 
 std::vector<Pose> refine_first_keyframes(

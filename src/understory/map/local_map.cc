@@ -12,11 +12,14 @@ void describe(ConfigTable& table, LocalMapConfig& config) {
   using Method = LocalMapConfig::Method;
   table.add_enum("method", config.method,
                  {{"accumulate", Method::kAccumulate}, {"recent", Method::kRecent}},
-                 "all keyframes within the radius, or the most recent ones (as the papers)");
-  table.add("radius_m", config.radius_m, {10.0, 1000.0}, "m", "accumulate: reach of the map");
-  table.add("recent_keyframes", config.recent_keyframes, {1, 10000}, "", "recent: how many");
+                 "accumulate: all keyframes within the radius; recent: the most recent ones, as in "
+                 "the papers");
+  table.add("radius_m", config.radius_m, {10.0, 1000.0}, "m",
+            "method accumulate: radius of the map");
+  table.add("recent_keyframes", config.recent_keyframes, {1, 10000}, "",
+            "method recent: number of keyframes");
   table.add("recent_spacing_m", config.recent_spacing_m, {0.0, 100.0}, "m",
-            "recent: one keyframe per cube of this edge");
+            "method recent: edge of the cubes that keep one keyframe each");
 }
 
 LocalMap::LocalMap(const LocalMapConfig& config)

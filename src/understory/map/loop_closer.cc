@@ -156,16 +156,17 @@ void describe(ConfigTable& table, LoopCloserConfig& config) {
   table.section("verification", [&] { describe(table, config.verification); });
   table.section("graph", [&] { describe(table, config.graph); });
   table.add("submap_keyframes", config.submap_keyframes, {0, 1000}, "",
-            "keyframes on each side of a candidate that are matched to");
+            "keyframes on each side of a candidate that make the target");
   table.add("source_keyframes", config.source_keyframes, {0, 100}, "",
-            "keyframes on each side of the query that are matched");
-  table.add("voxel_size_m", config.voxel_size_m, {0.05, 5.0}, "m", "thins what is matched");
+            "keyframes on each side of the newest one that make the source");
+  table.add("voxel_size_m", config.voxel_size_m, {0.05, 5.0}, "m",
+            "voxels that thin source and target");
   table.add("handover_keyframes", config.handover_keyframes, {1, 1000}, "",
-            "keyframes after which the result of a search is taken over");
+            "number of keyframes after which the result of a search is used");
   table.add("min_correction_m", config.min_correction_m, {0.0, 10.0}, "m",
-            "smaller corrections wait for the next");
+            "smaller shifts are not applied until the next loop");
   table.add("min_correction_deg", config.min_correction_deg, {0.0, 180.0}, "deg",
-            "smaller corrections wait for the next");
+            "smaller turns are not applied until the next loop");
 }
 
 LoopCloser::LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map)

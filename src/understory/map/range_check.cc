@@ -11,10 +11,12 @@ namespace understory {
 
 void describe(ConfigTable& table, RangeCheckConfig& config) {
   table.add("enabled", config.enabled, "look for a constant error of all ranges after the run");
-  table.add("max_pairs", config.max_pairs, {0, 100000}, "", "pairs of views that are looked at");
-  table.add("apart_m", config.apart_m, {0.1, 1000.0}, "m", "between the views of a pair");
+  table.add("max_pairs", config.max_pairs, {0, 100000}, "",
+            "most pairs of views that are compared");
+  table.add("apart_m", config.apart_m, {0.1, 1000.0}, "m",
+            "distance between the two views of a pair");
   table.add("view_half_m", config.view_half_m, {0.0, 100.0}, "m",
-            "keyframes up to there before and after make a view");
+            "keyframes within this distance along the path make a view");
   table.section("pair", [&] { describe(table, config.pair); });
 }
 

@@ -279,12 +279,11 @@ MappedStem finished(const Gathered& tree) {
 
 void describe(ConfigTable& table, StemMapConfig& config) {
   table.add("alpha_radius_m", config.alpha_radius_m, {0.0, 5.0}, "m",
-            "trees are the alpha shapes of all sights with that radius, 0.5 in the paper; "
-            "0: sights gathered about their mean");
-  table.add("min_sights", config.min_sights, {1, 100'000}, "",
-            "trees seen less often are not listed");
+            "radius of alpha shapes that make trees of sights, for instance 0.5; 0: sights are "
+            "gathered about their mean");
+  table.add("min_sights", config.min_sights, {1, 100'000}, "", "fewest sights of a listed tree");
   table.add("min_presence", config.min_presence, {0.0, 1.0}, "",
-            "nor those seen in a smaller share of the views in whose sector they lie");
+            "least share of the views in whose sector a listed tree lies that show it");
 }
 
 StemMapConfig tree_list_config() {

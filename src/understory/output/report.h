@@ -40,7 +40,7 @@ struct ReportLoop {
 // A fix of the receiver's antenna (world frame).
 struct ReportFix {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();
-  bool used = false;  // had a say in where the path lies
+  bool used = false;  // had a weight in the fit of the path
 };
 
 // Errors against a known truth (simulated or surveyed). Series may be empty.
@@ -110,6 +110,8 @@ struct ReportInput {
   std::vector<ReportScan> scans;
   std::vector<ReportFix> fixes;
   double sensor_period_ms = 0.0;  // 0: unknown
+  // Finest cells of the map, to whose means scans are matched, metres; 0: it holds single points.
+  double map_cell_m = 0.0;
   std::vector<ReportLoop> loops;
   std::size_t loops_not_listed = 0;  // views that look like an earlier place, and matching refuted
   bool loop_closure_enabled = true;
@@ -120,8 +122,11 @@ struct ReportInput {
 };
 
 // One self-contained page: no network, no scripts needed to read it (one small script sorts the
-// tree table). Throws OutputError.
+// tree table). It lists the results that lie in its folder by then, and run.json, which is written
+// last. Throws OutputError.
 void write_report(const std::filesystem::path& path, const ReportInput& input);
-[[nodiscard]] std::string report_html(const ReportInput& input);
+// `files`: names of the results beside it.
+[[nodiscard]] std::string report_html(const ReportInput& input,
+                                      const std::vector<std::string>& files = {});
 
 }  // namespace understory

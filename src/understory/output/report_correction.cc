@@ -10,12 +10,15 @@ namespace understory {
 std::string correction_section(const ReportInput& input) {
   if (!input.correction) return "";
   const ReportCorrection& correction = *input.correction;
+  const std::size_t matched = correction.tried.size() + correction.kept.size();
   std::string html = "<section><h2>How the map corrected itself</h2>";
   html += fmt::format(
-      "<p>{} pairs of views were matched again, {} of them are in the map ({:.1f} % of the views): "
-      "{}. A map is sharp if all sights of a tree fall on one place; nothing from outside is used "
-      "for that.</p>",
-      correction.tried.size() + correction.kept.size(), correction.kept.size(),
+      "<p>A view is the stems of one scan, and a sight is one stem of a view. A map is sharp where "
+      "all sights of a tree lie on one place. To make it sharper, the program matched {} {} of "
+      "views "
+      "again, of which {} {} in the map ({:.1f} % of the views). It ended there: {}.</p>",
+      matched, matched == 1 ? "pair" : "pairs", correction.kept.size(),
+      correction.kept.size() == 1 ? "is" : "are",
       100.0 * static_cast<double>(correction.kept.size()) /
           static_cast<double>(std::max<std::size_t>(1, input.scans.size())),
       escape_html(correction.ended));
@@ -34,8 +37,8 @@ std::string correction_section(const ReportInput& input) {
   if (correction.pairs.empty() && correction.kept.empty() && correction.tried.empty())
     return html + "</section>\n";
   Plot plot;
-  plot.x_label = "later view";
-  plot.y_label = "earlier view";
+  plot.x_label = "number of the later view";
+  plot.y_label = "number of the earlier view";
   plot.height = 420;
   plot.width = 1100;
   const auto dots = [&](const char* name, const char* colour, ReportCorrection::Pairs pairs) {

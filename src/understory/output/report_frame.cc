@@ -64,11 +64,11 @@ std::string consequence_of(const std::string& key) {
        {"imu.in_g", "Nothing is wrong with the result."},
        {"imu.untrusted", "The recording was mapped without the IMU, or should have been."},
        {"imu", "Tilt and fast turns are less certain."},
-       {"map.segment", "The pieces of the map lie beside each other by a guess only."},
+       {"map.segment", "How the pieces of the map lie to each other is a guess."},
        {"points.no_return", "Nothing is wrong with the result."},
        {"time.gap_lidar", "The path over such a gap is predicted, not measured."},
        {"time", "Stamps were mended; if they were wrong by more, the map is smeared."},
-       {"gnss", "Positions of the satellites were not used there."},
+       {"gnss", "Satellite positions were not used there."},
        {"loop", "Places seen twice may not lie exactly on each other."},
        {"match", "Positions there are less certain; see where the path is marked as weak."},
        {"inventory", "Trees may be missing from the list."},
@@ -79,12 +79,31 @@ std::string consequence_of(const std::string& key) {
   return "";
 }
 
-std::string tile(const std::string& value, const std::string& label) {
-  return "<div class=\"tile\"><b>" + value + "</b><span>" + escape_html(label) + "</span></div>";
-}
+// Figures at the top of the page, and below them what each means.
+class Tiles {
+ public:
+  void add(const std::string& value, const std::string& label, const std::string& meaning) {
+    tiles_ +=
+        "<div class=\"tile\"><b>" + value + "</b><span>" + escape_html(label) + "</span></div>";
+    meanings_ += "<dt>" + escape_html(label) + "</dt><dd>" + escape_html(meaning) + "</dd>";
+  }
 
-std::string stand_tiles(const InventoryResult& inventory) {
-  std::string html = tile(count_text(inventory.trees.size()), "trees with a measured stem");
+  [[nodiscard]] std::string html() const {
+    if (tiles_.empty()) return "";
+    return "<section><div class=\"tiles\">" + tiles_ +
+           "</div><details class=\"meanings\"><summary>What these figures mean</summary><dl>" +
+           meanings_ + "</dl></details></section>\n";
+  }
+
+ private:
+  std::string tiles_;
+  std::string meanings_;
+};
+
+void add_stand(Tiles& tiles, const InventoryResult& inventory) {
+  tiles.add(count_text(inventory.trees.size()), "trees with a measured stem",
+            "Trees whose stem shows its surface at several heights around 1.3 m. A tree without a "
+            "visible stem is not counted.");
   const double hectares = inventory.area_m2 / 1e4;
   double dbh = 0.0;
   double basal = 0.0;
@@ -94,14 +113,54 @@ std::string stand_tiles(const InventoryResult& inventory) {
   }
   const auto n = static_cast<double>(inventory.trees.size());
   if (hectares > 0.0) {
-    html += tile(fmt::format("{:.2f} ha", hectares), "area with points (not a plot's border)");
-    if (n > 0) html += tile(fmt::format("≈ {:.0f}", n / hectares), "stems per hectare seen");
+    tiles.add(
+        fmt::format("{:.2f} ha", hectares), "area with points (not a plot's border)",
+        "Squares of 2 m that hold points. The lidar looks beyond the border of a plot, so this "
+        "area is larger.");
+    if (n > 0) {
+      tiles.add(fmt::format("≈ {:.0f}", n / hectares), "stems per hectare seen",
+                "Measured trees divided by that area. Far from the path stems are missed, so the "
+                "stand has more. For a plot, count the trees of trees.csv within its border.");
+    }
   }
   if (n > 0) {
-    html += tile(fmt::format("{:.1f} cm", 100.0 * dbh / n), "mean diameter at 1.3 m");
-    if (hectares > 0.0) html += tile(fmt::format("≈ {:.1f} m²/ha", basal / hectares), "basal area");
+    tiles.add(fmt::format("{:.1f} cm", 100.0 * dbh / n), "mean diameter at 1.3 m",
+              "Mean of the measured diameters, 1.3 m above the ground.");
+    if (hectares > 0.0) {
+      tiles.add(
+          fmt::format("≈ {:.1f} m²/ha", basal / hectares), "basal area",
+          "Cross sections of all measured stems at 1.3 m, per hectare of that area. Too small "
+          "where stems are missed.");
+    }
   }
-  return html;
+}
+
+void add_run(Tiles& tiles, const ReportInput& input) {
+  if (!input.scans.empty()) {
+    tiles.add(fmt::format("{:.0f} m", path_length_m(input.scans)), "length of the path",
+              "How far the scanner was carried. Movements of less than 10 cm are left out.");
+    // By stems the scans shown are the views that were kept: a machine may stand at the end.
+    const double shown_s = to_seconds(input.scans.back().stamp - input.scans.front().stamp);
+    tiles.add(duration_text(std::max(shown_s, input.summary.recording_s)), "of recording",
+              "Time from the first scan to the last.");
+    tiles.add(count_text(input.summary.scans), "scans",
+              "A scan is one look of the lidar all around, often a tenth of a second.");
+  }
+  const auto scan = input.summary.stages.find("scan");
+  if (scan != input.summary.stages.end()) {
+    tiles.add(fmt::format("{:.0f} ms", scan->second.wall_ms.mean),
+              input.sensor_period_ms > 0.0
+                  ? fmt::format("per scan; a new one comes every {:.0f} ms", input.sensor_period_ms)
+                  : "per scan",
+              "Time of computing. Where it is shorter than the time between scans, the program can "
+              "work while the scanner is carried.");
+  }
+  if (!input.loops.empty()) {
+    const auto closed = std::count_if(input.loops.begin(), input.loops.end(),
+                                      [](const ReportLoop& loop) { return loop.accepted; });
+    tiles.add(std::to_string(closed), "loops closed",
+              "How often a place was seen again and the path was corrected by it.");
+  }
 }
 
 }  // namespace
@@ -148,35 +207,19 @@ std::string verdict_section(const ReportInput& input) {
 }
 
 std::string figures_section(const ReportInput& input) {
-  std::string html = "<section class=\"tiles\">";
-  if (!input.scans.empty()) {
-    html += tile(fmt::format("{:.0f} m", path_length_m(input.scans)), "length of the path");
-    // By stems the scans shown are the views that were kept: a machine may stand at the end.
-    const double shown_s = to_seconds(input.scans.back().stamp - input.scans.front().stamp);
-    html += tile(duration_text(std::max(shown_s, input.summary.recording_s)), "of recording");
-    html += tile(count_text(input.summary.scans), "scans");
-  }
+  Tiles tiles;
   if (input.inventory != nullptr) {
-    html += stand_tiles(*input.inventory);
+    add_stand(tiles, *input.inventory);
   } else if (input.trees != nullptr) {
-    html += tile(count_text(input.trees->size()), "trees");
+    tiles.add(count_text(input.trees->size()), "trees",
+              "Trees whose stem was seen in many of the scans that could see it.");
   }
-  if (!input.falls.empty())
-    html += tile(count_text(input.falls.size()), "of them felled while they were looked at");
-  const auto scan = input.summary.stages.find("scan");
-  if (scan != input.summary.stages.end()) {
-    html +=
-        tile(fmt::format("{:.0f} ms", scan->second.wall_ms.mean),
-             input.sensor_period_ms > 0.0
-                 ? fmt::format("per scan; a new one comes every {:.0f} ms", input.sensor_period_ms)
-                 : "per scan");
+  if (!input.falls.empty()) {
+    tiles.add(count_text(input.falls.size()), "of them felled meanwhile",
+              "Trees that stood at first and were gone later.");
   }
-  if (!input.loops.empty()) {
-    const auto closed = std::count_if(input.loops.begin(), input.loops.end(),
-                                      [](const ReportLoop& loop) { return loop.accepted; });
-    html += tile(std::to_string(closed), "loops closed");
-  }
-  return html + "</section>\n";
+  add_run(tiles, input);
+  return tiles.html();
 }
 
 std::string distrust_section(const ReportInput& input) {

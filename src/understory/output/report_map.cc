@@ -179,7 +179,8 @@ std::string scale_bar(const View& view) {
       "<g><rect x=\"12\" y=\"{0:.1f}\" width=\"{1:.1f}\" height=\"34\" fill=\"#fff\" "
       "opacity=\"0.85\"/><path d=\"M20 {2:.1f}v8h{3:.1f}v-8\" fill=\"none\" stroke=\"#111\" "
       "stroke-width=\"2\"/><text x=\"{4:.1f}\" y=\"{5:.1f}\" font-size=\"15\" "
-      "text-anchor=\"middle\">{6} m</text></g>",
+      "text-anchor=\"middle\" stroke=\"#fff\" stroke-width=\"4\" paint-order=\"stroke\">{6} "
+      "m</text></g>",
       y - 22, width + 16, y - 4, width, 20 + 0.5 * width, y - 3, tick_text(length, length));
 }
 
@@ -197,9 +198,8 @@ std::string map_section(const ReportInput& input) {
   const View view = view_of(input);
   if (input.picture == nullptr && input.scans.empty() && trees_of(input) == nullptr) return "";
   std::string svg = fmt::format(
-      "<svg class=\"paper\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"map from "
-      "above\" "
-      "style=\"max-width:{:.0f}px;margin:0 auto\">",
+      "<svg class=\"paper map\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"map from "
+      "above\" style=\"max-width:{:.0f}px;margin:0 auto\">",
       view.width_m * view.scale, view.height_m * view.scale, view.width_m * view.scale);
   if (input.picture != nullptr && !input.picture->empty()) {
     const MapPicture& p = *input.picture;
@@ -242,7 +242,7 @@ std::string map_section(const ReportInput& input) {
     line("--lost", "path without a match (predicted)");
   }
   if (!input.fixes.empty())
-    entry(" class=\"dot\"", "border-color:#d98200", "GNSS fix (pale: without a say)");
+    entry(" class=\"dot\"", "border-color:#d98200", "GNSS fix (pale: not used)");
   if (!input.loops.empty()) line("--loop", "loop closed");
   return "<section><h2>The map from above</h2>" + svg + legend + "</p></section>\n";
 }

@@ -48,13 +48,13 @@ std::string figure(const std::string& svg, const std::string& caption) {
 // P0 figure 9.
 std::string pair_scatter(const ReportCorrection& correction) {
   Plot plot;
-  plot.x_label = "overlap of what two views see";
-  plot.y_label = "error, m";
+  plot.x_label = "share of their sectors that two views have in common";
+  plot.y_label = "mean distance of their stems, m";
   plot.width = 1100;
   plot.height = 320;
   plot.y_max = 1.5;
-  PlotSeries good{"acceptable", "var(--good)", {}, true};
-  PlotSeries poor{"inferior", "var(--soft)", {}, true};
+  PlotSeries good{"worth matching again", "var(--good)", {}, true};
+  PlotSeries poor{"not worth it", "var(--soft)", {}, true};
   for (const ReportPair& pair : correction.pairs)
     (pair.acceptable ? good : poor)
         .points.emplace_back(pair.overlap, std::min(pair.error_m, plot.y_max));
@@ -68,10 +68,10 @@ std::string pair_scatter(const ReportCorrection& correction) {
         overlap, correction.acceptable_m + overlap * correction.acceptable_per_overlap_m);
   }
   plot.series.push_back(line);
-  return "<h3>Pairs of views as the odometry placed them</h3>" + svg_plot(plot) +
+  return "<h3>Pairs of views before the correction</h3>" + svg_plot(plot) +
          fmt::format(
-             "<p class=\"so\">{} pairs drawn at random; those below the line with an overlap of "
-             "more than {:.2f} are worth matching again.</p>",
+             "<p class=\"so\">{} pairs drawn at random. Those below the line with more than {:.2f} "
+             "in common are worth matching again.</p>",
              correction.pairs.size(), correction.min_overlap);
 }
 
@@ -113,8 +113,8 @@ std::string matrices(const ReportCorrection& correction) {
   if (correction.matrix_before.side < 2) return "";
   return "<h3>All pairs of views</h3><div class=\"trees matrices\">" +
          figure(matrix_svg(correction.matrix_before, false, {}),
-                "Share of stems in common, black: all. Later views to the right, earlier ones "
-                "downwards.") +
+                "Share of stems in common, black: all. Number of the later view to the right, of "
+                "the earlier one downwards.") +
          figure(matrix_svg(correction.matrix_before, true, correction.kept),
                 "Mean distance of these before correction, white 0 to black 0.5 m; red: more than "
                 "0.6 in common; green crosses: the corrections.") +
@@ -172,9 +172,10 @@ std::string sights(const ReportCorrection& correction) {
   const Window near{static_cast<double>(correction.max_moved.x()) - 0.5 * kNear,
                     static_cast<double>(correction.max_moved.y()) - 0.5 * kNear, kNear, kNear};
   const Window whole = whole_of(correction.sights_after);
+  const std::string across = fmt::format("{:.0f} m from left to right", whole.width_m);
   return "<h3>Every sight of every stem</h3><div class=\"panels\">" +
-         figure(sights_svg(correction.sights_before, whole), "Before correction.") +
-         figure(sights_svg(correction.sights_after, whole), "After correction.") +
+         figure(sights_svg(correction.sights_before, whole), "Before correction, " + across + ".") +
+         figure(sights_svg(correction.sights_after, whole), "After correction, " + across + ".") +
          figure(sights_svg(correction.sights_before, near),
                 fmt::format("{:.0f} m about the place that the correction moved most, before.",
                             kNear)) +

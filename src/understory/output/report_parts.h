@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "understory/output/report.h"
 
@@ -14,6 +15,8 @@ namespace understory {
 [[nodiscard]] std::string map_section(const ReportInput& input);
 [[nodiscard]] std::string distrust_section(const ReportInput& input);
 [[nodiscard]] std::string stand_section(const ReportInput& input);
+// What lies beside the report and how to open it; `files`: names.
+[[nodiscard]] std::string files_section(const std::vector<std::string>& files);
 [[nodiscard]] std::string matching_section(const ReportInput& input);
 [[nodiscard]] std::string loops_section(const ReportInput& input);
 [[nodiscard]] std::string correction_section(const ReportInput& input);

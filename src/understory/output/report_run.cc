@@ -80,17 +80,14 @@ std::string loop_counts(const ReportInput& input) {
         rejected);
   return fmt::format(
       "<p>{} views look like an earlier place. Matching their stems confirmed {} of them (the "
-      "table "
-      "below): {} closed, {} rejected because they contradict the others. The other {} were no "
-      "loops; loops.csv lists them with verified 0.</p>",
+      "table below): {} closed, {} rejected because they contradict the others. The other {} were "
+      "no loops. In loops.csv their column verified is 0.</p>",
       input.loops.size() + input.loops_not_listed, input.loops.size(), accepted, rejected,
       input.loops_not_listed);
 }
 
-}  // namespace
-
-std::string matching_section(const ReportInput& input) {
-  if (input.scans.empty()) return "";
+// How many scans matched well, weakly and not at all.
+std::string match_shares(const ReportInput& input) {
   std::size_t weak = 0;
   std::size_t lost = 0;
   for (const ReportScan& scan : input.scans) {
@@ -101,41 +98,71 @@ std::string matching_section(const ReportInput& input) {
     }
   }
   const double all = static_cast<double>(input.scans.size());
-  std::string html = "<section><h2>How well the scans matched</h2>";
-  html += fmt::format(
-      "<p>{:.1f} % of the scans matched well, {:.1f} % weakly (orange on the map), {:.1f} % not at "
-      "all (red: the position is a prediction).</p>",
+  return fmt::format(
+      "<p>The program lays each scan on the map of the scans before it. {:.1f} % of the scans "
+      "matched well, {:.1f} % weakly (orange on the map), {:.1f} % not at all (red: the position "
+      "is a prediction).</p>",
       100.0 * (all - static_cast<double>(weak + lost)) / all,
       100.0 * static_cast<double>(weak) / all, 100.0 * static_cast<double>(lost) / all);
+}
+
+// What the distance of matched points is measured from, and which values are usual.
+std::string distance_meaning(const ReportInput& input) {
+  const std::string line = " A level line is good. A line that rises means that the map blurs.</p>";
+  if (!(input.map_cell_m > 0.0))
+    return "<p>Distance of the scan's points from the nearest surface of the map." + line;
+  const double cell_cm = 100.0 * input.map_cell_m;
+  return fmt::format(
+             "<p>The map keeps one mean place for each cube of {:.0f} cm. The distance is that of "
+             "a point to the mean of its cube, so it is not the error of the map: {:.0f} to {:.0f} "
+             "cm are usual, and {:.0f} cm come about by chance.",
+             cell_cm, 0.32 * cell_cm, 0.46 * cell_cm, 0.5 * cell_cm) +
+         line;
+}
+
+}  // namespace
+
+std::string matching_section(const ReportInput& input) {
+  if (input.scans.empty()) return "";
+  std::string html = "<section><h2>How well the scans matched</h2>" + match_shares(input);
   const TimeAxis axis = time_axis(input);
   Plot plot;
   plot.x_label = axis.label;
-  plot.y_label = "share matched, %";
+  plot.y_label = input.correction ? "stems matched, %" : "points matched, %";
   plot.y_max = 100.0;
   plot.height = 200;
   plot.width = 1100;
   plot.series.push_back({"", "var(--line)", thinned_with_gaps(series_of(input, [](const auto& s) {
                            return 100.0 * static_cast<double>(s.inlier_ratio);
                          }))});
-  html += "<h3>Share of a scan's points that found their place in the map</h3>" + svg_plot(plot);
+  html +=
+      input.correction
+          ? "<h3>Stems found again</h3><p>Share of a view's stems that have a partner in the map."
+          : "<h3>Points found again</h3><p>Share of a scan's points that have a partner in the "
+            "map.";
+  html +=
+      " A dip shows where the scanner saw little that it had seen before: look at the map "
+      "there.</p>" +
+      svg_plot(plot);
   const bool measured = std::any_of(input.scans.begin(), input.scans.end(), [](const auto& scan) {
     return std::isfinite(scan.fitness_m2);
   });
   if (!measured) return html + "</section>\n";
   Plot fitness = plot;
   fitness.y_max = 0.0;
-  fitness.y_label = "distance, cm";
+  fitness.y_label = "distance from the map, cm";
   fitness.series[0].points = thinned_with_gaps(series_of(
       input, [](const auto& s) { return 100.0 * std::sqrt(static_cast<double>(s.fitness_m2)); }));
-  html +=
-      "<h3>Their distance from the map (root mean square; less is better)</h3>" + svg_plot(fitness);
-  return html + "</section>\n";
+  return html + "<h3>Distance of the matched points from the map</h3>" + distance_meaning(input) +
+         svg_plot(fitness) + "</section>\n";
 }
 
 std::string loops_section(const ReportInput& input) {
   if (input.scans.empty()) return "";
-  std::string html = "<section><h2>Places seen again</h2>";
-  if (!input.loop_closure_enabled) return html + "<p>Loop closure was off.</p></section>\n";
+  std::string html =
+      "<section><h2>Places seen again</h2><p>Where the path returns to a place, the program "
+      "recognises it and takes out the error that has grown since: it closes a loop.</p>";
+  if (!input.loop_closure_enabled) return html + "<p>This was switched off.</p></section>\n";
   html += loop_counts(input);
   if (input.loops.empty()) {
     return html +
@@ -175,7 +202,9 @@ std::string loops_section(const ReportInput& input) {
 std::string truth_section(const ReportInput& input) {
   if (!input.truth) return "";
   const ReportTruth& truth = *input.truth;
-  std::string html = "<section><h2>Errors against the known truth</h2><div class=\"wide\"><table>";
+  std::string html =
+      "<section><h2>Errors against the known truth</h2><p>The true path is known here, as in a "
+      "simulation.</p><div class=\"wide\"><table>";
   const auto row = [&](const std::string& name, const std::string& value) {
     html += "<tr><td>" + escape_html(name) + "</td><td class=\"n\">" + escape_html(value) +
             "</td></tr>";
@@ -183,12 +212,12 @@ std::string truth_section(const ReportInput& input) {
   const auto metres = [&](const char* name, double value) {
     if (std::isfinite(value)) row(name, fmt::format("{:.3f} m", value));
   };
-  row("alignment before comparing", truth.alignment);
-  metres("absolute position error (APE), root mean square", truth.ape_rmse_m);
-  metres("absolute position error, largest", truth.ape_max_m);
-  metres("drift at the end, first pose aligned", truth.drift_end_m);
+  row("how the path was laid on the true one", truth.alignment);
+  metres("position error (APE), root mean square", truth.ape_rmse_m);
+  metres("position error, largest", truth.ape_max_m);
+  metres("error at the end, with the starts laid on each other (drift)", truth.drift_end_m);
   if (std::isfinite(truth.drift_percent)) {
-    row("drift per length", fmt::format("{:.3f} %", truth.drift_percent));
+    row("the same as a share of the path", fmt::format("{:.3f} %", truth.drift_percent));
   }
   for (const auto& [name, value] : truth.more)
     row(name, value);
@@ -197,7 +226,7 @@ std::string truth_section(const ReportInput& input) {
     const TimeAxis axis = time_axis(input);
     Plot plot;
     plot.x_label = axis.label;
-    plot.y_label = "error, cm";
+    plot.y_label = "position error, cm";
     plot.width = 1100;
     plot.height = 200;
     Series series;
@@ -230,10 +259,9 @@ std::string time_section(const ReportInput& input) {
   if (!input.summary.stages.empty()) {
     html +=
         "<h3>Stages</h3><div class=\"wide\"><table><tr><th>stage</th><th class=\"n\">runs</th><th "
-        "class=\"n\">mean, "
-        "ms</th><th class=\"n\">half under, ms</th><th class=\"n\">99 % under, ms</th><th "
-        "class=\"n\">longest, ms</th><th class=\"n\">CPU mean, ms</th><th class=\"n\">all, s</th>"
-        "</tr>";
+        "class=\"n\">mean, ms</th><th class=\"n\">median, ms</th><th class=\"n\">99 % under, "
+        "ms</th><th class=\"n\">longest, ms</th><th class=\"n\">CPU mean, ms</th><th "
+        "class=\"n\">all, s</th></tr>";
     for (const auto& [name, stage] : input.summary.stages) {
       const Distribution& wall = stage.wall_ms;
       html += fmt::format(
@@ -246,7 +274,10 @@ std::string time_section(const ReportInput& input) {
     }
     html += "</table></div>";
   }
-  return html.empty() ? "" : "<section><h2>Time</h2>" + html + "</section>\n";
+  return html.empty() ? ""
+                      : "<section><h2>Time</h2><p>Time of computing, for those who run the program "
+                        "on a machine in the forest.</p>" +
+                            html + "</section>\n";
 }
 
 }  // namespace understory

@@ -17,6 +17,8 @@ constexpr float kCrossLow = 0.9F;
 constexpr float kCrossHigh = 1.9F;
 constexpr double kPanel = 30.0;  // metres of a cross section's side: stems are still to be seen
 constexpr std::size_t kMostPanels = 8;
+constexpr std::size_t kFewestPoints = 20;
+constexpr std::size_t kFewestPointsWithoutTree = 1'000;  // a stem that was missed may be there
 constexpr std::size_t kLongestTable = 3'000;
 
 std::string centimetres(double metres) {
@@ -91,8 +93,7 @@ std::string cross_section(const InventoryResult& inventory, const Panel& panel) 
   }
   std::string svg = fmt::format(
       "<svg class=\"paper\" viewBox=\"0 0 {0} {1}\" role=\"img\" aria-label=\"cross "
-      "section\"><image "
-      "width=\"{0}\" height=\"{1}\" href=\"data:image/png;base64,{2}\"/>",
+      "section\"><image width=\"{0}\" height=\"{1}\" href=\"data:image/png;base64,{2}\"/>",
       width, height, base64(encode_png(picture)));
   const auto out = std::back_inserter(svg);
   for (std::size_t i = 0; i < inventory.stems.size(); ++i) {
@@ -118,7 +119,10 @@ std::string cross_section(const InventoryResult& inventory, const Panel& panel) 
 
 std::string cross_sections(const InventoryResult& inventory) {
   std::vector<Panel> panels = panels_of(inventory);
-  std::erase_if(panels, [](const Panel& p) { return p.points < 20; });
+  // At the edge of the view a part may hold hardly more than noise.
+  std::erase_if(panels, [](const Panel& p) {
+    return p.points < (p.trees > 0 ? kFewestPoints : kFewestPointsWithoutTree);
+  });
   if (panels.empty()) return "";
   const std::size_t all = panels.size();
   if (all > kMostPanels) {
@@ -127,7 +131,7 @@ std::string cross_sections(const InventoryResult& inventory) {
     panels.resize(kMostPanels);
   }
   std::string html =
-      "<h3>Cross section 0.9–1.9 m above the ground</h3><p>Every dot is a point of the cloud; red "
+      "<h3>Cross section 0.9–1.9 m above the ground</h3><p>Every dot is a point of the cloud. Red "
       "circles are the measured stems at 1.3 m with their number. A ring of dots without a circle "
       "is a stem that was missed.</p><div class=\"panels";
   html += panels.size() == 1 ? " one\">" : "\">";
@@ -199,11 +203,10 @@ std::string section_of(const TreeSegment& segment, const Tree& tree, const StemF
   }
   return fmt::format(
       "<svg class=\"paper\" viewBox=\"0 0 {0} {0}\" role=\"img\" aria-label=\"cross "
-      "section\"><image "
-      "width=\"{0}\" height=\"{0}\" href=\"data:image/png;base64,{1}\"/><circle cx=\"{2}\" "
-      "cy=\"{2}\" r=\"{3:.1f}\" fill=\"none\" stroke=\"#d0342c\" stroke-width=\"2\"/><path d=\"M10 "
-      "282v8h{4:.1f}v-8\" fill=\"none\" stroke=\"#111\" stroke-width=\"2\"/><text x=\"{5:.1f}\" "
-      "y=\"292\" font-size=\"20\">20 cm</text></svg>",
+      "section\"><image width=\"{0}\" height=\"{0}\" href=\"data:image/png;base64,{1}\"/><circle "
+      "cx=\"{2}\" cy=\"{2}\" r=\"{3:.1f}\" fill=\"none\" stroke=\"#d0342c\" "
+      "stroke-width=\"2\"/><path d=\"M10 282v8h{4:.1f}v-8\" fill=\"none\" stroke=\"#111\" "
+      "stroke-width=\"2\"/><text x=\"{5:.1f}\" y=\"292\" font-size=\"20\">20 cm</text></svg>",
       kSide, base64(encode_png(picture)), kSide / 2, 0.5 * tree.dbh_m * kScale, 0.2 * kScale,
       16 + 0.2 * kScale);
 }
@@ -217,9 +220,8 @@ std::string single_trees(const InventoryResult& inventory) {
   }
   std::string html =
       "<h3>Some trees one by one</h3><p>Front view (height in metres), and the cross section of "
-      "its "
-      "stem 0.9–1.9 m above the ground. A sharp map shows one thin ring; a double or "
-      "thick ring means that the scans do not lie on each other.</p><div class=\"trees\">";
+      "its stem 0.9–1.9 m above the ground. A sharp map shows one thin ring. A double or thick "
+      "ring means that the scans do not lie on each other.</p><div class=\"trees\">";
   for (const TreeSegment& segment : inventory.segments) {
     const auto i = static_cast<std::size_t>(segment.tree_id - 1);
     const Tree& tree = inventory.trees[i];
@@ -252,7 +254,15 @@ std::string diameters(const std::vector<Tree>& trees) {
 // which have no heights.
 std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems) {
   std::string html =
-      "<h3>All trees</h3><div class=\"scroll\"><table class=\"sort\"><thead><tr>"
+      "<h3>All trees</h3><p class=\"so\">x, y and the height of the ground are those "
+      "of the stem's foot in the frame of the map. ";
+  html +=
+      stems != nullptr
+          ? "Returns are laser points on the stem. Seen around is the part of its circumference "
+            "that the laser saw."
+          : "Views are the scans that show the stem.";
+  html +=
+      "</p><div class=\"scroll\"><table class=\"sort\"><thead><tr>"
       "<th class=\"n\">no.</th><th class=\"n\">x, m</th><th class=\"n\">y, m</th><th "
       "class=\"n\">ground, m</th><th class=\"n\">diameter, cm</th><th class=\"n\">± cm</th><th "
       "class=\"n\">lean, °</th>";
@@ -307,8 +317,8 @@ std::string section_of_views(const ReportInput& input) {
   const std::vector<Tree>& trees = *input.trees;
   const TimeNs start = input.scans.empty() ? 0 : input.scans.front().stamp;
   return "<section><h2>Trees</h2><p>A tree is listed where many of the views that could see it saw "
-         "a stem. Its place is the mean of these sights, the diameter's ± is what they leave "
-         "uncertain; heights are not measured.</p><div class=\"two\">" +
+         "a stem. Its place is the mean of these sights. ± is one standard deviation of the "
+         "diameter. Heights are not measured.</p><div class=\"two\">" +
          diameters(trees) + "</div>" + fall_table(input.falls, start) + tree_table(trees, nullptr) +
          "</section>\n";
 }
@@ -325,10 +335,9 @@ std::string stand_section(const ReportInput& input) {
   } else {
     html +=
         "<p>A stem is listed where points show its surface at several heights around 1.3 m. "
-        "The diameter's ± is one standard deviation of the fit; it does not contain the "
-        "widening by the laser's beam. A height is given only where points were seen above the "
-        "stem and the lidar looked higher still; it is a lower bound where foliage hid the "
-        "top.</p><div class=\"two\">" +
+        "± is one standard deviation of the diameter, without the widening by the laser's beam. A "
+        "height is given only where points were seen above the stem and the lidar looked higher "
+        "still. Where foliage hid the top, the tree is higher.</p><div class=\"two\">" +
         diameters(inventory.trees) + "</div>";
   }
   html += cross_sections(inventory);

@@ -21,6 +21,8 @@ section{background:var(--card);border:1px solid var(--rule);border-radius:8px;pa
 .verdict.bad{border-left-color:var(--bad)}.verdict h2{margin:0;color:var(--good)}
 .verdict.fair h2{color:var(--fair)}.verdict.bad h2{color:var(--bad)}.verdict p,.verdict ul{margin:.2rem 0 0}
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(170px,1fr));gap:12px}
+.meanings{margin-top:12px}.meanings summary{font-weight:400;color:var(--soft)}
+dl{margin:.4rem 0 0;font-size:.9rem}dt{font-weight:600;margin-top:.4rem}dd{margin:0;color:var(--soft)}
 .tile b{display:block;white-space:nowrap;font-size:1.35rem;font-variant-numeric:tabular-nums}
 .tile span{color:var(--soft);font-size:.85rem;line-height:1.25;display:block}
 .paper{background:#fff;border:1px solid var(--rule);border-radius:4px}
@@ -45,7 +47,8 @@ th.n,td.n{text-align:right}table.sort th{cursor:pointer;white-space:nowrap;posit
 table.sort th:hover{color:var(--line)}
 .scroll{max-height:460px;overflow:auto}.wide{overflow-x:auto}code{font-size:.85em;overflow-wrap:anywhere}
 pre{overflow:auto;font-size:.82rem;max-height:480px}
-@media (max-width:640px){main{padding:12px 8px 40px}section{padding:12px}
+.files code{white-space:nowrap}
+@media (max-width:640px){svg.map text{font-size:38px}.panels text{font-size:34px}main{padding:12px 8px 40px}section{padding:12px}
 .wide svg.plot{min-width:600px}.tiles{grid-template-columns:repeat(auto-fit,minmax(130px,1fr))}.tile b{white-space:normal}}
 li,p,td,summary,figcaption{overflow-wrap:anywhere}.wide td,.wide th,.scroll td{overflow-wrap:normal}
 .warn{margin:0;padding-left:1.2rem}.so{color:var(--soft)}

@@ -14,6 +14,7 @@ constexpr double kLeft = 58.0;
 constexpr double kRight = 14.0;
 constexpr double kTop = 12.0;
 constexpr double kBottom = 42.0;
+constexpr int kWidestFigure = 640;  // units that fit beside something else
 
 // The drawing area of a plot and where a value lies in it.
 struct Frame {
@@ -218,7 +219,10 @@ std::string svg_histogram(const Histogram& histogram) {
   for (const int count : histogram.counts)
     most = std::max(most, count);
   frame.y_high = 1.1 * most;
-  std::string svg = opened(histogram.width, histogram.height, histogram.x_label);
+  // As a plot: one as wide as the page keeps its size on a narrow screen.
+  const bool wide = histogram.width > kWidestFigure;
+  std::string svg = wide ? "<div class=\"wide\">" : "";
+  svg += opened(histogram.width, histogram.height, histogram.x_label);
   svg += axes(frame, histogram.x_label, histogram.y_label);
   for (std::size_t i = 0; i < histogram.counts.size(); ++i) {
     if (histogram.counts[i] == 0) continue;
@@ -230,7 +234,7 @@ std::string svg_histogram(const Histogram& histogram) {
         left + 1, frame.y(histogram.counts[i]), std::max(1.0, right - left - 2),
         frame.y(0) - frame.y(histogram.counts[i]), histogram.counts[i]);
   }
-  return svg + "</svg>";
+  return svg + (wide ? "</svg></div>" : "</svg>");
 }
 
 }  // namespace understory

@@ -119,7 +119,8 @@ void EventOrderer::mend_offset(Stream stream) {
                             " the lidar's by the order of arrival";
   if (clock.believed && std::abs(offset) < kLongestDelay) {
     clock.lag = -offset;
-    log_->warn("time.clock_delay", about + "; taken for a delay of arrival, the stamps stand");
+    log_->warn("time.clock_delay",
+               about + "; this is a delay of arrival, and the stamps are not shifted");
     return;
   }
   clock.offset -= offset;

@@ -215,8 +215,8 @@ double refine(const PointBlocks& cloud, const GroundConfig& config, Raster& terr
 void describe(ConfigTable& table, GroundConfig& config) {
   table.add("cell_m", config.cell_m, {0.1, 10.0}, "m", "cell of the terrain model and the cloth");
   table.add("stiffness", config.stiffness, {1, 5}, "",
-            "of the cloth: 1 steep terrain, 2 rolling, 3 flat");
-  table.add("steps", config.steps, {10, 10'000}, "", "of the cloth, at most");
+            "stiffness of the cloth: 1 for steep terrain, 2 for rolling, 3 for flat");
+  table.add("steps", config.steps, {10, 10'000}, "", "most steps of the cloth");
   table.add("touch_m", config.touch_m, {0.05, 5.0}, "m",
             "lowest points this near to the cloth are ground");
   table.add("class_m", config.class_m, {0.02, 2.0}, "m",

@@ -274,17 +274,20 @@ void describe(ConfigTable& table, LoopClosureConfig& config) {
   describe(table, config.matcher);
   std::vector<std::string> last = matcher_names();
   last.insert(last.begin(), LoopClosureConfig::kNoRefinement);
-  table.add_choice("refine", config.refine, last,
-                   "method that has the last word on the relative pose; none: the same");
-  table.add(
-      "search_sigmas", config.search_sigmas, {0.0, 10.0}, "",
-      "standard deviations of the belief over which matching starts; 0: from the belief alone");
-  table.add("search_step_m", config.search_step_m, {0.1, 20.0}, "m", "between starts");
+  table.add_choice(
+      "refine", config.refine, last,
+      "method that computes the final relative pose; none: the pose of the search is kept");
+  table.add("search_sigmas", config.search_sigmas, {0.0, 10.0}, "",
+            "half width of the search, in standard deviations of the predicted relative pose; 0: "
+            "one start at the prediction");
+  table.add("search_step_m", config.search_step_m, {0.1, 20.0}, "m",
+            "distance between two starts of the search");
   table.add("search_yaw_step_deg", config.search_yaw_step_deg, {0.1, 90.0}, "deg",
-            "between starts");
-  table.add("max_starts", config.max_starts, {1, 100000}, "", "beyond, the steps grow");
+            "heading between two starts of the search");
+  table.add("max_starts", config.max_starts, {1, 100000}, "",
+            "most starts of the search; beyond that number the steps grow");
   table.add("refined_starts", config.refined_starts, {1, 100}, "",
-            "starts that are carried through");
+            "number of best starts that are matched coarse to fine");
   table.add("max_fitness_m2", config.max_fitness_m2, {0.0, 100.0}, "m^2",
             "largest mean squared distance of an accepted loop");
   table.add("structure_low_m", config.structure_low_m, {0.0, 50.0}, "m",
@@ -292,29 +295,29 @@ void describe(ConfigTable& table, LoopClosureConfig& config) {
   table.add("structure_high_m", config.structure_high_m, {0.0, 100.0}, "m",
             "height above ground up to which structure is compared");
   table.add("structure_cell_m", config.structure_cell_m, {0.05, 5.0}, "m",
-            "how near structure has to be to count as found again");
+            "largest distance at which structure counts as found again");
   table.add("min_structure_points", config.min_structure_points, {0, 1000000}, "",
-            "with fewer points above the ground nothing can be said");
+            "with fewer points above the ground a loop is not judged");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
             "share of the structure that has to be found again");
   table.add("min_contrast", config.min_contrast, {-1.0, 1.0}, "",
-            "by how much that share has to exceed what chance gives");
+            "least excess of that share over the share found by chance");
   table.add("contrast_shift_m", config.contrast_shift_m, {0.1, 20.0}, "m",
-            "chance is measured with the clouds shifted by this");
+            "shift of the clouds with which the share by chance is measured");
   table.add("max_runner_up", config.max_runner_up, {0.0, 1.0}, "",
             "overlap at the second best place, as a share of the best, above which the loop is "
             "ambiguous");
   table.add("max_asymmetry_m", config.max_asymmetry_m, {0.0, 10.0}, "m",
-            "difference between matching there and back");
+            "largest shift between the match and the match backwards");
   table.add("max_asymmetry_deg", config.max_asymmetry_deg, {0.0, 90.0}, "deg",
-            "difference between matching there and back");
-  table.add("check_symmetry", config.check_symmetry, "match back from target to source as well");
+            "largest turn between the match and the match backwards");
+  table.add("check_symmetry", config.check_symmetry, "match also backwards, from target to source");
   table.add("sigma_rotation_deg", config.sigma_rotation_deg, {1e-4, 10.0}, "deg",
-            "least standard deviation of a loop");
+            "least standard deviation of the rotation of a loop");
   table.add("sigma_translation_m", config.sigma_translation_m, {1e-5, 10.0}, "m",
-            "least standard deviation of a loop");
+            "least standard deviation of the translation of a loop");
   table.add("sigma_translation_per_m", config.sigma_translation_per_m, {0.0, 1.0}, "",
-            "what it grows by with the distance between the two places");
+            "growth of that standard deviation with the distance between the two places");
 }
 
 }  // namespace understory

@@ -160,27 +160,31 @@ bool loop_search_due(TimeNs last, TimeNs now, const LoopSearchConfig& config) {
 
 void describe(ConfigTable& table, LoopSearchConfig& config) {
   using Method = LoopSearchConfig::Method;
-  table.add_enum(
-      "method", config.method, {{"paper", Method::kPaper}, {"uncertainty", Method::kUncertainty}},
-      "paper: the nearest keyframe within a gate; uncertainty: all that the drift allows");
+  table.add_enum("method", config.method,
+                 {{"paper", Method::kPaper}, {"uncertainty", Method::kUncertainty}},
+                 "uncertainty: candidates within the drift that can have built up; paper: the "
+                 "nearest keyframe within a gate");
   table.add("exclude_recent", config.exclude_recent, {2, 100000}, "keyframes",
-            "paper: the most recent keyframes are no candidates");
-  table.add("gate_m", config.gate_m, {0.0, 1e4}, "m", "paper: farther candidates are dropped");
-  table.add("interval_s", config.interval_s, {0.0, 1e4}, "s", "at most one search in this time");
+            "method paper: number of most recent keyframes that are no candidates");
+  table.add("gate_m", config.gate_m, {0.0, 1e4}, "m",
+            "method paper: largest distance of a candidate");
+  table.add("interval_s", config.interval_s, {0.0, 1e4}, "s", "shortest time between two searches");
   table.add("exclude_path_m", config.exclude_path_m, {0.0, 1e5}, "m",
-            "keyframes are recent as long as the way since is shorter");
+            "keyframes are no candidates while the path since them is shorter");
   table.add("max_chord_ratio", config.max_chord_ratio, {0.0, 1.0}, "",
-            "keyframes are recent as long as they are farther than this share of the way since");
+            "keyframes are no candidates while their distance is more than this share of the path "
+            "since them");
   table.add("view_radius_m", config.view_radius_m, {1.0, 1000.0}, "m",
-            "how far from the sensor scans overlap usefully");
+            "range up to which the views of two keyframes are compared");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
-            "share of common view that a candidate must be able to have");
+            "least share of common view that a candidate can have");
   table.add("sigmas", config.sigmas, {0.0, 10.0}, "",
-            "standard deviations of drift that the search covers");
-  table.add("max_radius_m", config.max_radius_m, {1.0, 1e4}, "m", "farthest candidate");
-  table.add("max_candidates", config.max_candidates, {1, 100}, "", "candidates of one search");
+            "search radius in standard deviations of the drift");
+  table.add("max_radius_m", config.max_radius_m, {1.0, 1e4}, "m",
+            "largest distance of a candidate");
+  table.add("max_candidates", config.max_candidates, {1, 100}, "", "most candidates of one search");
   table.add("spacing_m", config.spacing_m, {0.0, 1e4}, "m",
-            "way between the candidates of one search");
+            "least path length between the candidates of one search");
 }
 
 }  // namespace understory

@@ -153,17 +153,18 @@ class Finder {
 
 void describe(ConfigTable& table, StemLoopConfig& config) {
   table.add("exclude_recent", config.exclude_recent, {1, 1'000'000}, "",
-            "views nearer than this in the recording are the same passage");
+            "views fewer than this number apart belong to the same passage and are no loop");
   table.add("place_spacing", config.place_spacing, {0.1, 100.0}, "stem spacings",
-            "along the path between the places that are kept to be found again");
+            "spacing along the path of the places that can be found again");
   table.add("max_distance_m", config.max_distance_m, {0.1, 100.0}, "m",
-            "views farther apart are not of the same place");
+            "largest distance between two views of one place");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
-            "share of the stems that two views must have in common");
+            "least share of stems that two views have in common");
   table.add(
       "gather_l0", config.gather_l0, {0.0, 100.0}, "stem spacings",
-      "views within that distance along the path, to each side, are joined; 0: each by itself");
-  table.add("gather_views", config.gather_views, {1, 1000}, "", "at most that many to each side");
+      "views within this distance along the path, to each side, are joined; 0: each view alone");
+  table.add("gather_views", config.gather_views, {1, 1000}, "",
+            "most views that are joined to each side");
   table.section("pattern", [&] { describe(table, config.pattern); });
   table.section("icp", [&] { describe(table, config.icp); });
 }

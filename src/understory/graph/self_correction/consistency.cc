@@ -152,16 +152,17 @@ double chi_squared_6(double probability) {
 
 void describe(ConfigTable& table, PoseGraphConfig& config) {
   table.add("robust_loops", config.robust_loops,
-            "weigh loops by graduated non-convexity, so that wrong ones lose their weight");
+            "weight loops by graduated non-convexity, so that wrong ones lose their weight");
   table.add("inlier_probability", config.inlier_probability, {0.5, 0.9999999}, "",
-            "probability with which a right loop is kept by that");
+            "probability that this weighting keeps a right loop");
   table.add("check_consistency", config.check_consistency,
             "keep only the largest set of loops that agree in pairs over the odometry");
   table.add("consistency_probability", config.consistency_probability, {0.5, 0.9999999}, "",
             "probability with which two right loops agree");
   table.add("odometry_sigma_scale", config.odometry_sigma_scale, {0.1, 100.0}, "",
             "factor on the odometry's standard deviations when loops are compared");
-  table.add("max_iterations", config.max_iterations, {1, 10000}, "", "Levenberg-Marquardt steps");
+  table.add("max_iterations", config.max_iterations, {1, 10000}, "",
+            "most Levenberg-Marquardt steps");
   table.add("relative_tolerance", config.relative_tolerance, {1e-15, 0.1}, "",
             "stop when the cost falls by less than this share");
 }

@@ -40,18 +40,21 @@ void describe(ConfigTable& table, PairConfig& config) {
   table.add_enum(
       "rule", config.rule,
       {{"poisson_disks", PairRule::kPoissonDisks}, {"delaunay_stars", PairRule::kDelaunayStars}},
-      "how pairs are chosen: spread by Poisson disks, or by the association of Delaunay stars, "
-      "which gives the order too");
-  table.add("tested", config.tested, {1, 100'000'000}, "", "pairs of views drawn at random");
-  table.add("shortest_gap", config.shortest_gap, {1, 1'000'000}, "", "views from one to the other");
-  table.add("longest_gap", config.longest_gap, {0, 100'000'000}, "", "the same; 0: any");
+      "how pairs are chosen: spread by Poisson disks, or by the association of Delaunay stars "
+      "(this also gives the order)");
+  table.add("tested", config.tested, {1, 100'000'000}, "",
+            "number of pairs of views drawn at random");
+  table.add("shortest_gap", config.shortest_gap, {1, 1'000'000}, "",
+            "least number of views between the two of a pair");
+  table.add("longest_gap", config.longest_gap, {0, 100'000'000}, "",
+            "largest number of views between the two of a pair; 0: any");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
-            "of the views' sectors, by their poses; the paper draws from 0.2 on");
+            "least overlap of the sectors that the two views see, by their poses");
   table.add("error_m", config.error_m, {0.0, 10.0}, "m",
-            "mean match error that is acceptable without any overlap");
+            "largest mean match error of a pair without overlap");
   table.add("error_per_overlap_m", config.error_per_overlap_m, {0.0, 10.0}, "m",
-            "how much more of it is acceptable with full overlap");
-  table.add("chosen", config.chosen, {1, 1'000'000}, "", "pairs chosen of these");
+            "increase of that limit from no overlap to full overlap");
+  table.add("chosen", config.chosen, {1, 1'000'000}, "", "number of pairs chosen of those drawn");
   table.add("outlier_ratio", config.outlier_ratio, {0.0, 0.95}, "",
             "share of the stems left out of the mean match error");
 }

@@ -24,27 +24,29 @@ void describe_power(ConfigTable& table, PowerConfig& config) {
                   {"match_error", PowerCoefficient::kMatchError},
                   {"metric", PowerCoefficient::kMetric},
                   {"screw", PowerCoefficient::kScrew}},
-                 "share of a correction that a view in between gets: by its number, by the path's "
-                 "length, by the errors of the matches, by a metric, or by a screw motion");
+                 "share of a correction that a view between gets: by its number, by path length, "
+                 "by the errors of the matches, by a metric, or along a screw motion");
   table.add("metric_rotation_m2", config.metric_rotation_m2, {0.0, 1e6}, "m^2",
-            "metric: weight of a squared angle");
+            "coefficient metric: weight of a squared angle");
   table.add("metric_translation", config.metric_translation, {0.0, 1e6}, "",
-            "metric: weight of a squared distance");
+            "coefficient metric: weight of a squared distance");
 }
 
 void describe_gain(ConfigTable& table, GainConfig& config) {
-  table.add("pool", config.pool, {1, 1'000'000}, "", "pairs among which the next is chosen");
+  table.add("pool", config.pool, {1, 1'000'000}, "",
+            "number of pairs among which the next is chosen");
   table.add("window_l0", config.window_l0, {0.0, 100.0}, "stem spacings",
-            "views within that distance along the path, to each side, are joined for a match");
-  table.add("window_views", config.window_views, {1, 1000}, "", "at most that many to each side");
+            "views within this distance along the path, to each side, are joined for a match");
+  table.add("window_views", config.window_views, {1, 1000}, "",
+            "most views that are joined to each side");
   table.add("match_sd_m", config.match_sd_m, {1e-4, 10.0}, "m",
-            "what a match of gathered views with full overlap is worth");
+            "standard deviation of a match of joined views with full overlap");
   table.add("min_gain", config.min_gain, {0.0, 100.0}, "nats",
-            "it ends where no pair is expected to tell more");
+            "the correction ends when no pair has a larger expected gain of information");
   table.add("revisits", config.revisits, {0, 100}, "",
-            "rounds in which accepted pairs are matched again from the better poses");
+            "number of rounds in which accepted pairs are matched again from the better poses");
   table.add("largest_step_l0", config.largest_step_l0, {0.0, 100.0}, "stem spacings",
-            "a match that moves views farther is refused");
+            "largest motion of a view by one match; larger ones are refused");
 }
 
 }  // namespace
@@ -70,14 +72,17 @@ void describe(ConfigTable& table, SelfCorrectionConfig& config) {
                   {"medium", CorrectionOrder::kMediumGaps},
                   {"random", CorrectionOrder::kRandom},
                   {"gain", CorrectionOrder::kGain}},
-                 "powers: which gaps first, or first the pairs with the largest expected gain");
+                 "method powers: small, medium or random gaps first, or the pair with the largest "
+                 "expected gain");
   table.section("pairs", [&] { describe(table, config.pairs); });
   table.section("power", [&] { describe_power(table, config.power); });
   table.section("lattice", [&] {
-    table.add("spacing", config.lattice.spacing, {1, 1'000'000}, "", "every that many views");
-    table.add("longest_gap", config.lattice.longest_gap, {1, 1'000'000}, "", "views");
+    table.add("spacing", config.lattice.spacing, {1, 1'000'000}, "",
+              "method lattice: every so many views");
+    table.add("longest_gap", config.lattice.longest_gap, {1, 1'000'000}, "",
+              "method lattice: largest number of views between the two of a pair");
     table.add("largest_outlier_ratio", config.lattice.largest_outlier_ratio, {0.0, 1.0}, "",
-              "of a match; larger ones are refused");
+              "largest outlier ratio of a match; larger ones are refused");
   });
   table.section("gain", [&] { describe_gain(table, config.gain); });
   table.section("icp", [&] { describe(table, config.icp); });
@@ -85,14 +90,15 @@ void describe(ConfigTable& table, SelfCorrectionConfig& config) {
   table.add("min_final_overlap", config.min_final_overlap, {0.0, 1.0}, "",
             "least overlap of the views' sectors after a match");
   table.add("largest_share", config.largest_share, {0.0, 1.0}, "",
-            "corrections at most, as a share of the views (the lattice has its own number)");
+            "most corrections, as a share of the views (the lattice has its own number)");
   table.add("patience", config.patience, {1, 1'000'000}, "",
-            "it ends after that many corrections without a sharper map (powers)");
+            "method powers: ends after so many corrections without a sharper map");
   table.add("eliminate_factor", config.eliminate_factor, {0.0, 1e6}, "",
-            "views are left out of the map whose mean square distance from the trees is more than "
-            "that times the median; 0: none");
-  table.add("eliminate_share", config.eliminate_share, {0.0, 1.0}, "", "views left out at most");
-  table.add("seed", config.seed, {0, 1'000'000'000}, "", "of the pairs drawn at random");
+            "views farther from the trees than this times the median (mean square) are left out of "
+            "the map; 0: none");
+  table.add("eliminate_share", config.eliminate_share, {0.0, 1.0}, "",
+            "largest share of views that are left out");
+  table.add("seed", config.seed, {0, 1'000'000'000}, "", "seed of the pairs drawn at random");
 }
 
 CorrectionViews::CorrectionViews(const SelfCorrectionProblem& given)

@@ -141,7 +141,8 @@ void close_loops(const StemCorrectionConfig& config, SelfCorrectionProblem& prob
 }  // namespace
 
 void describe(ConfigTable& table, StemCorrectionConfig& config) {
-  table.add("close_loops", config.close_loops, "find places seen before and correct the path");
+  table.add("close_loops", config.close_loops,
+            "find places seen before and correct the path by them");
   table.section("loops", [&] { describe(table, config.loops); });
   table.section("pose_graph", [&] { describe(table, config.graph); });
   table.section("map", [&] { describe(table, config.map); });

@@ -23,11 +23,11 @@ double range_m(const Stem& stem) {
 }  // namespace
 
 void describe(ConfigTable& table, StemSightConfig& config) {
-  table.add("range_share", config.range_share, {0.0, 100.0}, "",
-            "stems that make the map are nearer than that share of the usual range; matching takes "
-            "all");
+  table.add(
+      "range_share", config.range_share, {0.0, 100.0}, "",
+      "the map is made of stems within this share of the usual range; matching uses all stems");
   table.add("score_share", config.score_share, {0.0, 1.0}, "",
-            "and surer than that share of a high score in the recording");
+            "the map is made of stems with at least this share of a high score of the recording");
 }
 
 std::vector<StemView> map_sights(const std::vector<StemView>& views,

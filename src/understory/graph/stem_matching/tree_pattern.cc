@@ -36,16 +36,17 @@ struct Votes {
 
 void describe(ConfigTable& table, TreePatternConfig& config) {
   table.add("neighbours", config.neighbours, {2, 20}, "",
-            "triangles are made of a stem and two of this many nearest");
+            "a triangle is a stem and two of so many nearest stems");
   table.add("longest_side", config.longest_side, {0.5, 20.0}, "stem spacings",
-            "longer sides are left out");
+            "longest side of a triangle");
   table.add("tolerance", config.tolerance, {0.005, 0.5}, "stem spacings",
-            "sides and heights of the same triangle agree that well");
+            "largest difference of sides and heights of two equal triangles");
   table.add("vote_cell", config.vote_cell, {0.1, 10.0}, "stem spacings",
-            "triangles that agree on the place within it vote together");
+            "triangles whose places differ by less vote together");
   table.add("triangles", config.triangles, {10, 100'000}, "",
-            "of a view, about, that are asked for");
-  table.add("candidates", config.candidates, {1, 50}, "", "places handed on to be verified");
+            "number of triangles of a view that are looked up, about");
+  table.add("candidates", config.candidates, {1, 50}, "",
+            "number of places that are verified by matching");
 }
 
 // Sets of a stem and two of its neighbours, each set once.

@@ -18,11 +18,10 @@ void describe(ConfigTable& table, ScanMatchConfig& config) {
       "min_inlier_ratio", config.min_inlier_ratio, {0.0, 1.0}, "",
       "least share of a scan's points near the map for a match to count; of sparse scans 0.05");
   table.add("min_inlier_share", config.min_inlier_share, {0.0, 1.0}, "",
-            "a match that finds less of its points than this share of what matches before it found "
-            "does not count");
+            "a match counts if it finds this share of what the matches before it found, or more");
   table.add("coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "reaches",
-            "prediction error (1 sigma) above which matches begin from far (NDT: coarse cells); "
-            "NDT's reach is its finest cell");
+            "prediction error (1 sigma) above which matches begin from far. In reaches: the finest "
+            "cell of NDT");
   table.add("prior_weight", config.prior_weight, {0.0, 1.0}, "",
             "weight of the prediction inside the match");
 }

@@ -114,8 +114,8 @@ void TrustMonitor::begin_anew() {
 void TrustMonitor::suspect(TimeNs now) {
   if (was_on_probation_) {
     return distrust(
-        "the gyroscope agrees with the lidar, but the motion that the accelerometer tells of does "
-        "not: its axes look swapped or its scale wrong",
+        "the gyroscope agrees with the lidar, and the accelerometer does not: its axes look "
+        "swapped or its scale wrong",
         force_spread() < kSuspectSpread);
   }
   if (standing_ != Standing::kUnproven || !trust_.trusted) return;
@@ -195,11 +195,11 @@ void TrustMonitor::judge_turns() {
   std::string cause;
   bool explained = true;
   if (lidar_turning_ > kEnoughTurning && gyro_turning_ > kLooksLikeDegrees * lidar_turning_) {
-    cause = "; its rates look like degrees per second";
+    cause = ". Its rates look like degrees per second";
   } else if (axes.left < limit && axes.left < kAsGood * unexplained(sums, rotation)) {
-    cause = "; its axes look swapped: to agree with the lidar they would be " + axes.text;
+    cause = ". Its axes look swapped: to agree with the lidar they would be " + axes.text;
   } else if (unexplained(sums, rotation) < limit) {
-    cause = "; the IMU looks mounted about " + degrees(Eigen::AngleAxisd(rotation).angle()) +
+    cause = ". The IMU looks mounted about " + degrees(Eigen::AngleAxisd(rotation).angle()) +
             " degrees from where its extrinsics say";
   } else if (standing_ == Standing::kUnproven) {
     return suspect(now_);
@@ -208,7 +208,7 @@ void TrustMonitor::judge_turns() {
   } else {
     // A lidar that positions itself alone and is contradicted all the same: the IMU is of no use.
     explained = on_probation();
-    cause = "; none of the ways to turn its axes explains it";
+    cause = ". No other orientation of its axes explains it";
   }
   distrust("gyroscope and lidar disagree on how the sensor turned (" +
                std::to_string(static_cast<int>(std::lround(100.0 * std::sqrt(left / all)))) +
@@ -249,7 +249,7 @@ void TrustMonitor::judge_forces() {
   if (seconds_ < (on_probation() ? kEnoughForProbation : kEnoughSeconds)) return;
   const double spread = force_spread();
   if (spread > kForceSpread)
-    distrust("gravity as the accelerometer sees it swings by " + degrees(spread) +
+    distrust("gravity as the accelerometer measures it swings by " + degrees(spread) +
                  " degrees in the world: its axes do not fit the lidar's attitude",
              !on_probation());
 }

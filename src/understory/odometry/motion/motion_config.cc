@@ -21,9 +21,9 @@ void describe_lidar(ConfigTable& table, LidarNoiseConfig& config) {
   table.add("fitness_threshold_m2", config.fitness_threshold_m2, {0.0, 100.0}, "m^2",
             "mean squared distance above which the standard deviation grows");
   table.add("fitness_scale", config.fitness_scale, {0.0, 1e6}, "1/m^4",
-            "how fast it grows with the square of the excess");
+            "growth of that standard deviation with the square of the excess");
   table.add("information_divisor", config.information_divisor, {1.0, 1e9}, "",
-            "the matcher's information is divided by this, as its points are not independent");
+            "divisor of the matcher's information, because its points are not independent");
 }
 
 void describe_imu(ConfigTable& table, ImuNoiseConfig& config) {
@@ -41,19 +41,20 @@ void describe_imu(ConfigTable& table, ImuNoiseConfig& config) {
             "standard deviation of the accelerometer's bias at switch-on");
   table.add("gravity_m_s2", config.gravity_m_s2, {9.7, 9.9}, "m/s^2", "magnitude of gravity");
   table.add("gyro_range_deg_s", config.gyro_range_deg_s, {1.0, 1e5}, "deg/s",
-            "samples beyond are saturated and dropped");
+            "larger rates are saturated and dropped");
   table.add("accel_range_m_s2", config.accel_range_m_s2, {1.0, 1e5}, "m/s^2",
-            "samples beyond are saturated and dropped");
+            "larger accelerations are saturated and dropped");
   table.add(
       "max_gap_s", config.max_gap_s, {0.001, 1.0}, "s",
-      "longest hole between IMU samples that is bridged; beyond, constant velocity stands in");
+      "longest gap between IMU samples that is bridged; over longer ones velocity is constant");
 }
 
 void describe_gate(ConfigTable& table, MotionConfig& config) {
   table.add("velocity_gate_m_s", config.velocity_gate_m_s, {0.0, 1000.0}, "m/s",
             "a match that changes the velocity by more is dropped; 0 turns the gates off");
   table.add("angular_gate_deg_s", config.angular_gate_deg_s, {0.0, 1e5}, "deg/s",
-            "the same for the turn since the last scan, against the prediction; 0 turns it off");
+            "a match that turns faster than this against the prediction is dropped; 0 turns the "
+            "gate off");
   table.add_enum("velocity_gate_reference", config.velocity_gate_reference,
                  {{"prediction", VelocityGateReference::kPrediction},
                   {"previous", VelocityGateReference::kPreviousState}},
@@ -76,12 +77,12 @@ void describe(ConfigTable& table, MotionConfig& config) {
   table.section("lidar", [&] { describe_lidar(table, config.lidar); });
   describe_gate(table, config);
   table.add("level_world", config.level_world,
-            "level the world once in the first seconds, when the vertical has become known");
+            "level the world once in the first seconds, when the vertical is known");
   table.add("motion_accel_sigma_m_s2", config.motion_accel_sigma_m_s2, {1e-3, 1e3},
-            "m/s^2/sqrt(Hz)", "acceleration of the carrier where no IMU tells of it");
+            "m/s^2/sqrt(Hz)", "acceleration of the carrier where no IMU measures it");
   table.add("motion_angular_accel_sigma_rad_s2", config.motion_angular_accel_sigma_rad_s2,
             {1e-3, 1e3}, "rad/s^2/sqrt(Hz)",
-            "angular acceleration of the carrier where no IMU tells of it");
+            "angular acceleration of the carrier where no IMU measures it");
 }
 
 Matrix6d lidar_covariance(const LidarFactor& factor, const LidarNoiseConfig& config) {

@@ -55,22 +55,22 @@ GoIcpConfig SparseOdometryConfig::small_box() {
 }
 
 void describe(ConfigTable& table, SparseOdometryConfig& config) {
-  table.add_enum("target", config.target,
-                 {{"frame", SparseOdometryConfig::Target::kFrame},
-                  {"map", SparseOdometryConfig::Target::kMap}},
-                 "what a view is matched to: the one before, or a local map of stems");
   table.add_enum(
-      "matcher", config.matcher,
-      {{"icp", SparseOdometryConfig::Matcher::kIcp},
-       {"go_icp", SparseOdometryConfig::Matcher::kGoIcp}},
-      "icp: trimmed ICP from the prediction; go_icp: before it, branch and bound in a small "
-      "box around the prediction");
+      "target", config.target,
+      {{"frame", SparseOdometryConfig::Target::kFrame},
+       {"map", SparseOdometryConfig::Target::kMap}},
+      "what a view is matched to: frame (the view before) or map (a local map of stems)");
+  table.add_enum("matcher", config.matcher,
+                 {{"icp", SparseOdometryConfig::Matcher::kIcp},
+                  {"go_icp", SparseOdometryConfig::Matcher::kGoIcp}},
+                 "icp: trimmed ICP from the prediction; go_icp: first branch and bound in a small "
+                 "box around the prediction");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
-            "share of a view's stems that must be found again; below it a search is made");
+            "share of a view's stems that must be found again; with fewer a search follows");
   table.add("map_forgetting", config.map_forgetting, {0.01, 1.0}, "",
-            "share by which a stem of the map moves to where it is seen");
+            "share by which a stem of the local map moves to its newest sight");
   table.add("map_frames", config.map_frames, {1, 10'000}, "",
-            "stems not seen for that many views leave the local map");
+            "stems that so many views did not see leave the local map");
   table.add("tilt_gain", config.tilt_gain, {0.0, 1.0}, "",
             "share of the tilt from the stems' axes taken over at each view");
   table.section("icp", [&] { describe(table, config.icp); });

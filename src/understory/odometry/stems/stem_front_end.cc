@@ -29,24 +29,26 @@ void describe(ConfigTable& table, ViewChoiceConfig& config) {
                  {{"fixed", ViewChoiceConfig::Rule::kFixed},
                   {"overlap", ViewChoiceConfig::Rule::kOverlap},
                   {"region", ViewChoiceConfig::Rule::kRegion}},
-                 "when a positioned scan is kept as a view for the map");
+                 "when a positioned scan is kept as a view of the map: after a fixed motion, by "
+                 "overlap, or by convergence region");
   table.add("distance_m", config.distance_m, {0.0, 20.0}, "m",
-            "fixed: when the body has moved that far since the last one ...");
-  table.add("turn_deg", config.turn_deg, {0.0, 180.0}, "deg", "... or turned that much");
+            "rule fixed: motion of the body since the last kept view ...");
+  table.add("turn_deg", config.turn_deg, {0.0, 180.0}, "deg", "rule fixed: ... or its turn");
   table.add("overlap", config.overlap, {0.0, 1.0}, "",
-            "overlap: when its overlap with the map of the views before has sunk to that share of "
-            "what it was after the last one");
+            "rule overlap: a view is kept when its overlap with the map falls to this share of "
+            "that after the last kept view");
   table.add("region", config.region, {0.0, 10.0}, "",
-            "region: when the motion since the last one leaves that share of the region where "
-            "matching converges");
+            "rule region: a view is kept when the motion since the last one leaves this share of "
+            "the region where matching converges");
 }
 
 void describe(ConfigTable& table, StemFrontEndConfig& config) {
   table.add("min_score", config.min_score, {0.0, 1.0}, "",
-            "probability from which on a segment counts as a stem");
-  table.add("max_range_m", config.max_range_m, {5.0, 200.0}, "m", "reach of the stem detection");
+            "least probability with which a segment counts as a stem");
+  table.add("max_range_m", config.max_range_m, {5.0, 200.0}, "m",
+            "range up to which stems are detected");
   table.add("predict_turn", config.predict_turn,
-            "a match begins where turning on as before would lead; else with the last heading");
+            "predict the next pose with the last turn going on; false: with the last heading");
   table.section("keep", [&] { describe(table, config.keep); });
   table.section("imu", [&] { describe(table, config.imu); });
   table.section("odometry", [&] { describe(table, config.odometry); });

@@ -16,13 +16,13 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 }  // namespace
 
 void describe(ConfigTable& table, StemImuConfig& config) {
-  table.add("use", config.use, "turns and up from the recording's IMU, where it has one");
+  table.add("use", config.use, "use turns and vertical of the recording's IMU, where it has one");
   table.add("gravity_time_s", config.gravity_time_s, {0.5, 600.0}, "s",
-            "over which specific force is averaged, carried along by the gyroscope");
+            "time over which specific force is averaged, carried along by the gyroscope");
   table.add("gravity_sd_deg", config.gravity_sd_deg, {0.01, 30.0}, "deg",
-            "how well up is known from it, against up by the stems");
+            "standard deviation of the vertical from it");
   table.add("bias_time_s", config.bias_time_s, {1.0, 10'000.0}, "s",
-            "over which the gyroscope's bias is taken from the matches");
+            "time over which the gyroscope's bias is taken from the matches");
 }
 
 std::optional<StemImu::Motion> StemImu::motion(const ImuBuffer& samples, TimeNs before,

@@ -25,9 +25,10 @@ StemScan between(const StampedPose& from, const StemScan& to, const Scan& scan, 
 
 void describe(ConfigTable& table, StemPaceConfig& config) {
   table.add("longest_gap_s", config.longest_gap_s, {0.0, 10.0}, "s",
-            "longest time between scans that are positioned, while the motion is even; 0: each is");
+            "longest time between positioned scans while the motion is even; 0: every scan is "
+            "positioned");
   table.add("tolerance", config.tolerance, {0.0, 1000.0}, "",
-            "how far scans between may err, in standard deviations of a match");
+            "largest error of scans between, in standard deviations of a match");
 }
 
 // Constant acceleration over a gap leads its end four times as far from even motion as its middle.

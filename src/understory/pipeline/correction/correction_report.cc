@@ -14,10 +14,11 @@ ReportCorrection correction_of(const SelfCorrectionResult& self) {
   const MapSharpness& a = self.before;
   const MapSharpness& b = self.after;
   report.figures = {
-      {"distance of a tree's sights from their mean (e_C), cm", 100.0 * a.noise_m,
-       100.0 * b.noise_m, 1},
-      {"blurred area (beta), per mille of the map", 1e3 * a.beta, 1e3 * b.beta, 2},
-      {"dimension of the map (d): 0 points, 1 lines, 2 areas", a.dimension, b.dimension, 2}};
+      {"distance of the sights of a tree from their mean, cm (e_C; small is sharp)",
+       100.0 * a.noise_m, 100.0 * b.noise_m, 1},
+      {"blurred area of the map, per mille (beta; small is sharp)", 1e3 * a.beta, 1e3 * b.beta, 2},
+      {"dimension of the map, 0 points to 2 areas (d; small is sharp)", a.dimension, b.dimension,
+       2}};
   for (const TriedCorrection& tried : self.tried)
     (tried.kept ? report.kept : report.tried).emplace_back(tried.pair.i, tried.pair.j);
   return report;
@@ -74,8 +75,8 @@ ReportInput correction_report(const StemCorrectionConfig& config, const Correcti
   if (run.truth) report.truth = compare_with_truth(trajectory, *run.truth);
   report.summary = summary;
   report.remarks.push_back(
-      "Up is known from the stems alone: over a long way the map may tilt by degrees, and heights "
-      "far apart not hold. Distances in the plane do.");
+      "The vertical is known from the stems alone. Over a long path the map may tilt by degrees. "
+      "Distances in the plane are right, heights far apart may not be.");
   report.scans = scans_of(run);
   add_loops(run, report);
   report.loop_closure_enabled = config.close_loops;

@@ -51,9 +51,9 @@ void describe(ConfigTable& table, HeadCutLogConfig& config) {
             "CSV of a harvester's felling cuts, timestamp,x,y,z of its head in the body frame; "
             "empty: none");
   table.add("reach_m", config.cuts.reach_m, {0.0, 10.0}, "m",
-            "from the head to the tree that it cut, in the plane");
+            "largest distance in the plane from the head to the tree that it cut");
   table.add("settle_s", config.cuts.settle_s, {0.0, 3600.0}, "s",
-            "a cut tree may be seen at its place for so long");
+            "longest time for which a cut tree may still be seen at its place");
 }
 
 std::vector<LoggedCut> read_head_log(const std::string& file) {

@@ -117,18 +117,18 @@ Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log
       "median, {:.2f} m in the mean",
       fit.fixes.size(), fit.path.symmetric_rms_m, fit.path.fixes_median_m, fit.path.fixes_mean_m);
   if (fit.fixes_in_time > 0 && std::isfinite(fit.along_rms_m))
-    motion.outcome.summary += fmt::format("; {:.2f} m along and {:.2f} m across the way by time",
+    motion.outcome.summary += fmt::format("; {:.2f} m along and {:.2f} m across the path by time",
                                           fit.along_rms_m, fit.across_rms_m);
   if (fit.ambiguous)
     motion.doubt(
-        fmt::format("turned round the path fits as well ({:.2f} m against {:.2f} m), and "
-                    "the times do not tell which is right",
+        fmt::format("the path fits as well the other way round ({:.2f} m against {:.2f} m), and "
+                    "the times do not show which is right",
                     fit.path.turned_rms_m, fit.path.symmetric_rms_m));
   if (fit.path.heading_sd_deg > kMostHeadingSdDeg)
     motion.doubt(fmt::format(
-        "the fixes leave the heading open by {:.1f} degrees (one standard deviation; {:.0f} at "
-        "most): the path is too short, too straight or too round for fixes that are {:.1f} m off "
-        "it; a longer way with bends is needed, or a better receiver",
+        "the heading is uncertain by {:.1f} degrees (one standard deviation; {:.0f} at most). The "
+        "path is too short, too straight or too round for fixes that are {:.1f} m off it. Take a "
+        "longer path with bends, or a better receiver",
         fit.path.heading_sd_deg, kMostHeadingSdDeg, fit.path.fixes_rms_m));
   motion.gnss = rows_of(fit);
   return motion;

@@ -39,8 +39,8 @@ void judge(const InventoryResult& inventory, const Log& log, RunSummary& summary
   if (!inventory.too_sparse) return;
   if (inventory.trees.empty()) {
     lower(RunStatus::kUntrusted,
-          "No stem could be measured: too few points lie near breast height. That the list of "
-          "trees is empty does not mean that there are none.");
+          "No stem could be measured: too few points lie near breast height. The list of trees is "
+          "empty, but the stand need not be.");
   } else {
     lower(RunStatus::kPartial,
           "Few points lie near breast height: trees are missing from the list.");

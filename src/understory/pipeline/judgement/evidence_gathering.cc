@@ -51,9 +51,8 @@ std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicRep
   std::string why;
   const auto add = [&](const std::string& what) { why += (why.empty() ? "" : "; ") + what; };
   if (facts.imu_hearing.without_place() > 0) {
-    add(fmt::format(
-        "nothing tells where it sits on the carrier for {:.1f} s; give --extrinsics FILE",
-        to_seconds(facts.imu_hearing.without_place())));
+    add(fmt::format("its place on the carrier is not known for {:.1f} s; give --extrinsics FILE",
+                    to_seconds(facts.imu_hearing.without_place())));
   }
   if (facts.imu_hearing.unusable() > 0) {
     add(fmt::format(
@@ -75,7 +74,7 @@ std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicRep
     add(fmt::format("it was silent for {:.1f} s before {} s", sensor.longest_gap_s,
                     sensor.after_longest_gap));
   }
-  return why.empty() ? "scans left before its samples came" : why;
+  return why.empty() ? "its samples came after their scans were processed" : why;
 }
 
 // Why another sensor was not used, in words.

@@ -71,9 +71,9 @@ TEST(EvidenceGathering, AnImuThatBeginsLateOrStops) {
 // A regression: the stamps were compared before their clock was mended.
 TEST(EvidenceGathering, AClockThatWasMendedIsNoLateImu) {
   const std::string ahead = gathered(103.0, 163.0, -3.0).imu.unheard_why;
-  EXPECT_EQ(ahead, "scans left before its samples came");
+  EXPECT_EQ(ahead, "its samples came after their scans were processed");
   const std::string behind = gathered(97.0, 157.0, 3.0).imu.unheard_why;
-  EXPECT_EQ(behind, "scans left before its samples came");
+  EXPECT_EQ(behind, "its samples came after their scans were processed");
   const std::string late = gathered(100.0, 156.0, 4.0).imu.unheard_why;
   EXPECT_EQ(late, "it begins 4.0 s after the lidar");
 }

@@ -34,7 +34,7 @@ bool has_to_be_a_run(const fs::path& folder) {
 
 InheritedTrust unknown(const std::string& run, const std::string& why) {
   return {RunStatus::kUntrusted,
-          {run + why + ", so nothing tells whether its result can be trusted"}};
+          {run + why + ", so it is not known whether its result can be trusted"}};
 }
 
 }  // namespace

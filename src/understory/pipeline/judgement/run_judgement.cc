@@ -59,7 +59,7 @@ class Judge {
           "`understory map --resume RUN`");
     }
     if (evidence_.cut_off) {
-      missing("the recording is cut off; what came after is missing: " + evidence_.where_cut_off);
+      missing("the recording is cut off, and the rest is missing: " + evidence_.where_cut_off);
     }
   }
 
@@ -130,15 +130,15 @@ class Judge {
     if (match.scan_motion_probes < config_.min_scan_motion_probes) return;
     const double ratio = match.scan_motion_ratio;
     if (ratio >= config_.min_scan_motion && ratio <= config_.max_scan_motion) return;
-    const char* cause = "they are wrong";
+    const char* cause = "The times are wrong";
     if (ratio < -config_.min_scan_motion) {
-      cause = "they run backwards";
+      cause = "The times run backwards";
     } else if (ratio < config_.min_scan_motion) {
-      cause = "they are too long, or the points have been deskewed already";
+      cause = "The times are too long, or the points have been deskewed already";
     }
     hurt(fmt::format(
         "the times of points do not fit the motion: within scans the sensor moves {:.1f} "
-        "times as far as from scan to scan; {}",
+        "times as far as from scan to scan. {}",
         ratio, cause));
   }
 
@@ -170,17 +170,16 @@ class Judge {
     const double slack = 3.0 * scale_deviation();
     if (scale + slack < config_.min_imu_scale || scale - slack > config_.max_imu_scale) {
       hurt(fmt::format(
-          "the path speeds up and slows down {:.2f} times as much as the accelerometer "
-          "tells of: the scale of the clouds (unit), the stamps of the scans, or the IMU's "
-          "unit, clock or lever arm is wrong",
+          "the accelerations of the path are {:.2f} times those of the accelerometer. One of these "
+          "is wrong: the scale of the clouds (unit), the stamps of the scans, or the IMU's unit, "
+          "clock or lever arm",
           scale));
     } else if (!evidence_.by_stems &&  // whose steps err by centimetres: 0.2 in good runs
                evidence_.imu_motion_correlation < config_.min_imu_correlation &&
                scatter_m_s2() > config_.max_imu_scatter_m_s2) {
       hurt(fmt::format(
-          "the path speeds up and slows down otherwise than the accelerometer tells of "
-          "(correlation {:.2f}): scans are matched wrongly, or their stamps, or the IMU's clock or "
-          "lever arm, are wrong",
+          "the accelerations of the path are not those of the accelerometer (correlation {:.2f}). "
+          "Scans are matched wrongly, or their stamps, the IMU's clock or its lever arm are wrong",
           evidence_.imu_motion_correlation));
     }
   }
@@ -193,9 +192,8 @@ class Judge {
     if (off <= config_.max_range_offset_m || off <= kSureErrors * match.range_offset_error_m)
       return;
     hurt(fmt::format(
-        "ranges seem to be {:.2f} m too {} (± {:.2f} m): only so do surfaces lie on each other "
-        "that "
-        "were seen from two places; the lidar's range offset, or how the driver counts, is wrong",
+        "ranges seem to be {:.2f} m too {} (± {:.2f} m): surfaces seen from two places agree only "
+        "then. The lidar's range offset or the driver's calibration is wrong",
         off, match.range_offset_m > 0.0 ? "long" : "short",
         std::max(0.01, match.range_offset_error_m)));
   }
@@ -209,8 +207,8 @@ class Judge {
         motion.impossible, motion.steps, percent(motion.impossible, motion.steps),
         motion.fastest_m_s, motion.hardest_m_s2,
         evidence_.times_assumed
-            ? ": the times of the clouds were assumed and are wrong; give --rate-hz or times.txt"
-            : ": the stamps of the scans or the matches are wrong"));
+            ? ". The times of the clouds were assumed and are wrong: give --rate-hz or times.txt"
+            : ". The stamps of the scans or the matches are wrong"));
   }
 
   void judge_matches() {
@@ -223,7 +221,7 @@ class Judge {
                       "are predictions{}",
                       unmatched, match.scans, percent(unmatched, match.scans),
                       evidence_.times_assumed
-                          ? "; the times of the clouds were assumed: if they lie farther apart, "
+                          ? ". The times of the clouds were assumed: if they lie farther apart, "
                             "give --rate-hz or times.txt"
                           : ""));
     }
@@ -248,10 +246,10 @@ class Judge {
           100.0 * match.few_share));
     }
     if (match.chance_share > config_.max_chance) {
-      hurt(fmt::format(
-          "over {:.0f} % of the time the points that scans found in the map lie no nearer than by "
-          "chance: the map is blurred, or its scans are matched wrongly",
-          100.0 * match.chance_share));
+      hurt(
+          fmt::format("over {:.0f} % of the time matched points lie no nearer to the map than by "
+                      "chance. The map is blurred, or its scans are matched wrongly",
+                      100.0 * match.chance_share));
     }
     if (match.blur_growth > config_.max_blur_growth) {
       hurt(fmt::format(
@@ -267,14 +265,14 @@ class Judge {
     const bool carried = evidence_.imu_used &&
                          evidence_.imu.longest_gap_s <= config_.longest_lidar_gap_s &&
                          evidence_.match.segments == 1;
-    const char* way = carried ? "told by the IMU alone" : "guessed";
+    const char* way = carried ? "measured by the IMU alone" : "guessed";
     if (lidar.longest_gap_s > config_.longest_lidar_gap_s) {
       hurt(fmt::format(
-          "the lidar was silent for {:.1f} s before {} s; the way in between was {}, so the map "
+          "the lidar was silent for {:.1f} s before {} s. The motion in between was {}, so the map "
           "before and after may be offset",
           lidar.longest_gap_s, lidar.after_longest_gap, way));
     } else if (evidence_.motion.longest_step_s > config_.longest_lidar_gap_s) {
-      hurt(fmt::format("scans lie up to {:.1f} s apart; the way from one to the next was {}",
+      hurt(fmt::format("scans lie up to {:.1f} s apart; the motion from one to the next was {}",
                        evidence_.motion.longest_step_s, way));
     }
   }
@@ -336,7 +334,7 @@ void describe(ConfigTable& table, JudgementConfig& config) {
       "untrusted: over a larger share of the time matched points lay no nearer than by chance");
   table.add(
       "max_blur_growth", config.max_blur_growth, {1.0, 1e6}, "",
-      "untrusted: matched points lie farther off at the end than at the beginning, over this");
+      "untrusted: distance of matched points at the end over that at the beginning is larger");
   table.add("longest_lidar_gap_s", config.longest_lidar_gap_s, seconds, "s",
             "untrusted: the lidar was silent for longer");
   table.add("max_smear_m", config.max_smear_m, {0.0, 100.0}, "m",
@@ -353,22 +351,22 @@ void describe(ConfigTable& table, JudgementConfig& config) {
   table.add("max_scan_motion", config.max_scan_motion, ratios, "",
             "the same: more than this share");
   table.add("min_scan_motion_probes", config.min_scan_motion_probes, {1, 1000000}, "scans",
-            "fewer scans tell nothing of it");
+            "with fewer scans the motion within scans is not judged");
   table.add("min_imu_scale", config.min_imu_scale, ratios, "",
             "untrusted: accelerations by matching are less than this share of the accelerometer's");
   table.add("max_imu_scale", config.max_imu_scale, ratios, "", "the same: more than this share");
   table.add("min_imu_windows", config.min_imu_windows, {1, 1000000}, "windows",
-            "fewer thirds of a second tell nothing of it");
+            "with fewer (thirds of a second) the scale is not judged");
   table.add("min_imu_spread_m_s2", config.min_imu_spread_m_s2, {0.0, 100.0}, "m/s^2",
-            "nor do accelerations with a smaller standard deviation");
+            "nor with accelerations of a smaller standard deviation");
   table.add("min_imu_correlation", config.min_imu_correlation, {-1.0, 1.0}, "",
-            "untrusted: accelerations by matching and by the accelerometer go together by less");
+            "untrusted: accelerations by matching and by the accelerometer correlate by less ...");
   table.add("max_imu_scatter_m_s2", config.max_imu_scatter_m_s2, {0.0, 1000.0}, "m/s^2",
-            "and differ by more");
+            "... and differ by more (standard deviation)");
   table.add("max_range_offset_m", config.max_range_offset_m, {0.0, 1000.0}, "m",
             "untrusted: all ranges seem to be too long or too short by more");
   table.add("min_range_pairs", config.min_range_pairs, {1, 1000000}, "pairs",
-            "fewer pairs of views tell nothing of it");
+            "with fewer pairs of views the ranges are not judged");
 }
 
 double smear_of(const Pose& step) {
@@ -378,7 +376,7 @@ double smear_of(const Pose& step) {
 
 std::string imu_refusal(const std::string& reason) {
   return reason +
-         "; the recording was mapped without the IMU: check how it is mounted (--extrinsics FILE), "
+         ". The recording was mapped without the IMU: check how it is mounted (--extrinsics FILE), "
          "its axes, units and clock";
 }
 

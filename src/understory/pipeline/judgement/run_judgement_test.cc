@@ -196,7 +196,7 @@ TEST(RunJudgement, AccelerationsOfTheImu) {
   RunEvidence evidence = good_run();
   for (const double scale : {limits.min_imu_scale - 0.01, limits.max_imu_scale + 0.01}) {
     evidence.imu_motion_scale = scale;
-    expect(RunStatus::kUntrusted, "times as much as the accelerometer tells of", evidence);
+    expect(RunStatus::kUntrusted, "times those of the accelerometer", evidence);
   }
   evidence.imu_motion_spread_m_s2 = limits.min_imu_spread_m_s2 - 0.01;
   expect_complete(evidence);
@@ -212,12 +212,12 @@ TEST(RunJudgement, AScaleThatIsOffByAFifthIsNoticedWhereItIsKnownWell) {
   RunEvidence evidence = good_run();
   evidence.imu_motion_scale = 1.2;
   evidence.imu_motion_correlation = 0.99;  // the scale's standard deviation is 0.01
-  expect(RunStatus::kUntrusted, "1.20 times as much", evidence);
+  expect(RunStatus::kUntrusted, "1.20 times those", evidence);
   evidence.imu_motion_correlation = 0.5;  // 0.12
   evidence.imu_motion_spread_m_s2 = 0.3;
   expect_complete(evidence);
   evidence.imu_motion_scale = 3.3;  // 0.33
-  expect(RunStatus::kUntrusted, "3.30 times as much", evidence);
+  expect(RunStatus::kUntrusted, "3.30 times those", evidence);
 }
 
 TEST(RunJudgement, HowScansFittedTheMap) {
@@ -226,7 +226,7 @@ TEST(RunJudgement, HowScansFittedTheMap) {
   expect_limit(&RunEvidence::match, &MatchEvidence::few_share, limits.max_few,
                limits.max_few + 0.01, kUntrusted, "found few of their points in the map");
   expect_limit(&RunEvidence::match, &MatchEvidence::chance_share, limits.max_chance,
-               limits.max_chance + 0.01, kUntrusted, "no nearer than by chance");
+               limits.max_chance + 0.01, kUntrusted, "no nearer to the map than by chance");
   expect_limit(&RunEvidence::match, &MatchEvidence::blur_growth, limits.max_blur_growth,
                limits.max_blur_growth + 0.01, kUntrusted, "the map blurs as it grows");
 }
@@ -236,7 +236,7 @@ TEST(RunJudgement, SilenceOfTheLidar) {
   evidence.lidar.longest_gap_s = 1.0;
   expect_complete(evidence);
   evidence.lidar.longest_gap_s = 1.1;
-  expect(RunStatus::kUntrusted, "told by the IMU alone", evidence);
+  expect(RunStatus::kUntrusted, "measured by the IMU alone", evidence);
   evidence.imu.longest_gap_s = 1.1;
   expect(RunStatus::kUntrusted, "guessed", evidence);
   evidence.by_stems = true;  // there a step that finds too few stems is judged
@@ -250,7 +250,7 @@ TEST(RunJudgement, ScansFarApart) {
   evidence.motion.longest_step_s = 1.0;
   expect_complete(evidence);
   evidence.motion.longest_step_s = 5.7;
-  expect(RunStatus::kUntrusted, "scans lie up to 5.7 s apart; the way", evidence);
+  expect(RunStatus::kUntrusted, "scans lie up to 5.7 s apart; the motion", evidence);
   evidence.imu_used = false;
   expect(RunStatus::kUntrusted, "guessed", evidence);
   evidence.lidar.longest_gap_s = 5.7;

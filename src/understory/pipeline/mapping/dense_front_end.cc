@@ -197,8 +197,8 @@ void DenseFrontEnd::leave_out_first() {
 // A new odometry from this scan on, put `about_there`, and an empty local map.
 DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_there) {
   log_.warn("map.segment",
-            fmt::format("lost at {} s: a new piece of map begins there, joined to the "
-                        "old one by no more than a guess of the way in between",
+            fmt::format("position lost at {} s: a new piece of map begins there. Its place "
+                        "relative to the old one is a guess",
                         format_seconds(scan.stamp)));
   const bool proven = odometry_->motion().imu_trust().proven;
   make_odometry(rig_);

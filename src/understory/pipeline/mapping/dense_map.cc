@@ -85,7 +85,7 @@ std::unique_ptr<MapMaker> DenseFrontEnd::map_maker(const ReadRecording& recordin
   if (traits_.scan_points == 0) {
     log_.warn("lidar.unknown",
               recording.request.recording +
-                  ": its first messages hold no scan that tells what lidar this is: nothing was "
+                  ": no scan in the first messages shows what lidar this is: no setting was "
                   "adapted to it");
   }
   if (!recording.facts.stopped) {

@@ -144,7 +144,7 @@ bool EventLoop::start_over_for_imu() {
   const bool wrong = found.verdict == ImuFinding::Verdict::kWrong;
   log_.forget_all_but(wrong ? "imu.untrusted" : "imu.probation");
   log_.info(wrong ? "the recording is mapped again from its beginning, without the IMU"
-                  : "the recording is begun anew to find out");
+                  : "the recording is started again without the IMU, to find out which is wrong");
   RunConditions& conditions = request_.conditions;
   conditions.imu_judged_s = to_seconds(front_end_->last_scan_end() - front_end_->first_scan());
   conditions.imu_doubted = !wrong;
@@ -159,7 +159,7 @@ bool EventLoop::start_over_for_stamps() {
   if (orderer_->report().streams[EventOrderer::kImu].offset == 0 || stamps_believed_) return false;
   stamps_believed_ = true;
   log_.forget_all_but("");
-  log_.info("the recording is begun anew with the IMU's own stamps");
+  log_.info("the recording is started again with the IMU's own stamps");
   start_over();
   return true;
 }

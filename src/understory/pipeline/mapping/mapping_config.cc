@@ -22,9 +22,9 @@ ConfigTable mapping_table(MappingConfig& config) {
               "farther returns do not enter the finished map");
     table.add("keyframe_thin_m", config.keyframe_thin_m, {0.0, 1.0}, "m",
               "one point per cube of this edge of each scan in it; 0: all");
-    table.add(
-        "cloud_distance_m", config.cloud_distance_m, {0.0, 100.0}, "m",
-        "weighted distance between scans whose clouds make the finished map; of sparse scans 0.1");
+    table.add("cloud_distance_m", config.cloud_distance_m, {0.0, 100.0}, "m",
+              "distance between scans whose clouds make the finished map; turns count as for "
+              "keyframes; of sparse scans 0.1");
     table.add("thin_m", config.map.thin_m, {0.0, 1.0}, "m",
               "one point per cube of this edge of the finished map; 0: all");
     table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");

@@ -58,7 +58,8 @@ ReadConfig<SparseMappingConfig> read_sparse_mapping_config(const std::string& pr
     table.read_yaml(profile_text(profile), "profile " + profile, &passed_over);
     note_yaml(table, profile_text(profile), "profile " + profile, origins);
     if (!passed_over.empty())
-      log.info("profile " + profile + ": not for stems and passed over: " + joined(passed_over));
+      log.info("profile " + profile +
+               ": these settings do not exist for stems and are ignored: " + joined(passed_over));
   });
   problems.gather([&] {
     if (file.empty()) return;

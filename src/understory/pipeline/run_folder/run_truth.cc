@@ -50,10 +50,10 @@ std::optional<ReportTruth> compare_with_truth(const Trajectory& estimate, const 
   report.ape_over_time = errors_over_time(estimate, truth, *errors, options.tolerance_s);
   options.alignment = Alignment::kSe3;
   if (const auto aligned = evaluate_trajectory(estimate, truth, options)) {
-    report.more.emplace_back("APE after SE(3) alignment",
+    report.more.emplace_back("position error after the best alignment (SE(3))",
                              fmt::format("{:.3f} m", aligned->ape_rmse_m));
   }
-  report.more.emplace_back("rotation error",
+  report.more.emplace_back("rotation error, root mean square",
                            fmt::format("{:.2f} deg", errors->ape_rotation_rmse_deg));
   return report;
 }

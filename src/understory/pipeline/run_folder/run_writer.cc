@@ -345,6 +345,8 @@ ReportInput report_of(const ReadRecording& recording, const DenseFrontEnd& sessi
   report.summary = summary;
   report.scans = trajectory.scans;
   report.sensor_period_ms = trajectory.period_ms;
+  const auto matcher = make_matcher(session.config().keyframe_map.local_map.matcher);
+  if (matcher->sums_up_points()) report.map_cell_m = matcher->reach_m();
   report.loops = report_loops(session.map());
   report.loop_closure_enabled = session.config().keyframe_map.loop_closure.enabled;
   return report;

@@ -183,9 +183,10 @@ class MessageRecording : public Recording, public ArrivalTimes {
   void warn_of_missing_place() {
     if (choice_.imu.empty() || choice_.lidar.empty() || rig_.body_from_imu) return;
     log_.warn("recording.no_imu_extrinsics",
-              file_ + ": nothing tells where the IMU (" + frames_.imu +
-                  ") sits relative to the lidar (" + frames_.lidar +
-                  "): it is not used until a transform comes that does; give --extrinsics FILE");
+              file_ + ": the place of the IMU (" + frames_.imu + ") relative to the lidar (" +
+                  frames_.lidar +
+                  ") is not known: it is not used until a transform tells it. Give --extrinsics "
+                  "FILE");
   }
 
   // A sensor that begins later than the start of the recording was looked at.
@@ -420,8 +421,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
       if (!survey_.transforms.add(each.parent, each.child, each.parent_from_child)) continue;
       if (!place_sensors()) continue;
       log_.warn("recording.late_extrinsics",
-                file_ + ": where " + each.child + " sits on " + each.parent + " is told only at " +
-                    format_seconds(log_time) + " s: sensors that hang on it are used from then on");
+                file_ + ": the place of " + each.child + " on " + each.parent + " comes only at " +
+                    format_seconds(log_time) + " s: sensors that need it are used from then on");
     }
     return true;
   }

@@ -120,7 +120,7 @@ void describe(ConfigTable& table, GicpMatcherConfig& config) {
   table.add("map_cube_m", config.map.cube_m, {0.05, 5.0}, "m",
             "a target has one point per cube of this edge");
   table.add("map_growth", config.map.growth, {0.0, 10.0}, "",
-            "share of new points at which that point is worked out again");
+            "share of new points at which that point is computed again");
 }
 
 std::unique_ptr<const Matcher> make_matcher(const GicpMatcherConfig& config) {

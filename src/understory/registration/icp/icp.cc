@@ -14,7 +14,7 @@ void describe(ConfigTable& table, IcpConfig& config) {
   table.add_enum("metric", config.metric,
                  {{"point_to_point", IcpConfig::Metric::kPointToPoint},
                   {"point_to_plane", IcpConfig::Metric::kPointToPlane}},
-                 "distance that is made small");
+                 "distance that is minimised");
   table.add("max_distance_m", config.max_distance_m, {0.05, 20.0}, "m",
             "farther neighbours are no match");
   table.add("kernel_m", config.kernel_m, {0.005, 10.0}, "m",

@@ -135,7 +135,7 @@ void describe(ConfigTable& table, IcpMatcherConfig& config) {
   table.add("map_cube_m", config.map.cube_m, {0.05, 5.0}, "m",
             "a map of keyframes has one point per cube of this edge");
   table.add("map_growth", config.map.growth, {0.0, 10.0}, "",
-            "share of new points at which that point is worked out again");
+            "share of new points at which that point is computed again");
   table.add("map_max_distance_m", config.map_max_distance_m, {0.05, 20.0}, "m",
             "max_distance_m in a map of keyframes");
 }

@@ -132,19 +132,18 @@ class NdtMatcher : public Matcher {
 
 void describe_cells(ConfigTable& table, NdtMapConfig& cells) {
   table.add("min_points", cells.min_points, {3, 1000}, "",
-            "least points of a cell that has a distribution");
+            "fewest points of a cell that has a distribution");
   table.add("growth", cells.growth, {0.0, 1.0}, "",
-            "share of new points at which a cell's distribution is worked out again");
+            "share of new points at which a cell's distribution is computed again");
   table.add("sigma_floor_m", cells.sigma_floor_m, {1e-3, 1.0}, "m",
-            "no surface is taken to be thinner");
+            "least thickness of a surface (standard deviation)");
   table.add("second_axis_weight", cells.second_axis_weight, {0.0, 1.0}, "",
             "weight of a cell's second thinnest direction");
   table.add("volume_weight", cells.volume_weight, {0.0, 1.0}, "",
             "weight of cells that are neither surface nor line");
-  table.add(
-      "near_side_line", cells.near_side_line, {0.0, 2.0}, "",
-      "the side of a stem that is seen lies before the middle of its cell by this share of the "
-      "spread; 0: in its middle");
+  table.add("near_side_line", cells.near_side_line, {0.0, 2.0}, "",
+            "the visible side of a stem lies before the middle of its cell by this share of the "
+            "spread; 0: in its middle");
   table.add("near_side_volume", cells.near_side_volume, {0.0, 2.0}, "",
             "the same of cells that are neither surface nor line");
   table.add("few_rings", cells.few_rings,

@@ -14,15 +14,16 @@ void describe(ConfigTable& table, RangeOffsetConfig& config) {
   table.add("kernel_m", config.kernel_m, {0.001, 10.0}, "m",
             "scale of the Geman-McClure kernel at the end");
   table.add("max_distance_m", config.max_distance_m, {0.01, 20.0}, "m",
-            "patches whose middles lie farther apart are no match");
+            "largest distance between the middles of two matched patches");
   table.add("max_angle_deg", config.max_angle_deg, {0.1, 90.0}, "deg",
-            "between the normals of a match");
-  table.add("min_matches", config.min_matches, {7, 1000000}, "", "fewer say nothing");
-  table.add("iterations", config.iterations, {1, 1000}, "", "steps of a pair");
+            "largest angle between the normals of two matched patches");
+  table.add("min_matches", config.min_matches, {7, 1000000}, "",
+            "with fewer matched patches a pair of views is not used");
+  table.add("iterations", config.iterations, {1, 1000}, "", "steps for one pair of views");
   table.add("guess_translation_m", config.guess_translation_m, {1e-3, 100.0}, "m",
-            "standard deviation of the way between two views");
+            "standard deviation of the known shift between two views");
   table.add("guess_rotation_deg", config.guess_rotation_deg, {1e-3, 180.0}, "deg",
-            "the same of the turn");
+            "standard deviation of the known turn between two views");
 }
 
 namespace {

@@ -10,12 +10,13 @@ namespace understory {
 
 void describe(ConfigTable& table, SurfaceViewConfig& config) {
   table.add("cell_m", config.cell_m, {0.1, 10.0}, "m", "edge of the cells of flat patches");
-  table.add("range_max_m", config.range_max_m, {1.0, 1000.0}, "m", "farther points do not count");
-  table.add("min_points", config.min_points, {4, 100000}, "", "fewer make no patch");
+  table.add("range_max_m", config.range_max_m, {1.0, 1000.0}, "m", "farther points are not used");
+  table.add("min_points", config.min_points, {4, 100000}, "", "fewest points of a patch");
   table.add("max_thickness_m", config.max_thickness_m, {0.001, 10.0}, "m",
-            "standard deviation along the normal; thicker is no patch");
+            "largest standard deviation of a patch along its normal");
   table.add("min_width", config.min_width, {0.0, 0.3}, "",
-            "middle standard deviation over the cell's edge; narrower is the trace of one ring");
+            "least width of a patch (middle standard deviation over the cell's edge); a narrower "
+            "one is the trace of one ring");
 }
 
 namespace {

@@ -227,30 +227,33 @@ void describe(ConfigTable& table, GoIcpConfig& config) {
   table.add_enum(
       "mode", config.mode,
       {{"certified", GoIcpConfig::Mode::kCertified}, {"paper", GoIcpConfig::Mode::kPaper}},
-      "certified: until the gap is closed; paper: down to ICP's convergence region");
+      "certified: until the gap is closed; paper: down to ICP's convergence region, as published");
   table.add_enum(
       "boxes", config.boxes,
       {{"elongated", GoIcpConfig::Boxes::kElongated}, {"cubes", GoIcpConfig::Boxes::kCubes}},
       "elongated: halved where points move most; cubes: on all sides at once");
-  table.add("yaw_range_deg", config.yaw_range_deg, {0.0, 180.0}, "deg", "around the guess");
+  table.add("yaw_range_deg", config.yaw_range_deg, {0.0, 180.0}, "deg",
+            "searched heading to each side of the guess");
   table.add("shift_range_m", config.shift_range_m, {0.01, 1000.0}, "m",
-            "around the guess, per horizontal axis");
+            "searched shift to each side of the guess, per horizontal axis");
   table.add("tilt_range_deg", config.tilt_range_deg, {0.0, 180.0}, "deg",
-            "around the guess, about each level axis; motion=space only");
+            "motion space: searched tilt to each side of the guess, about each level axis");
   table.add("height_range_m", config.height_range_m, {0.0, 1000.0}, "m",
-            "around the guess; motion=space only");
+            "motion space: searched height to each side of the guess");
   table.add("outlier_ratio", config.outlier_ratio, {0.0, 0.95}, "",
             "share of the source points left out, those with the largest distances");
   table.add("gap_m", config.gap_m, {0.001, 100.0}, "m",
-            "certified when no other place can have an error smaller by more than this");
-  table.add("finest_yaw_deg", config.finest_yaw_deg, {0.0, 180.0}, "deg",
-            "paper: half side of the boxes at which the search stops; 0: as far as ICP converges");
+            "certified: no other place in the range has an error smaller by more than this");
+  table.add(
+      "finest_yaw_deg", config.finest_yaw_deg, {0.0, 180.0}, "deg",
+      "mode paper: half side of the boxes at which the search stops; 0: as far as ICP converges");
   table.add("finest_shift_m", config.finest_shift_m, {0.0, 1000.0}, "m",
-            "the same of the shift; 0: as far as ICP converges");
+            "mode paper: the same of the shift; 0: as far as ICP converges");
   table.add("finest_tilt_deg", config.finest_tilt_deg, {0.0, 180.0}, "deg",
-            "the same of the tilt; 0: 8.2");
-  table.add("max_nodes", config.max_nodes, {1, 2'000'000'000}, "", "given up beyond");
-  table.add("refine", config.refine, "all six degrees of freedom by ICP at the end");
+            "mode paper: the same of the tilt; 0: 8.2 degrees");
+  table.add("max_nodes", config.max_nodes, {1, 2'000'000'000}, "",
+            "most boxes that are looked at; beyond, the search gives up");
+  table.add("refine", config.refine, "refine all six degrees of freedom by ICP at the end");
 }
 
 std::string to_string(GoIcpStatus status) {

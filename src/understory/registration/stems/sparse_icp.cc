@@ -237,13 +237,16 @@ void describe(ConfigTable& table, SparseIcpConfig& config) {
   table.add_enum(
       "metric", config.metric,
       {{"plane", SparseIcpConfig::Metric::kPlane}, {"space", SparseIcpConfig::Metric::kSpace}},
-      "plane: yaw and horizontal position; space: all six");
+      "minimised over yaw and horizontal position (plane), or over all six degrees of freedom "
+      "(space)");
   table.add("outlier_ratio", config.outlier_ratio, {0.0, 0.95}, "",
             "share of the source points left out of each step, those with the largest distances");
-  table.add("max_iterations", config.max_iterations, {1, 1000}, "", "steps of each stage");
-  table.add("step_translation_m", config.step_translation_m, {0.0, 1.0}, "m", "converged below");
-  table.add("step_rotation_rad", config.step_rotation_rad, {0.0, 1.0}, "rad", "and below");
-  table.add("refine", config.refine, "after trimming: weights by Student's t, noise estimated");
+  table.add("max_iterations", config.max_iterations, {1, 1000}, "", "most steps of each stage");
+  table.add("step_translation_m", config.step_translation_m, {0.0, 1.0}, "m",
+            "converged when a step is shorter ...");
+  table.add("step_rotation_rad", config.step_rotation_rad, {0.0, 1.0}, "rad", "... and turns less");
+  table.add("refine", config.refine,
+            "after trimming: weight pairs by Student's t with estimated noise");
   table.add("overlap_distance_ratio", config.overlap_distance_ratio, {0.001, 1.0}, "stem spacings",
             "pairs nearer than this share of the mean distance between neighbouring stems overlap");
 }

@@ -95,13 +95,16 @@ SparsePoints turn(const SparsePoints& source, const Pose& guess, double yaw) {
 }  // namespace
 
 void describe(ConfigTable& table, YawVoteConfig& config) {
-  table.add("yaw_range_deg", config.yaw_range_deg, {0.0, 180.0}, "deg", "around the guess");
-  table.add("shift_range_m", config.shift_range_m, {0.1, 100.0}, "m", "around the guess, per axis");
+  table.add("yaw_range_deg", config.yaw_range_deg, {0.0, 180.0}, "deg",
+            "searched heading to each side of the guess");
+  table.add("shift_range_m", config.shift_range_m, {0.1, 100.0}, "m",
+            "searched shift to each side of the guess, per axis");
   table.add("cell_ratio", config.cell_ratio, {0.01, 1.0}, "stem spacings",
             "side of a cell of shifts");
-  table.add("candidates", config.candidates, {1, 100}, "", "guesses handed on to ICP");
+  table.add("candidates", config.candidates, {1, 100}, "",
+            "number of guesses from which ICP starts");
   table.add("height_range_ratio", config.height_range_ratio, {0.01, 100.0}, "stem spacings",
-            "pairs whose heights differ more do not vote");
+            "largest difference of heights in a pair that votes");
 }
 
 std::vector<YawVoteCandidate> vote_yaw(const SparseTarget& target, const SparsePoints& source,
