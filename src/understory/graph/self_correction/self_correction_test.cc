@@ -19,7 +19,21 @@ namespace {
 struct Drive {
   SelfCorrectionProblem problem;
   std::vector<Pose> truth;
+  std::vector<SparsePoints> second_look;  // the same trees with other noise: no method sees it
 };
+
+SparsePoints look(const SparsePoints& trees, const Pose& world_from_view, std::mt19937& random,
+                  std::normal_distribution<double>& normal) {
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  SparsePoints view;
+  for (const Eigen::Vector3d& tree : trees) {
+    const Eigen::Vector3d p = world_from_view.inverse() * tree;
+    if (p.norm() > 32.0 || std::abs(std::atan2(p.y(), p.x())) > 1.83) continue;
+    if (unit(random) < 0.25) continue;
+    view.push_back(p + 0.03 * Eigen::Vector3d(normal(random), normal(random), normal(random)));
+  }
+  return view;
+}
 
 Drive drive(unsigned seed) {
   std::mt19937 random(seed);
@@ -40,16 +54,13 @@ Drive drive(unsigned seed) {
     const double yaw = (back ? M_PI : 0.0) + 0.9 * std::sin(0.4 * k);
     result.truth.emplace_back(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
                               Eigen::Vector3d(along, back ? 20.0 : 0.0, 0.0));
-    SparsePoints view;
-    for (const Eigen::Vector3d& tree : trees) {
-      const Eigen::Vector3d p = result.truth.back().inverse() * tree;
-      if (p.norm() > 32.0 || std::abs(std::atan2(p.y(), p.x())) > 1.83) continue;
-      if (unit(random) < 0.25) continue;
-      view.push_back(p + 0.03 * Eigen::Vector3d(normal(random), normal(random), normal(random)));
-    }
-    result.problem.views.push_back(view);
+    result.problem.views.push_back(look(trees, result.truth.back(), random, normal));
   }
   result.problem.map_views = result.problem.views;
+  std::mt19937 other(seed + 1000);
+  std::normal_distribution<double> other_normal(0.0, 1.0);
+  for (const Pose& pose : result.truth)
+    result.second_look.push_back(look(trees, pose, other, other_normal));
   Vector6d variances;
   variances << 1e-6, 1e-6, 1e-6, 4e-4, 4e-4, 4e-4;
   result.problem.world_from_view.push_back(result.truth.front());
@@ -76,6 +87,12 @@ double error_m(const std::vector<Pose>& poses, const std::vector<Pose>& truth) {
   return std::sqrt(squares / static_cast<double>(poses.size()));
 }
 
+// How sharp the map of the second look is at these poses. A correction ends where its own map is
+// sharpest, so only what it has not seen can tell that it is wrong.
+MapSharpness unseen(const Drive& seen, const std::vector<Pose>& poses) {
+  return map_sharpness(seen.second_look, poses, {}, {});
+}
+
 SelfCorrectionConfig with(CorrectionMethod method) {
   SelfCorrectionConfig config;
   config.method = method;
@@ -87,12 +104,14 @@ SelfCorrectionConfig with(CorrectionMethod method) {
 TEST(SelfCorrection, EveryMethodSharpensTheMapAndNoneBlursIt) {
   const Drive seen = drive(5);
   const double before = error_m(seen.problem.world_from_view, seen.truth);
+  const MapSharpness blurred = unseen(seen, seen.problem.world_from_view);
   for (const CorrectionMethod method :
        {CorrectionMethod::kPowers, CorrectionMethod::kPoseGraph, CorrectionMethod::kGaussianProcess,
         CorrectionMethod::kExpectedGain}) {
     const SelfCorrectionResult result = self_correct(seen.problem, with(method));
-    EXPECT_LT(result.after.beta, result.before.beta) << static_cast<int>(method);
-    EXPECT_LT(result.after.noise_mean_m, 0.9 * result.before.noise_mean_m);
+    const MapSharpness sharp = unseen(seen, result.world_from_view);
+    EXPECT_LT(sharp.beta, 0.9 * blurred.beta) << static_cast<int>(method);
+    EXPECT_LT(sharp.noise_mean_m, 0.7 * blurred.noise_mean_m) << static_cast<int>(method);
     const double share = method == CorrectionMethod::kPowers ? 1.0 : 0.7;
     EXPECT_LT(error_m(result.world_from_view, seen.truth), share * before)
         << static_cast<int>(method);
@@ -128,7 +147,9 @@ TEST(SelfCorrection, PowersTakeTheirPairsInAnyOrderAskedFor) {
     config.order = order;
     config.patience = 100;
     const SelfCorrectionResult result = self_correct(seen.problem, config);
-    EXPECT_LT(result.after.beta, result.before.beta);
+    const MapSharpness sharp = unseen(seen, result.world_from_view);
+    const MapSharpness blurred = unseen(seen, seen.problem.world_from_view);
+    EXPECT_LT(sharp.noise_mean_m, 0.7 * blurred.noise_mean_m);
     for (const TriedCorrection& tried : result.tried)
       gaps[order].push_back(tried.pair.gap());
   }
@@ -149,7 +170,8 @@ TEST(SelfCorrection, PairsChosenByTheirStarsMendTheMap) {
   const SelfCorrectionResult disks = self_correct(seen.problem, config);
   config.pairs.rule = PairRule::kDelaunayStars;
   const SelfCorrectionResult stars = self_correct(seen.problem, config);
-  EXPECT_LT(stars.after.beta, stars.before.beta);
+  EXPECT_LT(unseen(seen, stars.world_from_view).noise_mean_m,
+            0.9 * unseen(seen, seen.problem.world_from_view).noise_mean_m);
   EXPECT_LT(error_m(stars.world_from_view, seen.truth), 0.7 * before);
   ASSERT_EQ(stars.tried.size(), 20U);
   const auto mean_gap = [](const SelfCorrectionResult& result) {
@@ -163,6 +185,34 @@ TEST(SelfCorrection, PairsChosenByTheirStarsMendTheMap) {
   EXPECT_GT(std::count_if(stars.tried.begin(), stars.tried.end(),
                           [](const auto& tried) { return tried.accepted; }),
             15);
+}
+
+// A map that is bent by the powers of one motion, and the true pose of its last view in its first.
+TEST(SelfCorrection, PowersOfTheTrueMatchStraightenABentMapAndOfTheWrongSignBlurIt) {
+  const Drive seen = drive(11);
+  const auto last = static_cast<int>(seen.truth.size()) - 1;
+  Vector6d bend;
+  bend << 0.0, 0.0, 0.02, 0.6, -0.4, 0.0;
+  const Pose& first = seen.truth.front();
+  std::vector<Pose> bent;
+  for (int k = 0; k <= last; ++k) {
+    const Pose share = Pose::exp(static_cast<double>(k) / last * bend);
+    bent.push_back(first * share * first.inverse() * seen.truth[static_cast<std::size_t>(k)]);
+  }
+  const Pose right = first.inverse() * seen.truth.back();
+  const Pose wrong = Pose::exp(2.0 * bend) * right;  // as far from what is believed, away from it
+  PowerConfig config;
+  config.coefficient = PowerCoefficient::kIndex;
+  const auto noise_after = [&](const Pose& match) {
+    std::vector<Pose> poses = bent;
+    apply_power_correction(poses, seen.problem.step_errors, 0, last, match, config);
+    return unseen(seen, poses).noise_mean_m;
+  };
+  const double before = unseen(seen, bent).noise_mean_m;
+  const double best = unseen(seen, seen.truth).noise_mean_m;
+  EXPECT_LT(best, 0.6 * before);
+  EXPECT_NEAR(noise_after(right), best, 1e-6);
+  EXPECT_GT(noise_after(wrong), 1.1 * before);
 }
 
 TEST(SelfCorrection, AMapThatIsRightIsLeftAlone) {
