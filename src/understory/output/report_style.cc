@@ -49,7 +49,7 @@ table.sort th:hover{color:var(--line)}
 pre{overflow:auto;font-size:.82rem;max-height:480px}
 .files code{white-space:nowrap}
 @media (max-width:640px){svg.map text{font-size:38px}.panels text{font-size:34px}main{padding:12px 8px 40px}section{padding:12px}
-.wide svg.plot{min-width:600px}.tiles{grid-template-columns:repeat(auto-fit,minmax(130px,1fr))}.tile b{white-space:normal}}
+.wide svg.plot{min-width:860px}.tiles{grid-template-columns:repeat(auto-fit,minmax(130px,1fr))}.tile b{white-space:normal}}
 li,p,td,summary,figcaption{overflow-wrap:anywhere}.wide td,.wide th,.scroll td{overflow-wrap:normal}
 .warn{margin:0;padding-left:1.2rem}.so{color:var(--soft)}
 summary{cursor:pointer;font-weight:600}
