@@ -200,15 +200,21 @@ class Judge {
 
   void judge_motion() {
     const MotionEvidence& motion = evidence_.motion;
-    if (share(motion.impossible, motion.steps) <= config_.max_impossible) return;
-    hurt(fmt::format(
+    const double impossible = share(motion.impossible, motion.steps);
+    if (impossible <= config_.max_misplaced) return;
+    const std::string found = fmt::format(
         "{} of {} steps from scan to scan ({:.1f} %) are motions that no carrier makes (up to "
-        "{:.0f} m/s and {:.0f} m/s^2){}",
+        "{:.0f} m/s and {:.0f} m/s^2)",
         motion.impossible, motion.steps, percent(motion.impossible, motion.steps),
-        motion.fastest_m_s, motion.hardest_m_s2,
-        evidence_.times_assumed
-            ? ". The times of the clouds were assumed and are wrong: give --rate-hz or times.txt"
-            : ". The stamps of the scans or the matches are wrong"));
+        motion.fastest_m_s, motion.hardest_m_s2);
+    if (evidence_.times_assumed) {
+      hurt(found +
+           ". The times of the clouds were assumed and are wrong: give --rate-hz or times.txt");
+    } else if (impossible > config_.max_impossible) {
+      hurt(found + ". The stamps of the scans or the matches are wrong");
+    } else {
+      missing(found + ". Single scans are at wrong places in the map");
+    }
   }
 
   void judge_matches() {
@@ -341,8 +347,10 @@ void describe(ConfigTable& table, JudgementConfig& config) {
             "untrusted: points have no times and are smeared by more, 10 m away");
   table.add("max_repeated", config.max_repeated, shares, "",
             "untrusted: a larger share of the scans holds the same points as the scan before");
+  table.add("max_misplaced", config.max_misplaced, shares, "",
+            "partial: a larger share of the steps is a motion that no carrier makes");
   table.add("max_impossible", config.max_impossible, shares, "",
-            "untrusted: a larger share of the steps is a motion that no carrier makes");
+            "untrusted: the same; where times were assumed, max_misplaced is the limit");
   const ConfigTable::Range ratios{-1e6, 1e6};
   table.add(
       "min_scan_motion", config.min_scan_motion, ratios, "",

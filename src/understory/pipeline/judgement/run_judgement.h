@@ -26,8 +26,12 @@ struct JudgementConfig {
   double max_blur_growth = 1.15;
   double longest_lidar_gap_s = 1.0;
   double max_smear_m = 0.05;
-  double max_repeated = 0.01;    // share of the scans; no lidar sees the same twice
-  double max_impossible = 0.01;  // share of the steps, see MotionLimits
+  double max_repeated = 0.01;  // share of the scans; no lidar sees the same twice
+  // Share of the steps, see MotionLimits. A scan at a wrong place makes two or three such steps.
+  // Beyond the first share the run is partial; beyond the second, or where the times of the scans
+  // were assumed, it is untrusted.
+  double max_misplaced = 0.01;
+  double max_impossible = 0.04;
   // Motion within scans over motion between them, see ScanMotion: 1 is right.
   double min_scan_motion = 0.4;
   double max_scan_motion = 1.8;

@@ -136,8 +136,13 @@ TEST(RunJudgement, Matches) {
   expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::repeated, 10, 11,
                                              kUntrusted, "hold the same points as the scan before");
   expect_limit<MotionEvidence, std::uint64_t>(&RunEvidence::motion, &MotionEvidence::impossible, 9,
-                                              10, kUntrusted,
-                                              "stamps of the scans or the matches are wrong");
+                                              10, RunStatus::kPartial,
+                                              "Single scans are at wrong places");
+  RunEvidence jumps = good_run();
+  jumps.motion.impossible = 39;
+  expect(RunStatus::kPartial, "Single scans are at wrong places", jumps);
+  jumps.motion.impossible = 40;
+  expect(kUntrusted, "stamps of the scans or the matches are wrong", jumps);
   RunEvidence pieces = good_run();
   pieces.match.segments = 2;
   pieces.match.first_lost = "17.5";
