@@ -12,35 +12,16 @@
 #include <unordered_map>
 #include <vector>
 
+#include "understory/forest/forest_constants.h"
+
 namespace understory {
 namespace {
+
+using namespace forest_constants::cloud_shape;
 
 using Eigen::Vector3d;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kMostPoints = 400'000;
-constexpr double kCellsAcross = 24.0;
-constexpr double kPointsPerCell = 64.0;   // or cells become larger
-constexpr std::size_t kLeastPoints = 16;  // in a cell
-constexpr std::size_t kLeastSteps = 100;  // between cells
-
-// Thresholds, see docs/method/forest.md.
-constexpr double kSmooth = 0.2;
-constexpr double kRough = 0.3;
-constexpr double kClearly = 1.8;
-constexpr double kThinnest = 3.0;        // a slice has no ground
-constexpr double kThinnestShare = 0.02;  // of the longest side
-constexpr double kSteepestDeg = 50.0;
-constexpr double kLeastLeanDeg = 12.0;
-constexpr double kLeastGain = 1.42;
-constexpr double kLeastGainOverZ = 1.12;
-constexpr double kTallForMetres = 42.0;
-constexpr double kTallest = 150.0;
-constexpr double kTallestCentimetres = 4'500.0;
-constexpr double kMostAlone = 0.8;
-constexpr double kWidestDegrees = 0.05;  // 5 km; as metres narrower than a stem
-constexpr double kLeastHeight = 2.0;
-constexpr double kCube = 3.0;
 
 double quantile(std::vector<double>& values, double share) {
   if (values.empty()) return kNan;
@@ -152,7 +133,6 @@ double column_height_of(const Columns& columns) {
         if (std::isfinite(next)) rises.push_back(std::abs(next - here));
     }
   }
-  constexpr std::size_t kLeastColumns = 4;
   if (heights.size() < kLeastColumns) return kNan;
   const double rise = rises.empty() ? 0.0 : quantile(rises, 0.75);
   return std::max(0.0, quantile(heights, 0.9) - 2.0 * rise);

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "understory/forest/cell_grid.h"
+#include "understory/forest/forest_constants.h"
 #include "understory/forest/ground/canopy.h"
 #include "understory/forest/stems/slice_thinner.h"
 #include "understory/forest/stems/stem_fit.h"
@@ -15,8 +16,7 @@
 namespace understory {
 namespace {
 
-constexpr double kAreaCell = 2.0;
-constexpr double kHighest = 120.0;  // metres above the ground: no tree
+using namespace forest_constants::inventory;
 
 // What the third run through the cloud gathers.
 struct Gathered {
@@ -105,7 +105,6 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
 // NaN where the tree may go on above the scanner's view.
 std::vector<double> heights_in_view(const InventoryResult& result, const TreeColumns& columns,
                                     double slices_end_m, const SeenTest& in_view) {
-  constexpr double kMargin = 1.0;  // metres over a top that have to be seen empty
   std::vector<double> heights;
   for (std::size_t i = 0; i < result.stems.size(); ++i) {
     double height = columns.top(i, slices_end_m);
@@ -201,8 +200,8 @@ InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& 
       trees_of(result, heights_in_view(result, columns, config.stems.highest_m, in_view));
   remark(gathered, config, result);
   tell("segments", 5.0);
-  constexpr double kReach = 1.5;
-  result.segments = collect_segments(cloud, result.ground, result.trees, config.segments, kReach);
+  result.segments =
+      collect_segments(cloud, result.ground, result.trees, config.segments, kSegmentReach);
   tell("segments", 6.0);
   return result;
 }

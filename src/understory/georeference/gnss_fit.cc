@@ -4,10 +4,13 @@
 #include <cmath>
 #include <iterator>
 
+#include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
+
+using namespace georeference_constants::gnss_fit;
 
 using Eigen::Vector3d;
 
@@ -21,7 +24,6 @@ std::optional<Vector3d> place_at(const std::vector<StampedPose>& trajectory, con
   if (after->stamp == stamp) return after->world_from_body * arm;
   if (after == trajectory.begin()) return std::nullopt;
   const auto before = std::prev(after);
-  constexpr double kGapS = 2.0;
   const double gap = to_seconds(after->stamp - before->stamp);
   if (gap > kGapS) return std::nullopt;
   const double u = to_seconds(stamp - before->stamp) / gap;
@@ -50,8 +52,6 @@ double time_rms_m(const std::vector<std::optional<Vector3d>>& places,
 // Fix minus antenna along and across the way, where the carrier moved within some seconds.
 void tell_along_and_across(const std::vector<std::optional<Vector3d>>& places,
                            const std::vector<Vector3d>& fixes, GnssFit& fit) {
-  constexpr std::size_t kReach = 12;  // fixes before and after, for the direction
-  constexpr double kLeastM = 2.0;
   double along = 0.0;
   double across = 0.0;
   double count = 0.0;
@@ -94,13 +94,11 @@ std::vector<FittedFix> fixes_on_path(const std::vector<GnssFix>& fixes,
 void decide_by_time(const std::vector<Vector3d>& path,
                     const std::vector<std::optional<Vector3d>>& places,
                     const std::vector<Vector3d>& fixes, PathFitConfig config, GnssFit& fit) {
-  constexpr double kAlike = 1.3;
   if (fit.path.turned_rms_m > kAlike * fit.path.symmetric_rms_m) return;
   const auto in_time = static_cast<std::size_t>(
       std::count_if(places.begin(), places.end(), [](const auto& p) { return p.has_value(); }));
   const double here = time_rms_m(places, fixes, fit.path.target_from_source);
   const double turned = time_rms_m(places, fixes, fit.path.turned_target_from_source);
-  constexpr double kClearly = 0.7;
   if (2 * in_time < fixes.size() || std::min(here, turned) > kClearly * std::max(here, turned)) {
     fit.ambiguous = true;
   } else if (turned < here) {

@@ -10,18 +10,19 @@
 #include <map>
 #include <utility>
 
+#include "understory/georeference/georeference_constants.h"
 #include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
 
+using namespace georeference_constants::path_fit;
+
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kNowhere = 1e9;    // no limit to how far a nearest point may be
-constexpr double kOtherDeg = 20.0;  // motions that differ by more are different answers
-constexpr double kLeastWidthM = 0.2;
+constexpr double kNowhere = 1e9;  // no limit to how far a nearest point may be
 
 struct Motion {
   double yaw = 0.0;
@@ -301,8 +302,6 @@ double independent_fixes(const std::vector<Vector3d>& path, const std::vector<Ve
     return sum;
   };
   const double variance = product(0);
-  constexpr double kNoMore = 0.05;
-  constexpr std::size_t kLongestLag = 5'000;
   double time = 1.0;
   for (std::size_t lag = 1; variance > 0.0 && lag < std::min(kLongestLag, errors.size() / 3);
        ++lag) {
@@ -318,9 +317,6 @@ double independent_fixes(const std::vector<Vector3d>& path, const std::vector<Ve
 // flat profiles. Half of the wider side and the narrower one, at most 90 degrees.
 double heading_sd_deg(const Fitter& fitter, const Motion& best, double width_m,
                       double independent) {
-  constexpr double kLeastNoiseM = 0.02;
-  constexpr double kFirstDeg = 0.25;
-  constexpr double kMostDeg = 90.0;
   constexpr int kSteps = 15;
   const double value = Fitter::value_of(fitter.pairs(best), width_m);
   const double noise_m2 = std::max(value, kLeastNoiseM * kLeastNoiseM);
@@ -380,13 +376,11 @@ void tell_path(const std::vector<Vector3d>& path, const std::vector<Vector3d>& f
 PathFit fit_path(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
                  const PathFitConfig& config) {
   PathFit fit;
-  constexpr std::size_t kLeast = 3;
-  constexpr double kLeastExtentM = 5.0;
-  if (path.size() < kLeast || fixes.size() < kLeast || extent_m(path) < kLeastExtentM ||
-      extent_m(fixes) < kLeastExtentM) {
+  if (path.size() < kFewestPoints || fixes.size() < kFewestPoints ||
+      extent_m(path) < kLeastExtentM || extent_m(fixes) < kLeastExtentM) {
     fit.reason = fmt::format(
         "expected two paths of at least {} points and {:g} m; there are {} points and {} fixes",
-        kLeast, kLeastExtentM, path.size(), fixes.size());
+        kFewestPoints, kLeastExtentM, path.size(), fixes.size());
     return fit;
   }
   const auto ends = starts(path, fixes, config.yaw_starts);

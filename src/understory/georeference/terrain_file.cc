@@ -16,14 +16,16 @@
 
 #include "understory/geometry/quiet_gdal.h"
 #include "understory/georeference/coordinate_system.h"
+#include "understory/georeference/georeference_constants.h"
 #include "understory/util/error.h"
 #include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {
 
+using namespace georeference_constants::terrain_file;
+
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-constexpr double kMostCells = 1e8;  // a region larger than any run
 
 // An opened raster: cells of `width` times `height` (north up), in its own coordinates.
 class TerrainFile {

@@ -9,16 +9,17 @@
 #include <set>
 #include <utility>
 
+#include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
 
+using namespace georeference_constants::terrain_fit;
+
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr std::size_t kLeastPoints = 10;
-constexpr double kLeastWidthM = 0.05;
 constexpr double kFixed = 1e-9;  // standard deviation of what is kept
 
 // A point with terrain below it, moved by the motion so far.

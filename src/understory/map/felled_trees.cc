@@ -5,11 +5,14 @@
 #include <optional>
 
 #include "understory/graph/loops/view_cone.h"
+#include "understory/map/map_constants.h"
 #include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
+
+using namespace map_constants::felled_trees;
 
 // What one view says of one tree.
 struct Sight {
@@ -70,7 +73,6 @@ std::vector<FelledTree> felled_trees(const std::vector<StemView>& views,
                                      const std::vector<MappedStem>& trees,
                                      const FelledConfig& config) {
   UNDERSTORY_CHECK(views.size() == world_from_body.size());
-  constexpr double kSameTreeM = 0.6;
   std::vector<SparsePoints> points;
   for (const StemView& view : views)
     points.push_back(points_of(view));

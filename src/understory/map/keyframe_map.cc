@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/map/map_constants.h"
 #include "understory/util/error.h"
 #include "understory/util/timing.h"
 
@@ -59,7 +60,9 @@ KeyframeMap::KeyframeMap(const Config& config, const std::filesystem::path& fold
       loops_(config.loop_closure, config.local_map) {}
 
 namespace {
-constexpr std::size_t kCachedKeyframes = 150;
+
+using namespace map_constants::keyframe_map;
+
 constexpr const char* kPointsFile = "keyframe_points.bin";
 }  // namespace
 

@@ -9,11 +9,14 @@
 
 #include "understory/geometry/alpha_shape.h"
 #include "understory/graph/loops/view_cone.h"
+#include "understory/map/map_constants.h"
 #include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
+
+using namespace map_constants::stem_map;
 
 // A tree while it is gathered (Welford's running moments).
 struct Gathered {
@@ -217,11 +220,9 @@ std::vector<int> chances(const std::vector<Gathered>& trees, const std::vector<S
 // Two trees side by side are seen together now and then; the two images of one tree that a bent
 // path makes are not, as a view has only one of them.
 bool same_tree(const Gathered& a, const Gathered& b, int chances) {
-  constexpr double kEnough = 3.0;  // views that should have seen both, if they were two
-  constexpr double kFew = 0.1;     // of these
   const double expected = static_cast<double>(a.views.size()) *
                           static_cast<double>(b.views.size()) / std::max(1, chances);
-  if (expected < kEnough) return false;
+  if (expected < kEnoughViews) return false;
   std::vector<int> both;
   std::set_intersection(a.views.begin(), a.views.end(), b.views.begin(), b.views.end(),
                         std::back_inserter(both));

@@ -130,6 +130,18 @@ inline constexpr double kLargestGyroBias = 0.1;
 inline constexpr double kForceTolerance = 0.5;
 }  // namespace initial_state
 
+namespace window_smoother {  // odometry/imu/window_smoother.cc
+// steps a state among the first 30, whose linearisation may be far off [chosen]
+inline constexpr int kFirstIterations = 5;
+// rad/s: a bias that has moved farther has its motion integrated again; below, the linear
+// correction is good to far less than the noise [bound: second order of the correction]
+inline constexpr double kGyroBiasShift = 1e-3;
+// m/s^2: the same [bound: second order of the correction]
+inline constexpr double kAccelBiasShift = 2e-2;
+// Units of the tangent: a smaller step has no consequence [bound: rounding]
+inline constexpr double kConverged = 1e-7;
+}  // namespace window_smoother
+
 namespace motion_scale {  // odometry/motion/motion_scale.cc
 // s over which accelerations are compared: three scans at 10 Hz [chosen]
 inline constexpr double kWindowS = 0.29;

@@ -4,15 +4,14 @@
 #include <cmath>
 #include <limits>
 
+#include "understory/forest/forest_constants.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
-constexpr float kFall = 0.02F;      // metres gained per step and step: gravity times step squared
-constexpr float kDamping = 0.98F;   // of the speed
-constexpr float kPull = 0.7F;       // of the way to the mean of the neighbours, per stiffness
-constexpr float kSettled = 0.002F;  // metres: the largest movement of a cloth at rest
+using namespace forest_constants::cloth;
+
 constexpr std::size_t kRowGrain = 16;
 
 class Cloth {

@@ -6,12 +6,15 @@
 #include <limits>
 
 #include "understory/forest/cell_grid.h"
+#include "understory/forest/forest_constants.h"
 #include "understory/forest/ground/cloth.h"
 #include "understory/forest/ground/low_noise.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
+
+using namespace forest_constants::ground;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
@@ -33,7 +36,6 @@ struct MeanCell {
 
 // The lowest point of a cell that another one lies near above; the lowest if there is none.
 float supported_height(const LowCell& cell) {
-  constexpr float kNear = 0.4F;
   for (std::size_t i = 0; i + 1 < cell.z.size(); ++i) {
     if (cell.z[i + 1] - cell.z[i] <= kNear) return cell.z[i];
   }
@@ -43,7 +45,6 @@ float supported_height(const LowCell& cell) {
 // The lowest height of each cell that is no stray point below the ground: one far under its
 // neighbours gives way to the next.
 std::vector<float> floor_heights(const Raster& grid, const std::vector<LowCell>& low) {
-  constexpr float kStrayDepth = 0.8F;
   std::vector<float> supported(low.size());
   std::transform(low.begin(), low.end(), supported.begin(), supported_height);
   std::vector<float> result(low.size(), kNan);

@@ -2,13 +2,12 @@
 
 #include <cmath>
 
+#include "understory/forest/forest_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kLeastShare = 0.01;  // of the fullest metre: less is a gap or a few ghosts
-constexpr double kDrop = 5.0;         // times the points of any metre in the sky above: a top
-constexpr int kSky = 8;               // metres that tell how many ghosts there are above a tip
-constexpr double kSigmas = 4.0;       // by which a tip's points are more than those
+using namespace forest_constants::height_column;
 
 }  // namespace
 

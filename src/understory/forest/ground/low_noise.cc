@@ -8,14 +8,12 @@
 #include <vector>
 
 #include "understory/forest/cell_grid.h"
+#include "understory/forest/forest_constants.h"
 
 namespace understory {
 namespace {
 
-constexpr double kCell = 2.0;
-constexpr double kStep = 0.5;          // half a layer
-constexpr std::uint32_t kLeast = 4;    // points that make a layer
-constexpr double kLeastShare = 0.004;  // of the points of its cell
+using namespace forest_constants::low_noise;
 
 // How many points a cell has by height, in steps, ascending.
 struct Column {
@@ -64,7 +62,6 @@ LowNoise::LowNoise(const PointBlocks& cloud) {
 }
 
 bool LowNoise::holds(const Eigen::Vector3d& point) const {
-  constexpr double kMargin = 0.5;
   return point.z() < lowest_.cell_value(point.x(), point.y()) - kMargin;  // false for NaN
 }
 

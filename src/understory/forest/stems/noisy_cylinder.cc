@@ -6,18 +6,16 @@
 #include <cmath>
 #include <cstdint>
 
+#include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/stem_axis.h"
 
 namespace understory {
 namespace {
 
+using namespace forest_constants::noisy_cylinder;
+
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
-constexpr double kLeastScatter = 0.004;
-constexpr double kMostScatter = 0.06;
-constexpr int kViews = 24;           // directions from which a stem may have been seen
-constexpr double kLeastView = 1e-4;  // share of a direction that gave nothing
 
 // exp(x) for x <= 0 to nine digits, a quarter of the library's time: the fit is made of these.
 double quick_exp(double x) {

@@ -4,12 +4,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/stem_axis.h"
 
 namespace understory {
 namespace {
 
-constexpr double kCell = 1.0;
+using namespace forest_constants::ring_linker;
 
 // A straight line through two rings, or a vertical one through one.
 struct Line {

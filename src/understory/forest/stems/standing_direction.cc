@@ -9,25 +9,15 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "understory/forest/forest_constants.h"
+
 namespace understory {
 namespace {
 
+using namespace forest_constants::standing_direction;
+
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double kVoxel = 0.2;  // one point each, or what is near would count most
-constexpr double kGroundCell = 2.0;
-constexpr double kAboveGround = 1.5;
-constexpr std::size_t kMostVoxels = 60'000;
-constexpr std::size_t kLeastVoxels = 2'000;
-constexpr double kFarthestDeg = 72.0;
-constexpr double kNearZDeg = 6.0;
-constexpr double kCoarseCell = 1.0;
-constexpr double kCoarseDeg = 6.0;
-constexpr double kCell = 0.5;
-constexpr std::size_t kFinalists = 4;
-constexpr int kApart = 3;  // cells, to those that are compared with
-constexpr double kMostCells = 4e6;
 
 std::uint64_t key_of(const Vector3d& point, double edge) {
   std::uint64_t key = 0;

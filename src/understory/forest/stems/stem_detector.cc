@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/circle_search.h"
 #include "understory/forest/stems/ring_linker.h"
 #include "understory/forest/stems/stem_fit.h"
@@ -11,6 +12,8 @@
 
 namespace understory {
 namespace {
+
+using namespace forest_constants::stem_detector;
 
 // Points by square of the ground, to gather those around a stem: sorts them, so that those of a
 // square, and of squares side by side, follow each other.
@@ -111,18 +114,21 @@ std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
 // line through scattered points has.
 double max_clutter(const StemFitResult& fit, double lean_deg) {
   const auto rings = static_cast<double>(fit.stem.slices.size());
-  if (lean_deg > 8.0) return 0.25;
-  const double limit = std::min(0.65, 0.34 + 0.085 * std::max(0.0, rings - 2.0));
-  return fit.evidence.scatter_m > 0.029 && rings < 6.0 ? std::min(limit, 0.4) : limit;
+  if (lean_deg > kSteepLeanDeg) return kSteepClutter;
+  const double limit =
+      std::min(kMostClutter, kClutterOfTwo + kClutterPerRing * std::max(0.0, rings - 2.0));
+  const bool noisy = fit.evidence.scatter_m > kNoisyScatter && rings < kFewRings;
+  return noisy ? std::min(limit, kNoisyClutter) : limit;
 }
 
 // A slim column of points that stands alone: with a thin stem and noisy ranges its inside fills up,
 // but nothing else looks like that.
 bool stands_alone(const StemFitResult& fit, double slices_between, double lean_deg) {
   const StemEvidence& e = fit.evidence;
-  return fit.stem.radius_m <= 0.1 && e.outside_ratio <= 0.12 && lean_deg <= 10.0 &&
-         fit.stem.highest_m - fit.stem.lowest_m >= 1.5 && e.slices >= 0.85 * slices_between &&
-         e.even_arc_deg >= 90.0 && e.scatter_m <= 0.4 * fit.stem.radius_m + 0.006;
+  return fit.stem.radius_m <= kSlimRadius && e.outside_ratio <= kAloneOutside &&
+         lean_deg <= kAloneLeanDeg && fit.stem.highest_m - fit.stem.lowest_m >= kAloneExtent &&
+         e.slices >= kAloneSlices * slices_between && e.even_arc_deg >= kAloneArcDeg &&
+         e.scatter_m <= 0.4 * fit.stem.radius_m + 0.006;
 }
 
 // Is it a stem, or a bush that a cone happens to fit?
@@ -136,26 +142,29 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
   const double extent = stem.highest_m - stem.lowest_m;
   // Steep leans are rare, and a line through scattered points leans as it likes: they have to be
   // better supported.
-  const double wanted_returns = config.min_returns * (1.0 + std::pow(lean_deg / 8.0, 2));
+  const double wanted_returns = config.min_returns * (1.0 + std::pow(lean_deg / kSteepLeanDeg, 2));
   const double slices_between = std::floor(stem.highest_m / config.slice_m) -
                                 std::floor(stem.lowest_m / config.slice_m) + 1.0;
   if (dbh < config.min_dbh_m || dbh > config.max_dbh_m || lean_deg > config.max_lean_deg ||
       e.returns < wanted_returns || e.slices < config.min_slices ||
-      e.slices < 0.6 * slices_between || extent < std::max(0.7, 2.0 * cut.thickness_m) ||
-      stem.lowest_m > kBreastHeight + 0.3 ||  // a branch or a crown, not a stem
+      e.slices < kLeastSliceShare * slices_between ||
+      extent < std::max(kLeastExtent, 2.0 * cut.thickness_m) ||
+      stem.lowest_m > kBreastHeight + kBeginsAbove ||  // a branch or a crown, not a stem
       stem.arc_deg < config.min_arc_deg ||
-      e.even_arc_deg < std::max(0.8 * config.min_arc_deg, 0.35 * stem.arc_deg) ||
-      dbh_sd > 0.01 + 0.08 * dbh) {
+      e.even_arc_deg < std::max(0.8 * config.min_arc_deg, kEvenArcShare * stem.arc_deg) ||
+      dbh_sd > kDbhSd + kDbhSdShare * dbh) {
     return false;
   }
   if (stands_alone(fit, slices_between, lean_deg)) return true;
   // Where points are many, a stem shows in thin slices; what only thick ones show has to be clean.
   const double clutter = e.inside_ratio + e.outside_ratio;
   const bool dense = e.on > 12 * e.slices;
-  if (cut.min_slices < config.min_slices && dense && (clutter > 0.25 || e.scatter_m > 0.025)) {
+  if (cut.min_slices < config.min_slices && dense &&
+      (clutter > kThickOnlyClutter || e.scatter_m > kThickOnlyScatter)) {
     return false;
   }
-  return 4 * e.inside <= e.on && e.inside_ratio <= 0.35 && clutter <= max_clutter(fit, lean_deg) &&
+  return 4 * e.inside <= e.on && e.inside_ratio <= kMostInside &&
+         clutter <= max_clutter(fit, lean_deg) &&
          e.scatter_m <= std::max(0.012, 0.2 * stem.radius_m) + 0.008;
 }
 
@@ -164,8 +173,6 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
 // filled to 0.67 and more on the tuning maps); what shows in few slices has to stand clear, and
 // must not be cut off where it was seen well.
 bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
-  constexpr double kLeastFill = 0.65;
-  constexpr double kWellSeen = 50.0;  // returns a slice
   const StemFit& stem = fit.stem;
   const StemEvidence& e = fit.evidence;
   if (!fit.converged || 2.0 * stem.radius_m < config.min_dbh_m ||
@@ -177,7 +184,8 @@ bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
   const double all = (config.highest_m - config.lowest_m) / config.slice_m;
   if (e.slices >= 0.8 * all) return true;
   const double sd = std::sqrt(std::max(0.0, stem.covariance(2, 2)));
-  return e.inside_ratio + e.outside_ratio <= 0.25 && sd <= 0.35 * stem.radius_m &&
+  return e.inside_ratio + e.outside_ratio <= kFewSlicesClutter &&
+         sd <= kFewSlicesSd * stem.radius_m &&
          (e.slices >= 0.4 * all || e.returns < kWellSeen * e.slices);
 }
 

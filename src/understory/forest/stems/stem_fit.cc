@@ -6,20 +6,17 @@
 #include <bit>
 #include <cmath>
 
+#include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
 
 namespace understory {
 namespace {
 
+using namespace forest_constants::stem_fit;
+
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
-constexpr double kUsualTaper = -0.008;  // radius per metre of height, of a stem's lower part
-constexpr double kTaperSd = 0.006;
-constexpr double kSlopeSd = 0.05;
-constexpr double kLeastScatter = 0.004;
-constexpr double kMostScatter = 0.03;
 
 // Parameters: centre x, y; slope x, y; radius; taper.
 struct System {
@@ -66,13 +63,12 @@ System build_system(const std::vector<SlicePoint>& points, const StemFit& stem,
 // Enough points to fit by: those near the surface of the start, every n-th where they are many.
 std::vector<SlicePoint> sample_of(const std::vector<SlicePoint>& points, const StemFit& start) {
   constexpr double kReach = 0.15;
-  constexpr std::size_t kEnough = 400;
   std::vector<SlicePoint> near;
   const StemAxis axis(start);
   for (const SlicePoint& point : points) {
     if (std::abs(axis.surface_error(point)) < kReach) near.push_back(point);
   }
-  const std::size_t stride = near.size() / kEnough + 1;
+  const std::size_t stride = near.size() / kEnoughPoints + 1;
   std::vector<SlicePoint> some;
   for (std::size_t i = 0; i < near.size(); i += stride)
     some.push_back(near[i]);
@@ -241,9 +237,6 @@ StemFit thin_start(const std::vector<SlicePoint>& points, const StemFit& start) 
 // diameters are then within two standard deviations, near the path and 30 m from it. On top comes
 // what no fit can see: keyframes that do not quite lie on each other, a stem that is not round.
 void set_uncertainty(const NoisyCylinder& fit, StemFit& stem) {
-  constexpr double kLinear = 1.5;
-  constexpr double kSquare = 1400.0;   // 1/m, of the radius
-  constexpr double kMapError = 0.002;  // m, of the radius
   const double spread = std::sqrt(std::max(1e-12, fit.covariance(4, 4)));
   const double factor = kLinear * kLinear + std::pow(kSquare * spread, 2);
   for (int i = 0; i < 3; ++i) {

@@ -4,13 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "understory/forest/forest_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kCrownReach = 1.5;  // metres around the stem in which a top is looked for
-constexpr double kCell = 1.0;        // of the squares that know the stems nearby
-constexpr int kLargestGap = 3;       // metres without points that a crown may begin after
-constexpr double kLeastAbove = 1.5;  // metres over the slices: less is no tree top
+using namespace forest_constants::tree_heights;
 
 Eigen::Vector2i cell_of(const Eigen::Vector2d& place) {
   return (place / kCell).array().floor().cast<int>();

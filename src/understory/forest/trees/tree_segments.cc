@@ -5,12 +5,12 @@
 #include <numeric>
 #include <unordered_set>
 
+#include "understory/forest/forest_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kLowThin = 0.015;  // near breast height, where the cross section is drawn
-constexpr double kThin = 0.05;
-constexpr std::size_t kMostPoints = 60'000;
+using namespace forest_constants::tree_segments;
 
 std::uint64_t cube_of(const Eigen::Vector3d& p) {
   const double size = p.z() > 0.8 && p.z() < 2.0 ? kLowThin : kThin;

@@ -8,17 +8,16 @@
 #include <numbers>
 #include <optional>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/graph/self_correction/structure.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
+using namespace graph_constants::loop_closure;
+
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr std::size_t kScoringPoints = 1200;  // enough to rank starts
-// Two answers nearer than this are the same place.
-constexpr double kSamePlaceM = 1.0;
-constexpr double kSamePlaceRad = 3.0 * kDegree;
 
 // A side of the loop, turned so that z is up.
 struct Side {

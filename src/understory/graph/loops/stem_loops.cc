@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/graph/stem_matching/pair_matching.h"
 #include "understory/registration/stems/tilt_about.h"
 #include "understory/util/error.h"
@@ -13,10 +14,7 @@
 namespace understory {
 namespace {
 
-// Stems of neighbouring views nearer than that are one.
-constexpr double kMergeL0 = 0.2;
-// Views around a place, to each side, among which the nearest one is looked for.
-constexpr int kNeighbourhood = 30;
+using namespace graph_constants::stem_loops;
 
 double median_l0(const std::vector<SparsePoints>& views) {
   std::vector<double> values(views.size());

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/graph/graph_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr std::size_t kSamples = 256;
-constexpr double kRangeShare = 0.9;   // of the stems lie nearer than the range
-constexpr double kAngleShare = 0.98;  // and within the sector: false stems may lie anywhere
+using namespace graph_constants::view_cone;
 
 double quantile(std::vector<double>& values, double share) {
   const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));

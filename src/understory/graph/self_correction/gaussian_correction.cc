@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/graph/self_correction/correction_methods.h"
 #include "understory/graph/self_correction/path_process.h"
 #include "understory/graph/stem_matching/pair_matching.h"
@@ -9,6 +10,8 @@
 
 namespace understory {
 namespace {
+
+using namespace graph_constants::gaussian_correction;
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
@@ -27,8 +30,7 @@ Vector6d mean_variances(const std::vector<Matrix6d>& covariances) {
 
 // Loops are in the poses already; that they hold is told to the regression as well.
 std::vector<PathObservation> observed_loops(const std::vector<PoseEdge>& loops) {
-  constexpr std::size_t kMost = 200;  // the time is cubic in them
-  const std::size_t count = std::min(loops.size(), kMost);
+  const std::size_t count = std::min(loops.size(), kMostLoops);
   std::vector<PathObservation> result;
   for (std::size_t k = 0; k < count; ++k) {
     const PoseEdge& loop = loops[k * loops.size() / count];

@@ -6,10 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
+
+using namespace graph_constants::path_process;
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
@@ -239,7 +242,6 @@ struct Fit {
 // Length and scale of the largest marginal likelihood of the observations in yaw and plane.
 Fit most_likely(PathProcess& process, std::vector<std::size_t> rows,
                 const PathProcessConfig& config) {
-  constexpr std::size_t kEnough = 60;
   if (rows.size() > kEnough) {
     std::vector<std::size_t> some;
     for (std::size_t k = 0; k < kEnough; ++k)

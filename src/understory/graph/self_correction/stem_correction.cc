@@ -3,14 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/registration/stems/tilt_about.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
+using namespace graph_constants::stem_correction;
+
 constexpr double kDegree = M_PI / 180.0;
-constexpr double kStepTilt = 0.2 * kDegree;  // from one view to the next
 
 // The views turned level by their own stems.
 struct LevelViews {
@@ -73,8 +75,6 @@ std::vector<int> neighbours_on_the_way(const std::vector<Pose>& poses, double re
 // A view has been turned level by its stems. As many views see the same trees, which lean as they
 // do, they know together no more of up than one of them.
 std::vector<TiltPrior> tilts_of(const LevelViews& level) {
-  constexpr double kStandLeans = 0.3 * kDegree;
-  constexpr double kSameTrees = 10.0;  // metres of way to each side
   const std::vector<int> sharing = neighbours_on_the_way(level.world_from_level, kSameTrees);
   std::vector<TiltPrior> tilts;
   for (std::size_t i = 0; i < level.ups.size(); ++i) {

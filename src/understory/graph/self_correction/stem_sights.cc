@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/graph/graph_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kShare = 0.9;
+using namespace graph_constants::stem_sights;
 
 // The value that a share of all does not exceed; infinite for none.
 double quantile(std::vector<double> values, double of_none) {

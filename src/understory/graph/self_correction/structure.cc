@@ -6,11 +6,12 @@
 #include <limits>
 
 #include "understory/geometry/voxel_key.h"
+#include "understory/graph/graph_constants.h"
 
 namespace understory {
 namespace {
 
-constexpr double kColumn = 2.0;  // m, edge of the columns in which the ground is looked for
+using namespace graph_constants::structure;
 
 // The third lowest height of a column: a few stray returns below the ground do no harm.
 struct Lowest {

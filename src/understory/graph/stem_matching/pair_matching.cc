@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/registration/stems/tilt_about.h"
 
 namespace understory {
 namespace {
+
+using namespace graph_constants::pair_matching;
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
@@ -39,8 +42,7 @@ PairMatch begin(const SparseTarget& target, const SparsePoints& source, const Po
 // P0 section 1: the overlap of the views stands for the share that can match, lambda = 1 - gamma;
 // of these again a share is missed or false.
 double outlier_ratio_of(double overlap, double within_overlap) {
-  constexpr double kMost = 0.9;
-  return std::min(kMost, 1.0 - overlap * (1.0 - within_overlap));
+  return std::min(kMostOutliers, 1.0 - overlap * (1.0 - within_overlap));
 }
 
 void require_better(PairMatch& match) {

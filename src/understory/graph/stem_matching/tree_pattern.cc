@@ -5,13 +5,13 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
-constexpr std::size_t kMostStems = 65'535;
-constexpr double kShortestSide = 1.0;  // L0; small triangles look alike
+using namespace graph_constants::tree_pattern;
 
 // The place that one matched triangle speaks for, as a cell of yaw and position.
 struct Cell {

@@ -3,10 +3,13 @@
 #include <Eigen/Cholesky>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/odometry/odometry_constants.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
+
+using namespace odometry_constants::window_smoother;
 
 using Matrix2x15 = Eigen::Matrix<double, 2, 15>;
 using Matrix15x2 = Eigen::Matrix<double, 15, 2>;
@@ -15,13 +18,6 @@ using Vector17d = Eigen::Matrix<double, 17, 1>;
 
 // During the first states the linearisation point can be far off, so more steps are taken.
 constexpr std::uint64_t kFirstStates = 30;
-constexpr int kFirstIterations = 5;
-// Biases that have moved further than this from where a motion was integrated have it integrated
-// again; below, the linear correction is good to far less than the noise.
-constexpr double kGyroBiasShift = 1e-3;
-constexpr double kAccelBiasShift = 2e-2;
-// A step below this in every component has no consequence; units of the tangent.
-constexpr double kConverged = 1e-7;
 
 // Derivative of the gravity vector by the two tilts (rotation about x and y of its own frame).
 Eigen::Matrix<double, 3, 2> gravity_by_tilt(const Eigen::Quaterniond& rotation, double magnitude) {

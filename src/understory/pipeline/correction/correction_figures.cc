@@ -7,17 +7,14 @@
 #include "understory/graph/loops/view_cone.h"
 #include "understory/graph/self_correction/correction_pairs.h"
 #include "understory/odometry/stems/stem_levelling.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
-constexpr int kPairs = 4000;   // drawn for P0 figure 9
-constexpr int kMatrix = 220;   // views along each side of P1 figure 5
-constexpr double kSame = 0.5;  // P1 figure 5: stems that far apart are outliers
-constexpr double kRing = 5.0;  // P1 figure 8
-constexpr int kRings = 8;
+using namespace pipeline_constants::correction_figures;
 
 // Views with z up, and where they stand.
 struct Placed {

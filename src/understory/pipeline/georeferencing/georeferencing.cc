@@ -20,6 +20,7 @@
 #include "understory/pipeline/correction/moved_map.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
@@ -30,12 +31,10 @@
 namespace understory {
 namespace {
 
+using namespace pipeline_constants::georeferencing;
+
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
-
-// A place 50 m from the middle of the path is then 4 m off.
-constexpr double kMostHeadingSdDeg = 5.0;
-constexpr double kLongestArmM = 10.0;
 
 // What a run folder holds that a motion can move.
 struct Run {
@@ -139,7 +138,6 @@ Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log
 std::vector<GroundPoint> ground_of(const GeoreferenceRequest& request, const Run& run) {
   std::vector<GroundPoint> points;
   if (fs::exists(request.run / "dtm.tif")) {
-    constexpr double kReachM = 30.0;
     PlaneArea area{run.trajectory.front().world_from_body.translation().head<2>(),
                    run.trajectory.front().world_from_body.translation().head<2>()};
     for (const StampedPose& pose : run.trajectory) {

@@ -8,10 +8,13 @@
 
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/recording/finding.h"
 
 namespace understory {
 namespace {
+
+using namespace pipeline_constants::evidence_gathering;
 
 SensorEvidence sensor_of(const EventOrderer::StreamReport& stream) {
   SensorEvidence sensor;
@@ -47,7 +50,6 @@ Span span_of(const TopicReport& topic, const EventOrderer::StreamReport& stream)
 // Why the IMU was not used, in words.
 std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicReport>& topics,
                            const SensorEvidence& sensor) {
-  constexpr double kNoticeableS = 0.1;
   std::string why;
   const auto add = [&](const std::string& what) { why += (why.empty() ? "" : "; ") + what; };
   if (facts.imu_hearing.without_place() > 0) {

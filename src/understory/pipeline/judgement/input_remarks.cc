@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/recording/recording_info.h"
 
 namespace understory {
 namespace {
 
-constexpr double kImuMissingS = 1.0;  // at the beginning or the end
+using namespace pipeline_constants::input_remarks;
 
 TimeNs first_of(const Recording& source, const std::string& role, TimeNs otherwise) {
   for (const TopicReport& topic : source.topics()) {

@@ -4,17 +4,15 @@
 #include <cmath>
 #include <vector>
 
+#include "understory/pipeline/pipeline_constants.h"
+
 namespace understory {
 namespace {
 
+using namespace pipeline_constants::match_course;
+
 constexpr TimeNs kWindow = 2 * kNsPerSecond;
 constexpr TimeNs kBeginning = 5;  // windows
-// Few: below this share of a scan's points, or of what the run's scans usually find.
-constexpr double kFewInliers = 0.25;
-constexpr double kFewOfUsual = 0.5;
-// Of the finest cell's edge. Chance gives 0.5 (a uniform point in a cube, from its middle); good
-// maps of forests, streets and yards have 0.32 to 0.46.
-constexpr double kByChance = 0.49;
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/pipeline/pipeline_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kShortestStepS = 1e-3;  // below, a difference of stamps tells nothing of a speed
-constexpr double kUsual = 0.99;
+using namespace pipeline_constants::path_evidence;
 
 // The value that this share of the values does not exceed; 0 where there are none.
 double quantile(std::vector<float> values, double share) {

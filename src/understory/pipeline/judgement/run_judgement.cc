@@ -7,8 +7,12 @@
 #include <cmath>
 #include <utility>
 
+#include "understory/pipeline/pipeline_constants.h"
+
 namespace understory {
 namespace {
+
+using namespace pipeline_constants::run_judgement;
 
 double share(std::uint64_t part, std::uint64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
@@ -17,9 +21,6 @@ double share(std::uint64_t part, std::uint64_t whole) {
 double percent(std::uint64_t part, std::uint64_t whole) {
   return 100.0 * share(part, whole);
 }
-
-// So many standard errors are no chance, even where pairs of views that overlap say the same.
-constexpr double kSureErrors = 5.0;
 
 // Gathers reasons for one judgement.
 class Judge {
@@ -378,7 +379,6 @@ void describe(ConfigTable& table, JudgementConfig& config) {
 }
 
 double smear_of(const Pose& step) {
-  constexpr double kRangeM = 10.0;
   return step.translation().norm() + kRangeM * step.angle();
 }
 

@@ -5,13 +5,12 @@
 #include <map>
 #include <utility>
 
+#include "understory/pipeline/pipeline_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kSparseVoxelM = 0.1;
-constexpr double kSparseKeyframeM = 0.3;
-constexpr double kSparseCloudM = 0.1;        // between scans of the finished map
-constexpr double kSparseInlierRatio = 0.05;  // few of the map's small cells have enough points yet
+using namespace pipeline_constants::adaptation;
 
 // Changes values of a table that nobody set, and notes each change.
 class Changes {

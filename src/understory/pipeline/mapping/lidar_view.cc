@@ -6,15 +6,14 @@
 #include <nlohmann/json.hpp>
 
 #include "understory/evaluation/trajectory.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/error.h"
 #include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {
 
-constexpr std::size_t kClouds = 60;  // enough to learn a view from
-constexpr double kReach = 60.0;      // metres from which a crown still gives enough returns
-constexpr double kStep = 1.0;        // metres between poses: what is seen hardly changes sooner
+using namespace pipeline_constants::lidar_view;
 
 std::size_t sector_of(const Eigen::Vector3d& point) {
   const double turn = std::atan2(point.y(), point.x()) / (2.0 * M_PI) + 0.5;

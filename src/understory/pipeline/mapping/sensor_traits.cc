@@ -9,15 +9,13 @@
 #include <vector>
 
 #include "understory/pipeline/mapping/read_ahead.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
 
-constexpr std::size_t kScans = 10;
-constexpr std::size_t kEmptyScan = 1'000;     // returns; with fewer it tells nothing of the lidar
-constexpr std::size_t kMostScans = 100;       // empty ones included
-constexpr std::size_t kMostEvents = 500'000;  // held in memory: 40 minutes of an IMU alone
+using namespace pipeline_constants::sensor_traits;
 
 struct ScansSeen {
   std::vector<std::size_t> points;  // of each

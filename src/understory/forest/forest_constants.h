@@ -1,0 +1,275 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// The fitted and chosen numbers of the layer `forest` that are no settings, which stand in the
+// Config structs. One namespace for each file that uses them. A comment gives the unit (none: a
+// plain number), the meaning, and in brackets where the number comes from:
+//   chosen   by judgement, fitted to nothing
+//   bound    by physics, geometry, statistics, memory or time
+//   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+// or real clouds and measurements by their page.
+namespace understory::forest_constants {
+
+namespace cloud_shape {  // forest/cloud_shape.cc
+// points of a cloud that are looked at [bound: time]
+inline constexpr std::size_t kMostPoints = 400'000;
+// cells along the longer side [chosen]
+inline constexpr double kCellsAcross = 24.0;
+// points a cell on average, or cells become larger [chosen]
+inline constexpr double kPointsPerCell = 64.0;
+// points in a cell whose lowest point counts [chosen]
+inline constexpr std::size_t kLeastPoints = 16;
+// steps between cells; with fewer nothing is told of the ground [chosen]
+inline constexpr std::size_t kLeastSteps = 100;
+// Roughness, in cells: another axis that is smoother may be up [real clouds,
+// docs/method/forest.md]
+inline constexpr double kSmooth = 0.2;
+// Roughness, in cells: z above it is not up [real clouds, docs/method/forest.md]
+inline constexpr double kRough = 0.3;
+// Times smoother another axis has to be than z [real clouds, docs/method/forest.md]
+inline constexpr double kClearly = 1.8;
+// m: a thinner cloud is a slice and has no ground [chosen]
+inline constexpr double kThinnest = 3.0;
+// Of the longest side: the same [chosen]
+inline constexpr double kThinnestShare = 0.02;
+// degrees: no ground of a level cloud slopes more; hardly any forest stands on more than 45
+// [bound: forests]
+inline constexpr double kSteepestDeg = 50.0;
+// degrees between z and the direction of the stems: less may be a slope's stand [real clouds,
+// docs/method/forest.md]
+inline constexpr double kLeastLeanDeg = 12.0;
+// Times as often two points share a column along the stems than beside each other [real clouds,
+// docs/method/forest.md]
+inline constexpr double kLeastGain = 1.42;
+// The same gain over that along z [real clouds, docs/method/forest.md]
+inline constexpr double kLeastGainOverZ = 1.12;
+// m: a taller stand without a unit may be in feet; real clouds have 15 to 28 m, in feet 49 to 92
+// [real clouds, docs/method/forest.md]
+inline constexpr double kTallForMetres = 42.0;
+// m: no stand is taller [bound: the tallest trees have 116 m]
+inline constexpr double kTallest = 150.0;
+// m, if the numbers were metres: taller ones are millimetres, not centimetres [bound: the tallest
+// trees]
+inline constexpr double kTallestCentimetres = 4'500.0;
+// Share of points alone in their cube; real clouds have 0.5 % [real clouds,
+// docs/method/forest.md]
+inline constexpr double kMostAlone = 0.8;
+// degrees: a cloud as wide is 5 km across; as metres it were narrower than a stem [bound:
+// geometry]
+inline constexpr double kWidestDegrees = 0.05;
+// m: a lower cloud tells nothing of its unit [chosen]
+inline constexpr double kLeastHeight = 2.0;
+// m: edge of the cubes in which points may be alone [chosen]
+inline constexpr double kCube = 3.0;
+// Columns at least for a height of the stand [chosen]
+inline constexpr std::size_t kLeastColumns = 4;
+}  // namespace cloud_shape
+
+namespace inventory {  // forest/inventory.cc
+// m: edge of the cells that the area of a stand is counted in [chosen]
+inline constexpr double kAreaCell = 2.0;
+// m above the ground: higher points are no tree [bound: the tallest trees have 116 m]
+inline constexpr double kHighest = 120.0;
+// m above a top that have to be seen empty for the height to count [chosen]
+inline constexpr double kMargin = 1.0;
+// m around a stem whose points are kept for a look at it [chosen]
+inline constexpr double kSegmentReach = 1.5;
+}  // namespace inventory
+
+namespace cloth {  // forest/ground/cloth.cc
+// m per step and step: gravity times the squared time step [chosen]
+inline constexpr float kFall = 0.02F;
+// Share of the speed that stays from step to step [chosen]
+inline constexpr float kDamping = 0.98F;
+// Share of the way to the mean of the neighbours, per stiffness, as in Zhang et al. 2016 [chosen]
+inline constexpr float kPull = 0.7F;
+// m: largest movement of a cloth at rest [chosen]
+inline constexpr float kSettled = 0.002F;
+}  // namespace cloth
+
+namespace ground {  // forest/ground/ground.cc
+// m: the lowest point of a cell is supported by another so near above it [chosen]
+inline constexpr float kNear = 0.4F;
+// m: a point so far under its neighbours is a stray one [chosen]
+inline constexpr float kStrayDepth = 0.8F;
+}  // namespace ground
+
+namespace low_noise {  // forest/ground/low_noise.cc
+// m: edge of a cell whose layers are counted [chosen]
+inline constexpr double kCell = 2.0;
+// m: half of a layer's thickness [chosen]
+inline constexpr double kStep = 0.5;
+// points that make a layer [chosen]
+inline constexpr std::uint32_t kLeast = 4;
+// Share of a cell's points that make a layer [chosen]
+inline constexpr double kLeastShare = 0.004;
+// m: points so far under the lowest layer are noise [chosen]
+inline constexpr double kMargin = 0.5;
+}  // namespace low_noise
+
+namespace height_column {  // forest/ground/height_column.cc
+// Of the fullest metre's points: less is a gap or a few ghosts [chosen; measured in
+// docs/method/forest.md, Heights]
+inline constexpr double kLeastShare = 0.01;
+// Times the points of any metre in the sky above: a top [chosen; measured in
+// docs/method/forest.md, Heights]
+inline constexpr double kDrop = 5.0;
+// m above a tip that tell how many ghosts there are [chosen]
+inline constexpr int kSky = 8;
+// Standard deviations by which a tip's points are more than those [chosen]
+inline constexpr double kSigmas = 4.0;
+}  // namespace height_column
+
+namespace stem_detector {  // forest/stems/stem_detector.cc
+// Share of a stem's directions that show a surface; stems' pieces were filled to 0.67 and more
+// [tuned on simulated maps]
+inline constexpr double kLeastFill = 0.65;
+// Returns a slice: seen well enough for a cut-off piece to be none [tuned on simulated maps]
+inline constexpr double kWellSeen = 50.0;
+// degrees: steeper leans are rare, and a line through scattered points has them; they have to be
+// better supported [tuned on simulated maps]
+inline constexpr double kSteepLeanDeg = 8.0;
+// Sum of the ratios of points inside and outside of the surface, of a steep stem at most [tuned
+// on simulated maps]
+inline constexpr double kSteepClutter = 0.25;
+// The same of a stem of two rings ... [tuned on simulated maps]
+inline constexpr double kClutterOfTwo = 0.34;
+// ... and what each further ring adds: in a thicket it takes many slices that agree [tuned on
+// simulated maps]
+inline constexpr double kClutterPerRing = 0.085;
+// The same at most [tuned on simulated maps]
+inline constexpr double kMostClutter = 0.65;
+// m: scatter from which few rings have to be clean [tuned on simulated maps]
+inline constexpr double kNoisyScatter = 0.029;
+// rings that are few then [tuned on simulated maps]
+inline constexpr double kFewRings = 6.0;
+// Sum of the ratios at most then [tuned on simulated maps]
+inline constexpr double kNoisyClutter = 0.4;
+// m: radius of a slim column that may stand alone [tuned on simulated maps]
+inline constexpr double kSlimRadius = 0.1;
+// Ratio of points outside of it at most [tuned on simulated maps]
+inline constexpr double kAloneOutside = 0.12;
+// degrees that it leans at most [tuned on simulated maps]
+inline constexpr double kAloneLeanDeg = 10.0;
+// m that it extends at least [tuned on simulated maps]
+inline constexpr double kAloneExtent = 1.5;
+// Share of its slices that show it [tuned on simulated maps]
+inline constexpr double kAloneSlices = 0.85;
+// degrees of its circle that are seen evenly [tuned on simulated maps]
+inline constexpr double kAloneArcDeg = 90.0;
+// Share of the slices between its ends that show a stem [tuned on simulated maps]
+inline constexpr double kLeastSliceShare = 0.6;
+// m that a stem extends at least [tuned on simulated maps]
+inline constexpr double kLeastExtent = 0.7;
+// m over breast height: what begins higher is a branch or a crown [tuned on simulated maps]
+inline constexpr double kBeginsAbove = 0.3;
+// Share of the seen arc that has to be seen evenly [tuned on simulated maps]
+inline constexpr double kEvenArcShare = 0.35;
+// m: error of a diameter at most ... [tuned on simulated maps]
+inline constexpr double kDbhSd = 0.01;
+// ... and of the diameter, added [tuned on simulated maps]
+inline constexpr double kDbhSdShare = 0.08;
+// Sum of the ratios of what only thick slices show, where points are many [tuned on simulated
+// maps]
+inline constexpr double kThickOnlyClutter = 0.25;
+// m: scatter of it [tuned on simulated maps]
+inline constexpr double kThickOnlyScatter = 0.025;
+// Ratio of points inside a stem at most [tuned on simulated maps]
+inline constexpr double kMostInside = 0.35;
+// Sum of the ratios of a stem that shows in few slices [tuned on simulated maps]
+inline constexpr double kFewSlicesClutter = 0.25;
+// radii: error of its radius at most [tuned on simulated maps]
+inline constexpr double kFewSlicesSd = 0.35;
+}  // namespace stem_detector
+
+namespace ring_linker {  // forest/stems/ring_linker.cc
+// m: edge of the cells in which rings of other slices are looked for [chosen]
+inline constexpr double kCell = 1.0;
+}  // namespace ring_linker
+
+namespace stem_fit {  // forest/stems/stem_fit.cc
+// m/m: radius lost per metre of height in a stem's lower part [chosen]
+inline constexpr double kUsualTaper = -0.008;
+// m/m: how far stems differ from it [chosen]
+inline constexpr double kTaperSd = 0.006;
+// m/m: how far the slope may leave that of the rings [chosen]
+inline constexpr double kSlopeSd = 0.05;
+// m: scatter of points about a stem, at least [bound: noise of lidars]
+inline constexpr double kLeastScatter = 0.004;
+// m: scatter of points about a stem, at most [chosen]
+inline constexpr double kMostScatter = 0.03;
+// 1/m: what the error of a radius grows by with its own square [tuned on handheld seeds 1 and 2,
+// harvester seed 1, true poses: 95 % within two standard deviations]
+inline constexpr double kSquare = 1400.0;
+// Times the fit's own error: returns are not independent [tuned like kSquare]
+inline constexpr double kLinear = 1.5;
+// m of the radius: keyframes do not quite lie on each other, stems are not round [tuned like
+// kSquare]
+inline constexpr double kMapError = 0.002;
+// points that a fit takes [bound: time]
+inline constexpr std::size_t kEnoughPoints = 400;
+}  // namespace stem_fit
+
+namespace noisy_cylinder {  // forest/stems/noisy_cylinder.cc
+// m: scatter of ranges at least [bound: noise of lidars]
+inline constexpr double kLeastScatter = 0.004;
+// m: scatter of ranges at most [chosen]
+inline constexpr double kMostScatter = 0.06;
+// Directions from which a stem may have been seen [chosen]
+inline constexpr int kViews = 24;
+// Share of a direction that gave nothing: keeps logarithms finite [bound: rounding]
+inline constexpr double kLeastView = 1e-4;
+}  // namespace noisy_cylinder
+
+namespace standing_direction {  // forest/stems/standing_direction.cc
+// m: one point each, or what is near would count most [chosen]
+inline constexpr double kVoxel = 0.2;
+// m: edge of the cells whose lowest point is the ground [chosen]
+inline constexpr double kGroundCell = 2.0;
+// m: points above that are looked at [chosen]
+inline constexpr double kAboveGround = 1.5;
+// Voxels that are looked at [bound: time]
+inline constexpr std::size_t kMostVoxels = 60'000;
+// Voxels at least, or nothing is told [chosen]
+inline constexpr std::size_t kLeastVoxels = 2'000;
+// degrees from z: directions farther away are not tried [chosen]
+inline constexpr double kFarthestDeg = 72.0;
+// degrees from z: nearer directions count as z [chosen]
+inline constexpr double kNearZDeg = 6.0;
+// m: edge of a column in the first search [chosen]
+inline constexpr double kCoarseCell = 1.0;
+// degrees between the directions of the first search [chosen]
+inline constexpr double kCoarseDeg = 6.0;
+// m: edge of a column in the last search [chosen]
+inline constexpr double kCell = 0.5;
+// Directions of the first search that are looked at closely [chosen]
+inline constexpr std::size_t kFinalists = 4;
+// Columns to those that are compared with [chosen]
+inline constexpr int kApart = 3;
+// Columns at most [bound: memory]
+inline constexpr double kMostCells = 4e6;
+}  // namespace standing_direction
+
+namespace tree_heights {  // forest/trees/tree_heights.cc
+// m around a stem in which its top is looked for [chosen]
+inline constexpr double kCrownReach = 1.5;
+// m: edge of the squares that know the stems nearby [chosen]
+inline constexpr double kCell = 1.0;
+// m without points that a crown may begin after [chosen]
+inline constexpr int kLargestGap = 3;
+// m over the slices: less is no tree top [chosen]
+inline constexpr double kLeastAbove = 1.5;
+}  // namespace tree_heights
+
+namespace tree_segments {  // forest/trees/tree_segments.cc
+// m: one point per cube near breast height, where the cross section is drawn [chosen]
+inline constexpr double kLowThin = 0.015;
+// m: one point per cube elsewhere [chosen]
+inline constexpr double kThin = 0.05;
+// points of a picture [bound: size of the report]
+inline constexpr std::size_t kMostPoints = 60'000;
+}  // namespace tree_segments
+
+}  // namespace understory::forest_constants

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+
+// The fitted and chosen numbers of the layer `graph` that are no settings, which stand in the
+// Config structs. One namespace for each file that uses them. A comment gives the unit (none: a
+// plain number), the meaning, and in brackets where the number comes from:
+//   chosen   by judgement, fitted to nothing
+//   bound    by physics, geometry, statistics, memory or time
+//   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+// or real clouds and measurements by their page.
+namespace understory::graph_constants {
+
+// rad a degree [mathematics]
+inline constexpr double kRadPerDegree = std::numbers::pi / 180.0;
+
+namespace structure {  // graph/self_correction/structure.cc
+// m: edge of the columns in which the ground is looked for [chosen]
+inline constexpr double kColumn = 2.0;
+}  // namespace structure
+
+namespace gaussian_correction {  // graph/self_correction/gaussian_correction.cc
+// Loops that the regression is told; its time is cubic in them [bound: time]
+inline constexpr std::size_t kMostLoops = 200;
+}  // namespace gaussian_correction
+
+namespace stem_sights {  // graph/self_correction/stem_sights.cc
+// Share of all sights that a range or an angle holds [chosen]
+inline constexpr double kShare = 0.9;
+}  // namespace stem_sights
+
+namespace path_process {  // graph/self_correction/path_process.cc
+// Observations that length and scale are found from; the time is cubic in them [bound: time]
+inline constexpr std::size_t kEnough = 60;
+}  // namespace path_process
+
+namespace stem_correction {  // graph/self_correction/stem_correction.cc
+// rad by which up may turn from one view to the next, one standard deviation [chosen]
+inline constexpr double kStepTilt = 0.2 * kRadPerDegree;
+// rad by which a stand leans as a whole, one standard deviation [chosen]
+inline constexpr double kStandLeans = 0.3 * kRadPerDegree;
+// m of way to each side whose views see the same trees [chosen]
+inline constexpr double kSameTrees = 10.0;
+}  // namespace stem_correction
+
+namespace stem_loops {  // graph/loops/stem_loops.cc
+// L0: stems of neighbouring views nearer than that are one [chosen]
+inline constexpr double kMergeL0 = 0.2;
+// views around a place, to each side, among which the nearest one is looked for [chosen]
+inline constexpr int kNeighbourhood = 30;
+}  // namespace stem_loops
+
+namespace loop_closure {  // graph/loops/loop_closure.cc
+// points that rank starts [bound: time]
+inline constexpr std::size_t kScoringPoints = 1200;
+// m: two answers nearer than this are the same place [chosen]
+inline constexpr double kSamePlaceM = 1.0;
+// rad: and turned by less [chosen]
+inline constexpr double kSamePlaceRad = 3.0 * kRadPerDegree;
+}  // namespace loop_closure
+
+namespace view_cone {  // graph/loops/view_cone.cc
+// points spread over a sector to measure an overlap, P0 F8 [chosen]
+inline constexpr std::size_t kSamples = 256;
+// Share of the stems that lie nearer than a view's range [chosen]
+inline constexpr double kRangeShare = 0.9;
+// Share of the stems within its sector: false ones may lie anywhere [chosen]
+inline constexpr double kAngleShare = 0.98;
+}  // namespace view_cone
+
+namespace pair_matching {  // graph/stem_matching/pair_matching.cc
+// Outlier ratio of a match at most [chosen]
+inline constexpr double kMostOutliers = 0.9;
+}  // namespace pair_matching
+
+namespace tree_pattern {  // graph/stem_matching/tree_pattern.cc
+// Stems of a view at most [bound: 16 bits]
+inline constexpr std::size_t kMostStems = 65'535;
+// L0: side of a triangle at least; small triangles look alike [chosen]
+inline constexpr double kShortestSide = 1.0;
+}  // namespace tree_pattern
+
+}  // namespace understory::graph_constants

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// The fitted and chosen numbers of the layer `map` that are no settings, which stand in the Config
+// structs. One namespace for each file that uses them. A comment gives the unit (none: a plain
+// number), the meaning, and in brackets where the number comes from:
+//   chosen   by judgement, fitted to nothing
+//   bound    by physics, geometry, statistics, memory or time
+//   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+// or real clouds and measurements by their page.
+namespace understory::map_constants {
+
+namespace felled_trees {  // map/felled_trees.cc
+// m in the plane within which a sight is of a tree [chosen]
+inline constexpr double kSameTreeM = 0.6;
+}  // namespace felled_trees
+
+namespace stem_map {  // map/stem_map.cc
+// views that should have seen both of two trees; with fewer nothing is told [chosen]
+inline constexpr double kEnoughViews = 3.0;
+// Of these: seen together less often, two trees are one [tuned on lieksa2: the list falls from
+// 2,513 to 1,338 trees at the same recall]
+inline constexpr double kFew = 0.1;
+}  // namespace stem_map
+
+namespace keyframe_map {  // map/keyframe_map.cc
+// Keyframes whose points stay in memory, about 60 MB [bound: memory]
+inline constexpr std::size_t kCachedKeyframes = 150;
+}  // namespace keyframe_map
+
+}  // namespace understory::map_constants

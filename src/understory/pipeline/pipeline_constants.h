@@ -1,0 +1,109 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// The fitted and chosen numbers of the layer `pipeline` that are no settings, which stand in the
+// Config structs. One namespace for each file that uses them. A comment gives the unit (none: a
+// plain number), the meaning, and in brackets where the number comes from:
+//   chosen   by judgement, fitted to nothing
+//   bound    by physics, geometry, statistics, memory or time
+//   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+// or real clouds and measurements by their page.
+namespace understory::pipeline_constants {
+
+namespace input_remarks {  // pipeline/judgement/input_remarks.cc
+// s without IMU at the beginning or the end that are remarked [chosen]
+inline constexpr double kImuMissingS = 1.0;
+}  // namespace input_remarks
+
+namespace match_course {  // pipeline/judgement/match_course.cc
+// Share of a scan's points found in the map: below, they are few [tuned on spoilt recordings,
+// seeds 1 and 2, docs/method/results.md]
+inline constexpr double kFewInliers = 0.25;
+// Of what the run's scans usually find: below, they are few [tuned on spoilt recordings, seeds 1
+// and 2, docs/method/results.md]
+inline constexpr double kFewOfUsual = 0.5;
+// Of the finest cell's edge: mean distance of found points. Chance gives 0.5 (a uniform point in
+// a cube, from its middle); good maps of forests, streets and yards have 0.32 to 0.46 [bound:
+// geometry, and real clouds]
+inline constexpr double kByChance = 0.49;
+}  // namespace match_course
+
+namespace path_evidence {  // pipeline/judgement/path_evidence.cc
+// s: below, a difference of stamps tells nothing of a speed [bound: rounding of stamps]
+inline constexpr double kShortestStepS = 1e-3;
+// Quantile of speeds and accelerations that is judged [chosen]
+inline constexpr double kUsual = 0.99;
+}  // namespace path_evidence
+
+namespace run_judgement {  // pipeline/judgement/run_judgement.cc
+// Standard errors that are no chance, even where pairs of views that overlap say the same
+// [chosen]
+inline constexpr double kSureErrors = 5.0;
+// m at which a turn counts as a shift [chosen]
+inline constexpr double kRangeM = 10.0;
+}  // namespace run_judgement
+
+namespace evidence_gathering {  // pipeline/judgement/evidence_gathering.cc
+// s without samples that are told [chosen]
+inline constexpr double kNoticeableS = 0.1;
+}  // namespace evidence_gathering
+
+namespace sensor_traits {  // pipeline/mapping/sensor_traits.cc
+// Scans that tell what the sensors are [chosen]
+inline constexpr std::size_t kScans = 10;
+// Returns; a scan with fewer tells nothing of the lidar [chosen]
+inline constexpr std::size_t kEmptyScan = 1'000;
+// Scans that are looked at, empty ones included [bound: time]
+inline constexpr std::size_t kMostScans = 100;
+// Events held in memory: 40 minutes of an IMU alone [bound: memory]
+inline constexpr std::size_t kMostEvents = 500'000;
+}  // namespace sensor_traits
+
+namespace adaptation {  // pipeline/mapping/adaptation.cc
+// m: preprocess.voxel.voxel_size_m of a sparse lidar [chosen: maps by the sleigh had been 0.2 %
+// too small]
+inline constexpr double kSparseVoxelM = 0.1;
+// m: keyframe.distance_m of a sparse lidar [chosen]
+inline constexpr double kSparseKeyframeM = 0.3;
+// m between scans of the finished map [chosen]
+inline constexpr double kSparseCloudM = 0.1;
+// Registration.min_inlier_ratio: few of the map's small cells have enough points at first
+// [chosen]
+inline constexpr double kSparseInlierRatio = 0.05;
+}  // namespace adaptation
+
+namespace lidar_view {  // pipeline/mapping/lidar_view.cc
+// Clouds that a view is learnt from [chosen]
+inline constexpr std::size_t kClouds = 60;
+// m from which a crown still gives enough returns [chosen]
+inline constexpr double kReach = 60.0;
+// m between poses: what is seen hardly changes sooner [chosen]
+inline constexpr double kStep = 1.0;
+}  // namespace lidar_view
+
+namespace georeferencing {  // pipeline/georeferencing/georeferencing.cc
+// degrees: with a less certain heading a place 50 m from the path's middle is over 4 m off
+// [chosen]
+inline constexpr double kMostHeadingSdDeg = 5.0;
+// m from the body to an antenna [bound: carriers]
+inline constexpr double kLongestArmM = 10.0;
+// m around the path whose ground is fitted [chosen]
+inline constexpr double kReachM = 30.0;
+}  // namespace georeferencing
+
+namespace correction_figures {  // pipeline/correction/correction_figures.cc
+// Pairs drawn for P0 figure 9 [chosen]
+inline constexpr int kPairs = 4000;
+// views along each side of P1 figure 5 [chosen]
+inline constexpr int kMatrix = 220;
+// m: stems that far apart are outliers, P1 figure 5 [chosen]
+inline constexpr double kSame = 0.5;
+// m: width of the rings of P1 figure 8 [chosen]
+inline constexpr double kRing = 5.0;
+// Rings of P1 figure 8 [chosen]
+inline constexpr int kRings = 8;
+}  // namespace correction_figures
+
+}  // namespace understory::pipeline_constants
