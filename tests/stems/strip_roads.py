@@ -162,15 +162,29 @@ def seen(roads, trees, at, turn, rng):
     return rows
 
 
-def write_strip_roads(folder, seed, roads=None):
-    """Writes stems.csv.gz, and truth/trajectory.tum and truth/trees.csv. Returns number of views."""
+def write_packed(path, rows):
+    with open(path, "wb") as raw, gzip.GzipFile("", "wb", 6, raw, 0) as packed:  # no name, no time
+        packed.write(("\n".join(rows) + "\n").encode())
+
+
+def rows_of(k, stamp, view):
+    return [f"{k},{stamp:.2f}," + ",".join(f"{v:.4f}" for v in (*p, *axis, dbh, score))
+            for p, axis, dbh, score in view]
+
+
+def write_strip_roads(folder, seed, roads=None, second_look=False):
+    """Writes stems.csv.gz, and truth/trajectory.tum and truth/trees.csv. Returns number of views.
+
+    With a second look, second_look.csv.gz has the same trees from the same poses, with other noise.
+    """
     roads = roads or Roads()
-    rng = random.Random(seed)
+    rng, other = random.Random(seed), random.Random(f"second look {seed}")
     way = path(roads)
     trees = stand(roads, way, rng)
     truth = folder / "truth"
     truth.mkdir(parents=True, exist_ok=True)
     rows = ["frame,timestamp,x,y,z,axis_x,axis_y,axis_z,dbh_m,score"]
+    second = rows[:]
     poses, tilt = [], [0.0, 0.0]
     for k, ((x, y), heading) in enumerate(way):
         swing = math.radians(roads.swing_deg) * math.sin(2 * math.pi * k / roads.swing_views)
@@ -179,13 +193,14 @@ def write_strip_roads(folder, seed, roads=None):
         at = (x, y, ground(x, y) + SCANNER_M)
         stamp = 0.5 * k
         poses.append(" ".join(f"{v:.9f}" for v in (stamp, *at, *quaternion(*angles))))
-        for p, axis, dbh, score in seen(roads, trees, at, rotation(*angles), rng):
-            rows.append(f"{k},{stamp:.2f}," + ",".join(f"{v:.4f}" for v in (*p, *axis, dbh, score)))
+        rows += rows_of(k, stamp, seen(roads, trees, at, rotation(*angles), rng))
+        if second_look:
+            second += rows_of(k, stamp, seen(roads, trees, at, rotation(*angles), other))
     (truth / "trajectory.tum").write_text("\n".join(poses) + "\n")
     (truth / "trees.csv").write_text("\n".join(
         ["id,x,y,z,dbh_m"] + [f"{i},{t.x:.4f},{t.y:.4f},{t.z:.4f},{2 * t.radius:.4f}"
                               for i, t in enumerate(trees) if not t.bush]) + "\n")
-    with open(folder / "stems.csv.gz", "wb") as raw, \
-            gzip.GzipFile("", "wb", 6, raw, 0) as packed:  # no name and no time in it
-        packed.write(("\n".join(rows) + "\n").encode())
+    write_packed(folder / "stems.csv.gz", rows)
+    if second_look:
+        write_packed(folder / "second_look.csv.gz", second)
     return len(way)
