@@ -1,0 +1,51 @@
+#include "understory/forest/ground/low_noise.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace understory {
+namespace {
+
+using Points = std::vector<Eigen::Vector3d>;
+
+PointBlocks blocks(const Points& points) {
+  return [&points](const PointVisitor& visit) { visit(points); };
+}
+
+// Ground of a slope, 20 x 20 m, with 16 points on each square metre.
+Points slope() {
+  Points points;
+  for (int j = 0; j < 80; ++j) {
+    for (int i = 0; i < 80; ++i)
+      points.emplace_back(0.25 * i, 0.25 * j, 300.0 + 0.05 * i);
+  }
+  return points;
+}
+
+TEST(LowNoise, GhostsFarBelowTheGroundAreNoise) {
+  Points points = slope();
+  for (int i = 0; i < 10; ++i)
+    points.emplace_back(5.0 + 0.01 * i, 5.0, 260.0 + 3.7 * i);  // spread over the depth
+  const LowNoise noise(blocks(points));
+  for (std::size_t i = points.size() - 10; i < points.size(); ++i)
+    EXPECT_TRUE(noise.holds(points[i])) << points[i].z();
+}
+
+TEST(LowNoise, NothingOfTheGroundIsNoise) {
+  const Points points = slope();
+  const LowNoise noise(blocks(points));
+  for (const Eigen::Vector3d& point : points)
+    ASSERT_FALSE(noise.holds(point)) << point.transpose();
+  EXPECT_FALSE(noise.holds({5.0, 5.0, 320.0})) << "nor what stands on it";
+  EXPECT_TRUE(noise.holds({5.0, 5.0, 299.0}));
+}
+
+TEST(LowNoise, WhereNothingIsKnownNothingIsNoise) {
+  const Points points = slope();
+  const LowNoise noise(blocks(points));
+  EXPECT_FALSE(noise.holds({500.0, 500.0, 0.0}));
+}
+
+}  // namespace
+}  // namespace understory

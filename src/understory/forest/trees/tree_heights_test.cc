@@ -1,0 +1,65 @@
+#include "understory/forest/trees/tree_heights.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace understory {
+namespace {
+
+StemFit stem_at(double x, double y, double slope = 0.0) {
+  StemFit stem;
+  stem.centre = {x, y};
+  stem.slope = {slope, 0.0};
+  return stem;
+}
+
+// A crown of full metres over a place.
+void add_crown(TreeColumns& columns, double x, double y, double from_m, double to_m) {
+  for (double height = from_m; height <= to_m + 1e-9; height += 0.05)
+    columns.add({x + 0.3 * std::sin(40.0 * height), y}, height);
+}
+
+TEST(TreeHeights, ATreeEndsAtItsHighestPoint) {
+  const std::vector<StemFit> stems = {stem_at(0.0, 0.0), stem_at(6.0, 0.0)};
+  TreeColumns columns(stems);
+  add_crown(columns, 0.0, 0.0, 1.0, 18.35);
+  add_crown(columns, 6.0, 0.0, 1.0, 11.0);
+  EXPECT_NEAR(columns.top(0, 3.5), 18.35, 0.06);
+  EXPECT_NEAR(columns.top(1, 3.5), 11.0, 0.06);
+}
+
+TEST(TreeHeights, ACrownOfTheNeighbourIsItsOwn) {
+  const std::vector<StemFit> stems = {stem_at(0.0, 0.0), stem_at(2.0, 0.0)};
+  TreeColumns columns(stems);
+  add_crown(columns, 0.0, 0.0, 1.0, 9.0);
+  add_crown(columns, 1.5, 0.0, 1.0, 20.0);  // nearer to the second stem
+  EXPECT_NEAR(columns.top(0, 3.5), 9.0, 0.06);
+  EXPECT_NEAR(columns.top(1, 3.5), 20.0, 0.06);
+}
+
+TEST(TreeHeights, ALeaningTreeIsFollowedToItsCrown) {
+  const std::vector<StemFit> stems = {stem_at(0.0, 0.0, 0.25)};
+  TreeColumns columns(stems);
+  for (double height = 1.0; height <= 14.0; height += 0.05)
+    columns.add(stem_place_at(stems[0], height), height);
+  EXPECT_NEAR(columns.top(0, 3.5), 14.0, 0.06);
+  EXPECT_NEAR(stem_place_at(stems[0], 3.3).x(), 0.5, 1e-12);
+  // Trees straighten: the lean of the foot is carried up by six metres.
+  EXPECT_NEAR(stem_place_at(stems[0], 30.0).x(), 1.5, 1e-12);
+}
+
+TEST(TreeHeights, NoTopIsInvented) {
+  const std::vector<StemFit> stems = {stem_at(0.0, 0.0), stem_at(10.0, 0.0), stem_at(20.0, 0.0)};
+  TreeColumns columns(stems);
+  add_crown(columns, 0.0, 0.0, 1.0, 3.5);   // nothing above the slices
+  add_crown(columns, 10.0, 0.0, 1.0, 4.4);  // cut off just above them
+  add_crown(columns, 20.0, 0.0, 1.0, 6.0);
+  add_crown(columns, 20.0, 0.0, 12.0, 15.0);  // of a tree behind: there is a gap
+  EXPECT_TRUE(std::isnan(columns.top(0, 3.5)));
+  EXPECT_TRUE(std::isnan(columns.top(1, 3.5)));
+  EXPECT_NEAR(columns.top(2, 3.5), 6.0, 0.06);
+}
+
+}  // namespace
+}  // namespace understory

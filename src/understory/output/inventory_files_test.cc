@@ -1,0 +1,58 @@
+#include "understory/output/inventory_files.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "understory/util/files/csv.h"
+#include "understory/util/files/folder_test_support.h"
+
+namespace understory {
+namespace {
+
+class InventoryFilesTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::set<std::string> names() const {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+      names.insert(entry.path().filename().string());
+    return names;
+  }
+  static InventoryResult plot() {
+    InventoryResult inventory;
+    inventory.ground.terrain.columns = inventory.ground.terrain.rows = 2;
+    inventory.ground.terrain.values = {1.0F, 1.0F, 1.0F, 1.0F};
+    inventory.canopy = inventory.ground.terrain;
+    inventory.trees.resize(2);
+    return inventory;
+  }
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(InventoryFilesTest, APlotHasTreesTwiceAndBothRasters) {
+  write_inventory_files(folder_.path(), plot(), "EPSG:3067");
+  EXPECT_EQ(names(), (std::set<std::string>{"trees.csv", "trees.gpkg", "dtm.tif", "chm.tif"}));
+  CsvReader trees(folder_ / "trees.csv");
+  EXPECT_TRUE(trees.next() && trees.next());
+  EXPECT_FALSE(trees.next());
+}
+
+TEST_F(InventoryFilesTest, WhereNothingWasSeenThereIsAnEmptyListAndNoRaster) {
+  write_inventory_files(folder_.path(), {}, "");
+  EXPECT_EQ(names(), (std::set<std::string>{"trees.csv", "trees.gpkg"}));
+}
+
+TEST_F(InventoryFilesTest, ThePictureTellsGroundFromVegetationByTheTerrain) {
+  InventoryResult inventory = plot();
+  MapPicture picture(0.5);
+  const std::vector<Eigen::Vector3d> points = {{0.25, 0.25, 1.0}, {1.25, 1.25, 9.0}};
+  add_to_picture(picture, points, inventory.ground);
+  MapPicture expected(0.5);
+  expected.add(0.25, 0.25, 1.0, 0.0);
+  expected.add(1.25, 1.25, 9.0, 8.0);
+  EXPECT_EQ(picture.png(), expected.png());
+}
+
+}  // namespace
+}  // namespace understory
