@@ -23,8 +23,7 @@ int run_correct(const CorrectOptions& options, CommandContext& context) {
   CorrectionRequest request;
   ConfigTable table;
   describe(table, request.config);
-  if (!options.config_file.empty()) table.read_file(options.config_file);
-  table.set(options.settings);
+  request.config_record.origins = read_settings(table, options.config_file, options.settings);
   if (options.print_config) {
     std::fputs(table.to_yaml(true).c_str(), stdout);
     return kExitDone;
@@ -35,7 +34,7 @@ int run_correct(const CorrectOptions& options, CommandContext& context) {
   request.stems = options.stems;
   request.run_folder = options.run_folder;
   request.overwrite = options.overwrite;
-  request.config_yaml = table.to_yaml(false);
+  request.config_record.asked_yaml = table.to_yaml(false);
   return report_outcome(
       run_correction(request, context.log, context.progress, context.stop_requested));
 }

@@ -23,8 +23,8 @@ int run_demo(const DemoOptions& options, CommandContext& context) {
   ReadConfig<FrontEndConfig> read =
       read_front_end_config(kDenseFrontEnd, "handheld", "", {}, context.log);
   request.config = std::move(read.config);
-  request.config_origins = std::move(read.origins);
-  request.config_yaml = yaml_of(request.config);
+  request.config_record.origins = std::move(read.origins);
+  request.config_record.asked_yaml = yaml_of(request.config);
   request.overwrite = options.overwrite;
   return report_outcome(run_mapping(begin_mapping(std::move(request)), context.log,
                                     context.progress, context.stop_requested));

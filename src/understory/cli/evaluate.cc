@@ -9,10 +9,10 @@
 #include "understory/cli/command.h"
 #include "understory/cli/evaluate_map.h"
 #include "understory/cli/evaluate_trees.h"
-#include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/prism_errors.h"
 #include "understory/evaluation/trajectory_errors.h"
 #include "understory/util/error.h"
+#include "understory/util/files/file_in_folder.h"
 
 namespace understory {
 namespace {

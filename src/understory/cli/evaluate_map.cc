@@ -9,12 +9,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/strip_roads.h"
 #include "understory/evaluation/trajectory.h"
 #include "understory/graph/self_correction/stem_correction.h"
 #include "understory/recording/clouds/stems_file.h"
 #include "understory/util/error.h"
+#include "understory/util/files/file_in_folder.h"
 
 namespace understory {
 namespace {

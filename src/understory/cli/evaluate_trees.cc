@@ -8,10 +8,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "understory/cli/file_in_folder.h"
 #include "understory/evaluation/tree_errors.h"
 #include "understory/evaluation/tree_rates.h"
 #include "understory/util/error.h"
+#include "understory/util/files/file_in_folder.h"
 
 namespace understory {
 namespace {

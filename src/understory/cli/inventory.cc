@@ -36,8 +36,7 @@ int run(const InventoryOptions& options, CommandContext& context) {
   InventoryRequest request = options.request;
   ConfigTable table;
   describe(table, request.config);
-  if (!request.config_file.empty()) table.read_file(request.config_file);
-  table.set(options.settings);
+  request.config_record.origins = read_settings(table, request.config_file, options.settings);
   if (options.print_config) {
     std::printf("%s", table.to_yaml(true).c_str());
     return kExitDone;
@@ -46,9 +45,8 @@ int run(const InventoryOptions& options, CommandContext& context) {
     throw ConfigError({"inventory needs a cloud (or run folder) and -o DIR; see --help"});
   }
   refuse_recording(request.cloud);
-  request.config_yaml = table.to_yaml(false);
-  const InventoryOutcome outcome = run_inventory(request, context.log, context.progress);
-  return report_outcome(outcome);
+  request.config_record.asked_yaml = table.to_yaml(false);
+  return report_outcome(run_inventory(request, context.log, context.progress));
 }
 
 }  // namespace

@@ -95,8 +95,8 @@ int run_map(const MapOptions& options, CommandContext& context) {
   request.recording = options.recording;
   request.run_folder = options.run_folder;
   request.config = std::move(read.config);
-  request.config_origins = std::move(read.origins);
-  request.config_yaml = yaml_of(request.config);
+  request.config_record.origins = std::move(read.origins);
+  request.config_record.asked_yaml = yaml_of(request.config);
   std::vector<std::string> files = files_named_in(request.config);
   files.push_back(options.config_file);
   refuse_run_over_inputs(request.run_folder, request.recording, options.open, files);

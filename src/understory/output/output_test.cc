@@ -312,7 +312,8 @@ TEST_F(OutputTest, RunJsonHasTheKeysThatOthersRead) {
   summary.status = RunStatus::kPartial;
   summary.reasons = {"stopped by the user"};
   summary.warnings = {{"imu.gap", "0.4 s without IMU", 2}};
-  summary.config_yaml = "ndt:\n  voxel_size_m: 0.5\n  method: ndt\n  on: true\n  list: [1, 2]\n";
+  summary.config.asked_yaml =
+      "ndt:\n  voxel_size_m: 0.5\n  method: ndt\n  on: true\n  list: [1, 2]\n";
   summary.quality["nothing"] = std::numeric_limits<double>::quiet_NaN();
   summary.counts["trees"] = std::int64_t{12};
   StageTimes times;

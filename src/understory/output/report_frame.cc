@@ -47,7 +47,7 @@ std::string adapted_table(const std::vector<ConfigAdaptation>& changes) {
 
 // What a kind of warning means for the result, by the beginning of its key.
 std::string consequence_of(const std::string& key) {
-  constexpr std::array<std::pair<const char*, const char*>, 22> kMeanings = {
+  constexpr std::array<std::pair<const char*, const char*>, 21> kMeanings = {
       {{"recording.damaged", "That part of the recording is missing from the map."},
        {"recording.truncated", "What was scanned later is missing from the map."},
        {"recording.unfinished", "Nothing is known to be missing."},
@@ -71,7 +71,6 @@ std::string consequence_of(const std::string& key) {
        {"gnss", "Satellite positions were not used there."},
        {"loop", "Places seen twice may not lie exactly on each other."},
        {"match", "Positions there are less certain; see where the path is marked as weak."},
-       {"inventory", "Trees may be missing from the list."},
        {"recording.assumed_rate", "Times were assumed; speeds and deskewing depend on them."}}};
   for (const auto& [beginning, meaning] : kMeanings) {
     if (key.rfind(beginning, 0) == 0) return meaning;
@@ -234,10 +233,6 @@ std::string distrust_section(const ReportInput& input) {
         warning.count > 1 ? fmt::format(" ({} times; the first is shown)", warning.count) : "";
     add(warning.first_message + times, consequence_of(warning.key));
   }
-  if (input.inventory != nullptr) {
-    for (const std::string& remark : input.inventory->remarks)
-      add(remark, "");
-  }
   for (const std::string& remark : input.remarks)
     add(remark, "");
   if (!input.scans.empty() && !input.loop_closure_enabled) {
@@ -284,8 +279,9 @@ std::string made_section(const ReportInput& input) {
   };
   listed("Counts", s.counts);
   listed("Quality figures", s.quality);
-  html += adapted_table(s.adapted);
-  const std::string& ran = s.effective_yaml.empty() ? s.config_yaml : s.effective_yaml;
+  html += adapted_table(s.config.adapted);
+  const std::string& ran =
+      s.config.effective_yaml.empty() ? s.config.asked_yaml : s.config.effective_yaml;
   html += "<h3>Configuration that ran</h3><pre>" + escape_html(ran) + "</pre>";
   return html + "</details></section>\n";
 }

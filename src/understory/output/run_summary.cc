@@ -165,13 +165,13 @@ std::string run_json(const RunSummary& summary) {
          {"bytes", input.bytes},
          {"sha256", input.sha256.empty() ? Json(nullptr) : Json(input.sha256)}});
   }
-  json["config"] = to_json(YAML::Load(summary.config_yaml));
-  json["config_origins"] = summary.config_origins;
-  const bool as_asked = summary.effective_yaml.empty();
+  json["config"] = to_json(YAML::Load(summary.config.asked_yaml));
+  json["config_origins"] = summary.config.origins;
+  const bool as_asked = summary.config.effective_yaml.empty();
   json["effective_config"] =
-      as_asked ? json["config"] : to_json(YAML::Load(summary.effective_yaml));
+      as_asked ? json["config"] : to_json(YAML::Load(summary.config.effective_yaml));
   json["adapted"] = Json::array();
-  for (const ConfigAdaptation& change : summary.adapted) {
+  for (const ConfigAdaptation& change : summary.config.adapted) {
     json["adapted"].push_back({{"key", change.key},
                                {"from", to_json(YAML::Load(change.from))},
                                {"to", to_json(YAML::Load(change.to))},

@@ -49,17 +49,15 @@ struct LidarViewFigures {
   std::vector<double> highest_deg;      // by azimuth in the lidar frame from -180 degrees on; NaN
 };
 
-// What run.json says. Warnings are one per kind.
+// What run.json says. Warnings are one per kind. A command makes it with RunDocuments
+// (pipeline/run_folder/run_documents.h), which fills in what all commands have in common.
 struct RunSummary {
-  std::string command;  // "map", "inventory", "correct"
+  std::string command;  // "map", "inventory", "correct", "georeference", "merge"
   std::string version;
   RunStatus status = RunStatus::kComplete;
   std::vector<std::string> reasons;  // empty if complete
   std::vector<Log::Warning> warnings;
-  std::string config_yaml;  // asked for, every key
-  ConfigOrigins config_origins;
-  std::string effective_yaml;  // that ran; empty: as asked for
-  std::vector<ConfigAdaptation> adapted;
+  ConfigRecord config;
   std::vector<InputHash> inputs;
   std::uint64_t scans = 0;
   std::uint64_t poses = 0;

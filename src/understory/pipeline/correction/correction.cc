@@ -3,16 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/pipeline/correction/correction_run.h"
 #include "understory/pipeline/correction/stem_map_maker.h"
+#include "understory/pipeline/judgement/inherited_trust.h"
+#include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/recording/clouds/stems_file.h"
 #include "understory/util/error.h"
 #include "understory/util/files/output_guard.h"
-#include "understory/util/version.h"
 
 namespace understory {
 namespace {
@@ -35,10 +35,11 @@ std::vector<SparseStep> position(const std::vector<StemView>& views,
 }
 
 // A run's trajectory in place of the chained odometry: what matching tells of the steps stays.
-void begin_from(const std::filesystem::path& trajectory, CorrectionInput& input) {
+void begin_from(const std::filesystem::path& trajectory, CorrectionInput& input,
+                RunDocuments& documents) {
   constexpr TimeNs kSame = 1'000'000;
   input.path = read_trajectory(trajectory);
-  input.summary.inputs.push_back(hash_input(trajectory));
+  documents.add_input(trajectory);
   for (std::size_t i = 0; i < input.steps.size(); ++i) {
     const TimeNs stamp = input.views[i].stamp;
     const auto at =
@@ -70,38 +71,32 @@ std::vector<std::filesystem::path> inputs_of(const CorrectionRequest& request) {
 }
 
 // The file of stems, the log of the head, and what is known of both.
-CorrectionInput read_stems(const CorrectionRequest& request, Log& log, StageTimes& times) {
+CorrectionInput read_stems(const CorrectionRequest& request, Log& log, StageTimes& times,
+                           RunDocuments& documents) {
   CorrectionInput input;
-  const auto start = std::chrono::steady_clock::now();
-  input.elapsed_s = [start] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  };
   const ScopedTimer timer(times, "reading");
   const std::filesystem::path stems = stems_of(request);
   input.views = read_stem_views(stems, log);
-  input.summary.command = "correct";
-  input.summary.version = kVersion;
-  input.summary.config_yaml = request.config_yaml;
-  input.summary.inputs.push_back(hash_input(stems));
-  input.trust = trust_of_run(request.stems);
+  documents.add_input(stems);
+  documents.inherit(trust_of_run(request.stems));
+  documents.report().title = request.stems.filename().string();
   const std::string& head_log = request.config.harvester.head_log;
   input.head_cuts = read_head_log(head_log);
-  if (!head_log.empty()) input.summary.inputs.push_back(hash_input(head_log));
-  input.title = request.stems.filename().string();
+  if (!head_log.empty()) documents.add_input(head_log);
   return input;
 }
 
 // All views that were read, with their steps; fewer where the user stops it.
 void position_views(const CorrectionRequest& request, const ProgressSink& progress,
-                    const StopRequested& stop_requested, StageTimes& times,
-                    CorrectionInput& input) {
+                    const StopRequested& stop_requested, StageTimes& times, CorrectionInput& input,
+                    RunDocuments& documents) {
   input.steps = position(input.views, request.config.odometry, progress, stop_requested, times);
   if (std::filesystem::is_directory(request.stems))
-    begin_from(request.stems / "trajectory.tum", input);
+    begin_from(request.stems / "trajectory.tum", input, documents);
   input.stopped = input.steps.size() < input.views.size();
   input.evidence.stopped = input.stopped;
   input.views.resize(input.steps.size());
-  input.made_from = fmt::format("stems of {} views", input.views.size());
+  documents.report().made_from = fmt::format("stems of {} views", input.views.size());
   input.scan_ms.assign(input.views.size(), 0.0F);
   const auto samples = times.samples("scan");
   // A stage that ran very often keeps a part of its samples: then they belong to no view.
@@ -117,10 +112,11 @@ RunOutcome run_correction(const CorrectionRequest& request, Log& log, const Prog
   refuse_input_as_output(request.run_folder, inputs_of(request));
   const RunFolder folder = RunFolder::claim(request.run_folder, request.overwrite);
   StageTimes times;
-  CorrectionInput input = read_stems(request, log, times);
-  position_views(request, progress, stop_requested, times, input);
+  RunDocuments documents("correct", request.config_record, times, log);
+  CorrectionInput input = read_stems(request, log, times, documents);
+  position_views(request, progress, stop_requested, times, input, documents);
   const std::filesystem::path results = folder.begin_results();
-  StemMapMaker map(std::move(input), request.config,
+  StemMapMaker map(std::move(input), std::move(documents), request.config,
                    {request.run_folder, results, times, log, progress});
   map.close_loops();
   map.finish_map();

@@ -5,6 +5,7 @@
 
 #include "understory/pipeline/correction/correction_config.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
+#include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
 
@@ -18,7 +19,7 @@ struct CorrectionRequest {
   std::filesystem::path run_folder;
   bool overwrite = false;  // what an earlier run left in the folder, finished or not
   CorrectionConfig config;
-  std::string config_yaml;  // asked for, every key, for run.json
+  ConfigRecord config_record;  // for run.json
 };
 
 // From the stems of a recording to the run folder: odometry, loops, trajectory, tree map.

@@ -62,25 +62,21 @@ void add_loops(const CorrectionRun& run, ReportInput& report) {
 
 }  // namespace
 
-ReportInput correction_report(const StemCorrectionConfig& config, const CorrectionRun& run,
-                              const Trajectory& trajectory, const RunSummary& summary) {
-  ReportInput report;
+void report_correction(const StemCorrectionConfig& config, const CorrectionRun& run,
+                       const Trajectory& trajectory, RunDocuments& documents) {
+  ReportInput& report = documents.report();
   report.trees = &run.trees;
   if (!run.stopped) {
     report.correction = correction_of(run.correction.self);
     add_correction_figures(run, config, run.trees, *report.correction);
   }
-  report.title = run.title;
-  report.made_from = run.made_from;
-  if (run.truth) report.truth = compare_with_truth(trajectory, *run.truth);
-  report.summary = summary;
+  if (run.truth) documents.compare_with_truth(compare_with_truth(trajectory, *run.truth));
   report.remarks.push_back(
       "The vertical is known from the stems alone. Over a long path the map may tilt by degrees. "
       "Distances in the plane are right, heights far apart may not be.");
   report.scans = scans_of(run);
   add_loops(run, report);
   report.loop_closure_enabled = config.close_loops;
-  return report;
 }
 
 }  // namespace understory

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
@@ -11,9 +9,7 @@
 #include "understory/graph/self_correction/stem_correction.h"
 #include "understory/map/stem_map.h"
 #include "understory/odometry/stems/sparse_odometry.h"
-#include "understory/output/run_summary.h"
 #include "understory/pipeline/correction/head_cut_log.h"
-#include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/judgement/run_evidence.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/stem_view.h"
@@ -34,13 +30,7 @@ struct CorrectionInput {
   std::vector<GnssFix> fixes;  // of the recording; compared with, not used
   Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();  // metres; zero where unknown
   std::optional<Trajectory> truth;                            // of a simulated recording
-  // What is known of the reading: for run.json, for the judgement and for the report.
-  RunSummary summary;
-  RunEvidence evidence;
-  InheritedTrust trust;  // of the run that the stems come from
-  std::string title;
-  std::string made_from;              // in words
-  std::function<double()> elapsed_s;  // seconds that the run has taken so far
+  RunEvidence evidence;                                       // of the reading
 };
 
 // What a correction has found beside.

@@ -4,8 +4,6 @@
 #include <cmath>
 
 #include "understory/pipeline/correction/correction_evidence.h"
-#include "understory/pipeline/judgement/inherited_trust.h"
-#include "understory/pipeline/judgement/run_judgement.h"
 
 namespace understory {
 namespace {
@@ -92,6 +90,12 @@ void add_loops(const StemCorrection& correction, RunSummary& summary) {
       std::count(correction.accepted.begin(), correction.accepted.end(), 1));
 }
 
+double duration_s(const CorrectionRun& run) {
+  if (!run.path.empty()) return to_seconds(run.path.back().stamp - run.path.front().stamp);
+  if (run.views.empty()) return 0.0;
+  return to_seconds(run.views.back().stamp - run.views.front().stamp);
+}
+
 }  // namespace
 
 double length_through(const std::vector<Pose>& poses) {
@@ -101,30 +105,22 @@ double length_through(const std::vector<Pose>& poses) {
   return length;
 }
 
-RunSummary correction_summary(const CorrectionConfig& config, const CorrectionRun& run,
-                              const Log& log) {
-  RunSummary summary = run.summary;
+void summarise_correction(const CorrectionConfig& config, const CorrectionRun& run,
+                          RunDocuments& documents) {
+  RunSummary& summary = documents.summary();
   summary.scans = run.path.empty() ? run.views.size() : run.path.size();
   summary.poses = summary.scans;
-  summary.counts["trees"] = static_cast<std::int64_t>(run.stems.size());
-  summary.counts["steps_searched"] =
-      static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kSearched));
-  summary.counts["steps_weak"] =
-      static_cast<std::int64_t>(count_of(run.steps, SparseStepStatus::kWeak));
+  summary.recording_s = duration_s(run);
+  documents.count("trees", run.stems.size());
+  documents.count("steps_searched", count_of(run.steps, SparseStepStatus::kSearched));
+  documents.count("steps_weak", count_of(run.steps, SparseStepStatus::kWeak));
   add_loops(run.correction, summary);
   summary.quality["path_length_m"] = length_through(run.correction.world_from_body);
   add_matching(run, summary);
   summary.quality["sight_noise_m"] = sight_noise_m(run.stems);
   summary.quality["axis_noise_deg"] = axis_noise_deg(run.stems);
   add_self_correction(run, summary);
-  summary.warnings = log.warnings();
-  const RunEvidence evidence = correction_evidence(run);
-  const RunJudgement judgement = judge_run(evidence, config.judgement);
-  summary.status = judgement.status;
-  summary.reasons = judgement.reasons;
-  summary.evidence = figures_of(evidence);
-  inherit(run.trust, summary.status, summary.reasons);
-  return summary;
+  documents.judge(correction_evidence(run), config.judgement);
 }
 
 }  // namespace understory

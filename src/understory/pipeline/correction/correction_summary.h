@@ -3,17 +3,16 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
-#include "understory/output/run_summary.h"
 #include "understory/pipeline/correction/correction_config.h"
 #include "understory/pipeline/correction/correction_run.h"
-#include "understory/util/log.h"
+#include "understory/pipeline/run_folder/run_documents.h"
 
 namespace understory {
 
-// What run.json says of a run by stems: the summary of its reading, with the figures of the
-// correction and the judgement of both.
-[[nodiscard]] RunSummary correction_summary(const CorrectionConfig& config,
-                                            const CorrectionRun& run, const Log& log);
+// Adds what run.json says of a run by stems: the figures of the correction, and the judgement of it
+// and of the reading.
+void summarise_correction(const CorrectionConfig& config, const CorrectionRun& run,
+                          RunDocuments& documents);
 
 // Length in metres of the way through poses.
 [[nodiscard]] double length_through(const std::vector<Pose>& poses);

@@ -44,9 +44,12 @@ Eigen::Vector3d moved(const Pose& motion, const Eigen::Vector3d& point) {
 
 }  // namespace
 
-StemMapMaker::StemMapMaker(CorrectionInput input, const CorrectionConfig& config,
-                           const StemMapPlace& place)
-    : run_{std::move(input), {}, {}, {}, {}, {}}, config_(config), place_(place) {
+StemMapMaker::StemMapMaker(CorrectionInput input, RunDocuments documents,
+                           const CorrectionConfig& config, const StemMapPlace& place)
+    : run_{std::move(input), {}, {}, {}, {}, {}},
+      documents_(std::move(documents)),
+      config_(config),
+      place_(place) {
   UNDERSTORY_CHECK(run_.steps.size() == run_.views.size());
 }
 
@@ -114,29 +117,19 @@ RunOutcome StemMapMaker::write() {
     write_trees_csv(folder / "trees.csv", run_.trees);
     cuts = place_cuts(run_.head_cuts, trajectory, place_.log);
   }
-  RunSummary summary = correction_summary(config_, run_, place_.log);
+  summarise_correction(config_, run_, documents_);
   std::vector<TreeFall> falls =
       write_felled_trees(folder, {run_.seen, run_.seen_from, run_.stems, run_.trees}, cuts,
-                         config_.harvester.cuts, summary);
-  std::vector<ReportFix> fixes = compare_with_gnss(trajectory, summary);
-  summary.stages = summarise(place_.times);
-  summary.wall_s = run_.elapsed_s();
-  summary.cpu_s = process_cpu_seconds();
-  summary.peak_memory_mb = peak_memory_mb();
-  ReportInput report = correction_report(config_.stems, run_, trajectory, summary);
-  report.fixes = std::move(fixes);
-  report.falls = std::move(falls);
-  write_report(folder / "report.html", report);
-  summary.wall_s = run_.elapsed_s();  // all of it, the report too
-  write_run_json(folder / "run.json", summary);
-  RunOutcome outcome;
-  outcome.status = summary.status;
-  outcome.reasons = summary.reasons;
-  outcome.summary =
+                         config_.harvester.cuts, documents_.summary());
+  std::vector<ReportFix> fixes = compare_with_gnss(trajectory, documents_.summary());
+  report_correction(config_.stems, run_, trajectory, documents_);
+  documents_.report().fixes = std::move(fixes);
+  documents_.report().falls = std::move(falls);
+  documents_.write(folder);
+  return documents_.outcome(
       fmt::format("{} views over {:.0f} m, {} trees, in {:.1f} s; see {}", run_.views.size(),
                   length_through(run_.correction.world_from_body), run_.stems.size(),
-                  summary.wall_s, (place_.run_folder / "report.html").string());
-  return outcome;
+                  documents_.summary().wall_s, (place_.run_folder / "report.html").string()));
 }
 
 }  // namespace understory

@@ -2,10 +2,10 @@
 
 #include <filesystem>
 
-#include "understory/output/report.h"
 #include "understory/pipeline/correction/correction_config.h"
 #include "understory/pipeline/correction/correction_run.h"
 #include "understory/pipeline/mapping/map_maker.h"
+#include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
 #include "understory/util/timing.h"
@@ -25,7 +25,9 @@ struct StemMapPlace {
 // sparse front end. Stages "loops", "self_correction", "tree_map", "writing", "gnss_fit".
 class StemMapMaker : public MapMaker {
  public:
-  StemMapMaker(CorrectionInput input, const CorrectionConfig& config, const StemMapPlace& place);
+  // `documents`: what is known of the reading.
+  StemMapMaker(CorrectionInput input, RunDocuments documents, const CorrectionConfig& config,
+               const StemMapPlace& place);
 
   // Loops, and the correction of the map by itself; not where positioning was stopped.
   void close_loops() override;
@@ -40,6 +42,7 @@ class StemMapMaker : public MapMaker {
                                                          RunSummary& summary) const;
 
   CorrectionRun run_;
+  RunDocuments documents_;
   CorrectionConfig config_;
   StemMapPlace place_;
 };

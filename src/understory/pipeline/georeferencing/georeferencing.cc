@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -14,19 +13,19 @@
 #include "understory/georeference/coordinate_system.h"
 #include "understory/georeference/terrain_file.h"
 #include "understory/output/geo_files.h"
-#include "understory/output/report.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/head_cut_log.h"
 #include "understory/pipeline/correction/moved_map.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/pipeline_constants.h"
+#include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/pipeline/source.h"
+#include "understory/util/config/config.h"
 #include "understory/util/error.h"
 #include "understory/util/files/output_guard.h"
 #include "understory/util/files/text_file.h"
-#include "understory/util/version.h"
 
 namespace understory {
 namespace {
@@ -38,7 +37,6 @@ using Eigen::Vector3d;
 
 // What a run folder holds that a motion can move.
 struct Run {
-  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
   Trajectory trajectory;
   std::vector<Tree> trees;
   bool has_trees = false;
@@ -85,12 +83,11 @@ struct Motion {
   Pose target_from_world;
   std::optional<GeodeticPlace> origin;  // of the target frame
   std::vector<GnssRow> gnss;
-  GeoreferenceOutcome outcome;
+  std::map<std::string, Figure> figures;
+  std::string summary;              // a few lines for the terminal
+  std::vector<std::string> doubts;  // why the result is untrusted
 
-  void doubt(const std::string& reason) {
-    outcome.status = RunStatus::kUntrusted;
-    outcome.reasons.push_back(reason);
-  }
+  void doubt(const std::string& reason) { doubts.push_back(reason); }
 };
 
 Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log) {
@@ -110,14 +107,14 @@ Motion by_gnss_path(const GeoreferenceRequest& request, const Run& run, Log& log
   Motion motion;
   motion.target_from_world = fit.enu_from_world;
   motion.origin = fit.origin;
-  motion.outcome.figures = figures_of(fit);
-  motion.outcome.summary = fmt::format(
+  motion.figures = figures_of(fit);
+  motion.summary = fmt::format(
       "{} fixes; fit {:.2f} m (symmetric, root mean square); fixes off the path by {:.2f} m in the "
       "median, {:.2f} m in the mean",
       fit.fixes.size(), fit.path.symmetric_rms_m, fit.path.fixes_median_m, fit.path.fixes_mean_m);
   if (fit.fixes_in_time > 0 && std::isfinite(fit.along_rms_m))
-    motion.outcome.summary += fmt::format("; {:.2f} m along and {:.2f} m across the path by time",
-                                          fit.along_rms_m, fit.across_rms_m);
+    motion.summary += fmt::format("; {:.2f} m along and {:.2f} m across the path by time",
+                                  fit.along_rms_m, fit.across_rms_m);
   if (fit.ambiguous)
     motion.doubt(
         fmt::format("the path fits as well the other way round ({:.2f} m against {:.2f} m), and "
@@ -203,17 +200,17 @@ Motion by_terrain(const GeoreferenceRequest& request, const Run& run) {
   motion.target_from_world = fit.terrain_from_world * placed;
   const Vector3d shift = fit.terrain_from_world * area_of(points, 0.0).low.homogeneous() -
                          area_of(points, 0.0).low.homogeneous();
-  motion.outcome.figures = {{"terrain_points", static_cast<std::int64_t>(fit.points)},
-                            {"terrain_points_used", static_cast<std::int64_t>(fit.used)},
-                            {"terrain_mean_before_m", fit.mean_before_m},
-                            {"terrain_rms_before_m", fit.rms_before_m},
-                            {"terrain_rms_m", fit.rms_m},
-                            {"terrain_median_m", fit.median_m},
-                            {"terrain_tilt_deg", fit.tilt_deg},
-                            {"terrain_moved_plane_m", shift.head<2>().norm()},
-                            {"terrain_place_sd_m", fit.place_sd_m},
-                            {"terrain_yaw_sd_deg", fit.yaw_sd_deg}};
-  motion.outcome.summary = fmt::format(
+  motion.figures = {{"terrain_points", static_cast<std::int64_t>(fit.points)},
+                    {"terrain_points_used", static_cast<std::int64_t>(fit.used)},
+                    {"terrain_mean_before_m", fit.mean_before_m},
+                    {"terrain_rms_before_m", fit.rms_before_m},
+                    {"terrain_rms_m", fit.rms_m},
+                    {"terrain_median_m", fit.median_m},
+                    {"terrain_tilt_deg", fit.tilt_deg},
+                    {"terrain_moved_plane_m", shift.head<2>().norm()},
+                    {"terrain_place_sd_m", fit.place_sd_m},
+                    {"terrain_yaw_sd_deg", fit.yaw_sd_deg}};
+  motion.summary = fmt::format(
       "{} of {} points on the ground used; heights above the terrain {:.2f} m before (mean off), "
       "{:.2f} m after, {:.2f} m in the median; up turned by {:.2f} degrees",
       fit.used, points.size(), fit.rms_before_m, fit.rms_m, fit.median_m, fit.tilt_deg);
@@ -282,32 +279,63 @@ std::vector<ReportFix> fixes_of(const std::vector<GnssRow>& rows) {
   return fixes;
 }
 
-void write_summary(const GeoreferenceRequest& request, const Run& run, const Motion& motion,
-                   const std::vector<Tree>& trees, const std::string& system, const Log& log) {
-  RunSummary summary;
-  summary.command = "georeference";
-  summary.version = kVersion;
-  summary.status = motion.outcome.status;
-  summary.reasons = motion.outcome.reasons;
-  summary.warnings = log.warnings();
-  summary.inputs.push_back(hash_input(request.run / "trajectory.tum"));
-  if (request.method == GeoreferenceMethod::kTerrain)
-    summary.inputs.push_back(hash_input(request.terrain_model));
+// The options of the command, by their names.
+std::string yaml_of(GeoreferenceRequest request) {
+  bool plain = !request.path.robust;
+  std::string dem = request.terrain_model.string();
+  std::vector<double> antenna_m(request.antenna_in_body.data(), request.antenna_in_body.data() + 3);
+  std::vector<double> start;
+  if (request.start) start.assign(request.start->begin(), request.start->end());
+  ConfigTable table;
+  table.add_enum(
+      "method", request.method,
+      {{"gnss-path", GeoreferenceMethod::kGnssPath}, {"terrain", GeoreferenceMethod::kTerrain}},
+      "");
+  table.add("gnss", request.gnss, "");
+  table.add("antenna_m", antenna_m, "m", "");
+  table.add("plain", plain, "");
+  table.add("dem", dem, "");
+  table.add("start", start, "", "");
+  table.add("place_sd_m", request.terrain.place_sd_m, {}, "m", "");
+  table.add("yaw_sd_deg", request.terrain.yaw_sd_deg, {}, "deg", "");
+  table.add("crs", request.coordinate_system, "");
+  return table.to_yaml(false);
+}
+
+// The files that the motion was computed from, and the trees.
+void add_inputs(const GeoreferenceRequest& request, const Run& run, Log& log,
+                RunDocuments& documents) {
+  documents.add_input(request.run / "trajectory.tum");
+  if (run.has_trees) documents.add_input(request.run / "trees.csv");
+  if (request.method == GeoreferenceMethod::kTerrain) {
+    documents.add_input(request.terrain_model);
+    if (fs::exists(request.run / "dtm.tif")) documents.add_input(request.run / "dtm.tif");
+  } else if (request.gnss.empty()) {
+    documents.add_input(request.run / "gnss.csv");
+  } else {
+    documents.add_inputs(hash_inputs(request.gnss, log));
+  }
+}
+
+void describe(const GeoreferenceRequest& request, const Run& run, const Motion& motion,
+              const std::vector<Tree>& trees, RunDocuments& documents) {
+  RunSummary& summary = documents.summary();
   summary.scans = summary.poses = run.trajectory.size();
-  summary.quality = motion.outcome.figures;
-  if (run.has_trees) summary.counts["trees"] = static_cast<std::int64_t>(trees.size());
-  summary.crs_wkt = system;
-  summary.config_yaml = fmt::format(
-      "method: {}\n", request.method == GeoreferenceMethod::kTerrain ? "terrain" : "gnss-path");
-  ReportInput report;
+  summary.recording_s = to_seconds(run.trajectory.back().stamp - run.trajectory.front().stamp);
+  summary.quality = motion.figures;
+  for (const std::string& doubt : motion.doubts)
+    documents.lower(RunStatus::kUntrusted, doubt);
+  documents.inherit(run.trust);
+  ReportInput& report = documents.report();
   report.title = request.run.filename().string();
   report.made_from = fmt::format("a run of {} poses, moved by one motion", run.trajectory.size());
-  report.summary = summary;
   report.north_is_up = motion.origin.has_value();
-  if (run.has_trees) report.trees = &trees;
+  if (run.has_trees) {
+    documents.count("trees", trees.size());
+    report.trees = &trees;
+  }
   report.falls = placed(run.falls, trees);
-  if (run.has_falls)
-    report.summary.counts["trees_felled"] = static_cast<std::int64_t>(report.falls.size());
+  if (run.has_falls) documents.count("trees_felled", report.falls.size());
   for (const StampedPose& pose : run.trajectory) {
     ReportScan scan;
     scan.stamp = pose.stamp;
@@ -315,15 +343,40 @@ void write_summary(const GeoreferenceRequest& request, const Run& run, const Mot
     report.scans.push_back(scan);
   }
   report.fixes = fixes_of(motion.gnss);
-  const auto elapsed_s = [&] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - run.start).count();
-  };
-  report.summary.wall_s = elapsed_s();
-  report.summary.cpu_s = process_cpu_seconds();
-  report.summary.peak_memory_mb = peak_memory_mb();
-  write_report(request.result / "report.html", report);
-  report.summary.wall_s = elapsed_s();
-  write_run_json(request.result / "run.json", report.summary);
+}
+
+// The motion that the fixes or the terrain model ask for.
+Motion find_motion(const GeoreferenceRequest& request, const Run& run, Log& log) {
+  Motion motion = request.method == GeoreferenceMethod::kTerrain ? by_terrain(request, run)
+                                                                 : by_gnss_path(request, run, log);
+  if (motion.origin) {
+    motion.figures["origin_latitude_deg"] = motion.origin->latitude_deg;
+    motion.figures["origin_longitude_deg"] = motion.origin->longitude_deg;
+    motion.figures["origin_height_m"] = motion.origin->height_m;
+  }
+  return motion;
+}
+
+// All files of the run, moved. Returns the coordinate system of the trees, empty where unknown.
+std::string write_moved(const GeoreferenceRequest& request, const Run& run, const Motion& motion,
+                        const std::vector<Tree>& trees, Log& log) {
+  write_moved_map(request.run, request.result, motion.target_from_world, log);
+  for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum"})
+    write_moved_path(request.run / name, request.result / name, motion.target_from_world);
+  write_moved_cuts(request.run / "cuts.csv", request.result / "cuts.csv", motion.target_from_world);
+  copy_unmoved(request.run, request.result);
+  std::string system;
+  if (run.has_trees) {
+    write_trees_csv(request.result / "trees.csv", trees);
+    if (run.has_falls) write_tree_falls(request.result / "felled.csv", placed(run.falls, trees));
+    if (motion.origin) system = write_trees_map(request, trees, *motion.origin);
+  }
+  if (motion.gnss.empty()) return system;
+  GnssWriter writer(request.result / "gnss.csv");
+  for (const GnssRow& row : motion.gnss)
+    writer.add(row);
+  writer.commit();
+  return system;
 }
 
 }  // namespace
@@ -336,37 +389,22 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& lo
   GeoreferenceRequest request = given;
   request.result = place.begin_results();
   if (!request.coordinate_system.empty()) (void)CoordinateSystem(request.coordinate_system);
+  StageTimes times;
+  RunDocuments documents("georeference", {yaml_of(given), {}, "", {}}, times, log);
+  std::optional<ScopedTimer> timer(std::in_place, times, "reading");
   const Run run = read_run(request.run);
-  Motion motion = request.method == GeoreferenceMethod::kTerrain ? by_terrain(request, run)
-                                                                 : by_gnss_path(request, run, log);
-  inherit(run.trust, motion.outcome.status, motion.outcome.reasons);
-  write_moved_map(request.run, request.result, motion.target_from_world, log);
-  if (motion.origin) {
-    motion.outcome.figures["origin_latitude_deg"] = motion.origin->latitude_deg;
-    motion.outcome.figures["origin_longitude_deg"] = motion.origin->longitude_deg;
-    motion.outcome.figures["origin_height_m"] = motion.origin->height_m;
-  }
-  for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum"})
-    write_moved_path(request.run / name, request.result / name, motion.target_from_world);
-  write_moved_cuts(request.run / "cuts.csv", request.result / "cuts.csv", motion.target_from_world);
-  copy_unmoved(request.run, request.result);
+  timer.emplace(times, "fit");
+  const Motion motion = find_motion(request, run, log);
+  add_inputs(request, run, log, documents);
+  timer.emplace(times, "writing");
   const std::vector<Tree> trees = moved_trees(run.trees, motion.target_from_world);
-  std::string system;
-  if (run.has_trees) {
-    write_trees_csv(request.result / "trees.csv", trees);
-    if (run.has_falls) write_tree_falls(request.result / "felled.csv", placed(run.falls, trees));
-    if (motion.origin) system = write_trees_map(request, trees, *motion.origin);
-  }
-  if (!motion.gnss.empty()) {
-    GnssWriter writer(request.result / "gnss.csv");
-    for (const GnssRow& row : motion.gnss)
-      writer.add(row);
-    writer.commit();
-  }
-  write_summary(request, run, motion, trees, system, log);
+  documents.summary().crs_wkt = write_moved(request, run, motion, trees, log);
+  timer.reset();
+  describe(request, run, motion, trees, documents);
+  documents.write(request.result);
   place.commit(log);
   place.forget_state();
-  return motion.outcome;
+  return {documents.outcome(motion.summary), motion.figures};
 }
 
 }  // namespace understory

@@ -6,11 +6,11 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "understory/georeference/path_fit.h"
 #include "understory/georeference/terrain_fit.h"
 #include "understory/output/run_summary.h"
+#include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/util/log.h"
 
 namespace understory {
@@ -39,11 +39,8 @@ struct GeoreferenceRequest {
 };
 
 // What `understory georeference` tells when it is done.
-struct GeoreferenceOutcome {
-  RunStatus status = RunStatus::kComplete;
-  std::vector<std::string> reasons;
+struct GeoreferenceOutcome : RunOutcome {
   std::map<std::string, Figure> figures;
-  std::string summary;  // a few lines for the terminal
 };
 
 // Moves a run by a fit after it was made: reads trajectory.tum and what else can be moved of the

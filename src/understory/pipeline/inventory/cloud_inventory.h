@@ -2,11 +2,11 @@
 
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "understory/forest/inventory.h"
-#include "understory/output/run_summary.h"
 #include "understory/pipeline/inventory/stand_cloud.h"
+#include "understory/pipeline/run_folder/run_outcome.h"
+#include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
 
@@ -19,20 +19,13 @@ struct InventoryRequest {
   bool overwrite = false;  // what an earlier run left in the folder
   CloudFrame frame;
   InventoryConfig config;
-  std::string config_yaml;  // every key, for run.json
-  std::string config_file;  // that the user named; not to be overwritten
-};
-
-// What `understory inventory` tells when it is done.
-struct InventoryOutcome {
-  RunStatus status = RunStatus::kComplete;
-  std::vector<std::string> reasons;  // why partial or untrusted
-  std::string summary;               // a line for the terminal
+  ConfigRecord config_record;  // for run.json
+  std::string config_file;     // that the user named; not to be overwritten
 };
 
 // From a point cloud to the run folder: ground, trees, rasters, report. Throws InputError where the
 // cloud cannot be read or is neither in metres nor upright, OutputError.
-[[nodiscard]] InventoryOutcome run_inventory(const InventoryRequest& request, Log& log,
-                                             const ProgressSink& progress);
+[[nodiscard]] RunOutcome run_inventory(const InventoryRequest& request, Log& log,
+                                       const ProgressSink& progress);
 
 }  // namespace understory

@@ -3,9 +3,9 @@
 
 #include "understory/pipeline/judgement/input_remarks.h"
 #include "understory/pipeline/mapping/dense_front_end.h"
+#include "understory/pipeline/mapping/dense_results.h"
 #include "understory/pipeline/mapping/finished_map.h"
 #include "understory/pipeline/mapping/lidar_view.h"
-#include "understory/pipeline/run_folder/run_writer.h"
 
 namespace understory {
 namespace {
@@ -54,7 +54,7 @@ class DenseMap : public MapMaker {
     made_.lidar_view = figures_of(view);
   }
 
-  RunOutcome write() override { return write_run(recording_, front_end_, made_); }
+  RunOutcome write() override { return write_dense_results(recording_, front_end_, made_); }
 
  private:
   DenseFrontEnd& front_end_;

@@ -43,10 +43,10 @@ void EventLoop::go_on() {
 // Orderer and front end at their beginning, with the configuration that suits the recording.
 void EventLoop::adapt_to_recording() {
   Adapted<FrontEndConfig> adapted =
-      adapt_front_end(asked_, request_.config_origins, request_.traits, request_.conditions);
+      adapt_front_end(asked_, request_.config_record.origins, request_.traits, request_.conditions);
   request_.config = std::move(adapted.config);
-  request_.adapted = std::move(adapted.changes);
-  request_.effective_yaml = yaml_of(request_.config);
+  request_.config_record.adapted = std::move(adapted.changes);
+  request_.config_record.effective_yaml = yaml_of(request_.config);
   orderer_.emplace(loop_of(request_.config).time_repair, log_);
   if (stamps_believed_) orderer_->believe_stamps(EventOrderer::kImu);
   front_end_.reset();  // lets go of its files

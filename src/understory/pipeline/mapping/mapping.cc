@@ -57,7 +57,7 @@ MappingRun reopen_mapping(const std::filesystem::path& run_folder) {
   UnfinishedRun unfinished = RunState::reopen(run_folder);
   MappingRequest& request = unfinished.request;
   request.config = reread_front_end_config(
-      unfinished.state.front_end(), request.config_yaml, run_folder.string(),
+      unfinished.state.front_end(), request.config_record.asked_yaml, run_folder.string(),
       [&](const std::string& file) { return request.found(file); });
   return {std::move(request), std::move(unfinished.state)};
 }

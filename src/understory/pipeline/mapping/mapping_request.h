@@ -17,18 +17,15 @@ namespace understory {
 struct MappingRequest {
   std::string recording;  // file, folder or sim:SITE
   std::filesystem::path run_folder;
-  FrontEndConfig config;         // says which front end; the run adapts it to the sensors
-  std::string config_yaml;       // asked for, every key, for run.json and for resuming
-  ConfigOrigins config_origins;  // which of them were set, by what
+  FrontEndConfig config;  // says which front end; the run adapts it to the sensors
+  // As asked for, for run.json and for resuming, and what the run made of it, for run.json.
+  ConfigRecord config_record;
   OpenOptions open;
   bool realtime = false;   // played at the speed of its sensors; late scans are dropped
   bool overwrite = false;  // start anew although the folder holds an unfinished run
   // What the run found out itself, and goes on from when it is resumed.
   SensorTraits traits;
   RunConditions conditions;
-  // Made of these and the configuration asked for, for run.json.
-  std::string effective_yaml;
-  std::vector<ConfigAdaptation> adapted;
   // Of a resumed run: where it was begun, if that is not the current folder; else empty.
   std::filesystem::path begun_in;
 

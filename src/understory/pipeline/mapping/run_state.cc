@@ -12,13 +12,14 @@ namespace {
 void put_request(BinaryWriter& writer, const MappingRequest& request) {
   const OpenOptions& open = request.open;
   for (const std::string& text :
-       {std::string(kVersion), request.recording, request.config_yaml, open.metadata_file,
-        open.lidar_topic, open.imu_topic, open.gnss_topic, open.extrinsics_file}) {
+       {std::string(kVersion), request.recording, request.config_record.asked_yaml,
+        open.metadata_file, open.lidar_topic, open.imu_topic, open.gnss_topic,
+        open.extrinsics_file}) {
     writer.put(text);
   }
   writer.put(open.rate_hz);
   writer.put(request.realtime);
-  put_origins(writer, request.config_origins);
+  put_origins(writer, request.config_record.origins);
   put_traits(writer, request.traits);
   put_conditions(writer, request.conditions);
   const bool again = !request.begun_in.empty();
@@ -33,7 +34,7 @@ void get_request(BinaryReader& reader, const std::filesystem::path& path, Mappin
         "was written by version " + version + ", this is " + kVersion + ": map the recording anew");
   }
   request.recording = reader.get_string();
-  request.config_yaml = reader.get_string();
+  request.config_record.asked_yaml = reader.get_string();
   OpenOptions& open = request.open;
   for (std::string* text : {&open.metadata_file, &open.lidar_topic, &open.imu_topic,
                             &open.gnss_topic, &open.extrinsics_file}) {
@@ -41,7 +42,7 @@ void get_request(BinaryReader& reader, const std::filesystem::path& path, Mappin
   }
   open.rate_hz = reader.get<double>();
   request.realtime = reader.get<bool>();
-  request.config_origins = get_origins(reader);
+  request.config_record.origins = get_origins(reader);
   request.traits = get_traits(reader);
   request.conditions = get_conditions(reader);
   const std::filesystem::path begun_in = reader.get_string();

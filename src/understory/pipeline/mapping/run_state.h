@@ -92,7 +92,7 @@ class RunState {
 };
 
 // A run that was killed, stopped or cut off, with what it was begun with; its configuration is read
-// as text (`config_yaml`).
+// as text (`config_record.asked_yaml`).
 struct UnfinishedRun {
   MappingRequest request;
   RunState state;

@@ -7,10 +7,9 @@
 #include "understory/pipeline/correction/stem_map_maker.h"
 #include "understory/pipeline/judgement/evidence_gathering.h"
 #include "understory/pipeline/judgement/input_remarks.h"
+#include "understory/pipeline/mapping/map_documents.h"
 #include "understory/pipeline/mapping/sparse_front_end.h"
 #include "understory/pipeline/run_folder/run_truth.h"
-#include "understory/pipeline/source.h"
-#include "understory/util/version.h"
 
 namespace understory {
 namespace {
@@ -27,28 +26,18 @@ void write_stems(const std::filesystem::path& file, std::vector<StemView>& views
   writer.commit();
 }
 
-// What run.json says of the reading.
-RunSummary summary_of(const SparseFrontEnd& front_end, const ReadRecording& recording) {
-  const MappingRequest& request = recording.request;
-  RunSummary summary;
-  summary.command = "map";
-  summary.version = kVersion;
-  summary.config_yaml = request.config_yaml;
-  summary.config_origins = request.config_origins;
-  summary.effective_yaml = request.effective_yaml;
-  summary.adapted = request.adapted;
-  summary.inputs = hash_inputs(request.recording, recording.log);
+// What run.json and the report say of the reading.
+RunDocuments documents_of(const SparseFrontEnd& front_end, const ReadRecording& recording,
+                          const StageTimes& times) {
+  RunDocuments documents = map_documents(recording, times);
   const std::string& head_log = front_end.config().correction.harvester.head_log;
-  if (!head_log.empty()) summary.inputs.push_back(hash_input(head_log));
-  const std::vector<StampedPose>& path = front_end.path();
-  summary.recording_s = to_seconds(path.back().stamp - path.front().stamp);
-  summary.counts["views"] = static_cast<std::int64_t>(front_end.views().size());
-  summary.counts["scans_positioned"] = static_cast<std::int64_t>(front_end.positioned());
-  if (recording.facts.realtime) {
-    summary.counts["scans_dropped"] = static_cast<std::int64_t>(recording.facts.dropped_scans);
-    add_latency(distribution_of(recording.facts.latencies_ms), summary);
-  }
-  return summary;
+  if (!head_log.empty()) documents.add_input(head_log);
+  documents.count("views", front_end.views().size());
+  documents.count("scans_positioned", front_end.positioned());
+  documents.report().made_from =
+      fmt::format("{}, {} scans, stems of {} views", recording.source.format(),
+                  front_end.path().size(), front_end.views().size());
+  return documents;
 }
 
 // Milliseconds of work on the scan of each view; 0 where unknown.
@@ -65,17 +54,12 @@ std::vector<float> scan_times_ms(const SparseFrontEnd& front_end) {
 CorrectionInput correction_input(SparseFrontEnd& front_end, const ReadRecording& recording) {
   const Recording& source = recording.source;
   CorrectionInput input;
-  input.summary = summary_of(front_end, recording);
   gather_sparse(front_end, recording.facts, source, recording.log, input.evidence);
   input.scan_ms = scan_times_ms(front_end);
-  input.title = std::filesystem::path(recording.request.recording).filename().string();
-  input.made_from = fmt::format("{}, {} scans, stems of {} views", source.format(),
-                                front_end.path().size(), front_end.views().size());
   input.truth = write_truth(recording.request.run_folder, source);
   if (const auto& antenna = source.rig().body_from_gnss)
     input.antenna_in_body = antenna->translation();
   input.head_cuts = read_head_log(front_end.config().correction.harvester.head_log);
-  input.elapsed_s = recording.facts.elapsed_s;
   front_end.hand_over(input.views, input.steps, input.path, input.fixes);
   write_stems(recording.results / "stems.csv.gz", input.views);
   return input;
@@ -96,10 +80,12 @@ std::string SparseFrontEnd::why_no_map(const Recording& source) const {
 
 std::unique_ptr<MapMaker> SparseFrontEnd::map_maker(const ReadRecording& recording) {
   remark_on_lever_arms(recording.source.rig(), recording.request.recording, recording.log);
+  RunDocuments documents = documents_of(*this, recording, times_);
   CorrectionInput input = correction_input(*this, recording);
   const StemMapPlace place{recording.request.run_folder, recording.results, times_, recording.log,
                            recording.progress};
-  return std::make_unique<StemMapMaker>(std::move(input), config_.correction, place);
+  return std::make_unique<StemMapMaker>(std::move(input), std::move(documents), config_.correction,
+                                        place);
 }
 
 }  // namespace understory

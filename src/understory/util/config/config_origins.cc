@@ -38,6 +38,18 @@ void note(const ConfigTable& table, const YAML::Node& node, const std::string& p
 
 }  // namespace
 
+ConfigOrigins read_settings(ConfigTable& table, const std::string& file,
+                            const std::vector<std::string>& settings) {
+  ConfigOrigins origins;
+  if (!file.empty()) {
+    table.read_file(file);
+    note_file(table, file, origins);
+  }
+  table.set(settings);
+  note_settings(table, settings, origins);
+  return origins;
+}
+
 void note_yaml(const ConfigTable& table, const std::string& text, const std::string& origin,
                ConfigOrigins& origins) {
   note(table, YAML::Load(text), "", origin, origins);

@@ -28,6 +28,19 @@ struct ConfigAdaptation {
   std::string why;
 };
 
+// A configuration as run.json tells it.
+struct ConfigRecord {
+  std::string asked_yaml;      // what was asked for, every key
+  ConfigOrigins origins;       // which of them were set, by what
+  std::string effective_yaml;  // what ran; empty: as asked for
+  std::vector<ConfigAdaptation> adapted;
+};
+
+// Reads a file into `table`, none where its name is empty, and then settings ("key=value"). Returns
+// the origins of the keys that they set. Throws ConfigError, InputError.
+[[nodiscard]] ConfigOrigins read_settings(ConfigTable& table, const std::string& file,
+                                          const std::vector<std::string>& settings);
+
 // Notes the keys of `table` that YAML text, a file or settings ("key=value") have set: what comes
 // later replaces what comes before. They have been read into the table without a problem; keys that
 // it does not have are passed over.

@@ -1,4 +1,4 @@
-#include "understory/cli/file_in_folder.h"
+#include "understory/util/files/file_in_folder.h"
 
 #include "understory/util/error.h"
 

@@ -19,8 +19,8 @@ struct DenseProducts {
 };
 
 // Writes what the dense front end has found: trajectory, states, keyframes, graph, fixes, map,
-// trees, terrain, run.json, report.
-[[nodiscard]] RunOutcome write_run(const ReadRecording& recording, DenseFrontEnd& session,
-                                   DenseProducts& made);
+// trees, terrain, run.json, report. Throws OutputError.
+[[nodiscard]] RunOutcome write_dense_results(const ReadRecording& recording,
+                                             DenseFrontEnd& front_end, DenseProducts& made);
 
 }  // namespace understory

@@ -1,4 +1,4 @@
-#include "understory/pipeline/run_folder/run_writer.h"
+#include "understory/pipeline/mapping/dense_results.h"
 
 #include <fmt/format.h>
 
@@ -10,18 +10,15 @@
 #include "understory/output/geo_files.h"
 #include "understory/output/las_writer.h"
 #include "understory/output/map_picture.h"
-#include "understory/output/report.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/judgement/evidence_gathering.h"
 #include "understory/pipeline/judgement/match_course.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
-#include "understory/pipeline/mapping/dense_front_end.h"
 #include "understory/pipeline/mapping/finished_trajectory.h"
+#include "understory/pipeline/mapping/map_documents.h"
 #include "understory/pipeline/run_folder/run_truth.h"
-#include "understory/pipeline/source.h"
 #include "understory/util/median.h"
-#include "understory/util/version.h"
 
 namespace understory {
 namespace {
@@ -63,8 +60,8 @@ double median_period_ms(const std::vector<ReportScan>& scans) {
 }
 
 // trajectory.tum and states.csv.gz.
-TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const DenseFrontEnd& session,
-                                 const MappingConfig& config) {
+TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
+                                 const DenseFrontEnd& front_end, const MappingConfig& config) {
   TumWriter trajectory(folder / "trajectory.tum");
   StatesWriter states(folder / "states.csv.gz");
   TrajectoryFacts facts;
@@ -76,7 +73,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder, const Dens
   Pose last;
   std::uint64_t empty_in_a_row = 0;
   for_each_finished_scan(
-      session.journal(), session.map().keyframes(), [&](const FinishedScan& scan) {
+      front_end.journal(), front_end.map().keyframes(), [&](const FinishedScan& scan) {
         const ScanRecord& record = *scan.record;
         facts.trajectory.push_back(trajectory.add({record.stamp, scan.world_from_body}));
         states.add({record.stamp, scan.velocity_in_world,
@@ -210,40 +207,41 @@ std::uint64_t write_map(const std::filesystem::path& folder, DenseProducts& made
   return points;
 }
 
-void fill_counts(RunSummary& summary, const DenseFrontEnd& session, const RunFacts& facts) {
-  const MappingCounts& counts = session.counts();
-  const auto count = [&](const char* name, std::uint64_t value) {
-    summary.counts[name] = static_cast<std::int64_t>(value);
-  };
-  count("keyframes", session.map().keyframes().size());
-  count("scans_unmatched", counts.unmatched);
-  count("scans_velocity_gated", counts.gated);
-  count("scans_with_few_points", counts.empty_scans);
-  count("segments", counts.segments);
-  const auto& used = session.map().loops_used();
-  count("loops_tried", used.size());
-  count("loops_closed", static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 1)));
-  count("imu_samples", counts.imu_samples);
-  count("gnss_fixes", session.fixes().size());
-  count("lidar_points", counts.points);
+void fill_streams(const EventOrderer::Report& time_repair, RunDocuments& documents) {
   static constexpr const char* kNames[] = {"lidar", "imu", "gnss", "mag"};
   for (std::size_t s = 0; s < EventOrderer::kStreams; ++s) {
-    const EventOrderer::StreamReport& stream = facts.time_repair.streams[s];
+    const EventOrderer::StreamReport& stream = time_repair.streams[s];
     const std::string name = kNames[s];
-    count((name + "_duplicates").c_str(), stream.duplicates);
-    count((name + "_reordered").c_str(), stream.reordered);
-    count((name + "_too_late").c_str(), stream.late);
-    count((name + "_clock_jumps").c_str(), stream.clock_jumps);
-    count((name + "_gaps").c_str(), stream.gaps);
+    documents.count(name + "_duplicates", stream.duplicates);
+    documents.count(name + "_reordered", stream.reordered);
+    documents.count(name + "_too_late", stream.late);
+    documents.count(name + "_clock_jumps", stream.clock_jumps);
+    documents.count(name + "_gaps", stream.gaps);
     if (stream.received == 0) continue;
-    count((name + "_received").c_str(), stream.received);
-    count((name + "_released").c_str(), stream.released);
-    summary.quality[name + "_unused_s"] = to_seconds(stream.unused);
-    summary.quality[name + "_clock_offset_s"] = to_seconds(stream.offset);
+    documents.count(name + "_received", stream.received);
+    documents.count(name + "_released", stream.released);
+    documents.summary().quality[name + "_unused_s"] = to_seconds(stream.unused);
+    documents.summary().quality[name + "_clock_offset_s"] = to_seconds(stream.offset);
   }
-  summary.quality["imu_without_place_s"] = to_seconds(session.imu_hearing().without_place());
-  count("scans_without_imu", facts.time_repair.scans_without_imu);
-  if (facts.realtime) count("scans_dropped", facts.dropped_scans);
+  documents.count("scans_without_imu", time_repair.scans_without_imu);
+}
+
+void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
+  const MappingCounts& counts = front_end.counts();
+  documents.summary().scans = counts.scans;
+  documents.summary().poses = front_end.journal().size();
+  documents.count("keyframes", front_end.map().keyframes().size());
+  documents.count("scans_unmatched", counts.unmatched);
+  documents.count("scans_velocity_gated", counts.gated);
+  documents.count("scans_with_few_points", counts.empty_scans);
+  documents.count("segments", counts.segments);
+  const auto& used = front_end.map().loops_used();
+  documents.count("loops_tried", used.size());
+  documents.count("loops_closed",
+                  static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 1)));
+  documents.count("imu_samples", counts.imu_samples);
+  documents.count("gnss_fixes", front_end.fixes().size());
+  documents.count("lidar_points", counts.points);
 }
 
 // Whether the work on a scan grows with the length of the run.
@@ -261,61 +259,40 @@ void fill_constancy(RunSummary& summary, const TrajectoryFacts& trajectory) {
   fill("scan_wall_ms", trajectory.wall_ms);
 }
 
-void fill_quality(RunSummary& summary, const TrajectoryFacts& trajectory, const RunFacts& facts) {
+void fill_quality(const DenseFrontEnd& front_end, const TrajectoryFacts& trajectory,
+                  const RunFacts& facts, RunSummary& summary) {
   fill_constancy(summary, trajectory);
   if (facts.memory_mb.size() > 1) {
     summary.quality["memory_mb_half"] = facts.memory_mb[facts.memory_mb.size() / 2];
     summary.quality["memory_mb_end"] = facts.memory_mb.back();
   }
+  summary.recording_s = trajectory.duration_s;
   summary.quality["length_m"] = trajectory.length_m;
   summary.quality["inlier_ratio_mean"] = trajectory.match.inliers_mean;
   summary.quality["match_distance_rms_m"] = trajectory.match.fitness_rms_m;
   summary.quality["weak_scans_percent"] =
       100.0 * static_cast<double>(trajectory.weak) / static_cast<double>(trajectory.scans.size());
-  if (!facts.realtime) return;
-  add_latency(distribution_of(facts.latencies_ms), summary);
+  summary.quality["imu_without_place_s"] = to_seconds(front_end.imu_hearing().without_place());
+  summary.quality["loop_search_cpu_s"] = front_end.map().search_cpu_seconds();
 }
 
-void check_ranges(DenseFrontEnd& session, MatchEvidence& evidence) {
-  const ScopedTimer timer(session.times(), "finish_check_ranges");
-  const RangeCheck check = session.map().check_ranges(session.rig().body_from_lidar.translation());
+void check_ranges(DenseFrontEnd& front_end, MatchEvidence& evidence) {
+  const ScopedTimer timer(front_end.times(), "finish_check_ranges");
+  const RangeCheck check =
+      front_end.map().check_ranges(front_end.rig().body_from_lidar.translation());
   evidence.range_offset_m = check.offset_m;
   evidence.range_offset_error_m = check.standard_error_m;
   evidence.range_pairs = check.pairs;
 }
 
-RunEvidence evidence_of(DenseFrontEnd& session, const RunFacts& facts, const Recording& source,
+RunEvidence evidence_of(DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
                         const TrajectoryFacts& trajectory, const Log& log) {
   RunEvidence evidence;
   evidence.motion = trajectory.motion;
   evidence.match = trajectory.match;
-  check_ranges(session, evidence.match);
-  gather_dense(session, facts, source, log, evidence);
+  check_ranges(front_end, evidence.match);
+  gather_dense(front_end, facts, source, log, evidence);
   return evidence;
-}
-
-RunSummary summarise_run(const MappingRequest& request, DenseFrontEnd& session,
-                         const RunFacts& facts, const TrajectoryFacts& trajectory,
-                         const RunEvidence& evidence, Log& log) {
-  RunSummary summary;
-  summary.command = "map";
-  summary.version = kVersion;
-  summary.config_yaml = request.config_yaml;
-  summary.config_origins = request.config_origins;
-  summary.effective_yaml = request.effective_yaml;
-  summary.adapted = request.adapted;
-  summary.inputs = hash_inputs(request.recording, log);
-  summary.scans = session.counts().scans;
-  summary.poses = session.journal().size();
-  summary.recording_s = trajectory.duration_s;
-  const RunJudgement judgement = judge_run(evidence, session.config().judgement);
-  summary.status = judgement.status;
-  summary.reasons = judgement.reasons;
-  summary.evidence = figures_of(evidence);
-  fill_counts(summary, session, facts);
-  fill_quality(summary, trajectory, facts);
-  summary.quality["loop_search_cpu_s"] = session.map().search_cpu_seconds();
-  return summary;
 }
 
 std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& trajectory,
@@ -335,62 +312,56 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
   return text + "report: " + (folder / "report.html").string();
 }
 
-ReportInput report_of(const ReadRecording& recording, const DenseFrontEnd& session,
-                      const TrajectoryFacts& trajectory, const RunSummary& summary) {
-  ReportInput report;
-  report.title = std::filesystem::path(recording.request.recording).filename().string();
+void fill_report(const ReadRecording& recording, const DenseFrontEnd& front_end,
+                 const TrajectoryFacts& trajectory, std::uint64_t scans, ReportInput& report) {
   const std::string& model = recording.source.rig().lidar_model;
   report.made_from = fmt::format("{}, {}{} scans", recording.facts.format,
-                                 model.empty() ? "" : model + ", ", summary.scans);
-  report.summary = summary;
+                                 model.empty() ? "" : model + ", ", scans);
   report.scans = trajectory.scans;
   report.sensor_period_ms = trajectory.period_ms;
-  const auto matcher = make_matcher(session.config().keyframe_map.local_map.matcher);
+  const auto matcher = make_matcher(front_end.config().keyframe_map.local_map.matcher);
   if (matcher->sums_up_points()) report.map_cell_m = matcher->reach_m();
-  report.loops = report_loops(session.map());
-  report.loop_closure_enabled = session.config().keyframe_map.loop_closure.enabled;
-  return report;
+  report.loops = report_loops(front_end.map());
+  report.loop_closure_enabled = front_end.config().keyframe_map.loop_closure.enabled;
+}
+
+// The files of the map, if one was made.
+void add_map(const std::filesystem::path& folder, DenseProducts& made, StageTimes& times,
+             const ProgressSink& progress, MapPicture& picture, RunDocuments& documents) {
+  documents.count("trees", made.inventory.trees.size());
+  documents.summary().lidar_view = made.lidar_view;
+  if (!made.tiles) return;
+  const ScopedTimer timer(times, "finish_write_map");
+  documents.count("map_points", write_map(folder, made, picture, progress));
+  if (!picture.empty()) documents.report().picture = &picture;
+  documents.report().inventory = &made.inventory;
+  for (const std::string& remark : made.inventory.remarks)
+    documents.remark("inventory", remark);
 }
 
 }  // namespace
 
-RunOutcome write_run(const ReadRecording& recording, DenseFrontEnd& session, DenseProducts& made) {
-  const auto& [request, facts, source, work, folder, log, progress] = recording;
-  StageTimes& times = session.times();
-  const TrajectoryFacts trajectory = write_trajectory(folder, session, session.config());
-  write_graph(folder, session.map());
-  write_fixes(folder, session.fixes());
+RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& front_end,
+                               DenseProducts& made) {
+  const std::filesystem::path& folder = recording.results;
+  const RunFacts& facts = recording.facts;
+  const TrajectoryFacts trajectory = write_trajectory(folder, front_end, front_end.config());
+  write_graph(folder, front_end.map());
+  write_fixes(folder, front_end.fixes());
+  RunDocuments documents = map_documents(recording, front_end.times());
+  documents.judge(evidence_of(front_end, facts, recording.source, trajectory, recording.log),
+                  front_end.config().judgement);
+  fill_streams(facts.time_repair, documents);
+  fill_counts(front_end, documents);
+  fill_quality(front_end, trajectory, facts, documents.summary());
+  if (const auto truth = write_truth(recording.request.run_folder, recording.source))
+    documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
   MapPicture picture;
-  RunSummary summary = summarise_run(request, session, facts, trajectory,
-                                     evidence_of(session, facts, source, trajectory, log), log);
-  std::optional<ReportTruth> truth;
-  if (const auto known = write_truth(request.run_folder, source))
-    truth = compare_with_truth(trajectory.trajectory, *known);
-  if (truth) {
-    summary.quality["ape_rmse_m"] = truth->ape_rmse_m;
-    summary.quality["drift_percent"] = truth->drift_percent;
-  }
-  if (made.tiles) {
-    const ScopedTimer timer(times, "finish_write_map");
-    summary.counts["map_points"] =
-        static_cast<std::int64_t>(write_map(folder, made, picture, progress));
-  }
-  summary.lidar_view = made.lidar_view;
-  summary.counts["trees"] = static_cast<std::int64_t>(made.inventory.trees.size());
-  summary.warnings = log.warnings();
-  summary.stages = summarise(times);
-  summary.wall_s = facts.elapsed_s();
-  summary.cpu_s = process_cpu_seconds();
-  summary.peak_memory_mb = peak_memory_mb();
-  ReportInput report = report_of(recording, session, trajectory, summary);
-  if (!picture.empty()) report.picture = &picture;
-  if (made.tiles) report.inventory = &made.inventory;
-  report.truth = truth;
-  write_report(folder / "report.html", report);
-  summary.wall_s = facts.elapsed_s();  // all of it, the report too
-  write_run_json(folder / "run.json", summary);
-  return {summary.status, summary.reasons,
-          terminal_summary(summary, trajectory, made.inventory, request.run_folder)};
+  add_map(folder, made, front_end.times(), recording.progress, picture, documents);
+  fill_report(recording, front_end, trajectory, documents.summary().scans, documents.report());
+  documents.write(folder);
+  return documents.outcome(terminal_summary(documents.summary(), trajectory, made.inventory,
+                                            recording.request.run_folder));
 }
 
 }  // namespace understory

@@ -1,0 +1,19 @@
+#include "understory/pipeline/mapping/map_documents.h"
+
+#include "understory/pipeline/source.h"
+
+namespace understory {
+
+RunDocuments map_documents(const ReadRecording& recording, const StageTimes& times) {
+  const MappingRequest& request = recording.request;
+  const RunFacts& facts = recording.facts;
+  RunDocuments documents("map", request.config_record, times, recording.log, facts.elapsed_s);
+  documents.add_inputs(hash_inputs(request.recording, recording.log));
+  documents.report().title = std::filesystem::path(request.recording).filename().string();
+  if (!facts.realtime) return documents;
+  documents.count("scans_dropped", facts.dropped_scans);
+  add_latency(distribution_of(facts.latencies_ms), documents.summary());
+  return documents;
+}
+
+}  // namespace understory
