@@ -67,7 +67,7 @@ def expect_mended(outcome, path, key):
 def whole(folder):
     outcome = map_recording(good, folder / "run")
     error, pairs = error_m(outcome, truth)
-    assert outcome.code == 0 and outcome.said == "" and outcome.run["warnings"] == [], outcome.said
+    assert outcome.code == 0 and outcome.said == "" and set(outcome.warnings) <= {"inventory"}, outcome.said
     assert outcome.run["counts"]["segments"] == 1
     assert pairs == ALL and error < 0.03, (pairs, error)
     return f"{100 * error:.1f} cm"

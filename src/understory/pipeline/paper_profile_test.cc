@@ -4,14 +4,14 @@
 #include <numbers>
 
 #include "understory/odometry/motion/motion_model.h"
-#include "understory/pipeline/mapping/mapping_config.h"
+#include "understory/pipeline/mapping/dense_mapping_config.h"
 #include "understory/util/time.h"
 
 namespace understory {
 namespace {
 
-MappingConfig paper() {
-  return read_mapping_config("paper", "", {}).config;
+DenseMappingConfig paper() {
+  return read_dense_mapping_config("paper", "", {}).config;
 }
 
 TEST(PaperProfile, LidarFactorIsEquation36WithItsParameters) {
@@ -28,7 +28,7 @@ TEST(PaperProfile, LidarFactorIsEquation36WithItsParameters) {
 }
 
 TEST(PaperProfile, ScansAreThinnedByVoxelMeansAndKeyframesAreNot) {
-  const MappingConfig config = paper();
+  const DenseMappingConfig config = paper();
   EXPECT_EQ(config.odometry.voxel.voxel_size_m, 0.4);
   EXPECT_EQ(config.odometry.voxel.point, VoxelPoint::kMean);
   EXPECT_EQ(config.keyframe_map.keyframe.voxel_size_m, 0.0);
@@ -77,7 +77,7 @@ TEST(PaperProfile, EdgesOfTheMapGraphHaveTheNoiseOfEquation36) {
 }
 
 TEST(PaperProfile, WhatIsNotThePapersIsOff) {
-  const MappingConfig config = paper();
+  const DenseMappingConfig config = paper();
   EXPECT_EQ(config.odometry.isolated.within_m, 0.0);
   EXPECT_EQ(config.odometry.motion.velocity_gate_m_s, 0.0);
   EXPECT_EQ(config.odometry.motion.angular_gate_deg_s, 0.0);

@@ -173,7 +173,7 @@ void gather_dense(const DenseFrontEnd& session, const RunFacts& facts, const Rec
   const ScanMotion scan_motion = session.odometry().scan_motion();
   evidence.match.scan_motion_ratio = scan_motion.ratio;
   evidence.match.scan_motion_probes = scan_motion.probes;
-  const MappingCounts& counts = session.counts();
+  const DenseCounts& counts = session.counts();
   MatchEvidence& match = evidence.match;
   match.scans = counts.scans;
   match.unmatched = counts.unmatched + counts.gated;

@@ -57,7 +57,7 @@ void MatchCourse::put(MatchEvidence& evidence) const {
   const auto fewer =
       std::count_if(inliers.begin(), inliers.end(), [&](double x) { return x < few; });
   evidence.few_share = share_of(static_cast<std::size_t>(fewer), inliers.size());
-  const double chance = kByChance * finest_cell_m_;
+  const double chance = kByChance * reach_m_;
   const auto by_chance =
       std::count_if(squares.begin(), squares.end(), [&](double x) { return x > chance * chance; });
   evidence.chance_share = share_of(static_cast<std::size_t>(by_chance), squares.size());

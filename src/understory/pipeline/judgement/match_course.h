@@ -14,9 +14,9 @@ namespace understory {
 // thread-safe.
 class MatchCourse {
  public:
-  // Edge of the finest cells that scans are matched to, metres. A point anywhere in such a cell is
-  // half an edge (RMS) from its middle.
-  explicit MatchCourse(double finest_cell_m) : finest_cell_m_(finest_cell_m) {}
+  // Reach of the matcher, see Matcher::reach_m: of cells it is the edge of the finest ones. A point
+  // anywhere in such a cell is half an edge (RMS) from its middle.
+  explicit MatchCourse(double reach_m) : reach_m_(reach_m) {}
 
   // One scan, in order of time. Without a match it found none of its points.
   //   inlier_ratio: share of its points near the map; fitness_m2: their mean squared distance
@@ -31,7 +31,7 @@ class MatchCourse {
     std::uint64_t scans = 0;
     std::uint64_t matched = 0;
   };
-  double finest_cell_m_;
+  double reach_m_;
   TimeNs first_ = 0;
   std::map<TimeNs, Window> windows_;  // by number
 };

@@ -42,14 +42,15 @@ class Changes {
 };
 
 // What the matcher itself knows to suit such scans.
-void suit_matcher(const MappingConfig& config, const ScanTraits& scans, const std::string& why,
+void suit_matcher(const DenseMappingConfig& config, const ScanTraits& scans, const std::string& why,
                   Changes& changes, double when_s = 0.0) {
   for (const SuitedSetting& setting : suited_settings(config.keyframe_map.local_map.matcher, scans))
     changes.set("registration." + setting.key, setting.value, why, when_s);
 }
 
 // A sparse scan is thinned less, its keyframes lie closer, and fewer of its points need a match.
-void suit_sparse_scans(const MappingConfig& config, const SensorTraits& traits, Changes& changes) {
+void suit_sparse_scans(const DenseMappingConfig& config, const SensorTraits& traits,
+                       Changes& changes) {
   if (traits.scan_points == 0 ||
       traits.scan_points >= static_cast<std::uint64_t>(config.sparse_scan_points))
     return;
@@ -66,7 +67,7 @@ void suit_sparse_scans(const MappingConfig& config, const SensorTraits& traits, 
 }
 
 // Without an IMU predictions are often far off.
-void suit_scans_alone(const MappingConfig& config, const SensorTraits& traits,
+void suit_scans_alone(const DenseMappingConfig& config, const SensorTraits& traits,
                       const RunConditions& conditions, Changes& changes) {
   std::string why;
   double when_s = 0.0;
@@ -98,11 +99,11 @@ constexpr const char* kLive = "--realtime: each sensor is in order, and waiting 
 
 }  // namespace
 
-Adapted<MappingConfig> adapt(const MappingConfig& asked, const ConfigOrigins& origins,
-                             const SensorTraits& traits, const RunConditions& conditions) {
-  Adapted<MappingConfig> adapted{asked, {}};
-  MappingConfig& config = adapted.config;
-  Changes changes(mapping_table(config), origins);
+Adapted<DenseMappingConfig> adapt(const DenseMappingConfig& asked, const ConfigOrigins& origins,
+                                  const SensorTraits& traits, const RunConditions& conditions) {
+  Adapted<DenseMappingConfig> adapted{asked, {}};
+  DenseMappingConfig& config = adapted.config;
+  Changes changes(dense_mapping_table(config), origins);
   if (conditions.realtime) changes.set("time_repair.window_s", "0", kLive);
   suit_sparse_scans(asked, traits, changes);
   suit_scans_alone(asked, traits, conditions, changes);
@@ -131,9 +132,10 @@ Adapted<SparseMappingConfig> adapt(const SparseMappingConfig& asked, const Confi
 }
 
 // The table is made of the defaults, which it tells; its values are those of the fields later.
-std::string commented_yaml(const Adapted<MappingConfig>& adapted, const ConfigOrigins& origins) {
-  MappingConfig config;
-  const ConfigTable table = mapping_table(config);
+std::string commented_yaml(const Adapted<DenseMappingConfig>& adapted,
+                           const ConfigOrigins& origins) {
+  DenseMappingConfig config;
+  const ConfigTable table = dense_mapping_table(config);
   config = adapted.config;
   return yaml_with_remarks(table, remarks_on(adapted.changes, origins));
 }

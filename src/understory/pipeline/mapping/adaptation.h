@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/pipeline/mapping/mapping_config.h"
+#include "understory/pipeline/mapping/dense_mapping_config.h"
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/mapping/sparse_mapping_config.h"
 #include "understory/util/config/config_origins.h"
@@ -32,15 +32,16 @@ struct Adapted {
 
 // From the configuration asked for to the one that runs. A key that was set (`origins`) is never
 // changed, with one exception: an IMU that was found to be wrong is left out. Pure.
-[[nodiscard]] Adapted<MappingConfig> adapt(const MappingConfig& asked, const ConfigOrigins& origins,
-                                           const SensorTraits& traits,
-                                           const RunConditions& conditions);
+[[nodiscard]] Adapted<DenseMappingConfig> adapt(const DenseMappingConfig& asked,
+                                                const ConfigOrigins& origins,
+                                                const SensorTraits& traits,
+                                                const RunConditions& conditions);
 [[nodiscard]] Adapted<SparseMappingConfig> adapt(const SparseMappingConfig& asked,
                                                  const ConfigOrigins& origins,
                                                  const RunConditions& conditions);
 
 // Every key with its meaning, what set it (`origins`), and what was changed, from what and why.
-[[nodiscard]] std::string commented_yaml(const Adapted<MappingConfig>& adapted,
+[[nodiscard]] std::string commented_yaml(const Adapted<DenseMappingConfig>& adapted,
                                          const ConfigOrigins& origins);
 [[nodiscard]] std::string commented_yaml(const Adapted<SparseMappingConfig>& adapted,
                                          const ConfigOrigins& origins);

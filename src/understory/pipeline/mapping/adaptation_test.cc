@@ -31,26 +31,26 @@ std::vector<std::string> keys_of(const std::vector<ConfigAdaptation>& changes) {
   return keys;
 }
 
-Adapted<MappingConfig> adapt_read(const std::string& profile,
-                                  const std::vector<std::string>& settings,
-                                  const SensorTraits& traits,
-                                  const RunConditions& conditions = {}) {
-  const ReadConfig<MappingConfig> read = read_mapping_config(profile, "", settings);
+Adapted<DenseMappingConfig> adapt_read(const std::string& profile,
+                                       const std::vector<std::string>& settings,
+                                       const SensorTraits& traits,
+                                       const RunConditions& conditions = {}) {
+  const ReadConfig<DenseMappingConfig> read = read_dense_mapping_config(profile, "", settings);
   return adapt(read.config, read.origins, traits, conditions);
 }
 
-const NdtMatcherConfig& ndt_of(const Adapted<MappingConfig>& adapted) {
+const NdtMatcherConfig& ndt_of(const Adapted<DenseMappingConfig>& adapted) {
   return adapted.config.keyframe_map.local_map.matcher.get<NdtMatcherConfig>();
 }
 
-std::string yaml_of(MappingConfig config) {
-  return mapping_table(config).to_yaml(false);
+std::string yaml_of(DenseMappingConfig config) {
+  return dense_mapping_table(config).to_yaml(false);
 }
 
 TEST(Adaptation, ADenseLidarWithAnImuRunsAsAsked) {
   const auto adapted = adapt_read("", {}, many_rings());
   EXPECT_TRUE(adapted.changes.empty());
-  EXPECT_EQ(yaml_of(adapted.config), yaml_of(MappingConfig()));
+  EXPECT_EQ(yaml_of(adapted.config), yaml_of(DenseMappingConfig()));
 }
 
 TEST(Adaptation, SparseScansAreThinnedLessAndEachChangeIsTold) {
@@ -68,14 +68,14 @@ TEST(Adaptation, SparseScansAreThinnedLessAndEachChangeIsTold) {
                 "registration.min_inlier_ratio", "registration.ndt.few_rings",
                 "registration.ndt.min_points", "registration.ndt.volume_weight"}));
   // Nothing else changed than what is told.
-  MappingConfig back = adapted.config;
-  const ConfigTable table = mapping_table(back);
+  DenseMappingConfig back = adapted.config;
+  const ConfigTable table = dense_mapping_table(back);
   for (const ConfigAdaptation& change : adapted.changes) {
     EXPECT_EQ(value_of(table, change.key), change.to);
     EXPECT_NE(change.why.find("29000 points"), std::string::npos) << change.why;
     set_value(table, change.key, change.from);
   }
-  EXPECT_EQ(yaml_of(back), yaml_of(MappingConfig()));
+  EXPECT_EQ(yaml_of(back), yaml_of(DenseMappingConfig()));
 }
 
 // What was set was replaced, also by a value that was the default's anyway.
@@ -99,7 +99,7 @@ TEST(Adaptation, WhatTheUserSetStays) {
 }
 
 TEST(Adaptation, WhatAProfileSetStays) {
-  const ReadConfig<MappingConfig> read = read_mapping_config("paper", "", {});
+  const ReadConfig<DenseMappingConfig> read = read_dense_mapping_config("paper", "", {});
   const auto adapted = adapt(read.config, read.origins, sixteen_rings(), {});
   for (const ConfigAdaptation& change : adapted.changes)
     EXPECT_EQ(read.origins.count(change.key), 0U) << change.key;
@@ -158,7 +158,8 @@ TEST(Adaptation, AtTheSpeedOfTheSensorsNothingWaitsUnlessTheUserSaysSo) {
 }
 
 TEST(Adaptation, PrintedWithWhatWasSetAndWhatWasChanged) {
-  const ReadConfig<MappingConfig> read = read_mapping_config("", "", {"keyframe.distance_m=0.7"});
+  const ReadConfig<DenseMappingConfig> read =
+      read_dense_mapping_config("", "", {"keyframe.distance_m=0.7"});
   const std::string text =
       commented_yaml(adapt(read.config, read.origins, sixteen_rings(), {}), read.origins);
   EXPECT_NE(text.find("    voxel_size_m: 0.1 "), std::string::npos) << text;
@@ -169,7 +170,8 @@ TEST(Adaptation, PrintedWithWhatWasSetAndWhatWasChanged) {
 
 // The value asked for stood there as the default.
 TEST(Adaptation, DefaultsArePrintedAsTheyAre) {
-  const ReadConfig<MappingConfig> read = read_mapping_config("", "", {"keyframe.distance_m=0.7"});
+  const ReadConfig<DenseMappingConfig> read =
+      read_dense_mapping_config("", "", {"keyframe.distance_m=0.7"});
   const std::string text =
       commented_yaml(adapt(read.config, read.origins, sixteen_rings(), {}), read.origins);
   EXPECT_NE(text.find("see the next setting (default 0.5, m,"), std::string::npos) << text;

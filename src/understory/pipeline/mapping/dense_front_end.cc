@@ -26,7 +26,7 @@ Points points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) 
 
 }  // namespace
 
-DenseFrontEnd::DenseFrontEnd(const MappingConfig& config, const SensorTraits& traits,
+DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTraits& traits,
                              const RunConditions& conditions, std::filesystem::path folder,
                              Log& log)
     : config_(config),

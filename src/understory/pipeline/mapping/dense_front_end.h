@@ -27,7 +27,7 @@ namespace understory {
 inline constexpr std::size_t kFewPoints = 100;
 
 // Counts of one run, for run.json and for what to distrust.
-struct MappingCounts {
+struct DenseCounts {
   std::uint64_t scans = 0;
   std::uint64_t unmatched = 0;    // no usable match; the prediction stands in
   std::uint64_t gated = 0;        // dropped by the velocity gate (P2-8)
@@ -50,7 +50,7 @@ class DenseFrontEnd : public FrontEnd {
  public:
   // An IMU that `conditions` refuse or doubt is left out, or is left out until it is clear whether
   // it is right.
-  DenseFrontEnd(const MappingConfig& config, const SensorTraits& traits,
+  DenseFrontEnd(const DenseMappingConfig& config, const SensorTraits& traits,
                 const RunConditions& conditions, std::filesystem::path folder, Log& log);
 
   // `rig` is looked at when the first scan comes, and for the places of sensors that become known
@@ -76,12 +76,12 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] bool started() const { return odometry_ != nullptr; }
   // False during the first scans, which may be done again; no state can be saved then.
   [[nodiscard]] bool settled() const override { return opening_ == nullptr; }
-  [[nodiscard]] const MappingConfig& config() const { return config_; }
+  [[nodiscard]] const DenseMappingConfig& config() const { return config_; }
   [[nodiscard]] const SensorTraits& traits() const { return traits_; }
   // Why this run does without the IMU; empty if it does not.
   [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
   [[nodiscard]] const Rig& rig() const { return rig_; }
-  [[nodiscard]] const MappingCounts& counts() const { return counts_; }
+  [[nodiscard]] const DenseCounts& counts() const { return counts_; }
   // For how long the IMU's samples could not be used.
   [[nodiscard]] const ImuHearing& imu_hearing() const { return imu_hearing_; }
   [[nodiscard]] const KeyframeMap& map() const { return *map_; }
@@ -108,7 +108,7 @@ class DenseFrontEnd : public FrontEnd {
     std::vector<Event> events;
     AssumedMotion motion;
     int rounds = 0;
-    MappingCounts counts_before;
+    DenseCounts counts_before;
     ImuHearing hearing_before;
     std::deque<ImuSample> imu_before;
     std::size_t fixes_before = 0;
@@ -133,7 +133,7 @@ class DenseFrontEnd : public FrontEnd {
                    const Pose& keyframe_from_body);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
 
-  MappingConfig config_;
+  DenseMappingConfig config_;
   SensorTraits traits_;
   std::filesystem::path folder_;
   Log& log_;
@@ -147,7 +147,7 @@ class DenseFrontEnd : public FrontEnd {
   VoxelFilter cloud_filter_;
   std::vector<GnssFix> fixes_;
   std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced
-  MappingCounts counts_;
+  DenseCounts counts_;
   ImuHearing imu_hearing_;
   TimeNs last_scan_end_ = 0;
   Recovery recovery_;

@@ -78,7 +78,7 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   imu_doubted_ = reader.get<bool>();
   const auto fixes = reader.get<RecordCount>();
   if (fixes.records > 0) load_fixes(fixes);
-  counts_ = reader.get<MappingCounts>();
+  counts_ = reader.get<DenseCounts>();
   imu_hearing_.load(reader);
   last_scan_end_ = reader.get<TimeNs>();
   ScanClouds::Last last_cloud;

@@ -61,7 +61,7 @@ double median_period_ms(const std::vector<ReportScan>& scans) {
 
 // trajectory.tum and states.csv.gz.
 TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
-                                 const DenseFrontEnd& front_end, const MappingConfig& config) {
+                                 const DenseFrontEnd& front_end, const DenseMappingConfig& config) {
   TumWriter trajectory(folder / "trajectory.tum");
   StatesWriter states(folder / "states.csv.gz");
   TrajectoryFacts facts;
@@ -227,7 +227,7 @@ void fill_streams(const EventOrderer::Report& time_repair, RunDocuments& documen
 }
 
 void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
-  const MappingCounts& counts = front_end.counts();
+  const DenseCounts& counts = front_end.counts();
   documents.summary().scans = counts.scans;
   documents.summary().poses = front_end.journal().size();
   documents.count("keyframes", front_end.map().keyframes().size());

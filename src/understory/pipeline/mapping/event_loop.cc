@@ -4,21 +4,23 @@
 
 #include <utility>
 
-#include "understory/pipeline/source.h"
 #include "understory/util/files/read_error.h"
 #include "understory/util/timing.h"
 
 namespace understory {
 
 EventLoop::EventLoop(const MappingRequest& request, RunState& state, Log& log,
-                     const ProgressSink& progress, const StopRequested& stop_requested)
+                     const ProgressSink& progress, const StopRequested& stop_requested,
+                     EventLoopParts parts)
     : request_(request),
       asked_(request.config),
       state_(state),
       log_(log),
       progress_(progress),
       stop_requested_(stop_requested),
-      source_(open_source(request.recording, request.open, log)) {
+      parts_(std::move(parts)),
+      source_(parts_.open_recording(request.recording, request.open, log)),
+      opened_(source_.get()) {
   state_.check_inputs(request_);
   state_.resumed() ? go_on() : begin();
   if (request_.realtime) play_at_sensor_speed();
@@ -51,7 +53,7 @@ void EventLoop::adapt_to_recording() {
   if (stamps_believed_) orderer_->believe_stamps(EventOrderer::kImu);
   front_end_.reset();  // lets go of its files
   front_end_ =
-      make_front_end(request_.config, request_.traits, request_.conditions, state_.work(), log_);
+      parts_.front_end(request_.config, request_.traits, request_.conditions, state_.work(), log_);
 }
 
 void EventLoop::play_at_sensor_speed() {
@@ -166,13 +168,10 @@ bool EventLoop::start_over_for_stamps() {
 
 void EventLoop::start_over() {
   adapt_to_recording();
-  source_ = open_source(request_.recording, request_.open, log_);
+  source_ = parts_.open_recording(request_.recording, request_.open, log_);
+  opened_ = source_.get();
   events_ = 0;
   state_.begin_anew(request_, *front_end_, *orderer_, log_, *source_);
-}
-
-const Recording& EventLoop::recording() const {
-  return player_ != nullptr ? player_->played() : *source_;
 }
 
 RunFacts EventLoop::facts() {

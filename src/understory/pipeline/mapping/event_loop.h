@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,12 +13,24 @@
 #include "understory/pipeline/mapping/realtime_player.h"
 #include "understory/pipeline/mapping/run_facts.h"
 #include "understory/pipeline/mapping/run_state.h"
+#include "understory/pipeline/source.h"
 #include "understory/preprocess/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
 
 namespace understory {
+
+// How an event loop opens its recording and makes its front end. Tests give their own.
+struct EventLoopParts {
+  std::function<std::unique_ptr<Recording>(const std::string& name, const OpenOptions& options,
+                                           Log& log)>
+      open_recording = open_source;
+  std::function<std::unique_ptr<FrontEnd>(const FrontEndConfig& config, const SensorTraits& traits,
+                                          const RunConditions& conditions,
+                                          const std::filesystem::path& work, Log& log)>
+      front_end = make_front_end;
+};
 
 // Reads a recording and hands its events to a front end in order of time: recording -> event
 // orderer -> front end. Saves the state now and then, and begins the recording anew where the front
@@ -26,7 +40,7 @@ class EventLoop {
   // Opens the recording; that of a resumed run at its place, with the front end in its state.
   // Throws InputError where it cannot be read or is not the one that the run was begun with.
   EventLoop(const MappingRequest& request, RunState& state, Log& log, const ProgressSink& progress,
-            const StopRequested& stop_requested);
+            const StopRequested& stop_requested, EventLoopParts parts = {});
 
   // Positions every scan, until the recording ends, cannot be read any further or the user stops.
   [[nodiscard]] RunFacts run();
@@ -34,8 +48,9 @@ class EventLoop {
   [[nodiscard]] FrontEnd& front_end() { return *front_end_; }
   // With the configuration that runs, and what was found out.
   [[nodiscard]] const MappingRequest& request() const { return request_; }
-  // The recording itself, also where it is played at sensor speed. After `run`.
-  [[nodiscard]] const Recording& recording() const;
+  // The recording as it was opened, also where it is played at sensor speed or its first events
+  // were read before. After `run`.
+  [[nodiscard]] const Recording& recording() const { return *opened_; }
 
  private:
   void begin();
@@ -59,7 +74,9 @@ class EventLoop {
   Log& log_;
   const ProgressSink& progress_;
   const StopRequested& stop_requested_;
+  const EventLoopParts parts_;
   std::unique_ptr<Recording> source_;
+  const Recording* opened_;           // source_, or the recording that it wraps
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
   std::optional<EventOrderer> orderer_;
   std::unique_ptr<FrontEnd> front_end_;

@@ -10,8 +10,8 @@ std::unique_ptr<FrontEnd> make_front_end(const FrontEndConfig& config, const Sen
                                          const std::filesystem::path& work, Log& log) {
   if (const auto* sparse = std::get_if<SparseMappingConfig>(&config))
     return std::make_unique<SparseFrontEnd>(*sparse, conditions, work, log);
-  return std::make_unique<DenseFrontEnd>(std::get<MappingConfig>(config), traits, conditions, work,
-                                         log);
+  return std::make_unique<DenseFrontEnd>(std::get<DenseMappingConfig>(config), traits, conditions,
+                                         work, log);
 }
 
 }  // namespace understory

@@ -6,22 +6,22 @@ namespace understory {
 namespace {
 
 // Of a configuration by value, because a table is bound to what it changes.
-std::string yaml(MappingConfig config) {
-  return mapping_table(config).to_yaml(false);
+std::string yaml(DenseMappingConfig config) {
+  return dense_mapping_table(config).to_yaml(false);
 }
 std::string yaml(SparseMappingConfig config) {
   return sparse_mapping_table(config).to_yaml(false);
 }
 
-std::vector<std::string> named_files(const MappingConfig& config) {
+std::vector<std::string> named_files(const DenseMappingConfig& config) {
   return {config.odometry.machine_boxes_file};
 }
 std::vector<std::string> named_files(const SparseMappingConfig& config) {
   return {config.machine_boxes_file, config.correction.harvester.head_log};
 }
 
-Adapted<MappingConfig> adapt_one(const MappingConfig& asked, const ConfigOrigins& origins,
-                                 const SensorTraits& traits, const RunConditions& conditions) {
+Adapted<DenseMappingConfig> adapt_one(const DenseMappingConfig& asked, const ConfigOrigins& origins,
+                                      const SensorTraits& traits, const RunConditions& conditions) {
   return adapt(asked, origins, traits, conditions);
 }
 Adapted<SparseMappingConfig> adapt_one(const SparseMappingConfig& asked,
@@ -54,7 +54,7 @@ void check_files_named_in(const FrontEndConfig& config) {
 }
 
 bool depends_on_sensors(const FrontEndConfig& config) {
-  return std::holds_alternative<MappingConfig>(config);
+  return std::holds_alternative<DenseMappingConfig>(config);
 }
 
 ReadConfig<FrontEndConfig> read_front_end_config(const std::string& front_end,
@@ -66,7 +66,7 @@ ReadConfig<FrontEndConfig> read_front_end_config(const std::string& front_end,
     auto read = read_sparse_mapping_config(profile, file, settings, log);
     return {std::move(read.config), std::move(read.origins)};
   }
-  auto read = read_mapping_config(profile, file, settings);
+  auto read = read_dense_mapping_config(profile, file, settings);
   return {std::move(read.config), std::move(read.origins)};
 }
 
@@ -78,7 +78,7 @@ FrontEndConfig reread_front_end_config(
     reread(config, yaml, origin, found);
     return config;
   }
-  MappingConfig config;
+  DenseMappingConfig config;
   reread(config, yaml, origin, found);
   return config;
 }

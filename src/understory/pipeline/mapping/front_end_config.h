@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "understory/pipeline/mapping/adaptation.h"
-#include "understory/pipeline/mapping/mapping_config.h"
+#include "understory/pipeline/mapping/dense_mapping_config.h"
 #include "understory/pipeline/mapping/sparse_mapping_config.h"
 #include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
@@ -18,7 +18,7 @@ inline constexpr const char* kDenseFrontEnd = "dense";
 inline constexpr const char* kSparseFrontEnd = "sparse";
 
 // Everything that can be set for `understory map`. Which of the two it is says which front end.
-using FrontEndConfig = std::variant<MappingConfig, SparseMappingConfig>;
+using FrontEndConfig = std::variant<DenseMappingConfig, SparseMappingConfig>;
 
 // The name of the front end that a configuration belongs to: dense or sparse.
 [[nodiscard]] std::string name_of(const FrontEndConfig& config);

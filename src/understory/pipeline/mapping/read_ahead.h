@@ -29,8 +29,6 @@ class ReadAhead : public Recording {
   [[nodiscard]] std::vector<TopicReport> topics() const override { return source_->topics(); }
   [[nodiscard]] std::string format() const override { return source_->format(); }
   [[nodiscard]] double progress() const override { return source_->progress(); }
-  // The recording itself, for who asks what kind it is.
-  [[nodiscard]] const Recording& source() const { return *source_; }
 
  private:
   std::unique_ptr<Recording> source_;

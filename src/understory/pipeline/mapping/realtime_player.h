@@ -46,8 +46,6 @@ class RealtimePlayer : public Recording {
   [[nodiscard]] std::uint64_t dropped_scans() const;
   // Ends the playing; `next` is not to be called any more.
   void stop();
-  // The recording that is played; not to be touched before `next` has returned nothing or `stop`.
-  [[nodiscard]] const Recording& played() const { return *source_; }
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "understory/pipeline/mapping/mapping_config.h"
+#include "understory/pipeline/mapping/dense_mapping_config.h"
 #include "understory/util/error.h"
 
 namespace understory {

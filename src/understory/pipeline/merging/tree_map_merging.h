@@ -30,6 +30,7 @@ struct BestWeight {
   double position_rmse_m = 0.0;
 };
 
+// What `understory merge` tells when it is done.
 struct MergeOutcome : RunOutcome {
   std::size_t trees_a = 0;
   std::size_t trees_b = 0;

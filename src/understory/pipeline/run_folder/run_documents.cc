@@ -20,9 +20,7 @@ std::function<double()> seconds_from_now() {
 
 RunDocuments::RunDocuments(const std::string& command, ConfigRecord config, const StageTimes& times,
                            const Log& log, std::function<double()> elapsed_s)
-    : times_(times),
-      log_(log),
-      elapsed_s_(elapsed_s ? std::move(elapsed_s) : seconds_from_now()) {
+    : times_(times), log_(log), elapsed_s_(elapsed_s ? std::move(elapsed_s) : seconds_from_now()) {
   summary().command = command;
   summary().version = kVersion;
   summary().config = std::move(config);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "understory/evaluation/trajectory_errors.h"
-#include "understory/pipeline/mapping/read_ahead.h"
 #include "understory/simulation/simulator.h"
 
 namespace understory {
@@ -27,9 +26,7 @@ std::vector<std::pair<double, double>> errors_over_time(const Trajectory& estima
 
 std::optional<Trajectory> write_truth(const std::filesystem::path& run_folder,
                                       const Recording& source) {
-  const auto* ahead = dynamic_cast<const ReadAhead*>(&source);
-  const auto* simulator =
-      dynamic_cast<const Simulator*>(ahead != nullptr ? &ahead->source() : &source);
+  const auto* simulator = dynamic_cast<const Simulator*>(&source);
   if (simulator == nullptr) return std::nullopt;
   const std::filesystem::path folder = run_folder.string() + ".truth";
   simulator->write_truth(folder.string());

@@ -16,9 +16,9 @@
 
 namespace understory {
 
-// Everything that can be set for `understory map`. Each part is described where it belongs; this is
-// only their sum.
-struct MappingConfig {
+// Everything that can be set for the dense front end. Each part is described where it belongs; this
+// is only their sum.
+struct DenseMappingConfig {
   EventLoopConfig loop;
   DenseOdometryConfig odometry;
   KeyframeMap::Config keyframe_map;
@@ -37,19 +37,19 @@ struct MappingConfig {
 };
 
 // The table of all keys, bound to `config`.
-[[nodiscard]] ConfigTable mapping_table(MappingConfig& config);
+[[nodiscard]] ConfigTable dense_mapping_table(DenseMappingConfig& config);
 
 // Names of the shipped profiles, and their YAML text. Throws ConfigError for an unknown name.
 [[nodiscard]] std::vector<std::string> profile_names();
 [[nodiscard]] std::string profile_text(const std::string& name);
 
 // Defaults, then the profile, then the file, then the settings ("key=value"). Empty = none.
-[[nodiscard]] ReadConfig<MappingConfig> read_mapping_config(
+[[nodiscard]] ReadConfig<DenseMappingConfig> read_dense_mapping_config(
     const std::string& profile, const std::string& file, const std::vector<std::string>& settings);
 
 // A configuration as `to_yaml` of its table wrote it; `found` says where a file lies now that is
 // named in it. Throws ConfigError.
-void reread(MappingConfig& config, const std::string& yaml, const std::string& origin,
+void reread(DenseMappingConfig& config, const std::string& yaml, const std::string& origin,
             const std::function<std::string(const std::string&)>& found);
 
 }  // namespace understory

@@ -1,4 +1,4 @@
-#include "understory/pipeline/mapping/mapping_config.h"
+#include "understory/pipeline/mapping/dense_mapping_config.h"
 
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 
 namespace understory {
 
-ConfigTable mapping_table(MappingConfig& config) {
+ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   ConfigTable table;
   table.section("time_repair", [&] { EventOrderer::describe(table, config.loop.time_repair); });
   describe(table, config.odometry);
@@ -64,10 +64,11 @@ std::string profile_text(const std::string& name) {
   throw ConfigError({"--profile " + name + ": unknown; there are " + known});
 }
 
-ReadConfig<MappingConfig> read_mapping_config(const std::string& profile, const std::string& file,
-                                              const std::vector<std::string>& settings) {
-  MappingConfig config;
-  ConfigTable table = mapping_table(config);
+ReadConfig<DenseMappingConfig> read_dense_mapping_config(const std::string& profile,
+                                                         const std::string& file,
+                                                         const std::vector<std::string>& settings) {
+  DenseMappingConfig config;
+  ConfigTable table = dense_mapping_table(config);
   ConfigProblems problems;
   ConfigOrigins origins;
   problems.gather([&] {
@@ -86,9 +87,9 @@ ReadConfig<MappingConfig> read_mapping_config(const std::string& profile, const 
   return {config, origins};
 }
 
-void reread(MappingConfig& config, const std::string& yaml, const std::string& origin,
+void reread(DenseMappingConfig& config, const std::string& yaml, const std::string& origin,
             const std::function<std::string(const std::string&)>& found) {
-  mapping_table(config).read_yaml(yaml, origin);
+  dense_mapping_table(config).read_yaml(yaml, origin);
   config.odometry.machine_boxes_file = found(config.odometry.machine_boxes_file);
 }
 
