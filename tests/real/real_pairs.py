@@ -84,7 +84,8 @@ def map_recording(recording, run, *options):
 def check_capture(folder):
     run = folder / "os1"
     said = map_recording(CAPTURE, run)
-    assert said["warnings"] == [], said["warnings"]  # the IMU used to be called out of order here
+    # The IMU used to be called out of order here; the capture shows no stems.
+    assert {warning["key"] for warning in said["warnings"]} == {"inventory"}, said["warnings"]
     info = json.loads(subprocess.run([PROGRAM, "info", "--json", str(CAPTURE)], check=True,
                                      capture_output=True, text=True).stdout)["rig"]
     # The body is the IMU, which is not turned against Ouster's sensor frame.

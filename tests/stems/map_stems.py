@@ -90,7 +90,7 @@ def pace(folder):
 @cases.case("figures of the papers in the report")
 def report(folder):
     page = (RUN / "report.html").read_text()
-    for figure in ("Pairs of views as the odometry placed them", "Which views were matched again",
+    for figure in ("Pairs of views before the correction", "Which views were matched again",
                    "Every sight of every stem", "All pairs of views", "Trees over the distance from the path"):
         assert f"<h3>{figure}</h3>" in page, figure
     assert page.count("data:image/png;base64,") == 7, page.count("data:image/png;base64,")
