@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "understory/geometry/pose_io.h"
 #include "understory/odometry/dense/match_gate.h"
@@ -15,7 +14,6 @@ namespace {
 
 using namespace odometry_constants::imu_smoother;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr TimeNs kHistory = 2 * kNsPerSecond;  // of the IMU, kept before the first scan
 
 }  // namespace
