@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+
 #include "understory/output/png_test_support.h"
 
 namespace understory {
@@ -22,7 +24,7 @@ TEST(Png, PixelsAndColoursComeBack) {
 
 TEST(Png, ALargePictureComesBack) {
   PalettePicture picture{400, 300, {{0, 0, 0}, {1, 1, 1}}, {}};
-  for (int i = 0; i < 400 * 300; ++i)
+  for (std::int64_t i = 0; i < 400 * 300; ++i)
     picture.pixels.push_back(static_cast<std::uint8_t>(i * i % 7 == 1 ? 1 : 0));
   const test::DecodedPng png = test::decode_png(encode_png(picture));
   ASSERT_EQ(png.rows.size(), 300U);
