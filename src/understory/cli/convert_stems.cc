@@ -36,6 +36,7 @@ void write(const StemSegments& found, const Pose& body_from_points, int frame, T
 int convert_cloud_to_stems(const std::string& input, StagedFile& staged, CommandContext& context) {
   const StandCloud stand = read_stand(input, {}, context.log);
   if (!stand.doubt.empty()) throw InputError(input, "", "expected metres and z up: " + stand.doubt);
+  if (!stand.suspicion.empty()) context.log.info(stand.suspicion);
   InventoryConfig config;
   config.segments = 0;
   const InventoryResult found = take_inventory(blocks_of(stand.cloud), config, context.progress);

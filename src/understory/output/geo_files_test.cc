@@ -161,7 +161,7 @@ TEST_F(GeoFilesTest, AFolderThatIsNotThereIsAnErrorOfTheOutput) {
 }
 
 TEST_F(GeoFilesTest, AFullDiskLeavesNoRaster) {
-  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  ASSERT_TRUE(std::filesystem::exists("/dev/full"));
   Raster large = two_by_three();
   large.columns = large.rows = 600;
   large.values.resize(360'000);
