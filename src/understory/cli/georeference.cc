@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <variant>
@@ -5,6 +7,7 @@
 #include "understory/cli/command.h"
 #include "understory/cli/outcome.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
+#include "understory/pipeline/georeferencing/placement_methods.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -55,8 +58,8 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
   request.terrain = options.terrain;
   request.path.robust = !options.plain;
   request.coordinate_system = options.coordinate_system;
-  request.method =
-      options.method == "terrain" ? GeoreferenceMethod::kTerrain : GeoreferenceMethod::kGnssPath;
+  for (const PlacementMethod& method : placement_methods())
+    if (options.method == method.name) request.method = method.method;
   if (!options.antenna_m.empty())
     request.antenna_in_body = {options.antenna_m[0], options.antenna_m[1], options.antenna_m[2]};
   if (!options.start.empty())
@@ -79,12 +82,15 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
   const auto options = std::make_shared<GeoreferenceOptions>();
   command->add_option("RUN", options->run, "Run folder");
   command->add_option("-o,--output", options->result, "Folder for the moved run");
-  command
-      ->add_option("--method", options->method,
-                   "gnss-path: one motion in the plane between both paths, no common clock needed; "
-                   "terrain: height and tilt from a terrain model")
+  std::vector<std::string> names;
+  std::vector<std::string> meanings;
+  for (const PlacementMethod& method : placement_methods()) {
+    names.emplace_back(method.name);
+    meanings.push_back(std::string(method.name) + ": " + method.meaning);
+  }
+  command->add_option("--method", options->method, fmt::format("{}", fmt::join(meanings, "; ")))
       ->required()
-      ->check(CLI::IsMember({"gnss-path", "terrain"}));
+      ->check(CLI::IsMember(names));
   command->add_option("--gnss", options->gnss,
                       "Fixes: a recording, an NMEA log or a CSV table (gnss.csv of the run if not "
                       "given)");

@@ -83,7 +83,7 @@ inline constexpr double kReach = 60.0;
 inline constexpr double kStep = 1.0;
 }  // namespace lidar_view
 
-namespace georeferencing {  // pipeline/georeferencing/georeferencing.cc
+namespace georeferencing {  // pipeline/georeferencing/place_by_*.cc
 // degrees: with a less certain heading a place 50 m from the path's middle is over 4 m off
 // [chosen]
 inline constexpr double kMostHeadingSdDeg = 5.0;

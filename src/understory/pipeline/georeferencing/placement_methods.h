@@ -1,0 +1,31 @@
+#pragma once
+
+#include <vector>
+
+#include "understory/pipeline/georeferencing/georeferencing.h"
+#include "understory/pipeline/georeferencing/movable_run.h"
+#include "understory/pipeline/georeferencing/placement.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// One way to find the place of a run. A new method is its own file and one line of the list.
+struct PlacementMethod {
+  GeoreferenceMethod method;
+  const char* name;     // as on the command line
+  const char* meaning;  // for --help
+  // Throws InputError where the method cannot be used on this input.
+  Placement (*place)(const GeoreferenceRequest& request, const MovableRun& run, Log& log);
+};
+
+// All of them, in the order of --help.
+[[nodiscard]] const std::vector<PlacementMethod>& placement_methods();
+
+// georeferencing/place_by_gnss_path.cc: P1 (6).
+[[nodiscard]] Placement place_by_gnss_path(const GeoreferenceRequest& request,
+                                           const MovableRun& run, Log& log);
+// georeferencing/place_by_terrain.cc: P1 section 3, table 1.
+[[nodiscard]] Placement place_by_terrain(const GeoreferenceRequest& request, const MovableRun& run,
+                                         Log& log);
+
+}  // namespace understory
