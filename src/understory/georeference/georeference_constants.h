@@ -59,4 +59,85 @@ namespace terrain_file {  // georeference/terrain_file.cc
 inline constexpr double kMostCells = 1e8;
 }  // namespace terrain_file
 
+namespace tree_match {  // georeference/trees/
+// m: a map of trees reaches so far beyond its trees [chosen: three times the distance of trees]
+inline constexpr double kCoverM = 16.0;
+// m: standard deviation of the bell that smooths the density of trees [tuned]
+inline constexpr double kDensitySdM = 12.0;
+// Share of the median density that any place of a map has at least [chosen]
+inline constexpr double kLeastDensityShare = 0.2;
+// m: grid of the places that are searched [bound: time]
+inline constexpr double kCellM = 1.0;
+// m: error of a place on that grid and of a heading between two steps [bound: geometry]
+inline constexpr double kSearchSdM = 0.5;
+// m: step of the heading, at 0.7 of the reach of the source [bound: time]
+inline constexpr double kTurnM = 1.4;
+// Logarithm of a likelihood ratio that one tree adds in the search at most [chosen]
+inline constexpr double kMostScore = 1.7;
+// Share of pairs whose sizes have no relation [chosen]
+inline constexpr double kStrangeSizes = 0.25;
+// Correlation of the ranks of one tree's heights, or diameters, in two maps [chosen]
+inline constexpr double kSameSizeCorrelation = 0.6;
+// The same of a diameter and a height [chosen]
+inline constexpr double kOtherSizeCorrelation = 0.4;
+// Share of the trees of a map that have a size, if sizes are to be used [chosen]
+inline constexpr double kLeastSized = 0.7;
+// m: neighbours within it are compared in size [chosen: some 30 trees]
+inline constexpr double kRankRadiusM = 16.0;
+// Trees of the source per tree of the target, over one area, at most [tuned]
+inline constexpr double kDominantDensity = 1.5;
+// m: places of the search that are nearer to each other are one [chosen]
+inline constexpr double kApartM = 3.0;
+// Places of one heading that are kept [tuned]
+inline constexpr std::size_t kOfHeading = 12;
+// Places of all headings that are kept [tuned]
+inline constexpr std::size_t kCandidates = 150;
+// Steps of the first refinement [tuned]
+inline constexpr int kFirstSteps = 6;
+// Places that are refined to the end [tuned]
+inline constexpr std::size_t kRefined = 50;
+// Steps of that at most [chosen]
+inline constexpr int kAllSteps = 40;
+// Standard deviations beyond which trees are no partners [chosen]
+inline constexpr double kReachSds = 3.0;
+// Weight of pairs that a fit needs at least [bound: three parameters in the plane]
+inline constexpr double kLeastWeight = 3.0;
+// Share of the target's trees within the source's area that the source has, about [chosen]
+inline constexpr double kSeenShare = 0.85;
+// Distances of trees: the source counts as seen so far from a tree [tuned]
+inline constexpr double kSeenReach = 1.3;
+// Distances of trees: so far back from the edge of that [tuned]
+inline constexpr double kSeenShrink = 0.9;
+// Trees: the weight of the noise and the share that are expected, against those that fit [tuned]
+inline constexpr double kPriorTrees = 15.0;
+// m: least noise that is fitted [chosen]
+inline constexpr double kLeastSdM = 0.15;
+// m: most noise that is fitted [chosen]
+inline constexpr double kMostSdM = 1.3;
+// Least share of trees in common that is fitted [chosen]
+inline constexpr double kLeastShare = 0.2;
+// Most share of trees in common that is fitted [chosen]
+inline constexpr double kMostShare = 0.95;
+// m: a fit that moves less has ended [chosen]
+inline constexpr double kStillM = 1e-4;
+// m: fits that end nearer to each other are one place [chosen]
+inline constexpr double kSamePlaceM = 2.0;
+// Factor by which the part that is fitted grows from step to step [chosen]
+inline constexpr double kGrowth = 1.5;
+// m: pairs lie within it, or within the standard deviations below if that is more [chosen]
+inline constexpr double kLeastPairM = 1.0;
+// Standard deviations of the noise within which pairs lie [chosen]
+inline constexpr double kPairSds = 2.5;
+// Pairs with heights that give a shift in height at least [chosen]
+inline constexpr std::size_t kLeastHeights = 3;
+// Trees of each map at least [bound: fewer lie so by chance somewhere]
+inline constexpr std::size_t kFewestTrees = 10;
+// Trees with a partner at least for a place to be trusted [chosen]
+inline constexpr double kLeastMatched = 8.0;
+// m: radius of the area that is searched at most [bound: memory, time]
+inline constexpr double kLargestRadiusM = 3000.0;
+// Parts of the source that are tried [bound: time]
+inline constexpr std::size_t kParts = 3;
+}  // namespace tree_match
+
 }  // namespace understory::georeference_constants
