@@ -26,13 +26,29 @@ struct GeoreferenceOptions {
   bool overwrite = false;
   TerrainFitConfig terrain;
   std::string coordinate_system;
+  std::string tree_map;
+  std::string tree_map_system;
+  std::vector<double> near;
+  double radius_m = 200.0;
 };
+
+void check_trees(const GeoreferenceOptions& options, std::vector<std::string>& problems) {
+  const bool trees = options.method == "trees";
+  if (trees && options.tree_map.empty())
+    problems.emplace_back("--method trees needs --tree-map FILE");
+  if (!trees &&
+      !(options.tree_map.empty() && options.near.empty() && options.tree_map_system.empty()))
+    problems.emplace_back("--tree-map, --tree-map-crs and --near belong to trees");
+  if (trees && !(options.gnss.empty() && options.antenna_m.empty() && !options.plain))
+    problems.emplace_back("--gnss, --antenna-m and --plain belong to gnss-path");
+}
 
 // Options that belong to one method are errors with the other.
 void check(const GeoreferenceOptions& options) {
   std::vector<std::string> problems;
   if (options.run.empty()) problems.emplace_back("RUN is needed: a run folder");
   if (options.result.empty()) problems.emplace_back("-o is needed: the folder to write");
+  check_trees(options, problems);
   const bool terrain = options.method == "terrain";
   if (terrain && options.terrain_model.empty())
     problems.emplace_back("--method terrain needs --dem FILE");
@@ -58,6 +74,10 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
   request.terrain = options.terrain;
   request.path.robust = !options.plain;
   request.coordinate_system = options.coordinate_system;
+  request.tree_map = options.tree_map;
+  request.tree_map_system = options.tree_map_system;
+  request.near_radius_m = options.radius_m;
+  if (!options.near.empty()) request.near = Eigen::Vector2d(options.near[0], options.near[1]);
   for (const PlacementMethod& method : placement_methods())
     if (options.method == method.name) request.method = method.method;
   if (!options.antenna_m.empty())
@@ -74,11 +94,29 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
   return report_outcome(json.dump(2), outcome.status, outcome.reasons);
 }
 
+void add_tree_options(CLI::App& command, GeoreferenceOptions& options) {
+  command.add_option("--tree-map", options.tree_map,
+                     "Map of trees: CSV table, GeoPackage or other points; or a cloud from the air "
+                     "(.las, .laz)");
+  command.add_option("--tree-map-crs", options.tree_map_system,
+                     "Coordinate system of a tree map that states none, for instance EPSG:3067");
+  command
+      .add_option("--near", options.near,
+                  "Where the middle of the run's trees lies about, in the coordinates of the tree "
+                  "map: x y (by GNSS or all of the map if not given)")
+      ->expected(2);
+  command
+      .add_option("--radius-m", options.radius_m,
+                  "How far the rough position may be off; trees are searched within it")
+      ->check(CLI::Range(1.0, 3000.0))
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void add_georeference_command(CLI::App& app, Command& chosen) {
-  CLI::App* command =
-      app.add_subcommand("georeference", "Move a finished run onto a GNSS path or a terrain model");
+  CLI::App* command = app.add_subcommand(
+      "georeference", "Move a finished run onto a GNSS path, a terrain model or a map of trees");
   const auto options = std::make_shared<GeoreferenceOptions>();
   command->add_option("RUN", options->run, "Run folder");
   command->add_option("-o,--output", options->result, "Folder for the moved run");
@@ -117,6 +155,7 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
                    "Standard deviation of the heading: the relief turns it, too (0 keeps it)")
       ->check(CLI::Range(0.0, 45.0))
       ->capture_default_str();
+  add_tree_options(*command, *options);
   command->add_option("--crs", options->coordinate_system,
                       "Coordinate system of trees.gpkg, for instance EPSG:3067 (the UTM zone if "
                       "not given)");
@@ -124,7 +163,9 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->footer(
       "Examples:\n  understory georeference forest --method gnss-path --gnss drive.nmea -o placed\n"
-      "  understory georeference placed --method terrain --dem terrain.tif -o levelled");
+      "  understory georeference placed --method terrain --dem terrain.tif -o levelled\n"
+      "  understory georeference forest --method trees --tree-map stand.gpkg --near 563200 7024500 "
+      "-o found");
   command->callback([&chosen, options] {
     chosen = [options](CommandContext& context) { return run_georeference(*options, context); };
   });

@@ -14,6 +14,7 @@ namespace understory {
 struct CoordinateSystem::Impl {
   OGRSpatialReference system;
   std::unique_ptr<OGRCoordinateTransformation> from_wgs84;
+  std::unique_ptr<OGRCoordinateTransformation> to_wgs84;
 };
 
 CoordinateSystem::CoordinateSystem(const std::string& definition)
@@ -26,8 +27,9 @@ CoordinateSystem::CoordinateSystem(const std::string& definition)
   const bool known = impl_->system.SetFromUserInput(definition.c_str()) == OGRERR_NONE &&
                      (impl_->system.IsProjected() != 0 || impl_->system.IsGeographic() != 0);
   if (known) impl_->from_wgs84.reset(OGRCreateCoordinateTransformation(&wgs84, &impl_->system));
+  if (known) impl_->to_wgs84.reset(OGRCreateCoordinateTransformation(&impl_->system, &wgs84));
   CPLPopErrorHandler();
-  if (impl_->from_wgs84 == nullptr)
+  if (impl_->from_wgs84 == nullptr || impl_->to_wgs84 == nullptr)
     throw ConfigError({"'" + definition.substr(0, 60) +
                        "' is no coordinate system on the earth: expected one like EPSG:3067"});
 }
@@ -43,6 +45,17 @@ std::optional<Eigen::Vector3d> CoordinateSystem::from_place(const GeodeticPlace&
   CPLPopErrorHandler();
   if (!done || !std::isfinite(x) || !std::isfinite(y)) return std::nullopt;
   return Eigen::Vector3d(x, y, z);
+}
+
+std::optional<GeodeticPlace> CoordinateSystem::to_place(const Eigen::Vector3d& point) const {
+  double x = point.x();
+  double y = point.y();
+  double z = point.z();
+  CPLPushErrorHandler(CPLQuietErrorHandler);
+  const bool done = impl_->to_wgs84->Transform(1, &x, &y, &z) != 0;
+  CPLPopErrorHandler();
+  if (!done || !std::isfinite(x) || !std::isfinite(y) || std::abs(y) > 90.0) return std::nullopt;
+  return GeodeticPlace{y, x, z};
 }
 
 bool CoordinateSystem::is_geographic() const {

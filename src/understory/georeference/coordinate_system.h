@@ -22,6 +22,8 @@ class CoordinateSystem {
 
   // Nothing where the system is not defined for the place.
   [[nodiscard]] std::optional<Eigen::Vector3d> from_place(const GeodeticPlace& place) const;
+  // The way back. Nothing where the system is not defined there.
+  [[nodiscard]] std::optional<GeodeticPlace> to_place(const Eigen::Vector3d& point) const;
   [[nodiscard]] bool is_geographic() const;  // degrees instead of metres
 
  private:

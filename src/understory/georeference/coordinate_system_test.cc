@@ -15,5 +15,15 @@ TEST(CoordinateSystem, TheUnitInThePlaneIsTold) {
   EXPECT_TRUE(std::isnan(metres_per_unit("no such system")));
 }
 
+TEST(CoordinateSystem, TheWayBackEndsAtThePlace) {
+  const CoordinateSystem system("EPSG:3067");
+  const GeodeticPlace place{63.318, 30.193, 160.0};
+  const auto back = system.to_place(*system.from_place(place));
+  ASSERT_TRUE(back);
+  EXPECT_NEAR(back->latitude_deg, place.latitude_deg, 1e-9);
+  EXPECT_NEAR(back->longitude_deg, place.longitude_deg, 1e-9);
+  EXPECT_NEAR(back->height_m, place.height_m, 1e-3);
+}
+
 }  // namespace
 }  // namespace understory

@@ -136,6 +136,8 @@ inline constexpr std::size_t kFewestTrees = 10;
 inline constexpr double kLeastMatched = 8.0;
 // m: radius of the area that is searched at most [bound: memory, time]
 inline constexpr double kLargestRadiusM = 3000.0;
+// m: a column of diameters with a greater median is in centimetres [bound: trees]
+inline constexpr double kThickestM = 2.0;
 // Parts of the source that are tried [bound: time]
 inline constexpr std::size_t kParts = 3;
 }  // namespace tree_match

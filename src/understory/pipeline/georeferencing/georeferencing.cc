@@ -48,6 +48,13 @@ std::string yaml_of(GeoreferenceRequest request) {
   table.add("start", start, "", "");
   table.add("place_sd_m", request.terrain.place_sd_m, {}, "m", "");
   table.add("yaw_sd_deg", request.terrain.yaw_sd_deg, {}, "deg", "");
+  std::string tree_map = request.tree_map.string();
+  std::vector<double> near;
+  if (request.near) near = {request.near->x(), request.near->y()};
+  table.add("tree_map", tree_map, "");
+  table.add("tree_map_crs", request.tree_map_system, "");
+  table.add("near", near, "", "");
+  table.add("radius_m", request.near_radius_m, {}, "m", "");
   table.add("crs", request.coordinate_system, "");
   return table.to_yaml(false);
 }
@@ -99,7 +106,7 @@ Placement find_placement(const GeoreferenceRequest& request, const MovableRun& r
 
 GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& log) {
   std::vector<fs::path> inputs = files_of(given.gnss, {});
-  inputs.insert(inputs.end(), {given.run, given.terrain_model});
+  inputs.insert(inputs.end(), {given.run, given.terrain_model, given.tree_map});
   refuse_input_as_output(given.result, inputs);
   const RunFolder place = RunFolder::claim(given.result, given.overwrite);
   GeoreferenceRequest request = given;

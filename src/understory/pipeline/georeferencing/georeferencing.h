@@ -9,6 +9,7 @@
 
 #include "understory/georeference/path_fit.h"
 #include "understory/georeference/terrain_fit.h"
+#include "understory/georeference/trees/tree_match.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/util/log.h"
@@ -18,7 +19,8 @@ namespace understory {
 // What a map is laid on.
 enum class GeoreferenceMethod {
   kGnssPath,  // one motion in the plane between two paths, P1 (6)
-  kTerrain    // one rigid motion that lays ground points on a terrain model, P1 table 1
+  kTerrain,   // one rigid motion that lays ground points on a terrain model, P1 table 1
+  kTrees      // turn and shift by which the trees are found in a map of trees
 };
 
 // One call of `understory georeference`.
@@ -35,6 +37,13 @@ struct GeoreferenceRequest {
   // the direction of its x axis, degrees anticlockwise from east.
   std::optional<std::array<double, 3>> start;
   TerrainFitConfig terrain;
+  // A map of trees, or a cloud from the air in which tops are found.
+  std::filesystem::path tree_map;
+  std::string tree_map_system;  // of a tree map that states none
+  // Where the middle of the run's trees lies about, in the tree map's coordinates.
+  std::optional<Eigen::Vector2d> near;
+  double near_radius_m = 200.0;  // how far off that may be
+  TreeMatchConfig trees;
   std::string coordinate_system;  // of trees.gpkg; empty: the UTM zone
 };
 

@@ -28,4 +28,8 @@ struct PlacementMethod {
 [[nodiscard]] Placement place_by_terrain(const GeoreferenceRequest& request, const MovableRun& run,
                                          Log& log);
 
+// georeferencing/place_by_trees.cc: by the pattern of the trees alone.
+[[nodiscard]] Placement place_by_trees(const GeoreferenceRequest& request, const MovableRun& run,
+                                       Log& log);
+
 }  // namespace understory
