@@ -84,6 +84,8 @@ inline constexpr double kOtherSizeCorrelation = 0.4;
 inline constexpr double kLeastSized = 0.7;
 // m: neighbours within it are compared in size [chosen: some 30 trees]
 inline constexpr double kRankRadiusM = 16.0;
+// m: radius in which neighbours are counted to tell how dense the source is [chosen]
+inline constexpr double kCrowdM = 8.0;
 // Trees of the source per tree of the target, over one area, at most [tuned]
 inline constexpr double kDominantDensity = 1.5;
 // m: places of the search that are nearer to each other are one [chosen]

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <tuple>
 
 #include "understory/georeference/georeference_constants.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -44,14 +46,27 @@ SourcePart part_around(const std::vector<PatternTree>& trees, const Vector2d& mi
   return part;
 }
 
+// Trees per square metre around half of the trees at least: neighbours within a circle, so that it
+// does not depend on how the map is turned.
+double usual_density(std::span<const Tree> trees, const std::vector<std::size_t>& indices) {
+  std::vector<PatternTree> places;
+  for (const std::size_t i : indices)
+    places.push_back({Vector2d(trees[i].x, trees[i].y), 0.0});
+  const PatternGrid grid(places);
+  std::vector<double> counts;
+  for (const PatternTree& tree : places) {
+    double count = -1.0;  // without the tree itself
+    grid.near(tree.at, kCrowdM, [&](std::size_t, double) { count += 1.0; });
+    counts.push_back(count);
+  }
+  return std::max(1.0, upper_median(counts)) / (std::numbers::pi * kCrowdM * kCrowdM);
+}
+
 }  // namespace
 
 std::vector<std::size_t> dominant_trees(std::span<const Tree> trees,
                                         const std::vector<std::size_t>& indices, double density) {
-  std::vector<PatternTree> places;
-  for (const std::size_t i : indices)
-    places.push_back({Vector2d(trees[i].x, trees[i].y), 0.0});
-  const double own = PatternGrid(std::move(places)).median_density();
+  const double own = usual_density(trees, indices);
   const double share = kDominantDensity * density / own;
   double Tree::*size = mostly_known(trees, indices, &Tree::height_m) ? &Tree::height_m
                        : mostly_known(trees, indices, &Tree::dbh_m)  ? &Tree::dbh_m
