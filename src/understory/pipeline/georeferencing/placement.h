@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -12,10 +14,27 @@
 
 namespace understory {
 
+// What one thing that a run was laid on (a control point, a tree) lies off its place in the run.
+struct PlacementResidual {
+  std::string name;
+  Eigen::Vector3d residual_in_target =  // its place minus the moved one, metres; NaN: not known
+      Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  bool used = true;
+  std::string reason;  // why not used
+};
+
 // How a run is to be moved, and what to say of it. Every method of `georeference` returns one.
 struct Placement {
   Pose target_from_world;
-  std::optional<GeodeticPlace> origin;    // of the target frame, where that is east, north, up
+  std::string method;  // that found it, as on the command line; `auto` names the one it chose
+  // Of a right perturbation of target_from_world, rotation before translation (rad, m). NaN where
+  // the method does not tell it.
+  Matrix6d covariance = Matrix6d::Constant(std::numeric_limits<double>::quiet_NaN());
+  // Error of a place on the path that the covariance makes one expect, root mean square over the
+  // poses, metres; NaN where it is not known.
+  double expected_error_m = std::numeric_limits<double>::quiet_NaN();
+  std::vector<PlacementResidual> residuals;  // of things other than fixes
+  std::optional<GeodeticPlace> origin;       // of the target frame, where that is east, north, up
   std::vector<InputHash> inputs;          // files that it was computed from, beside the run's own
   std::vector<GnssRow> gnss;              // the fixes as used, for gnss.csv
   std::map<std::string, Figure> figures;  // for run.json
