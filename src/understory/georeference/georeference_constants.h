@@ -12,9 +12,96 @@
 // or real clouds and measurements by their page.
 namespace understory::georeference_constants {
 
-namespace gnss_fit {  // georeference/gnss_fit.cc
+namespace satellite_pairs {  // georeference/satellite_pairs.cc
 // s between poses beyond which no place is interpolated [chosen]
 inline constexpr double kGapS = 2.0;
+}  // namespace satellite_pairs
+
+namespace receiver_noise {  // georeference/receiver_noise.cc
+// The grid: the slow error's standard deviation over that of the residuals. Residuals are smaller
+// than the error, since the fit takes a part of it away [bound: statistics]
+inline constexpr double kLarger[] = {0.25, 0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 1.9, 2.5, 3.5, 5.0, 8.0};
+// s: correlation times of the slow error [bound: from one pair to a long run]
+inline constexpr double kCorrelationsS[] = {2.0,   5.0,   10.0,  20.0,  40.0,  80.0,
+                                            120.0, 180.0, 260.0, 400.0, 700.0, 1200.0};
+// The independent error over the slow one [bound: from none to all]
+inline constexpr double kFastShares[] = {0.03, 0.1, 0.3, 1.0};
+// Columns that are made white at once, at most [bound: four parameters and a residual]
+inline constexpr std::ptrdiff_t kMostColumns = 8;
+// Probability below which a noise has no say in a covariance [bound: time]
+inline constexpr double kLeastWeight = 1e-3;
+}  // namespace receiver_noise
+
+namespace control_points {  // georeference/control_points.cc
+// m: points that are nearer tell no heading [chosen]
+inline constexpr double kLeastApartM = 1.0;
+// Points that find one blunder [bound: two tell a motion, a third may be the blunder]
+inline constexpr std::size_t kFewestForBlunders = 4;
+// Median residuals beyond which a point is a blunder [chosen: 5 standard deviations of a length]
+inline constexpr double kBlunder = 4.0;
+// Steps of the fit [bound: convergence to a micrometre]
+inline constexpr int kSteps = 6;
+// Coordinates that the error stated before is worth [chosen]
+inline constexpr double kPriorCoordinates = 4.0;
+}  // namespace control_points
+
+namespace rigid_fits {  // georeference/rigid_fits.cc
+// Pairs of a rigid motion at least [bound: six degrees of freedom]
+inline constexpr std::size_t kFewestPairs = 3;
+// m: places that are nearer to their middle in the mean are one place [chosen]
+inline constexpr double kLeastSpreadM = 0.01;
+// Width of Cauchy's weight in standard deviations: 95 % efficient [bound: statistics]
+inline constexpr double kCauchyWidth = 2.385;
+}  // namespace rigid_fits
+
+namespace split_fit {  // georeference/split_fit.cc
+// Pairs at least [bound: three parameters in the plane]
+inline constexpr std::size_t kFewestPairs = 3;
+// m: extent of the path at least [chosen]
+inline constexpr double kLeastExtentM = 5.0;
+// Steps of the first motion [bound: convergence to a micrometre]
+inline constexpr int kFirstSteps = 30;
+// Steps of the fit: each takes the noise anew [bound: convergence to a millimetre]
+inline constexpr int kSteps = 3;
+// Width of Cauchy's weight in standard deviations: 95 % efficient [bound: statistics]
+inline constexpr double kCauchyWidth = 2.385;
+// Median of a distance in the plane over the standard deviation of an axis [bound: normal
+// distribution]
+inline constexpr double kRayleighMedian = 1.1774;
+// Median of an absolute value over the standard deviation [bound: normal distribution]
+inline constexpr double kNormalMedian = 0.6745;
+// A pair is believed to be at most that many times as good or bad as the median [chosen]
+inline constexpr double kMostScale = 4.0;
+// Standard deviations beyond which a pair is a runaway [chosen: slow errors of a few
+// minutes are no outliers]
+inline constexpr double kFarOff = 4.0;
+// m: standard deviation of a height that nothing tells [bound: the earth]
+inline constexpr double kUnknownHeightM = 1'000.0;
+}  // namespace split_fit
+
+namespace satellite_smoothing {  // georeference/satellite_smoothing.cc
+// rad^-2: weight of the first guess of the attitude [bound: keeps the equations regular]
+inline constexpr double kAttitudeWeight = 1e-2;
+// m/s: of the first velocity [bound: carriers]
+inline constexpr double kVelocitySdMS = 10.0;
+// Width of Cauchy's weight in standard deviations: 95 % efficient [bound: statistics]
+inline constexpr double kCauchyWidth = 2.385;
+// s without samples that still is an interval [chosen]
+inline constexpr double kLongestGapS = 0.1;
+// rad and m: a step below that is the last [chosen]
+inline constexpr double kConverged = 1e-6;
+}  // namespace satellite_smoothing
+
+namespace satellite_fit {  // georeference/satellite_fit.cc
+// s between poses beyond which no pose is interpolated [chosen]
+inline constexpr double kGapS = 2.0;
+// m: root mean square of residuals below which no mistake of the angles is looked for [chosen]
+inline constexpr double kLeastMisfitM = 3.0;
+// Ratio of residuals below which swapped angles are the right ones [chosen]
+inline constexpr double kClearlyBetter = 0.5;
+}  // namespace satellite_fit
+
+namespace gnss_fit {  // georeference/gnss_fit.cc
 // Fixes before and after one that tell its direction [chosen]
 inline constexpr std::size_t kReach = 12;
 // m between these: less tells no direction [chosen]

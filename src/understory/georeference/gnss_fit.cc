@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "understory/georeference/georeference_constants.h"
+#include "understory/georeference/satellite_pairs.h"
 #include "understory/util/median.h"
 
 namespace understory {
@@ -14,29 +14,13 @@ using namespace georeference_constants::gnss_fit;
 
 using Eigen::Vector3d;
 
-// Position at a time, linear between poses; nothing outside.
-std::optional<Vector3d> place_at(const std::vector<StampedPose>& trajectory, const Vector3d& arm,
-                                 TimeNs stamp) {
-  const auto after =
-      std::lower_bound(trajectory.begin(), trajectory.end(), stamp,
-                       [](const StampedPose& pose, TimeNs t) { return pose.stamp < t; });
-  if (after == trajectory.end()) return std::nullopt;
-  if (after->stamp == stamp) return after->world_from_body * arm;
-  if (after == trajectory.begin()) return std::nullopt;
-  const auto before = std::prev(after);
-  const double gap = to_seconds(after->stamp - before->stamp);
-  if (gap > kGapS) return std::nullopt;
-  const double u = to_seconds(stamp - before->stamp) / gap;
-  return (1.0 - u) * (before->world_from_body * arm) + u * (after->world_from_body * arm);
-}
-
 // Where the antenna was at the time of each fix, world frame.
 std::vector<std::optional<Vector3d>> places_in_time(const std::vector<StampedPose>& trajectory,
                                                     const Vector3d& arm,
                                                     const std::vector<GnssFix>& fixes) {
   std::vector<std::optional<Vector3d>> places;
   for (const GnssFix& fix : fixes)
-    places.push_back(place_at(trajectory, arm, fix.stamp));
+    places.push_back(antenna_place(trajectory, arm, fix.stamp));
   return places;
 }
 

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "understory/sensor/gnss_fix.h"
+
+namespace understory {
+
+// What a fix says of its own error. Metres, one standard deviation.
+struct FixCovarianceConfig {
+  // Error of a position for a dilution of precision of one [chosen: code positions under trees].
+  double sd_per_dop_m = 1.5;
+  double default_plane_sd_m = 2.0;   // each axis, of a fix that says nothing [chosen]
+  double default_height_sd_m = 4.0;  // of a fix that says nothing [chosen]
+  double least_sd_m = 0.01;          // nothing is believed to be better [bound: GNSS]
+};
+
+// Covariance of a fix, east, north, up, m^2: the receiver's own where it is one (finite, positive
+// on its diagonal, no correlation beyond one), else from HDOP and VDOP as P2 section 3 does, else
+// the default. HDOP is of both axes of the plane together. Receivers under trees promise too much:
+// the fits estimate one more factor for all fixes.
+[[nodiscard]] Eigen::Matrix3d fix_covariance(const GnssFix& fix, const FixCovarianceConfig& config);
+
+}  // namespace understory

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/stamped_pose.h"
+#include "understory/georeference/fix_covariance.h"
+#include "understory/georeference/geodetic.h"
+#include "understory/sensor/gnss_fix.h"
+
+namespace understory {
+
+// How fixes and a path are brought together by time.
+struct PairingConfig {
+  // Where the antenna is in the body frame, metres.
+  Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();
+  // Added to the stamps of the fixes: negative where the receiver's are late.
+  double time_offset_s = 0.0;
+  // Fixes of one interval become one pair. The interval is this long at least, and longer where
+  // that gives more than `most_pairs` [bound: a path moves little in a second; time].
+  double interval_s = 1.0;
+  std::size_t most_pairs = 250;
+  FixCovarianceConfig covariance;
+};
+
+// The antenna by the path and by the receiver, means over the fixes of one interval. The motion
+// that lays the path on the fixes takes the one mean to the other.
+struct SatellitePair {
+  double time_s = 0.0;  // since the first fix
+  Eigen::Vector3d antenna_in_world = Eigen::Vector3d::Zero();
+  Eigen::Vector3d velocity_in_world = Eigen::Vector3d::Zero();  // of the antenna, m/s
+  Eigen::Vector3d fix_in_enu = Eigen::Vector3d::Zero();
+  bool has_height = false;  // all its fixes have one; else z of the fix is no measurement
+  // Mean covariance that the fixes state: errors within an interval are nearly the same.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  std::size_t fixes = 0;
+};
+
+// All pairs of a run, in order of time. Frame east, north, up at the first fix.
+struct SatellitePairs {
+  std::optional<GeodeticPlace> origin;
+  std::vector<SatellitePair> pairs;
+  std::size_t fixes_in_time = 0;   // that have a place of the antenna
+  std::string reason;              // why there are none, for a person
+};
+
+// Where the antenna was at a time, world frame, linear between poses; nothing outside of the path
+// or where poses are more than two seconds apart. `trajectory` is in order of time.
+[[nodiscard]] std::optional<Eigen::Vector3d> antenna_place(
+    const std::vector<StampedPose>& trajectory, const Eigen::Vector3d& antenna_in_body,
+    TimeNs stamp);
+
+// Fixes without a finite latitude and longitude are passed over. Deterministic; thread-safe.
+[[nodiscard]] SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
+                                          const std::vector<GnssFix>& fixes,
+                                          const PairingConfig& config);
+
+// The pairs that have a height.
+[[nodiscard]] std::vector<SatellitePair> with_height(const std::vector<SatellitePair>& pairs);
+
+// Diagonal of the box around the antenna's places in the plane, metres.
+[[nodiscard]] double plane_extent_m(const std::vector<SatellitePair>& pairs);
+
+}  // namespace understory
