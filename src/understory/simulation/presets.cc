@@ -29,7 +29,25 @@ const std::vector<SensorPreset>& gnss_presets() {
         "gnss.multipath_share=0.2", "gnss.white_sd_m=0.05", "gnss.height_factor=1.7",
         "gnss.outage_interval_s=1", "gnss.outage_s=1.8", "gnss.jump_interval_s=3",
         "gnss.jump_m=5.5", "gnss.burst_interval_s=40", "gnss.burst_m=50", "gnss.burst_s=5",
-        "receiver_hold.below_m_s=0"}}};
+        "receiver_hold.below_m_s=0"}},
+      {"faitli_evo1",
+       {"gnss.open_sd_m=0.5", "gnss.canopy_sd_m=5", "gnss.correlation_s=200",
+        "gnss.multipath_share=0.25", "gnss.height_factor=5", "gnss.reported_factor=0.5",
+        "gnss.jump_interval_s=120", "gnss.jump_m=1"}},
+      {"faitli_evo2",
+       {"gnss.open_sd_m=0.5", "gnss.canopy_sd_m=12", "gnss.correlation_s=150",
+        "gnss.multipath_share=0.2", "gnss.height_factor=1.5", "gnss.reported_factor=0.5",
+        "gnss.jump_interval_s=120", "gnss.jump_m=1"}},
+      {"faitli_tuusniemi1",
+       {"gnss.open_sd_m=1", "gnss.canopy_sd_m=12", "gnss.correlation_s=600",
+        "gnss.multipath_share=0.2", "gnss.height_factor=1.4", "gnss.reported_factor=0.12",
+        "gnss.burst_interval_s=300", "gnss.burst_m=8", "gnss.jump_interval_s=200",
+        "gnss.jump_m=2"}},
+      {"faitli_tuusniemi3",
+       {"gnss.open_sd_m=3", "gnss.canopy_sd_m=36", "gnss.correlation_s=500",
+        "gnss.multipath_share=0.2", "gnss.height_factor=1.2", "gnss.reported_factor=0.12",
+        "gnss.burst_interval_s=300", "gnss.burst_m=15", "gnss.jump_interval_s=200",
+        "gnss.jump_m=4"}}};
   return presets;
 }
 

@@ -343,8 +343,10 @@ void describe(ConfigTable& table, SiteConfig& config) {
   });
   table.add("imu_preset", config.imu_preset,
             "measured IMU: site (as the site says), vectornav, xsens");
-  table.add("gnss_preset", config.gnss_preset,
-            "measured receiver: site (as the site says), phone, phone_wild");
+  table.add(
+      "gnss_preset", config.gnss_preset,
+      "measured receiver: site (as the site says), phone, phone_wild, faitli_evo1, faitli_evo2, "
+      "faitli_tuusniemi1, faitli_tuusniemi3");
 }
 
 namespace {

@@ -1,0 +1,213 @@
+// Many receivers on one path: how far each fit to satellite positions lays a run off its place, and
+// whether the stated covariance holds (docs/method/georeference.md; georeference_table.py).
+//   georeference_table SITE PATH FROM TO [key=value ...]
+// PATH is a run folder that was mapped on the site with the same settings, or drift:N, the true path
+// with the drift of seed N. The receivers have the seeds FROM to TO. Prints one row of CSV a
+// receiver and method.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "understory/evaluation/trajectory.h"
+#include "understory/georeference/gnss_fit.h"
+#include "understory/georeference/satellite_fit.h"
+#include "understory/georeference/satellite_smoothing.h"
+#include "understory/simulation/sensors/inertial.h"
+#include "understory/simulation/sensors/satellite.h"
+#include "understory/simulation/world.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+using Eigen::Vector3d;
+
+Trajectory true_path(const SimulatedWorld& world, const std::vector<TimeNs>& stamps, TimeNs start) {
+  Trajectory path;
+  for (const TimeNs stamp : stamps)
+    path.push_back({stamp, world.plan.path.pose(to_seconds(stamp - start))});
+  return path;
+}
+
+// The truth as a map would have it: in the frame of its first pose, level to 0.05 degrees, with
+// errors that grow with the way.
+Trajectory drifted_path(const Trajectory& truth, std::uint64_t seed) {
+  Random random(seed, 7);
+  const auto normal = [&](double sd) {
+    return Vector3d(random.normal(0.0, sd), random.normal(0.0, sd), random.normal(0.0, sd));
+  };
+  const Pose first = truth.front().world_from_body;
+  const Vector3d heading = first.rotation() * Vector3d::UnitX();
+  const Pose level(Eigen::Quaterniond(Eigen::AngleAxisd(
+                       std::atan2(heading.y(), heading.x()), Vector3d::UnitZ())),
+                   first.translation());
+  const Pose world_from_truth = Pose(so3_exp(normal(0.05 * M_PI / 180.0)), Vector3d::Zero()) *
+                                level.inverse();
+  Trajectory path;
+  Pose now = world_from_truth * first;
+  path.push_back({truth.front().stamp, now});
+  for (std::size_t k = 1; k < truth.size(); ++k) {
+    const Pose step = truth[k - 1].world_from_body.inverse() * truth[k].world_from_body;
+    const double root_m = std::sqrt(step.translation().norm());
+    Vector6d error;
+    error << normal(5e-5 * root_m), normal(2e-3 * root_m);
+    now = now * step * Pose::exp(error);
+    path.push_back({truth[k].stamp, now});
+  }
+  return path;
+}
+
+// The motion that lays the run on the truth, from all its poses.
+Pose reference_motion(const Trajectory& run, const Trajectory& truth) {
+  std::vector<FullPair> pairs;
+  std::vector<PlacePair> places;
+  Matrix6d covariance = Matrix6d::Identity();
+  covariance.topLeftCorner<3, 3>() *= std::pow(0.1 * M_PI / 180.0, 2.0);
+  covariance.bottomRightCorner<3, 3>() *= 0.05 * 0.05;
+  for (std::size_t k = 0; k < run.size(); ++k) {
+    FullPair pair;
+    pair.source_from_body = run[k].world_from_body;
+    pair.target_from_body = truth[k].world_from_body;
+    pair.target_covariance = covariance;
+    pairs.push_back(pair);
+    PlacePair place;
+    place.source = pair.source_from_body.translation();
+    place.target = pair.target_from_body.translation();
+    places.push_back(place);
+  }
+  return fit_poses(pairs, fit_closed(places).target_from_source, {}).target_from_source;
+}
+
+std::vector<GnssFix> fixes_of(const SimulatedWorld& world, int seed, TimeNs start, TimeNs end) {
+  SiteConfig site = world.site;
+  site.seed = seed;
+  SatelliteReceiver receiver(site, world.plan.path, world.scene, start);
+  std::vector<GnssFix> fixes;
+  while (receiver.next_stamp() <= end) {
+    if (const auto fix = receiver.next()) fixes.push_back(*fix);
+  }
+  return fixes;
+}
+
+std::vector<ImuSample> samples_of(const SimulatedWorld& world, TimeNs start, TimeNs end) {
+  InertialSensor sensor(world.site, world.plan.path, start, world.plan.shocks_s);
+  std::vector<ImuSample> samples;
+  while (sensor.next_stamp() <= end)
+    samples.push_back(sensor.next());
+  return samples;
+}
+
+struct Judged {
+  const SimulatedWorld& world;
+  const Trajectory& run;
+  Pose reference;  // site from run
+  std::vector<ImuSample> samples;
+  Pose body_from_imu;
+
+  void print(int seed, const char* method, const Pose& enu_from_world, const GeodeticPlace& origin,
+             const Matrix6d& spread, double expected_m) const {
+    const OriginConfig& at = world.site.origin;
+    const Vector3d shift = EastNorthUp({at.latitude_deg, at.longitude_deg, at.height_m})
+                               .from_place(origin);
+    const Pose placed(enu_from_world.rotation(), enu_from_world.translation() + shift);
+    const Vector3d turn =
+        so3_log(placed.rotation() * reference.rotation().conjugate()) * 180.0 / M_PI;
+    const Vector3d first = run.front().world_from_body.translation();
+    const Vector3d off = placed * first - reference * first;
+    Vector3d middle = Vector3d::Zero();
+    double squares = 0.0;
+    for (const StampedPose& pose : run) {
+      const Vector3d p = pose.world_from_body.translation();
+      squares += (placed * p - reference * p).squaredNorm() / static_cast<double>(run.size());
+      middle += p / static_cast<double>(run.size());
+    }
+    const Vector3d middle_off = placed * middle - reference * middle;
+    std::printf("%d,%s,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f", seed, method, off.x(), off.y(),
+                off.z(), turn.x(), turn.y(), turn.z(), std::sqrt(squares), expected_m);
+    for (int k = 0; k < 6; ++k) {
+      const double error = k < 3 ? turn(k) * M_PI / 180.0 : middle_off(k - 3);
+      std::printf(",%.5f", error * error / spread(k, k));
+    }
+    std::printf("\n");
+  }
+};
+
+void lay(const Judged& judged, const std::vector<GnssFix>& fixes, int seed) {
+  SatelliteFitConfig config;
+  const std::vector<double>& mount = judged.world.site.gnss.mount_m;
+  config.pairing.antenna_in_body = {mount[0], mount[1], mount[2]};
+  const std::vector<SatelliteFit> fits = fits_to_satellites(
+      judged.run, fixes,
+      {SatelliteMethod::kClosed, SatelliteMethod::kFit3, SatelliteMethod::kSplit}, config);
+  const char* names[] = {"closed", "fit3", "split"};
+  const SatelliteFit* best = nullptr;
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    const SatelliteFit& fit = fits[k];
+    if (!fit.found) continue;
+    judged.print(seed, names[k], fit.enu_from_world, *fit.origin, fit.spread,
+                 fit.expected_error_m);
+    if (best == nullptr || fit.expected_error_m < best->expected_error_m) best = &fit;
+  }
+  if (best != nullptr)
+    judged.print(seed, "auto", best->enu_from_world, *best->origin, best->spread,
+                 best->expected_error_m);
+  SatelliteSmoothingConfig smoothing;
+  smoothing.pairing = config.pairing;
+  smoothing.body_from_imu = judged.body_from_imu;
+  const SatelliteFit six = fit_to_satellites(
+      judged.run, fixes, SatelliteMethod::kFit6, config,
+      smooth_satellites(judged.run, fixes, judged.samples, fits[2].enu_from_world, smoothing));
+  if (six.found)
+    judged.print(seed, "fit6", six.enu_from_world, *six.origin, six.spread, six.expected_error_m);
+  const GnssFit path = fit_to_gnss(judged.run, config.pairing.antenna_in_body, fixes, {});
+  if (path.path.found)
+    judged.print(seed, "gnss-path", path.enu_from_world, *path.origin,
+                 Matrix6d::Constant(std::nan("")), std::nan(""));
+}
+
+int run_table(int argc, char** argv) {
+  const std::string path = argv[2];
+  const int from = std::atoi(argv[3]);
+  const int to = std::atoi(argv[4]);
+  const std::vector<std::string> settings(argv + 5, argv + argc);
+  const SiteConfig site = load_site(argv[1], settings);
+  const SimulatedWorld world(site);
+  const double whole_s = std::floor(site.origin.start_time_s);
+  const TimeNs start = static_cast<TimeNs>(whole_s) * kNsPerSecond +
+                       from_seconds(site.origin.start_time_s - whole_s);
+  Trajectory run;
+  std::vector<TimeNs> stamps;
+  if (path.starts_with("drift:")) {
+    for (TimeNs t = 0; to_seconds(t) < world.plan.path.duration_s() - 1.0; t += kNsPerSecond / 10)
+      stamps.push_back(start + t);
+  } else {
+    run = read_trajectory(std::filesystem::path(path) / "trajectory.tum");
+    for (const StampedPose& pose : run)
+      stamps.push_back(pose.stamp);
+  }
+  const Trajectory truth = true_path(world, stamps, start);
+  if (run.empty()) run = drifted_path(truth, std::strtoull(path.c_str() + 6, nullptr, 10));
+  const Judged judged{world, run, reference_motion(run, truth),
+                      samples_of(world, start, stamps.back()),
+                      InertialSensor(site, world.plan.path, start).body_from_imu()};
+  std::printf(
+      "seed,method,east_m,north_m,up_m,turn_east_deg,turn_north_deg,turn_up_deg,rms_m,expected_m,"
+      "n_turn_east,n_turn_north,n_turn_up,n_east,n_north,n_up\n");
+  for (int seed = from; seed <= to; ++seed)
+    lay(judged, fixes_of(world, seed, start, stamps.back()), seed);
+  return 0;
+}
+
+}  // namespace
+}  // namespace understory
+
+int main(int argc, char** argv) {
+  if (argc < 5) {
+    std::fprintf(stderr, "georeference_table SITE PATH FROM TO [key=value ...]\n");
+    return 2;
+  }
+  return understory::run_table(argc, argv);
+}
