@@ -19,8 +19,13 @@ struct GeoreferenceOptions {
   std::string method;
   std::string gnss;
   std::string terrain_model;
+  std::string points;
+  std::string recording;
   std::vector<double> antenna_m;
   std::vector<double> start;
+  double time_offset_s = 0.0;
+  double time_offset_sd_s = 0.0;
+  double tilt_sd_deg = -1.0;  // not given
   bool plain = false;
   bool json = false;
   bool overwrite = false;
@@ -40,7 +45,7 @@ void check_trees(const GeoreferenceOptions& options, std::vector<std::string>& p
       !(options.tree_map.empty() && options.near.empty() && options.tree_map_system.empty()))
     problems.emplace_back("--tree-map, --tree-map-crs and --near belong to trees");
   if (trees && !(options.gnss.empty() && options.antenna_m.empty() && !options.plain))
-    problems.emplace_back("--gnss, --antenna-m and --plain belong to gnss-path");
+    problems.emplace_back("--gnss, --antenna-m and --plain do not belong to trees");
 }
 
 // Options that belong to one method are errors with the other.
@@ -50,12 +55,29 @@ void check(const GeoreferenceOptions& options) {
   if (options.result.empty()) problems.emplace_back("-o is needed: the folder to write");
   check_trees(options, problems);
   const bool terrain = options.method == "terrain";
+  const bool points = options.method == "points";
+  if (points && options.points.empty())
+    problems.emplace_back("--method points needs --points FILE");
+  if (points && options.coordinate_system.empty())
+    problems.emplace_back("--points needs --crs: the coordinate system of its columns");
+  if (options.method != "fit6" && !options.recording.empty())
+    problems.emplace_back("--recording belongs to --method fit6");
+  if (!points && !options.points.empty())
+    problems.emplace_back("--points belongs to --method points");
+  if (points && !options.gnss.empty()) problems.emplace_back("--gnss does not belong to points");
+  const bool timed =
+      !terrain && !points && options.method != "gnss-path" && options.method != "trees";
+  if (!timed && (options.time_offset_s != 0.0 || options.time_offset_sd_s > 0.0))
+    problems.emplace_back(
+        "--time-offset-s and --time-offset-sd-s belong to auto, split, closed, fit3, fit6");
+  if (!timed && !points && options.tilt_sd_deg >= 0.0)
+    problems.emplace_back("--tilt-sd-deg belongs to auto, split, closed, fit3, fit6, points");
   if (terrain && options.terrain_model.empty())
     problems.emplace_back("--method terrain needs --dem FILE");
-  if (terrain && !options.gnss.empty()) problems.emplace_back("--gnss belongs to gnss-path");
-  if (terrain && options.plain) problems.emplace_back("--plain belongs to gnss-path");
+  if (terrain && !options.gnss.empty()) problems.emplace_back("--gnss does not belong to terrain");
+  if (terrain && options.plain) problems.emplace_back("--plain does not belong to terrain");
   if (terrain && !options.antenna_m.empty())
-    problems.emplace_back("--antenna-m belongs to gnss-path");
+    problems.emplace_back("--antenna-m does not belong to terrain");
   if (!terrain && !options.terrain_model.empty()) problems.emplace_back("--dem belongs to terrain");
   if (!terrain && !options.start.empty()) problems.emplace_back("--start belongs to terrain");
   if (!terrain && (options.terrain.place_sd_m > 0.0 || options.terrain.yaw_sd_deg > 0.0))
@@ -72,7 +94,12 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
   request.gnss = options.gnss;
   request.terrain_model = options.terrain_model;
   request.terrain = options.terrain;
+  request.points = options.points;
+  request.recording = options.recording;
   request.path.robust = !options.plain;
+  request.time_offset_s = options.time_offset_s;
+  request.time_offset_sd_s = options.time_offset_sd_s;
+  if (options.tilt_sd_deg >= 0.0) request.tilt_sd_deg = options.tilt_sd_deg;
   request.coordinate_system = options.coordinate_system;
   request.tree_map = options.tree_map;
   request.tree_map_system = options.tree_map_system;
@@ -94,6 +121,65 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
   return report_outcome(json.dump(2), outcome.status, outcome.reasons);
 }
 
+// Of the fits to satellite positions and control points. `options` must outlive the command.
+void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
+  command.add_option(
+      "--gnss", options.gnss,
+      "Fixes: a recording, an NMEA log, an RTKLIB .pos file or a CSV table (gnss.csv "
+      "of the run if not given)");
+  command
+      .add_option(
+          "--antenna-m", options.antenna_m,
+          "Where the GNSS antenna, or what stood on the points, is in the body frame: x y z "
+          "(the origin if not given)")
+      ->expected(3);
+  command
+      .add_option("--time-offset-s", options.time_offset_s,
+                  "Added to the times of the fixes (negative where the receiver's are late)")
+      ->check(CLI::Range(-1e6, 1e6))
+      ->capture_default_str();
+  command
+      .add_option("--time-offset-sd-s", options.time_offset_sd_s,
+                  "Standard deviation of that offset: the fit finds it (0 keeps it)")
+      ->check(CLI::Range(0.0, 60.0))
+      ->capture_default_str();
+  command
+      .add_option("--tilt-sd-deg", options.tilt_sd_deg,
+                  "How far the run's up may be off gravity, one standard deviation (0.1 for a run "
+                  "with an IMU, else 5)")
+      ->check(CLI::Range(0.0, 45.0));
+  command.add_flag("--plain", options.plain,
+                   "Plain least squares: fixes that are far off count like others");
+  command.add_option("--recording", options.recording,
+                     "With fit6: the recording whose IMU smooths the fixes (the one that run.json "
+                     "names if not given)");
+  command.add_option("--points", options.points,
+                     "Control points: CSV with name, east_m, north_m, height_m (in --crs), and x, "
+                     "y, z of the run or timestamp_s");
+}
+
+// Of the fit to a terrain model; the same of `options`.
+void add_terrain_options(CLI::App& command, GeoreferenceOptions& options) {
+  command.add_option("--dem", options.terrain_model,
+                     "Terrain model: GeoTIFF, ESRI ASCII grid, XYZ grid");
+  command
+      .add_option("--start", options.start,
+                  "Where the run's origin lies on the terrain model and how its x axis is turned "
+                  "from east: x_m y_m yaw_deg")
+      ->expected(3);
+  command
+      .add_option("--place-sd-m", options.terrain.place_sd_m,
+                  "Standard deviation of the place: the relief moves it, too (0 keeps it)")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  command
+      .add_option("--yaw-sd-deg", options.terrain.yaw_sd_deg,
+                  "Standard deviation of the heading: the relief turns it, too (0 keeps it)")
+      ->check(CLI::Range(0.0, 45.0))
+      ->capture_default_str();
+}
+
+// Of the search in a map of trees; the same of `options`.
 void add_tree_options(CLI::App& command, GeoreferenceOptions& options) {
   command.add_option("--tree-map", options.tree_map,
                      "Map of trees: CSV table, GeoPackage or other points; or a cloud from the air "
@@ -116,7 +202,8 @@ void add_tree_options(CLI::App& command, GeoreferenceOptions& options) {
 
 void add_georeference_command(CLI::App& app, Command& chosen) {
   CLI::App* command = app.add_subcommand(
-      "georeference", "Move a finished run onto a GNSS path, a terrain model or a map of trees");
+      "georeference",
+      "Move a finished run onto GNSS fixes, control points, a terrain model or a map of trees");
   const auto options = std::make_shared<GeoreferenceOptions>();
   command->add_option("RUN", options->run, "Run folder");
   command->add_option("-o,--output", options->result, "Folder for the moved run");
@@ -129,32 +216,8 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
   command->add_option("--method", options->method, fmt::format("{}", fmt::join(meanings, "; ")))
       ->required()
       ->check(CLI::IsMember(names));
-  command->add_option("--gnss", options->gnss,
-                      "Fixes: a recording, an NMEA log or a CSV table (gnss.csv of the run if not "
-                      "given)");
-  command
-      ->add_option("--antenna-m", options->antenna_m,
-                   "Where the GNSS antenna is in the body frame: x y z (the origin if not given)")
-      ->expected(3);
-  command->add_flag("--plain", options->plain,
-                    "Plain least squares: fixes that are far off count like others");
-  command->add_option("--dem", options->terrain_model,
-                      "Terrain model: GeoTIFF, ESRI ASCII grid, XYZ grid");
-  command
-      ->add_option("--start", options->start,
-                   "Where the run's origin lies on the terrain model and how its x axis is turned "
-                   "from east: x_m y_m yaw_deg")
-      ->expected(3);
-  command
-      ->add_option("--place-sd-m", options->terrain.place_sd_m,
-                   "Standard deviation of the place: the relief moves it, too (0 keeps it)")
-      ->check(CLI::Range(0.0, 100.0))
-      ->capture_default_str();
-  command
-      ->add_option("--yaw-sd-deg", options->terrain.yaw_sd_deg,
-                   "Standard deviation of the heading: the relief turns it, too (0 keeps it)")
-      ->check(CLI::Range(0.0, 45.0))
-      ->capture_default_str();
+  add_satellite_options(*command, *options);
+  add_terrain_options(*command, *options);
   add_tree_options(*command, *options);
   command->add_option("--crs", options->coordinate_system,
                       "Coordinate system of trees.gpkg, for instance EPSG:3067 (the UTM zone if "
@@ -162,7 +225,8 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
   command->add_flag("--overwrite", options->overwrite, kOverwriteMeaning);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->footer(
-      "Examples:\n  understory georeference forest --method gnss-path --gnss drive.nmea -o placed\n"
+      "Examples:\n  understory georeference forest --method auto --gnss walk.pos -o placed\n"
+      "  understory georeference forest --method gnss-path --gnss drive.nmea -o placed\n"
       "  understory georeference placed --method terrain --dem terrain.tif -o levelled\n"
       "  understory georeference forest --method trees --tree-map stand.gpkg --near 563200 7024500 "
       "-o found");

@@ -89,7 +89,7 @@ std::vector<ReportFix> StemMapMaker::compare_with_gnss(const Trajectory& traject
   summary.quality.merge(figures_of(fit));
   GnssWriter writer(place_.results / "gnss.csv");
   const Pose world_from_enu = fit.enu_from_world.inverse();
-  for (GnssRow row : rows_of(fit)) {
+  for (GnssRow row : rows_of(fit.fixes, "too far from the path")) {
     row.position_in_world = moved(world_from_enu, row.position_in_world);
     row.residual = moved(Pose(world_from_enu.rotation(), Eigen::Vector3d::Zero()), row.residual);
     drawn.push_back({row.position_in_world.cast<float>(), row.used});

@@ -9,6 +9,7 @@
 #include "understory/georeference/coordinate_system.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
+#include "understory/pipeline/georeferencing/placement_figures.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
 #include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/pipeline/run_folder/run_folder.h"
@@ -43,6 +44,13 @@ std::string yaml_of(GeoreferenceRequest request) {
   table.add_enum("method", request.method, methods, "");
   table.add("gnss", request.gnss, "");
   table.add("antenna_m", antenna_m, "m", "");
+  std::string points = request.points.string();
+  table.add("points", points, "");
+  table.add("recording", request.recording, "");
+  table.add("time_offset_s", request.time_offset_s, {}, "s", "");
+  table.add("time_offset_sd_s", request.time_offset_sd_s, {}, "s", "");
+  double tilt_sd_deg = request.tilt_sd_deg.value_or(-1.0);
+  if (request.tilt_sd_deg) table.add("tilt_sd_deg", tilt_sd_deg, {}, "deg", "");
   table.add("plain", plain, "");
   table.add("dem", dem, "");
   table.add("start", start, "", "");
@@ -94,6 +102,8 @@ Placement find_placement(const GeoreferenceRequest& request, const MovableRun& r
       methods.begin(), methods.end(),
       [&](const PlacementMethod& candidate) { return candidate.method == request.method; });
   Placement placement = method->place(request, run, log);
+  if (placement.method.empty()) placement.method = method->name;
+  tell_placement(run.trajectory, placement);
   if (placement.origin) {
     placement.figures["origin_latitude_deg"] = placement.origin->latitude_deg;
     placement.figures["origin_longitude_deg"] = placement.origin->longitude_deg;
@@ -106,7 +116,7 @@ Placement find_placement(const GeoreferenceRequest& request, const MovableRun& r
 
 GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& log) {
   std::vector<fs::path> inputs = files_of(given.gnss, {});
-  inputs.insert(inputs.end(), {given.run, given.terrain_model, given.tree_map});
+  inputs.insert(inputs.end(), {given.run, given.terrain_model, given.tree_map, given.points});
   refuse_input_as_output(given.result, inputs);
   const RunFolder place = RunFolder::claim(given.result, given.overwrite);
   GeoreferenceRequest request = given;

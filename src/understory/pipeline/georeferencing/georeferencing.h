@@ -18,6 +18,12 @@ namespace understory {
 
 // What a map is laid on.
 enum class GeoreferenceMethod {
+  kAuto,      // the one of the following with the smallest expected error
+  kSplit,     // each degree of freedom by what knows it best, P4 section 5.3
+  kClosed,    // closed form, P4 table 5
+  kFit3,      // positions with their covariances, P4 (43, 44)
+  kFit6,      // poses: positions smoothed with the IMU, P4 (45-52)
+  kPoints,    // surveyed control points
   kGnssPath,  // one motion in the plane between two paths, P1 (6)
   kTerrain,   // one rigid motion that lays ground points on a terrain model, P1 table 1
   kTrees      // turn and shift by which the trees are found in a map of trees
@@ -31,6 +37,12 @@ struct GeoreferenceRequest {
   GeoreferenceMethod method = GeoreferenceMethod::kGnssPath;
   std::string gnss;  // file with fixes; empty: gnss.csv of the run
   Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();
+  std::string recording;          // whose IMU smooths the fixes; empty: as run.json names it
+  std::filesystem::path points;   // table of control points
+  double time_offset_s = 0.0;     // added to the stamps of the fixes
+  double time_offset_sd_s = 0.0;  // and how far it may be off; 0 holds it
+  // How far the run's up may be off gravity; not given: by whether it was mapped with an IMU.
+  std::optional<double> tilt_sd_deg;
   PathFitConfig path;
   std::filesystem::path terrain_model;
   // Where the run's origin lies on a terrain model without a coordinate system: x, y, metres, and

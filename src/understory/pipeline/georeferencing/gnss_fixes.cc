@@ -7,6 +7,7 @@
 
 #include "understory/pipeline/source.h"
 #include "understory/recording/captures/nmea.h"
+#include "understory/recording/captures/rtklib.h"
 #include "understory/util/error.h"
 #include "understory/util/files/csv.h"
 #include "understory/util/files/text_file.h"
@@ -51,6 +52,9 @@ std::vector<GnssFix> read_table(const std::string& file) {
     fix.height_m = table.number("height_m");
     fix.hdop = table.number("hdop");
     fix.vdop = table.number("vdop");
+    const double c[] = {table.number("c00"), table.number("c01"), table.number("c02"),
+                        table.number("c11"), table.number("c12"), table.number("c22")};
+    fix.covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
     fixes.push_back(fix);
   }
   return fixes;
@@ -75,6 +79,8 @@ std::vector<GnssFix> read_fixes(const std::string& file, Log& log) {
   const std::string name = fs::path(file).filename().string();
   if (plain && first_letter(file) == '$') {
     fixes = read_nmea(file, log);
+  } else if (plain && is_rtklib_solution(file)) {
+    fixes = read_rtklib_solution(file, log);
   } else if (plain && (name.ends_with(".csv") || name.ends_with(".csv.gz"))) {
     fixes = read_table(file);
   } else {
@@ -85,15 +91,15 @@ std::vector<GnssFix> read_fixes(const std::string& file, Log& log) {
   return fixes;
 }
 
-std::vector<GnssRow> rows_of(const GnssFit& fit) {
+std::vector<GnssRow> rows_of(const std::vector<FittedFix>& fixes, const std::string& unused) {
   std::vector<GnssRow> rows;
-  for (const FittedFix& fitted : fit.fixes) {
+  for (const FittedFix& fitted : fixes) {
     GnssRow row;
     row.fix = fitted.fix;
     row.position_in_world = fitted.position_in_enu;
     row.residual = fitted.residual;
     row.used = fitted.used;
-    if (!row.used) row.reason = "too far from the path";
+    if (!row.used) row.reason = unused;
     rows.push_back(row);
   }
   return rows;

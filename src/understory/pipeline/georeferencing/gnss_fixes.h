@@ -12,13 +12,14 @@
 
 namespace understory {
 
-// The fixes of a file: an NMEA log, a table with timestamp, latitude_deg and longitude_deg
-// (gnss.csv of a run or of a folder of clouds), or any recording. Those without a position are left
-// out. Throws InputError where there are none.
+// The fixes of a file: an NMEA log, an RTKLIB .pos file, a table with timestamp, latitude_deg and
+// longitude_deg (gnss.csv of a run or of a folder of clouds), or any recording. Those without a
+// position are left out. Throws InputError where there are none.
 [[nodiscard]] std::vector<GnssFix> read_fixes(const std::string& file, Log& log);
 
-// For gnss.csv, positions in the frame east, north, up.
-[[nodiscard]] std::vector<GnssRow> rows_of(const GnssFit& fit);
+// For gnss.csv, positions in the frame east, north, up. `unused`: why a fix was not used.
+[[nodiscard]] std::vector<GnssRow> rows_of(const std::vector<FittedFix>& fixes,
+                                           const std::string& unused);
 // For run.json: gnss_fit_rms_m and the like; empty if there was no fit.
 [[nodiscard]] std::map<std::string, Figure> figures_of(const GnssFit& fit);
 

@@ -19,8 +19,8 @@ Placement place_by_gnss_path(const GeoreferenceRequest& request, const MovableRu
   const fs::path file = request.gnss.empty() ? request.run / "gnss.csv" : fs::path(request.gnss);
   if (request.gnss.empty() && !fs::exists(file))
     throw InputError(request.run.string(), "",
-                     "expected gnss.csv in the run, or --gnss with a recording, an NMEA log or a "
-                     "table of fixes");
+                     "expected gnss.csv in the run, or --gnss with a recording, an NMEA log, an "
+                     "RTKLIB .pos file or a table of fixes");
   if (request.antenna_in_body.norm() > kLongestArmM)
     log.warn("recording.lever_arm",
              fmt::format("the antenna is said to be {:.1f} m from the body's origin (--antenna-m): "
@@ -51,7 +51,7 @@ Placement place_by_gnss_path(const GeoreferenceRequest& request, const MovableRu
         "path is too short, too straight or too round for fixes that are {:.1f} m off it. Take a "
         "longer path with bends, or a better receiver",
         fit.path.heading_sd_deg, kMostHeadingSdDeg, fit.path.fixes_rms_m));
-  placement.gnss = rows_of(fit);
+  placement.gnss = rows_of(fit.fixes, "too far from the path");
   if (request.gnss.empty())
     placement.inputs.push_back(hash_input(file));
   else

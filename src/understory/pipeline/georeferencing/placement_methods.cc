@@ -4,6 +4,18 @@ namespace understory {
 
 const std::vector<PlacementMethod>& placement_methods() {
   static const std::vector<PlacementMethod> kMethods{
+      {GeoreferenceMethod::kAuto, "auto",
+       "the one of split, fit3, closed with the smallest expected error; gnss-path where no fix is "
+       "of the run's time",
+       place_by_best},
+      {GeoreferenceMethod::kSplit, "split",
+       "heading and place from positions in the plane, height and tilt apart", place_by_split},
+      {GeoreferenceMethod::kClosed, "closed", "closed form, all fixes alike", place_by_closed_form},
+      {GeoreferenceMethod::kFit3, "fit3", "positions weighted by their covariances", place_by_fit3},
+      {GeoreferenceMethod::kFit6, "fit6", "poses: positions smoothed with the IMU of the recording",
+       place_by_fit6},
+      {GeoreferenceMethod::kPoints, "points",
+       "surveyed points seen in the map, or of times stood on them", place_by_points},
       {GeoreferenceMethod::kGnssPath, "gnss-path",
        "one motion in the plane between both paths, no common clock needed", place_by_gnss_path},
       {GeoreferenceMethod::kTerrain, "terrain", "height and tilt from a terrain model",

@@ -21,6 +21,22 @@ struct PlacementMethod {
 // All of them, in the order of --help.
 [[nodiscard]] const std::vector<PlacementMethod>& placement_methods();
 
+// georeferencing/place_by_auto.cc: the fit with the smallest expected error.
+[[nodiscard]] Placement place_by_best(const GeoreferenceRequest& request, const MovableRun& run,
+                                      Log& log);
+// georeferencing/place_by_satellites.cc: fits by the times of the fixes.
+[[nodiscard]] Placement place_by_closed_form(const GeoreferenceRequest& request,
+                                             const MovableRun& run, Log& log);
+[[nodiscard]] Placement place_by_fit3(const GeoreferenceRequest& request, const MovableRun& run,
+                                      Log& log);
+[[nodiscard]] Placement place_by_split(const GeoreferenceRequest& request, const MovableRun& run,
+                                       Log& log);
+// georeferencing/place_by_fit6.cc: poses from positions and IMU.
+[[nodiscard]] Placement place_by_fit6(const GeoreferenceRequest& request, const MovableRun& run,
+                                      Log& log);
+// georeferencing/place_by_points.cc: control points.
+[[nodiscard]] Placement place_by_points(const GeoreferenceRequest& request, const MovableRun& run,
+                                        Log& log);
 // georeferencing/place_by_gnss_path.cc: P1 (6).
 [[nodiscard]] Placement place_by_gnss_path(const GeoreferenceRequest& request,
                                            const MovableRun& run, Log& log);

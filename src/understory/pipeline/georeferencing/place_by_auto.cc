@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/pipeline/georeferencing/placement_methods.h"
+#include "understory/pipeline/georeferencing/satellite_placement.h"
+
+namespace understory {
+namespace {
+
+// A method that was tried, and what it made one expect.
+struct TriedMethod {
+  const char* name;
+  SatelliteFit fit;
+};
+
+std::string account_of(const std::vector<TriedMethod>& tried, const TriedMethod& best) {
+  std::string text =
+      fmt::format("auto: {} has the smallest expected error, {:.2f} m", best.name,
+                  best.fit.expected_error_m);
+  for (const TriedMethod& other : tried) {
+    if (&other == &best) continue;
+    text += other.fit.found
+                ? fmt::format("; {} {:.2f} m", other.name, other.fit.expected_error_m)
+                : fmt::format("; {} cannot be used: {}", other.name, other.fit.reason);
+  }
+  return text;
+}
+
+}  // namespace
+
+Placement place_by_best(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {
+  const SatelliteInput input = read_satellite_input(request, run, log);
+  std::vector<TriedMethod> tried;
+  const char* names[] = {"split", "fit3", "closed"};
+  const std::vector<SatelliteFit> fits = fits_to_satellites(
+      run.trajectory, input.fixes,
+      {SatelliteMethod::kSplit, SatelliteMethod::kFit3, SatelliteMethod::kClosed}, input.config);
+  for (std::size_t k = 0; k < fits.size(); ++k)
+    tried.push_back({names[k], fits[k]});
+  const TriedMethod* best = nullptr;
+  for (const TriedMethod& one : tried) {
+    if (one.fit.found &&
+        (best == nullptr || one.fit.expected_error_m < best->fit.expected_error_m))
+      best = &one;
+  }
+  if (best == nullptr && tried.front().fit.fixes_in_time == 0) {
+    Placement placement = place_by_gnss_path(request, run, log);
+    placement.method = "gnss-path";
+    placement.summary =
+        "auto: no fix is of a time of the run, so the paths were compared without a clock\n" +
+        placement.summary;
+    placement.doubt(tried.front().fit.reason);
+    return placement;
+  }
+  if (best == nullptr)
+    return placement_of(request, run, input, tried.front().fit, tried.front().name, log);
+  Placement placement = placement_of(request, run, input, best->fit, best->name, log);
+  for (const TriedMethod& one : tried) {
+    if (one.fit.found)
+      placement.figures[fmt::format("expected_error_{}_m", one.name)] = one.fit.expected_error_m;
+  }
+  placement.summary = account_of(tried, *best) + "\n" + placement.summary;
+  return placement;
+}
+
+}  // namespace understory

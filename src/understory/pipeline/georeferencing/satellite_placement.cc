@@ -1,0 +1,158 @@
+#include "understory/pipeline/georeferencing/satellite_placement.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "understory/pipeline/georeferencing/gnss_fixes.h"
+#include "understory/pipeline/georeferencing/placement_figures.h"
+#include "understory/pipeline/pipeline_constants.h"
+#include "understory/pipeline/source.h"
+#include "understory/util/error.h"
+#include "understory/util/files/text_file.h"
+
+namespace understory {
+namespace {
+
+using namespace pipeline_constants::georeferencing;
+
+namespace fs = std::filesystem;
+
+// Whether the run's up is that of gravity: it was mapped with an IMU, or laid on the earth before.
+bool is_level(const fs::path& folder, const MovableRun& run) {
+  if (run.origin) return true;
+  if (!fs::exists(folder / "run.json")) return false;
+  const auto json = nlohmann::json::parse(read_text_file(folder / "run.json"), nullptr, false);
+  if (json.is_discarded() || !json.is_object()) return false;
+  const auto counts = json.find("counts");
+  if (counts == json.end() || !counts->is_object()) return false;
+  const auto samples = counts->find("imu_samples");
+  return samples != counts->end() && samples->is_number() && samples->get<double>() > 0.0;
+}
+
+double extent_m(const Trajectory& trajectory) {
+  Eigen::Vector2d low = trajectory.front().world_from_body.translation().head<2>();
+  Eigen::Vector2d high = low;
+  for (const StampedPose& pose : trajectory) {
+    low = low.cwiseMin(pose.world_from_body.translation().head<2>());
+    high = high.cwiseMax(pose.world_from_body.translation().head<2>());
+  }
+  return (high - low).norm();
+}
+
+void doubt(const MovableRun& run, const SatelliteFit& fit, Placement& placement) {
+  const double heading_sd_deg = std::get<double>(placement.figures.at("sd_heading_deg"));
+  const double extent = extent_m(run.trajectory);
+  if (heading_sd_deg > kMostHeadingSdDeg)
+    placement.doubt(fmt::format(
+        "the heading is uncertain by {:.1f} degrees (one standard deviation; {:.0f} at most): the "
+        "path spans {:.0f} m and the fixes err by {:.1f} m. Take a longer path or a better "
+        "receiver",
+        heading_sd_deg, kMostHeadingSdDeg, extent, fit.plane_noise_m));
+  const double tilt_sd_deg = std::max(std::get<double>(placement.figures.at("sd_turn_east_deg")),
+                                      std::get<double>(placement.figures.at("sd_turn_north_deg")));
+  if (tilt_sd_deg > kMostHeadingSdDeg)
+    placement.doubt(fmt::format(
+        "the tilt is uncertain by {:.1f} degrees (one standard deviation; {:.0f} at most): use "
+        "--method split or auto",
+        tilt_sd_deg, kMostHeadingSdDeg));
+  if (!fit.height_known)
+    placement.doubt("the fixes have no heights: the height of the run is not that of the earth");
+  if (fit.plane_rms_m > SatelliteFitConfig().most_misfit * extent)
+    placement.doubt(fmt::format(
+        "the fixes lie {:.1f} m off the path (root mean square), which spans {:.0f} m: are they "
+        "fixes of this run?",
+        fit.plane_rms_m, extent));
+}
+
+void tell_figures(const SatelliteFit& fit, Placement& placement) {
+  const auto used = std::count_if(fit.fixes.begin(), fit.fixes.end(),
+                                  [](const FittedFix& fix) { return fix.used; });
+  placement.figures["gnss_fixes"] = static_cast<std::int64_t>(fit.fixes.size());
+  placement.figures["gnss_fixes_in_time"] = static_cast<std::int64_t>(fit.fixes_in_time);
+  placement.figures["gnss_fixes_used_share"] =
+      static_cast<double>(used) / static_cast<double>(fit.fixes.size());
+  placement.figures["gnss_plane_rms_m"] = fit.plane_rms_m;
+  placement.figures["gnss_plane_error_m"] = fit.plane_noise_m;
+  placement.figures["gnss_correlation_s"] = fit.correlation_s;
+  placement.figures["gnss_independent_fixes"] = fit.independent_fixes;
+  placement.figures["gnss_yaw_deg"] = yaw_of(fit.enu_from_world) * 180.0 / M_PI;
+  if (fit.height_known) {
+    placement.figures["gnss_height_rms_m"] = fit.height_rms_m;
+    placement.figures["gnss_height_error_m"] = fit.height_noise_m;
+  }
+  if (fit.time_offset_sd_s > 0.0) {
+    placement.figures["gnss_time_offset_s"] = fit.time_offset_s;
+    placement.figures["gnss_time_offset_sd_s"] = fit.time_offset_sd_s;
+  }
+}
+
+}  // namespace
+
+fs::path fixes_file(const GeoreferenceRequest& request) {
+  const fs::path file = request.gnss.empty() ? request.run / "gnss.csv" : fs::path(request.gnss);
+  if (request.gnss.empty() && !fs::exists(file))
+    throw InputError(request.run.string(), "",
+                     "expected gnss.csv in the run, or --gnss with a recording, an NMEA log, an "
+                     "RTKLIB .pos file or a table of fixes");
+  return file;
+}
+
+double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run) {
+  if (request.tilt_sd_deg) return *request.tilt_sd_deg;
+  return is_level(request.run, run) ? SplitFitConfig().tilt_sd_deg : SplitFitConfig().unlevel_tilt_sd_deg;
+}
+
+SatelliteInput read_satellite_input(const GeoreferenceRequest& request, const MovableRun& run,
+                                    Log& log) {
+  if (request.antenna_in_body.norm() > kLongestArmM)
+    log.warn("recording.lever_arm",
+             fmt::format("the antenna is said to be {:.1f} m from the body's origin (--antenna-m): "
+                         "check that these are metres and not a place on the earth",
+                         request.antenna_in_body.norm()));
+  SatelliteInput input;
+  input.file = fixes_file(request);
+  input.fixes = read_fixes(input.file.string(), log);
+  input.config.pairing.antenna_in_body = request.antenna_in_body;
+  input.config.pairing.time_offset_s = request.time_offset_s;
+  input.config.split.time_offset_sd_s = request.time_offset_sd_s;
+  input.config.split.robust = input.config.rigid.robust = request.path.robust;
+  input.config.split.tilt_sd_deg = tilt_sd_deg(request, run);
+  return input;
+}
+
+Placement placement_of(const GeoreferenceRequest& request, const MovableRun& run,
+                       const SatelliteInput& input, const SatelliteFit& fit,
+                       const std::string& method, Log& log) {
+  if (!fit.found) throw InputError(input.file.string(), "", fit.reason);
+  if (fit.swapped)
+    throw InputError(input.file.string(), "",
+                     fmt::format("latitude and longitude seem to be swapped: as they stand the "
+                                 "fixes lie {:.1f} m off the path, swapped less than half of that",
+                                 fit.plane_rms_m));
+  Placement placement;
+  placement.method = method;
+  placement.target_from_world = fit.enu_from_world;
+  placement.origin = fit.origin;
+  placement.covariance = fit.covariance;
+  placement.expected_error_m = fit.expected_error_m;
+  tell_figures(fit, placement);
+  tell_placement(run.trajectory, placement);
+  doubt(run, fit, placement);
+  placement.gnss = rows_of(fit.fixes, "far off the others, or of another time");
+  placement.summary = fmt::format(
+      "{}: {} fixes at times of the path, {:.2f} m off it in the plane (root mean square); they "
+      "know the place as {:.0f} independent ones do\nexpected error {:.2f} m over the path; one "
+      "standard deviation: {}",
+      method, fit.fixes_in_time, fit.plane_rms_m, fit.independent_fixes, fit.expected_error_m,
+      precision_of(placement));
+  if (request.gnss.empty())
+    placement.inputs.push_back(hash_input(input.file));
+  else
+    placement.inputs = hash_inputs(request.gnss, log);
+  return placement;
+}
+
+}  // namespace understory

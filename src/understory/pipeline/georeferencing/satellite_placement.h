@@ -1,0 +1,40 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "understory/georeference/satellite_fit.h"
+#include "understory/pipeline/georeferencing/georeferencing.h"
+#include "understory/pipeline/georeferencing/movable_run.h"
+#include "understory/pipeline/georeferencing/placement.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// What the fits to satellite positions of one call have in common.
+struct SatelliteInput {
+  std::filesystem::path file;  // of the fixes
+  std::vector<GnssFix> fixes;
+  SatelliteFitConfig config;
+};
+
+// The file of the fixes: --gnss, else gnss.csv of the run. Throws InputError where there is none.
+[[nodiscard]] std::filesystem::path fixes_file(const GeoreferenceRequest& request);
+
+// How far the run's up may be off gravity, degrees: --tilt-sd-deg, else by whether the run was mapped
+// with an IMU or laid on the earth before.
+[[nodiscard]] double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run);
+
+// Reads the fixes and settles the settings of the fits: a run that was mapped with an IMU is level.
+// Warns of a lever arm that is no lever arm. Throws InputError.
+[[nodiscard]] SatelliteInput read_satellite_input(const GeoreferenceRequest& request,
+                                                  const MovableRun& run, Log& log);
+
+// A fit as the placement of a run, with figures, doubts and the fixes as used. Throws InputError
+// where the fit was not found or the angles of the fixes are swapped.
+[[nodiscard]] Placement placement_of(const GeoreferenceRequest& request, const MovableRun& run,
+                                     const SatelliteInput& input, const SatelliteFit& fit,
+                                     const std::string& method, Log& log);
+
+}  // namespace understory
