@@ -388,7 +388,7 @@ def bad(folder):
     refused(2, "--method", RUN)
     refused(2, "--dem", RUN, "--method", "terrain")
     refused(2, "--start belongs", RUN, "--method", "gnss-path", "--start", 1, 2, 3)
-    refused(2, "--plain belongs", RUN, "--method", "terrain", "--dem", DEM, "--plain")
+    refused(2, "--plain does not belong", RUN, "--method", "terrain", "--dem", DEM, "--plain")
     refused(3, "gnss.csv", RUN, "--method", "gnss-path")
     refused(3, "no such file", RUN, "--method", "gnss-path", "--gnss", folder / "none.csv")
     (folder / "empty.csv").write_text("timestamp,latitude_deg,longitude_deg\n")

@@ -107,7 +107,7 @@ def methods(folder):
     best = min(told[m]["expected_error_m"] for m in ("closed", "fit3", "split"))
     assert told["auto"]["expected_error_m"] == best and told["auto"]["method"] == "split", told["auto"]
     assert error_of(folder / "auto") < 1.1 * error_of(folder / "closed")
-    assert told["split"]["sd_turn_east_deg"] < 0.11 < told["closed"]["sd_turn_east_deg"]
+    assert told["split"]["sd_turn_east_deg"] < 0.06 < told["closed"]["sd_turn_east_deg"]
     text = georeference(RUN, "--method", "auto", "--gnss", FIXES, "-o", folder / "again").stdout
     assert "split has the smallest expected error" in text and "closed" in text, text
     rows = list(csv.DictReader((folder / "split" / "gnss.csv").open()))

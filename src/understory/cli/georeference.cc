@@ -145,7 +145,7 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
       ->capture_default_str();
   command
       .add_option("--tilt-sd-deg", options.tilt_sd_deg,
-                  "How far the run's up may be off gravity, one standard deviation (0.1 for a run "
+                  "How far the run's up may be off gravity, one standard deviation (0.05 for a run "
                   "with an IMU, else 5)")
       ->check(CLI::Range(0.0, 45.0));
   command.add_flag("--plain", options.plain,

@@ -18,7 +18,7 @@ struct ControlPoint {
 
 // How control points are fitted.
 struct ControlFitConfig {
-  double tilt_sd_deg = 0.1;  // how far the run's up may be off, each level axis
+  double tilt_sd_deg = 0.05;  // how far the run's up may be off, each level axis
   // Error of a point in the run and in the survey together, one axis, before the points are looked
   // at; their residuals change it as far as there are more points than unknowns [chosen].
   double sd_m = 0.1;

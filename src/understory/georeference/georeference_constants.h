@@ -70,8 +70,6 @@ inline constexpr double kCauchyWidth = 2.385;
 inline constexpr double kRayleighMedian = 1.1774;
 // Median of an absolute value over the standard deviation [bound: normal distribution]
 inline constexpr double kNormalMedian = 0.6745;
-// A pair is believed to be at most that many times as good or bad as the median [chosen]
-inline constexpr double kMostScale = 4.0;
 // Standard deviations beyond which a pair is a runaway [chosen: slow errors of a few
 // minutes are no outliers]
 inline constexpr double kFarOff = 4.0;

@@ -67,7 +67,7 @@ Pose first_motion(const std::vector<SatellitePair>& pairs, bool robust, bool hei
 }
 
 // What the receiver states of each pair, over the median of all.
-NoisyTimes stated(const std::vector<SatellitePair>& pairs, bool plane) {
+NoisyTimes stated(const std::vector<SatellitePair>& pairs, bool plane, double most_scale) {
   NoisyTimes times;
   std::vector<double> sd;
   for (const SatellitePair& pair : pairs) {
@@ -80,7 +80,7 @@ NoisyTimes stated(const std::vector<SatellitePair>& pairs, bool plane) {
   times.extra_sd_m = VectorXd::Zero(times.scale.size());
   for (std::size_t k = 0; k < sd.size(); ++k)
     times.scale(static_cast<Eigen::Index>(k)) =
-        std::clamp(sd[k] / times.stated_sd_m, 1.0 / kMostScale, kMostScale);
+        std::clamp(sd[k] / times.stated_sd_m, 1.0 / most_scale, most_scale);
   return times;
 }
 
@@ -90,8 +90,8 @@ class Splitter {
       : pairs_(pairs), config_(config) {
     fit_.height_known =
         std::all_of(pairs.begin(), pairs.end(), [](const auto& p) { return p.has_height; });
-    plane_ = stated(pairs, true);
-    height_ = stated(pairs, false);
+    plane_ = stated(pairs, true, config.most_scale);
+    height_ = stated(pairs, false, config.most_scale);
     level_ = first_motion(pairs, config.robust, fit_.height_known);
     fit_.far_off.assign(pairs.size(), 0);
   }
@@ -161,8 +161,8 @@ class Splitter {
     }
     MatrixXd information = MatrixXd::Zero(clock ? 4 : 3, clock ? 4 : 3);
     if (clock) information(3, 3) = std::pow(config_.time_offset_sd_s, -2.0);
-    const NoisyEstimate found = estimate_under_noise(plane_times(), series, information,
-                                                     config_.plane);
+    const NoisyEstimate found =
+        estimate_under_noise(plane_times(), series, information, config_.plane);
     level_ = about(centre, Vector3d(0.0, 0.0, found.mean(0)),
                    Vector3d(found.mean(1), found.mean(2), 0.0)) *
              level_;
@@ -233,9 +233,9 @@ Pose at(const Vector3d& middle) {
 SplitFit fit_split(const std::vector<SatellitePair>& pairs, const SplitFitConfig& config) {
   SplitFit fit;
   if (pairs.size() < kFewestPairs) {
-    fit.reason = fmt::format(
-        "expected fixes of three seconds at least at times of the path: there are {}",
-        pairs.size());
+    fit.reason =
+        fmt::format("expected fixes of three seconds at least at times of the path: there are {}",
+                    pairs.size());
     return fit;
   }
   const double extent_m = plane_extent_m(pairs);

@@ -14,7 +14,10 @@ namespace understory {
 struct SplitFitConfig {
   // How far the run's up may be off gravity, one standard deviation about each level axis. With an
   // IMU a map is level [measured: docs/method/georeference.md].
-  double tilt_sd_deg = 0.1;
+  double tilt_sd_deg = 0.05;
+  // A pair is believed to be at most that many times as good or as bad as the median says: what a
+  // receiver states of a moment tells only a part of its error [tuned: the presets below].
+  double most_scale = 2.0;
   // The same for a run that was mapped without an IMU [chosen: a lidar that is carried by hand].
   double unlevel_tilt_sd_deg = 5.0;
   // How far the receiver's clock may be off beyond what is known; 0 holds it.
@@ -36,7 +39,7 @@ struct SplitFit {
   // east, north and up axes through it (rad), then a shift east, north, up (m).
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   Matrix6d spread = Matrix6d::Zero();
-  bool height_known = false;  // false: no fix has a height, and that of the run is kept
+  bool height_known = false;   // false: no fix has a height, and that of the run is kept
   double time_offset_s = 0.0;  // beyond that of the pairs
   double time_offset_sd_s = 0.0;
   NoisyTimes plane_times;  // as used, with the extra errors of what lies far off
