@@ -1,8 +1,8 @@
 // Many receivers on one path: how far each fit to satellite positions lays a run off its place, and
 // whether the stated covariance holds (docs/method/georeference.md; georeference_table.py).
 //   georeference_table SITE PATH FROM TO [key=value ...]
-// PATH is a run folder that was mapped on the site with the same settings, or drift:N, the true path
-// with the drift of seed N. The receivers have the seeds FROM to TO. Prints one row of CSV a
+// PATH is a run folder that was mapped on the site with the same settings, or drift:N, the true
+// path with the drift of seed N. The receivers have the seeds FROM to TO. Prints one row of CSV a
 // receiver and method.
 #include <cmath>
 #include <cstdio>
@@ -41,11 +41,11 @@ Trajectory drifted_path(const Trajectory& truth, std::uint64_t seed) {
   };
   const Pose first = truth.front().world_from_body;
   const Vector3d heading = first.rotation() * Vector3d::UnitX();
-  const Pose level(Eigen::Quaterniond(Eigen::AngleAxisd(
-                       std::atan2(heading.y(), heading.x()), Vector3d::UnitZ())),
+  const Pose level(Eigen::Quaterniond(
+                       Eigen::AngleAxisd(std::atan2(heading.y(), heading.x()), Vector3d::UnitZ())),
                    first.translation());
-  const Pose world_from_truth = Pose(so3_exp(normal(0.05 * M_PI / 180.0)), Vector3d::Zero()) *
-                                level.inverse();
+  const Pose world_from_truth =
+      Pose(so3_exp(normal(0.05 * M_PI / 180.0)), Vector3d::Zero()) * level.inverse();
   Trajectory path;
   Pose now = world_from_truth * first;
   path.push_back({truth.front().stamp, now});
@@ -110,8 +110,8 @@ struct Judged {
   void print(int seed, const char* method, const Pose& enu_from_world, const GeodeticPlace& origin,
              const Matrix6d& spread, double expected_m) const {
     const OriginConfig& at = world.site.origin;
-    const Vector3d shift = EastNorthUp({at.latitude_deg, at.longitude_deg, at.height_m})
-                               .from_place(origin);
+    const Vector3d shift =
+        EastNorthUp({at.latitude_deg, at.longitude_deg, at.height_m}).from_place(origin);
     const Pose placed(enu_from_world.rotation(), enu_from_world.translation() + shift);
     const Vector3d turn =
         so3_log(placed.rotation() * reference.rotation().conjugate()) * 180.0 / M_PI;
@@ -147,8 +147,7 @@ void lay(const Judged& judged, const std::vector<GnssFix>& fixes, int seed) {
   for (std::size_t k = 0; k < fits.size(); ++k) {
     const SatelliteFit& fit = fits[k];
     if (!fit.found) continue;
-    judged.print(seed, names[k], fit.enu_from_world, *fit.origin, fit.spread,
-                 fit.expected_error_m);
+    judged.print(seed, names[k], fit.enu_from_world, *fit.origin, fit.spread, fit.expected_error_m);
     if (best == nullptr || fit.expected_error_m < best->expected_error_m) best = &fit;
   }
   if (best != nullptr)

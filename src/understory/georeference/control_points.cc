@@ -36,8 +36,7 @@ std::optional<Pose> motion_of_pair(const ControlPoint& a, const ControlPoint& b)
   const Vector2d source = (b.place_in_world - a.place_in_world).head<2>();
   const Vector2d target = (b.place_in_target - a.place_in_target).head<2>();
   if (source.norm() < kLeastApartM || target.norm() < kLeastApartM) return std::nullopt;
-  const double yaw =
-      std::atan2(target.y(), target.x()) - std::atan2(source.y(), source.x());
+  const double yaw = std::atan2(target.y(), target.x()) - std::atan2(source.y(), source.x());
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(yaw, Vector3d::UnitZ()));
   Vector3d shift = 0.5 * (a.place_in_target + b.place_in_target) -
                    turn * (0.5 * (a.place_in_world + b.place_in_world));
@@ -131,18 +130,17 @@ void refine(const std::vector<ControlPoint>& points, const ControlFitConfig& con
     const Eigen::LDLT<Matrix6d> solver(normal.hessian + prior);
     const Vector6d xi = solver.solve(normal.gradient + pull);
     const Pose to(Eigen::Quaterniond::Identity(), middle);
-    fit.target_from_world = to * Pose(so3_exp(xi.head<3>()), xi.tail<3>()) * to.inverse() *
-                            fit.target_from_world;
+    fit.target_from_world =
+        to * Pose(so3_exp(xi.head<3>()), xi.tail<3>()) * to.inverse() * fit.target_from_world;
     tilt += xi.head<3>();
     fit.redundant = normal.coordinates - 4;
-    const ControlNormal after =
-        normal_of(points, fit.used, fit.target_from_world, middle);
+    const ControlNormal after = normal_of(points, fit.used, fit.target_from_world, middle);
     // What is known before counts as much as some coordinates do.
     fit.sd_m = std::sqrt((kPriorCoordinates * config.sd_m * config.sd_m + after.squares) /
                          (kPriorCoordinates + std::max(0, fit.redundant)));
-    fit.covariance = right_from_spread(
-        fit.sd_m * fit.sd_m * Matrix6d(solver.solve(Matrix6d::Identity())), fit.target_from_world,
-        middle);
+    fit.covariance =
+        right_from_spread(fit.sd_m * fit.sd_m * Matrix6d(solver.solve(Matrix6d::Identity())),
+                          fit.target_from_world, middle);
   }
 }
 

@@ -74,8 +74,8 @@ TEST(ControlPoints, TheStatedCovarianceHolds) {
   Vector6d squares = Vector6d::Zero();
   constexpr int kDraws = 150;
   for (int draw = 0; draw < kDraws; ++draw) {
-    const ControlFit fit =
-        fit_control_points(surveyed(6, 0.1, static_cast<std::uint64_t>(100 + draw)), {5.0, 0.1, 2.0});
+    const ControlFit fit = fit_control_points(
+        surveyed(6, 0.1, static_cast<std::uint64_t>(100 + draw)), {5.0, 0.1, 2.0});
     const Vector6d error = right_difference(survey_from_run(), fit.target_from_world);
     squares += error.cwiseAbs2().cwiseQuotient(fit.covariance.diagonal()) / kDraws;
   }

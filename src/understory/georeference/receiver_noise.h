@@ -17,11 +17,11 @@ struct ReceiverNoise {
 // What is believed of a receiver before its fixes are compared with a path: medians, and the
 // standard deviation of the natural logarithm.
 struct ReceiverPriorConfig {
-  double overconfidence = 2.2;      // slow_sd_m over what the receiver states
+  double overconfidence = 2.2;  // slow_sd_m over what the receiver states
   double overconfidence_log = 1.0;
   double correlation_s = 150.0;
   double correlation_log = 0.9;
-  double fast_share = 0.25;         // fast_sd_m over slow_sd_m
+  double fast_share = 0.25;  // fast_sd_m over slow_sd_m
   double fast_share_log = 0.9;
 };
 

@@ -50,8 +50,8 @@ TEST(ReceiverNoise, WhiteningIsTheInverseOfTheCovariance) {
   }
   const ReceiverNoise noise{2.0, 25.0, 0.7};
   const MatrixXd covariance = noise_covariance(times, {{noise}, {1.0}});
-  EXPECT_NEAR(covariance(3, 1),
-              times.scale(3) * times.scale(1) * 4.0 * std::exp(-6.0 / 25.0), 1e-9);
+  EXPECT_NEAR(covariance(3, 1), times.scale(3) * times.scale(1) * 4.0 * std::exp(-6.0 / 25.0),
+              1e-9);
   const MatrixXd expected = columns.transpose() * covariance.ldlt().solve(columns);
   MatrixXd white = columns;
   const double logs = whiten(times, noise, white);
@@ -74,8 +74,8 @@ TEST(ReceiverNoise, TheStatedErrorOfAMeanHoldsOverManyReceivers) {
     noise.correlation_s = 100.0 * std::exp(0.5 * random.normal());
     noise.fast_sd_m = 0.3 * noise.slow_sd_m;
     const VectorXd errors = drawn(times, noise, random);
-    const NoisyEstimate estimate = estimate_under_noise(
-        times, {{errors, MatrixXd::Ones(150, 1)}}, MatrixXd::Zero(1, 1), prior);
+    const NoisyEstimate estimate = estimate_under_noise(times, {{errors, MatrixXd::Ones(150, 1)}},
+                                                        MatrixXd::Zero(1, 1), prior);
     squared += estimate.mean(0) * estimate.mean(0) / estimate.covariance(0, 0) / kReceivers;
     const double variance = (errors.array() - errors.mean()).square().mean() / 150.0;
     naive += errors.mean() * errors.mean() / variance / kReceivers;
@@ -90,8 +90,8 @@ TEST(ReceiverNoise, LearnsHowSlowTheErrorsAre) {
   for (const double correlation_s : {5.0, 80.0}) {
     Random random(7);
     const VectorXd errors = drawn(times, {1.5, correlation_s, 0.1}, random);
-    const NoisyEstimate estimate = estimate_under_noise(
-        times, {{errors, MatrixXd::Ones(400, 1)}}, MatrixXd::Zero(1, 1), {});
+    const NoisyEstimate estimate =
+        estimate_under_noise(times, {{errors, MatrixXd::Ones(400, 1)}}, MatrixXd::Zero(1, 1), {});
     EXPECT_NEAR(std::log(estimate.noise.correlation_s() / correlation_s), 0.0, 0.8);
     EXPECT_NEAR(estimate.noise.slow_sd_m(), 1.5, 0.6);
   }

@@ -31,7 +31,8 @@ struct Step {
 };
 
 // Cauchy's weights of squared Mahalanobis distances; their scale is the median's.
-void weigh(const std::vector<double>& squared, double expected_median, std::vector<double>& weight) {
+void weigh(const std::vector<double>& squared, double expected_median,
+           std::vector<double>& weight) {
   const double scale = std::max(1e-12, upper_median(squared) / expected_median);
   for (std::size_t k = 0; k < squared.size(); ++k)
     weight[k] = 1.0 / (1.0 + squared[k] / (scale * kCauchyWidth * kCauchyWidth));
@@ -49,8 +50,7 @@ RigidFit iterate(const Problem& problem, std::size_t pairs, const Pose& start,
     return fit;
   }
   for (; fit.steps < config.most_steps; ++fit.steps) {
-    if (config.robust)
-      weigh(problem.squared(fit.target_from_source), Problem::kMedian, fit.weight);
+    if (config.robust) weigh(problem.squared(fit.target_from_source), Problem::kMedian, fit.weight);
     const auto step = problem.step(fit.target_from_source, fit.weight);
     const Eigen::LDLT<Matrix6d> solver(step.hessian);
     if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0.0) {

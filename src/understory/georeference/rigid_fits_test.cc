@@ -97,9 +97,9 @@ TEST(RigidFits, TheClosedFormIsHornsQuaternion) {
   for (const PlacePair& pair : pairs)
     s += pair.weight * (pair.source - source / total) * (pair.target - target / total).transpose();
   Eigen::Matrix4d n;
-  n << s.trace(), s(1, 2) - s(2, 1), s(2, 0) - s(0, 2), s(0, 1) - s(1, 0),  //
+  n << s.trace(), s(1, 2) - s(2, 1), s(2, 0) - s(0, 2), s(0, 1) - s(1, 0),     //
       0.0, s(0, 0) - s(1, 1) - s(2, 2), s(0, 1) + s(1, 0), s(2, 0) + s(0, 2),  //
-      0.0, 0.0, s(1, 1) - s(0, 0) - s(2, 2), s(1, 2) + s(2, 1),  //
+      0.0, 0.0, s(1, 1) - s(0, 0) - s(2, 2), s(1, 2) + s(2, 1),                //
       0.0, 0.0, 0.0, s(2, 2) - s(0, 0) - s(1, 1);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(
       Eigen::Matrix4d(n.selfadjointView<Eigen::Upper>()));
@@ -122,7 +122,8 @@ TEST(RigidFits, TheClosedFormIsNoMirror) {
 }
 
 TEST(RigidFits, JacobiansAgreeWithDifferences) {
-  for (const Pose& motion : {Pose(), some_motion(), some_motion() * Pose::exp(Vector6d::Constant(0.4))}) {
+  for (const Pose& motion :
+       {Pose(), some_motion(), some_motion() * Pose::exp(Vector6d::Constant(0.4))}) {
     for (const PlacePair& pair : {places(1.0, 2)[0], places(1.0, 2)[31]}) {
       const auto analytic = place_residual_jacobian(pair, motion);
       for (int axis = 0; axis < 6; ++axis) {
@@ -150,7 +151,8 @@ TEST(RigidFits, JacobiansAgreeWithDifferences) {
 // minimum for the covariances at the solution.
 TEST(RigidFits, PositionsEndAtTheMinimumOfEquation44) {
   const std::vector<PlacePair> pairs = places(0.5, 3);
-  const RigidFit fit = fit_positions(pairs, fit_closed(pairs).target_from_source, {50, 1e-12, false});
+  const RigidFit fit =
+      fit_positions(pairs, fit_closed(pairs).target_from_source, {50, 1e-12, false});
   ASSERT_TRUE(fit.found) << fit.reason;
   const Matrix3d r = fit.target_from_source.rotation_matrix();
   expect_minimum(
@@ -171,15 +173,16 @@ TEST(RigidFits, PositionsEndAtTheMinimumOfEquation44) {
 // the same minimum, and the fit ends there.
 TEST(RigidFits, PosesEndAtTheMinimumOfEquation46InBothConventions) {
   const std::vector<FullPair> pairs = poses(0.01, 6);
-  const RigidFit fit = fit_poses(pairs, some_motion() * Pose::exp(Vector6d::Constant(0.1)),
-                                 {50, 1e-12, false});
+  const RigidFit fit =
+      fit_poses(pairs, some_motion() * Pose::exp(Vector6d::Constant(0.1)), {50, 1e-12, false});
   ASSERT_TRUE(fit.found) << fit.reason;
   EXPECT_LT(turn_between(fit.target_from_source, some_motion()), 0.02);
   expect_minimum(
       [&](const Pose& motion) {
         double sum = 0.0;
         for (const FullPair& pair : pairs) {
-          const Vector6d d = ((motion * pair.source_from_body).inverse() * pair.target_from_body).log();
+          const Vector6d d =
+              ((motion * pair.source_from_body).inverse() * pair.target_from_body).log();
           sum += d.dot((pair.target_covariance + pair.source_covariance).ldlt().solve(d));
         }
         return sum;
@@ -189,8 +192,10 @@ TEST(RigidFits, PosesEndAtTheMinimumOfEquation46InBothConventions) {
       [&](const Pose& motion) {
         double sum = 0.0;
         for (const FullPair& pair : pairs) {
-          const Vector6d d = (pair.target_from_body * (motion * pair.source_from_body).inverse()).log();
-          // Left covariances of both, by the adjoints; that of the moved pose is (47)'s second term.
+          const Vector6d d =
+              (pair.target_from_body * (motion * pair.source_from_body).inverse()).log();
+          // Left covariances of both, by the adjoints; that of the moved pose is (47)'s second
+          // term.
           const Matrix6d at = pair.target_from_body.adjoint();
           const Matrix6d as = motion.adjoint() * pair.source_from_body.adjoint();
           const Matrix6d sum6 = at * pair.target_covariance * at.transpose() +
@@ -212,7 +217,8 @@ TEST(RigidFits, RunawaysHaveLittleSay) {
   const auto error = [&](const RigidFit& fit) {
     double worst = 0.0;
     for (const PlacePair& pair : pairs)
-      worst = std::max(worst, (fit.target_from_source * pair.source - some_motion() * pair.source).norm());
+      worst = std::max(worst,
+                       (fit.target_from_source * pair.source - some_motion() * pair.source).norm());
     return worst;
   };
   EXPECT_LT(error(fit_positions(pairs, start, {})), 0.1);

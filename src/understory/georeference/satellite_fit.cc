@@ -123,8 +123,8 @@ SixFit fit_six(const std::vector<StampedPose>& trajectory,
         (pairs[k].target_covariance + pairs[k].source_covariance).inverse();
     linear.jacobian.push_back(turn * pose_residual_jacobian(pairs[k], six.fit.target_from_source));
     linear.information.push_back(six.fit.weight[k] * turn * information * turn.transpose());
-    attitude += turn * pairs[k].target_covariance * turn.transpose() /
-                static_cast<double>(pairs.size());
+    attitude +=
+        turn * pairs[k].target_covariance * turn.transpose() / static_cast<double>(pairs.size());
   }
   const Gains<6> gains = linear.gains();
   times.scale = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(pairs.size()));
@@ -190,12 +190,12 @@ void tell_residuals(const std::vector<SatellitePair>& pairs, const SplitFit& see
   fit.plane_rms_m = std::sqrt(plane / n);
   fit.height_rms_m = seen.height_known ? std::sqrt(height / n) : std::nan("");
   fit.plane_noise_m = std::hypot(seen.plane_noise.slow_sd_m(), seen.plane_noise.fast_sd_m());
-  fit.height_noise_m = seen.height_known ? std::hypot(seen.height_noise.slow_sd_m(),
-                                                      seen.height_noise.fast_sd_m())
-                                         : std::nan("");
+  fit.height_noise_m =
+      seen.height_known ? std::hypot(seen.height_noise.slow_sd_m(), seen.height_noise.fast_sd_m())
+                        : std::nan("");
   fit.correlation_s = seen.plane_noise.correlation_s();
-  fit.independent_fixes = 2.0 * fit.plane_noise_m * fit.plane_noise_m /
-                          (seen.spread(3, 3) + seen.spread(4, 4));
+  fit.independent_fixes =
+      2.0 * fit.plane_noise_m * fit.plane_noise_m / (seen.spread(3, 3) + seen.spread(4, 4));
   fit.time_offset_s = seen.time_offset_s;
   fit.time_offset_sd_s = seen.time_offset_sd_s;
   fit.height_known = seen.height_known;
@@ -213,17 +213,15 @@ void tell_fixes(const std::vector<StampedPose>& trajectory, const std::vector<Gn
     FittedFix one;
     one.fix = fix;
     const bool has_height = std::isfinite(fix.height_m);
-    one.position_in_enu = frame.from_place(
-        {fix.latitude_deg, fix.longitude_deg, has_height ? fix.height_m : 0.0});
+    one.position_in_enu =
+        frame.from_place({fix.latitude_deg, fix.longitude_deg, has_height ? fix.height_m : 0.0});
     if (!has_height) one.position_in_enu.z() = std::nan("");
-    const auto place =
-        antenna_place(trajectory, config.pairing.antenna_in_body, fix.stamp + shift);
+    const auto place = antenna_place(trajectory, config.pairing.antenna_in_body, fix.stamp + shift);
     if (place) {
       one.residual = one.position_in_enu - fit.enu_from_world * *place;
       const double time_s = to_seconds(fix.stamp - first);
-      auto pair = std::lower_bound(
-          pairs.pairs.begin(), pairs.pairs.end(), time_s,
-          [](const SatellitePair& a, double t) { return a.time_s < t; });
+      auto pair = std::lower_bound(pairs.pairs.begin(), pairs.pairs.end(), time_s,
+                                   [](const SatellitePair& a, double t) { return a.time_s < t; });
       if (pair == pairs.pairs.end() ||
           (pair != pairs.pairs.begin() && time_s - std::prev(pair)->time_s < pair->time_s - time_s))
         --pair;

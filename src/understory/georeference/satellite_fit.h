@@ -69,10 +69,10 @@ struct SatelliteFit {
   std::vector<FittedFix> fixes;  // all of them
 };
 
-// Lays a path on fixes by several methods, a fit each. `smoothed` is for kFit6 only. Not found where no fix is of the path's time,
-// the path spans too little, or the method needs heights and there are none. The covariance is that
-// of the method under errors that are correlated in time, whose size the residuals tell.
-// Deterministic; thread-safe.
+// Lays a path on fixes by several methods, a fit each. `smoothed` is for kFit6 only. Not found
+// where no fix is of the path's time, the path spans too little, or the method needs heights and
+// there are none. The covariance is that of the method under errors that are correlated in time,
+// whose size the residuals tell. Deterministic; thread-safe.
 [[nodiscard]] std::vector<SatelliteFit> fits_to_satellites(
     const std::vector<StampedPose>& trajectory, const std::vector<GnssFix>& fixes,
     const std::vector<SatelliteMethod>& methods, const SatelliteFitConfig& config,

@@ -26,7 +26,8 @@ std::vector<StampedPose> walk() {
   for (int k = 0; k < 1200; ++k) {
     const double t = 0.5 * k;
     const Vector3d place(60.0 * std::sin(0.02 * t), 40.0 * std::sin(0.03 * t), std::sin(0.05 * t));
-    const Eigen::Quaterniond turn = so3_exp({0.05 * std::sin(t), 0.05 * std::cos(0.7 * t), 0.02 * t});
+    const Eigen::Quaterniond turn =
+        so3_exp({0.05 * std::sin(t), 0.05 * std::cos(0.7 * t), 0.02 * t});
     poses.push_back({from_seconds(1000.0 + t), Pose(turn, place)});
   }
   return poses;
@@ -61,7 +62,8 @@ std::vector<GnssFix> received(const std::vector<StampedPose>& poses, const Recei
     fix.longitude_deg = place.longitude_deg;
     fix.height_m = place.height_m;
     fix.covariance = receiver.stated_m * receiver.stated_m *
-                     Vector3d(1.0, 1.0, receiver.height_factor * receiver.height_factor).asDiagonal()
+                     Vector3d(1.0, 1.0, receiver.height_factor * receiver.height_factor)
+                         .asDiagonal()
                          .toDenseMatrix();
     fixes.push_back(fix);
   }
@@ -85,7 +87,8 @@ double rms_error_m(const SatelliteFit& fit, const std::vector<StampedPose>& pose
   double sum = 0.0;
   for (const StampedPose& pose : poses) {
     const Vector3d p = pose.world_from_body.translation();
-    sum += (placed(fit, p) - enu_from_world() * p).squaredNorm() / static_cast<double>(poses.size());
+    sum +=
+        (placed(fit, p) - enu_from_world() * p).squaredNorm() / static_cast<double>(poses.size());
   }
   return std::sqrt(sum);
 }
@@ -124,9 +127,11 @@ TEST(SatelliteFit, CovariancesHoldUnderSlowErrorsThatTheReceiverUnderstates) {
       const Pose truth(enu_from_world().rotation(), enu_from_world().translation() - origin);
       const Pose error = truth * fit.enu_from_world.inverse();
       Vector6d off;
-      off << so3_log(error.rotation()), truth * (fit.enu_from_world.inverse() * fit.middle) - fit.middle;
+      off << so3_log(error.rotation()),
+          truth * (fit.enu_from_world.inverse() * fit.middle) - fit.middle;
       squares += off.cwiseAbs2().cwiseQuotient(fit.spread.diagonal()) / kDraws;
-      squared_errors[static_cast<std::size_t>(m)] += std::pow(rms_error_m(fit, poses), 2.0) / kDraws;
+      squared_errors[static_cast<std::size_t>(m)] +=
+          std::pow(rms_error_m(fit, poses), 2.0) / kDraws;
     }
     for (const int axis : {2, 3, 4, 5}) {
       EXPECT_GT(squares(axis), 0.4) << m << " " << axis;
@@ -165,7 +170,8 @@ TEST(SatelliteFit, ABurstHasLittleSay) {
   EXPECT_TRUE(fit.fixes[100].used);
   SatelliteFitConfig plain = usual();
   plain.split.robust = false;
-  EXPECT_GT(rms_error_m(fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, plain), poses), 1.0);
+  EXPECT_GT(rms_error_m(fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, plain), poses),
+            1.0);
 }
 
 // P4 (45-52): poses of the body that a smoother gave, level to a milliradian, in the fixes' frame.

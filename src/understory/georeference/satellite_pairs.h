@@ -43,8 +43,8 @@ struct SatellitePair {
 struct SatellitePairs {
   std::optional<GeodeticPlace> origin;
   std::vector<SatellitePair> pairs;
-  std::size_t fixes_in_time = 0;   // that have a place of the antenna
-  std::string reason;              // why there are none, for a person
+  std::size_t fixes_in_time = 0;  // that have a place of the antenna
+  std::string reason;             // why there are none, for a person
 };
 
 // Where the antenna was at a time, world frame, linear between poses; nothing outside of the path

@@ -27,7 +27,7 @@ Vector3d gravity_at(double latitude_deg) {
 // A position of the antenna at one state; weights are inverse variances of east, north, up.
 struct AntennaFactor {
   Vector3d place_in_enu = Vector3d::Zero();
-  Vector3d sd_m = Vector3d::Ones();    // of one position by itself
+  Vector3d sd_m = Vector3d::Ones();  // of one position by itself
   Vector3d weight = Vector3d::Zero();
 };
 
@@ -64,8 +64,8 @@ class SatelliteChain {
   void integrate() {
     motions_.clear();
     for (std::size_t k = 0; k < samples_.size(); ++k)
-      motions_.push_back(preintegrate(samples_[k], states_[k].gyro_bias, states_[k].accel_bias,
-                                      config_.imu));
+      motions_.push_back(
+          preintegrate(samples_[k], states_[k].gyro_bias, states_[k].accel_bias, config_.imu));
   }
 
   [[nodiscard]] ChainSystem linearise() const {
@@ -92,8 +92,7 @@ class SatelliteChain {
 
   void add_antenna(std::size_t k, ChainSystem& system) const {
     const Matrix3d r = states_[k].world_from_imu.rotation_matrix();
-    const Vector3d error =
-        states_[k].world_from_imu * arm_in_imu_ - antennas_[k].place_in_enu;
+    const Vector3d error = states_[k].world_from_imu * arm_in_imu_ - antennas_[k].place_in_enu;
     Eigen::Matrix<double, 3, 6> j;
     j << -r * skew(arm_in_imu_), r;
     // Cauchy's weight: runaways have little say.
@@ -119,8 +118,8 @@ class SatelliteChain {
     const double seconds = motions_[k].duration;
     weight << Vector3d::Constant(
         1.0 / (std::pow(config_.imu.gyro_bias_walk_rad_s2_sqrt_hz, 2.0) * seconds)),
-        Vector3d::Constant(
-            1.0 / (std::pow(config_.imu.accel_bias_walk_m_s3_sqrt_hz, 2.0) * seconds));
+        Vector3d::Constant(1.0 /
+                           (std::pow(config_.imu.accel_bias_walk_m_s3_sqrt_hz, 2.0) * seconds));
     Vector6d walk;
     walk << states_[k + 1].gyro_bias - states_[k].gyro_bias,
         states_[k + 1].accel_bias - states_[k].accel_bias;
@@ -149,11 +148,10 @@ class SatelliteChain {
       const Eigen::LDLT<Matrix15d> pivot(system.diagonal[k]);
       const Matrix15d own = pivot.solve(Matrix15d::Identity());
       const Matrix15d gain = own * system.next[k];
-      const Vector15d right = k < last ? Vector15d(system.right[k] - system.next[k] * step)
-                                       : system.right[k];
+      const Vector15d right =
+          k < last ? Vector15d(system.right[k] - system.next[k] * step) : system.right[k];
       step = pivot.solve(right);
-      marginals_[k] =
-          k < last ? Matrix15d(own + gain * marginals_[k + 1] * gain.transpose()) : own;
+      marginals_[k] = k < last ? Matrix15d(own + gain * marginals_[k + 1] * gain.transpose()) : own;
       largest = std::max(largest, step.head<6>().cwiseAbs().maxCoeff());
       states_[k] = retract(states_[k], step);
     }
@@ -246,8 +244,9 @@ std::vector<SmoothedPose> smooth_satellites(const std::vector<StampedPose>& traj
     const Pose placed = start * pose->world_from_body;
     AntennaFactor antenna;
     antenna.place_in_enu =
-        pair.fix_in_enu + start.rotation() * (pose->world_from_body * config.pairing.antenna_in_body -
-                                              pair.antenna_in_world);
+        pair.fix_in_enu +
+        start.rotation() *
+            (pose->world_from_body * config.pairing.antenna_in_body - pair.antenna_in_world);
     // Positions whose errors stay the same for a while count as few independent ones.
     const double repeats = std::max(1.0, 2.0 * config.correlation_s / dt);
     antenna.sd_m = config.overconfidence * pair.covariance.diagonal().cwiseSqrt();

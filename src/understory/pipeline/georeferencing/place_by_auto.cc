@@ -17,14 +17,12 @@ struct TriedMethod {
 };
 
 std::string account_of(const std::vector<TriedMethod>& tried, const TriedMethod& best) {
-  std::string text =
-      fmt::format("auto: {} has the smallest expected error, {:.2f} m", best.name,
-                  best.fit.expected_error_m);
+  std::string text = fmt::format("auto: {} has the smallest expected error, {:.2f} m", best.name,
+                                 best.fit.expected_error_m);
   for (const TriedMethod& other : tried) {
     if (&other == &best) continue;
-    text += other.fit.found
-                ? fmt::format("; {} {:.2f} m", other.name, other.fit.expected_error_m)
-                : fmt::format("; {} cannot be used: {}", other.name, other.fit.reason);
+    text += other.fit.found ? fmt::format("; {} {:.2f} m", other.name, other.fit.expected_error_m)
+                            : fmt::format("; {} cannot be used: {}", other.name, other.fit.reason);
   }
   return text;
 }
@@ -42,8 +40,7 @@ Placement place_by_best(const GeoreferenceRequest& request, const MovableRun& ru
     tried.push_back({names[k], fits[k]});
   const TriedMethod* best = nullptr;
   for (const TriedMethod& one : tried) {
-    if (one.fit.found &&
-        (best == nullptr || one.fit.expected_error_m < best->fit.expected_error_m))
+    if (one.fit.found && (best == nullptr || one.fit.expected_error_m < best->fit.expected_error_m))
       best = &one;
   }
   if (best == nullptr && tried.front().fit.fixes_in_time == 0) {

@@ -69,8 +69,8 @@ Placement place_by_fit6(const GeoreferenceRequest& request, const MovableRun& ru
   SatelliteSmoothingConfig smoothing;
   smoothing.pairing = input.config.pairing;
   smoothing.body_from_imu = data.body_from_imu;
-  const std::vector<SmoothedPose> smoothed = smooth_satellites(
-      run.trajectory, input.fixes, data.samples, start.enu_from_world, smoothing);
+  const std::vector<SmoothedPose> smoothed =
+      smooth_satellites(run.trajectory, input.fixes, data.samples, start.enu_from_world, smoothing);
   if (smoothed.empty())
     throw InputError(name, "", "expected samples of the IMU at the times of the fixes and the run");
   const SatelliteFit fit = fit_to_satellites(run.trajectory, input.fixes, SatelliteMethod::kFit6,

@@ -65,8 +65,7 @@ std::vector<SurveyedRow> read_points(const GeoreferenceRequest& request, const M
     row.has_height = std::isfinite(height);
     const auto place = system.to_place(
         {table.finite("east_m"), table.finite("north_m"), row.has_height ? height : 0.0});
-    if (!place)
-      table.fail("expected east_m and north_m in " + request.coordinate_system);
+    if (!place) table.fail("expected east_m and north_m in " + request.coordinate_system);
     row.place = *place;
     row.place_in_world = place_in_run(table, request, run, row.name);
     rows.push_back(row);
@@ -101,13 +100,15 @@ void tell_points(const std::vector<ControlPoint>& points, const ControlFit& fit,
   placement.figures["points_rms_m"] = std::sqrt(squares / static_cast<double>(used));
   placement.figures["points_error_m"] = fit.sd_m;
   if (!blunders.empty())
-    placement.doubt(fmt::format("{}: control point {} does not agree with the other {} and was "
-                                "left out",
-                                file, blunders, used));
+    placement.doubt(
+        fmt::format("{}: control point {} does not agree with the other {} and was "
+                    "left out",
+                    file, blunders, used));
   if (fit.disagree)
-    placement.doubt(fmt::format("{}: the control points do not agree ({:.2f} m), and fewer than "
-                                "four cannot tell which of them is wrong",
-                                file, std::sqrt(squares / static_cast<double>(used))));
+    placement.doubt(
+        fmt::format("{}: the control points do not agree ({:.2f} m), and fewer than "
+                    "four cannot tell which of them is wrong",
+                    file, std::sqrt(squares / static_cast<double>(used))));
   if (fit.redundant < 1)
     placement.doubt(file + ": nothing checks so few control points: expected three at least");
 }
@@ -143,11 +144,13 @@ Placement place_by_points(const GeoreferenceRequest& request, const MovableRun& 
   tell_placement(run.trajectory, placement);
   const double heading_sd_deg = std::get<double>(placement.figures.at("sd_heading_deg"));
   if (heading_sd_deg > kMostHeadingSdDeg)
-    placement.doubt(fmt::format("the control points are too near to each other: the heading is "
-                                "uncertain by {:.1f} degrees",
-                                heading_sd_deg));
+    placement.doubt(
+        fmt::format("the control points are too near to each other: the heading is "
+                    "uncertain by {:.1f} degrees",
+                    heading_sd_deg));
   placement.summary = fmt::format(
-      "points: {} of {} control points used, {:.2f} m off (root mean square)\nexpected error {:.2f} "
+      "points: {} of {} control points used, {:.2f} m off (root mean square)\nexpected error "
+      "{:.2f} "
       "m over the path; one standard deviation: {}",
       std::get<std::int64_t>(placement.figures.at("points_used")), points.size(),
       std::get<double>(placement.figures.at("points_rms_m")), placement.expected_error_m,

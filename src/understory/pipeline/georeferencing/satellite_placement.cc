@@ -102,7 +102,8 @@ fs::path fixes_file(const GeoreferenceRequest& request) {
 
 double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run) {
   if (request.tilt_sd_deg) return *request.tilt_sd_deg;
-  return is_level(request.run, run) ? SplitFitConfig().tilt_sd_deg : SplitFitConfig().unlevel_tilt_sd_deg;
+  return is_level(request.run, run) ? SplitFitConfig().tilt_sd_deg
+                                    : SplitFitConfig().unlevel_tilt_sd_deg;
 }
 
 SatelliteInput read_satellite_input(const GeoreferenceRequest& request, const MovableRun& run,

@@ -32,8 +32,8 @@ struct SolutionFormat {
 };
 
 // Days since 1970 from which GPS time is ahead of UTC by one second more than before; 1981 to 2017.
-constexpr std::array<int, 18> kLeapDays{4'199,  4'564,  4'929,  5'660,  6'574, 7'305,
-                                        7'670,  8'217,  8'582,  8'947,  9'496, 10'043,
+constexpr std::array<int, 18> kLeapDays{4'199,  4'564,  4'929,  5'660,  6'574,  7'305,
+                                        7'670,  8'217,  8'582,  8'947,  9'496,  10'043,
                                         10'592, 13'149, 14'245, 15'522, 16'617, 17'167};
 
 TimeNs utc_from_gps(TimeNs gps) {
@@ -112,9 +112,7 @@ void set_from_earth_centred(double x, double y, double z, GnssFix& fix) {
 
 // Variances and signed roots of covariances: north, east, up, north-east, east-up, up-north.
 Eigen::Matrix3d covariance_of(const std::vector<double>& sd, std::size_t first) {
-  const auto covariance = [&](std::size_t k) {
-    return sd[first + k] * std::abs(sd[first + k]);
-  };
+  const auto covariance = [&](std::size_t k) { return sd[first + k] * std::abs(sd[first + k]); };
   Eigen::Matrix3d c;
   c(0, 0) = covariance(1);
   c(1, 1) = covariance(0);
@@ -212,8 +210,8 @@ bool is_rtklib_solution(const std::string& file) {
   std::string line(2 * kLongestLine, '\0');
   stream.read(line.data(), static_cast<std::streamsize>(line.size()));
   line.resize(static_cast<std::size_t>(stream.gcount()));
-  return line.starts_with('%') && (line.find("RTKLIB") != std::string::npos ||
-                                   line.find("latitude(") != std::string::npos);
+  return line.starts_with('%') &&
+         (line.find("RTKLIB") != std::string::npos || line.find("latitude(") != std::string::npos);
 }
 
 }  // namespace understory

@@ -24,9 +24,10 @@ std::vector<GnssFix> read(const std::string& text, Log& log) {
 
 TEST(Rtklib, ReadsPositionsWithTheirCovariances) {
   Log log;
-  const auto fixes = read(kHeader + "2019/08/10 08:30:00.250   61.201234567   25.101234567   "
-                                    "160.1234   2   9   0.5000   0.4000   1.2000  -0.3000   "
-                                    "0.2000  -0.1000   0.50    1.4\n",
+  const auto fixes = read(kHeader +
+                              "2019/08/10 08:30:00.250   61.201234567   25.101234567   "
+                              "160.1234   2   9   0.5000   0.4000   1.2000  -0.3000   "
+                              "0.2000  -0.1000   0.50    1.4\n",
                           log);
   ASSERT_EQ(fixes.size(), 1U);
   // GPS time is 18 s ahead of UTC in 2019; 2019-08-10 is day 18118.
@@ -46,20 +47,23 @@ TEST(Rtklib, ReadsPositionsWithTheirCovariances) {
 // One place in each way of writing it.
 TEST(Rtklib, ReadsEveryWayOfWritingPlacesAndTimes) {
   Log log;
-  const auto plain =
-      read(kHeader + "2019/08/10,08:30:18.000,61.5,-25.25,100.0,1,9\n", log);
-  const auto week = read("%  GPST latitude(deg) longitude(deg) height(m)\n"
-                         "2065 549018.000 61.5 -25.25 100.0 1 9\n",
-                         log);
-  const auto minutes = read("%  UTC latitude(d'\") longitude(d'\") height(m)\n"
-                            "2019/08/10 08:30:00.000 61 30 00.0 -25 15 00.0 100.0 1 9\n",
-                            log);
-  const auto japan = read("%  JST latitude(deg) longitude(deg) height(m)\n"
-                          "2019/08/10 17:30:00.000 61.5 -25.25 100.0 1 9\n",
-                          log);
-  const auto centred = read("%  UTC x-ecef(m) y-ecef(m) z-ecef(m)\n"
-                            "2019/08/10 08:30:00.000 2759790.8939 -1301601.8870 5582229.4743 1 9\n",
-                            log);
+  const auto plain = read(kHeader + "2019/08/10,08:30:18.000,61.5,-25.25,100.0,1,9\n", log);
+  const auto week = read(
+      "%  GPST latitude(deg) longitude(deg) height(m)\n"
+      "2065 549018.000 61.5 -25.25 100.0 1 9\n",
+      log);
+  const auto minutes = read(
+      "%  UTC latitude(d'\") longitude(d'\") height(m)\n"
+      "2019/08/10 08:30:00.000 61 30 00.0 -25 15 00.0 100.0 1 9\n",
+      log);
+  const auto japan = read(
+      "%  JST latitude(deg) longitude(deg) height(m)\n"
+      "2019/08/10 17:30:00.000 61.5 -25.25 100.0 1 9\n",
+      log);
+  const auto centred = read(
+      "%  UTC x-ecef(m) y-ecef(m) z-ecef(m)\n"
+      "2019/08/10 08:30:00.000 2759790.8939 -1301601.8870 5582229.4743 1 9\n",
+      log);
   for (const auto* one : {&week, &minutes, &japan, &centred}) {
     ASSERT_EQ(one->size(), 1U);
     EXPECT_EQ(one->front().stamp, plain.front().stamp);
