@@ -35,6 +35,7 @@ struct GeoreferenceOptions {
   std::string tree_map_system;
   std::vector<double> near;
   double radius_m = 200.0;
+  bool geoid = false;
 };
 
 void check_trees(const GeoreferenceOptions& options, std::vector<std::string>& problems) {
@@ -100,11 +101,12 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
   request.time_offset_s = options.time_offset_s;
   request.time_offset_sd_s = options.time_offset_sd_s;
   if (options.tilt_sd_deg >= 0.0) request.tilt_sd_deg = options.tilt_sd_deg;
-  request.coordinate_system = options.coordinate_system;
   request.tree_map = options.tree_map;
   request.tree_map_system = options.tree_map_system;
   request.near_radius_m = options.radius_m;
   if (!options.near.empty()) request.near = Eigen::Vector2d(options.near[0], options.near[1]);
+  request.layers.coordinate_system = options.coordinate_system;
+  if (options.geoid) request.layers.heights = HeightWish::kGeoid;
   for (const PlacementMethod& method : placement_methods())
     if (options.method == method.name) request.method = method.method;
   if (!options.antenna_m.empty())
@@ -220,8 +222,12 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
   add_terrain_options(*command, *options);
   add_tree_options(*command, *options);
   command->add_option("--crs", options->coordinate_system,
-                      "Coordinate system of trees.gpkg, for instance EPSG:3067 (the UTM zone if "
-                      "not given)");
+                      "Coordinate system of map.laz, rasters and trees.gpkg, EPSG:3067 or WKT "
+                      "(if not given that of the run, else ETRS-TM35FIN in Finland, else the UTM "
+                      "zone)");
+  command->add_flag("--geoid", options->geoid,
+                    "Heights of these layers above the geoid, where PROJ has its grid (above the "
+                    "ellipsoid if not given)");
   command->add_flag("--overwrite", options->overwrite, kOverwriteMeaning);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->footer(

@@ -61,10 +61,13 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_option("--config", options->request.config_file, "YAML file with settings");
   command->add_option("--set", options->settings, "key=value, may be repeated");
   add_cloud_frame_options(*command, options->request.frame);
+  command->add_option("--crs", options->request.coordinate_system,
+                      "Coordinate system of a cloud that names none, for instance EPSG:3067 (a "
+                      "cloud that names its own keeps it)");
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
   command->add_flag("--overwrite", options->request.overwrite, kOverwriteMeaning);
   command->footer(
-      "Writes trees.csv, trees.gpkg, dtm.tif, chm.tif, report.html and run.json.\n"
+      "Writes trees.csv, trees.gpkg, dtm.tif, chm.tif, map.qgs, report.html and run.json.\n"
       "Example:\n  understory inventory plot.laz -o plot-inventory");
   command->callback([options, &chosen] {
     chosen = [options](CommandContext& context) { return run(*options, context); };

@@ -23,6 +23,7 @@ struct MapOptions {
   std::string profile;
   std::string config_file;
   std::vector<std::string> settings;
+  std::string coordinate_system;
   std::string front_end = kDenseFrontEnd;
   bool realtime = false;
   bool overwrite = false;
@@ -85,8 +86,11 @@ int run_map(const MapOptions& options, CommandContext& context) {
   if (!options.resume.empty())
     return with_advice(options.resume, [&] { return run(reopen_mapping(options.resume)); });
   refuse_cloud(options.recording);
+  std::vector<std::string> settings = options.settings;
+  if (!options.coordinate_system.empty())
+    settings.push_back("georeference.crs=" + options.coordinate_system);
   ReadConfig<FrontEndConfig> read = read_front_end_config(
-      options.front_end, options.profile, options.config_file, options.settings, context.log);
+      options.front_end, options.profile, options.config_file, settings, context.log);
   if (options.print_config) return print_config(options, read, context);
   if (options.recording.empty() || options.run_folder.empty()) {
     throw ConfigError({"understory map needs a RECORDING and -o RUN (or --resume RUN)"});
@@ -125,6 +129,10 @@ void add_map_command(CLI::App& app, Command& chosen) {
       ->add_option("--front-end", options->front_end,
                    "How scans are positioned: all points (dense) or stems alone (sparse)")
       ->check(CLI::IsMember({kDenseFrontEnd, kSparseFrontEnd}));
+  command->add_option("--crs", options->coordinate_system,
+                      "Coordinate system of map.laz, rasters and trees.gpkg where the recording "
+                      "has GNSS: EPSG:3067 or WKT (if not given ETRS-TM35FIN in Finland, else the "
+                      "UTM zone)");
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "
                     "(time_repair.window_s is 0, of stems also stems.pace.longest_gap_s)");

@@ -228,5 +228,13 @@ inline constexpr double kThickestM = 2.0;
 // Parts of the source that are tried [bound: time]
 inline constexpr std::size_t kParts = 3;
 }  // namespace tree_match
+namespace layer_frame {  // georeference/layer_frame.cc
+// m: nodes of the grid that points are interpolated in. The level plane leaves the ellipsoid by
+// the square of the distance over twice the radius of the earth: 0.04 mm in the middle of a cell
+// [bound: geometry]
+inline constexpr double kGridM = 32.0;
+// cells from the origin: farther points go through PROJ one by one [bound: 32 bits]
+inline constexpr double kMostCells = 1e6;
+}  // namespace layer_frame
 
 }  // namespace understory::georeference_constants

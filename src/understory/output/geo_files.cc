@@ -54,8 +54,8 @@ void close(GDALDatasetUniquePtr dataset, const std::filesystem::path& path) {
 void set_system(OGRSpatialReference& system, const std::string& wkt) {
   system.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
   if (wkt.empty()) {
-    system.SetLocalCS("local metric frame, z up");
-    system.SetLinearUnits(SRS_UL_METER, 1.0);
+    // By this name GDAL knows srs_id -1; 0 would be undefined degrees.
+    system.SetLocalCS("Undefined Cartesian SRS");
   } else if (system.SetFromUserInput(wkt.c_str()) != OGRERR_NONE) {
     throw InternalError("not a coordinate system: " + wkt);
   }
@@ -74,7 +74,7 @@ void set_field(OGRFeature& feature, const TreeColumn& column, const Tree& tree) 
 }  // namespace
 
 void write_geotiff(const std::filesystem::path& path, const Raster& raster,
-                   const std::string& crs_wkt) {
+                   const std::string& crs_wkt, const std::string& meaning) {
   UNDERSTORY_CHECK(!raster.empty());
   const QuietGdal quiet;
   char** options = CSLSetNameValue(nullptr, "COMPRESS", "DEFLATE");
@@ -94,6 +94,7 @@ void write_geotiff(const std::filesystem::path& path, const Raster& raster,
   GDALRasterBand* band = dataset->GetRasterBand(1);
   band->SetNoDataValue(kNoData);
   band->SetUnitType("metre");
+  if (!meaning.empty()) band->SetDescription(meaning.c_str());
   std::vector<float> line(static_cast<std::size_t>(raster.columns));
   for (int row = 0; row < raster.rows; ++row) {
     const int from = raster.rows - 1 - row;  // a TIFF starts in the north
@@ -111,8 +112,55 @@ void write_geotiff(const std::filesystem::path& path, const Raster& raster,
   close(std::move(dataset), path);
 }
 
+namespace {
+
+// A layer of the package with its description.
+OGRLayer* add_layer(GDALDataset& dataset, const char* name, OGRwkbGeometryType type,
+                    const std::string& crs_wkt, const std::string& description,
+                    const std::filesystem::path& path) {
+  OGRSpatialReference system;
+  set_system(system, crs_wkt);
+  char** options = CSLSetNameValue(nullptr, "DESCRIPTION", description.c_str());
+  OGRLayer* layer = dataset.CreateLayer(name, &system, type, options);
+  CSLDestroy(options);
+  if (layer == nullptr) fail(path);
+  return layer;
+}
+
+void add_field(OGRLayer& layer, const char* name, bool whole, const std::filesystem::path& path) {
+  OGRFieldDefn field(name, whole ? OFTInteger : OFTReal);
+  if (layer.CreateField(&field) != OGRERR_NONE) fail(path);
+}
+
+void add_trees(OGRLayer& layer, const std::vector<Tree>& trees, const std::filesystem::path& path) {
+  for (const Tree& tree : trees) {
+    const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer.GetLayerDefn()));
+    for (const TreeColumn& column : kTreeColumns) {
+      if (!column.place) set_field(*feature, column, tree);
+    }
+    OGRPoint point(tree.x, tree.y, tree.z);
+    feature->SetGeometry(&point);
+    if (layer.CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
+  }
+}
+
+void add_line(OGRLayer& layer, const PathLine& line, const std::filesystem::path& path) {
+  const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer.GetLayerDefn()));
+  feature->SetField("begin_s", line.begin_s);
+  feature->SetField("end_s", line.end_s);
+  feature->SetField("length_m", line.length_m);
+  OGRLineString drawn;
+  for (const Eigen::Vector3d& point : line.points)
+    drawn.addPoint(point.x(), point.y(), point.z());
+  feature->SetGeometry(&drawn);
+  if (layer.CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
+}
+
+}  // namespace
+
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
-                      const std::string& crs_wkt) {
+                      const std::string& crs_wkt, const PathLine& line,
+                      const std::string& heights) {
   const QuietGdal quiet;
   // The same rows give the same bytes: without this the file holds the time of writing.
   CPLSetThreadLocalConfigOption("OGR_CURRENT_DATE", "2000-01-01T00:00:00.000Z");
@@ -121,27 +169,23 @@ void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>
   GDALDatasetUniquePtr dataset(
       driver("GPKG")->Create(part_path(path).c_str(), 0, 0, 0, GDT_Unknown, nullptr));
   if (dataset == nullptr) fail(path);
-  OGRSpatialReference system;
-  set_system(system, crs_wkt);
-  OGRLayer* layer =
-      dataset->CreateLayer("trees", crs_wkt.empty() ? nullptr : &system, wkbPoint25D, nullptr);
-  if (layer == nullptr) fail(path);
+  const std::string above = heights.empty() ? "" : "; heights are " + heights;
+  OGRLayer* layer = add_layer(*dataset, "trees", wkbPoint25D, crs_wkt,
+                              "trees where the stem meets the ground" + above, path);
   for (const TreeColumn& column : kTreeColumns) {
-    if (column.place) continue;
-    const bool whole = std::holds_alternative<int Tree::*>(column.member);
-    OGRFieldDefn field(column.name, whole ? OFTInteger : OFTReal);
-    if (layer->CreateField(&field) != OGRERR_NONE) fail(path);
+    if (!column.place)
+      add_field(*layer, column.name, std::holds_alternative<int Tree::*>(column.member), path);
+  }
+  OGRLayer* drawn = nullptr;
+  if (line.points.size() > 1) {
+    drawn =
+        add_layer(*dataset, "path", wkbLineString25D, crs_wkt, "path of the scanner" + above, path);
+    for (const char* name : {"begin_s", "end_s", "length_m"})
+      add_field(*drawn, name, false, path);
   }
   dataset->StartTransaction();
-  for (const Tree& tree : trees) {
-    const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer->GetLayerDefn()));
-    for (const TreeColumn& column : kTreeColumns) {
-      if (!column.place) set_field(*feature, column, tree);
-    }
-    OGRPoint point(tree.x, tree.y, tree.z);
-    feature->SetGeometry(&point);
-    if (layer->CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
-  }
+  add_trees(*layer, trees, path);
+  if (drawn != nullptr) add_line(*drawn, line, path);
   if (dataset->CommitTransaction() != OGRERR_NONE) fail(path);
   close(std::move(dataset), path);
 }

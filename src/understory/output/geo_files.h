@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -10,12 +11,23 @@
 namespace understory {
 
 // GeoTIFF, float32, deflate, NaN as no-data. `crs_wkt` is WKT or
-// "EPSG:25832"; empty: local coordinates, no system.
+// "EPSG:25832"; empty: local coordinates, no system. `meaning` is the description of its band.
 void write_geotiff(const std::filesystem::path& path, const Raster& raster,
-                   const std::string& crs_wkt);
+                   const std::string& crs_wkt, const std::string& meaning = "");
 
-// GeoPackage with one layer `trees` of points (x, y, z = ground) and the columns of trees.csv.
+// The path of the scanner as a line on a map.
+struct PathLine {
+  std::vector<Eigen::Vector3d> points;  // frame of the layer; fewer than two: no line
+  double begin_s = 0.0;                 // times as in trajectory.tum
+  double end_s = 0.0;
+  double length_m = 0.0;
+};
+
+// GeoPackage with the layer `trees` of points (x, y, z = ground) and the columns of trees.csv, and
+// where there is a path with the layer `path`. Without a system the layers have srs_id -1
+// (undefined Cartesian), which QGIS takes for metres. `heights` says what z is above.
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
-                      const std::string& crs_wkt);
+                      const std::string& crs_wkt, const PathLine& line = {},
+                      const std::string& heights = "");
 
 }  // namespace understory

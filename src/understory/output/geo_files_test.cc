@@ -122,6 +122,12 @@ TEST_F(GeoFilesTest, TreesHaveAllColumns) {
   const auto dataset = open("trees.gpkg", GDAL_OF_VECTOR);
   OGRLayer* layer = dataset->GetLayerByName("trees");
   ASSERT_NE(layer, nullptr);
+  EXPECT_EQ(dataset->GetLayerCount(), 1);  // no path was given
+  // Undefined Cartesian, which QGIS takes for metres; srs_id 0 would be undefined degrees.
+  OGRLayer* contents = dataset->ExecuteSQL("SELECT srs_id FROM gpkg_contents", nullptr, nullptr);
+  ASSERT_NE(contents, nullptr);
+  EXPECT_EQ(OGRFeatureUniquePtr(contents->GetNextFeature())->GetFieldAsInteger(0), -1);
+  dataset->ReleaseResultSet(contents);
   EXPECT_EQ(layer->GetFeatureCount(), 2);
   const OGRFeatureUniquePtr first(layer->GetNextFeature());
   const OGRFeatureUniquePtr second(layer->GetNextFeature());

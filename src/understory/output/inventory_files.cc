@@ -1,6 +1,7 @@
 #include "understory/output/inventory_files.h"
 
 #include "understory/output/geo_files.h"
+#include "understory/output/layer_files.h"
 #include "understory/output/run_tables.h"
 
 namespace understory {
@@ -15,10 +16,20 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
   if (!inventory.canopy.empty()) write_geotiff(folder / "chm.tif", inventory.canopy, crs);
 }
 
+void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
+                           const LayerFrame& layers) {
+  write_trees_csv(folder / "trees.csv", inventory.trees);
+  write_tree_layers(folder, inventory.trees, {}, layers);
+  write_raster_layers(folder, inventory.ground.terrain, inventory.canopy, change_into(layers),
+                      layers);
+}
+
 void add_to_picture(MapPicture& picture, std::span<const Eigen::Vector3d> points,
-                    const GroundModel& ground) {
-  for (const Eigen::Vector3d& point : points)
-    picture.add(point.x(), point.y(), point.z(), ground.height_above(point));
+                    const GroundModel& ground, const LayerFrame& drawing) {
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d at = drawing.from_world(point);
+    picture.add(at.x(), at.y(), at.z(), ground.height_above(point));
+  }
 }
 
 }  // namespace understory

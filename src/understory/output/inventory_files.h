@@ -5,17 +5,23 @@
 #include <string>
 
 #include "understory/forest/inventory.h"
+#include "understory/georeference/layer_frame.h"
 #include "understory/output/map_picture.h"
 
 namespace understory {
 
 // Writes trees.csv, trees.gpkg, dtm.tif and chm.tif into `folder` (the rasters only where there is
-// one). `crs` is WKT or "EPSG:25832", empty for a local frame. Throws OutputError.
+// one). The inventory is in the world frame of `layers`; trees.csv stays in it. Throws OutputError.
+void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
+                           const LayerFrame& layers);
+// The same of a cloud that is in the coordinate system `crs` ("EPSG:25832" or WKT) already; empty
+// for a local frame.
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const std::string& crs);
 
-// Adds a block of a cloud to the picture of the map.
+// Adds a block of a cloud (world frame) to the picture of the map, in the frame that it is drawn
+// in.
 void add_to_picture(MapPicture& picture, std::span<const Eigen::Vector3d> points,
-                    const GroundModel& ground);
+                    const GroundModel& ground, const LayerFrame& drawing);
 
 }  // namespace understory

@@ -43,11 +43,21 @@ TEST_F(InventoryFilesTest, WhereNothingWasSeenThereIsAnEmptyListAndNoRaster) {
   EXPECT_EQ(names(), (std::set<std::string>{"trees.csv", "trees.gpkg"}));
 }
 
+// The list stays in the frame of the run, the layers lie in the system.
+TEST_F(InventoryFilesTest, OfARunOnTheGlobeTheLayersAreInItsSystem) {
+  const LayerFrame layers(Pose(), {61.2, 24.7, 150.0}, "EPSG:3067");
+  write_inventory_files(folder_.path(), plot(), layers);
+  CsvReader trees(folder_ / "trees.csv");
+  ASSERT_TRUE(trees.next());
+  EXPECT_EQ(trees.number("x"), 0.0);
+  EXPECT_EQ(names(), (std::set<std::string>{"trees.csv", "trees.gpkg", "dtm.tif", "chm.tif"}));
+}
+
 TEST_F(InventoryFilesTest, ThePictureTellsGroundFromVegetationByTheTerrain) {
   InventoryResult inventory = plot();
   MapPicture picture(0.5);
   const std::vector<Eigen::Vector3d> points = {{0.25, 0.25, 1.0}, {1.25, 1.25, 9.0}};
-  add_to_picture(picture, points, inventory.ground);
+  add_to_picture(picture, points, inventory.ground, LayerFrame());
   MapPicture expected(0.5);
   expected.add(0.25, 0.25, 1.0, 0.0);
   expected.add(1.25, 1.25, 9.0, 8.0);

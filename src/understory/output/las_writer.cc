@@ -89,7 +89,9 @@ struct LasWriter::Impl {
     header->offset_to_point_data = 375;
     header->point_data_format = 6;
     header->point_data_record_length = 30;
-    header->x_scale_factor = header->y_scale_factor = header->z_scale_factor = options.scale_m;
+    header->x_scale_factor = options.scale.x();
+    header->y_scale_factor = options.scale.y();
+    header->z_scale_factor = options.scale.z();
     header->x_offset = options.offset.x();
     header->y_offset = options.offset.y();
     header->z_offset = options.offset.z();
@@ -104,15 +106,16 @@ struct LasWriter::Impl {
         "OGC coordinate system WKT", reinterpret_cast<const laszip_U8*>(options.crs_wkt.c_str())));
   }
 
-  [[nodiscard]] laszip_I32 scaled(double value, double offset, double& stored) const {
-    const double steps = std::round((value - offset) / options.scale_m);
+  [[nodiscard]] laszip_I32 scaled(double value, int axis) const {
+    const double offset = options.offset[axis];
+    const double scale = options.scale[axis];
+    const double steps = std::round((value - offset) / scale);
     if (!(std::abs(steps) < 2147483647.0)) {
       throw OutputError(path.string(),
                         fmt::format("coordinate {} m does not fit: expected one within {:.0f} km "
                                     "of the offset {} m",
-                                    value, 2147483.647 * options.scale_m, offset));
+                                    value, 2147483.647 * scale, offset));
     }
-    stored = steps * options.scale_m + offset;
     return static_cast<laszip_I32>(steps);
   }
 };
@@ -144,10 +147,9 @@ std::uint64_t LasWriter::points() const {
 void LasWriter::add(const LasRecord& point) {
   Impl& self = *impl_;
   laszip_point& out = *self.point;
-  double stored = 0.0;
-  out.X = self.scaled(point.x, self.options.offset.x(), stored);
-  out.Y = self.scaled(point.y, self.options.offset.y(), stored);
-  out.Z = self.scaled(point.z, self.options.offset.z(), stored);
+  out.X = self.scaled(point.x, 0);
+  out.Y = self.scaled(point.y, 1);
+  out.Z = self.scaled(point.z, 2);
   out.gps_time = las_time(point.stamp);
   out.intensity = point.intensity;
   out.return_number = 1;

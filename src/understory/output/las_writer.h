@@ -23,9 +23,10 @@ struct LasRecord {
 // How points are written to LAS and LAZ.
 struct LasOptions {
   // Written into the header; choose a round number of metres near the data. Coordinates further
-  // than 2,147 km from it do not fit and are an OutputError.
+  // than 2,147 million steps of `scale` from it (2,147 km) do not fit and are an OutputError.
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
-  double scale_m = 0.001;
+  // Step of the stored coordinates, in the units of the coordinate system.
+  Eigen::Vector3d scale = Eigen::Vector3d::Constant(0.001);
   std::string crs_wkt;  // OGC WKT of the coordinate system; empty = local frame, none written
   // Stamps are written as adjusted standard GPS time if they are of this century (Unix time), else
   // as seconds as they are.

@@ -20,6 +20,7 @@ std::string report_html(const ReportInput& input, const std::vector<std::string>
   html += verdict_section(input);
   html += figures_section(input);
   html += map_section(input);
+  html += place_section(input);
   html += distrust_section(input);
   html += stand_section(input);
   html += files_section(files);

@@ -10,6 +10,7 @@
 
 #include "understory/forest/inventory.h"
 #include "understory/forest/trees/tree_fall.h"
+#include "understory/georeference/layer_frame.h"
 #include "understory/output/map_picture.h"
 #include "understory/output/run_summary.h"
 #include "understory/util/time.h"
@@ -118,7 +119,15 @@ struct ReportInput {
   std::optional<ReportCorrection> correction;
   std::optional<ReportTruth> truth;
   std::vector<std::string> remarks;  // what to distrust in results of this kind
-  bool north_is_up = false;          // only where the world frame is east-north-up
+  bool north_is_up = false;          // the frame that the map is drawn in has its north up
+  // The frame that the map is drawn in, and `picture` with it; null: the world frame.
+  const LayerFrame* drawing = nullptr;  // not owned
+  bool has_fixes = false;               // of a GNSS receiver
+  // Of a run that was moved: how its scans were matched stands in its own report.
+  bool moved = false;
+  // Of `trees` without an inventory: they come from a cloud, so that heights are measured.
+  bool trees_of_cloud = false;
+  double area_m2 = 0.0;  // squares with points, of these trees; 0: unknown
 };
 
 // One self-contained page: no network, no scripts needed to read it (one small script sorts the

@@ -16,9 +16,11 @@ struct ResultFile {
 };
 
 // In the order in which a user wants them; docs/reference/outputs.md has their columns.
-constexpr std::array<ResultFile, 20> kResultFiles = {
+constexpr std::array<ResultFile, 21> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
-     {"trees.gpkg", "the same trees as points on a map", "QGIS: drag the file into the window"},
+     {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
+     {"trees.gpkg", "the same trees as points on a map, and the path",
+      "QGIS: drag the file into the window"},
      {"felled.csv", "trees that were felled meanwhile", "a spreadsheet"},
      {"map.laz", "all points; ground and vegetation have classes of their own",
       "CloudCompare, QGIS"},

@@ -47,7 +47,7 @@ std::string adapted_table(const std::vector<ConfigAdaptation>& changes) {
 
 // What a kind of warning means for the result, by the beginning of its key.
 std::string consequence_of(const std::string& key) {
-  constexpr std::array<std::pair<const char*, const char*>, 21> kMeanings = {
+  constexpr std::array<std::pair<const char*, const char*>, 23> kMeanings = {
       {{"recording.damaged", "That part of the recording is missing from the map."},
        {"recording.truncated", "What was scanned later is missing from the map."},
        {"recording.unfinished", "Nothing is known to be missing."},
@@ -68,7 +68,9 @@ std::string consequence_of(const std::string& key) {
        {"points.no_return", "Nothing is wrong with the result."},
        {"time.gap_lidar", "The path over such a gap is predicted, not measured."},
        {"time", "Stamps were mended; if they were wrong by more, the map is smeared."},
+       {"gnss.not_placed", "The layers are in a local frame, without a coordinate system."},
        {"gnss", "Satellite positions were not used there."},
+       {"georeference", "Look at the layers over a known map before you use them."},
        {"loop", "Places seen twice may not lie exactly on each other."},
        {"match", "Positions there are less certain; see where the path is marked as weak."},
        {"recording.assumed_rate", "Times were assumed; speeds and deskewing depend on them."}}};
@@ -99,18 +101,18 @@ class Tiles {
   std::string meanings_;
 };
 
-void add_stand(Tiles& tiles, const InventoryResult& inventory) {
-  tiles.add(count_text(inventory.trees.size()), "trees with a measured stem",
+void add_stand(Tiles& tiles, const std::vector<Tree>& trees, double area_m2) {
+  tiles.add(count_text(trees.size()), "trees with a measured stem",
             "Trees whose stem shows its surface at several heights around 1.3 m. A tree without a "
             "visible stem is not counted.");
-  const double hectares = inventory.area_m2 / 1e4;
+  const double hectares = area_m2 / 1e4;
   double dbh = 0.0;
   double basal = 0.0;
-  for (const Tree& tree : inventory.trees) {
+  for (const Tree& tree : trees) {
     dbh += tree.dbh_m;
     basal += 0.25 * M_PI * tree.dbh_m * tree.dbh_m;
   }
-  const auto n = static_cast<double>(inventory.trees.size());
+  const auto n = static_cast<double>(trees.size());
   if (hectares > 0.0) {
     tiles.add(
         fmt::format("{:.2f} ha", hectares), "area with points (not a plot's border)",
@@ -208,7 +210,9 @@ std::string verdict_section(const ReportInput& input) {
 std::string figures_section(const ReportInput& input) {
   Tiles tiles;
   if (input.inventory != nullptr) {
-    add_stand(tiles, *input.inventory);
+    add_stand(tiles, input.inventory->trees, input.inventory->area_m2);
+  } else if (input.trees != nullptr && input.trees_of_cloud) {
+    add_stand(tiles, *input.trees, input.area_m2);
   } else if (input.trees != nullptr) {
     tiles.add(count_text(input.trees->size()), "trees",
               "Trees whose stem was seen in many of the scans that could see it.");
@@ -220,6 +224,33 @@ std::string figures_section(const ReportInput& input) {
   add_run(tiles, input);
   return tiles.html();
 }
+
+namespace {
+
+// What the place on the globe rests on, in one item of the list. `add` takes what and meaning.
+template <typename Add>
+void add_place(const ReportInput& input, const Add& add) {
+  const std::optional<RunPlace>& place = input.summary.place;
+  if (place && place->on_globe) {
+    if (!std::isfinite(place->heading_sd_deg)) return;
+    constexpr double kAtM = 50.0;
+    add(fmt::format("The heading of the map on the globe is known to {:.1f}° (one standard "
+                    "deviation).",
+                    place->heading_sd_deg),
+        fmt::format("{:.0f} m from the middle of the path that is {:.1f} m on the ground.", kAtM,
+                    kAtM * std::tan(place->heading_sd_deg * M_PI / 180.0)));
+    return;
+  }
+  if (!input.summary.crs_wkt.empty() || input.north_is_up) return;
+  add(input.has_fixes
+          ? "The map is in a local frame, though the recording has satellite positions: see "
+            "“Where it is”."
+          : "The map is in a local frame: without satellite positions its heading and place on the "
+            "earth are arbitrary.",
+      input.remarks.empty() ? "Distances and heights within it hold." : "");
+}
+
+}  // namespace
 
 std::string distrust_section(const ReportInput& input) {
   std::string items;
@@ -238,11 +269,7 @@ std::string distrust_section(const ReportInput& input) {
   if (!input.scans.empty() && !input.loop_closure_enabled) {
     add("Loop closure was switched off.", "Places seen twice need not lie on each other.");
   }
-  if (!input.scans.empty() && input.summary.crs_wkt.empty() && !input.north_is_up) {
-    add("The map is in a local frame: without satellite positions its heading and place on the "
-        "earth are arbitrary.",
-        input.remarks.empty() ? "Distances and heights within it hold." : "");
-  }
+  if (!input.scans.empty()) add_place(input, add);
   if (items.empty()) {
     items = "<li>Nothing stood out: no warning was given during processing.</li>";
   }

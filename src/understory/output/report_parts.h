@@ -13,6 +13,8 @@ namespace understory {
 [[nodiscard]] std::string verdict_section(const ReportInput& input);
 [[nodiscard]] std::string figures_section(const ReportInput& input);
 [[nodiscard]] std::string map_section(const ReportInput& input);
+// Where the run lies on the globe, how that was found and how sure it is.
+[[nodiscard]] std::string place_section(const ReportInput& input);
 [[nodiscard]] std::string distrust_section(const ReportInput& input);
 [[nodiscard]] std::string stand_section(const ReportInput& input);
 // What lies beside the report and how to open it; `files`: names.

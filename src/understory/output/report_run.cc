@@ -123,7 +123,7 @@ std::string distance_meaning(const ReportInput& input) {
 }  // namespace
 
 std::string matching_section(const ReportInput& input) {
-  if (input.scans.empty()) return "";
+  if (input.scans.empty() || input.moved) return "";
   std::string html = "<section><h2>How well the scans matched</h2>" + match_shares(input);
   const TimeAxis axis = time_axis(input);
   Plot plot;
@@ -158,7 +158,7 @@ std::string matching_section(const ReportInput& input) {
 }
 
 std::string loops_section(const ReportInput& input) {
-  if (input.scans.empty()) return "";
+  if (input.scans.empty() || input.moved) return "";
   std::string html =
       "<section><h2>Places seen again</h2><p>Where the path returns to a place, the program "
       "recognises it and takes out the error that has grown since: it closes a loop.</p>";

@@ -250,33 +250,32 @@ std::string diameters(const std::vector<Tree>& trees) {
   return "<figure><h3>Diameters</h3>" + svg_histogram(histogram) + "</figure>";
 }
 
-// `stems`: their fits in the same order, or null where trees come from sights of single views,
-// which have no heights.
-std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems) {
+// `stems`: their fits in the same order, or null. `of_cloud`: else trees come from sights of single
+// views, which have no heights.
+std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems,
+                       bool of_cloud) {
   std::string html =
       "<h3>All trees</h3><p class=\"so\">x, y and the height of the ground are those "
-      "of the stem's foot in the frame of the map. ";
-  html +=
-      stems != nullptr
-          ? "Returns are laser points on the stem. Seen around is the part of its circumference "
-            "that the laser saw."
-          : "Views are the scans that show the stem.";
+      "of the stem's foot, as in trees.csv. ";
+  if (!of_cloud) html += "Views are the scans that show the stem.";
+  if (of_cloud) html += "Returns are laser points on the stem. ";
+  if (stems != nullptr) html += "Seen around is the part of its circumference that the laser saw.";
   html +=
       "</p><div class=\"scroll\"><table class=\"sort\"><thead><tr>"
       "<th class=\"n\">no.</th><th class=\"n\">x, m</th><th class=\"n\">y, m</th><th "
       "class=\"n\">ground, m</th><th class=\"n\">diameter, cm</th><th class=\"n\">± cm</th><th "
       "class=\"n\">lean, °</th>";
-  html += stems != nullptr
-              ? "<th class=\"n\">height, m</th><th class=\"n\">returns</th><th class=\"n\">seen "
-                "around, °</th></tr></thead><tbody>"
-              : "<th class=\"n\">views</th></tr></thead><tbody>";
+  html += of_cloud ? "<th class=\"n\">height, m</th><th class=\"n\">returns</th>"
+                   : "<th class=\"n\">views</th>";
+  if (stems != nullptr) html += "<th class=\"n\">seen around, °</th>";
+  html += "</tr></thead><tbody>";
   const auto out = std::back_inserter(html);
   for (std::size_t i = 0; i < std::min(trees.size(), kLongestTable); ++i) {
     const Tree& t = trees[i];
     std::vector<std::string> cells = {
         std::to_string(t.id), metres(t.x, 2),          metres(t.y, 2),       metres(t.z, 2),
         centimetres(t.dbh_m), centimetres(t.dbh_sd_m), metres(t.lean_deg, 1)};
-    if (stems != nullptr) cells.push_back(metres(t.height_m, 1));
+    if (of_cloud) cells.push_back(metres(t.height_m, 1));
     cells.push_back(std::to_string(t.observations));
     if (stems != nullptr) cells.push_back(metres((*stems)[i].arc_deg, 0));
     fmt::format_to(out, "<tr>");
@@ -313,21 +312,34 @@ std::string fall_table(const std::vector<TreeFall>& falls, TimeNs start) {
   return html + "</tbody></table></div>";
 }
 
+// Trees of a cloud that is not at hand: of a run that was moved.
+std::string section_of_moved(const ReportInput& input) {
+  const std::vector<Tree>& trees = *input.trees;
+  return "<section><h2>Trees</h2><p>These are the trees of the run that was moved. Its own report "
+         "shows their cross sections. ± is one standard deviation of the diameter. A height is "
+         "given only where the top was seen.</p><div class=\"two\">" +
+         diameters(trees) + "</div>" +
+         fall_table(input.falls, input.scans.empty() ? 0 : input.scans.front().stamp) +
+         tree_table(trees, nullptr, true) + "</section>\n";
+}
+
 std::string section_of_views(const ReportInput& input) {
   const std::vector<Tree>& trees = *input.trees;
   const TimeNs start = input.scans.empty() ? 0 : input.scans.front().stamp;
   return "<section><h2>Trees</h2><p>A tree is listed where many of the views that could see it saw "
          "a stem. Its place is the mean of these sights. ± is one standard deviation of the "
          "diameter. Heights are not measured.</p><div class=\"two\">" +
-         diameters(trees) + "</div>" + fall_table(input.falls, start) + tree_table(trees, nullptr) +
-         "</section>\n";
+         diameters(trees) + "</div>" + fall_table(input.falls, start) +
+         tree_table(trees, nullptr, false) + "</section>\n";
 }
 
 }  // namespace
 
 std::string stand_section(const ReportInput& input) {
   if (input.inventory == nullptr)
-    return input.trees == nullptr || input.trees->empty() ? "" : section_of_views(input);
+    return input.trees == nullptr || input.trees->empty() ? ""
+           : input.trees_of_cloud                         ? section_of_moved(input)
+                                                          : section_of_views(input);
   const InventoryResult& inventory = *input.inventory;
   std::string html = "<section><h2>Trees</h2>";
   if (inventory.trees.empty()) {
@@ -342,7 +354,7 @@ std::string stand_section(const ReportInput& input) {
   }
   html += cross_sections(inventory);
   if (!inventory.trees.empty())
-    html += single_trees(inventory) + tree_table(inventory.trees, &inventory.stems);
+    html += single_trees(inventory) + tree_table(inventory.trees, &inventory.stems, true);
   return html + "</section>\n";
 }
 

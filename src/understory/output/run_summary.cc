@@ -74,6 +74,37 @@ Json numbers(const std::vector<double>& values) {
   return list;
 }
 
+Json or_null(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json or_null(const std::string& text) {
+  return text.empty() ? Json(nullptr) : Json(text);
+}
+
+// All digits: whoever reads it brings layers back to the world frame by it.
+Json to_json(const RunPlace& place) {
+  Json json;
+  json["on_globe"] = place.on_globe;
+  json["reason"] = or_null(place.reason);
+  if (!place.on_globe) return json;
+  const Eigen::Vector3d& t = place.enu_from_world.translation();
+  const Eigen::Quaterniond& q = place.enu_from_world.rotation();
+  json["method"] = or_null(place.method);
+  json["coordinate_system"] = or_null(place.coordinate_system);
+  json["heights"] = or_null(place.heights);
+  json["origin"] = {{"latitude_deg", place.origin.latitude_deg},
+                    {"longitude_deg", place.origin.longitude_deg},
+                    {"height_m", place.origin.height_m}};
+  json["enu_from_world"] = {{"translation_m", {t.x(), t.y(), t.z()}},
+                            {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+  json["true_north_deg"] = place.north_deg;
+  json["grid_scale"] = place.grid_scale;
+  json["expected_error_m"] = or_null(place.expected_error_m);
+  json["heading_sd_deg"] = or_null(place.heading_sd_deg);
+  return json;
+}
+
 std::vector<double> means_by_tenth(const std::vector<double>& values) {
   const std::size_t share = values.size() / 10;
   if (share < 10) return {};
@@ -158,6 +189,8 @@ std::string run_json(const RunSummary& summary) {
                           {"highest_deg", numbers(summary.lidar_view.highest_deg)}};
   }
   json["coordinate_system"] = summary.crs_wkt.empty() ? Json(nullptr) : Json(summary.crs_wkt);
+  if (summary.place) json["georeference"] = to_json(*summary.place);
+  if (!summary.frames.empty()) json["frames"] = summary.frames;
   json["inputs"] = Json::array();
   for (const InputHash& input : summary.inputs) {
     json["inputs"].push_back(

@@ -2,12 +2,16 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "understory/geometry/pose.h"
+#include "understory/georeference/geodetic.h"
 #include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
 #include "understory/util/timing.h"
@@ -49,6 +53,23 @@ struct LidarViewFigures {
   std::vector<double> highest_deg;      // by azimuth in the lidar frame from -180 degrees on; NaN
 };
 
+// Where the world frame of a run lies on the globe, and what its layers are in: map.laz, rasters,
+// trees.gpkg.
+struct RunPlace {
+  bool on_globe = false;  // what follows holds; else the layers are in the world frame
+  std::string reason;     // why not
+  std::string method;     // that found it, as `georeference --method` names it
+  Pose enu_from_world;    // to east, north, up at the origin
+  GeodeticPlace origin;
+  std::string coordinate_system;  // "EPSG:3067", or its name
+  std::string heights;            // what heights of the layers are above, in words
+  double north_deg = 0.0;         // true north clockwise from grid north, at the origin
+  double grid_scale = 1.0;        // metres of the grid per metre of the ground, there
+  // Standard deviations; NaN where the method does not tell.
+  double expected_error_m = std::numeric_limits<double>::quiet_NaN();  // over the path
+  double heading_sd_deg = std::numeric_limits<double>::quiet_NaN();
+};
+
 // What run.json says. Warnings are one per kind. A command makes it with RunDocuments
 // (pipeline/run_folder/run_documents.h), which fills in what all commands have in common.
 struct RunSummary {
@@ -69,8 +90,11 @@ struct RunSummary {
   std::map<std::string, Figure> counts;    // keyframes, loops_accepted, map_points, trees ...
   std::map<std::string, Figure> quality;   // inlier_ratio_mean, ape_rmse_m ...
   std::map<std::string, Figure> evidence;  // what the status rests on
-  std::string crs_wkt;                     // empty = local frame
-  LidarViewFigures lidar_view;             // empty = unknown
+  std::string crs_wkt;                     // of the layers; empty = local frame
+  std::optional<RunPlace> place;           // of runs with a world frame
+  // The frame of each file that has one: "world", or the coordinate system.
+  std::map<std::string, std::string> frames;
+  LidarViewFigures lidar_view;  // empty = unknown
 };
 
 // Of a run at the speed of its sensors: milliseconds from the end of a scan to its pose, as the

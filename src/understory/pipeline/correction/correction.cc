@@ -117,7 +117,7 @@ RunOutcome run_correction(const CorrectionRequest& request, Log& log, const Prog
   position_views(request, progress, stop_requested, times, input, documents);
   const std::filesystem::path results = folder.begin_results();
   StemMapMaker map(std::move(input), std::move(documents), request.config,
-                   {request.run_folder, results, times, log, progress});
+                   {request.run_folder, results, times, log, progress, {}});
   map.close_loops();
   map.finish_map();
   map.list_trees();

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <utility>
 
+#include "understory/output/layer_files.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/correction_report.h"
 #include "understory/pipeline/correction/correction_summary.h"
 #include "understory/pipeline/correction/correction_tables.h"
-#include "understory/pipeline/georeferencing/gnss_fixes.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -33,13 +33,6 @@ std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
     trees.push_back(tree);
   }
   return trees;
-}
-
-// By a motion in the plane; a height that is not known stays so, and alone.
-Eigen::Vector3d moved(const Pose& motion, const Eigen::Vector3d& point) {
-  Eigen::Vector3d result = motion * Eigen::Vector3d(point.x(), point.y(), 0.0);
-  result.z() += point.z();
-  return result;
 }
 
 }  // namespace
@@ -78,33 +71,14 @@ void StemMapMaker::list_trees() {
   run_.trees = trees_of(run_.stems);
 }
 
-// The recording's own GNSS path beside the path: how well they lie on each other, P1 (6), and
-// gnss.csv in the run's frame. The fixes do not change the path.
-std::vector<ReportFix> StemMapMaker::compare_with_gnss(const Trajectory& trajectory,
-                                                       RunSummary& summary) const {
-  std::vector<ReportFix> drawn;
+PlacedMap StemMapMaker::place_on_globe(const Trajectory& trajectory) {
   const ScopedTimer timer(place_.times, "gnss_fit");
-  if (run_.fixes.empty()) return drawn;
-  const GnssFit fit = fit_to_gnss(trajectory, run_.antenna_in_body, run_.fixes, {});
-  summary.quality.merge(figures_of(fit));
-  GnssWriter writer(place_.results / "gnss.csv");
-  const Pose world_from_enu = fit.enu_from_world.inverse();
-  for (GnssRow row : rows_of(fit.fixes, "too far from the path")) {
-    row.position_in_world = moved(world_from_enu, row.position_in_world);
-    row.residual = moved(Pose(world_from_enu.rotation(), Eigen::Vector3d::Zero()), row.residual);
-    drawn.push_back({row.position_in_world.cast<float>(), row.used});
-    row.used = false;
-    row.reason = "compared with, not used";
-    writer.add(row);
-  }
-  for (std::size_t k = 0; fit.fixes.empty() && k < run_.fixes.size(); ++k) {
-    GnssRow row;
-    row.fix = run_.fixes[k];
-    row.reason = fit.path.reason;
-    writer.add(row);
-  }
-  writer.commit();
-  return drawn;
+  PlacedMap map = place_map({place_.results, trajectory, run_.fixes, run_.antenna_in_body},
+                            place_.georeference, place_.log);
+  documents_.summary().quality.merge(map.figures);
+  documents_.report().fixes = std::move(map.fixes);
+  documents_.report().has_fixes = !run_.fixes.empty();
+  return map;
 }
 
 RunOutcome StemMapMaker::write() {
@@ -121,9 +95,11 @@ RunOutcome StemMapMaker::write() {
   std::vector<TreeFall> falls =
       write_felled_trees(folder, {run_.seen, run_.seen_from, run_.stems, run_.trees}, cuts,
                          config_.harvester.cuts, documents_.summary());
-  std::vector<ReportFix> fixes = compare_with_gnss(trajectory, documents_.summary());
+  const PlacedMap map = place_on_globe(trajectory);
+  write_tree_layers(folder, run_.trees, trajectory, map.frames.layers);
+  write_layer_project(folder, documents_.report().title, trajectory, map.frames.layers);
   report_correction(config_.stems, run_, trajectory, documents_);
-  documents_.report().fixes = std::move(fixes);
+  documents_.place(map.place, map.frames);
   documents_.report().falls = std::move(falls);
   documents_.write(folder);
   return documents_.outcome(

@@ -4,6 +4,7 @@
 
 #include "understory/pipeline/correction/correction_config.h"
 #include "understory/pipeline/correction/correction_run.h"
+#include "understory/pipeline/georeferencing/map_placing.h"
 #include "understory/pipeline/mapping/map_maker.h"
 #include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/util/log.h"
@@ -19,6 +20,7 @@ struct StemMapPlace {
   StageTimes& times;                 // of the run so far; further stages are added
   Log& log;
   const ProgressSink& progress;
+  GeoreferenceConfig georeference;  // how its layers lie on the globe
 };
 
 // Map, trees and files of positioned stems: of `understory correct`, and of `understory map` by the
@@ -33,13 +35,13 @@ class StemMapMaker : public MapMaker {
   void close_loops() override;
   void finish_map() override;
   void list_trees() override;
-  // odometry.tum, trajectory.tum, steps.csv, loops.csv, corrections.csv, trees.csv, felled.csv,
-  // gnss.csv, run.json, report.html.
+  // odometry.tum, trajectory.tum, steps.csv, loops.csv, corrections.csv, trees.csv, trees.gpkg,
+  // felled.csv, gnss.csv, map.qgs, run.json, report.html.
   [[nodiscard]] RunOutcome write() override;
 
  private:
-  [[nodiscard]] std::vector<ReportFix> compare_with_gnss(const Trajectory& trajectory,
-                                                         RunSummary& summary) const;
+  // By the recording's own fixes, which do not change the path; gnss.csv.
+  [[nodiscard]] PlacedMap place_on_globe(const Trajectory& trajectory);
 
   CorrectionRun run_;
   RunDocuments documents_;

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "understory/evaluation/tree_falls.h"
-#include "understory/georeference/coordinate_system.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
 #include "understory/pipeline/georeferencing/placement_figures.h"
@@ -63,12 +62,15 @@ std::string yaml_of(GeoreferenceRequest request) {
   table.add("tree_map_crs", request.tree_map_system, "");
   table.add("near", near, "", "");
   table.add("radius_m", request.near_radius_m, {}, "m", "");
-  table.add("crs", request.coordinate_system, "");
+  table.add("crs", request.layers.coordinate_system, "");
+  table.add_enum("heights", request.layers.heights,
+                 {{"ellipsoid", HeightWish::kEllipsoid}, {"geoid", HeightWish::kGeoid}}, "");
   return table.to_yaml(false);
 }
 
-void describe(const GeoreferenceRequest& request, const MovableRun& run, const Placement& placement,
-              const std::vector<Tree>& trees, RunDocuments& documents) {
+void describe(const GeoreferenceRequest& request, const MovedRun& moved, RunDocuments& documents) {
+  const MovableRun& run = moved.run;
+  const Placement& placement = moved.placement;
   RunSummary& summary = documents.summary();
   summary.scans = summary.poses = run.trajectory.size();
   summary.recording_s = to_seconds(run.trajectory.back().stamp - run.trajectory.front().stamp);
@@ -79,18 +81,20 @@ void describe(const GeoreferenceRequest& request, const MovableRun& run, const P
   ReportInput& report = documents.report();
   report.title = request.run.filename().string();
   report.made_from = fmt::format("a run of {} poses, moved by one motion", run.trajectory.size());
-  report.north_is_up = placement.origin.has_value();
+  report.moved = true;
+  report.trees_of_cloud = run.of_cloud;
+  report.area_m2 = run.area_m2;
+  report.has_fixes = !placement.gnss.empty();
   if (run.has_trees) {
-    documents.count("trees", trees.size());
-    report.trees = &trees;
+    documents.count("trees", moved.trees.size());
+    report.trees = &moved.trees;
   }
-  report.falls = placed(run.falls, trees);
+  report.falls = placed(run.falls, moved.trees);
   if (run.has_falls) documents.count("trees_felled", report.falls.size());
-  for (const StampedPose& pose : run.trajectory) {
+  for (const StampedPose& pose : moved.trajectory) {
     ReportScan scan;
     scan.stamp = pose.stamp;
-    scan.position =
-        (placement.target_from_world * pose.world_from_body).translation().cast<float>();
+    scan.position = pose.world_from_body.translation().cast<float>();
     report.scans.push_back(scan);
   }
   report.fixes = fixes_of(placement.gnss);
@@ -112,6 +116,32 @@ Placement find_placement(const GeoreferenceRequest& request, const MovableRun& r
   return placement;
 }
 
+// The place of the result: its world frame is east, north, up where the origin is known.
+RunPlace place_of(const GeoreferenceRequest& request, const Placement& placement) {
+  RunPlace place;
+  place.method = placement.method;
+  place.on_globe = placement.origin.has_value();
+  if (place.on_globe) {
+    place.origin = *placement.origin;
+    place.heights = request.method == GeoreferenceMethod::kTerrain
+                        ? "as the terrain model counts them"
+                        : other_heights(placement);
+  } else {
+    place.reason =
+        "the map that it was laid on has no coordinate system, or none that the run is known in";
+  }
+  place.heading_sd_deg = heading_sd_deg(placement);
+  place.expected_error_m = placement.expected_error_m;
+  return place;
+}
+
+MovedRun moved_run(const MovableRun& run, const Placement& placement) {
+  MovedRun moved{run, placement, {}, moved_trees(run.trees, placement.target_from_world)};
+  for (const StampedPose& pose : run.trajectory)
+    moved.trajectory.push_back({pose.stamp, placement.target_from_world * pose.world_from_body});
+  return moved;
+}
+
 }  // namespace
 
 GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& log) {
@@ -121,22 +151,30 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& lo
   const RunFolder place = RunFolder::claim(given.result, given.overwrite);
   GeoreferenceRequest request = given;
   request.result = place.begin_results();
-  if (!request.coordinate_system.empty()) (void)CoordinateSystem(request.coordinate_system);
+  check(request.layers);
   StageTimes times;
   RunDocuments documents("georeference", {yaml_of(given), {}, "", {}}, times, log);
   std::optional<ScopedTimer> timer(std::in_place, times, "reading");
   const MovableRun run = read_movable_run(request.run);
+  // Layers that are in a system stay in it.
+  if (request.layers.coordinate_system.empty() && run.layers->system() != nullptr)
+    request.layers.coordinate_system = run.layers->wkt();
   timer.emplace(times, "fit");
   const Placement placement = find_placement(request, run, log);
   documents.add_input(request.run / "trajectory.tum");
   if (run.has_trees) documents.add_input(request.run / "trees.csv");
   documents.add_inputs(placement.inputs);
   timer.emplace(times, "writing");
-  const std::vector<Tree> trees = moved_trees(run.trees, placement.target_from_world);
-  documents.summary().crs_wkt = write_moved_run(request.run, request.result, run, placement, trees,
-                                                request.coordinate_system, log);
+  const MovedRun moved = moved_run(run, placement);
+  RunPlace on_globe = place_of(request, placement);
+  ResultFrames frames;
+  if (on_globe.on_globe) frames = frames_at(on_globe, request.layers, log);
+  MapPicture picture;
+  write_moved_run(request.run, request.result, moved, frames, picture, log);
   timer.reset();
-  describe(request, run, placement, trees, documents);
+  describe(request, moved, documents);
+  documents.place(std::move(on_globe), frames);
+  if (!picture.empty()) documents.report().picture = &picture;
   documents.write(request.result);
   place.commit(log);
   place.forget_state();

@@ -11,6 +11,7 @@
 #include "understory/georeference/terrain_fit.h"
 #include "understory/georeference/trees/tree_match.h"
 #include "understory/output/run_summary.h"
+#include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/util/log.h"
 
@@ -56,7 +57,7 @@ struct GeoreferenceRequest {
   std::optional<Eigen::Vector2d> near;
   double near_radius_m = 200.0;  // how far off that may be
   TreeMatchConfig trees;
-  std::string coordinate_system;  // of trees.gpkg; empty: the UTM zone
+  GeoreferenceConfig layers;  // their coordinate system
 };
 
 // What `understory georeference` tells when it is done.

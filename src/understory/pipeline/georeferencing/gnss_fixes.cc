@@ -91,6 +91,18 @@ std::vector<GnssFix> read_fixes(const std::string& file, Log& log) {
   return fixes;
 }
 
+NamedFixes fixes_of_run(const std::string& gnss, const fs::path& folder,
+                        const std::vector<GnssFix>& in_memory, Log& log) {
+  if (!gnss.empty()) return {gnss, read_fixes(gnss, log)};
+  const fs::path file = folder / "gnss.csv";
+  if (!in_memory.empty()) return {file.string(), in_memory};
+  if (!fs::exists(file))
+    throw InputError(folder.string(), "",
+                     "expected gnss.csv in the run, or --gnss with a recording, an NMEA log, an "
+                     "RTKLIB .pos file or a table of fixes");
+  return {file.string(), read_fixes(file.string(), log)};
+}
+
 std::vector<GnssRow> rows_of(const std::vector<FittedFix>& fixes, const std::string& unused) {
   std::vector<GnssRow> rows;
   for (const FittedFix& fitted : fixes) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
@@ -16,6 +17,16 @@ namespace understory {
 // longitude_deg (gnss.csv of a run or of a folder of clouds), or any recording. Those without a
 // position are left out. Throws InputError where there are none.
 [[nodiscard]] std::vector<GnssFix> read_fixes(const std::string& file, Log& log);
+
+// The fixes that a method places a run by: those of --gnss, else of a run that is being mapped,
+// else of the run's gnss.csv. `file` names them in messages. Throws InputError where there are
+// none.
+struct NamedFixes {
+  std::string file;
+  std::vector<GnssFix> fixes;
+};
+[[nodiscard]] NamedFixes fixes_of_run(const std::string& gnss, const std::filesystem::path& folder,
+                                      const std::vector<GnssFix>& in_memory, Log& log);
 
 // For gnss.csv, positions in the frame east, north, up. `unused`: why a fix was not used.
 [[nodiscard]] std::vector<GnssRow> rows_of(const std::vector<FittedFix>& fixes,

@@ -5,11 +5,10 @@
 #include <system_error>
 
 #include "understory/evaluation/tree_errors.h"
-#include "understory/georeference/coordinate_system.h"
-#include "understory/output/geo_files.h"
+#include "understory/output/layer_files.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/head_cut_log.h"
-#include "understory/pipeline/correction/moved_map.h"
+#include "understory/pipeline/georeferencing/moved_layers.h"
 #include "understory/util/error.h"
 #include "understory/util/files/text_file.h"
 
@@ -19,22 +18,13 @@ namespace {
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
 
-// The place that an earlier fit to a GNSS path has left in run.json.
-std::optional<GeodeticPlace> origin_of(const fs::path& run) {
-  if (!fs::exists(run / "run.json")) return std::nullopt;
+// Squares with points of the run's map; 0 where its run.json does not tell.
+double area_of(const fs::path& run) {
+  if (!fs::exists(run / "run.json")) return 0.0;
   const auto json = nlohmann::json::parse(read_text_file(run / "run.json"), nullptr, false);
-  if (json.is_discarded() || !json.is_object()) return std::nullopt;
-  const auto quality = json.find("quality");
-  if (quality == json.end() || !quality->is_object()) return std::nullopt;
-  const auto number = [&](const char* key) {
-    const auto found = quality->find(key);
-    return found != quality->end() && found->is_number() ? found->get<double>() : std::nan("");
-  };
-  const GeodeticPlace place{number("origin_latitude_deg"), number("origin_longitude_deg"),
-                            number("origin_height_m")};
-  if (!std::isfinite(place.latitude_deg + place.longitude_deg + place.height_m))
-    return std::nullopt;
-  return place;
+  const nlohmann::json::json_pointer place("/quality/area_m2");
+  if (json.is_discarded() || !json.contains(place) || !json.at(place).is_number()) return 0.0;
+  return json.at(place).get<double>();
 }
 
 void write_moved_path(const fs::path& from, const fs::path& to, const Pose& motion) {
@@ -43,26 +33,6 @@ void write_moved_path(const fs::path& from, const fs::path& to, const Pose& moti
   for (const StampedPose& pose : read_trajectory(from))
     writer.add({pose.stamp, motion * pose.world_from_body});
   writer.commit();
-}
-
-// The trees in a coordinate system that maps know; returns its name.
-std::string write_trees_map(const fs::path& folder, const std::string& wish,
-                            const std::vector<Tree>& trees, const GeodeticPlace& origin) {
-  std::string name = wish.empty() ? utm_zone(origin) : wish;
-  const CoordinateSystem system(name);
-  const EastNorthUp frame(origin);
-  std::vector<Tree> placed;
-  for (Tree tree : trees) {
-    const auto at = system.from_place(frame.to_place({tree.x, tree.y, tree.z}));
-    if (!at)
-      throw ConfigError({"coordinate system " + name + " does not reach the place of the run"});
-    tree.x = at->x();
-    tree.y = at->y();
-    tree.z = at->z();
-    placed.push_back(tree);
-  }
-  write_trees_gpkg(folder / "trees.gpkg", placed, name);
-  return name;
 }
 
 void copy_unmoved(const fs::path& from, const fs::path& to) {
@@ -85,7 +55,13 @@ MovableRun read_movable_run(const fs::path& folder) {
   if (run.has_trees) run.trees = read_trees(folder / "trees.csv");
   run.has_falls = run.has_trees && fs::exists(folder / "felled.csv");
   if (run.has_falls) run.falls = read_tree_falls(folder / "felled.csv");
-  run.origin = origin_of(folder);
+  if (const std::optional<RunPlace> place = read_run_place(folder)) {
+    run.origin = place->origin;
+    run.enu_from_world = place->enu_from_world;
+  }
+  run.layers = std::make_shared<LayerFrame>(read_layer_frame(folder));
+  run.of_cloud = fs::exists(folder / "map.laz") || fs::exists(folder / "dtm.tif");
+  run.area_m2 = area_of(folder);
   run.trust = trust_of_run(folder);
   return run;
 }
@@ -104,26 +80,25 @@ std::vector<Tree> moved_trees(const std::vector<Tree>& trees, const Pose& motion
   return result;
 }
 
-std::string write_moved_run(const fs::path& from, const fs::path& to, const MovableRun& run,
-                            const Placement& placement, const std::vector<Tree>& trees,
-                            const std::string& crs, Log& log) {
-  write_moved_map(from, to, placement.target_from_world, log);
+void write_moved_run(const fs::path& from, const fs::path& to, const MovedRun& moved,
+                     const ResultFrames& frames, MapPicture& picture, Log& log) {
+  const MovableRun& run = moved.run;
+  const Pose& motion = moved.placement.target_from_world;
+  write_moved_layers({from, *run.layers}, motion, {to, frames.layers}, frames.drawing(), picture,
+                     log);
   for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum"})
-    write_moved_path(from / name, to / name, placement.target_from_world);
-  write_moved_cuts(from / "cuts.csv", to / "cuts.csv", placement.target_from_world);
+    write_moved_path(from / name, to / name, motion);
+  write_moved_cuts(from / "cuts.csv", to / "cuts.csv", motion);
   copy_unmoved(from, to);
-  std::string system;
-  if (run.has_trees) {
-    write_trees_csv(to / "trees.csv", trees);
-    if (run.has_falls) write_tree_falls(to / "felled.csv", placed(run.falls, trees));
-    if (placement.origin) system = write_trees_map(to, crs, trees, *placement.origin);
-  }
-  if (placement.gnss.empty()) return system;
+  if (run.has_trees) write_trees_csv(to / "trees.csv", moved.trees);
+  if (run.has_falls) write_tree_falls(to / "felled.csv", placed(run.falls, moved.trees));
+  write_tree_layers(to, moved.trees, moved.trajectory, frames.layers);
+  write_layer_project(to, from.filename().string(), moved.trajectory, frames.layers);
+  if (moved.placement.gnss.empty()) return;
   GnssWriter writer(to / "gnss.csv");
-  for (const GnssRow& row : placement.gnss)
+  for (const GnssRow& row : moved.placement.gnss)
     writer.add(row);
   writer.commit();
-  return system;
 }
 
 }  // namespace understory

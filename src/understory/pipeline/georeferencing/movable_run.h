@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,8 +9,12 @@
 #include "understory/evaluation/trajectory.h"
 #include "understory/evaluation/tree_falls.h"
 #include "understory/georeference/geodetic.h"
+#include "understory/georeference/layer_frame.h"
+#include "understory/output/map_picture.h"
 #include "understory/pipeline/georeferencing/placement.h"
+#include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
+#include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/log.h"
 
@@ -22,7 +27,15 @@ struct MovableRun {
   bool has_trees = false;
   std::vector<TreeFall> falls;
   bool has_falls = false;
-  std::optional<GeodeticPlace> origin;  // of its frame, where that is east, north, up
+  // Where it lies already: the place of the frame east, north, up that `enu_from_world` leads to
+  // (the identity where the run's own frame is that frame). Nothing where it is not known.
+  std::optional<GeodeticPlace> origin;
+  Pose enu_from_world;
+  std::vector<GnssFix> fixes;  // of a run that is being mapped; else in its gnss.csv
+  // The frame that its layers are in: map.laz, dtm.tif and chm.tif.
+  std::shared_ptr<const LayerFrame> layers = std::make_shared<LayerFrame>();
+  bool of_cloud = false;  // it has a cloud, so that heights of trees are measured
+  double area_m2 = 0.0;   // squares with points; 0: unknown
   InheritedTrust trust;
 };
 
@@ -32,14 +45,17 @@ struct MovableRun {
 // The trees in the target frame; their standard deviations turn with the axes.
 [[nodiscard]] std::vector<Tree> moved_trees(const std::vector<Tree>& trees, const Pose& motion);
 
-// Writes every file of the run in `from`, moved, to the folder `to`. `trees` are moved already.
-// `crs` is a wish, "EPSG:3067" or WKT; empty: the UTM zone. Returns the coordinate system of the
-// layers, empty where the place on the globe is not known. Throws InputError, OutputError or
-// ConfigError.
-[[nodiscard]] std::string write_moved_run(const std::filesystem::path& from,
-                                          const std::filesystem::path& to, const MovableRun& run,
-                                          const Placement& placement,
-                                          const std::vector<Tree>& trees, const std::string& crs,
-                                          Log& log);
+// A run that was moved: its lists in the world frame of the result.
+struct MovedRun {
+  const MovableRun& run;
+  const Placement& placement;
+  Trajectory trajectory;
+  std::vector<Tree> trees;
+};
+// Writes every file of the run in `from`, moved, to the folder `to`; the cloud is drawn into
+// `picture`. Throws InputError or OutputError.
+void write_moved_run(const std::filesystem::path& from, const std::filesystem::path& to,
+                     const MovedRun& moved, const ResultFrames& frames, MapPicture& picture,
+                     Log& log);
 
 }  // namespace understory

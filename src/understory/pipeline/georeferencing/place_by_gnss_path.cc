@@ -13,22 +13,16 @@ namespace understory {
 
 using namespace pipeline_constants::georeferencing;
 
-namespace fs = std::filesystem;
-
 Placement place_by_gnss_path(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {
-  const fs::path file = request.gnss.empty() ? request.run / "gnss.csv" : fs::path(request.gnss);
-  if (request.gnss.empty() && !fs::exists(file))
-    throw InputError(request.run.string(), "",
-                     "expected gnss.csv in the run, or --gnss with a recording, an NMEA log, an "
-                     "RTKLIB .pos file or a table of fixes");
+  const NamedFixes named = fixes_of_run(request.gnss, request.run, run.fixes, log);
   if (request.antenna_in_body.norm() > kLongestArmM)
     log.warn("recording.lever_arm",
              fmt::format("the antenna is said to be {:.1f} m from the body's origin (--antenna-m): "
                          "check that these are metres and not a place on the earth",
                          request.antenna_in_body.norm()));
-  const GnssFit fit = fit_to_gnss(run.trajectory, request.antenna_in_body,
-                                  read_fixes(file.string(), log), request.path);
-  if (!fit.path.found) throw InputError(file.string(), "", fit.path.reason);
+  const GnssFit fit =
+      fit_to_gnss(run.trajectory, request.antenna_in_body, named.fixes, request.path);
+  if (!fit.path.found) throw InputError(named.file, "", fit.path.reason);
   Placement placement;
   placement.target_from_world = fit.enu_from_world;
   placement.origin = fit.origin;
@@ -53,7 +47,7 @@ Placement place_by_gnss_path(const GeoreferenceRequest& request, const MovableRu
         fit.path.heading_sd_deg, kMostHeadingSdDeg, fit.path.fixes_rms_m));
   placement.gnss = rows_of(fit.fixes, "too far from the path");
   if (request.gnss.empty())
-    placement.inputs.push_back(hash_input(file));
+    placement.inputs.push_back(hash_input(named.file));
   else
     placement.inputs = hash_inputs(request.gnss, log);
   return placement;

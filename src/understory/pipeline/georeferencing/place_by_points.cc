@@ -55,7 +55,7 @@ Vector3d place_in_run(const CsvReader& table, const GeoreferenceRequest& request
 }
 
 std::vector<SurveyedRow> read_points(const GeoreferenceRequest& request, const MovableRun& run) {
-  const CoordinateSystem system(request.coordinate_system);
+  const CoordinateSystem system(request.layers.coordinate_system);
   CsvReader table(request.points, {"name", "east_m", "north_m"});
   std::vector<SurveyedRow> rows;
   while (table.next()) {
@@ -65,7 +65,7 @@ std::vector<SurveyedRow> read_points(const GeoreferenceRequest& request, const M
     row.has_height = std::isfinite(height);
     const auto place = system.to_place(
         {table.finite("east_m"), table.finite("north_m"), row.has_height ? height : 0.0});
-    if (!place) table.fail("expected east_m and north_m in " + request.coordinate_system);
+    if (!place) table.fail("expected east_m and north_m in " + request.layers.coordinate_system);
     row.place = *place;
     row.place_in_world = place_in_run(table, request, run, row.name);
     rows.push_back(row);

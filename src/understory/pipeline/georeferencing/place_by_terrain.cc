@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 
 #include "understory/georeference/terrain_file.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
@@ -20,22 +21,25 @@ using Eigen::Vector3d;
 std::vector<GroundPoint> ground_of(const GeoreferenceRequest& request, const MovableRun& run) {
   std::vector<GroundPoint> points;
   if (fs::exists(request.run / "dtm.tif")) {
-    PlaneArea area{run.trajectory.front().world_from_body.translation().head<2>(),
-                   run.trajectory.front().world_from_body.translation().head<2>()};
+    const LayerFrame& layers = *run.layers;
+    PlaneArea area{Eigen::Vector2d::Constant(std::numeric_limits<double>::max()),
+                   Eigen::Vector2d::Constant(std::numeric_limits<double>::lowest())};
     for (const StampedPose& pose : run.trajectory) {
-      area.low = area.low.cwiseMin(pose.world_from_body.translation().head<2>());
-      area.high = area.high.cwiseMax(pose.world_from_body.translation().head<2>());
+      const Vector3d at = layers.from_world(pose.world_from_body.translation());
+      area.low = area.low.cwiseMin(at.head<2>());
+      area.high = area.high.cwiseMax(at.head<2>());
     }
-    area.low.array() -= kReachM;
-    area.high.array() += kReachM;
+    area.low.array() -= kReachM * layers.units_per_metre();
+    area.high.array() += kReachM * layers.units_per_metre();
     const Raster own = read_terrain(request.run / "dtm.tif", area, std::nullopt);
-    const int step = std::max(1, static_cast<int>(std::lround(1.0 / own.cell_m)));
+    const int step =
+        std::max(1, static_cast<int>(std::lround(layers.units_per_metre() / own.cell_m)));
     for (int row = 0; row < own.rows; row += step) {
       for (int column = 0; column < own.columns; column += step) {
         const double x = own.x0 + (column + 0.5) * own.cell_m;
         const double y = own.y0 + (row + 0.5) * own.cell_m;
         const double z = own.cell_value(x, y);
-        if (std::isfinite(z)) points.push_back({{x, y, z}, 0.1});
+        if (std::isfinite(z)) points.push_back({layers.to_world({x, y, z}), 0.1});
       }
     }
     return points;
@@ -69,7 +73,7 @@ Placement place_by_terrain(const GeoreferenceRequest& request, const MovableRun&
     throw InputError(request.run.string(), "",
                      "expected a run that was laid on a GNSS path, or --start: where it lies on "
                      "the terrain model is not known (0 0 0 if its frame is that of the model)");
-  Pose placed;
+  Pose placed = run.enu_from_world;
   if (request.start) {
     placed = Pose(Eigen::Quaterniond(
                       Eigen::AngleAxisd((*request.start)[2] * M_PI / 180.0, Vector3d::UnitZ())),

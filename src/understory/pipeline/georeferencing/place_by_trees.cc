@@ -30,7 +30,8 @@ struct RoughPlace {
 // From an earlier fit, else from the fixes of the run.
 std::optional<RoughPlace> rough_place(const GeoreferenceRequest& request, const MovableRun& run,
                                       Log& log) {
-  if (run.origin) return RoughPlace{Vector2d::Zero(), *run.origin};
+  if (run.origin)
+    return RoughPlace{run.enu_from_world.inverse().translation().head<2>(), *run.origin};
   const fs::path file = request.run / "gnss.csv";
   if (!fs::exists(file)) return std::nullopt;
   std::vector<double> latitudes;

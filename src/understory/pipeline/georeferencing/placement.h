@@ -44,4 +44,9 @@ struct Placement {
   void doubt(const std::string& reason) { doubts.push_back(reason); }
 };
 
+// What heights are above where it is not the ellipsoid: no fix may have a height. Else empty.
+[[nodiscard]] std::string other_heights(const Placement& placement);
+// Standard deviation of the heading, degrees; NaN where the method does not tell it.
+[[nodiscard]] double heading_sd_deg(const Placement& placement);
+
 }  // namespace understory

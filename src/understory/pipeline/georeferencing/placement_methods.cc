@@ -1,5 +1,10 @@
 #include "understory/pipeline/georeferencing/placement_methods.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <variant>
+
 namespace understory {
 
 const std::vector<PlacementMethod>& placement_methods() {
@@ -24,6 +29,23 @@ const std::vector<PlacementMethod>& placement_methods() {
        "turn and shift by the pattern of the trees in a map of trees or a cloud from the air",
        place_by_trees}};
   return kMethods;
+}
+
+std::string other_heights(const Placement& placement) {
+  const bool told = placement.gnss.empty() ||
+                    std::any_of(placement.gnss.begin(), placement.gnss.end(),
+                                [](const GnssRow& row) { return std::isfinite(row.fix.height_m); });
+  return told ? "" : "above the origin of the run, as no fix has a height";
+}
+
+double heading_sd_deg(const Placement& placement) {
+  for (const char* key : {"sd_heading_deg", "gnss_heading_sd_deg", "trees_yaw_sd_deg"}) {
+    const auto found = placement.figures.find(key);
+    if (found == placement.figures.end()) continue;
+    const double* value = std::get_if<double>(&found->second);
+    if (value != nullptr && std::isfinite(*value)) return *value;
+  }
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace understory

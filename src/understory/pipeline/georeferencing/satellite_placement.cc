@@ -91,15 +91,6 @@ void tell_figures(const SatelliteFit& fit, Placement& placement) {
 
 }  // namespace
 
-fs::path fixes_file(const GeoreferenceRequest& request) {
-  const fs::path file = request.gnss.empty() ? request.run / "gnss.csv" : fs::path(request.gnss);
-  if (request.gnss.empty() && !fs::exists(file))
-    throw InputError(request.run.string(), "",
-                     "expected gnss.csv in the run, or --gnss with a recording, an NMEA log, an "
-                     "RTKLIB .pos file or a table of fixes");
-  return file;
-}
-
 double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run) {
   if (request.tilt_sd_deg) return *request.tilt_sd_deg;
   return is_level(request.run, run) ? SplitFitConfig().tilt_sd_deg
@@ -114,8 +105,9 @@ SatelliteInput read_satellite_input(const GeoreferenceRequest& request, const Mo
                          "check that these are metres and not a place on the earth",
                          request.antenna_in_body.norm()));
   SatelliteInput input;
-  input.file = fixes_file(request);
-  input.fixes = read_fixes(input.file.string(), log);
+  const NamedFixes named = fixes_of_run(request.gnss, request.run, run.fixes, log);
+  input.file = named.file;
+  input.fixes = named.fixes;
   input.config.pairing.antenna_in_body = request.antenna_in_body;
   input.config.pairing.time_offset_s = request.time_offset_s;
   input.config.split.time_offset_sd_s = request.time_offset_sd_s;

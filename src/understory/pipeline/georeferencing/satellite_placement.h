@@ -19,9 +19,6 @@ struct SatelliteInput {
   SatelliteFitConfig config;
 };
 
-// The file of the fixes: --gnss, else gnss.csv of the run. Throws InputError where there is none.
-[[nodiscard]] std::filesystem::path fixes_file(const GeoreferenceRequest& request);
-
 // How far the run's up may be off gravity, degrees: --tilt-sd-deg, else by whether the run was
 // mapped with an IMU or laid on the earth before.
 [[nodiscard]] double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run);

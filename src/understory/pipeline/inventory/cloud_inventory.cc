@@ -2,9 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <memory>
+#include <optional>
 #include <span>
 
+#include "understory/georeference/coordinate_system.h"
 #include "understory/output/inventory_files.h"
+#include "understory/output/qgis_project.h"
+#include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/mapping/lidar_view.h"
 #include "understory/pipeline/run_folder/run_documents.h"
@@ -45,16 +50,60 @@ void judge(const InventoryResult& inventory, const Log& log, RunDocuments& docum
 struct Stock {
   fs::path path;  // of the cloud
   bool of_run = false;
+  std::optional<RunPlace> place;  // of that run
+  ResultFrames frames;            // of that run; the frame of a cloud is its own
   StandCloud stand;
   InventoryResult inventory;
   MapPicture picture;
 };
 
+// What the user says of the system of a cloud that names none.
+void name_system(const InventoryRequest& request, Stock& stock) {
+  if (request.coordinate_system.empty()) return;
+  std::string& own = stock.stand.cloud.coordinate_system;
+  if (stock.of_run || !own.empty())
+    throw ConfigError({"--crs names the coordinate system of a cloud that says nothing of it; " +
+                       stock.path.string() + " is in " +
+                       (own.empty() ? "the frame of its run" : own.substr(0, 60))});
+  own = request.coordinate_system;
+}
+
+// map.qgs over the results.
+void write_project(const Stock& stock, const fs::path& results) {
+  QgisProject project;
+  project.title = stock.path.filename().string();
+  const std::string& own = stock.stand.cloud.coordinate_system;
+  if (stock.of_run) {
+    project.crs_wkt = stock.frames.layers.wkt();
+    project.crs_code = stock.frames.layers.code();
+  } else if (const auto system = CoordinateSystem::find(own)) {
+    project.crs_wkt = system->wkt();
+    project.crs_code = system->code();
+  }
+  write_qgis_project(results, project, false);
+}
+
+// A run's map and its frames.
+Stock stock_of(const InventoryRequest& request) {
+  Stock stock;
+  stock.path = cloud_of(request.cloud);
+  stock.of_run = stock.path != fs::path(request.cloud);
+  if (!stock.of_run) return stock;
+  stock.place = read_run_place(request.cloud);
+  stock.frames.layers = read_layer_frame(request.cloud);
+  const CoordinateSystem* system = stock.frames.layers.system();
+  if (stock.place && system != nullptr && system->is_geographic())
+    stock.frames.local = std::make_unique<LayerFrame>(stock.place->enu_from_world);
+  return stock;
+}
+
 void take_stock(const InventoryRequest& request, const fs::path& results, Log& log,
                 const ProgressSink& progress, StageTimes& times, Stock& stock) {
   {
     const ScopedTimer timer(times, "reading");
-    stock.stand = read_stand(stock.path, request.frame, log);
+    stock.stand = stock.of_run ? read_run_map(stock.path, stock.frames.layers, request.frame, log)
+                               : read_stand(stock.path, request.frame, log);
+    name_system(request, stock);
   }
   // The map of a run is in metres, and what is wrong with it is a matter of trust.
   if (!stock.stand.doubt.empty() && !stock.of_run)
@@ -67,9 +116,14 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
   }
   const ScopedTimer timer(times, "writing");
   blocks([&](std::span<const Eigen::Vector3d> points) {
-    add_to_picture(stock.picture, points, stock.inventory.ground);
+    add_to_picture(stock.picture, points, stock.inventory.ground, stock.frames.drawing());
   });
-  write_inventory_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
+  if (stock.of_run) {
+    write_inventory_files(results, stock.inventory, stock.frames.layers);
+  } else {
+    write_inventory_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
+  }
+  write_project(stock, results);
 }
 
 void describe(const InventoryRequest& request, const Stock& stock, const Log& log,
@@ -77,7 +131,7 @@ void describe(const InventoryRequest& request, const Stock& stock, const Log& lo
   const InventoryResult& inventory = stock.inventory;
   const PointCloudFile& cloud = stock.stand.cloud;
   documents.add_input(stock.path);
-  documents.summary().crs_wkt = cloud.coordinate_system;
+  if (!stock.of_run) documents.summary().crs_wkt = cloud.coordinate_system;
   documents.count("points", inventory.points);
   documents.count("trees", inventory.trees.size());
   documents.summary().quality["area_m2"] = inventory.area_m2;
@@ -96,6 +150,8 @@ void describe(const InventoryRequest& request, const Stock& stock, const Log& lo
   report.picture = &stock.picture;
   report.inventory = &inventory;
   report.north_is_up = !cloud.coordinate_system.empty();
+  if (!stock.of_run || !stock.place) return;
+  documents.place(*stock.place, stock.frames);
 }
 
 }  // namespace
@@ -103,9 +159,8 @@ void describe(const InventoryRequest& request, const Stock& stock, const Log& lo
 RunOutcome run_inventory(const InventoryRequest& request, Log& log, const ProgressSink& progress) {
   StageTimes times;
   RunDocuments documents("inventory", request.config_record, times, log);
-  Stock stock;
-  stock.path = cloud_of(request.cloud);
-  stock.of_run = stock.path != fs::path(request.cloud);
+  if (!request.coordinate_system.empty()) (void)CoordinateSystem(request.coordinate_system);
+  Stock stock = stock_of(request);
   refuse_input_as_output(request.run_folder, {request.cloud, stock.path, request.config_file});
   const RunFolder place = RunFolder::claim(request.run_folder, request.overwrite);
   const fs::path results = place.begin_results();

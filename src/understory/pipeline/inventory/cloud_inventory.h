@@ -18,12 +18,15 @@ struct InventoryRequest {
   std::filesystem::path run_folder;
   bool overwrite = false;  // what an earlier run left in the folder
   CloudFrame frame;
+  std::string coordinate_system;  // of a cloud that names none: "EPSG:3067" or WKT; empty: unknown
   InventoryConfig config;
   ConfigRecord config_record;  // for run.json
   std::string config_file;     // that the user named; not to be overwritten
 };
 
-// From a point cloud to the run folder: ground, trees, rasters, report. Throws InputError where the
+// From a point cloud to the run folder. Of a run's map the results are in the frames of the run:
+// trees.csv in its world frame, the layers in its coordinate system.
+// Writes ground, trees, rasters, report. Throws InputError where the
 // cloud cannot be read or is neither in metres nor upright, OutputError.
 [[nodiscard]] RunOutcome run_inventory(const InventoryRequest& request, Log& log,
                                        const ProgressSink& progress);

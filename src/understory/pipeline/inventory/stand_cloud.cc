@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "understory/forest/cloud_shape.h"
 #include "understory/georeference/coordinate_system.h"
@@ -119,16 +120,41 @@ PointBlocks blocks_of(const PointCloudFile& cloud) {
   };
 }
 
-StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame, Log& log) {
+namespace {
+
+StandCloud checked_stand(PointCloudFile cloud, const std::string& name, const CloudFrame& frame,
+                         Log& log) {
   StandCloud stand;
-  stand.cloud = read_cloud(path.string(), log);
+  stand.cloud = std::move(cloud);
   const std::string system = stand.cloud.coordinate_system;
-  bring_upright(frame, path.string(), stand.cloud, log);
+  bring_upright(frame, name, stand.cloud, log);
   if (frame.unit_m > 0.0 && !frame.up.empty()) return stand;
   const CloudShape shape = shape_of(blocks_of(stand.cloud));
   stand.doubt = doubt_of(shape, system, frame);
   stand.suspicion = suspicion_of(shape, system, frame);
   return stand;
+}
+
+void bring_to_world(const LayerFrame& layers, PointCloudFile& cloud) {
+  if (layers.is_world()) return;
+  const Eigen::Vector3d origin = layers.to_world(cloud.origin);
+  for (Eigen::Vector3f& point : cloud.points)
+    point = (layers.to_world(cloud.origin + point.cast<double>()) - origin).cast<float>();
+  cloud.origin = origin;
+  cloud.coordinate_system.clear();
+}
+
+}  // namespace
+
+StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame, Log& log) {
+  return checked_stand(read_cloud(path.string(), log), path.string(), frame, log);
+}
+
+StandCloud read_run_map(const std::filesystem::path& path, const LayerFrame& layers,
+                        const CloudFrame& frame, Log& log) {
+  PointCloudFile cloud = read_cloud(path.string(), log);
+  bring_to_world(layers, cloud);
+  return checked_stand(std::move(cloud), path.string(), frame, log);
 }
 
 }  // namespace understory

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "understory/forest/inventory.h"
+#include "understory/georeference/layer_frame.h"
 #include "understory/recording/clouds/cloud_file.h"
 
 namespace understory {
@@ -32,5 +33,8 @@ struct StandCloud {
 // with a warning. Throws InputError where read_cloud does, and for a recording.
 [[nodiscard]] StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame,
                                     Log& log);
+// The map of a run, brought back from the frame of its layers to the world frame.
+[[nodiscard]] StandCloud read_run_map(const std::filesystem::path& path, const LayerFrame& layers,
+                                      const CloudFrame& frame, Log& log);
 
 }  // namespace understory

@@ -30,6 +30,7 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
     table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
   });
   table.section("inventory", [&] { describe(table, config.inventory); });
+  table.section("georeference", [&] { describe(table, config.georeference); });
   table.section("judgement", [&] {
     describe(table, config.judgement);
     table.section("motion", [&] { describe(table, config.motion_limits); });
@@ -83,6 +84,7 @@ ReadConfig<DenseMappingConfig> read_dense_mapping_config(const std::string& prof
   });
   problems.gather([&] { table.set(settings); });
   note_settings(table, settings, origins);
+  problems.gather([&] { check(config.georeference); });
   problems.throw_if_any();
   return {config, origins};
 }

@@ -8,6 +8,7 @@
 #include "understory/map/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/odometry/dense/dense_odometry.h"
+#include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/pipeline/mapping/event_loop_config.h"
@@ -27,6 +28,7 @@ struct DenseMappingConfig {
   double map_range_max_m = 60.0;  // farther returns do not enter the finished map
   bool map_enabled = true;        // write map.laz and what is made from it
   InventoryConfig inventory;
+  GeoreferenceConfig georeference;
   JudgementConfig judgement;
   MotionLimits motion_limits;
   double cloud_distance_m = 1.0;  // weighted distance (37) between scans whose clouds are kept

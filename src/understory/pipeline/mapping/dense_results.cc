@@ -7,10 +7,11 @@
 #include <numeric>
 
 #include "understory/forest/inventory.h"
-#include "understory/output/geo_files.h"
 #include "understory/output/las_writer.h"
+#include "understory/output/layer_files.h"
 #include "understory/output/map_picture.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/georeferencing/map_placing.h"
 #include "understory/pipeline/judgement/evidence_gathering.h"
 #include "understory/pipeline/judgement/match_course.h"
 #include "understory/pipeline/judgement/path_evidence.h"
@@ -161,30 +162,24 @@ std::vector<ReportLoop> report_loops(const KeyframeMap& map) {
   return rows;
 }
 
-void write_fixes(const std::filesystem::path& folder, const std::vector<GnssFix>& fixes) {
-  if (fixes.empty()) return;
-  GnssWriter writer(folder / "gnss.csv");
-  for (const GnssFix& fix : fixes) {
-    GnssRow row;
-    row.fix = fix;
-    row.reason =
-        fix.quality == 0 ? "no fix" : "positions are not used: the map is in a local frame";
-    writer.add(row);
-  }
-  writer.commit();
+std::string title_of(const ReadRecording& recording) {
+  return std::filesystem::path(recording.request.recording).filename().string();
 }
 
 std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
-                          const GroundModel& ground, MapPicture& picture,
-                          const ProgressSink& progress) {
-  LasWriter writer(file, LasOptions{});
+                          const GroundModel& ground, const ResultFrames& frames,
+                          MapPicture& picture, const ProgressSink& progress) {
+  LasWriter writer(file, las_options(frames.layers));
   double done = 0.0;
   tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
     for (const MapPoint& p : points) {
-      const double height = ground.height_above({p.x, p.y, p.z});
+      const Eigen::Vector3d in_world(p.x, p.y, p.z);
+      const double height = ground.height_above(in_world);
       const std::uint8_t las_class = ground.las_class(height);
-      writer.add({p.x, p.y, p.z, p.stamp, p.intensity, las_class});
-      picture.add(p.x, p.y, p.z, height);
+      const Eigen::Vector3d at = frames.layers.from_world(in_world);
+      writer.add({at.x(), at.y(), at.z(), p.stamp, p.intensity, las_class});
+      const Eigen::Vector3d drawn = frames.local ? frames.local->from_world(in_world) : at;
+      picture.add(drawn.x(), drawn.y(), drawn.z(), height);
     }
     done += static_cast<double>(points.size());
     if (progress) progress({"writing map.laz", done / 1e3, 0.0, "thousand points", ""});
@@ -193,17 +188,19 @@ std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
   return writer.points();
 }
 
-// map.laz, trees.csv, dtm.tif and chm.tif. Returns the number of points.
-std::uint64_t write_map(const std::filesystem::path& folder, DenseProducts& made,
-                        MapPicture& picture, const ProgressSink& progress) {
+// map.laz, trees.csv, trees.gpkg, dtm.tif, chm.tif and map.qgs. Returns the number of points.
+std::uint64_t write_map(const ReadRecording& recording, DenseProducts& made,
+                        const Trajectory& trajectory, const ResultFrames& frames,
+                        MapPicture& picture) {
+  const std::filesystem::path& folder = recording.results;
   const InventoryResult& inventory = made.inventory;
-  const std::uint64_t points =
-      write_cloud(folder / "map.laz", *made.tiles, inventory.ground, picture, progress);
+  const std::uint64_t points = write_cloud(folder / "map.laz", *made.tiles, inventory.ground,
+                                           frames, picture, recording.progress);
   write_trees_csv(folder / "trees.csv", inventory.trees);
-  if (!inventory.ground.terrain.empty()) {
-    write_geotiff(folder / "dtm.tif", inventory.ground.terrain, "");
-    write_geotiff(folder / "chm.tif", inventory.canopy, "");
-  }
+  write_tree_layers(folder, inventory.trees, trajectory, frames.layers);
+  write_raster_layers(folder, inventory.ground.terrain, inventory.canopy,
+                      change_into(frames.layers), frames.layers);
+  write_layer_project(folder, title_of(recording), trajectory, frames.layers);
   return points;
 }
 
@@ -326,17 +323,32 @@ void fill_report(const ReadRecording& recording, const DenseFrontEnd& front_end,
 }
 
 // The files of the map, if one was made.
-void add_map(const std::filesystem::path& folder, DenseProducts& made, StageTimes& times,
-             const ProgressSink& progress, MapPicture& picture, RunDocuments& documents) {
+void add_map(const ReadRecording& recording, DenseProducts& made, const Trajectory& trajectory,
+             const ResultFrames& frames, MapPicture& picture, RunDocuments& documents) {
   documents.count("trees", made.inventory.trees.size());
   documents.summary().lidar_view = made.lidar_view;
   if (!made.tiles) return;
-  const ScopedTimer timer(times, "finish_write_map");
-  documents.count("map_points", write_map(folder, made, picture, progress));
+  documents.summary().quality["area_m2"] = made.inventory.area_m2;
+  documents.count("map_points", write_map(recording, made, trajectory, frames, picture));
   if (!picture.empty()) documents.report().picture = &picture;
   documents.report().inventory = &made.inventory;
   for (const std::string& remark : made.inventory.remarks)
     documents.remark("inventory", remark);
+}
+
+// Where the run lies on the globe, by its own fixes; gnss.csv.
+PlacedMap place_on_globe(const ReadRecording& recording, DenseFrontEnd& front_end,
+                         const Trajectory& trajectory, RunDocuments& documents) {
+  const ScopedTimer timer(front_end.times(), "finish_georeference");
+  MappedPath path{recording.results, trajectory, front_end.fixes()};
+  path.level = front_end.counts().imu_samples > 0;
+  if (const auto& antenna = front_end.rig().body_from_gnss)
+    path.antenna_in_body = antenna->translation();
+  PlacedMap map = place_map(path, front_end.config().georeference, recording.log);
+  documents.summary().quality.merge(map.figures);
+  documents.report().fixes = std::move(map.fixes);
+  documents.report().has_fixes = !front_end.fixes().empty();
+  return map;
 }
 
 }  // namespace
@@ -347,7 +359,6 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   const RunFacts& facts = recording.facts;
   const TrajectoryFacts trajectory = write_trajectory(folder, front_end, front_end.config());
   write_graph(folder, front_end.map());
-  write_fixes(folder, front_end.fixes());
   RunDocuments documents = map_documents(recording, front_end.times());
   documents.judge(evidence_of(front_end, facts, recording.source, trajectory, recording.log),
                   front_end.config().judgement);
@@ -356,8 +367,13 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   fill_quality(front_end, trajectory, facts, documents.summary());
   if (const auto truth = write_truth(recording.request.run_folder, recording.source))
     documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
+  const PlacedMap map = place_on_globe(recording, front_end, trajectory.trajectory, documents);
+  documents.place(map.place, map.frames);
   MapPicture picture;
-  add_map(folder, made, front_end.times(), recording.progress, picture, documents);
+  {
+    const ScopedTimer timer(front_end.times(), "finish_write_map");
+    add_map(recording, made, trajectory.trajectory, map.frames, picture, documents);
+  }
   fill_report(recording, front_end, trajectory, documents.summary().scans, documents.report());
   documents.write(folder);
   return documents.outcome(terminal_summary(documents.summary(), trajectory, made.inventory,

@@ -82,8 +82,8 @@ std::unique_ptr<MapMaker> SparseFrontEnd::map_maker(const ReadRecording& recordi
   remark_on_lever_arms(recording.source.rig(), recording.request.recording, recording.log);
   RunDocuments documents = documents_of(*this, recording, times_);
   CorrectionInput input = correction_input(*this, recording);
-  const StemMapPlace place{recording.request.run_folder, recording.results, times_, recording.log,
-                           recording.progress};
+  const StemMapPlace place{recording.request.run_folder, recording.results,   times_, recording.log,
+                           recording.progress,           config_.georeference};
   return std::make_unique<StemMapMaker>(std::move(input), std::move(documents), config_.correction,
                                         place);
 }

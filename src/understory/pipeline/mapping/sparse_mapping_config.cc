@@ -35,6 +35,7 @@ ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
     table.section("pace", [&] { describe(table, config.pace); });
   });
   describe(table, config.correction);
+  table.section("georeference", [&] { describe(table, config.georeference); });
   table.section("run", [&] {
     table.add("checkpoint_interval_s", config.loop.checkpoint_interval_s, {0.1, 60.0}, "s",
               "of recording between checkpoints");
@@ -69,6 +70,7 @@ ReadConfig<SparseMappingConfig> read_sparse_mapping_config(const std::string& pr
   problems.gather([&] { table.set(settings); });
   note_settings(table, settings, origins);
   problems.gather([&] { read_boxes(config); });
+  problems.gather([&] { check(config.georeference); });
   problems.throw_if_any();
   return {config, origins};
 }

@@ -7,6 +7,7 @@
 #include "understory/odometry/stems/stem_front_end.h"
 #include "understory/odometry/stems/stem_pacer.h"
 #include "understory/pipeline/correction/correction_config.h"
+#include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/mapping/event_loop_config.h"
 #include "understory/util/config/config.h"
 #include "understory/util/config/config_origins.h"
@@ -21,6 +22,7 @@ struct SparseMappingConfig {
   StemFrontEndConfig front_end;
   StemPaceConfig pace;
   CorrectionConfig correction;
+  GeoreferenceConfig georeference;
 };
 
 // The table of all keys, bound to `config`.

@@ -16,6 +16,21 @@ std::function<double()> seconds_from_now() {
   };
 }
 
+// The frame of each file of the folder that has one. Views, graphs and figures have none.
+std::map<std::string, std::string> frames_of(const std::filesystem::path& folder,
+                                             const RunPlace& place) {
+  const std::string layers = place.on_globe ? place.coordinate_system : "world";
+  std::map<std::string, std::string> frames;
+  for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum", "states.csv.gz",
+                           "graph.g2o", "gnss.csv", "trees.csv", "felled.csv", "cuts.csv"}) {
+    if (std::filesystem::exists(folder / name)) frames[name] = "world";
+  }
+  for (const char* name : {"map.laz", "dtm.tif", "dsm.tif", "chm.tif", "trees.gpkg", "map.qgs"}) {
+    if (std::filesystem::exists(folder / name)) frames[name] = layers;
+  }
+  return frames;
+}
+
 }  // namespace
 
 RunDocuments::RunDocuments(const std::string& command, ConfigRecord config, const StageTimes& times,
@@ -47,6 +62,13 @@ void RunDocuments::compare_with_truth(const std::optional<ReportTruth>& truth) {
   if (!truth) return;
   summary().quality["ape_rmse_m"] = truth->ape_rmse_m;
   summary().quality["drift_percent"] = truth->drift_percent;
+}
+
+void RunDocuments::place(RunPlace place, const ResultFrames& frames) {
+  summary().crs_wkt = frames.layers.wkt();
+  report_.north_is_up = place.on_globe;
+  report_.drawing = frames.drawing().is_world() ? nullptr : &frames.drawing();
+  summary().place = std::move(place);
 }
 
 void RunDocuments::lower(RunStatus status, const std::string& reason) {
@@ -81,6 +103,7 @@ void RunDocuments::write(const std::filesystem::path& results) {
   all.wall_s = elapsed_s_();
   all.cpu_s = process_cpu_seconds();
   all.peak_memory_mb = peak_memory_mb();
+  if (all.place) all.frames = frames_of(results, *all.place);
   write_report(results / "report.html", report_);
   all.wall_s = elapsed_s_();  // all of it, the report too
   write_run_json(results / "run.json", all);

@@ -9,6 +9,7 @@
 
 #include "understory/output/report.h"
 #include "understory/output/run_summary.h"
+#include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/judgement/run_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
@@ -45,6 +46,9 @@ class RunDocuments {
   // What a user has to know of the result and no part of the program has warned of before: under
   // "warnings", beside those of the log, and in the report.
   void remark(const std::string& key, const std::string& message);
+  // Where the run lies on the globe, and the frame that its map is drawn in. `frames` must live
+  // until `write`.
+  void place(RunPlace place, const ResultFrames& frames);
   // Errors against a known truth, if there is one: in the report and under "quality".
   void compare_with_truth(const std::optional<ReportTruth>& truth);
 

@@ -1,4 +1,4 @@
-#include "understory/pipeline/correction/moved_map.h"
+#include "understory/pipeline/georeferencing/moved_layers.h"
 
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ struct Folders {
   }
 };
 
-TEST(MovedMap, CloudAndRastersGoWithThePath) {
+TEST(MovedLayers, CloudAndRastersGoWithThePath) {
   const Folders folders;
   constexpr std::int64_t kUnix = 1'780'000'000'250'000'000;
   {
@@ -72,7 +72,10 @@ TEST(MovedMap, CloudAndRastersGoWithThePath) {
   const Pose motion(so3_exp(Vector3d(0.0, 0.0, 1.1)) * so3_exp(Vector3d(0.05, -0.03, 0.0)),
                     Vector3d(300.0, -200.0, 120.0));
   Log log;
-  write_moved_map(folders.run, folders.result, motion, log);
+  const LayerFrame local;
+  MapPicture picture;
+  write_moved_layers({folders.run, local}, motion, {folders.result, local}, local, picture, log);
+  EXPECT_FALSE(picture.empty());
 
   const auto before = open_file((folders.run / "map.laz").string());
   const auto after = open_file((folders.result / "map.laz").string());
@@ -109,6 +112,40 @@ TEST(MovedMap, CloudAndRastersGoWithThePath) {
   // Nothing is known beyond the edges.
   const Vector3d beyond = motion * Vector3d(0.0, 14.0, 0.0);
   EXPECT_TRUE(std::isnan(ground.cell_value(beyond.x(), beyond.y())));
+}
+
+// A run on the globe is read back from its own system, whatever that is.
+TEST(MovedLayers, FromOneCoordinateSystemIntoAnother) {
+  const Folders folders;
+  const GeodeticPlace place{61.2, 24.7, 150.0};
+  const Pose enu_from_world(so3_exp(Vector3d(0.0, 0.0, 0.6)), Vector3d(5.0, 6.0, 7.0));
+  const LayerFrame before(enu_from_world, place, "EPSG:3067");
+  const LayerFrame after(Pose(), place, "EPSG:32634");
+  const std::vector<Vector3d> points = {{0, 0, 0}, {40, -30, 5}, {-25, 60, 12}};
+  {
+    LasOptions options;
+    options.offset = before.offset();
+    options.crs_wkt = before.wkt();
+    LasWriter writer(folders.run / "map.laz", options);
+    for (const Vector3d& point : points) {
+      const Vector3d at = before.exact_from_world(point);
+      writer.add({at.x(), at.y(), at.z(), 1, 2, 2});
+    }
+    writer.commit();
+  }
+  Log log;
+  MapPicture picture;
+  write_moved_layers({folders.run, before}, enu_from_world, {folders.result, after}, after, picture,
+                     log);
+  const auto file = open_file((folders.result / "map.laz").string());
+  const LasHeader header = read_las_header(*file);
+  EXPECT_EQ(header.coordinate_system, "EPSG:32634");
+  std::size_t next = 0;
+  read_las_points(*file, header, log, [&](const LasPoint& point) {
+    const Vector3d expected = after.exact_from_world(enu_from_world * points[next++]);
+    EXPECT_LT((point.position - expected).norm(), 0.002);
+  });
+  EXPECT_EQ(next, points.size());
 }
 
 }  // namespace

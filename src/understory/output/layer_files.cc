@@ -1,0 +1,118 @@
+#include "understory/output/layer_files.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "understory/georeference/coordinate_system.h"
+#include "understory/output/qgis_project.h"
+
+namespace understory {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kAtRestM = 0.1;   // a sensor at rest jitters by millimetres
+constexpr double kAroundM = 20.0;  // of the path that a window shows
+
+// Cosine and sine of the turn of the axes in the plane, without sign.
+std::array<double, 2> turn_of(const LayerFrame& layers, const Vector3d& point) {
+  Vector3d east = layers.from_world(point + Vector3d::UnitX()) - layers.from_world(point);
+  if (layers.system() != nullptr && layers.system()->is_geographic())
+    east.x() *= std::cos(layers.from_world(point).y() * M_PI / 180.0);
+  const double length = east.head<2>().norm();
+  return {std::abs(east.x()) / length, std::abs(east.y()) / length};
+}
+
+std::string band_meaning(const char* what, const LayerFrame& layers) {
+  return layers.wkt().empty() ? std::string(what) : what + (", metres " + layers.heights());
+}
+
+}  // namespace
+
+FrameChange change_into(const LayerFrame& layers) {
+  return {[&layers](const Vector3d& point) { return layers.from_world(point); },
+          [&layers](const Vector3d& point) { return layers.to_world(point); },
+          layers.units_per_metre(), layers.is_world()};
+}
+
+std::vector<Tree> trees_in(const LayerFrame& layers, const std::vector<Tree>& trees) {
+  if (layers.is_world()) return trees;
+  std::vector<Tree> placed = trees;
+  for (Tree& tree : placed) {
+    const Vector3d from(tree.x, tree.y, std::isfinite(tree.z) ? tree.z : 0.0);
+    const Vector3d at = layers.from_world(from);
+    const auto [c, s] = turn_of(layers, from);
+    const double x_sd = tree.x_sd_m;
+    const double y_sd = tree.y_sd_m;
+    tree.x = at.x();
+    tree.y = at.y();
+    if (std::isfinite(tree.z)) tree.z = at.z();
+    tree.x_sd_m = std::hypot(c * x_sd, s * y_sd);
+    tree.y_sd_m = std::hypot(s * x_sd, c * y_sd);
+  }
+  return placed;
+}
+
+PathLine path_in(const LayerFrame& layers, const std::vector<StampedPose>& path) {
+  PathLine line;
+  if (path.empty()) return line;
+  line.begin_s = to_seconds(path.front().stamp);
+  line.end_s = to_seconds(path.back().stamp);
+  Vector3d last = path.front().world_from_body.translation();
+  line.points.push_back(layers.from_world(last));
+  for (const StampedPose& pose : path) {
+    const Vector3d& here = pose.world_from_body.translation();
+    const double step = (here - last).norm();
+    if (step < kAtRestM) continue;
+    line.length_m += step;
+    line.points.push_back(layers.from_world(here));
+    last = here;
+  }
+  return line;
+}
+
+LasOptions las_options(const LayerFrame& layers) {
+  LasOptions options;
+  options.offset = layers.offset();
+  options.scale = layers.resolution();
+  options.crs_wkt = layers.wkt();
+  return options;
+}
+
+void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
+                       const std::vector<StampedPose>& path, const LayerFrame& layers) {
+  write_trees_gpkg(folder / "trees.gpkg", trees_in(layers, trees), layers.wkt(),
+                   path_in(layers, path), layers.heights());
+}
+
+void write_raster_layers(const std::filesystem::path& folder, const Raster& terrain,
+                         const Raster& canopy, const FrameChange& change,
+                         const LayerFrame& layers) {
+  const auto write = [&](const char* name, const Raster& own, CellHeights heights,
+                         const std::string& meaning) {
+    write_geotiff(folder / name, moved_raster(own, terrain, change, heights), layers.wkt(),
+                  meaning);
+  };
+  if (terrain.empty()) return;
+  write("dtm.tif", terrain, CellHeights::kOfGround, band_meaning("height of the ground", layers));
+  if (!canopy.empty())
+    write("chm.tif", canopy, CellHeights::kAboveGround, "height of the canopy above the ground");
+}
+
+void write_layer_project(const std::filesystem::path& folder, const std::string& title,
+                         const std::vector<StampedPose>& path, const LayerFrame& layers) {
+  constexpr double kFar = std::numeric_limits<double>::max();
+  QgisProject project{title, layers.wkt(), layers.code(), {kFar, kFar, -kFar, -kFar}};
+  const double around = kAroundM * layers.units_per_metre();
+  const PathLine line = path_in(layers, path);
+  for (const Vector3d& point : line.points) {
+    project.extent[0] = std::min(project.extent[0], point.x() - around);
+    project.extent[1] = std::min(project.extent[1], point.y() - around);
+    project.extent[2] = std::max(project.extent[2], point.x() + around);
+    project.extent[3] = std::max(project.extent[3], point.y() + around);
+  }
+  write_qgis_project(folder, project, line.points.size() > 1);
+}
+
+}  // namespace understory

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/raster.h"
+#include "understory/geometry/stamped_pose.h"
+#include "understory/georeference/layer_frame.h"
+#include "understory/georeference/moved_raster.h"
+#include "understory/output/geo_files.h"
+#include "understory/output/las_writer.h"
+#include "understory/sensor/tree.h"
+
+namespace understory {
+
+// The way from the world frame into the frame of the layers. `layers` must outlive it.
+[[nodiscard]] FrameChange change_into(const LayerFrame& layers);
+
+// The trees in the frame of the layers; their standard deviations turn with the axes.
+[[nodiscard]] std::vector<Tree> trees_in(const LayerFrame& layers, const std::vector<Tree>& trees);
+// The path in the frame of the layers, without the jitter of a sensor at rest.
+[[nodiscard]] PathLine path_in(const LayerFrame& layers, const std::vector<StampedPose>& path);
+
+// How map.laz is written: coordinate system, offset, steps.
+[[nodiscard]] LasOptions las_options(const LayerFrame& layers);
+
+// Writes trees.gpkg with the layers trees and path. Frame of both: world. Throws OutputError.
+void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
+                       const std::vector<StampedPose>& path, const LayerFrame& layers);
+
+// Writes dtm.tif and chm.tif (where it is not empty) over cells of the layers' grid. `change` leads
+// there from the frame of the rasters. Throws OutputError.
+void write_raster_layers(const std::filesystem::path& folder, const Raster& terrain,
+                         const Raster& canopy, const FrameChange& change, const LayerFrame& layers);
+
+// Writes map.qgs over what lies in the folder by then. `path` (world frame) is what the window
+// shows first. Throws OutputError.
+void write_layer_project(const std::filesystem::path& folder, const std::string& title,
+                         const std::vector<StampedPose>& path, const LayerFrame& layers);
+
+}  // namespace understory

@@ -1,0 +1,143 @@
+#include "understory/output/qgis_project.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "understory/output/svg_plot.h"
+#include "understory/util/files/atomic_file.h"
+
+namespace understory {
+namespace {
+
+// One layer of the project.
+struct Layer {
+  std::string id;
+  std::string name;
+  std::string source;    // relative to the project
+  std::string provider;  // of QGIS
+  std::string attributes;
+  std::string style;
+  bool shown = true;
+};
+
+std::string system_xml(const QgisProject& project) {
+  std::string id = project.crs_code;
+  if (id.find('+') != std::string::npos || id.find(':') == std::string::npos) id.clear();
+  const std::string number = id.empty() ? "0" : id.substr(id.find(':') + 1);
+  return fmt::format(
+      "<spatialrefsys nativeFormat=\"Wkt\"><wkt>{}</wkt><srid>{}</srid><authid>{}</authid>"
+      "</spatialrefsys>",
+      escape_html(project.crs_wkt), number, escape_html(id));
+}
+
+// A symbol in the words of QGIS: options since 3.26, props before.
+std::string symbol_xml(const char* type, const char* kind,
+                       const std::vector<std::array<const char*, 2>>& options) {
+  std::string map;
+  std::string props;
+  for (const auto& [key, value] : options) {
+    map += fmt::format("<Option type=\"QString\" name=\"{}\" value=\"{}\"/>", key, value);
+    props += fmt::format("<prop k=\"{}\" v=\"{}\"/>", key, value);
+  }
+  return fmt::format(
+      "<renderer-v2 type=\"singleSymbol\" symbollevels=\"0\" enableorderby=\"0\" "
+      "forceraster=\"0\"><symbols><symbol type=\"{}\" name=\"0\" alpha=\"1\" "
+      "clip_to_extent=\"1\" force_rhr=\"0\"><layer class=\"{}\" enabled=\"1\" locked=\"0\" "
+      "pass=\"0\"><Option type=\"Map\">{}</Option>{}</layer></symbol></symbols></renderer-v2>",
+      type, kind, map, props);
+}
+
+std::vector<Layer> layers_of(bool has_path, const std::vector<std::string>& files) {
+  const auto there = [&](const char* name) {
+    return std::find(files.begin(), files.end(), name) != files.end();
+  };
+  std::vector<Layer> layers;
+  if (there("trees.gpkg")) {
+    layers.push_back({"trees", "trees", "./trees.gpkg|layername=trees", "ogr",
+                      "type=\"vector\" geometry=\"Point\"",
+                      symbol_xml("marker", "SimpleMarker",
+                                 {{"color", "255,242,194,255"},
+                                  {"name", "circle"},
+                                  {"outline_color", "192,57,43,255"},
+                                  {"outline_width", "0.4"},
+                                  {"size", "2"}})});
+    if (has_path)
+      layers.push_back({"path", "path of the scanner", "./trees.gpkg|layername=path", "ogr",
+                        "type=\"vector\" geometry=\"Line\"",
+                        symbol_xml("line", "SimpleLine",
+                                   {{"line_color", "37,99,200,255"}, {"line_width", "0.5"}})});
+  }
+  if (there("chm.tif"))
+    layers.push_back({"chm", "height of the canopy", "./chm.tif", "gdal", "type=\"raster\"", ""});
+  if (there("dsm.tif"))
+    layers.push_back({"dsm", "height of the surface", "./dsm.tif", "gdal", "type=\"raster\"", ""});
+  if (there("dtm.tif"))
+    layers.push_back({"dtm", "height of the ground", "./dtm.tif", "gdal", "type=\"raster\"", ""});
+  if (there("map.laz"))
+    layers.push_back({"cloud", "points", "./map.laz", "pdal", "type=\"point-cloud\"", "", false});
+  return layers;
+}
+
+std::string layer_xml(const Layer& layer, const std::string& system) {
+  return fmt::format(
+      "<maplayer {} autoRefreshEnabled=\"0\" hasScaleBasedVisibilityFlag=\"0\"><id>{}</id>"
+      "<datasource>{}</datasource><layername>{}</layername><srs>{}</srs>"
+      "<provider encoding=\"UTF-8\">{}</provider>{}</maplayer>\n",
+      layer.attributes, layer.id, escape_html(layer.source), escape_html(layer.name), system,
+      layer.provider, layer.style);
+}
+
+std::string extent_xml(const std::array<double, 4>& extent) {
+  if (!(extent[2] > extent[0]) || !(extent[3] > extent[1])) return "";
+  return fmt::format(
+      "<extent><xmin>{:.9g}</xmin><ymin>{:.9g}</ymin><xmax>{:.9g}</xmax><ymax>{:.9g}</ymax>"
+      "</extent>",
+      extent[0], extent[1], extent[2], extent[3]);
+}
+
+}  // namespace
+
+std::string qgis_project_xml(const QgisProject& project, bool has_path,
+                             const std::vector<std::string>& files) {
+  const std::string system = system_xml(project);
+  const std::vector<Layer> layers = layers_of(has_path, files);
+  std::string tree;
+  std::string order;
+  std::string maps;
+  for (const Layer& layer : layers) {
+    tree += fmt::format(
+        "<layer-tree-layer id=\"{}\" name=\"{}\" checked=\"{}\" expanded=\"0\" "
+        "providerKey=\"{}\" source=\"{}\"/>\n",
+        layer.id, escape_html(layer.name), layer.shown ? "Qt::Checked" : "Qt::Unchecked",
+        layer.provider, escape_html(layer.source));
+    order += fmt::format("<layer id=\"{}\"/>", layer.id);
+    maps += layer_xml(layer, system);
+  }
+  return fmt::format(
+      "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
+      "<qgis projectname=\"{0}\" version=\"3.22.0\">\n<title>{0}</title>\n"
+      "<projectCrs>{1}</projectCrs>\n<layer-tree-group>\n{2}</layer-tree-group>\n"
+      "<mapcanvas name=\"theMapCanvas\" annotationsVisible=\"1\"><units>{3}</units>{4}"
+      "<rotation>0</rotation><destinationsrs>{1}</destinationsrs></mapcanvas>\n"
+      "<layerorder>{5}</layerorder>\n<projectlayers>\n{6}</projectlayers>\n"
+      "<properties><Paths><Absolute type=\"bool\">false</Absolute></Paths><SpatialRefSys>"
+      "<ProjectionsEnabled type=\"int\">{7}</ProjectionsEnabled></SpatialRefSys></properties>\n"
+      "</qgis>\n",
+      escape_html(project.title), system, tree,
+      project.crs_wkt.rfind("GEOG", 0) == 0 ? "degrees" : "meters", extent_xml(project.extent),
+      order, maps, project.crs_wkt.empty() ? 0 : 1);
+}
+
+void write_qgis_project(const std::filesystem::path& folder, const QgisProject& project,
+                        bool has_path) {
+  std::vector<std::string> files;
+  for (const char* name : {"trees.gpkg", "chm.tif", "dsm.tif", "dtm.tif", "map.laz"}) {
+    if (std::filesystem::exists(folder / name)) files.emplace_back(name);
+  }
+  AtomicFile file(folder / "map.qgs");
+  file.write(qgis_project_xml(project, has_path, files));
+  file.commit();
+}
+
+}  // namespace understory

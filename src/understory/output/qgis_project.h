@@ -1,0 +1,28 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace understory {
+
+// A QGIS project over the layers of a folder.
+struct QgisProject {
+  std::string title;
+  std::string crs_wkt;   // empty: no system, plane metres
+  std::string crs_code;  // "EPSG:3067"; empty where the system has no code
+  // What the window shows first: west, south, east, north; all 0: QGIS decides.
+  std::array<double, 4> extent{};
+};
+
+// Writes map.qgs, which opens trees.gpkg (trees, and the path if it is there), chm.tif, dtm.tif and
+// map.laz as far as they lie in the folder, by relative paths. QGIS 3.16 or newer; the cloud needs
+// 3.26 and is not shown until it is switched on. Throws OutputError.
+void write_qgis_project(const std::filesystem::path& folder, const QgisProject& project,
+                        bool has_path);
+// Its text. `files`: names of the layers that are there.
+[[nodiscard]] std::string qgis_project_xml(const QgisProject& project, bool has_path,
+                                           const std::vector<std::string>& files);
+
+}  // namespace understory

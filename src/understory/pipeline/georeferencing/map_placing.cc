@@ -1,0 +1,183 @@
+#include "understory/pipeline/georeferencing/map_placing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+
+#include "understory/georeference/split_fit.h"
+#include "understory/output/run_tables.h"
+#include "understory/pipeline/georeferencing/movable_run.h"
+#include "understory/pipeline/georeferencing/placement_methods.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr const char* kBest = "auto";
+
+const PlacementMethod& best_method() {
+  const std::vector<PlacementMethod>& methods = placement_methods();
+  const auto found = std::find_if(methods.begin(), methods.end(), [](const PlacementMethod& one) {
+    return std::string(one.name) == kBest;
+  });
+  return found != methods.end() ? *found : methods.front();
+}
+
+bool has_position(const GnssFix& fix) {
+  return fix.quality != 0 && std::isfinite(fix.latitude_deg) && std::isfinite(fix.longitude_deg) &&
+         std::abs(fix.latitude_deg) <= 90.0 && std::abs(fix.longitude_deg) <= 360.0;
+}
+
+// One row for each fix, as far as nothing is known of its place in the world frame.
+std::vector<GnssRow> rows_of(const std::vector<GnssFix>& fixes, const std::string& reason) {
+  std::vector<GnssRow> rows;
+  for (const GnssFix& fix : fixes) {
+    GnssRow row;
+    row.fix = fix;
+    row.reason = has_position(fix) ? reason : "no fix";
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+void write_rows(const std::filesystem::path& folder, const std::vector<GnssRow>& rows) {
+  GnssWriter writer(folder / "gnss.csv");
+  for (const GnssRow& row : rows)
+    writer.add(row);
+  writer.commit();
+}
+
+// By a motion whose inverse is nearly in the plane; a height that is not known stays so.
+Eigen::Vector3d moved(const Pose& motion, const Eigen::Vector3d& point) {
+  if (std::isfinite(point.z())) return motion * point;
+  Eigen::Vector3d result = motion * Eigen::Vector3d(point.x(), point.y(), 0.0);
+  result.z() = point.z();
+  return result;
+}
+
+// What the fit says of each fix, brought back into the world frame of the run.
+void fill_rows(const Placement& placement, const RunPlace& place, std::vector<GnssRow>& rows) {
+  constexpr TimeNs kSame = 1'000;  // a table of fixes keeps no more digits
+  const Pose world_from_enu = placement.target_from_world.inverse();
+  const Pose turn(world_from_enu.rotation(), Eigen::Vector3d::Zero());
+  std::size_t next = 0;
+  for (const GnssRow& fitted : placement.gnss) {
+    while (next < rows.size() && rows[next].fix.stamp < fitted.fix.stamp - kSame)
+      ++next;
+    if (next == rows.size()) break;
+    GnssRow& row = rows[next];
+    if (row.fix.stamp > fitted.fix.stamp + kSame) continue;
+    ++next;
+    row.position_in_world = moved(world_from_enu, fitted.position_in_world);
+    row.residual = moved(turn, fitted.residual);
+    row.used = place.on_globe && fitted.used;
+    row.reason = place.on_globe ? fitted.reason : place.reason;
+  }
+}
+
+std::string joined(const std::vector<std::string>& reasons) {
+  std::string text;
+  for (const std::string& reason : reasons)
+    text += (text.empty() ? "" : "; ") + reason;
+  return text;
+}
+
+// What an error says, without the file that it names first.
+std::string said(const InputError& error) {
+  const std::string text = error.what();
+  const std::string file = error.file() + ": ";
+  return text.rfind(file, 0) == 0 ? text.substr(file.size()) : text;
+}
+
+// The placement of the best method, or why there is none.
+struct Attempt {
+  std::optional<Placement> placement;
+  std::string reason;
+};
+
+Attempt try_to_place(const MappedPath& run, const std::vector<GnssFix>& fixes, Log& log) {
+  GeoreferenceRequest request;
+  request.run = run.results;
+  request.method = best_method().method;
+  request.antenna_in_body = run.antenna_in_body;
+  if (run.level) request.tilt_sd_deg = SplitFitConfig().tilt_sd_deg;
+  MovableRun movable;
+  movable.trajectory = run.trajectory;
+  movable.fixes = fixes;
+  try {
+    return {best_method().place(request, movable, log), ""};
+  } catch (const InputError& error) {  // the fixes cannot be used: the map is as good as without
+    return {std::nullopt, said(error)};
+  }
+}
+
+std::vector<GnssFix> fixes_with_position(const std::vector<GnssFix>& all) {
+  std::vector<GnssFix> fixes;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(fixes), has_position);
+  return fixes;
+}
+
+// Fills in the frames of a run that was placed; says why where the system does not reach it.
+void lay_on_globe(const Placement& placement, const GeoreferenceConfig& config, PlacedMap& map,
+                  Log& log) {
+  map.place.method = placement.method.empty() ? best_method().name : placement.method;
+  map.place.enu_from_world = placement.target_from_world;
+  map.place.origin = *placement.origin;
+  map.place.heights = other_heights(placement);
+  map.place.heading_sd_deg = heading_sd_deg(placement);
+  map.place.expected_error_m = placement.expected_error_m;
+  try {
+    map.frames = frames_at(map.place, config, log);
+    map.place.on_globe = true;
+  } catch (const ConfigError& error) {
+    map.place.reason = joined(error.problems());
+  }
+}
+
+}  // namespace
+
+PlacedMap place_map(const MappedPath& run, const GeoreferenceConfig& config, Log& log) {
+  PlacedMap map;
+  if (run.fixes.empty()) {
+    map.place.reason = "the recording has no satellite positions";
+    return map;
+  }
+  const std::vector<GnssFix> fixes = fixes_with_position(run.fixes);
+  write_rows(run.results, rows_of(fixes, ""));  // a method names them as its input
+  Attempt attempt;
+  if (!config.enabled) {
+    map.place.reason = "georeference.enabled is off";
+  } else if (fixes.empty()) {
+    map.place.reason = "no message of the receiver has a position";
+  } else {
+    attempt = try_to_place(run, fixes, log);
+    map.place.reason = attempt.reason;
+  }
+  if (attempt.placement) {
+    const Placement& placement = *attempt.placement;
+    std::copy_if(placement.figures.begin(), placement.figures.end(),
+                 std::inserter(map.figures, map.figures.end()), [](const auto& figure) {
+                   const double* value = std::get_if<double>(&figure.second);
+                   return value == nullptr || std::isfinite(*value);
+                 });
+    map.place.reason = joined(placement.doubts);
+    if (!placement.origin) map.place.reason = "the method tells no place on the globe";
+    if (map.place.reason.empty()) lay_on_globe(placement, config, map, log);
+  }
+  if (!map.place.on_globe && config.enabled)
+    log.warn("gnss.not_placed", "the map has no place on the globe: " + map.place.reason);
+  std::vector<GnssRow> rows =
+      rows_of(run.fixes, map.place.on_globe ? "not looked at" : map.place.reason);
+  if (attempt.placement) {
+    fill_rows(*attempt.placement, map.place, rows);
+    for (const GnssRow& row : rows) {
+      if (row.position_in_world.head<2>().allFinite())
+        map.fixes.push_back({row.position_in_world.cast<float>(), row.used});
+    }
+  }
+  write_rows(run.results, rows);
+  return map;
+}
+
+}  // namespace understory

@@ -1,0 +1,97 @@
+#include "understory/pipeline/georeferencing/moved_layers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "understory/georeference/terrain_file.h"
+#include "understory/output/layer_files.h"
+#include "understory/recording/bags/byte_source.h"
+#include "understory/recording/clouds/las.h"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kAnywhere = 1e8;
+
+// The writer turns Unix time into adjusted standard GPS time, and leaves seconds as they are; here
+// is the way back.
+TimeNs stamp_of(double gps_time) {
+  constexpr double kAdjusted = 1e9;
+  constexpr double kUnixAtGpsEpoch = 315'964'800.0;
+  constexpr double kLeapSeconds = 18.0;
+  const bool seconds = gps_time >= 0.0 && gps_time < 1e7;
+  return from_seconds(seconds ? gps_time : gps_time + kAdjusted + kUnixAtGpsEpoch - kLeapSeconds);
+}
+
+// All of a raster of the run; empty where there is none.
+Raster read_layer(const fs::path& file) {
+  if (!fs::exists(file)) return {};
+  const PlaneArea all{Vector2d::Constant(-kAnywhere), Vector2d::Constant(kAnywhere)};
+  return read_terrain(file, all, std::nullopt);
+}
+
+// The way of one point through both worlds.
+struct Move {
+  const LayerFrame& from;
+  const Pose& target_from_world;
+  const LayerFrame& to;
+  Pose world_from_target = target_from_world.inverse();
+
+  [[nodiscard]] Vector3d to_target_world(const Vector3d& point_in_layer) const {
+    return target_from_world * from.to_world(point_in_layer);
+  }
+  [[nodiscard]] FrameChange change() const {
+    return {[this](const Vector3d& point) { return to.from_world(to_target_world(point)); },
+            [this](const Vector3d& point) {
+              return from.from_world(world_from_target * to.to_world(point));
+            },
+            to.units_per_metre() / from.units_per_metre(), false};
+  }
+};
+
+void move_cloud(const fs::path& from, const fs::path& to, const Move& move, const Raster& ground,
+                const LayerFrame& drawing, MapPicture& picture, Log& log) {
+  const auto file = open_file(from.string());
+  const LasHeader header = read_las_header(*file);
+  LasWriter writer(to, las_options(move.to));
+  read_las_points(*file, header, log, [&](const LasPoint& point) {
+    LasRecord record;
+    const Vector3d in_world = move.to_target_world(point.position);
+    const Vector3d at = move.to.from_world(in_world);
+    record.x = at.x();
+    record.y = at.y();
+    record.z = at.z();
+    record.stamp = stamp_of(point.gps_time);
+    record.intensity =
+        static_cast<std::uint16_t>(std::clamp(std::lround(point.intensity), 0L, 65535L));
+    record.classification = point.classification;
+    writer.add(record);
+    const Vector3d drawn = drawing.from_world(in_world);
+    const double height =
+        ground.empty()
+            ? std::numeric_limits<double>::quiet_NaN()
+            : point.position.z() - ground.interpolate(point.position.x(), point.position.y());
+    picture.add(drawn.x(), drawn.y(), drawn.z(), height);
+  });
+  writer.commit();
+}
+
+}  // namespace
+
+void write_moved_layers(const RunLayers& from, const Pose& target_from_world, const RunLayers& to,
+                        const LayerFrame& drawing, MapPicture& picture, Log& log) {
+  const Move move{from.frame, target_from_world, to.frame};
+  const Raster ground = read_layer(from.folder / "dtm.tif");
+  if (fs::exists(from.folder / "map.laz"))
+    move_cloud(from.folder / "map.laz", to.folder / "map.laz", move, ground, drawing, picture, log);
+  if (ground.empty()) return;
+  write_raster_layers(to.folder, ground, read_layer(from.folder / "chm.tif"), move.change(),
+                      to.frame);
+}
+
+}  // namespace understory

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+
+#include "understory/geometry/pose.h"
+#include "understory/georeference/layer_frame.h"
+#include "understory/output/map_picture.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// The layers of a run and the frame that they are in.
+struct RunLayers {
+  std::filesystem::path folder;
+  const LayerFrame& frame;
+};
+
+// Writes what a run folder holds of map.laz, dtm.tif and chm.tif to another, moved: the cloud point
+// by point, the rasters over cells of their own size, north up in the new frame. A point of a layer
+// goes back to the world frame of its run, by `target_from_world` to the world frame of the result,
+// and from there into the layers of the result. The cloud is drawn into `picture`, in the frame
+// `drawing` of the result. Throws InputError or OutputError.
+void write_moved_layers(const RunLayers& from, const Pose& target_from_world, const RunLayers& to,
+                        const LayerFrame& drawing, MapPicture& picture, Log& log);
+
+}  // namespace understory
