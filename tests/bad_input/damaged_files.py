@@ -219,13 +219,16 @@ def others(folder):
     assert done.returncode == 0 and f"{path}: at byte" in done.stdout, done.stdout
     copy = folder / "copy.mcap"
     done = program("convert", path, copy)
-    assert done.returncode == 0 and f"{path}: at byte" in done.stderr, done.stderr
+    assert done.returncode == 4 and "so the output is partial" in done.stderr, done.stderr
+    assert f"{path}: at byte" in done.stderr, done.stderr
     kept = program("info", "--json", copy)
     assert kept.returncode == 0 and '"warnings": []' in kept.stdout, kept.stdout
-    return "warned, and the rest kept"
+    stems = program("convert", path, folder / "stems.csv.gz")
+    assert stems.returncode == 4 and "so the output is partial" in stems.stderr, stems.stderr
+    return "exit 4, and the rest kept"
 
 
-@cases.case("inventory of damaged clouds")
+@cases.case("inventory, convert and register of damaged clouds")
 def inventory(folder):
     done = program("map", good, "-o", folder / "run")
     assert done.returncode == 0, done.stderr
@@ -233,6 +236,11 @@ def inventory(folder):
     done = program("inventory", path, "-o", folder / "plot")
     assert done.returncode == 4 and f"{path}: " in done.stderr, (done.returncode, done.stderr)
     assert len((folder / "plot" / "trees.csv").read_text().splitlines()) > 10
+    done = program("convert", path, folder / "stems.csv.gz")
+    assert done.returncode == 4 and f"{path}: " in done.stderr, (done.returncode, done.stderr)
+    assert (folder / "stems.csv.gz").exists()
+    done = program("register", folder / "run" / "map.laz", path)
+    assert done.returncode == 4 and "a cloud is not whole" in done.stderr, (done.returncode, done.stderr)
     path.write_bytes(b"")
     done = program("inventory", path, "-o", folder / "none")
     assert done.returncode == 3 and f"{path}: the file is empty" in done.stderr, done.stderr

@@ -69,7 +69,7 @@ class File:
         content = bytearray()
         for change in self.changes[:self.synced]:
             self.apply(content, change)
-        if mode == "lost":
+        if mode in ("lost", "newest"):
             return content
         for change in self.changes[self.synced:]:
             if mode == "kept":
@@ -164,7 +164,8 @@ class Disk:
 
     def write(self, into, seed, mode=None):
         """What is left after a cut now, into an empty folder. Mode: of what was not synced everything is
-        "lost" or "kept", or "drawn" bit by bit; None draws the mode as well."""
+        "lost" or "kept", or "drawn" bit by bit. In "newest" the name that the last call changed is kept and the
+        rest is lost: folders do not keep an order. None draws the mode as well."""
         dice = random.Random(seed)
         mode = mode or dice.choice(["lost", "kept", "drawn", "drawn", "drawn"])
         happened = {}
@@ -172,6 +173,8 @@ class Disk:
         into.mkdir(parents=True, exist_ok=True)
 
         def has_happened(number):
+            if mode == "newest":
+                return number == self.calls
             if mode != "drawn":
                 return mode == "kept"
             return happened.setdefault(number, dice.random() < 0.5)

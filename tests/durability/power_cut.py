@@ -24,6 +24,7 @@ SITES = {"dense": ["demo", "lidar.model=VLP-16", "carrier.still_s=1", "carrier.t
 def moments(run):
     """(what, calls before the cut, seed, mode, break the newest checkpoint too, most that may be done again)"""
     calls = len(run.calls)
+    first = run.find(RENAME, "checkpoint.bin")
     second = run.find(RENAME, "checkpoint.2.bin")
     third = run.find(RENAME, "checkpoint.bin", second)
     late = run.find(RENAME, "checkpoint.2.bin", third)
@@ -31,6 +32,8 @@ def moments(run):
     results = run.find(MAKE, "trajectory.tum")
     most = INTERVAL_S + SLACK_S
     yield "before anything", 0, 1, None, False, 0.0
+    yield "only the name of the first checkpoint is on the disk", first, 9, "newest", False, most
+    yield "only the name of the second checkpoint is on the disk", second, 10, "newest", False, most
     yield "the second checkpoint is renamed, not synced", second, 2, "lost", False, most
     yield "in the middle of writing the fourth checkpoint", late - 2, 3, "drawn", False, most
     yield "the same, and the newest is broken", synced, 4, "drawn", True, most + INTERVAL_S

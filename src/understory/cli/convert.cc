@@ -197,7 +197,7 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
   if (copier.events() == 0)
     throw InputError(options.input, "", "expected scans, IMU samples or fixes; found none");
   copier.finish();
-  return commit_unless_stopped(*target, stopped, options.output, context);
+  return commit_conversion(*target, stopped, options.output, context);
 }
 
 }  // namespace

@@ -33,7 +33,8 @@ void write(const StemSegments& found, const Pose& body_from_points, int frame, T
     writer.add(frame, stamp, stem_of(segment, body_from_points, found.up));
 }
 
-int convert_cloud_to_stems(const std::string& input, StagedFile& staged, CommandContext& context) {
+int convert_cloud_to_stems(const std::string& input, const std::string& output, StagedFile& staged,
+                           CommandContext& context) {
   const StandCloud stand = read_stand(input, {}, context.log);
   if (!stand.doubt.empty()) throw InputError(input, "", "expected metres and z up: " + stand.doubt);
   if (!stand.suspicion.empty()) context.log.info(stand.suspicion);
@@ -54,8 +55,7 @@ int convert_cloud_to_stems(const std::string& input, StagedFile& staged, Command
   for (const Stem& stem : stems_of(found, origin))
     writer.add(0, 0, stem);
   writer.commit();
-  staged.commit();
-  return kExitDone;
+  return commit_conversion(staged, false, output, context);
 }
 
 }  // namespace
@@ -69,7 +69,7 @@ bool is_stems_file(const std::string& output) {
 int convert_to_stems(const std::string& input, const std::string& output, const OpenOptions& open,
                      bool overwrite, CommandContext& context) {
   StagedFile staged(output, overwrite);
-  if (is_cloud(input)) return convert_cloud_to_stems(input, staged, context);
+  if (is_cloud(input)) return convert_cloud_to_stems(input, output, staged, context);
   const std::unique_ptr<Recording> recording = open_source(input, open, context.log);
   StemsWriter writer(staged.part());
   std::optional<Eigen::Vector3d> up;
@@ -99,7 +99,7 @@ int convert_to_stems(const std::string& input, const std::string& output, const 
   if (stems == 0)
     throw InputError(input, "", fmt::format("no upright stems in any of its {} scans", frame));
   writer.commit();
-  return commit_unless_stopped(staged, stopped, output, context);
+  return commit_conversion(staged, stopped, output, context);
 }
 
 }  // namespace understory

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "understory/cli/command.h"
+#include "understory/recording/finding.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 
@@ -18,18 +19,24 @@ namespace understory {
                                    const OpenOptions& open, bool overwrite,
                                    CommandContext& context);
 
-// Puts the output in place. What is there of a conversion that Ctrl-C stopped is put there, too,
-// but not in the place of a whole one. Returns the exit code.
+// Puts the output of a conversion in place. Returns the exit code: kExitUntrusted where the output
+// is partial, because Ctrl-C stopped it or the input is damaged. What a stopped conversion wrote
+// does not replace a former output.
 template <typename Staged>
-[[nodiscard]] int commit_unless_stopped(Staged& staged, bool stopped, const std::string& output,
-                                        CommandContext& context) {
+[[nodiscard]] int commit_conversion(Staged& staged, bool stopped, const std::string& output,
+                                    CommandContext& context) {
   const bool keep = stopped && staged.replaces();
   if (!keep) staged.commit();
-  if (!stopped) return kExitDone;
-  context.log.warn("convert.stopped",
-                   keep ? "stopped before the end: " + output + " is left as it was"
-                        : "stopped before the end: the output is partial");
-  return kExitUntrusted;
+  if (stopped)
+    context.log.warn("convert.stopped",
+                     keep ? "stopped before the end: " + output + " is left as it was"
+                          : "stopped before the end: the output is partial");
+  std::string damage = found(context.log, Finding::kDamage).first;
+  if (damage.empty()) damage = found(context.log, Finding::kCutOff).first;
+  if (!damage.empty() && !keep)
+    context.log.warn("convert.damaged",
+                     "the input is damaged, so the output is partial: " + damage);
+  return stopped || !damage.empty() ? kExitUntrusted : kExitDone;
 }
 
 }  // namespace understory

@@ -9,6 +9,7 @@
 #include "understory/cli/register_stems.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/recording/clouds/cloud_file.h"
+#include "understory/recording/finding.h"
 #include "understory/registration/matchers.h"
 #include "understory/util/error.h"
 
@@ -170,6 +171,11 @@ int run_register(const RegisterOptions& options, CommandContext& context) {
     print_json(result, a_from_b);
   else
     print_text(result, a_from_b);
+  const std::string damage = found(context.log, Finding::kDamage).first;
+  if (!damage.empty()) {
+    context.log.warn("register.untrusted", "a cloud is not whole: " + damage);
+    return kExitUntrusted;
+  }
   const bool trusted =
       result.status == RegistrationStatus::kConverged && result.degenerate_directions.cols() == 0;
   if (!trusted)
