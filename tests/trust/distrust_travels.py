@@ -225,7 +225,7 @@ def clouds(folder):
     for wrong in ("up", "1,2", "0,0,0", "1,2,nan", "1,2,3,4"):
         assert inventory(cloud, folder, f"--up={wrong}").returncode == 2, wrong
     cloud = write_ply(folder / "turned.ply", [(x, -y, -z) for x, y, z in points])
-    # Who says that it is right as it is, is believed.
+    # A frame that is given is taken as it is.
     assert inventory(cloud, folder, "--up", "z").returncode in (0, 4)
     # The map of a run is not refused, but not trusted either.
     run = write_run(folder / "run", "complete", ())

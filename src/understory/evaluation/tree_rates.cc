@@ -1,12 +1,12 @@
 #include "understory/evaluation/tree_rates.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "understory/evaluation/alignment.h"
 #include "understory/evaluation/tree_errors.h"
+#include "understory/geometry/symmetric_eigen.h"
 #include "understory/registration/ndt/plane_grid.h"
 
 namespace understory {
@@ -45,7 +45,7 @@ Vector2d main_direction(const Trajectory& path) {
     const Vector2d d = pose.world_from_body.translation().head<2>() - mean;
     scatter += d * d.transpose();
   }
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(scatter).eigenvectors().col(1);
+  return symmetric_eigen(scatter).vectors.col(1);
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ inline constexpr double kCell = 1.5;
 inline constexpr double kPatch = 3.0;
 // cells to each side of a patch's middle that its plane is fitted to [chosen]
 inline constexpr int kReach = 4;
-// m/m: what slopes of the ground are believed to be, one standard deviation [chosen]
+// m/m: slopes of the ground that are expected, one standard deviation [chosen]
 inline constexpr double kSlopeSd = 0.15;
 // m: scatter of lowest returns about a plane [chosen]
 inline constexpr double kRelief = 0.08;

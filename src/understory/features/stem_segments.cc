@@ -10,6 +10,8 @@
 #include "understory/features/ring_view.h"
 #include "understory/features/stem_chain.h"
 #include "understory/features/stem_score.h"
+#include "understory/geometry/pose.h"
+#include "understory/geometry/rotation_between.h"
 #include "understory/util/median.h"
 
 namespace understory {
@@ -19,7 +21,7 @@ using namespace features_constants::stem_segments;
 
 // The smallest turn that makes `up` the z axis.
 Eigen::Matrix3d level_from(const Eigen::Vector3d& up) {
-  return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  return rotation_between(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
 // Median and spread of the radii that the stems show by themselves.

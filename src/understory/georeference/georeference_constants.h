@@ -118,7 +118,7 @@ inline constexpr double kLeastWidthM = 0.05;
 }  // namespace terrain_fit
 
 namespace path_fit {  // georeference/path_fit.cc
-// degrees: motions that differ by more are different answers [chosen]
+// degrees: motions that differ by more are different solutions [chosen]
 inline constexpr double kOtherDeg = 20.0;
 // m: width of the biweight at least [chosen]
 inline constexpr double kLeastWidthM = 0.2;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <map>
 #include <utility>
 
+#include "understory/geometry/symmetric_eigen.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/median.h"
@@ -235,7 +235,7 @@ Vector2d main_direction(const std::vector<Vector3d>& points) {
   Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   for (const Vector3d& point : points)
     scatter += (point.head<2>() - mean) * (point.head<2>() - mean).transpose();
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(scatter).eigenvectors().col(1);
+  return symmetric_eigen(scatter).vectors.col(1);
 }
 
 double turn_deg(const Motion& a, const Motion& b) {

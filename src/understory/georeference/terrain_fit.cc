@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <utility>
 
+#include "understory/geometry/symmetric_eigen.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"
 
@@ -132,7 +132,7 @@ bool spread_out(const std::vector<Sample>& samples) {
     const Vector2d d = sample.arm.head<2>() - mean;
     scatter += d * d.transpose() / static_cast<double>(samples.size());
   }
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(scatter).eigenvalues()[0] > 1.0;
+  return symmetric_eigen(scatter).values[0] > 1.0;
 }
 
 void tell(const std::vector<Sample>& before, const std::vector<Sample>& after, TerrainFit& fit) {

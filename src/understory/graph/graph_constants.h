@@ -55,7 +55,7 @@ inline constexpr int kNeighbourhood = 30;
 namespace loop_closure {  // graph/loops/loop_closure.cc
 // points that rank starts [bound: time]
 inline constexpr std::size_t kScoringPoints = 1200;
-// m: two answers nearer than this are the same place [chosen]
+// m: two results nearer than this are the same place [chosen]
 inline constexpr double kSamePlaceM = 1.0;
 // rad: and turned by less [chosen]
 inline constexpr double kSamePlaceRad = 3.0 * kRadPerDegree;

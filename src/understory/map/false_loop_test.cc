@@ -57,8 +57,8 @@ Points scan_at(const Stand& stand, const Pose& world_from_body, std::uint64_t se
   return testing::scan_stand(near, world_from_body, pattern, seed);
 }
 
-// Where the walker believes to be.
-Pose believed(int step) {
+// The estimated pose of the walker.
+Pose estimated(int step) {
   const double angle = 2.0 * std::numbers::pi * step / kSteps * 1.05;
   return {so3_exp({0.0, 0.0, angle}),
           Eigen::Vector3d(kRadiusM * std::sin(angle), kRadiusM * (1.0 - std::cos(angle)), 1.7)};
@@ -66,7 +66,7 @@ Pose believed(int step) {
 
 struct Walk {
   std::vector<LoopAttempt> loops;  // tried from places wholly after the slip
-  int used = 0;                    // of those, believed by the graph
+  int used = 0;                    // of those, accepted by the graph
   std::vector<Keyframe> keyframes;
 };
 
@@ -96,7 +96,7 @@ KeyframeMap::Config paper_config() {
   return config;
 }
 
-// `slip`: from half way on the walker truly is that far from where it believes to be.
+// `slip`: from half way on the walker truly is that far from its estimated pose.
 Walk walk(const Stand& stand, const Eigen::Vector3d& slip,
           const KeyframeMap::Config& config = own_config()) {
   const test::TemporaryFolder folder;
@@ -108,8 +108,8 @@ Walk walk(const Stand& stand, const Eigen::Vector3d& slip,
   for (int step = 0; step <= kSteps; ++step) {
     const Pose truth =
         Pose(Eigen::Quaterniond::Identity(), step > kSteps / 2 ? slip : Eigen::Vector3d::Zero()) *
-        believed(step);
-    const auto now = map.add(TimeNs{step} * kNsPerSecond, moved * believed(step),
+        estimated(step);
+    const auto now = map.add(TimeNs{step} * kNsPerSecond, moved * estimated(step),
                              scan_at(stand, truth, static_cast<std::uint64_t>(step)));
     if (now) moved = *now * moved;
   }
@@ -138,9 +138,9 @@ TEST(FalseLoops, ATrueReturnIsClosed) {
   const Walk result = walk(grown_stand(), slip);
   print(result);
   EXPECT_GT(result.used, 0);
-  const Pose truth = Pose(Eigen::Quaterniond::Identity(), slip) * believed(kSteps);
+  const Pose truth = Pose(Eigen::Quaterniond::Identity(), slip) * estimated(kSteps);
   const Pose first = result.keyframes.front().world_from_body;
-  const Pose found = believed(0) * first.inverse() * result.keyframes.back().world_from_body;
+  const Pose found = estimated(0) * first.inverse() * result.keyframes.back().world_from_body;
   EXPECT_LT((found.translation() - truth.translation()).norm(), 0.25);
 }
 
@@ -158,7 +158,7 @@ TEST(FalseLoops, ThePapersLoopsTakeTheEdgeFromTheMatchToTheLocalMap) {
     const auto truly = [&](int step) {
       return Pose(Eigen::Quaterniond::Identity(),
                   step > kSteps / 2 ? slip : Eigen::Vector3d::Zero()) *
-             believed(step);
+             estimated(step);
     };
     const Vector6d error =
         right_difference(loop.edge.from_from_to, truly(loop.from).inverse() * truly(loop.to));
@@ -171,9 +171,9 @@ TEST(FalseLoops, ThePapersLoopsTakeTheEdgeFromTheMatchToTheLocalMap) {
         Eigen::Vector3d::Constant(translation * translation);
     EXPECT_TRUE(loop.edge.covariance.isApprox(Matrix6d(variances.asDiagonal()), 1e-9));
   }
-  const Pose truth = Pose(Eigen::Quaterniond::Identity(), slip) * believed(kSteps);
+  const Pose truth = Pose(Eigen::Quaterniond::Identity(), slip) * estimated(kSteps);
   const Pose first = result.keyframes.front().world_from_body;
-  const Pose found = believed(0) * first.inverse() * result.keyframes.back().world_from_body;
+  const Pose found = estimated(0) * first.inverse() * result.keyframes.back().world_from_body;
   EXPECT_LT((found.translation() - truth.translation()).norm(), 0.25);
 }
 
@@ -184,8 +184,8 @@ void expect_no_loop(const Walk& result) {
   for (const LoopAttempt& loop : result.loops)
     EXPECT_FALSE(loop.reason.empty()) << loop.from << " - " << loop.to;
   const Pose first = result.keyframes.front().world_from_body;
-  const Pose found = believed(0) * first.inverse() * result.keyframes.back().world_from_body;
-  EXPECT_LT((found.translation() - believed(kSteps).translation()).norm(), 0.15);
+  const Pose found = estimated(0) * first.inverse() * result.keyframes.back().world_from_body;
+  EXPECT_LT((found.translation() - estimated(kSteps).translation()).norm(), 0.15);
 }
 
 TEST(FalseLoops, AnotherPlaceOfAStandIsNone) {

@@ -6,8 +6,8 @@
 namespace understory {
 namespace {
 
-bool believable(const RegistrationResult& match, const Pose& before,
-                const FirstKeyframesConfig& config) {
+bool is_acceptable(const RegistrationResult& match, const Pose& before,
+                   const FirstKeyframesConfig& config) {
   if (!match.usable() || match.degenerate_directions.cols() > 0) return false;
   const Pose change = before.inverse() * match.target_from_source;
   return change.translation().norm() <= config.max_m &&
@@ -39,7 +39,7 @@ std::vector<Pose> refine_first_keyframes(
   for (std::size_t i = count; i < known; ++i)
     map.insert({points(i).get(), segment[i].world_from_body}, false);
 
-  std::vector<Pose> answer(count);
+  std::vector<Pose> result(count);
   Pose moved;  // of the world, at the keyframe looked at last
   for (std::size_t i = count; i-- > 0;) {
     const auto cloud = points(i);
@@ -47,11 +47,11 @@ std::vector<Pose> refine_first_keyframes(
     const PosePrior prior{guess, segment[i + 1].covariance.inverse()};
     const RegistrationResult match =
         map.snapshot()->match(*cloud, guess, {prior}, MatchStart::kNear);
-    answer[i] = believable(match, guess, config) ? match.target_from_source : guess;
-    moved = answer[i] * segment[i].world_from_body.inverse();
-    map.insert({cloud.get(), answer[i]}, false);
+    result[i] = is_acceptable(match, guess, config) ? match.target_from_source : guess;
+    moved = result[i] * segment[i].world_from_body.inverse();
+    map.insert({cloud.get(), result[i]}, false);
   }
-  return answer;
+  return result;
 }
 
 }  // namespace understory

@@ -18,7 +18,7 @@ struct FirstKeyframesConfig {
   bool enabled = true;
   int keyframes = 25;      // at the beginning that are positioned again
   int map_keyframes = 25;  // after those, that the map begins with
-  // What would move a keyframe farther than this is not believed.
+  // What would move a keyframe farther than this is rejected.
   double max_m = 0.3;
   double max_deg = 2.0;
 };

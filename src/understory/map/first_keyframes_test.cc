@@ -83,7 +83,7 @@ TEST(Beginning, IsPutRightByTheMapThatFollows) {
     EXPECT_EQ(refined[i].translation(), again[i].translation());
 }
 
-TEST(Beginning, StaysWhatItWasWhereTheCorrectionIsNotBelieved) {
+TEST(FirstKeyframes, StayWhatTheyWereWhereTheCorrectionIsRejected) {
   const Path path;
   const std::vector<Keyframe> tilted = path.tilted(4);
   const std::vector<Pose> refined =

@@ -88,7 +88,7 @@ class KeyframeMap {
   [[nodiscard]] const MatchTargetPtr& local_map() const { return snapshot_; }
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
   [[nodiscard]] const std::vector<LoopAttempt>& loops() const { return loops_.attempts(); }
-  // Which of the verified loops the graph believes in; of the size of loops().
+  // Which of the verified loops the graph accepts; of the size of loops().
   [[nodiscard]] const std::vector<char>& loops_used() const { return loops_used_; }
   // CPU time of the searches for loops, which run beside the scan loop.
   [[nodiscard]] double search_cpu_seconds() const { return loops_.search_cpu_seconds(); }

@@ -10,7 +10,7 @@ namespace understory {
 struct LoopAttempt {
   int from = 0;  // the older keyframe
   int to = 0;
-  bool verified = false;      // the scans fit; whether the graph believes it is another question
+  bool verified = false;      // the scans fit; whether the graph accepts it is another question
   double correction_m = 0.0;  // by how much it disagreed with the poses at the time
   PoseEdge edge;              // if verified
   std::string reason;         // if not

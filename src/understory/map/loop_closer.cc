@@ -47,15 +47,15 @@ Points points_around(const Search& search, std::size_t keyframe, int reach) {
 }
 
 LoopAttempt attempt_of(std::size_t query, const LoopCandidate& candidate,
-                       const Pose& candidate_from_query, const LoopVerification& answer) {
+                       const Pose& candidate_from_query, const LoopVerification& verified) {
   LoopAttempt attempt;
   attempt.from = candidate.keyframe;
   attempt.to = static_cast<int>(query);
-  attempt.verified = answer.accepted;
-  attempt.reason = answer.reason;
+  attempt.verified = verified.accepted;
+  attempt.reason = verified.reason;
   attempt.correction_m =
-      (candidate_from_query.inverse() * answer.target_from_source).translation().norm();
-  attempt.edge = {attempt.from, attempt.to, answer.target_from_source, answer.covariance};
+      (candidate_from_query.inverse() * verified.target_from_source).translation().norm();
+  attempt.edge = {attempt.from, attempt.to, verified.target_from_source, verified.covariance};
   return attempt;
 }
 
@@ -74,10 +74,10 @@ LoopAttempt try_loop(const Search& search, std::size_t query, const LoopCandidat
                     verify_loop(input, search.config.verification));
 }
 
-bool worth_applying(const Search& search, const std::vector<Pose>& answer) {
+bool worth_applying(const Search& search, const std::vector<Pose>& solved) {
   const auto& poses = search.problem.world_from_keyframe;
-  for (std::size_t i = 0; i < answer.size(); ++i) {
-    const Pose change = poses[i].inverse() * answer[i];
+  for (std::size_t i = 0; i < solved.size(); ++i) {
+    const Pose change = poses[i].inverse() * solved[i];
     if (change.translation().norm() > search.config.min_correction_m ||
         change.angle() > search.config.min_correction_deg * std::numbers::pi / 180.0) {
       return true;
@@ -116,8 +116,8 @@ LoopAttempt try_in_present(const Search& search, std::size_t query, const LoopCa
       VoxelFilter().filter(*search.points->get(from), search.config.voxel_size_m);
   input.world_from_candidate = poses[from];
   input.world_from_query = poses[query];
-  const Pose believed = poses[from].inverse() * poses[query];
-  return attempt_of(query, candidate, believed,
+  const Pose estimated = poses[from].inverse() * poses[query];
+  return attempt_of(query, candidate, estimated,
                     register_to_local_map(input, search.config.verification));
 }
 

@@ -60,7 +60,7 @@ TEST(RangeCheck, PairsAreCombinedByWhatTheyTell) {
   EXPECT_EQ(few.pairs, 5);
   EXPECT_NEAR(few.offset_m, 1.0, 0.02);
   EXPECT_LT(few.standard_error_m, 0.05);
-  // One that is far off and believes in itself counts as one that is off by three deviations.
+  // One that is far off and overconfident counts as one that is off by three deviations.
   std::vector<RangeOffset> with_stray(20, pair(0.1, 0.05));
   with_stray.push_back(pair(8.0, 0.05));
   EXPECT_NEAR(combine(with_stray).offset_m, 0.1, 0.02);

@@ -61,7 +61,7 @@ class TestCarrier {
     return sample;
   }
 
-  // The answer of a scan matcher in the world of the model, whose origin is where it began.
+  // The result of a scan matcher in the world of the model, whose origin is where it began.
   [[nodiscard]] LidarFactor lidar(double t, const Pose& model_from_truth) {
     Vector6d error;
     error << normal(lidar_noise_, config_.lidar_sigma_rad),

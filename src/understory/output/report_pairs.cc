@@ -75,6 +75,25 @@ std::string pair_scatter(const ReportCorrection& correction) {
              correction.pairs.size(), correction.min_overlap);
 }
 
+// Ticks and names of both axes of a matrix: views are counted from 0 at the upper left corner.
+std::string matrix_axes(int views, double left, double side) {
+  std::string svg;
+  const double scale = side / std::max(1, views);
+  for (const double view : round_ticks(0.0, views, 4)) {
+    svg += fmt::format(
+        "<text x=\"{0:.1f}\" y=\"{1:.1f}\" text-anchor=\"middle\">{2:.0f}</text>"
+        "<text x=\"{3:.1f}\" y=\"{4:.1f}\" text-anchor=\"end\">{2:.0f}</text>",
+        left + view * scale, side + 16.0, view, left - 4.0, view * scale + 9.0);
+  }
+  svg += fmt::format(
+      "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">later view, number</text>",
+      left + 0.5 * side, side + 32.0);
+  return svg + fmt::format(
+                   "<text transform=\"translate(11 {:.1f}) rotate(-90)\" "
+                   "text-anchor=\"middle\">earlier view, number</text>",
+                   0.5 * side);
+}
+
 // A matrix of all pairs, later views to the right, earlier ones downwards, with the corrections.
 std::string matrix_svg(const ReportViewMatrix& matrix, bool errors,
                        const ReportCorrection::Pairs& marked) {
@@ -94,16 +113,18 @@ std::string matrix_svg(const ReportViewMatrix& matrix, bool errors,
       if (errors && overlap > 0.6F && column > row + 1) picture.at(column, row) = kRed;
     }
   }
+  constexpr double kLeft = 52.0;
   std::string svg = fmt::format(
-      "<svg class=\"paper\" viewBox=\"0 0 {0:.0f} {0:.0f}\" role=\"img\" "
-      "aria-label=\"all pairs of views\">",
-      kSide);
-  svg += image(picture, 0.0, 0.0, kSide, kSide);
+      "<svg class=\"plot\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" "
+      "aria-label=\"all pairs of views\">"
+      "<rect fill=\"#fff\" x=\"{:.0f}\" width=\"{:.0f}\" height=\"{:.0f}\"/>",
+      kLeft + kSide + 14.0, kSide + 38.0, kLeft, kSide, kSide);
+  svg += image(picture, kLeft, 0.0, kSide, kSide) + matrix_axes(matrix.views, kLeft, kSide);
   const double scale = kSide / std::max(1, matrix.views);
   for (const auto& [later, earlier] : marked) {
     svg += fmt::format(
         "<path d=\"M{0:.1f} {1:.1f}h8m-4 -4v8\" stroke=\"#1d8f3f\" stroke-width=\"1.6\"/>",
-        later * scale - 4.0, earlier * scale);
+        kLeft + later * scale - 4.0, earlier * scale);
   }
   return svg + "</svg>";
 }
@@ -113,8 +134,7 @@ std::string matrices(const ReportCorrection& correction) {
   if (correction.matrix_before.side < 2) return "";
   return "<h3>All pairs of views</h3><div class=\"trees matrices\">" +
          figure(matrix_svg(correction.matrix_before, false, {}),
-                "Share of stems in common, black: all. Number of the later view to the right, of "
-                "the earlier one downwards.") +
+                "Share of stems in common, white 0 to black 1.") +
          figure(matrix_svg(correction.matrix_before, true, correction.kept),
                 "Mean distance of these before correction, white 0 to black 0.5 m; red: more than "
                 "0.6 in common; green crosses: the corrections.") +

@@ -76,8 +76,8 @@ class EventOrderer {
 
   // Before the first push: a constant offset of this stream (below ten seconds) is taken for a
   // delay of its arrival. Its stamps stand, and scans wait for it if it is the IMU.
-  void believe_stamps(Stream stream) { clocks_[stream].believed = true; }
-  [[nodiscard]] bool believes_stamps(Stream stream) const { return clocks_[stream].believed; }
+  void trust_stamps(Stream stream) { clocks_[stream].trusted = true; }
+  [[nodiscard]] bool trusts_stamps(Stream stream) const { return clocks_[stream].trusted; }
 
   void push(Event event);
   // The next event in order of time, or nothing yet.
@@ -108,7 +108,7 @@ class EventOrderer {
     TimeNs released = 0;     // stamp of the last one that left
     bool any_released = false;
     TimeNs unbroken_since = 0;      // stamp of the first that left after the last gap of an IMU
-    bool believed = false;          // stamps, against the order of arrival
+    bool trusted = false;           // stamps, against the order of arrival
     StreamOffset arrival;           // against the lidar's; not of the lidar itself
     TimeNs lag = 0;                 // by which its messages come late; negative: lidar's do
     TimeNs last_raw = 0;            // of the message that came last

@@ -107,11 +107,11 @@ TEST(EventOrderer, AnImuWhoseClockRunsAheadOrBehindIsShiftedFromItsFirstSample) 
   }
 }
 
-TEST(EventOrderer, AnImuThatComesLateIsWaitedForWhereItsStampsAreBelieved) {
+TEST(EventOrderer, AnImuThatComesLateIsWaitedForWhereItsStampsAreTrusted) {
   const std::vector<Event> late = shifted(recording(12.0), EventOrderer::kImu, -2000 * kMs);
   Log log;
   EventOrderer orderer({}, log);
-  orderer.believe_stamps(EventOrderer::kImu);
+  orderer.trust_stamps(EventOrderer::kImu);
   Outcome outcome;
   for (const Event& event : late) {
     orderer.push(event);

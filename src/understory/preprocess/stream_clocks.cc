@@ -117,7 +117,7 @@ void EventOrderer::mend_offset(Stream stream) {
   const std::string about = std::string(kNames[stream]) + ": its stamps are " +
                             seconds(std::abs(offset)) + (offset > 0 ? " ahead of" : " behind") +
                             " the lidar's by the order of arrival";
-  if (clock.believed && std::abs(offset) < kLongestDelay) {
+  if (clock.trusted && std::abs(offset) < kLongestDelay) {
     clock.lag = -offset;
     log_->warn("time.clock_delay",
                about + "; this is a delay of arrival, and the stamps are not shifted");

@@ -26,7 +26,7 @@ struct Judgement {
 [[nodiscard]] RegistrationResult refused(RegistrationStatus status, std::string reason,
                                          const Pose& guess);
 
-// The answer of a matcher that came to `minimum`, where `at` (with a positive Hessian) are its sums
+// The result of a matcher that came to `minimum`, where `at` (with a positive Hessian) are its sums
 // over `source`, whose mean range is `range_m`. Refused if hardly any point matched or nothing
 // constrains the pose.
 [[nodiscard]] RegistrationResult judged_match(const Minimum& minimum, const MatchSums& at,

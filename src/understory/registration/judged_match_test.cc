@@ -45,7 +45,7 @@ TEST(Conclude, FiguresAreThoseOfTheSums) {
   EXPECT_EQ(result.degenerate_directions.cols(), 0);
 }
 
-TEST(Conclude, ResidualsThatLookTooGoodAreNotBelieved) {
+TEST(JudgedMatch, ResidualsThatLookTooGoodAreNotTrusted) {
   MatchSums at = sums();
   at.weighted_residual = 0.0;
   EXPECT_TRUE(conclude_from(at).information.isApprox(0.5 / 0.1 * at.hessian));

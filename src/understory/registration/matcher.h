@@ -41,7 +41,7 @@ class MatchTarget {
   virtual ~MatchTarget() = default;
 
   // Matches points, best thinned by a voxel filter, from a guess of target_from_source. `terms`
-  // count beside the points; the information of the answer is that of the points alone. Parallel;
+  // count beside the points; the information of the result is that of the points alone. Parallel;
   // same bits for any number of threads.
   [[nodiscard]] virtual RegistrationResult match(const Points& source, const Pose& guess,
                                                  const PoseTerms& terms,

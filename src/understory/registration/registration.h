@@ -10,13 +10,13 @@
 
 namespace understory {
 
-// What is believed of the pose before matching; added to the cost as a Gaussian.
+// What is known of the pose before matching; added to the cost as a Gaussian.
 struct PosePrior {
   Pose target_from_source;
   Matrix6d information = Matrix6d::Zero();  // of a right perturbation, rotation first
 };
 
-// Where a point of the source is believed to be, e.g. a GNSS antenna; added to the cost as a
+// Where a point of the source is expected, e.g. a GNSS antenna; added to the cost as a
 // Gaussian.
 struct PositionPrior {
   Eigen::Vector3d position_in_target;
@@ -48,7 +48,7 @@ enum class RegistrationStatus {
 // The name of a status in messages and tables.
 [[nodiscard]] std::string to_string(RegistrationStatus status);
 
-// The answer of every matcher.
+// The result of every matcher.
 struct RegistrationResult {
   RegistrationStatus status = RegistrationStatus::kTooFewPoints;
   std::string reason;  // for the log and the report, empty if converged

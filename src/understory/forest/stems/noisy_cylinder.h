@@ -28,7 +28,7 @@ struct NoisyCylinder {
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
-// What is believed of a stem's form before it is fitted; tapers and slopes are tangents.
+// The prior of a stem's form before it is fitted; tapers and slopes are tangents.
 struct NoisyCylinderConfig {
   double usual_taper = -0.008;  // of the radius per metre of height
   double taper_sd = 0.006;      // how far stems differ from it

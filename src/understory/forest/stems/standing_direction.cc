@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "understory/forest/forest_constants.h"
+#include "understory/geometry/rotation_between.h"
 
 namespace understory {
 namespace {
@@ -62,7 +63,7 @@ std::vector<Vector3d> above_ground(const std::vector<Vector3d>& points, const Ve
 class ColumnCounts {
  public:
   ColumnCounts(const std::vector<Vector3d>& points, const Vector3d& axis, double cell) {
-    const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(axis, Vector3d::UnitZ());
+    const Eigen::Quaterniond turn = rotation_between(axis, Vector3d::UnitZ());
     const Eigen::Matrix<double, 2, 3> across = turn.toRotationMatrix().topRows<2>() / cell;
     std::vector<Vector2d> places;
     places.reserve(points.size());
@@ -124,7 +125,7 @@ Vector3d direction(double off_z_deg, double around_deg) {
 // Rings of directions around an axis, about `step_deg` apart.
 std::vector<Vector3d> directions_around(const Vector3d& axis, double farthest_deg,
                                         double step_deg) {
-  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis);
+  const Eigen::Quaterniond turn = rotation_between(Vector3d::UnitZ(), axis);
   std::vector<Vector3d> directions{axis};
   for (double off = step_deg; off <= farthest_deg + 1e-9; off += step_deg) {
     const int count =

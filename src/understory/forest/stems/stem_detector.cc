@@ -110,7 +110,7 @@ std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
 }
 
 // How much may lie beside the surface, as the sum of both ratios of StemEvidence, for it still to
-// be a stem. In a thicket it takes many slices that agree to believe in one; a steep lean is what a
+// be a stem. In a thicket it takes many slices that agree to accept one; a steep lean is what a
 // line through scattered points has.
 double max_clutter(const StemFitResult& fit, double lean_deg) {
   const auto rings = static_cast<double>(fit.stem.slices.size());

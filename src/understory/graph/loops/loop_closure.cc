@@ -8,6 +8,8 @@
 #include <numbers>
 #include <optional>
 
+#include "understory/geometry/pose.h"
+#include "understory/geometry/rotation_between.h"
 #include "understory/graph/graph_constants.h"
 #include "understory/graph/self_correction/structure.h"
 #include "understory/util/parallel.h"
@@ -37,7 +39,7 @@ Points move_points(const Points& points, const Pose& pose) {
 }
 
 Side make_side(const Points& points, const Eigen::Vector3d& up, const Matcher& matcher) {
-  const Pose level(Eigen::Quaterniond::FromTwoVectors(up.normalized(), Eigen::Vector3d::UnitZ()),
+  const Pose level(rotation_between(up.normalized(), Eigen::Vector3d::UnitZ()),
                    Eigen::Vector3d::Zero());
   Side side;
   side.points = move_points(points, level);
@@ -46,7 +48,7 @@ Side make_side(const Points& points, const Eigen::Vector3d& up, const Matcher& m
   return side;
 }
 
-// The believed pose first, then around it.
+// The estimated pose first, then around it.
 std::vector<Pose> make_starts(const Pose& guess, const LoopInput& input,
                               const LoopClosureConfig& config) {
   double step = config.search_step_m;

@@ -10,20 +10,20 @@
 
 namespace understory {
 
-// Two places that may be the same, and what is believed of their relative pose. Points of both in
+// Two places that may be the same, and their estimated relative pose. Points of both in
 // the body frames of their keyframes, thinned by a voxel filter (about 0.2-0.4 m); best each a
 // small map of a few keyframes around it.
 struct LoopInput {
   Points target_points;
   Points source_points;
-  Pose target_from_source;           // believed
+  Pose target_from_source;           // estimated
   double sigma_translation_m = 0.0;  // of that, per axis
   double sigma_rotation_rad = 0.0;   // of its heading
   Eigen::Vector3d up_in_target = Eigen::Vector3d::UnitZ();
   Eigen::Vector3d up_in_source = Eigen::Vector3d::UnitZ();
 };
 
-// How a loop is matched, and when a match is believed.
+// How a loop is matched, and when a match is accepted.
 struct LoopClosureConfig {
   MatcherConfig matcher;  // for a first estimate
   // The method that has the last word, e.g. ICP as in P2-7, with its settings in `matcher`; none:
@@ -51,7 +51,7 @@ struct LoopClosureConfig {
   double max_asymmetry_m = 0.1;   // between source to target and target to source
   double max_asymmetry_deg = 0.5;
   bool check_symmetry = true;
-  // The least that is believed of the result's standard deviations.
+  // The least standard deviations of a result.
   double sigma_rotation_deg = 0.1;
   double sigma_translation_m = 0.02;
   double sigma_translation_per_m = 0.002;  // of the distance between the two: surfaces seen from

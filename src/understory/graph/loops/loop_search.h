@@ -37,7 +37,7 @@ void describe(ConfigTable& table, LoopSearchConfig& config);
 struct LoopCandidate {
   int keyframe = 0;
   double distance_m = 0.0;
-  double expected_overlap = 0.0;  // 0..1, of the two views where they are believed to be
+  double expected_overlap = 0.0;  // 0..1, of the two views at their estimated poses
   // Standard deviations of the relative pose between the candidate and the query.
   double sigma_translation_m = 0.0;
   double sigma_rotation_rad = 0.0;

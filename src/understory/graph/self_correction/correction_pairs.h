@@ -36,7 +36,7 @@ struct PairConfig {
   int tested = 100'000;    // pairs of views drawn at random
   int shortest_gap = 2;    // views
   int longest_gap = 1000;  // views; 0: any
-  // lambda of step 1. The paper draws from 0.2 on, but believes no match that ends below 0.4.
+  // lambda of step 1. The paper draws from 0.2 on, but accepts no match that ends below 0.4.
   double min_overlap = 0.4;
   // (27): a match is acceptable if its error is below the first plus overlap times the second.
   double error_m = 0.3;

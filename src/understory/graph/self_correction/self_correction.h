@@ -43,7 +43,7 @@ struct GainConfig {
   double match_sd_m = 0.02;      // of a match of gathered views with full overlap
   double min_gain = 0.05;        // nats; the next pair must be expected to tell that much
   int revisits = 2;              // rounds in which all accepted pairs are matched again
-  double largest_step_l0 = 1.0;  // a match that moves the views farther apart is not believed
+  double largest_step_l0 = 1.0;  // a match that moves the views farther apart is rejected
 };
 
 // Settings of `understory correct` below `correction`; the method decides which of them count.
@@ -75,7 +75,7 @@ struct SelfCorrectionProblem {
   std::vector<Pose> steps;                 // of the odometry, to each view from the one before it
   std::vector<double> step_errors;         // e of the step to each view; 0 for the first
   std::vector<Matrix6d> step_covariances;  // of the step to each view, right perturbation
-  std::vector<PoseEdge> loops;             // believed already, for the methods that solve a graph
+  std::vector<PoseEdge> loops;             // accepted already, for the methods that solve a graph
   std::vector<TiltPrior> tilts;            // what the views know of up, for the same methods
 };
 
@@ -89,7 +89,7 @@ struct TriedCorrection {
   double moved_m = 0.0;        // in the plane, by which the match differs from the poses before
   bool by_go_icp = false;      // ICP alone had failed
   bool accepted = false;
-  bool kept = false;   // in the answer
+  bool kept = false;   // in the result
   std::string reason;  // if not accepted or not kept
   double beta = 0.0;   // of the map after it, if accepted (powers and lattice)
 };
@@ -100,7 +100,7 @@ struct [[nodiscard]] SelfCorrectionResult {
   std::vector<char> use;  // 0: the map is better without this view
   std::vector<TriedCorrection> tried;
   std::size_t promising = 0;  // |I2|
-  int kept = 0;               // corrections in the answer
+  int kept = 0;               // corrections in the result
   int go_icp_calls = 0;
   MapSharpness before;
   MapSharpness after;

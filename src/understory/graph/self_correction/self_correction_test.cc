@@ -200,7 +200,7 @@ TEST(SelfCorrection, PowersOfTheTrueMatchStraightenABentMapAndOfTheWrongSignBlur
     bent.push_back(first * share * first.inverse() * seen.truth[static_cast<std::size_t>(k)]);
   }
   const Pose right = first.inverse() * seen.truth.back();
-  const Pose wrong = Pose::exp(2.0 * bend) * right;  // as far from what is believed, away from it
+  const Pose wrong = Pose::exp(2.0 * bend) * right;  // as far from the start, away from it
   PowerConfig config;
   config.coefficient = PowerCoefficient::kIndex;
   const auto noise_after = [&](const Pose& match) {

@@ -36,7 +36,7 @@ struct ScanPathCorrection {
 //   source: deskewed along the guessed path, body frame at its stamp; thinned
 //   duration: from the stamp to the last point, > 0
 //   start: the pose of the body at the stamp, best from a rigid match
-// The difference of the two corrections is bound by the acceleration the carrier is believed
+// The difference of the two corrections is bound by the acceleration the carrier is taken
 // capable of. Deterministic for any number of threads. Thread-safe.
 [[nodiscard]] ScanPathCorrection match_scan_path(const MatchTarget& target, const BodyCloud& source,
                                                  TimeNs duration, const Pose& start,

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/geometry/rotation_between.h"
 #include "understory/odometry/dense/match_gate.h"
 #include "understory/odometry/imu/imu_sums.h"
 #include "understory/odometry/imu/initial_state.h"
@@ -305,7 +306,7 @@ void ImuSmoother::hand_over_to_isam() {
 
 Eigen::Quaterniond ImuSmoother::level_from_world() const {
   if (!vertical_since_ || !use_imu()) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond::FromTwoVectors(-gravity(), Eigen::Vector3d::UnitZ());
+  return rotation_between(-gravity(), Eigen::Vector3d::UnitZ());
 }
 
 void ImuSmoother::move_world(const Pose& new_world_from_old_world) {

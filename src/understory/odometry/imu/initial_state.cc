@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "understory/geometry/pose.h"
+#include "understory/geometry/rotation_between.h"
 #include "understory/odometry/odometry_constants.h"
 
 namespace understory {
@@ -37,7 +39,7 @@ Statistics statistics(const std::vector<InertialSample>& samples) {
 // Attitude of the body with `up_in_body` upwards and the x axis (or y, where x is upright) at
 // heading zero.
 Eigen::Quaterniond levelled(const Eigen::Vector3d& up_in_body) {
-  const auto level = Eigen::Quaterniond::FromTwoVectors(up_in_body, Eigen::Vector3d::UnitZ());
+  const auto level = rotation_between(up_in_body, Eigen::Vector3d::UnitZ());
   Eigen::Vector3d axis = level * Eigen::Vector3d::UnitX();
   double heading = 0.0;
   if (axis.head<2>().norm() < 0.2) {

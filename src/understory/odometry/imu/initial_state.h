@@ -13,8 +13,8 @@ struct InitialState {
 };
 
 // From the IMU samples around the first scan (possibly none). Still: the mean specific force points
-// up and the mean rate is the gyroscope's bias. In motion: the same attitude, but nothing is
-// believed of velocity and biases, and little of the vertical; the smoother finds them. The body's
+// up and the mean rate is the gyroscope's bias. In motion: the same attitude, but velocity
+// and biases are unknown, and the vertical nearly so; the smoother finds them. The body's
 // origin becomes the world's, the heading of its x axis zero.
 [[nodiscard]] InitialState find_initial_state(const std::vector<InertialSample>& samples,
                                               TimeNs stamp, const Pose& body_from_imu,

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/geometry/rotation_between.h"
 #include "understory/odometry/odometry_constants.h"
 #include "understory/util/error.h"
 
@@ -96,7 +97,7 @@ Eigen::Vector3d WindowSmoother::gravity() const {
 }
 
 void WindowSmoother::set_up(const Eigen::Vector3d& up_in_world) {
-  gravity_rotation_ = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up_in_world);
+  gravity_rotation_ = rotation_between(Eigen::Vector3d::UnitZ(), up_in_world);
   prior_.gravity_rotation = gravity_rotation_;
 }
 

@@ -23,7 +23,7 @@ struct MotionInterval {
 void put_interval(BinaryWriter& writer, const MotionInterval& interval);
 [[nodiscard]] MotionInterval get_interval(BinaryReader& reader);
 
-// What is believed before the first scan, as standard deviations.
+// The prior before the first scan, as standard deviations.
 struct InitialUncertainty {
   double rotation_rad = 1e-4;  // the first pose defines the world, so next to nothing
   double position_m = 1e-4;

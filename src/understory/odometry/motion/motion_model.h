@@ -77,7 +77,7 @@ struct ImuTrust {
 //
 // Order of calls for a scan: add_imu for all samples that are there (best up to the end of the
 // scan), predict_path over the scan to deskew it, predict at its stamp as the start of the match,
-// add_scan with the answer.
+// add_scan with the result.
 class MotionModel {
  public:
   virtual ~MotionModel() = default;
@@ -133,7 +133,7 @@ enum class LidarNoise {
   kBoth,         // the information matrix with the floor of (36)
 };
 
-// What the match of a scan is believed, P4 (36).
+// Covariance of the match of a scan, P4 (36).
 struct LidarNoiseConfig {
   LidarNoise source = LidarNoise::kBoth;
   double sigma_rotation_deg = 0.05;   // floor of one match
@@ -179,9 +179,9 @@ struct MotionConfig {
   double velocity_gate_m_s = 1.0;
   double angular_gate_deg_s = 30.0;  // the same for the turn since the last scan
   VelocityGateReference velocity_gate_reference = VelocityGateReference::kPrediction;
-  int velocity_gate_patience = 5;  // drops in a row before a match is believed after all
+  int velocity_gate_patience = 5;  // drops in a row before a match is accepted after all
   bool level_world = true;         // allow new_world_from_old_world in the first seconds
-  // Constant-velocity model: acceleration that the carrier is believed capable of.
+  // Constant-velocity model: acceleration that the carrier is capable of.
   double motion_accel_sigma_m_s2 = 3.0;
   double motion_angular_accel_sigma_rad_s2 = 6.0;
 };

@@ -33,7 +33,7 @@ class MotionPredictor {
   [[nodiscard]] MotionPrediction predict(const MotionPrediction& from, TimeNs to) const;
 
   // The states from `from` (included) to `to` (included), one for each sample in between.
-  // `fixed_velocity` (world, m/s): the accelerometer is not believed, only the gyroscope is.
+  // `fixed_velocity` (world, m/s): the accelerometer is not used, only the gyroscope is.
   [[nodiscard]] std::vector<ImuState> path(
       const MotionPrediction& from, TimeNs to,
       const std::optional<Eigen::Vector3d>& fixed_velocity) const;

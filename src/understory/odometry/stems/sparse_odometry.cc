@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/geometry/rotation_between.h"
 
 namespace understory {
 namespace {
@@ -20,12 +21,11 @@ Pose upright(const Pose& pose) {
 // Turns a view that was matched towards the tilt that its stems show, by a share. In the plane its
 // feet stay on those that they were matched to, as well as they can: the body stands some metres
 // above them, and turned about its own place by a hundredth of a degree, always the same way, it
-// would lose half a millimetre at each view. Its height stays, as it is not the heights' tilt that
-// is believed.
+// would lose half a millimetre at each view. Its height stays: the
+// tilt comes from the axes of the stems, not from heights.
 Pose hold_tilt(const Pose& world_from_level, const Matrix6d& information, double share) {
   const Eigen::Vector3d seen = world_from_level.rotation() * Eigen::Vector3d::UnitZ();
-  const Eigen::Quaterniond whole =
-      Eigen::Quaterniond::FromTwoVectors(seen, Eigen::Vector3d::UnitZ());
+  const Eigen::Quaterniond whole = rotation_between(seen, Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d turn =
       world_from_level.rotation().inverse() * (share * so3_log(whole)).eval();
   Vector6d step = Vector6d::Zero();

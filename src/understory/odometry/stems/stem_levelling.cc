@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/geometry/rotation_between.h"
 #include "understory/odometry/odometry_constants.h"
 
 namespace understory {
@@ -49,7 +50,7 @@ StemUp stem_up(const StemView& view) {
 }
 
 Eigen::Quaterniond level_from_body(const StemUp& up) {
-  return Eigen::Quaterniond::FromTwoVectors(up.up_in_body, Eigen::Vector3d::UnitZ());
+  return rotation_between(up.up_in_body, Eigen::Vector3d::UnitZ());
 }
 
 std::vector<double> height_sds(const StemView& view) {

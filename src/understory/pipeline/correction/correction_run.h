@@ -35,7 +35,7 @@ struct CorrectionInput {
 
 // What a correction has found beside.
 struct CorrectionRun : CorrectionInput {
-  StemCorrection correction;    // the answer
+  StemCorrection correction;    // the result
   std::vector<StemView> seen;   // the views that make the map: those that hurt it may be left out
   std::vector<Pose> seen_from;  // world from body, of these
   std::vector<MappedStem> stems;

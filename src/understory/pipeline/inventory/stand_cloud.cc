@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "understory/forest/cloud_shape.h"
+#include "understory/geometry/rotation_between.h"
 #include "understory/georeference/coordinate_system.h"
 
 namespace understory {
@@ -35,8 +36,7 @@ std::optional<Eigen::Matrix3d> upright_from(const std::string& up) {
   }
   const auto direction = direction_of(up);
   if (!direction) return std::nullopt;
-  return Eigen::Quaterniond::FromTwoVectors(*direction, Eigen::Vector3d::UnitZ())
-      .toRotationMatrix();
+  return rotation_between(*direction, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
 std::string text_of(const Eigen::Vector3d& direction) {

@@ -9,7 +9,7 @@
 
 namespace understory {
 
-// What the user knows of a cloud's frame. What he says is believed, what he does not say is
+// What the user knows of a cloud's frame. What is given is taken as it is, what is not given is
 // checked.
 struct CloudFrame {
   double unit_m = 0.0;  // metres per unit; 0: metres, if nothing speaks against it

@@ -24,7 +24,7 @@ SensorEvidence sensor_of(const EventOrderer::StreamReport& stream) {
   sensor.duplicates = stream.duplicates;
   sensor.reordered = stream.reordered;
   sensor.clock_jumps = stream.clock_jumps;
-  sensor.unheard_s = to_seconds(stream.unused);
+  sensor.unused_s = to_seconds(stream.unused);
   sensor.longest_gap_s = to_seconds(stream.longest_gap);
   if (stream.longest_gap > 0) sensor.after_longest_gap = format_seconds(stream.after_longest_gap);
   return sensor;
@@ -52,14 +52,14 @@ std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicRep
                            const SensorEvidence& sensor) {
   std::string why;
   const auto add = [&](const std::string& what) { why += (why.empty() ? "" : "; ") + what; };
-  if (facts.imu_hearing.without_place() > 0) {
+  if (facts.imu_usage.without_place() > 0) {
     add(fmt::format("its place on the carrier is not known for {:.1f} s; give --extrinsics FILE",
-                    to_seconds(facts.imu_hearing.without_place())));
+                    to_seconds(facts.imu_usage.without_place())));
   }
-  if (facts.imu_hearing.unusable() > 0) {
+  if (facts.imu_usage.unusable() > 0) {
     add(fmt::format(
         "its samples are not numbers or beyond its range for {:.1f} s (degrees per second?)",
-        to_seconds(facts.imu_hearing.unusable())));
+        to_seconds(facts.imu_usage.unusable())));
   }
   const TopicReport* imu = topic_of(topics, "imu");
   const TopicReport* lidar = topic_of(topics, "lidar");
@@ -128,15 +128,15 @@ void gather_reading(const ReadingFacts& facts, RunEvidence& evidence) {
     sensor = sensor_of(facts.time_repair->streams[s]);
     const TopicReport* topic = topic_of(topics, kSensorRoles[s].name);
     if (topic != nullptr) sensor.unreadable = topic->unreadable;
-    sensor.unheard_why = loss_of(sensor);
+    sensor.unused_why = loss_of(sensor);
   }
   if (facts.imu_wanted) {
-    evidence.imu.unheard_s =
-        std::max(evidence.imu.unheard_s, to_seconds(facts.imu_hearing.without_place())) +
-        to_seconds(facts.imu_hearing.unusable());
-    evidence.imu.unheard_why = silence_of_imu(facts, topics, evidence.imu);
+    evidence.imu.unused_s =
+        std::max(evidence.imu.unused_s, to_seconds(facts.imu_usage.without_place())) +
+        to_seconds(facts.imu_usage.unusable());
+    evidence.imu.unused_why = silence_of_imu(facts, topics, evidence.imu);
   } else {
-    evidence.imu.unheard_s = 0.0;
+    evidence.imu.unused_s = 0.0;
   }
   gather_findings(*facts.log, evidence);
 }
@@ -157,7 +157,7 @@ void gather_dense(const DenseFrontEnd& session, const RunFacts& facts, const Rec
   reading.log = &log;
   reading.last_scan_end = session.last_scan_end();
   reading.imu_wanted = refused || session.imu_wanted();
-  reading.imu_hearing = session.imu_hearing();
+  reading.imu_usage = session.imu_usage();
   gather_reading(reading, evidence);
   evidence.stopped = facts.stopped;
   evidence.unreadable = facts.unreadable;
@@ -191,7 +191,7 @@ void gather_sparse(const SparseFrontEnd& front_end, const RunFacts& facts, const
   reading.log = &log;
   reading.last_scan_end = front_end.last_scan_end();
   reading.imu_wanted = front_end.config().front_end.imu.use;
-  reading.imu_hearing = front_end.imu_hearing();
+  reading.imu_usage = front_end.imu_usage();
   gather_reading(reading, evidence);
   evidence.stopped = facts.stopped;
   evidence.unreadable = facts.unreadable;

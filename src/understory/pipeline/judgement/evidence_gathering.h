@@ -1,7 +1,7 @@
 #pragma once
 
 #include "understory/odometry/motion/motion_model.h"
-#include "understory/pipeline/judgement/imu_hearing.h"
+#include "understory/pipeline/judgement/imu_usage.h"
 #include "understory/pipeline/judgement/run_evidence.h"
 #include "understory/pipeline/mapping/dense_front_end.h"
 #include "understory/pipeline/mapping/run_facts.h"
@@ -19,7 +19,7 @@ struct ReadingFacts {
   const Log* log = nullptr;
   TimeNs last_scan_end = 0;
   bool imu_wanted = true;  // by the configuration
-  ImuHearing imu_hearing;
+  ImuUsage imu_usage;
 };
 void gather_reading(const ReadingFacts& facts, RunEvidence& evidence);
 

@@ -63,18 +63,18 @@ RunEvidence gathered(double imu_first_s, double imu_last_s, double imu_offset_s)
 }
 
 TEST(EvidenceGathering, AnImuThatBeginsLateOrStops) {
-  const std::string why = gathered(104.0, 155.0, 0.0).imu.unheard_why;
+  const std::string why = gathered(104.0, 155.0, 0.0).imu.unused_why;
   EXPECT_NE(why.find("it begins 4.0 s after the lidar"), std::string::npos) << why;
   EXPECT_NE(why.find("it stops 5.0 s before the lidar"), std::string::npos) << why;
 }
 
 // A regression: the stamps were compared before their clock was mended.
 TEST(EvidenceGathering, AClockThatWasMendedIsNoLateImu) {
-  const std::string ahead = gathered(103.0, 163.0, -3.0).imu.unheard_why;
+  const std::string ahead = gathered(103.0, 163.0, -3.0).imu.unused_why;
   EXPECT_EQ(ahead, "its samples came after their scans were processed");
-  const std::string behind = gathered(97.0, 157.0, 3.0).imu.unheard_why;
+  const std::string behind = gathered(97.0, 157.0, 3.0).imu.unused_why;
   EXPECT_EQ(behind, "its samples came after their scans were processed");
-  const std::string late = gathered(100.0, 156.0, 4.0).imu.unheard_why;
+  const std::string late = gathered(100.0, 156.0, 4.0).imu.unused_why;
   EXPECT_EQ(late, "it begins 4.0 s after the lidar");
 }
 
@@ -90,15 +90,15 @@ TEST(EvidenceGathering, SamplesThatCannotBeUsedHaveNoSay) {
   for (int k = 0; k < 300; ++k) {
     sample.stamp = from_seconds(100.0 + 0.01 * k);
     sample.angular_rate = {0.0, 0.0, k > 100 ? 100.0 : 1.0};  // degrees per second
-    facts.imu_hearing.add(sample, true, ImuNoiseConfig());
+    facts.imu_usage.add(sample, true, ImuNoiseConfig());
   }
   RunEvidence evidence;
   gather_reading(facts, evidence);
-  EXPECT_NEAR(evidence.imu.unheard_s, 1.99, 1e-9);
-  EXPECT_NE(evidence.imu.unheard_why.find("degrees per second"), std::string::npos);
+  EXPECT_NEAR(evidence.imu.unused_s, 1.99, 1e-9);
+  EXPECT_NE(evidence.imu.unused_why.find("degrees per second"), std::string::npos);
   facts.imu_wanted = false;
   gather_reading(facts, evidence);
-  EXPECT_EQ(evidence.imu.unheard_s, 0.0);
+  EXPECT_EQ(evidence.imu.unused_s, 0.0);
 }
 
 // By stems, too: what is 1.3 times too large was complete.

@@ -18,7 +18,7 @@ void put_sensor(Figures& figures, const std::string& name, const SensorEvidence&
   put(figures, name + "_reordered", sensor.reordered);
   put(figures, name + "_clock_jumps", sensor.clock_jumps);
   figures[name + "_longest_gap_s"] = sensor.longest_gap_s;
-  figures[name + "_unheard_s"] = sensor.unheard_s;
+  figures[name + "_unused_s"] = sensor.unused_s;
 }
 
 void put_motion(Figures& figures, const MotionEvidence& motion) {
@@ -72,7 +72,7 @@ Figures figures_of(const RunEvidence& evidence) {
   figures["times_assumed"] = evidence.times_assumed;
   figures["point_times_missing"] = evidence.point_times_missing;
   figures["imu_used"] = evidence.imu_used;
-  figures["imu_believed"] = evidence.imu_distrust.empty();
+  figures["imu_trusted"] = evidence.imu_distrust.empty();
   figures["imu_motion_scale"] = evidence.imu_motion_scale;
   figures["imu_motion_correlation"] = evidence.imu_motion_correlation;
   figures["imu_motion_spread_m_s2"] = evidence.imu_motion_spread_m_s2;

@@ -22,8 +22,8 @@ struct SensorEvidence {
   std::string after_longest_gap;  // stamp of the message that ended it, seconds
   // How long the sensor was not used although it belongs to the recording: it began late, stopped,
   // was silent, or was not used; and why, in words.
-  double unheard_s = 0.0;
-  std::string unheard_why;
+  double unused_s = 0.0;
+  std::string unused_why;
 };
 
 // How the carrier moved by the finished path.
@@ -108,7 +108,7 @@ struct RunEvidence {
   double imu_motion_correlation = 0.0;
   double imu_motion_spread_m_s2 = 0.0;
   int imu_motion_windows = 0;
-  std::string imu_distrust;  // why the IMU is not believed; empty: it is, or is none
+  std::string imu_distrust;  // why the IMU is not trusted; empty: it is, or is none
   MotionEvidence motion;
   MatchEvidence match;
   StemRunEvidence stems;

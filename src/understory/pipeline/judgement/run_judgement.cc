@@ -30,8 +30,8 @@ class Judge {
 
   RunJudgement judge() {
     judge_ending();
-    judge_unheard_scans();
-    judge_unheard_sensors();
+    judge_unused_scans();
+    judge_unused_sensors();
     judge_damage();
     judge_times();
     judge_scan_motion();
@@ -43,7 +43,7 @@ class Judge {
     judge_course();
     judge_outages();
     judge_stems();
-    return conclude();
+    return judgement();
   }
 
  private:
@@ -65,12 +65,12 @@ class Judge {
   }
 
   // Of all that the lidar sent, what never reached the map.
-  void judge_unheard_scans() {
+  void judge_unused_scans() {
     const SensorEvidence& lidar = evidence_.lidar;
     const std::uint64_t all = evidence_.dropped_scans + lidar.received + lidar.unreadable;
-    const std::uint64_t unheard =
+    const std::uint64_t unused =
         evidence_.dropped_scans + lidar.unreadable + lidar.late + lidar.glitches;
-    if (share(unheard, all) <= config_.max_unheard_scans) return;
+    if (share(unused, all) <= config_.max_unused_scans) return;
     std::string parts;
     const std::array<std::pair<std::uint64_t, const char*>, 4> kinds = {
         {{evidence_.dropped_scans, "dropped because the machine could not keep up"},
@@ -81,17 +81,17 @@ class Judge {
       if (count == 0) continue;
       parts += fmt::format("{}{} {}", parts.empty() ? "" : ", ", count, what);
     }
-    missing(fmt::format("{} of {} scans ({:.1f} %) are not in the map: {}", unheard, all,
-                        percent(unheard, all), parts));
+    missing(fmt::format("{} of {} scans ({:.1f} %) are not in the map: {}", unused, all,
+                        percent(unused, all), parts));
   }
 
-  void judge_unheard_sensors() {
+  void judge_unused_sensors() {
     const std::array<std::pair<const char*, const SensorEvidence*>, 3> sensors = {
         {{"IMU", &evidence_.imu}, {"GNSS", &evidence_.gnss}, {"magnetometer", &evidence_.mag}}};
     for (const auto& [name, sensor] : sensors) {
-      if (sensor->unheard_s <= config_.max_unheard_s) continue;
-      missing(fmt::format("the {} was not used for {:.1f} s: {}", name, sensor->unheard_s,
-                          sensor->unheard_why));
+      if (sensor->unused_s <= config_.max_unused_s) continue;
+      missing(fmt::format("the {} was not used for {:.1f} s: {}", name, sensor->unused_s,
+                          sensor->unused_why));
     }
   }
 
@@ -304,7 +304,7 @@ class Judge {
     }
   }
 
-  RunJudgement conclude() {
+  RunJudgement judgement() {
     RunJudgement judgement;
     if (!missing_.empty()) judgement.status = RunStatus::kPartial;
     if (!hurt_.empty()) judgement.status = RunStatus::kUntrusted;
@@ -325,9 +325,9 @@ void describe(ConfigTable& table, JudgementConfig& config) {
   const ConfigTable::Range shares{0.0, 1.0};
   const ConfigTable::Range seconds{0.0, 1e6};
   table.add(
-      "max_unheard_scans", config.max_unheard_scans, shares, "",
+      "max_unused_scans", config.max_unused_scans, shares, "",
       "partial: a larger share of the scans was dropped, late, unreadable or far off in time");
-  table.add("max_unheard_s", config.max_unheard_s, seconds, "s",
+  table.add("max_unused_s", config.max_unused_s, seconds, "s",
             "partial: another sensor was not used for longer");
   table.add("max_unmatched", config.max_unmatched, shares, "",
             "untrusted: a larger share of the scans could not be matched");

@@ -15,8 +15,8 @@ namespace understory {
 // `./run accuracy --spoilt --fit` shows what good and wrong maps have of each number.
 struct JudgementConfig {
   // Partial: what was not used.
-  double max_unheard_scans = 0.01;  // share of the scans
-  double max_unheard_s = 1.0;       // of any other sensor
+  double max_unused_scans = 0.01;  // share of the scans
+  double max_unused_s = 1.0;       // of any other sensor
   // Untrusted. A prediction bridges a scan or two without harm; beyond these shares the map has
   // weak places.
   double max_unmatched = 0.02;

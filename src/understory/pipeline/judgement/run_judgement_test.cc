@@ -93,10 +93,10 @@ TEST(RunJudgement, SensorsWithoutASay) {
   for (SensorEvidence RunEvidence::*sensor :
        {&RunEvidence::imu, &RunEvidence::gnss, &RunEvidence::mag}) {
     RunEvidence evidence = good_run();
-    (evidence.*sensor).unheard_s = 1.0;
-    (evidence.*sensor).unheard_why = "it stops";
+    (evidence.*sensor).unused_s = 1.0;
+    (evidence.*sensor).unused_why = "it stops";
     expect_complete(evidence);
-    (evidence.*sensor).unheard_s = 1.1;
+    (evidence.*sensor).unused_s = 1.1;
     expect(RunStatus::kPartial, "was not used for 1.1 s: it stops", evidence);
   }
 }

@@ -56,12 +56,12 @@ ImuFinding DenseFrontEnd::imu_finding() const {
 }
 
 FrontEndProgress DenseFrontEnd::progress() const {
-  return {"mapping", counts_.scans, fmt::format("{} keyframes", map_->keyframes().size())};
+  return {"mapping", received_.counts.scans, fmt::format("{} keyframes", map_->keyframes().size())};
 }
 
 std::optional<TimeNs> DenseFrontEnd::last_imu() const {
-  if (recent_imu_.empty()) return std::nullopt;
-  return recent_imu_.back().stamp;
+  if (received_.imu.empty()) return std::nullopt;
+  return received_.imu.back().stamp;
 }
 
 std::vector<TimeNs> DenseFrontEnd::handle(const Event& event, const Rig& rig) {
@@ -77,14 +77,11 @@ void DenseFrontEnd::take(const Event& event, const Rig& rig) {
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
     take_sample(*sample);
   } else if (const auto* fix = std::get_if<GnssFix>(&event)) {
-    fixes_.push_back(*fix);
+    received_.fixes.push_back(*fix);
   } else if (const auto* scan = std::get_if<ScanPtr>(&event)) {
     if (!started()) {
       opening_->events.push_back(event);
-      opening_->counts_before = counts_;
-      opening_->hearing_before = imu_hearing_;
-      opening_->imu_before = recent_imu_;
-      opening_->fixes_before = fixes_.size();
+      opening_->before = received_;
       rig_ = rig;
       start_anew();
     }
@@ -93,13 +90,13 @@ void DenseFrontEnd::take(const Event& event, const Rig& rig) {
 }
 
 void DenseFrontEnd::take_sample(const ImuSample& sample) {
-  ++counts_.imu_samples;
+  ++received_.counts.imu_samples;
   if (started())
-    imu_hearing_.add(sample, rig_.body_from_imu.has_value(), config_.odometry.motion.imu);
-  recent_imu_.push_back(sample);
+    received_.imu_usage.add(sample, rig_.body_from_imu.has_value(), config_.odometry.motion.imu);
+  received_.imu.push_back(sample);
   const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
-  while (recent_imu_.size() > most)
-    recent_imu_.pop_front();
+  while (received_.imu.size() > most)
+    received_.imu.pop_front();
   if (started()) odometry_->add_imu(sample);
 }
 
@@ -112,7 +109,7 @@ void DenseFrontEnd::complete_rig(const Rig& rig) {
   if (rig_.body_from_imu || !rig.body_from_imu) return;
   rig_.body_from_imu = rig.body_from_imu;
   rig_.imu_extrinsic_source = rig.imu_extrinsic_source;
-  const std::vector<ImuSample> recent(recent_imu_.begin(), recent_imu_.end());
+  const std::vector<ImuSample> recent(received_.imu.begin(), received_.imu.end());
   odometry_->take_imu(*rig_.body_from_imu, recent);
   if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(recovery_.last_scan());
 }
@@ -133,12 +130,9 @@ void DenseFrontEnd::start_anew() {
                                   opening_->motion.angular_rate_rad_s);
   }
   // What came after the first scan comes again.
-  recent_imu_ = opening_->imu_before;
-  fixes_.resize(opening_->fixes_before);
-  counts_ = opening_->counts_before;
-  imu_hearing_ = opening_->hearing_before;
+  received_ = opening_->before;
   recovery_.forget_matches();
-  for (const ImuSample& waiting : recent_imu_)
+  for (const ImuSample& waiting : received_.imu)
     odometry_->add_imu(waiting);
   const Scan& first = *std::get<ScanPtr>(opening_->events.front());
   if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(first.stamp);
@@ -146,9 +140,9 @@ void DenseFrontEnd::start_anew() {
 
 // Whether the first scan was a smear or a part: then the recording's first scans are done again.
 void DenseFrontEnd::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
-  if (counts_.scans < 2) return;
+  if (received_.counts.scans < 2) return;
   const Scan& first = *std::get<ScanPtr>(opening_->events.front());
-  if (counts_.parts == 0 && opening_->rounds == 0 && is_part_of_turn(first, scan)) {
+  if (received_.counts.parts == 0 && opening_->rounds == 0 && is_part_of_turn(first, scan)) {
     leave_out_first();
     return;
   }
@@ -182,11 +176,8 @@ void DenseFrontEnd::leave_out_first() {
             fmt::format("the recording begins within a turn of the lidar: its first scan, of {} "
                         "points at {} s, is left out",
                         first.points.size(), format_seconds(first.stamp)));
-  recent_imu_ = opening_->imu_before;
-  fixes_.resize(opening_->fixes_before);
-  counts_ = opening_->counts_before;
-  imu_hearing_ = opening_->hearing_before;
-  counts_.parts = 1;
+  received_ = opening_->before;
+  received_.counts.parts = 1;
   opening_ = std::make_unique<Opening>();
   odometry_.reset();
   const Rig rig = rig_;
@@ -202,14 +193,14 @@ DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_t
                         format_seconds(scan.stamp)));
   const bool proven = odometry_->motion().imu_trust().proven;
   make_odometry(rig_);
-  for (const ImuSample& sample : recent_imu_)
+  for (const ImuSample& sample : received_.imu)
     odometry_->add_imu(sample);
   if (odometry_->uses_imu() && !proven) odometry_->suspect_imu(scan.stamp);
   // A better guess than standing still.
   odometry_->set_initial_motion(recovery_.last_velocity_in_body(), Eigen::Vector3d::Zero());
   map_->start_segment();
-  if (counts_.segments++ == 1) counts_.first_lost = scan.stamp;
-  counts_.lost_in_a_row = 0;
+  if (received_.counts.segments++ == 1) received_.counts.first_lost = scan.stamp;
+  received_.counts.lost_in_a_row = 0;
   DenseEstimate estimate = odometry_->process(scan, map_->local_map());
   put_at(about_there, *odometry_, estimate);
   return estimate;
@@ -225,14 +216,14 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
   if (!map_->keyframes().empty() && estimate.thinned.size() >= kFewPoints) {
     if (recovery_.lost_over_outage(scan.stamp, estimate)) {
       estimate = begin_segment(scan, recovery_.place_after_outage(predicted));
-    } else if (recovery_.lost(estimate, counts_.lost_in_a_row)) {
+    } else if (recovery_.lost(estimate, received_.counts.lost_in_a_row)) {
       estimate = begin_segment(scan, recovery_.last_good());
     }
   }
   recovery_.note_scan(scan.stamp);
   const std::uint64_t content = content_of(scan);
-  counts_.repeated += is_repetition(content, counts_.last_content) ? 1 : 0;
-  counts_.last_content = content;
+  received_.counts.repeated += is_repetition(content, received_.counts.last_content) ? 1 : 0;
+  received_.counts.last_content = content;
   ScanRecord record;
   record.stamp = scan.stamp;
   record.points = static_cast<std::uint32_t>(scan.points.size());
@@ -248,8 +239,8 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
 }
 
 void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& record) {
-  ++counts_.scans;
-  counts_.points += record.points;
+  ++received_.counts.scans;
+  received_.counts.points += record.points;
   record.fitness_m2 = static_cast<float>(estimate.match.fitness_m2);
   record.inlier_ratio = static_cast<float>(estimate.match.inlier_ratio);
   record.iterations = static_cast<std::uint16_t>(estimate.match.iterations);
@@ -257,7 +248,7 @@ void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& reco
       static_cast<std::uint8_t>(estimate.match.degenerate_directions.cols());
   record.set_covariance(estimate.state.pose_covariance);
   if (estimate.thinned.size() < kFewPoints) {
-    ++counts_.empty_scans;
+    ++received_.counts.empty_scans;
     log_.warn("scan.few_points",
               fmt::format("scan at {} has only {} usable points", format_seconds(record.stamp),
                           estimate.thinned.size()));
@@ -265,13 +256,13 @@ void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& reco
   record.outcome = ScanOutcome::kMatched;
   if (estimate.update.status == MotionStatus::kVelocityGate) {
     record.outcome = ScanOutcome::kGated;
-    ++counts_.gated;
+    ++received_.counts.gated;
     log_.warn("match.velocity_gate",
               fmt::format("match of the scan at {} dropped: {}", format_seconds(record.stamp),
                           estimate.update.reason));
   } else if (!estimate.matched && map_->local_map() != nullptr) {
     record.outcome = ScanOutcome::kUnmatched;
-    ++counts_.unmatched;
+    ++received_.counts.unmatched;
     if (estimate.thinned.size() < kFewPoints) return;
     log_.warn("match.none",
               fmt::format("scan at {} could not be matched ({:.0f} % of its points "
@@ -288,7 +279,7 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   }
   const bool good =
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
-  counts_.lost_in_a_row = good ? 0 : counts_.lost_in_a_row + 1;
+  received_.counts.lost_in_a_row = good ? 0 : received_.counts.lost_in_a_row + 1;
   if (good) recovery_.note_good(estimate);
   const bool wanted = good && map_->wants(state.world_from_body);
   // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop

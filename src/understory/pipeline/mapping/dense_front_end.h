@@ -13,7 +13,7 @@
 #include "understory/odometry/dense/dense_odometry.h"
 #include "understory/odometry/dense/recovery.h"
 #include "understory/odometry/dense/start_in_motion.h"
-#include "understory/pipeline/judgement/imu_hearing.h"
+#include "understory/pipeline/judgement/imu_usage.h"
 #include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/run_folder/journal.h"
 #include "understory/recording/recording.h"
@@ -81,16 +81,16 @@ class DenseFrontEnd : public FrontEnd {
   // Why this run does without the IMU; empty if it does not.
   [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
   [[nodiscard]] const Rig& rig() const { return rig_; }
-  [[nodiscard]] const DenseCounts& counts() const { return counts_; }
+  [[nodiscard]] const DenseCounts& counts() const { return received_.counts; }
   // For how long the IMU's samples could not be used.
-  [[nodiscard]] const ImuHearing& imu_hearing() const { return imu_hearing_; }
+  [[nodiscard]] const ImuUsage& imu_usage() const { return received_.imu_usage; }
   [[nodiscard]] const KeyframeMap& map() const { return *map_; }
   [[nodiscard]] KeyframeMap& map() { return *map_; }
   // Whether the configuration of this run has it use an IMU.
   [[nodiscard]] bool imu_wanted() const { return config_.odometry.imu_enabled; }
   [[nodiscard]] const Journal& journal() const { return *journal_; }
   [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_->clouds(); }
-  [[nodiscard]] const std::vector<GnssFix>& fixes() const { return fixes_; }
+  [[nodiscard]] const std::vector<GnssFix>& fixes() const { return received_.fixes; }
   [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
   [[nodiscard]] StageTimes& times() { return times_; }
   // Set after each scan, for progress and latency.
@@ -102,16 +102,21 @@ class DenseFrontEnd : public FrontEnd {
   static constexpr const char* kJournalFile = "journal.bin";
   static constexpr const char* kCloudsFile = "clouds.bin";
 
+  // What came of the recording so far.
+  struct Received {
+    DenseCounts counts;
+    ImuUsage imu_usage;
+    std::deque<ImuSample> imu;  // all before the first scan, then the last ones
+    std::vector<GnssFix> fixes;
+  };
+
   // The first two scans, which may be done again (odometry/dense/start_in_motion.h), and what there
   // was before them.
   struct Opening {
     std::vector<Event> events;
     AssumedMotion motion;
     int rounds = 0;
-    DenseCounts counts_before;
-    ImuHearing hearing_before;
-    std::deque<ImuSample> imu_before;
-    std::size_t fixes_before = 0;
+    Received before;
   };
 
   void refuse_imu(const std::string& reason);
@@ -139,16 +144,13 @@ class DenseFrontEnd : public FrontEnd {
   Log& log_;
   StageTimes times_;
   Rig rig_;
-  std::deque<ImuSample> recent_imu_;  // all before the first scan, then the last ones
+  Received received_;
   std::unique_ptr<DenseOdometry> odometry_;
   std::unique_ptr<KeyframeMap> map_;
   std::unique_ptr<Journal> journal_;
   std::unique_ptr<ScanClouds> clouds_;
   VoxelFilter cloud_filter_;
-  std::vector<GnssFix> fixes_;
   std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced
-  DenseCounts counts_;
-  ImuHearing imu_hearing_;
   TimeNs last_scan_end_ = 0;
   Recovery recovery_;
   std::string imu_refused_;

@@ -12,12 +12,12 @@ constexpr const char* kFixesFile = "fixes.bin";
 }  // namespace
 
 void DenseFrontEnd::sync() {
-  if (!fixes_file_ && !fixes_.empty())
+  if (!fixes_file_ && !received_.fixes.empty())
     fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile);
   if (fixes_file_) {
-    for (std::size_t i = fixes_file_->count().records; i < fixes_.size(); ++i) {
+    for (std::size_t i = fixes_file_->count().records; i < received_.fixes.size(); ++i) {
       BinaryWriter record;
-      put_fix(record, fixes_[i]);
+      put_fix(record, received_.fixes[i]);
       fixes_file_->append({bytes_of(record.bytes())});
     }
     fixes_file_->sync();
@@ -44,8 +44,8 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   writer.put(imu_refused_);
   writer.put(imu_doubted_);
   writer.put(fixes_file_ ? fixes_file_->count() : RecordCount());
-  writer.put(counts_);
-  imu_hearing_.save(writer);
+  writer.put(received_.counts);
+  received_.imu_usage.save(writer);
   writer.put(last_scan_end_);
   const ScanClouds::Last last_cloud = clouds_ ? clouds_->last() : ScanClouds::Last();
   writer.put(last_cloud.keyframe);
@@ -54,8 +54,8 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   put_optional(writer, rig_.body_from_imu, put_pose);
   put_optional(writer, rig_.body_from_gnss, put_pose);
   writer.put(started());
-  writer.put(static_cast<std::uint64_t>(recent_imu_.size()));
-  for (const ImuSample& sample : recent_imu_)
+  writer.put(static_cast<std::uint64_t>(received_.imu.size()));
+  for (const ImuSample& sample : received_.imu)
     put_imu(writer, sample);
   if (!started()) return;
   writer.put(journal_->count());
@@ -68,7 +68,7 @@ void DenseFrontEnd::load_fixes(const RecordCount& known) {
   fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile, known);
   fixes_file_->for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
     BinaryReader record({bytes.begin(), bytes.end()}, fixes_file_->path().string());
-    fixes_.push_back(get_fix(record));
+    received_.fixes.push_back(get_fix(record));
   });
 }
 
@@ -78,8 +78,8 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   imu_doubted_ = reader.get<bool>();
   const auto fixes = reader.get<RecordCount>();
   if (fixes.records > 0) load_fixes(fixes);
-  counts_ = reader.get<DenseCounts>();
-  imu_hearing_.load(reader);
+  received_.counts = reader.get<DenseCounts>();
+  received_.imu_usage.load(reader);
   last_scan_end_ = reader.get<TimeNs>();
   ScanClouds::Last last_cloud;
   last_cloud.keyframe = reader.get<std::uint64_t>();
@@ -90,7 +90,7 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   const bool was_started = reader.get<bool>();
   const auto waiting = reader.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < waiting; ++i)
-    recent_imu_.push_back(get_imu(reader));
+    received_.imu.push_back(get_imu(reader));
   if (!was_started) return;
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile, reader.get<RecordCount>());
   const auto clouds = reader.get<RecordCount>();

@@ -269,7 +269,7 @@ void fill_quality(const DenseFrontEnd& front_end, const TrajectoryFacts& traject
   summary.quality["match_distance_rms_m"] = trajectory.match.fitness_rms_m;
   summary.quality["weak_scans_percent"] =
       100.0 * static_cast<double>(trajectory.weak) / static_cast<double>(trajectory.scans.size());
-  summary.quality["imu_without_place_s"] = to_seconds(front_end.imu_hearing().without_place());
+  summary.quality["imu_without_place_s"] = to_seconds(front_end.imu_usage().without_place());
   summary.quality["loop_search_cpu_s"] = front_end.map().search_cpu_seconds();
 }
 

@@ -38,7 +38,7 @@ void EventLoop::go_on() {
   adapt_to_recording();
   state_.find_place(*source_);
   state_.restore(*front_end_, *orderer_, log_, source_->rig());
-  stamps_believed_ = orderer_->believes_stamps(EventOrderer::kImu);
+  stamps_trusted_ = orderer_->trusts_stamps(EventOrderer::kImu);
   events_ = state_.events();
 }
 
@@ -50,7 +50,7 @@ void EventLoop::adapt_to_recording() {
   request_.config_record.adapted = std::move(adapted.changes);
   request_.config_record.effective_yaml = yaml_of(request_.config);
   orderer_.emplace(loop_of(request_.config).time_repair, log_);
-  if (stamps_believed_) orderer_->believe_stamps(EventOrderer::kImu);
+  if (stamps_trusted_) orderer_->trust_stamps(EventOrderer::kImu);
   front_end_.reset();  // lets go of its files
   front_end_ =
       parts_.front_end(request_.config, request_.traits, request_.conditions, state_.work(), log_);
@@ -141,7 +141,7 @@ void EventLoop::save_state_if_due() {
 bool EventLoop::start_over_for_imu() {
   if (player_ != nullptr) return false;
   const ImuFinding found = front_end_->imu_finding();
-  if (found.verdict == ImuFinding::Verdict::kBelieved) return false;
+  if (found.verdict == ImuFinding::Verdict::kTrusted) return false;
   if (start_over_for_stamps()) return true;
   const bool wrong = found.verdict == ImuFinding::Verdict::kWrong;
   log_.forget_all_but(wrong ? "imu.untrusted" : "imu.probation");
@@ -158,8 +158,8 @@ bool EventLoop::start_over_for_imu() {
 // An IMU whose clock was shifted by its arrival, and that contradicts the scans: perhaps it came
 // late with stamps that are right. True if the recording was begun anew with them.
 bool EventLoop::start_over_for_stamps() {
-  if (orderer_->report().streams[EventOrderer::kImu].offset == 0 || stamps_believed_) return false;
-  stamps_believed_ = true;
+  if (orderer_->report().streams[EventOrderer::kImu].offset == 0 || stamps_trusted_) return false;
+  stamps_trusted_ = true;
   log_.forget_all_but("");
   log_.info("the recording is started again with the IMU's own stamps");
   start_over();

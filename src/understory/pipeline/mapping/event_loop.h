@@ -82,8 +82,8 @@ class EventLoop {
   std::unique_ptr<FrontEnd> front_end_;
   std::uint64_t events_ = 0;  // taken from the recording
   bool stopped_ = false;
-  bool stamps_believed_ = false;  // of the IMU, against the order of arrival
-  std::string unreadable_;        // where the recording could not be read any further, and why
+  bool stamps_trusted_ = false;  // of the IMU, against the order of arrival
+  std::string unreadable_;       // where the recording could not be read any further, and why
   std::vector<double> memory_mb_;
   std::vector<double> latencies_ms_;
 };

@@ -19,11 +19,11 @@ namespace understory {
 // What the scans say of the IMU.
 struct ImuFinding {
   enum class Verdict {
-    kBelieved,   // or there is none
+    kTrusted,    // or there is none
     kSuspected,  // contradicted before it ever agreed: who is right is found out without it
     kWrong,
   };
-  Verdict verdict = Verdict::kBelieved;
+  Verdict verdict = Verdict::kTrusted;
   std::string reason;
 };
 
@@ -63,7 +63,7 @@ class FrontEnd : public Resumable {
   [[nodiscard]] virtual bool settled() const = 0;
   // Stamp of the first scan.
   [[nodiscard]] virtual TimeNs first_scan() const = 0;
-  // What was positioned with an IMU that is not believed is better done again without it.
+  // What was positioned with an IMU that is not trusted is better done again without it.
   [[nodiscard]] virtual ImuFinding imu_finding() const = 0;
   [[nodiscard]] virtual FrontEndProgress progress() const = 0;
 

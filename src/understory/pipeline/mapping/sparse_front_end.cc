@@ -34,7 +34,7 @@ std::vector<TimeNs> SparseFrontEnd::handle(const Event& event, const Rig& rig) {
 
 // The recording has said so where it does not know the IMU's place; it may learn it later.
 void SparseFrontEnd::on_sample(const ImuSample& sample, const Rig& rig) {
-  imu_hearing_.add(sample, rig.body_from_imu.has_value(), ImuNoiseConfig());
+  imu_usage_.add(sample, rig.body_from_imu.has_value(), ImuNoiseConfig());
   if (rig.body_from_imu) pacer_.add(sample);
 }
 
@@ -120,7 +120,7 @@ void SparseFrontEnd::save(BinaryWriter& writer) const {
   writer.put(journal_ != nullptr ? journal_->count() : RecordCount());
   writer.put(last_scan_end_);
   writer.put(imu_refused_);
-  imu_hearing_.save(writer);
+  imu_usage_.save(writer);
   writer.put(repeated_);
   writer.put(last_content_);
   pacer_.save(writer);
@@ -135,7 +135,7 @@ void SparseFrontEnd::load(BinaryReader& reader, const Rig& /*rig*/) {
   last_scan_end_ = reader.get<TimeNs>();
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);
-  imu_hearing_.load(reader);
+  imu_usage_.load(reader);
   repeated_ = reader.get<std::uint64_t>();
   last_content_ = reader.get<std::uint64_t>();
   pacer_.load(reader);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "understory/odometry/stems/stem_pacer.h"
-#include "understory/pipeline/judgement/imu_hearing.h"
+#include "understory/pipeline/judgement/imu_usage.h"
 #include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/run_folder/view_journal.h"
 #include "understory/recording/recording.h"
@@ -51,7 +51,7 @@ class SparseFrontEnd : public FrontEnd, private ViewSink {
   void hand_over(std::vector<StemView>& views, std::vector<SparseStep>& steps,
                  std::vector<StampedPose>& path, std::vector<GnssFix>& fixes);
   // For how long the IMU's samples could not be used.
-  [[nodiscard]] const ImuHearing& imu_hearing() const { return imu_hearing_; }
+  [[nodiscard]] const ImuUsage& imu_usage() const { return imu_usage_; }
   [[nodiscard]] ImuTrust imu_trust() const { return pacer_.imu_trust(); }
 
   // Why this run does without the IMU: an earlier pass found it to be wrong; empty if it does not.
@@ -74,7 +74,7 @@ class SparseFrontEnd : public FrontEnd, private ViewSink {
   std::deque<TimeNs> waiting_ends_;       // of scans that have no pose yet
   TimeNs last_scan_end_ = 0;
   std::string imu_refused_;
-  ImuHearing imu_hearing_;
+  ImuUsage imu_usage_;
   std::size_t scans_ = 0;  // of which the last may still wait
   std::uint64_t repeated_ = 0;
   std::uint64_t last_content_ = 0;

@@ -118,7 +118,7 @@ std::string decompress(ByteSpan packed, std::string_view method, std::uint64_t l
                        std::vector<std::uint8_t>& out) {
   limit = std::min(limit, kLongestBlock);
   out.clear();
-  // The promised length is believed as far as such data usually shrink.
+  // The promised length is used as far as such data usually shrink.
   out.reserve(static_cast<std::size_t>(std::min<std::uint64_t>(limit, 16 * packed.size())));
   if (method == "zstd") return unpack_zstd(packed, limit, out);
   if (method == "lz4") return unpack_lz4(packed, limit, out);

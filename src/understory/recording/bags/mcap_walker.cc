@@ -355,7 +355,7 @@ void Walker::load(BinaryReader& reader) {
   profile_ = reader.get_string();
 }
 
-// A message outside of chunks is believed if its channel is known and a record follows it.
+// A message outside of chunks counts if its channel is known and a record follows it.
 bool Walker::is_intact_message(std::uint64_t offset, const Head& head) {
   std::uint8_t id[2];
   if (file_.read(offset + kRecordHead, id, 2) != 2) return false;

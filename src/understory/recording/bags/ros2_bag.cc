@@ -204,9 +204,9 @@ bool is_ros2_bag_folder(const std::string& path) {
 std::vector<std::string> bag_parts_outside(const std::string& path) {
   std::vector<std::string> outside;
   if (!is_ros2_bag_folder(path)) return outside;
-  Log unheard;  // what is wrong is said when the bag is read
+  Log quiet;  // what is wrong is said when the bag is read
   const fs::path folder = fs::absolute(path).lexically_normal();
-  for (const std::string& file : files_of_metadata(path, unheard)) {
+  for (const std::string& file : files_of_metadata(path, quiet)) {
     const fs::path below = fs::absolute(file).lexically_normal().lexically_relative(folder);
     if (below.empty() || *below.begin() == "..")
       outside.push_back(fs::path(file).lexically_normal().string());

@@ -207,9 +207,9 @@ class VelodynePcap : public DecodedPcap<VelodyneDecoder> {
  private:
   // The model, and the hour out of the first position packet, are wanted before the first scan.
   void look_ahead() {
-    Log unheard;  // what is damaged is told when it is read
-    file_->rewind(unheard);
-    VelodyneDecoder first({}, file_->name(), unheard);
+    Log quiet;  // what is damaged is told when it is read
+    file_->rewind(quiet);
+    VelodyneDecoder first({}, file_->name(), quiet);
     try {
       look_at_start(first);
     } catch (const ReadError&) {
@@ -377,8 +377,8 @@ FoundMetadata metadata_of(const std::string& capture, const OpenOptions& options
 
 std::unique_ptr<PcapRecording> open(std::unique_ptr<ByteSource> source, const OpenOptions& options,
                                     Log& log) {
-  Log unheard;
-  auto file = std::make_unique<PcapFile>(std::move(source), unheard);
+  Log quiet;
+  auto file = std::make_unique<PcapFile>(std::move(source), quiet);
   const std::string name = file->name();
   const FoundMetadata beside = metadata_of(name, options);
   PcapWanted wanted;

@@ -26,7 +26,7 @@ struct VelodyneConfig {
   // Adds the height at which each beam leaves the optics (VLP-16 manual, "Vertical Correction"; up
   // to 11 mm). Off: all beams leave the origin, as the nebula driver for ROS 2 has it.
   bool vertical_offsets = true;
-  // Factory bytes are believed where this is kUnknown.
+  // Factory bytes are used where this is kUnknown.
   VelodyneModel model = VelodyneModel::kUnknown;
 };
 

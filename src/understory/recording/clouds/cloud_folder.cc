@@ -199,8 +199,8 @@ class CloudFolder : public Recording {
   }
 
   void take_times(const OpenOptions& options) {
-    Log unheard;  // one cloud needs no rate
-    times_ = cloud_file_times(folder_.string(), names_, options.rate_hz, single_ ? unheard : log_);
+    Log quiet;  // one cloud needs no rate
+    times_ = cloud_file_times(folder_.string(), names_, options.rate_hz, single_ ? quiet : log_);
     if (times_.source == "file names") sort_by_time();
     names_.resize(times_.stamps.size());
     if (names_.empty()) throw InputError(folder_.string(), "times.txt", "expected times");
@@ -227,7 +227,7 @@ class CloudFolder : public Recording {
 
   // Understands the times of the points by the first clouds that can be read.
   void judge_clouds() {
-    Log unheard;  // damage is told when it is read
+    Log quiet;  // damage is told when it is read
     std::vector<CloudTimes> clouds;
     std::string field;
     std::string type;
@@ -235,7 +235,7 @@ class CloudFolder : public Recording {
     bool any = false;
     for (std::size_t i = 0; i < names_.size() && clouds.size() < kCloudsToJudge; ++i) {
       try {
-        const CloudTable table = read_table(path(i), unheard);
+        const CloudTable table = read_table(path(i), quiet);
         const PointCloud2Message message = table.message(times_.stamps[i]);
         const auto layout = CloudLayout::find(message);
         if (!layout) throw InputError(path(i), "header", "expected the fields x, y and z");

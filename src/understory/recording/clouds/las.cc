@@ -311,7 +311,7 @@ bool write_all(int pipe, const void* data, std::size_t size) {
   return true;
 }
 
-// LASzip believes the sizes that a damaged file states, up to 4 GB. (A sanitizer's own memory is
+// LASzip allocates the sizes that a damaged file states, up to 4 GB. (A sanitizer's own memory is
 // far beyond any limit.)
 void limit_memory() {
 #if !defined(UNDERSTORY_SANITIZED)

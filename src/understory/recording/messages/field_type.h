@@ -20,7 +20,7 @@ enum class FieldType : std::uint8_t {
 // that names no type (a message may hold any) the zero of that.
 template <typename Visit>
 auto visit_field_type(FieldType type, const Visit& visit) {
-  using Answer = decltype(visit(0.0));
+  using Value = decltype(visit(0.0));
   switch (type) {
     case FieldType::kInt8:
       return visit(std::int8_t{});
@@ -39,7 +39,7 @@ auto visit_field_type(FieldType type, const Visit& visit) {
     case FieldType::kFloat64:
       return visit(double{});
   }
-  return Answer();
+  return Value();
 }
 
 // Bytes; 0 for no type.

@@ -170,8 +170,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
     const std::string own = rig_.body_frame == "imu"     ? frames_.imu
                             : rig_.body_frame == "lidar" ? frames_.lidar
                                                          : rig_.body_frame;
-    Log unheard;
-    apply_extrinsics_file(extrinsics_file_, {own}, rig_, extrinsics_told_ ? unheard : log_);
+    Log quiet;
+    apply_extrinsics_file(extrinsics_file_, {own}, rig_, extrinsics_told_ ? quiet : log_);
     extrinsics_told_ = true;
   }
 

@@ -13,7 +13,7 @@ namespace understory {
 // Settings of generalised ICP, Segal et al. 2009.
 struct GicpConfig {
   double max_distance_m = 0.5;  // farther neighbours are no match
-  // A point is believed to lie on its surface to `sigma_m`, and anywhere along it to
+  // A point is taken to lie on its surface to `sigma_m`, and anywhere along it to
   // `along_sigma_m`. Segal et al., section III.B, have 1 and sqrt(1e-3) of it.
   double sigma_m = 0.03;
   double along_sigma_m = 1.0;

@@ -49,7 +49,7 @@ void describe(ConfigTable& table, NdtConfig& config);
                                               const Pose& guess, const PoseTerms& terms,
                                               const NdtConfig& config);
 
-// Coarse to fine: each map in turn, the answer of one is the guess of the next.
+// Coarse to fine: each map in turn, the result of one is the guess of the next.
 [[nodiscard]] RegistrationResult register_ndt(std::span<const NdtMapPtr> targets,
                                               const Points& source, const Pose& guess,
                                               const PoseTerms& terms, const NdtConfig& config);

@@ -71,7 +71,7 @@ PlaneGrid::Neighbour PlaneGrid::nearest(const Eigen::Vector3d& at, double limit_
     });
     if (best.index >= 0 && best.squared_m2 <= radius * radius) return best;
     last = radius;
-    // Whatever is found is the answer at the latest when all cells have been seen.
+    // The search ends at the latest when all cells have been seen.
     if (best.index >= 0)
       radius = std::max(std::sqrt(best.squared_m2), 1.0001 * radius);
     else

@@ -65,16 +65,16 @@ class Solver {
       pose_ = pose_ * Pose::exp(step.head<6>());
       offset_ += step[6];
     }
-    RangeOffset answer;
-    answer.solved = true;
-    answer.offset_m = offset_;
-    answer.matches = sums.matches;
-    answer.target_from_source = pose_;
+    RangeOffset result;
+    result.solved = true;
+    result.offset_m = offset_;
+    result.matches = sums.matches;
+    result.target_from_source = pose_;
     // Residuals larger than the noise that was assumed make the estimate worse.
     const double noise = std::sqrt(sums.weighted_squares / std::max(1e-9, sums.weight));
     const Matrix7d covariance = sums.information.ldlt().solve(Matrix7d::Identity());
-    answer.sd_m = std::sqrt(covariance(6, 6)) * std::max(1.0, noise / kPatchNoise);
-    return answer;
+    result.sd_m = std::sqrt(covariance(6, 6)) * std::max(1.0, noise / kPatchNoise);
+    return result;
   }
 
  private:

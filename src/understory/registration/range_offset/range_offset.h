@@ -14,7 +14,7 @@ struct RangeOffsetConfig {
   double max_angle_deg = 20.0;  // between the normals of a match
   int min_matches = 60;         // fewer say nothing
   int iterations = 12;
-  // What is believed of the guess: standard deviations. They only matter for directions that the
+  // What is known of the guess: standard deviations. They only matter for directions that the
   // surfaces leave open, as the way along flat ground.
   double guess_translation_m = 0.3;
   double guess_rotation_deg = 3.0;

@@ -72,7 +72,7 @@ SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoin
                                     const Pose& guess, const SparseIcpConfig& config,
                                     const std::vector<double>& source_height_sd_m = {});
 
-// Where ICP converges, P0 (24-26): distances that a shift and a turn may have from the answer.
+// Where ICP converges, P0 (24-26): distances that a shift and a turn may have from the solution.
 struct ConvergenceRegion {
   double delta0_m = 0.0;     // (24) L0 / 2
   double theta0_rad = 0.0;   // (25) delta0 / (sqrt(1 - gamma) R)

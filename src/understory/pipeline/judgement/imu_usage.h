@@ -11,7 +11,7 @@ namespace understory {
 
 // For how long samples of an IMU came that could not be used. A hole between samples counts a tenth
 // of a second at most: holes are counted where the messages are put in order. Not thread-safe.
-class ImuHearing {
+class ImuUsage {
  public:
   // In order of time. `has_place`: its extrinsics are known.
   void add(const ImuSample& sample, bool has_place, const ImuNoiseConfig& config);

@@ -1,4 +1,4 @@
-#include "understory/pipeline/judgement/imu_hearing.h"
+#include "understory/pipeline/judgement/imu_usage.h"
 
 #include <algorithm>
 
@@ -6,7 +6,7 @@
 
 namespace understory {
 
-void ImuHearing::add(const ImuSample& sample, bool has_place, const ImuNoiseConfig& config) {
+void ImuUsage::add(const ImuSample& sample, bool has_place, const ImuNoiseConfig& config) {
   const TimeNs since = last_ ? sample.stamp - *last_ : 0;
   const TimeNs step = std::clamp<TimeNs>(since, 0, kNsPerSecond / 10);
   last_ = sample.stamp;
@@ -17,14 +17,14 @@ void ImuHearing::add(const ImuSample& sample, bool has_place, const ImuNoiseConf
   }
 }
 
-void ImuHearing::save(BinaryWriter& writer) const {
+void ImuUsage::save(BinaryWriter& writer) const {
   writer.put(last_.has_value());
   writer.put(last_.value_or(0));
   writer.put(without_place_);
   writer.put(unusable_);
 }
 
-void ImuHearing::load(BinaryReader& reader) {
+void ImuUsage::load(BinaryReader& reader) {
   const bool any = reader.get<bool>();
   const auto last = reader.get<TimeNs>();
   last_ = any ? std::optional<TimeNs>(last) : std::nullopt;
