@@ -1,48 +1,15 @@
 #include "understory/graph/pose_graph.h"
 
-#include <gtsam/geometry/Pose3.h>
-#include <gtsam/navigation/AttitudeFactor.h>
 #include <gtsam/nonlinear/GncOptimizer.h>
 #include <gtsam/nonlinear/LevenbergMarquardtOptimizer.h>
-#include <gtsam/slam/BetweenFactor.h>
 
 #include <cmath>
 
+#include "understory/graph/pose_graph_factors.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
-
-gtsam::Pose3 to_gtsam(const Pose& pose) {
-  return {gtsam::Rot3(pose.rotation()), pose.translation()};
-}
-
-Pose from_gtsam(const gtsam::Pose3& pose) {
-  return {pose.rotation().toQuaternion(), pose.translation()};
-}
-
-void add_edge(gtsam::NonlinearFactorGraph& graph, const PoseEdge& edge) {
-  // GTSAM's Pose3 has our convention: right perturbation, rotation first.
-  graph.emplace_shared<gtsam::BetweenFactor<gtsam::Pose3>>(
-      static_cast<gtsam::Key>(edge.from), static_cast<gtsam::Key>(edge.to),
-      to_gtsam(edge.from_from_to),
-      gtsam::noiseModel::Gaussian::Covariance(gtsam::Matrix(edge.covariance)));
-}
-
-void add_tilt(gtsam::NonlinearFactorGraph& graph, const TiltPrior& tilt) {
-  graph.emplace_shared<gtsam::Pose3AttitudeFactor>(
-      static_cast<gtsam::Key>(tilt.keyframe), gtsam::Unit3(Eigen::Vector3d::UnitZ()),
-      gtsam::noiseModel::Isotropic::Sigma(2, tilt.sd_rad), gtsam::Unit3(tilt.up_in_keyframe));
-}
-
-gtsam::LevenbergMarquardtParams lm_params(const PoseGraphConfig& config) {
-  gtsam::LevenbergMarquardtParams params;
-  params.maxIterations = static_cast<std::size_t>(config.max_iterations);
-  params.relativeErrorTol = config.relative_tolerance;
-  params.absoluteErrorTol = 1e-12;
-  params.orderingType = gtsam::Ordering::COLAMD;
-  return params;
-}
 
 void check(const PoseGraphProblem& problem) {
   const int n = static_cast<int>(problem.world_from_keyframe.size());
@@ -73,19 +40,6 @@ double cost(const PoseGraphProblem& problem, const std::vector<Pose>& poses,
   return sum;
 }
 
-// The graph with the loops that are still believed.
-gtsam::NonlinearFactorGraph build(const PoseGraphProblem& problem, const std::vector<char>& used) {
-  gtsam::NonlinearFactorGraph graph;
-  for (const PoseEdge& edge : problem.odometry)
-    add_edge(graph, edge);
-  for (std::size_t i = 0; i < problem.loops.size(); ++i) {
-    if (used[i] != 0) add_edge(graph, problem.loops[i]);
-  }
-  for (const TiltPrior& tilt : problem.tilts)
-    add_tilt(graph, tilt);
-  return graph;
-}
-
 struct Solved {
   gtsam::Values values;
   bool converged = false;
@@ -105,7 +59,7 @@ Solved solve_plain(gtsam::NonlinearFactorGraph graph, const gtsam::Values& first
 // Marks the loops that graduated non-convexity (Yang et al. 2020) gives no weight.
 void reject_by_gnc(const PoseGraphProblem& problem, const gtsam::Values& first,
                    const PoseGraphConfig& config, std::vector<char>& used) {
-  gtsam::NonlinearFactorGraph graph = build(problem, used);
+  gtsam::NonlinearFactorGraph graph = build_graph(problem, used);
   graph.addPrior(gtsam::Key{0}, first.at<gtsam::Pose3>(0),
                  gtsam::noiseModel::Isotropic::Sigma(6, 1e-6));
   using Params = gtsam::GncParams<gtsam::LevenbergMarquardtParams>;
@@ -149,7 +103,7 @@ PoseGraphResult optimise_pose_graph(const PoseGraphProblem& problem,
     if (config.check_consistency) result.loop_used = consistent_loops(problem, config);
     if (config.robust_loops && !problem.loops.empty())
       reject_by_gnc(problem, first, config, result.loop_used);
-    const Solved solved = solve_plain(build(problem, result.loop_used), first, config);
+    const Solved solved = solve_plain(build_graph(problem, result.loop_used), first, config);
     result.converged = solved.converged;
     if (!solved.converged) result.reason = "iteration limit";
     for (std::size_t k = 1; k < result.world_from_keyframe.size(); ++k)

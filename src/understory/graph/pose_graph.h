@@ -16,7 +16,7 @@ struct PoseEdge {
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation, rotation first
 };
 
-// Which loops a pose graph believes, and when its solution ends.
+// Which loops a pose graph accepts, and when its solution ends.
 struct PoseGraphConfig {
   bool robust_loops = true;  // graduated non-convexity over the loops, truncated least squares
   // Probability with which a right loop lies within the truncation (6 degrees of freedom).
@@ -42,9 +42,9 @@ struct TiltPrior {
 // The second graph of P4 F2. Keyframe 0 is held where it is.
 struct PoseGraphProblem {
   std::vector<Pose> world_from_keyframe;  // first values
-  std::vector<PoseEdge> odometry;         // believed
+  std::vector<PoseEdge> odometry;         // never rejected
   std::vector<PoseEdge> loops;            // each of them may be wrong
-  std::vector<TiltPrior> tilts;           // believed
+  std::vector<TiltPrior> tilts;           // never rejected
 };
 
 // The poses that a pose graph comes to, and what it thinks of its edges.
@@ -55,7 +55,7 @@ struct [[nodiscard]] PoseGraphResult {
   double initial_cost =
       0.0;  // half the sum of squared residuals over odometry, tilts and used loops
   double final_cost = 0.0;
-  // Residual of each edge at the answer, in standard deviations (root of the Mahalanobis square).
+  // Residual of each edge at the solution, in standard deviations (root of the Mahalanobis square).
   std::vector<double> odometry_residual;
   std::vector<double> loop_residual;
   std::vector<char> loop_used;  // 0: rejected as contradicting the rest
