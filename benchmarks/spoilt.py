@@ -161,10 +161,11 @@ def map_source(work, key, source, options=()):
 
 
 def row_of(key, result, error, pairs, **more):
-    report, code, said, _, cpu_s = result
+    report, code, said, folder, cpu_s = result
     row = {"key": key, "code": code, "cpu_s": cpu_s, "error_m": error, "pairs": pairs,
            "status": report["status"] if report else ("none" if code == 3 else f"exit {code}"),
-           "reasons": report["reasons"] if report else [said.strip()[-300:]],
+           "reasons": [reason.replace(f"{folder.parent}/", "").replace("spoilt/", "")
+                       for reason in (report["reasons"] if report else [said.strip()[-300:]])],
            "evidence": report.get("evidence", {}) if report else {},
            "warnings": [w["key"] for w in report["warnings"]] if report else []}
     row.update(more)

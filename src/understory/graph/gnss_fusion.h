@@ -32,7 +32,8 @@ struct GnssErrors {
 // Settings of the pose graph with positions by satellites.
 struct GnssFusionConfig {
   double bias_interval_s = 5.0;  // between two values of the slow part
-  // The kernel (Cauchy): residuals beyond that many standard deviations of the fast part count less.
+  // The kernel (Cauchy): residuals beyond that many standard deviations of the fast part count
+  // less.
   double kernel_sigmas = 2.0;
   double tilt_sd_deg = 0.5;  // of the vertical of the first keyframe, before it is seen
   double relative_tolerance = 1e-6;
@@ -51,11 +52,11 @@ struct [[nodiscard]] GnssFusionResult {
   std::vector<Eigen::Vector3d> residual;         // position minus antenna, metres
 };
 
-// Solves the pose graph together with positions by satellites (P2-6, P4-5): odometry, the loops that
-// `loop_used` marks, tilts, positions with a lever arm, and the receivers' slow errors, which are
-// estimated along. Nothing is held: the positions tell where the path is. `problem` is in its world
-// frame, whose z axis is up; `enu_from_world` is a first guess, for instance from a rigid fit.
-// Deterministic; thread-safe. Where the system is undetermined the path is that of the guess.
+// Solves the pose graph together with positions by satellites (P2-6, P4-5): odometry, the loops
+// that `loop_used` marks, tilts, positions with a lever arm, and the receivers' slow errors, which
+// are estimated along. Nothing is held: the positions tell where the path is. `problem` is in its
+// world frame, whose z axis is up; `enu_from_world` is a first guess, for instance from a rigid
+// fit. Deterministic; thread-safe. Where the system is undetermined the path is that of the guess.
 GnssFusionResult fuse_gnss(const PoseGraphProblem& problem, const std::vector<char>& loop_used,
                            const std::vector<GnssObservation>& observations,
                            const Pose& enu_from_world, const GnssErrors& errors,

@@ -142,11 +142,10 @@ TEST(GnssFusion, ErrorsUnderTreesDoNotBendThePath) {
 
 TEST(GnssFusion, AJumpOfMinutesNeitherBendsNorMovesThePath) {
   const Walk walk(300, 0.0, 0.003, 3);
-  const auto clean = fuse_gnss(walk.problem, {}, positions_of(walk, kForest, 5),
-                               walk.enu_from_world, kForest, {});
-  const auto jumping =
-      fuse_gnss(walk.problem, {}, positions_of(walk, kForest, 5, 10.0, 100, 160),
-                walk.enu_from_world, kForest, {});
+  const auto clean =
+      fuse_gnss(walk.problem, {}, positions_of(walk, kForest, 5), walk.enu_from_world, kForest, {});
+  const auto jumping = fuse_gnss(walk.problem, {}, positions_of(walk, kForest, 5, 10.0, 100, 160),
+                                 walk.enu_from_world, kForest, {});
   ASSERT_TRUE(jumping.converged) << jumping.reason;
   EXPECT_LT(bend(jumping.enu_from_keyframe, walk.truth),
             1.1 * bend(clean.enu_from_keyframe, walk.truth) + 0.001);
@@ -166,10 +165,9 @@ TEST(GnssFusion, OutagesAndMissingHeightsAreNoObstacle) {
   ASSERT_TRUE(result.converged) << result.reason;
   double plane = 0.0;
   for (std::size_t k = 0; k < walk.truth.size(); ++k)
-    plane = std::max(plane, (result.enu_from_keyframe[k].translation() -
-                             walk.truth[k].translation())
-                                .head<2>()
-                                .norm());
+    plane = std::max(
+        plane,
+        (result.enu_from_keyframe[k].translation() - walk.truth[k].translation()).head<2>().norm());
   EXPECT_LT(plane, 0.4);
 }
 
@@ -182,9 +180,9 @@ TEST(GnssFusion, TheStatedCovarianceIsHonest) {
     const GnssFusionResult result = fuse_gnss(
         walk.problem, {}, positions_of(walk, kForest, static_cast<std::uint64_t>(1000 + seed)),
         walk.enu_from_world, kForest, {});
-    const Vector3d error = result.enu_from_keyframe.back().rotation().conjugate() *
-                           (walk.truth.back().translation() -
-                            result.enu_from_keyframe.back().translation());
+    const Vector3d error =
+        result.enu_from_keyframe.back().rotation().conjugate() *
+        (walk.truth.back().translation() - result.enu_from_keyframe.back().translation());
     const Eigen::Matrix3d place = result.last_covariance.bottomRightCorner<3, 3>();
     squares += error.dot(place.inverse() * error) / (3.0 * kWalks);
   }
@@ -194,8 +192,7 @@ TEST(GnssFusion, TheStatedCovarianceIsHonest) {
 
 TEST(GnssFusion, WithoutPositionsThePathIsThatOfTheGuess) {
   const Walk walk(20, 0.0, 0.0, 1);
-  const GnssFusionResult result =
-      fuse_gnss(walk.problem, {}, {}, walk.enu_from_world, kForest, {});
+  const GnssFusionResult result = fuse_gnss(walk.problem, {}, {}, walk.enu_from_world, kForest, {});
   EXPECT_FALSE(result.converged);
   EXPECT_LT(rms(result.enu_from_keyframe, walk.truth), 1e-6);
 }

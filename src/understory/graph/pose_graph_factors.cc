@@ -36,7 +36,8 @@ gtsam::LevenbergMarquardtParams lm_params(const PoseGraphConfig& config) {
   return params;
 }
 
-gtsam::NonlinearFactorGraph build_graph(const PoseGraphProblem& problem, const std::vector<char>& used) {
+gtsam::NonlinearFactorGraph build_graph(const PoseGraphProblem& problem,
+                                        const std::vector<char>& used) {
   gtsam::NonlinearFactorGraph graph;
   for (const PoseEdge& edge : problem.odometry)
     add_edge(graph, edge);

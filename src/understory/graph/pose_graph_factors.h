@@ -16,7 +16,9 @@ namespace understory {
 [[nodiscard]] gtsam::Pose3 to_gtsam(const Pose& pose);
 [[nodiscard]] Pose from_gtsam(const gtsam::Pose3& pose);
 
+// A relative pose between two keyframes, with its covariance.
 void add_edge(gtsam::NonlinearFactorGraph& graph, const PoseEdge& edge);
+// The vertical of one keyframe.
 void add_tilt(gtsam::NonlinearFactorGraph& graph, const TiltPrior& tilt);
 // Odometry, the loops that `loop_used` marks, and tilts, in this order.
 [[nodiscard]] gtsam::NonlinearFactorGraph build_graph(const PoseGraphProblem& problem,

@@ -35,6 +35,10 @@ namespace path_evidence {  // pipeline/judgement/path_evidence.cc
 inline constexpr double kShortestStepS = 1e-3;
 // Quantile of speeds and accelerations that is judged [chosen]
 inline constexpr double kUsual = 0.99;
+// ns before and after a jump that tell how fast the path was [chosen]
+inline constexpr std::int64_t kJumpBase = 500'000'000;
+// ns between impossible steps of one jump at most [chosen]
+inline constexpr std::int64_t kJumpGap = 500'000'000;
 }  // namespace path_evidence
 
 namespace run_judgement {  // pipeline/judgement/run_judgement.cc

@@ -39,7 +39,10 @@ void describe(ConfigTable& table, MotionLimits& config) {
 }
 
 void PathEvidence::add(const StampedPose& pose) {
-  if (!last_.empty()) {
+  bool impossible = false;
+  if (last_.empty()) {
+    origin_ = pose.world_from_body.translation();
+  } else {
     const StampedPose& before = last_.back();
     const double step_s = to_seconds(pose.stamp - before.stamp);
     if (step_s < kShortestStepS) return;
@@ -47,7 +50,7 @@ void PathEvidence::add(const StampedPose& pose) {
     const Pose step = before.world_from_body.inverse() * pose.world_from_body;
     const double speed = step.translation().norm() / step_s;
     const double turn_rate = step.angle() / step_s * 180.0 / std::numbers::pi;
-    bool impossible = speed > limits_.speed_m_s || turn_rate > limits_.turn_rate_deg_s;
+    impossible = speed > limits_.speed_m_s || turn_rate > limits_.turn_rate_deg_s;
     speeds_.push_back(static_cast<float>(speed));
     turn_rates_.push_back(static_cast<float>(turn_rate));
     if (last_.size() == 2) {
@@ -66,6 +69,51 @@ void PathEvidence::add(const StampedPose& pose) {
     impossible_ += impossible ? 1 : 0;
   }
   last_.push_back(pose);
+  places_.push_back(
+      {pose.stamp, (pose.world_from_body.translation() - origin_).cast<float>(), impossible});
+}
+
+// How far the path between two poses is longer or shorter than the speeds before and after it make
+// one expect, metres.
+double PathEvidence::jump_m(std::size_t first, std::size_t last) const {
+  const auto speed_between = [&](std::size_t from, std::size_t to) -> Eigen::Vector3f {
+    const double seconds = to_seconds(places_[to].stamp - places_[from].stamp);
+    return (places_[to].position - places_[from].position) / static_cast<float>(seconds);
+  };
+  std::size_t before = first;
+  while (before > 0 && places_[first].stamp - places_[before].stamp < kJumpBase)
+    --before;
+  std::size_t after = last;
+  while (after + 1 < places_.size() && places_[after].stamp - places_[last].stamp < kJumpBase)
+    ++after;
+  if (before == first && after == last) return 0.0;  // nothing else is known of the path
+  Eigen::Vector3f speed = Eigen::Vector3f::Zero();
+  if (before < first) speed += speed_between(before, first);
+  if (after > last) speed += speed_between(last, after);
+  if (before < first && after > last) speed *= 0.5F;
+  const auto seconds = static_cast<float>(to_seconds(places_[last].stamp - places_[first].stamp));
+  return static_cast<double>(
+      (places_[last].position - places_[first].position - speed * seconds).norm());
+}
+
+// Impossible steps that follow each other closely are one jump. It begins two poses before the
+// first of them, where the motion was still a carrier's. A scan at a wrong place returns, and jumps
+// by nothing.
+void PathEvidence::find_jump(MotionEvidence& motion) const {
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    if (!places_[i].impossible) continue;
+    std::size_t last = i;
+    for (std::size_t k = i + 1;
+         k < places_.size() && places_[k].stamp - places_[last].stamp <= kJumpGap; ++k) {
+      if (places_[k].impossible) last = k;
+    }
+    const double jump = jump_m(i < 2 ? 0 : i - 2, last);
+    if (jump > motion.jump_m) {
+      motion.jump_m = jump;
+      motion.jump_stamp = places_[last].stamp;
+    }
+    i = last;
+  }
 }
 
 MotionEvidence PathEvidence::evidence() const {
@@ -78,6 +126,7 @@ MotionEvidence PathEvidence::evidence() const {
   motion.hardest_m_s2 = largest(accelerations_);
   motion.impossible = impossible_;
   motion.longest_step_s = longest_step_s_;
+  find_jump(motion);
   return motion;
 }
 

@@ -21,7 +21,7 @@ struct MotionLimits {
 };
 void describe(ConfigTable& table, MotionLimits& config);
 
-// Gathers speeds, accelerations and turn rates of a path, pose by pose in order of time. Memory: 12
+// Gathers speeds, accelerations and turn rates of a path, pose by pose in order of time. Memory: 36
 // bytes a pose. Not thread-safe.
 class PathEvidence {
  public:
@@ -31,8 +31,21 @@ class PathEvidence {
   [[nodiscard]] MotionEvidence evidence() const;
 
  private:
+  // Where the path was; `impossible`: the step to here, or the bend at the pose before.
+  struct Place {
+    TimeNs stamp = 0;
+    Eigen::Vector3f position = Eigen::Vector3f::Zero();  // m, from the first pose
+    bool impossible = false;
+  };
+
+  // The largest jump of the path that stays.
+  void find_jump(MotionEvidence& motion) const;
+  [[nodiscard]] double jump_m(std::size_t first, std::size_t last) const;
+
   MotionLimits limits_;
   std::vector<StampedPose> last_;  // at most two
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  std::vector<Place> places_;
   std::vector<float> speeds_;
   std::vector<float> accelerations_;
   std::vector<float> turn_rates_;

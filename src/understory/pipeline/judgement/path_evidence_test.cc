@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -51,6 +52,29 @@ TEST(PathEvidence, NoiseOfMatchingIsNoAcceleration) {
     return Eigen::Vector3d(t + (std::lround(10.0 * t) % 2 == 0 ? 0.04 : -0.04), 0.0, 0.0);
   };
   EXPECT_EQ(gathered(noisy).impossible, 0U);
+}
+
+// Walks at 4 m/s, and slides by 10 m within a second.
+TEST(PathEvidence, APathThatSlidesAwayHasJumped) {
+  const auto slides = [](double t) {
+    const double slide = 10.0 * std::clamp(t - 8.0, 0.0, 1.0);
+    return Eigen::Vector3d(4.0 * t + slide, 0.4 * std::sin(90.0 * slide), 0.0);
+  };
+  const MotionEvidence motion = gathered(slides);
+  EXPECT_GT(motion.impossible, 2U);
+  EXPECT_NEAR(motion.jump_m, 10.0, 1.5);
+  EXPECT_NEAR(to_seconds(motion.jump_stamp), 9.0, 0.3);
+}
+
+TEST(PathEvidence, ScansAtWrongPlacesComeBackAndAreNoJump) {
+  const auto strays = [](double t) {
+    const auto scan = std::lround(10.0 * t);
+    return Eigen::Vector3d(4.0 * t + (scan == 60 || scan == 62 || scan == 120 ? 1.7 : 0.0), 0.0,
+                           0.0);
+  };
+  const MotionEvidence motion = gathered(strays);
+  EXPECT_GT(motion.impossible, 5U);
+  EXPECT_LT(motion.jump_m, 0.3);
 }
 
 TEST(PathEvidence, OfNoPathThereIsNothing) {

@@ -28,6 +28,7 @@ void put_motion(Figures& figures, const MotionEvidence& motion) {
   figures["speed_max_m_s"] = motion.fastest_m_s;
   figures["acceleration_p99_m_s2"] = motion.acceleration_p99_m_s2;
   figures["acceleration_max_m_s2"] = motion.hardest_m_s2;
+  figures["jump_max_m"] = motion.jump_m;
   figures["step_max_s"] = motion.longest_step_s;
   figures["turn_rate_p99_deg_s"] = motion.turn_rate_p99_deg_s;
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "understory/output/run_summary.h"
+#include "understory/util/time.h"
 
 namespace understory {
 
@@ -37,6 +38,9 @@ struct MotionEvidence {
   double longest_step_s = 0.0;  // between two scans
   // Steps beyond what any carrier does, see JudgementConfig.
   std::uint64_t impossible = 0;
+  // How far the path went astray over such steps without coming back, at most, and when.
+  double jump_m = 0.0;
+  TimeNs jump_stamp = 0;
 };
 
 // How scans fitted the map.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "understory/pipeline/pipeline_constants.h"
+#include "understory/util/time.h"
 
 namespace understory {
 namespace {
@@ -201,6 +202,12 @@ class Judge {
 
   void judge_motion() {
     const MotionEvidence& motion = evidence_.motion;
+    if (motion.jump_m > config_.max_jump_m) {
+      hurt(
+          fmt::format("the path jumps by {:.1f} m before {} s and does not come back: the maps "
+                      "before and behind do not fit together",
+                      motion.jump_m, format_seconds(motion.jump_stamp)));
+    }
     const double impossible = share(motion.impossible, motion.steps);
     if (impossible <= config_.max_misplaced) return;
     const std::string found = fmt::format(
@@ -352,6 +359,8 @@ void describe(ConfigTable& table, JudgementConfig& config) {
             "partial: a larger share of the steps is a motion that no carrier makes");
   table.add("max_impossible", config.max_impossible, shares, "",
             "untrusted: the same; where times were assumed, max_misplaced is the limit");
+  table.add("max_jump_m", config.max_jump_m, {0.0, 1e6}, "m",
+            "untrusted: the path goes astray by more over such steps and does not come back");
   const ConfigTable::Range ratios{-1e6, 1e6};
   table.add(
       "min_scan_motion", config.min_scan_motion, ratios, "",

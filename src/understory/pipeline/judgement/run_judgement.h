@@ -32,6 +32,8 @@ struct JudgementConfig {
   // were assumed, it is untrusted.
   double max_misplaced = 0.01;
   double max_impossible = 0.04;
+  // A scan at a wrong place comes back; a path that does not come back has come off its map.
+  double max_jump_m = 1.0;
   // Motion within scans over motion between them, see ScanMotion: 1 is right.
   double min_scan_motion = 0.4;
   double max_scan_motion = 1.8;

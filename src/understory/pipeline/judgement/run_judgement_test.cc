@@ -143,6 +143,8 @@ TEST(RunJudgement, Matches) {
   expect(RunStatus::kPartial, "Single scans are at wrong places", jumps);
   jumps.motion.impossible = 40;
   expect(kUntrusted, "stamps of the scans or the matches are wrong", jumps);
+  expect_limit<MotionEvidence, double>(&RunEvidence::motion, &MotionEvidence::jump_m, 1.0, 1.1,
+                                       kUntrusted, "the path jumps by 1.1 m");
   RunEvidence pieces = good_run();
   pieces.match.segments = 2;
   pieces.match.first_lost = "17.5";
