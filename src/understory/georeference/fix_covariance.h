@@ -12,7 +12,7 @@ struct FixCovarianceConfig {
   double sd_per_dop_m = 1.5;
   double default_plane_sd_m = 2.0;   // each axis, of a fix that says nothing [chosen]
   double default_height_sd_m = 4.0;  // of a fix that says nothing [chosen]
-  double least_sd_m = 0.01;          // nothing is believed to be better [bound: GNSS]
+  double least_sd_m = 0.01;          // no fix is better [bound: GNSS]
 };
 
 // Covariance of a fix, east, north, up, m^2: the receiver's own where it is one (finite, positive

@@ -14,7 +14,7 @@ struct ReceiverNoise {
   double fast_sd_m = 0.1;
 };
 
-// What is believed of a receiver before its fixes are compared with a path: medians, and the
+// The prior of a receiver before its fixes are compared with a path: medians, and the
 // standard deviation of the natural logarithm.
 struct ReceiverPriorConfig {
   double overconfidence = 2.2;  // slow_sd_m over what the receiver states

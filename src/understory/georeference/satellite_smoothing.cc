@@ -73,7 +73,7 @@ class SatelliteChain {
     system.diagonal.assign(states_.size(), Matrix15d::Zero());
     system.next.assign(states_.size(), Matrix15d::Zero());
     system.right.assign(states_.size(), Vector15d::Zero());
-    // What is believed of velocity and biases before, and next to nothing of the attitude.
+    // The prior of velocity and biases, and next to nothing of the attitude.
     Vector15d weight = Vector15d::Zero();
     weight.head<3>().setConstant(kAttitudeWeight);
     weight.segment<3>(6).setConstant(std::pow(kVelocitySdMS, -2.0));

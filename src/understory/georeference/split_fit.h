@@ -15,7 +15,7 @@ struct SplitFitConfig {
   // How far the run's up may be off gravity, one standard deviation about each level axis. With an
   // IMU a map is level [measured: docs/method/georeference.md].
   double tilt_sd_deg = 0.05;
-  // A pair is believed to be at most that many times as good or as bad as the median says: what a
+  // A pair counts as at most that many times as good or as bad as the median says: what a
   // receiver states of a moment tells only a part of its error [tuned: the presets below].
   double most_scale = 2.0;
   // The same for a run that was mapped without an IMU [chosen: a lidar that is carried by hand].
