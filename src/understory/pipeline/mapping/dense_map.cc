@@ -71,11 +71,11 @@ std::string DenseFrontEnd::why_no_map(const Recording& source) const {
     topics += (topics.empty() ? "" : ", ") + topic.name + " (" + topic.type + ")";
     empty += topic.empty_points;
   }
-  if (counts_.scans > 0) {
+  if (received_.counts.scans > 0) {
     return fmt::format(
         "none of its {} scans has points to map: {} points are not a number or at zero range, the "
         "others too near, too far or on the machine",
-        counts_.scans, empty);
+        received_.counts.scans, empty);
   }
   return "no lidar scan could be read from it" +
          (topics.empty() ? std::string() : "; it holds " + topics);
