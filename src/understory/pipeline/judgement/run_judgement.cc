@@ -115,7 +115,7 @@ class Judge {
   void judge_times() {
     const MatchEvidence& match = evidence_.match;
     if (evidence_.point_times_missing && match.smear_m > config_.max_smear_m) {
-      hurt(fmt::format("{}; the sensor moved so much that points 10 m away are smeared by {:.2f} m",
+      hurt(fmt::format("{}. The sensor moved so much that points 10 m away are smeared by {:.2f} m",
                        evidence_.why_no_point_times, match.smear_m));
     }
     if (share(match.repeated, match.scans) > config_.max_repeated) {
