@@ -133,7 +133,7 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
       .add_option(
           "--antenna-m", options.antenna_m,
           "Where the GNSS antenna, or what stood on the points, is in the body frame: x y z "
-          "(the origin if not given)")
+          "(if not given: of the run's own receiver as its run.json says, else the origin)")
       ->expected(3);
   command
       .add_option("--time-offset-s", options.time_offset_s,

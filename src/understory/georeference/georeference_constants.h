@@ -54,6 +54,15 @@ inline constexpr double kLeastSpreadM = 0.01;
 inline constexpr double kCauchyWidth = 2.385;
 }  // namespace rigid_fits
 
+namespace fused_path {  // georeference/fused_path.cc
+// m: fast error of a receiver at least: graphs need a width [chosen]
+inline constexpr double kLeastErrorM = 0.005;
+// m: what a receiver states in the plane that may be believed [chosen: RTK, fixed or float]
+inline constexpr double kGoodReceiverM = 0.15;
+// Steps of the logarithm of the odometry's scale, from the configured one [chosen: factors of 3]
+inline constexpr double kScaleSteps[] = {0.0, 1.1, 2.2, 3.3};
+}  // namespace fused_path
+
 namespace split_fit {  // georeference/split_fit.cc
 // Pairs at least [bound: three parameters in the plane]
 inline constexpr std::size_t kFewestPairs = 3;

@@ -11,11 +11,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/graph/pose_graph_factors.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
+
+using namespace graph_constants::gnss_fusion;
 
 using Eigen::Vector3d;
 using gtsam::symbol_shorthand::B;  // the receiver's slow error
@@ -155,6 +158,36 @@ void add_first_pose(gtsam::NonlinearFactorGraph& graph, const Pose& enu_from_fir
       gtsam::Key{0}, enu_from_first.translation(), diagonal(kFree, 1.0));
 }
 
+// The error of a keyframe's place, over keyframes that are spread along the path.
+double expected_error_m(const gtsam::Marginals& marginals, std::size_t keyframes) {
+  const std::size_t step = std::max<std::size_t>(1, keyframes / kKeyframesOfExpectedError);
+  double squares = 0.0;
+  double count = 0.0;
+  for (std::size_t k = 0; k < keyframes; k += step) {
+    squares += marginals.marginalCovariance(k).bottomRightCorner<3, 3>().trace();
+    count += 1.0;
+  }
+  return std::sqrt(squares / count);
+}
+
+// Logarithm of the determinant of a noise's square root information.
+double log_root_information(const gtsam::SharedNoiseModel& noise) {
+  const auto robust = boost::dynamic_pointer_cast<gtsam::noiseModel::Robust>(noise);
+  const auto& of = robust ? robust->noise() : noise;
+  const auto gaussian = boost::dynamic_pointer_cast<gtsam::noiseModel::Gaussian>(of);
+  return gaussian ? gaussian->R().diagonal().array().abs().log().sum() : 0.0;
+}
+
+double log_evidence(const gtsam::NonlinearFactorGraph& graph, const gtsam::Values& values) {
+  double evidence = -graph.error(values);
+  evidence -= graph.linearize(values)->eliminateMultifrontal()->logDeterminant();
+  for (const auto& factor : graph) {
+    if (const auto noisy = boost::dynamic_pointer_cast<gtsam::NoiseModelFactor>(factor))
+      evidence += log_root_information(noisy->noiseModel());
+  }
+  return evidence;
+}
+
 void check(const PoseGraphProblem& problem, const std::vector<GnssObservation>& observations,
            const GnssErrors& errors, const GnssFusionConfig& config) {
   for (std::size_t i = 0; i < observations.size(); ++i) {
@@ -219,6 +252,8 @@ GnssFusionResult fuse_gnss(const PoseGraphProblem& problem, const std::vector<ch
     const gtsam::Marginals marginals(graph, values);
     result.first_covariance = marginals.marginalCovariance(0);
     result.last_covariance = marginals.marginalCovariance(result.enu_from_keyframe.size() - 1);
+    result.expected_error_m = expected_error_m(marginals, result.enu_from_keyframe.size());
+    result.log_evidence = log_evidence(graph, values);
     fusion.judge(values, result);
   } catch (const std::exception& error) {  // an indeterminate system
     result.converged = false;

@@ -31,7 +31,7 @@ struct GnssErrors {
 
 // Settings of the pose graph with positions by satellites.
 struct GnssFusionConfig {
-  double bias_interval_s = 5.0;  // between two values of the slow part
+  double bias_interval_s = 1.0;  // between two values of the slow part
   // The kernel (Cauchy): residuals beyond that many standard deviations of the fast part count
   // less.
   double kernel_sigmas = 2.0;
@@ -48,8 +48,12 @@ struct [[nodiscard]] GnssFusionResult {
   std::vector<Pose> enu_from_keyframe;
   Matrix6d first_covariance = Matrix6d::Zero();  // of the first keyframe, right perturbation
   Matrix6d last_covariance = Matrix6d::Zero();   // of the last one
-  std::vector<double> weight;                    // of each observation by the kernel, 0 to 1
-  std::vector<Eigen::Vector3d> residual;         // position minus antenna, metres
+  double expected_error_m = 0.0;                 // of a keyframe's place, root mean square
+  // Logarithm of the probability of the positions (Laplace), up to a constant. Of the same
+  // positions, it compares covariances of the odometry and errors of the receiver.
+  double log_evidence = 0.0;
+  std::vector<double> weight;             // of each observation by the kernel, 0 to 1
+  std::vector<Eigen::Vector3d> residual;  // position minus antenna, metres
 };
 
 // Solves the pose graph together with positions by satellites (P2-6, P4-5): odometry, the loops

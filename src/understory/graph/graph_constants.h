@@ -16,6 +16,11 @@ namespace understory::graph_constants {
 // rad a degree [mathematics]
 inline constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 
+namespace gnss_fusion {  // graph/gnss_fusion.cc
+// Keyframes that the expected error of a path is a mean of [bound: time]
+inline constexpr std::size_t kKeyframesOfExpectedError = 50;
+}  // namespace gnss_fusion
+
 namespace structure {  // graph/self_correction/structure.cc
 // m: edge of the columns in which the ground is looked for [chosen]
 inline constexpr double kColumn = 2.0;

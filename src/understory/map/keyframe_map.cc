@@ -267,6 +267,20 @@ RangeCheck KeyframeMap::check_ranges(const Eigen::Vector3d& lidar_in_body) const
   return check;
 }
 
+std::vector<char> KeyframeMap::graph_loops_used() const {
+  std::vector<char> used;
+  for (std::size_t i = 0; i < loops_used_.size(); ++i) {
+    if (loops_.attempts()[i].verified) used.push_back(loops_used_[i]);
+  }
+  return used;
+}
+
+void KeyframeMap::set_poses(const std::vector<Pose>& world_from_keyframe) {
+  UNDERSTORY_CHECK(world_from_keyframe.size() == keyframes_.size() && snapshot_ == nullptr);
+  for (std::size_t i = 0; i < keyframes_.size(); ++i)
+    keyframes_[i].world_from_body = world_from_keyframe[i];
+}
+
 void KeyframeMap::move_world(const Pose& new_world_from_old_world) {
   // What a running search finds refers to the world as it was. Its loops are kept for the next
   // optimisation, its poses are not.

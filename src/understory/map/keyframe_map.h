@@ -81,6 +81,11 @@ class KeyframeMap {
   // Of the finished map: whether its clouds tell of ranges that are all too long or too short.
   //   lidar_in_body: where the beams begin, metres
   [[nodiscard]] RangeCheck check_ranges(const Eigen::Vector3d& lidar_in_body) const;
+  // Of the finished map: its graph at its poses, and which of the graph's loops it accepted.
+  [[nodiscard]] PoseGraphProblem graph() const { return loops_.problem_of(keyframes_); }
+  [[nodiscard]] std::vector<char> graph_loops_used() const;
+  // Of the finished map: new poses of all keyframes.
+  void set_poses(const std::vector<Pose>& world_from_keyframe);
   // Moves everything, e.g. to level the world.
   void move_world(const Pose& new_world_from_old_world);
 

@@ -80,7 +80,9 @@ class LoopCloser {
   [[nodiscard]] const std::vector<LoopAttempt>& attempts() const { return attempts_; }
   // CPU time of all searches so far, that which is running included.
   [[nodiscard]] double search_cpu_seconds() const { return work_.cpu_seconds(); }
-  // The graph optimised with all verified loops; without any, no poses.
+  // The graph of the keyframes, with all verified loops.
+  [[nodiscard]] PoseGraphProblem problem_of(const std::vector<Keyframe>& keyframes) const;
+  // That graph optimised; without any loop, no poses.
   [[nodiscard]] PoseGraphResult optimise(const std::vector<Keyframe>& keyframes) const;
 
   // Without the attempts, which only grow.
@@ -98,7 +100,6 @@ class LoopCloser {
   void begin(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
              KeyframePoints& points);
   [[nodiscard]] bool due(const std::vector<Keyframe>& keyframes);
-  [[nodiscard]] PoseGraphProblem problem_of(const std::vector<Keyframe>& keyframes) const;
 
   LoopCloserConfig config_;
   LocalMapConfig local_map_config_;

@@ -87,6 +87,10 @@ Json to_json(const RunPlace& place) {
   Json json;
   json["on_globe"] = place.on_globe;
   json["reason"] = or_null(place.reason);
+  if (place.antenna_in_body) {
+    const Eigen::Vector3d& at = *place.antenna_in_body;
+    json["antenna_in_body_m"] = {at.x(), at.y(), at.z()};
+  }
   if (!place.on_globe) return json;
   const Eigen::Vector3d& t = place.enu_from_world.translation();
   const Eigen::Quaterniond& q = place.enu_from_world.rotation();

@@ -59,7 +59,9 @@ struct RunPlace {
   bool on_globe = false;  // what follows holds; else the layers are in the world frame
   std::string reason;     // why not
   std::string method;     // that found it, as `georeference --method` names it
-  Pose enu_from_world;    // to east, north, up at the origin
+  // Of the receiver whose fixes the run holds, in the body frame, metres; nothing where unknown.
+  std::optional<Eigen::Vector3d> antenna_in_body;
+  Pose enu_from_world;  // to east, north, up at the origin
   GeodeticPlace origin;
   std::string coordinate_system;  // "EPSG:3067", or its name
   std::string heights;            // what heights of the layers are above, in words

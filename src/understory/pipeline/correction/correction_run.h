@@ -27,10 +27,10 @@ struct CorrectionInput {
   std::vector<float> scan_ms;  // work on the scan of each view; 0: unknown
   bool stopped = false;        // before all views had their steps: they are not corrected
   std::vector<LoggedCut> head_cuts;
-  std::vector<GnssFix> fixes;  // of the recording; compared with, not used
-  Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();  // metres; zero where unknown
-  std::optional<Trajectory> truth;                            // of a simulated recording
-  RunEvidence evidence;                                       // of the reading
+  std::vector<GnssFix> fixes;                      // of the recording; compared with, not used
+  std::optional<Eigen::Vector3d> antenna_in_body;  // metres; nothing where unknown
+  std::optional<Trajectory> truth;                 // of a simulated recording
+  RunEvidence evidence;                            // of the reading
 };
 
 // What a correction has found beside.

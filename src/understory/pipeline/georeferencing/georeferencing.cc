@@ -33,7 +33,8 @@ std::vector<ReportFix> fixes_of(const std::vector<GnssRow>& rows) {
 std::string yaml_of(GeoreferenceRequest request) {
   bool plain = !request.path.robust;
   std::string dem = request.terrain_model.string();
-  std::vector<double> antenna_m(request.antenna_in_body.data(), request.antenna_in_body.data() + 3);
+  std::vector<double> antenna_m;
+  if (const auto& at = request.antenna_in_body) antenna_m.assign(at->data(), at->data() + 3);
   std::vector<double> start;
   if (request.start) start.assign(request.start->begin(), request.start->end());
   ConfigTable table;
@@ -117,8 +118,10 @@ Placement find_placement(const GeoreferenceRequest& request, const MovableRun& r
 }
 
 // The place of the result: its world frame is east, north, up where the origin is known.
-RunPlace place_of(const GeoreferenceRequest& request, const Placement& placement) {
+RunPlace place_of(const GeoreferenceRequest& request, const MovableRun& run,
+                  const Placement& placement) {
   RunPlace place;
+  if (request.gnss.empty()) place.antenna_in_body = run.antenna_in_body;
   place.method = placement.method;
   place.on_globe = placement.origin.has_value();
   if (place.on_globe) {
@@ -166,7 +169,7 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& lo
   documents.add_inputs(placement.inputs);
   timer.emplace(times, "writing");
   const MovedRun moved = moved_run(run, placement);
-  RunPlace on_globe = place_of(request, placement);
+  RunPlace on_globe = place_of(request, run, placement);
   ResultFrames frames;
   if (on_globe.on_globe) frames = frames_at(on_globe, request.layers, log);
   MapPicture picture;

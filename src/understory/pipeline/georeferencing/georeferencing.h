@@ -37,7 +37,8 @@ struct GeoreferenceRequest {
   bool overwrite = false;  // what an earlier run left in the folder of the result
   GeoreferenceMethod method = GeoreferenceMethod::kGnssPath;
   std::string gnss;  // file with fixes; empty: gnss.csv of the run
-  Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();
+  // Of the receiver or of what stood on the points; not given: that of the run's own receiver.
+  std::optional<Eigen::Vector3d> antenna_in_body;
   std::string recording;          // whose IMU smooths the fixes; empty: as run.json names it
   std::filesystem::path points;   // table of control points
   double time_offset_s = 0.0;     // added to the stamps of the fixes

@@ -90,32 +90,20 @@ std::string said(const InputError& error) {
   return text.rfind(file, 0) == 0 ? text.substr(file.size()) : text;
 }
 
-// The placement of the best method, or why there is none.
-struct Attempt {
-  std::optional<Placement> placement;
-  std::string reason;
-};
-
-Attempt try_to_place(const MappedPath& run, const std::vector<GnssFix>& fixes, Log& log) {
+FoundPlacement try_to_place(const MappedPath& run, const std::vector<GnssFix>& fixes, Log& log) {
   GeoreferenceRequest request;
   request.run = run.results;
   request.method = best_method().method;
-  request.antenna_in_body = run.antenna_in_body;
   if (run.level) request.tilt_sd_deg = SplitFitConfig().tilt_sd_deg;
   MovableRun movable;
   movable.trajectory = run.trajectory;
   movable.fixes = fixes;
+  movable.antenna_in_body = run.antenna_in_body;
   try {
     return {best_method().place(request, movable, log), ""};
   } catch (const InputError& error) {  // the fixes cannot be used: the map is as good as without
     return {std::nullopt, said(error)};
   }
-}
-
-std::vector<GnssFix> fixes_with_position(const std::vector<GnssFix>& all) {
-  std::vector<GnssFix> fixes;
-  std::copy_if(all.begin(), all.end(), std::back_inserter(fixes), has_position);
-  return fixes;
 }
 
 // Fills in the frames of a run that was placed; says why where the system does not reach it.
@@ -137,25 +125,29 @@ void lay_on_globe(const Placement& placement, const GeoreferenceConfig& config, 
 
 }  // namespace
 
-PlacedMap place_map(const MappedPath& run, const GeoreferenceConfig& config, Log& log) {
-  PlacedMap map;
-  if (run.fixes.empty()) {
-    map.place.reason = "the recording has no satellite positions";
-    return map;
-  }
+std::vector<GnssFix> fixes_with_position(const std::vector<GnssFix>& all) {
+  std::vector<GnssFix> fixes;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(fixes), has_position);
+  return fixes;
+}
+
+FoundPlacement find_placement(const MappedPath& run, const GeoreferenceConfig& config, Log& log) {
+  if (run.fixes.empty()) return {std::nullopt, "the recording has no satellite positions"};
   const std::vector<GnssFix> fixes = fixes_with_position(run.fixes);
   write_rows(run.results, rows_of(fixes, ""));  // a method names them as its input
-  Attempt attempt;
-  if (!config.enabled) {
-    map.place.reason = "georeference.enabled is off";
-  } else if (fixes.empty()) {
-    map.place.reason = "no message of the receiver has a position";
-  } else {
-    attempt = try_to_place(run, fixes, log);
-    map.place.reason = attempt.reason;
-  }
-  if (attempt.placement) {
-    const Placement& placement = *attempt.placement;
+  if (!config.enabled) return {std::nullopt, "georeference.enabled is off"};
+  if (fixes.empty()) return {std::nullopt, "no message of the receiver has a position"};
+  return try_to_place(run, fixes, log);
+}
+
+PlacedMap place_map(const MappedPath& run, const FoundPlacement& found,
+                    const GeoreferenceConfig& config, Log& log) {
+  PlacedMap map;
+  map.place.reason = found.reason;
+  if (run.fixes.empty()) return map;
+  map.place.antenna_in_body = run.antenna_in_body;
+  if (found.placement) {
+    const Placement& placement = *found.placement;
     std::copy_if(placement.figures.begin(), placement.figures.end(),
                  std::inserter(map.figures, map.figures.end()), [](const auto& figure) {
                    const double* value = std::get_if<double>(&figure.second);
@@ -169,8 +161,8 @@ PlacedMap place_map(const MappedPath& run, const GeoreferenceConfig& config, Log
     log.warn("gnss.not_placed", "the map has no place on the globe: " + map.place.reason);
   std::vector<GnssRow> rows =
       rows_of(run.fixes, map.place.on_globe ? "not looked at" : map.place.reason);
-  if (attempt.placement) {
-    fill_rows(*attempt.placement, map.place, rows);
+  if (found.placement) {
+    fill_rows(*found.placement, map.place, rows);
     for (const GnssRow& row : rows) {
       if (row.position_in_world.head<2>().allFinite())
         map.fixes.push_back({row.position_in_world.cast<float>(), row.used});
@@ -178,6 +170,10 @@ PlacedMap place_map(const MappedPath& run, const GeoreferenceConfig& config, Log
   }
   write_rows(run.results, rows);
   return map;
+}
+
+PlacedMap place_map(const MappedPath& run, const GeoreferenceConfig& config, Log& log) {
+  return place_map(run, find_placement(run, config, log), config, log);
 }
 
 }  // namespace understory

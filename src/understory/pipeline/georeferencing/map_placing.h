@@ -3,11 +3,13 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/output/report.h"
+#include "understory/pipeline/georeferencing/placement.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/util/log.h"
@@ -19,7 +21,7 @@ struct MappedPath {
   std::filesystem::path results;  // folder that holds its trajectory.tum
   const Trajectory& trajectory;   // world frame
   const std::vector<GnssFix>& fixes;
-  Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();  // metres; zero where unknown
+  std::optional<Eigen::Vector3d> antenna_in_body = {};  // metres; nothing where unknown
   bool level = false;  // it was mapped with an IMU: its up is that of gravity
 };
 
@@ -31,11 +33,26 @@ struct PlacedMap {
   std::vector<ReportFix> fixes;           // world frame
 };
 
-// Finds the place of a run by the recording's own fixes, by the method `auto` where there is one.
-// Writes gnss.csv, with the fixes in the run's world frame and what became of each. Where there are
-// no fixes, or the fit is not to be trusted, the layers stay in the world frame, with the reason;
-// where there are fixes a warning says so. The run's status does not depend on it. Throws
+// A placement by the recording's own fixes, or why there is none.
+struct FoundPlacement {
+  std::optional<Placement> placement;
+  std::string reason;
+};
+
+// Those of `all` whose latitude and longitude are a place on the earth.
+[[nodiscard]] std::vector<GnssFix> fixes_with_position(const std::vector<GnssFix>& all);
+
+// By the method `auto`. Writes gnss.csv, which the placement names as its input. Throws
 // OutputError.
+[[nodiscard]] FoundPlacement find_placement(const MappedPath& run, const GeoreferenceConfig& config,
+                                            Log& log);
+// Lays a run on the globe. Writes gnss.csv, with the fixes in the run's world frame and what became
+// of each. Where there are no fixes, or the fit is not to be trusted, the layers stay in the world
+// frame, with the reason; where there are fixes a warning says so. The run's status does not depend
+// on it. Throws OutputError.
+[[nodiscard]] PlacedMap place_map(const MappedPath& run, const FoundPlacement& found,
+                                  const GeoreferenceConfig& config, Log& log);
+// Both.
 [[nodiscard]] PlacedMap place_map(const MappedPath& run, const GeoreferenceConfig& config,
                                   Log& log);
 

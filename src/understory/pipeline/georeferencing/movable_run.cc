@@ -59,6 +59,7 @@ MovableRun read_movable_run(const fs::path& folder) {
     run.origin = place->origin;
     run.enu_from_world = place->enu_from_world;
   }
+  run.antenna_in_body = read_antenna(folder);
   run.layers = std::make_shared<LayerFrame>(read_layer_frame(folder));
   run.of_cloud = fs::exists(folder / "map.laz") || fs::exists(folder / "dtm.tif");
   run.area_m2 = area_of(folder);

@@ -5,6 +5,7 @@
 #include "understory/georeference/gnss_fit.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
+#include "understory/pipeline/georeferencing/satellite_placement.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
@@ -15,13 +16,8 @@ using namespace pipeline_constants::georeferencing;
 
 Placement place_by_gnss_path(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {
   const NamedFixes named = fixes_of_run(request.gnss, request.run, run.fixes, log);
-  if (request.antenna_in_body.norm() > kLongestArmM)
-    log.warn("recording.lever_arm",
-             fmt::format("the antenna is said to be {:.1f} m from the body's origin (--antenna-m): "
-                         "check that these are metres and not a place on the earth",
-                         request.antenna_in_body.norm()));
   const GnssFit fit =
-      fit_to_gnss(run.trajectory, request.antenna_in_body, named.fixes, request.path);
+      fit_to_gnss(run.trajectory, antenna_of(request, run, log), named.fixes, request.path);
   if (!fit.path.found) throw InputError(named.file, "", fit.path.reason);
   Placement placement;
   placement.target_from_world = fit.enu_from_world;

@@ -41,11 +41,11 @@ Vector3d place_in_run(const CsvReader& table, const GeoreferenceRequest& request
   TimeNs stamp = 0;
   if (!parse_seconds(std::string(table.text("timestamp_s")), stamp))
     table.fail("expected a time in seconds of point " + name);
+  const Vector3d foot = request.antenna_in_body.value_or(Vector3d(Vector3d::Zero()));
   Vector3d sum = Vector3d::Zero();
   double count = 0.0;
   for (const double off_s : {-0.5, 0.0, 0.5}) {
-    const auto at =
-        antenna_place(run.trajectory, request.antenna_in_body, stamp + from_seconds(off_s));
+    const auto at = antenna_place(run.trajectory, foot, stamp + from_seconds(off_s));
     if (!at) continue;
     sum += *at;
     count += 1.0;

@@ -113,6 +113,19 @@ std::optional<RunPlace> read_run_place(const fs::path& run) {
   }
 }
 
+std::optional<Eigen::Vector3d> read_antenna(const fs::path& run) {
+  const Json json = read_run_json(run);
+  if (json.is_null() || !json.contains("georeference")) return std::nullopt;
+  const Json& block = json.at("georeference");
+  if (!block.is_object() || !block.contains("antenna_in_body_m")) return std::nullopt;
+  try {
+    const auto at = block.at("antenna_in_body_m").get<std::array<double, 3>>();
+    return Eigen::Vector3d(at[0], at[1], at[2]);
+  } catch (const Json::exception& error) {
+    throw InputError((run / "run.json").string(), "georeference", error.what());
+  }
+}
+
 LayerFrame read_layer_frame(const fs::path& run) {
   const Json json = read_run_json(run);
   if (json.is_null() || !json.contains("georeference")) return {};

@@ -97,18 +97,25 @@ double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run) {
                                     : SplitFitConfig().unlevel_tilt_sd_deg;
 }
 
-SatelliteInput read_satellite_input(const GeoreferenceRequest& request, const MovableRun& run,
-                                    Log& log) {
-  if (request.antenna_in_body.norm() > kLongestArmM)
+Eigen::Vector3d antenna_of(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {
+  const bool own = request.gnss.empty() && run.antenna_in_body.has_value();
+  const Eigen::Vector3d antenna = request.antenna_in_body.value_or(
+      own ? *run.antenna_in_body : Eigen::Vector3d(Eigen::Vector3d::Zero()));
+  if (antenna.norm() > kLongestArmM)
     log.warn("recording.lever_arm",
              fmt::format("the antenna is said to be {:.1f} m from the body's origin (--antenna-m): "
                          "check that these are metres and not a place on the earth",
-                         request.antenna_in_body.norm()));
+                         antenna.norm()));
+  return antenna;
+}
+
+SatelliteInput read_satellite_input(const GeoreferenceRequest& request, const MovableRun& run,
+                                    Log& log) {
   SatelliteInput input;
   const NamedFixes named = fixes_of_run(request.gnss, request.run, run.fixes, log);
   input.file = named.file;
   input.fixes = named.fixes;
-  input.config.pairing.antenna_in_body = request.antenna_in_body;
+  input.config.pairing.antenna_in_body = antenna_of(request, run, log);
   input.config.pairing.time_offset_s = request.time_offset_s;
   input.config.split.time_offset_sd_s = request.time_offset_sd_s;
   input.config.split.robust = input.config.rigid.robust = request.path.robust;

@@ -23,6 +23,11 @@ struct SatelliteInput {
 // mapped with an IMU or laid on the earth before.
 [[nodiscard]] double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run);
 
+// Where the antenna of the fixes is in the body frame, metres: as the request says; else, of the
+// run's own fixes, as run.json says; else at the body's origin. Warns of one that is far off.
+[[nodiscard]] Eigen::Vector3d antenna_of(const GeoreferenceRequest& request, const MovableRun& run,
+                                         Log& log);
+
 // Reads the fixes and settles the settings of the fits: a run that was mapped with an IMU is level.
 // Warns of a lever arm that is no lever arm. Throws InputError.
 [[nodiscard]] SatelliteInput read_satellite_input(const GeoreferenceRequest& request,

@@ -5,6 +5,7 @@
 #include "understory/pipeline/mapping/dense_front_end.h"
 #include "understory/pipeline/mapping/dense_results.h"
 #include "understory/pipeline/mapping/finished_map.h"
+#include "understory/pipeline/mapping/finished_trajectory.h"
 #include "understory/pipeline/mapping/lidar_view.h"
 
 namespace understory {
@@ -35,7 +36,18 @@ class DenseMap : public MapMaker {
   DenseMap(DenseFrontEnd& front_end, const ReadRecording& recording)
       : front_end_(front_end), recording_(recording) {}
 
-  void close_loops() override { front_end_.map().finish(); }
+  void close_loops() override {
+    front_end_.map().finish();
+    if (front_end_.config().gnss.use == GnssUse::kGeoreference) return;
+    const ScopedTimer timer(front_end_.times(), "finish_gnss");
+    const SolvedRun solved = solved_run();
+    RunWithPositions with_positions =
+        use_positions(mapped_path(recording_, front_end_, solved.trajectory), solved,
+                      front_end_.config().georeference, front_end_.config().gnss, recording_.log);
+    if (!with_positions.world_from_keyframe.empty())
+      front_end_.map().set_poses(with_positions.world_from_keyframe);
+    made_.placement = std::move(with_positions.found);
+  }
   void finish_map() override {
     if (!front_end_.config().map_enabled) return;
     const ScopedTimer timer(front_end_.times(), "finish_gather_map");
@@ -57,6 +69,17 @@ class DenseMap : public MapMaker {
   RunOutcome write() override { return write_dense_results(recording_, front_end_, made_); }
 
  private:
+  [[nodiscard]] SolvedRun solved_run() const {
+    const KeyframeMap& map = front_end_.map();
+    SolvedRun run{map.graph(), map.graph_loops_used(), {}, {}};
+    for (const Keyframe& keyframe : map.keyframes())
+      run.stamps.push_back(keyframe.stamp);
+    for_each_finished_scan(front_end_.journal(), map.keyframes(), [&](const FinishedScan& scan) {
+      run.trajectory.push_back({scan.record->stamp, scan.world_from_body});
+    });
+    return run;
+  }
+
   DenseFrontEnd& front_end_;
   ReadRecording recording_;
   DenseProducts made_;

@@ -31,6 +31,7 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   });
   table.section("inventory", [&] { describe(table, config.inventory); });
   table.section("georeference", [&] { describe(table, config.georeference); });
+  table.section("gnss", [&] { describe(table, config.gnss); });
   table.section("judgement", [&] {
     describe(table, config.judgement);
     table.section("motion", [&] { describe(table, config.motion_limits); });

@@ -8,6 +8,7 @@
 #include "understory/map/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/odometry/dense/dense_odometry.h"
+#include "understory/pipeline/georeferencing/gnss_in_graph.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
@@ -29,6 +30,7 @@ struct DenseMappingConfig {
   bool map_enabled = true;        // write map.laz and what is made from it
   InventoryConfig inventory;
   GeoreferenceConfig georeference;
+  GnssUseConfig gnss;
   JudgementConfig judgement;
   MotionLimits motion_limits;
   double cloud_distance_m = 1.0;  // weighted distance (37) between scans whose clouds are kept

@@ -11,7 +11,6 @@
 #include "understory/output/layer_files.h"
 #include "understory/output/map_picture.h"
 #include "understory/output/run_tables.h"
-#include "understory/pipeline/georeferencing/map_placing.h"
 #include "understory/pipeline/judgement/evidence_gathering.h"
 #include "understory/pipeline/judgement/match_course.h"
 #include "understory/pipeline/judgement/path_evidence.h"
@@ -338,13 +337,13 @@ void add_map(const ReadRecording& recording, DenseProducts& made, const Trajecto
 
 // Where the run lies on the globe, by its own fixes; gnss.csv.
 PlacedMap place_on_globe(const ReadRecording& recording, DenseFrontEnd& front_end,
-                         const Trajectory& trajectory, RunDocuments& documents) {
+                         const DenseProducts& made, const Trajectory& trajectory,
+                         RunDocuments& documents) {
   const ScopedTimer timer(front_end.times(), "finish_georeference");
-  MappedPath path{recording.results, trajectory, front_end.fixes()};
-  path.level = front_end.counts().imu_samples > 0;
-  if (const auto& antenna = front_end.rig().body_from_gnss)
-    path.antenna_in_body = antenna->translation();
-  PlacedMap map = place_map(path, front_end.config().georeference, recording.log);
+  const MappedPath path = mapped_path(recording, front_end, trajectory);
+  const GeoreferenceConfig& config = front_end.config().georeference;
+  PlacedMap map = made.placement ? place_map(path, *made.placement, config, recording.log)
+                                 : place_map(path, config, recording.log);
   documents.summary().quality.merge(map.figures);
   documents.report().fixes = std::move(map.fixes);
   documents.report().has_fixes = !front_end.fixes().empty();
@@ -352,6 +351,15 @@ PlacedMap place_on_globe(const ReadRecording& recording, DenseFrontEnd& front_en
 }
 
 }  // namespace
+
+MappedPath mapped_path(const ReadRecording& recording, const DenseFrontEnd& front_end,
+                       const Trajectory& trajectory) {
+  MappedPath path{recording.results, trajectory, front_end.fixes()};
+  path.level = front_end.counts().imu_samples > 0;
+  if (const auto& antenna = front_end.rig().body_from_gnss)
+    path.antenna_in_body = antenna->translation();
+  return path;
+}
 
 RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& front_end,
                                DenseProducts& made) {
@@ -367,7 +375,8 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   fill_quality(front_end, trajectory, facts, documents.summary());
   if (const auto truth = write_truth(recording.request.run_folder, recording.source))
     documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
-  const PlacedMap map = place_on_globe(recording, front_end, trajectory.trajectory, documents);
+  const PlacedMap map =
+      place_on_globe(recording, front_end, made, trajectory.trajectory, documents);
   documents.place(map.place, map.frames);
   MapPicture picture;
   {

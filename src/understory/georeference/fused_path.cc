@@ -1,0 +1,242 @@
+#include "understory/georeference/fused_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "understory/georeference/georeference_constants.h"
+#include "understory/util/error.h"
+#include "understory/util/median.h"
+
+namespace understory {
+namespace {
+
+using namespace georeference_constants::fused_path;
+
+using Eigen::Vector3d;
+
+// The positions of one run and how they err, as both functions need them.
+struct Positions {
+  std::string reason;  // why there are none
+  std::vector<GnssObservation> observations;
+  GnssErrors errors;
+};
+
+GnssErrors errors_of(const SplitFit& seen) {
+  GnssErrors errors;
+  errors.slow_plane_m = seen.plane_noise.slow_sd_m();
+  errors.fast_plane_m = std::max(seen.plane_noise.fast_sd_m(), kLeastErrorM);
+  errors.correlation_s = seen.plane_noise.correlation_s();
+  if (seen.height_known) {
+    errors.slow_height_m = seen.height_noise.slow_sd_m();
+    errors.fast_height_m = std::max(seen.height_noise.fast_sd_m(), kLeastErrorM);
+  }
+  return errors;
+}
+
+// A receiver that states decimetres and does not jump by more from pair to pair is as good as it
+// states (RTK in the open): what is smooth in the residuals is the error of the path. Under trees a
+// receiver that states too little jumps, too.
+GnssErrors errors_of_good_receiver(const SplitFit& seen, const GnssErrors& shown,
+                                   const SplitFitConfig& config) {
+  const double plane_m = seen.plane_times.stated_sd_m;
+  if (plane_m > kGoodReceiverM || shown.fast_plane_m > plane_m) return shown;
+  GnssErrors errors = shown;
+  errors.slow_plane_m = std::min(shown.slow_plane_m, plane_m);
+  errors.fast_plane_m = std::max(shown.fast_plane_m, config.plane.fast_share * plane_m);
+  if (!seen.height_known) return errors;
+  const double height_m = seen.height_times.stated_sd_m;
+  errors.slow_height_m = std::min(shown.slow_height_m, height_m);
+  errors.fast_height_m = std::max(shown.fast_height_m, config.height.fast_share * height_m);
+  return errors;
+}
+
+double stated_plane_m(const SatellitePair& pair) {
+  return std::sqrt(0.5 * pair.covariance.topLeftCorner<2, 2>().trace());
+}
+
+// Each pair at the keyframe before it.
+std::vector<GnssObservation> observations_of(const SolvedRun& run,
+                                             const std::vector<SatellitePair>& pairs,
+                                             TimeNs first_fix, double most_scale) {
+  std::vector<double> stated;
+  for (const SatellitePair& pair : pairs)
+    stated.push_back(stated_plane_m(pair));
+  const double median = upper_median(stated);
+  std::vector<GnssObservation> observations;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const SatellitePair& pair = pairs[k];
+    GnssObservation one;
+    one.stamp = first_fix + from_seconds(pair.time_s);
+    const auto after = std::upper_bound(run.stamps.begin(), run.stamps.end(), one.stamp);
+    const auto keyframe = after == run.stamps.begin() ? 0 : after - run.stamps.begin() - 1;
+    one.keyframe = static_cast<int>(keyframe);
+    one.antenna_in_keyframe =
+        run.graph.world_from_keyframe[static_cast<std::size_t>(keyframe)].inverse() *
+        pair.antenna_in_world;
+    one.position_in_enu = pair.fix_in_enu;
+    one.has_height = pair.has_height;
+    one.scale = std::clamp(stated[k] / median, 1.0 / most_scale, most_scale);
+    observations.push_back(one);
+  }
+  return observations;
+}
+
+TimeNs first_stamp(const std::vector<GnssFix>& fixes) {
+  std::optional<TimeNs> first;
+  for (const GnssFix& fix : fixes) {
+    if (std::isfinite(fix.latitude_deg) && std::isfinite(fix.longitude_deg))
+      first = first ? std::min(*first, fix.stamp) : fix.stamp;
+  }
+  return first.value_or(0);
+}
+
+Positions positions_of(const SolvedRun& run, const std::vector<GnssFix>& fixes,
+                       const PairingConfig& pairing, const SplitFitConfig& split,
+                       const FusedPathConfig& config) {
+  Positions positions;
+  const SatellitePairs coarse = pair_by_time(run.trajectory, fixes, pairing);
+  positions.reason = coarse.reason;
+  if (!positions.reason.empty()) return positions;
+  const SplitFit seen = fit_split(coarse.pairs, split);
+  positions.reason = seen.reason;
+  if (!seen.found) return positions;
+  positions.errors = errors_of_good_receiver(seen, errors_of(seen), split);
+  PairingConfig fine = pairing;
+  fine.most_pairs = static_cast<std::size_t>(config.most_positions);
+  const TimeNs first = first_stamp(fixes) + from_seconds(pairing.time_offset_s);
+  positions.observations = observations_of(run, pair_by_time(run.trajectory, fixes, fine).pairs,
+                                           first, split.most_scale);
+  return positions;
+}
+
+GnssFusionConfig with_tilt(const FusedPathConfig& config, const SplitFitConfig& split) {
+  GnssFusionConfig fusion = config.fusion;
+  fusion.tilt_sd_deg = split.tilt_sd_deg;
+  return fusion;
+}
+
+// The solved graph again, with edges that say what its poses say.
+PoseGraphProblem settled(const PoseGraphProblem& solved, double odometry_scale) {
+  PoseGraphProblem graph = solved;
+  const auto between = [&](PoseEdge& edge) {
+    edge.from_from_to = solved.world_from_keyframe[static_cast<std::size_t>(edge.from)].inverse() *
+                        solved.world_from_keyframe[static_cast<std::size_t>(edge.to)];
+  };
+  for (PoseEdge& edge : graph.odometry) {
+    between(edge);
+    edge.covariance *= odometry_scale * odometry_scale;
+  }
+  for (PoseEdge& edge : graph.loops)
+    between(edge);
+  graph.tilts.clear();  // the poses say that, too
+  return graph;
+}
+
+void take_over(const GnssFusionResult& solved, const Positions& positions, FusedPath& path) {
+  path.found = solved.converged;
+  path.reason = solved.reason;
+  path.covariance = solved.first_covariance;
+  path.expected_error_m = solved.expected_error_m;
+  path.errors = positions.errors;
+  path.positions = positions.observations.size();
+  for (const double weight : solved.weight)
+    path.weight += weight / static_cast<double>(solved.weight.size());
+}
+
+// How far places lie off the same ones by a rigid motion, which is fitted to the middle and to the
+// heading.
+double bent_m(const std::vector<Pose>& bent, const std::vector<Pose>& straight) {
+  Eigen::Matrix3Xd to(3, static_cast<Eigen::Index>(bent.size()));
+  Eigen::Matrix3Xd from(3, to.cols());
+  for (Eigen::Index k = 0; k < to.cols(); ++k) {
+    to.col(k) = bent[static_cast<std::size_t>(k)].translation();
+    from.col(k) = straight[static_cast<std::size_t>(k)].translation();
+  }
+  const Vector3d to_middle = to.rowwise().mean();
+  const Vector3d from_middle = from.rowwise().mean();
+  to.colwise() -= to_middle;
+  from.colwise() -= from_middle;
+  const double along = (to.topRows<2>().cwiseProduct(from.topRows<2>())).sum();
+  const double across =
+      (from.row(0).cwiseProduct(to.row(1)) - from.row(1).cwiseProduct(to.row(0))).sum();
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(std::atan2(across, along), Vector3d::UnitZ()).toRotationMatrix();
+  return std::sqrt((to - turn * from).squaredNorm() / static_cast<double>(to.cols()));
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, FusedPathConfig& config) {
+  describe(table, config.fusion);
+  table.add("odometry_scale", config.odometry_scale, {1e-3, 100.0}, "",
+            "standard deviations of the odometry over those of the graph, before the positions are "
+            "looked at");
+  table.add("odometry_scale_log", config.odometry_scale_log, {0.0, 10.0}, "",
+            "standard deviation of the logarithm of that; 0: it is kept");
+  table.add("most_positions", config.most_positions, {10, 100000}, "",
+            "positions in the graph at most; more are gathered over longer intervals");
+}
+
+FusedPath fuse_path(const SolvedRun& run, const std::vector<GnssFix>& fixes,
+                    const Pose& enu_from_world, const PairingConfig& pairing,
+                    const SplitFitConfig& split, const FusedPathConfig& config) {
+  UNDERSTORY_CHECK(run.stamps.size() == run.graph.world_from_keyframe.size());
+  FusedPath path;
+  const Positions positions = positions_of(run, fixes, pairing, split, config);
+  path.reason = positions.reason;
+  if (!path.reason.empty()) return path;
+  double best = 0.0;
+  for (const double steps : kScaleSteps) {
+    if (config.odometry_scale_log <= 0.0 && steps != 0.0) break;
+    const double scale = config.odometry_scale * std::exp(steps);
+    const GnssFusionResult solved =
+        fuse_gnss(settled(run.graph, scale), run.loop_used, positions.observations, enu_from_world,
+                  positions.errors, with_tilt(config, split));
+    if (!solved.converged) {
+      if (!path.found) path.reason = solved.reason;
+      continue;
+    }
+    const double off = steps == 0.0 ? 0.0 : steps / config.odometry_scale_log;
+    const double evidence = solved.log_evidence - 0.5 * off * off;
+    if (path.found && evidence <= best) break;  // it only falls from here
+    best = evidence;
+    path = {};
+    take_over(solved, positions, path);
+    path.enu_from_keyframe = solved.enu_from_keyframe;
+    path.odometry_scale = scale;
+  }
+  if (path.found) path.bent_m = bent_m(path.enu_from_keyframe, run.graph.world_from_keyframe);
+  return path;
+}
+
+FusedPath move_path(const SolvedRun& run, const std::vector<GnssFix>& fixes,
+                    const Pose& enu_from_world, const PairingConfig& pairing,
+                    const SplitFitConfig& split, const FusedPathConfig& config) {
+  UNDERSTORY_CHECK(!run.stamps.empty() &&
+                   run.stamps.size() == run.graph.world_from_keyframe.size());
+  FusedPath path;
+  Positions positions = positions_of(run, fixes, pairing, split, config);
+  path.reason = positions.reason;
+  if (!path.reason.empty()) return path;
+  // All hangs on one pose: that of the first keyframe.
+  const Pose& world_from_first = run.graph.world_from_keyframe.front();
+  for (GnssObservation& one : positions.observations) {
+    const auto k = static_cast<std::size_t>(one.keyframe);
+    one.antenna_in_keyframe =
+        world_from_first.inverse() * run.graph.world_from_keyframe[k] * one.antenna_in_keyframe;
+    one.keyframe = 0;
+  }
+  PoseGraphProblem rigid;
+  rigid.world_from_keyframe = {world_from_first};
+  const GnssFusionResult solved = fuse_gnss(rigid, {}, positions.observations, enu_from_world,
+                                            positions.errors, with_tilt(config, split));
+  take_over(solved, positions, path);
+  if (!path.found) return path;
+  const Pose motion = solved.enu_from_keyframe.front() * world_from_first.inverse();
+  for (const Pose& pose : run.graph.world_from_keyframe)
+    path.enu_from_keyframe.push_back(motion * pose);
+  return path;
+}
+
+}  // namespace understory

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "understory/geometry/stamped_pose.h"
+#include "understory/georeference/satellite_pairs.h"
+#include "understory/georeference/split_fit.h"
+#include "understory/graph/gnss_fusion.h"
+#include "understory/graph/pose_graph.h"
+#include "understory/sensor/gnss_fix.h"
+#include "understory/util/config/config.h"
+#include "understory/util/time.h"
+
+namespace understory {
+
+// A run whose graph was solved without positions by satellites.
+struct SolvedRun {
+  PoseGraphProblem graph;               // world frame, its z axis up; its poses are the solution
+  std::vector<char> loop_used;          // of graph.loops
+  std::vector<TimeNs> stamps;           // of the keyframes, in order
+  std::vector<StampedPose> trajectory;  // of the scans, world frame, in order of time
+};
+
+// Settings of positions by satellites beside or in the graph.
+struct FusedPathConfig {
+  GnssFusionConfig fusion;
+  // Standard deviations of the odometry between keyframes are these times those of the graph,
+  // which are large so that loops close. The positions tell which [tuned: handheld, evo2, lake,
+  // seeds up to 19].
+  double odometry_scale = 0.1;
+  // Standard deviation of its natural logarithm before the positions are looked at.
+  double odometry_scale_log = 1.0;
+  // Pairs of antenna and fixes that become factors, at most [bound: time].
+  int most_positions = 1000;
+};
+void describe(ConfigTable& table, FusedPathConfig& config);
+
+// How keyframes lie by the positions together with the graph. Frame east, north, up at the first
+// fix.
+struct [[nodiscard]] FusedPath {
+  bool found = false;
+  std::string reason;  // if not
+  std::vector<Pose> enu_from_keyframe;
+  Matrix6d covariance = Matrix6d::Zero();  // of the first of them, right perturbation
+  double expected_error_m = 0.0;           // of a keyframe's place, root mean square
+  // How far the positions moved the keyframes against the best rigid motion, root mean square.
+  double bent_m = 0.0;
+  double odometry_scale = 1.0;  // that the positions made probable
+  GnssErrors errors;            // of the receiver, as estimated
+  std::size_t positions = 0;    // factors
+  double weight = 0.0;          // of them by the kernel, mean
+};
+
+// The positions become factors of the graph (P2-6, P4-5). What the clouds say of its shape stays:
+// edges say again what the solved poses say, and are as stiff as the positions make probable.
+// `enu_from_world` is a rigid fit of the same path to the same fixes. Deterministic; thread-safe.
+FusedPath fuse_path(const SolvedRun& run, const std::vector<GnssFix>& fixes,
+                    const Pose& enu_from_world, const PairingConfig& pairing,
+                    const SplitFitConfig& split, const FusedPathConfig& config);
+
+// One motion of the whole run, estimated with the receiver's slow errors as in fuse_path; its shape
+// stays. The keyframes are moved by it.
+FusedPath move_path(const SolvedRun& run, const std::vector<GnssFix>& fixes,
+                    const Pose& enu_from_world, const PairingConfig& pairing,
+                    const SplitFitConfig& split, const FusedPathConfig& config);
+
+}  // namespace understory
