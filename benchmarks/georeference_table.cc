@@ -12,9 +12,11 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
+#include "understory/georeference/fused_path.h"
 #include "understory/georeference/gnss_fit.h"
 #include "understory/georeference/satellite_fit.h"
 #include "understory/georeference/satellite_smoothing.h"
+#include "understory/map/keyframe_map.h"
 #include "understory/simulation/sensors/inertial.h"
 #include "understory/simulation/sensors/satellite.h"
 #include "understory/simulation/world.h"
@@ -100,12 +102,67 @@ std::vector<ImuSample> samples_of(const SimulatedWorld& world, TimeNs start, Tim
   return samples;
 }
 
+// The run as `map` has it before positions enter its graph: a keyframe each metre, with the
+// odometry's default covariances; without its loops, whose work is done.
+SolvedRun solved_run(const Trajectory& run) {
+  const KeyframeMap::Config edges;
+  SolvedRun solved;
+  solved.trajectory = run;
+  Pose last;
+  for (const StampedPose& pose : run) {
+    const Pose& at = pose.world_from_body;
+    const Pose step = last.inverse() * at;
+    const double length_m = step.translation().norm();
+    const int index = static_cast<int>(solved.stamps.size());
+    if (index > 0 && length_m < 1.0) continue;
+    if (index > 0) {
+      Vector6d sd;
+      sd << Vector3d::Constant(edges.edge_rotation_deg_per_sqrt_m * M_PI / 180.0),
+          Vector3d::Constant(edges.edge_translation_m_per_sqrt_m);
+      solved.graph.odometry.push_back(
+          {index - 1, index, step, (length_m * sd.cwiseAbs2()).asDiagonal()});
+    }
+    solved.graph.world_from_keyframe.push_back(at);
+    solved.stamps.push_back(pose.stamp);
+    last = at;
+  }
+  return solved;
+}
+
 struct Judged {
   const SimulatedWorld& world;
   const Trajectory& run;
+  const Trajectory& truth;
+  SolvedRun solved;
   Pose reference;  // site from run
   std::vector<ImuSample> samples;
   Pose body_from_imu;
+
+  // A path whose shape may differ from that of the run.
+  void print(int seed, const char* method, const FusedPath& path,
+             const GeodeticPlace& origin) const {
+    const OriginConfig& at = world.site.origin;
+    const Vector3d shift =
+        EastNorthUp({at.latitude_deg, at.longitude_deg, at.height_m}).from_place(origin);
+    double squares = 0.0;
+    Vector3d first = Vector3d::Zero();
+    Vector3d turn = Vector3d::Zero();
+    std::size_t row = 0;
+    for (std::size_t k = 0; k < path.enu_from_keyframe.size(); ++k) {
+      while (truth[row].stamp < solved.stamps[k])
+        ++row;
+      const Pose& there = truth[row].world_from_body;
+      const Pose& found = path.enu_from_keyframe[k];
+      const Vector3d off = found.translation() + shift - there.translation();
+      squares += off.squaredNorm() / static_cast<double>(path.enu_from_keyframe.size());
+      if (k > 0) continue;
+      first = off;
+      turn = so3_log(found.rotation() * there.rotation().conjugate()) * 180.0 / M_PI;
+    }
+    std::printf("%d,%s,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,nan,nan,nan,nan,nan,nan\n", seed,
+                method, first.x(), first.y(), first.z(), turn.x(), turn.y(), turn.z(),
+                std::sqrt(squares), path.expected_error_m);
+  }
 
   void print(int seed, const char* method, const Pose& enu_from_world, const GeodeticPlace& origin,
              const Matrix6d& spread, double expected_m) const {
@@ -153,6 +210,15 @@ void lay(const Judged& judged, const std::vector<GnssFix>& fixes, int seed) {
   if (best != nullptr)
     judged.print(seed, "auto", best->enu_from_world, *best->origin, best->spread,
                  best->expected_error_m);
+  if (fits[2].found) {
+    const Pose& guess = fits[2].enu_from_world;
+    const FusedPath rigid =
+        move_path(judged.solved, fixes, guess, config.pairing, config.split, {});
+    const FusedPath fused =
+        fuse_path(judged.solved, fixes, guess, config.pairing, config.split, {});
+    if (rigid.found) judged.print(seed, "rigid", rigid, *fits[2].origin);
+    if (fused.found) judged.print(seed, "fuse", fused, *fits[2].origin);
+  }
   SatelliteSmoothingConfig smoothing;
   smoothing.pairing = config.pairing;
   smoothing.body_from_imu = judged.body_from_imu;
@@ -189,7 +255,11 @@ int run_table(int argc, char** argv) {
   }
   const Trajectory truth = true_path(world, stamps, start);
   if (run.empty()) run = drifted_path(truth, std::strtoull(path.c_str() + 6, nullptr, 10));
-  const Judged judged{world, run, reference_motion(run, truth),
+  const Judged judged{world,
+                      run,
+                      truth,
+                      solved_run(run),
+                      reference_motion(run, truth),
                       samples_of(world, start, stamps.back()),
                       InertialSensor(site, world.plan.path, start).body_from_imu()};
   std::printf(

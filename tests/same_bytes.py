@@ -35,7 +35,7 @@ def report_without_times(text):
     """The report without its section on time, and without figures of time and memory elsewhere."""
     sections = [part for part in re.split(r"(?=<section)", text) if "<h2>Time" not in part]
     rest = re.sub(r'<div class="tile"><b>[\d.,]+ ms</b>.*?</div>', "", "".join(sections))
-    rest = re.sub(r"[\d.,]+ s of computing|[\d.,]+ s of CPU time|peak memory [\d.,]+ MB", "", rest)
+    rest = re.sub(r"· [^·<>]+ of computing \([^()]+ of CPU time\)|peak memory [\d.,]+ MB", "", rest)
     return re.sub(r"<tr><td>([^<]*)</td><td>[^<]*</td></tr>",
                   lambda row: "" if TIMED_FIGURE.search(row[1]) else row[0], rest)
 

@@ -6,7 +6,6 @@
 
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/error.h"
-#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -51,18 +50,10 @@ GnssErrors errors_of_good_receiver(const SplitFit& seen, const GnssErrors& shown
   return errors;
 }
 
-double stated_plane_m(const SatellitePair& pair) {
-  return std::sqrt(0.5 * pair.covariance.topLeftCorner<2, 2>().trace());
-}
-
 // Each pair at the keyframe before it.
 std::vector<GnssObservation> observations_of(const SolvedRun& run,
                                              const std::vector<SatellitePair>& pairs,
-                                             TimeNs first_fix, double most_scale) {
-  std::vector<double> stated;
-  for (const SatellitePair& pair : pairs)
-    stated.push_back(stated_plane_m(pair));
-  const double median = upper_median(stated);
+                                             TimeNs first_fix, const PairTimes& times) {
   std::vector<GnssObservation> observations;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const SatellitePair& pair = pairs[k];
@@ -76,7 +67,11 @@ std::vector<GnssObservation> observations_of(const SolvedRun& run,
         pair.antenna_in_world;
     one.position_in_enu = pair.fix_in_enu;
     one.has_height = pair.has_height;
-    one.scale = std::clamp(stated[k] / median, 1.0 / most_scale, most_scale);
+    const auto row = static_cast<Eigen::Index>(k);
+    one.plane_scale = times.plane.scale(row);
+    one.height_scale = times.height.scale(row);
+    one.extra_plane_m = times.plane.extra_sd_m(row);
+    one.extra_height_m = times.height.extra_sd_m(row);
     observations.push_back(one);
   }
   return observations;
@@ -105,8 +100,9 @@ Positions positions_of(const SolvedRun& run, const std::vector<GnssFix>& fixes,
   PairingConfig fine = pairing;
   fine.most_pairs = static_cast<std::size_t>(config.most_positions);
   const TimeNs first = first_stamp(fixes) + from_seconds(pairing.time_offset_s);
-  positions.observations = observations_of(run, pair_by_time(run.trajectory, fixes, fine).pairs,
-                                           first, split.most_scale);
+  const std::vector<SatellitePair> pairs = pair_by_time(run.trajectory, fixes, fine).pairs;
+  positions.observations =
+      observations_of(run, pairs, first, pair_times(pairs, seen.enu_from_world, split));
   return positions;
 }
 

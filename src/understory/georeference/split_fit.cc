@@ -90,10 +90,7 @@ class Splitter {
       : pairs_(pairs), config_(config) {
     fit_.height_known =
         std::all_of(pairs.begin(), pairs.end(), [](const auto& p) { return p.has_height; });
-    plane_ = stated(pairs, true, config.most_scale);
-    height_ = stated(pairs, false, config.most_scale);
     level_ = first_motion(pairs, config.robust, fit_.height_known);
-    fit_.far_off.assign(pairs.size(), 0);
   }
 
   SplitFit solve() {
@@ -117,27 +114,11 @@ class Splitter {
     return sum / static_cast<double>(pairs_.size());
   }
 
-  // What lies far off gets an error of that size, which is independent of the others: a runaway
-  // must not draw its neighbours along.
   void weigh() {
-    if (!config_.robust) return;
-    std::vector<double> plane;
-    std::vector<double> up;
-    for (const SatellitePair& pair : pairs_) {
-      const Vector3d r = pair.fix_in_enu - fit_.enu_from_world * pair.antenna_in_world;
-      plane.push_back(r.head<2>().norm());
-      up.push_back(std::abs(r.z()));
-    }
-    const double plane_sd = std::max(1e-6, upper_median(plane) / kRayleighMedian);
-    const double up_sd = std::max(1e-6, upper_median(up) / kNormalMedian);
-    fit_.plane_times = plane_;
-    fit_.height_times = height_;
-    for (std::size_t k = 0; k < pairs_.size(); ++k) {
-      const auto row = static_cast<Eigen::Index>(k);
-      fit_.far_off[k] = plane[k] > kFarOff * plane_sd ? 1 : 0;
-      if (fit_.far_off[k] != 0) fit_.plane_times.extra_sd_m(row) = plane[k];
-      if (up[k] > kFarOff * up_sd) fit_.height_times.extra_sd_m(row) = up[k];
-    }
+    PairTimes times = pair_times(pairs_, fit_.enu_from_world, config_);
+    fit_.plane_times = std::move(times.plane);
+    fit_.height_times = std::move(times.height);
+    fit_.far_off = std::move(times.far_off);
   }
 
   void solve_plane() {
@@ -162,7 +143,7 @@ class Splitter {
     MatrixXd information = MatrixXd::Zero(clock ? 4 : 3, clock ? 4 : 3);
     if (clock) information(3, 3) = std::pow(config_.time_offset_sd_s, -2.0);
     const NoisyEstimate found =
-        estimate_under_noise(plane_times(), series, information, config_.plane);
+        estimate_under_noise(fit_.plane_times, series, information, config_.plane);
     level_ = about(centre, Vector3d(0.0, 0.0, found.mean(0)),
                    Vector3d(found.mean(1), found.mean(2), 0.0)) *
              level_;
@@ -194,7 +175,7 @@ class Splitter {
     MatrixXd information = MatrixXd::Zero(3, 3);
     information(0, 0) = information(1, 1) = 1.0 / std::max(1e-12, tilt_sd * tilt_sd);
     const NoisyEstimate found =
-        estimate_under_noise(height_times(), {series}, information, config_.height);
+        estimate_under_noise(fit_.height_times, {series}, information, config_.height);
     tilt_ = Vector3d(found.mean(0), found.mean(1), 0.0);
     up_ = found.mean(2);
     fit_.height_noise = found.noise;
@@ -205,19 +186,8 @@ class Splitter {
     }
   }
 
-  [[nodiscard]] const NoisyTimes& plane_times() {
-    if (!config_.robust) fit_.plane_times = plane_;
-    return fit_.plane_times;
-  }
-  [[nodiscard]] const NoisyTimes& height_times() {
-    if (!config_.robust) fit_.height_times = height_;
-    return fit_.height_times;
-  }
-
   const std::vector<SatellitePair>& pairs_;
   const SplitFitConfig& config_;
-  NoisyTimes plane_;
-  NoisyTimes height_;
   Pose level_;  // without the tilt and the height that were found
   Vector3d tilt_ = Vector3d::Zero();
   double up_ = 0.0;
@@ -229,6 +199,31 @@ Pose at(const Vector3d& middle) {
 }
 
 }  // namespace
+
+PairTimes pair_times(const std::vector<SatellitePair>& pairs, const Pose& enu_from_world,
+                     const SplitFitConfig& config) {
+  PairTimes times;
+  times.plane = stated(pairs, true, config.most_scale);
+  times.height = stated(pairs, false, config.most_scale);
+  times.far_off.assign(pairs.size(), 0);
+  if (!config.robust) return times;
+  std::vector<double> plane;
+  std::vector<double> up;
+  for (const SatellitePair& pair : pairs) {
+    const Vector3d r = pair.fix_in_enu - enu_from_world * pair.antenna_in_world;
+    plane.push_back(r.head<2>().norm());
+    up.push_back(std::abs(r.z()));
+  }
+  const double plane_sd = std::max(1e-6, upper_median(plane) / kRayleighMedian);
+  const double up_sd = std::max(1e-6, upper_median(up) / kNormalMedian);
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    times.far_off[k] = plane[k] > kFarOff * plane_sd ? 1 : 0;
+    if (times.far_off[k] != 0) times.plane.extra_sd_m(row) = plane[k];
+    if (up[k] > kFarOff * up_sd) times.height.extra_sd_m(row) = up[k];
+  }
+  return times;
+}
 
 SplitFit fit_split(const std::vector<SatellitePair>& pairs, const SplitFitConfig& config) {
   SplitFit fit;

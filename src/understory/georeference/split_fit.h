@@ -49,6 +49,19 @@ struct SplitFit {
   std::vector<char> far_off;  // of each pair: 1 if it hardly counts
 };
 
+// How well pairs tell a place, in the plane and in height: scale and extra error of each.
+struct PairTimes {
+  NoisyTimes plane;
+  NoisyTimes height;
+  std::vector<char> far_off;  // of each pair: 1 if it lies far off in the plane
+};
+
+// Scales are what the receiver states of each pair over the median. What lies far off
+// `enu_from_world` against the others gets an extra error of that size, unless `config.robust` is
+// off: a runaway must not draw its neighbours along. At least one pair.
+[[nodiscard]] PairTimes pair_times(const std::vector<SatellitePair>& pairs,
+                                   const Pose& enu_from_world, const SplitFitConfig& config);
+
 // Heading and place from the positions in the plane alone, height and tilt from the heights and
 // from how level the run's world is. The errors of the fixes are correlated in time, and their size
 // is estimated along (`estimate_under_noise`). `pairs` all have heights or none counts. Not found

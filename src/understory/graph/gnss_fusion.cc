@@ -24,6 +24,10 @@ using Eigen::Vector3d;
 using gtsam::symbol_shorthand::B;  // the receiver's slow error
 using Jacobian = boost::optional<gtsam::Matrix&>;
 
+Vector3d scale_of(const GnssObservation& observation) {
+  return {observation.plane_scale, observation.plane_scale, observation.height_scale};
+}
+
 // A position of the antenna: that of the keyframe with the lever arm, plus the slow error.
 class PositionFactor : public gtsam::NoiseModelFactor2<gtsam::Pose3, Vector3d> {
  public:
@@ -32,6 +36,7 @@ class PositionFactor : public gtsam::NoiseModelFactor2<gtsam::Pose3, Vector3d> {
       : NoiseModelFactor2(noise, static_cast<gtsam::Key>(observation.keyframe), bias),
         antenna_(observation.antenna_in_keyframe),
         position_(observation.position_in_enu),
+        scale_(scale_of(observation)),
         axes_(observation.has_height ? 3 : 2) {}
 
   gtsam::Vector evaluateError(const gtsam::Pose3& pose, const Vector3d& bias, Jacobian by_pose,
@@ -39,13 +44,14 @@ class PositionFactor : public gtsam::NoiseModelFactor2<gtsam::Pose3, Vector3d> {
     gtsam::Matrix36 by_motion;
     const Vector3d antenna = pose.transformFrom(antenna_, by_motion);
     if (by_pose) *by_pose = by_motion.topRows(axes_);
-    if (by_bias) *by_bias = gtsam::Matrix3::Identity().topRows(axes_);
-    return (antenna + bias - position_).head(axes_);
+    if (by_bias) *by_bias = gtsam::Matrix3(scale_.asDiagonal()).topRows(axes_);
+    return (antenna + scale_.cwiseProduct(bias) - position_).head(axes_);
   }
 
  private:
   Vector3d antenna_;
   Vector3d position_;
+  Vector3d scale_;     // of the slow error
   Eigen::Index axes_;  // east, north, and up where it is measured
 };
 
@@ -117,7 +123,8 @@ class Fusion {
       const Pose& pose = result.enu_from_keyframe[static_cast<std::size_t>(observation.keyframe)];
       const Vector3d residual =
           observation.position_in_enu - pose * observation.antenna_in_keyframe;
-      const Vector3d fast = residual - values.at<Vector3d>(key_of(nodes_[i]));
+      const Vector3d slow = values.at<Vector3d>(key_of(nodes_[i]));
+      const Vector3d fast = residual - scale_of(observation).cwiseProduct(slow);
       const gtsam::SharedNoiseModel noise = noise_of(observation);
       const gtsam::Vector axes = fast.head(static_cast<Eigen::Index>(noise->dim()));
       const double sigmas = noise->whiten(axes).norm() / config_.kernel_sigmas;
@@ -135,9 +142,11 @@ class Fusion {
     return B(static_cast<std::uint64_t>(node - nodes_.front()));
   }
   [[nodiscard]] gtsam::SharedNoiseModel noise_of(const GnssObservation& observation) const {
-    const double plane = observation.scale * errors_.fast_plane_m;
-    if (observation.has_height) return diagonal(plane, observation.scale * errors_.fast_height_m);
-    return gtsam::noiseModel::Isotropic::Sigma(2, plane);
+    const double plane =
+        std::hypot(observation.plane_scale * errors_.fast_plane_m, observation.extra_plane_m);
+    if (!observation.has_height) return gtsam::noiseModel::Isotropic::Sigma(2, plane);
+    return diagonal(plane, std::hypot(observation.height_scale * errors_.fast_height_m,
+                                      observation.extra_height_m));
   }
 
   const std::vector<GnssObservation>& observations_;
@@ -194,7 +203,8 @@ void check(const PoseGraphProblem& problem, const std::vector<GnssObservation>& 
     const int keyframe = observations[i].keyframe;
     UNDERSTORY_CHECK(keyframe >= 0 &&
                      keyframe < static_cast<int>(problem.world_from_keyframe.size()));
-    UNDERSTORY_CHECK(observations[i].scale > 0.0 && observations[i].position_in_enu.allFinite());
+    UNDERSTORY_CHECK(observations[i].plane_scale > 0.0 && observations[i].height_scale > 0.0 &&
+                     observations[i].position_in_enu.allFinite());
     UNDERSTORY_CHECK(i == 0 || observations[i - 1].stamp <= observations[i].stamp);
   }
   UNDERSTORY_CHECK(errors.fast_plane_m > 0.0 && errors.fast_height_m > 0.0 &&

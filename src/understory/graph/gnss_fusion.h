@@ -16,7 +16,11 @@ struct GnssObservation {
   Eigen::Vector3d antenna_in_keyframe = Eigen::Vector3d::Zero();  // m
   Eigen::Vector3d position_in_enu = Eigen::Vector3d::Zero();      // m
   bool has_height = true;                                         // else z is no measurement
-  double scale = 1.0;  // of its errors against those of the others, 1 in the median
+  // Of its errors against those of the others, 1 in the median.
+  double plane_scale = 1.0;
+  double height_scale = 1.0;
+  double extra_plane_m = 0.0;  // independent errors of one that lies far off the others
+  double extra_height_m = 0.0;
 };
 
 // How positions by satellites err, standard deviations in metres: a slow part that is correlated

@@ -205,7 +205,8 @@ TimeConvention detect_point_times(const std::string& field, const std::string& t
   }
   const std::string name = field + " (" + type + ")";
   if (told.empty())
-    return without_times(name + " is the same for all points", clouds, imu_delays, period);
+    return without_times("the times of points are all the same in field " + name, clouds,
+                         imu_delays, period);
   const double span = raw_span(told);
   const bool offsets = near_zero(told, span);
   const auto unit = fitting_unit(span, period);
