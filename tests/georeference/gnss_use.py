@@ -56,7 +56,11 @@ def fused(folder):
     place = facts["georeference"]
     assert place["on_globe"] and place["method"] == "fuse", place
     assert place["enu_from_world"]["translation_m"] == [0, 0, 0] and turn(place["enu_from_world"]) == 0, place
-    # The truth is east, north, up of a place 0.2 degrees exactly; the run's is that of the first fix.
+    figures = facts["quality"]
+    assert [figures[f"motion_{axis}_m"] for axis in "xyz"] == [0, 0, 0], figures
+    of_split = RUNS["good", "georeference"][2]["georeference"]["heading_sd_deg"]
+    assert abs(place["heading_sd_deg"] - of_split) < 0.1 * of_split, (place["heading_sd_deg"], of_split)
+    # The truth is east, north, up of a place that is known; the run's is that of the first fix.
     truth = {round(row[0], 3): row for row in poses(GOOD.with_suffix(".truth") / "trajectory.tum")}
     north_m, east_m = 111_450.0, 111_320.0 * math.cos(math.radians(61.2)) * 1.0025
     north = (place["origin"]["latitude_deg"] - 61.2) * north_m
@@ -88,6 +92,9 @@ def rigid(folder):
             assert (run / file).read_bytes() == (plain / file).read_bytes(), (name, file)
         assert facts["georeference"]["on_globe"] and facts["georeference"]["method"] == "rigid", facts["georeference"]
         assert facts["georeference"]["origin"] == other["georeference"]["origin"]
+        place, figures = facts["georeference"], facts["quality"]
+        moved = place["enu_from_world"]["translation_m"]
+        assert [figures[f"motion_{axis}_m"] for axis in "xyz"] == moved, (name, figures)
         assert facts["georeference"]["expected_error_m"] >= other["georeference"]["expected_error_m"]
 
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/error.h"
@@ -77,15 +76,6 @@ std::vector<GnssObservation> observations_of(const SolvedRun& run,
   return observations;
 }
 
-TimeNs first_stamp(const std::vector<GnssFix>& fixes) {
-  std::optional<TimeNs> first;
-  for (const GnssFix& fix : fixes) {
-    if (std::isfinite(fix.latitude_deg) && std::isfinite(fix.longitude_deg))
-      first = first ? std::min(*first, fix.stamp) : fix.stamp;
-  }
-  return first.value_or(0);
-}
-
 Positions positions_of(const SolvedRun& run, const std::vector<GnssFix>& fixes,
                        const PairingConfig& pairing, const SplitFitConfig& split,
                        const FusedPathConfig& config) {
@@ -93,14 +83,17 @@ Positions positions_of(const SolvedRun& run, const std::vector<GnssFix>& fixes,
   const SatellitePairs coarse = pair_by_time(run.trajectory, fixes, pairing);
   positions.reason = coarse.reason;
   if (!positions.reason.empty()) return positions;
-  const SplitFit seen = fit_split(coarse.pairs, split);
+  const SplitFit seen = fit_split(of_one_kind(coarse.pairs), split);
   positions.reason = seen.reason;
   if (!seen.found) return positions;
   positions.errors = errors_of_good_receiver(seen, errors_of(seen), split);
   PairingConfig fine = pairing;
   fine.most_pairs = static_cast<std::size_t>(config.most_positions);
-  const TimeNs first = first_stamp(fixes) + from_seconds(pairing.time_offset_s);
-  const std::vector<SatellitePair> pairs = pair_by_time(run.trajectory, fixes, fine).pairs;
+  const SatellitePairs all = pair_by_time(run.trajectory, fixes, fine);
+  std::vector<SatellitePair> pairs = of_one_kind(all.pairs);
+  for (SatellitePair& pair : pairs)
+    pair.has_height = seen.height_known;
+  const TimeNs first = all.first_fix + from_seconds(pairing.time_offset_s);
   positions.observations =
       observations_of(run, pairs, first, pair_times(pairs, seen.enu_from_world, split));
   return positions;
@@ -132,7 +125,6 @@ PoseGraphProblem settled(const PoseGraphProblem& solved, double odometry_scale) 
 void take_over(const GnssFusionResult& solved, const Positions& positions, FusedPath& path) {
   path.found = solved.converged;
   path.reason = solved.reason;
-  path.covariance = solved.first_covariance;
   path.expected_error_m = solved.expected_error_m;
   path.errors = positions.errors;
   path.positions = positions.observations.size();

@@ -151,6 +151,32 @@ TEST(FusedPath, AMotionKeepsTheShape) {
   EXPECT_LT(error_m(walk, fixes, path), 4.0 * path.expected_error_m);
 }
 
+// Half a minute far off: the slow error must not follow it and draw its neighbours along.
+TEST(FusedPath, ARunawayDoesNotDrawThePathAlong) {
+  const Walk walk(300, 0.0, 4);
+  const auto clean = received(walk, {1.0, 0.3, 60.0, 1.0}, 11);
+  auto away = clean;
+  for (std::size_t k = 120; k < 150; ++k)
+    away[k].latitude_deg += 40.0 / 111'450.0;
+  const Pose guess = first_guess(walk, clean);
+  const FusedPath before = move_path(walk.run, clean, guess, with_arm(), {}, {});
+  const FusedPath after = move_path(walk.run, away, guess, with_arm(), {}, {});
+  ASSERT_TRUE(before.found && after.found);
+  EXPECT_LT(error_m(walk, away, after), error_m(walk, clean, before) + 0.5);
+}
+
+TEST(FusedPath, FewFixesWithoutAHeightAreLeftOut) {
+  const Walk walk(200, 0.0, 3);
+  auto fixes = received(walk, {0.0, 0.02, 60.0, 0.5}, 7);
+  for (const std::size_t k : {20U, 90U, 150U})
+    fixes[k].height_m = std::nan("");
+  const FusedPath path = move_path(walk.run, fixes, first_guess(walk, fixes), with_arm(), {}, {});
+  ASSERT_TRUE(path.found) << path.reason;
+  EXPECT_LT(path.positions, fixes.size());
+  EXPECT_LT(path.errors.slow_height_m, 1.0);  // the default is 4
+  EXPECT_LT(error_m(walk, fixes, path), 0.1);
+}
+
 TEST(FusedPath, FixesOfAnotherDayAreNamed) {
   const Walk walk(50, 0.0, 1);
   auto fixes = received(walk, {}, 2);

@@ -283,9 +283,7 @@ std::vector<SatelliteFit> fits_to_satellites(const std::vector<StampedPose>& tra
   common.reason = pairs.reason;
   SplitFit seen;
   if (common.reason.empty()) {
-    // Fixes without a height are left out where most have one.
-    std::vector<SatellitePair> high = with_height(pairs.pairs);
-    if (2 * high.size() >= pairs.pairs.size()) pairs.pairs = std::move(high);
+    pairs.pairs = of_one_kind(pairs.pairs);
     seen = fit_split(pairs.pairs, config.split);
     common.reason = seen.reason;
   }

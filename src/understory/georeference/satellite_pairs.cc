@@ -124,6 +124,7 @@ SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
   const EastNorthUp frame(*result.origin);
   std::stable_sort(fixes.begin(), fixes.end(),
                    [](const GnssFix& a, const GnssFix& b) { return a.stamp < b.stamp; });
+  result.first_fix = fixes.front().stamp;
   const TimeNs shift = from_seconds(config.time_offset_s);
   const Vector3d& arm = config.antenna_in_body;
   std::vector<SatellitePair> single;
@@ -152,10 +153,15 @@ SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
 }
 
 std::vector<SatellitePair> with_height(const std::vector<SatellitePair>& pairs) {
-  std::vector<SatellitePair> result;
-  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(result),
+  std::vector<SatellitePair> high;
+  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(high),
                [](const SatellitePair& pair) { return pair.has_height; });
-  return result;
+  return high;
+}
+
+std::vector<SatellitePair> of_one_kind(const std::vector<SatellitePair>& pairs) {
+  std::vector<SatellitePair> high = with_height(pairs);
+  return 2 * high.size() >= pairs.size() ? high : pairs;
 }
 
 double plane_extent_m(const std::vector<SatellitePair>& pairs) {

@@ -43,6 +43,7 @@ struct SatellitePair {
 struct SatellitePairs {
   std::optional<GeodeticPlace> origin;
   std::vector<SatellitePair> pairs;
+  TimeNs first_fix = 0;           // where `time_s` of the pairs counts from
   std::size_t fixes_in_time = 0;  // that have a place of the antenna
   std::string reason;             // why there are none, for a person
 };
@@ -60,6 +61,8 @@ struct SatellitePairs {
 
 // The pairs that have a height.
 [[nodiscard]] std::vector<SatellitePair> with_height(const std::vector<SatellitePair>& pairs);
+// Those where most have one; else all of them, and no height counts.
+[[nodiscard]] std::vector<SatellitePair> of_one_kind(const std::vector<SatellitePair>& pairs);
 
 // Diagonal of the box around the antenna's places in the plane, metres.
 [[nodiscard]] double plane_extent_m(const std::vector<SatellitePair>& pairs);

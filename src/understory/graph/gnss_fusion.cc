@@ -219,8 +219,6 @@ void describe(ConfigTable& table, GnssFusionConfig& config) {
             "time between two values of the receiver's slow error");
   table.add("kernel_sigmas", config.kernel_sigmas, {0.5, 100.0}, "",
             "positions that are off by more standard deviations count less");
-  table.add("tilt_sd_deg", config.tilt_sd_deg, {0.001, 45.0}, "deg",
-            "standard deviation of the vertical of the first keyframe");
   table.add("relative_tolerance", config.relative_tolerance, {1e-12, 0.1}, "",
             "stop when the cost falls by less than this share");
   table.add("max_iterations", config.max_iterations, {1, 1000}, "", "iterations at most");

@@ -39,7 +39,9 @@ struct GnssFusionConfig {
   // The kernel (Cauchy): residuals beyond that many standard deviations of the fast part count
   // less.
   double kernel_sigmas = 2.0;
-  double tilt_sd_deg = 0.5;  // of the vertical of the first keyframe, before it is seen
+  // Of the vertical of the first keyframe, before it is seen. No setting: whether there was an IMU
+  // tells it.
+  double tilt_sd_deg = 0.5;
   double relative_tolerance = 1e-6;
   int max_iterations = 100;
 };

@@ -190,6 +190,31 @@ TEST(GnssFusion, TheStatedCovarianceIsHonest) {
   EXPECT_LT(squares, 1.4);
 }
 
+// Two moments that are far apart in time and say different places: the better one counts.
+TEST(GnssFusion, SlowErrorsAreScaledAsTheReceiverStates) {
+  const Vector3d apart(0.0, 100.0, 0.0);
+  PoseGraphProblem pair;
+  pair.world_from_keyframe = {Pose(), Pose(Eigen::Quaterniond::Identity(), apart)};
+  pair.odometry.push_back({0, 1, pair.world_from_keyframe[1], covariance(1e-4, 1e-3)});
+  std::vector<GnssObservation> observations(4);
+  for (std::size_t i = 0; i < 4; ++i) {
+    observations[i].keyframe = static_cast<int>(i % 2);
+    if (i % 2 == 1) observations[i].position_in_enu = apart;
+    if (i < 2) continue;
+    observations[i].stamp = from_seconds(3600.0);
+    observations[i].position_in_enu.x() += 5.0;
+  }
+  const auto east = [&] {
+    const GnssFusionResult result = fuse_gnss(pair, {}, observations, Pose(), kForest, {});
+    EXPECT_TRUE(result.converged) << result.reason;
+    return result.enu_from_keyframe[0].translation().x();
+  };
+  EXPECT_NEAR(east(), 2.5, 0.1);
+  for (std::size_t i = 0; i < 4; ++i)
+    observations[i].plane_scale = i < 2 ? 0.5 : 2.0;
+  EXPECT_NEAR(east(), 5.0 * 0.25 / (0.25 + 4.0), 0.1);
+}
+
 TEST(GnssFusion, WithoutPositionsThePathIsThatOfTheGuess) {
   const Walk walk(20, 0.0, 0.0, 1);
   const GnssFusionResult result = fuse_gnss(walk.problem, {}, {}, walk.enu_from_world, kForest, {});

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <string>
 
+#include "understory/georeference/gnss_fit.h"
 #include "understory/pipeline/georeferencing/placement_figures.h"
 
 namespace understory {
@@ -26,12 +27,22 @@ Trajectory moved_path(const SolvedRun& solved, const std::vector<Pose>& moved) {
   return trajectory;
 }
 
-void tell_residuals(const Trajectory& path, const PairingConfig& pairing,
-                    std::vector<GnssRow>& rows) {
-  for (GnssRow& row : rows) {
+void tell_residuals(const Trajectory& path, const PairingConfig& pairing, Placement& placement) {
+  double plane = 0.0;
+  double height = 0.0;
+  double fixes = 0.0;
+  for (GnssRow& row : placement.gnss) {
     const auto antenna = antenna_place(path, pairing.antenna_in_body, row.fix.stamp);
-    if (antenna) row.residual = row.position_in_world - *antenna;
+    if (!antenna) continue;
+    row.residual = row.position_in_world - *antenna;
+    plane += row.residual.head<2>().squaredNorm();
+    height += row.residual.z() * row.residual.z();
+    fixes += 1.0;
   }
+  if (fixes == 0.0) return;
+  placement.figures["gnss_plane_rms_m"] = std::sqrt(plane / fixes);
+  if (placement.figures.contains("gnss_height_rms_m") && std::isfinite(height))
+    placement.figures["gnss_height_rms_m"] = std::sqrt(height / fixes);
 }
 
 void tell_figures(const FusedPath& path, Placement& placement) {
@@ -59,15 +70,21 @@ Placement placement_of(const SolvedRun& solved, const FusedPath& path, const Gns
   placement.expected_error_m = larger(rigid.expected_error_m, path.expected_error_m);
   placement.figures["expected_error_m"] = placement.expected_error_m;
   const Trajectory moved = moved_path(solved, path.enu_from_keyframe);
-  tell_residuals(moved, pairing, placement.gnss);
+  tell_residuals(moved, pairing, placement);
+  const Pose motion =
+      path.enu_from_keyframe.front() * solved.graph.world_from_keyframe.front().inverse();
+  placement.figures["gnss_yaw_deg"] = yaw_of(motion) * 180.0 / std::numbers::pi;
   if (fused) {
+    // The run's frame is east, north, up now: what was uncertain before that motion is after it.
+    const Matrix6d turn = motion.adjoint();
+    placement.covariance = turn * rigid.covariance * turn.transpose();
     placement.target_from_world = Pose();
     placement.figures["gnss_bent_m"] = path.bent_m;
     placement.figures["gnss_odometry_scale"] = path.odometry_scale;
   } else {
-    placement.target_from_world =
-        path.enu_from_keyframe.front() * solved.graph.world_from_keyframe.front().inverse();
+    placement.target_from_world = motion;
   }
+  tell_placement(fused ? moved : solved.trajectory, placement);
   return placement;
 }
 

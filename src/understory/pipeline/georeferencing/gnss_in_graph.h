@@ -16,6 +16,8 @@ enum class GnssUse {
   kRigid,         // the same by one motion, estimated together with the receiver's slow errors
   kFuse           // they are factors of the pose graph: the world frame becomes east, north, up
 };
+
+// The settings of section `gnss`.
 struct GnssUseConfig {
   GnssUse use = GnssUse::kGeoreference;
   FusedPathConfig path;
