@@ -1,9 +1,9 @@
 // Many receivers on one path: how far each fit to satellite positions lays a run off its place, and
 // whether the stated covariance holds (docs/method/georeference.md; georeference_table.py).
-//   georeference_table SITE PATH FROM TO [key=value ...]
+//   georeference_table SITE PATH FROM TO [--fits-only] [key=value ...]
 // PATH is a run folder that was mapped on the site with the same settings, or drift:N, the true
-// path with the drift of seed N. The receivers have the seeds FROM to TO. Prints one row of CSV a
-// receiver and method.
+// path with the drift of seed N. The receivers have the seeds FROM to TO. --fits-only leaves
+// the slow methods out: fuse, fit6 and gnss-path. Prints one row of CSV a receiver and method.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -192,7 +192,7 @@ struct Judged {
   }
 };
 
-void lay(const Judged& judged, const std::vector<GnssFix>& fixes, int seed) {
+void lay(const Judged& judged, const std::vector<GnssFix>& fixes, int seed, bool fits_only) {
   SatelliteFitConfig config;
   const std::vector<double>& mount = judged.world.site.gnss.mount_m;
   config.pairing.antenna_in_body = {mount[0], mount[1], mount[2]};
@@ -210,13 +210,11 @@ void lay(const Judged& judged, const std::vector<GnssFix>& fixes, int seed) {
   if (best != nullptr)
     judged.print(seed, "auto", best->enu_from_world, *best->origin, best->spread,
                  best->expected_error_m);
+  if (fits_only) return;
   if (fits[2].found) {
     const Pose& guess = fits[2].enu_from_world;
-    const FusedPath rigid =
-        move_path(judged.solved, fixes, guess, config.pairing, config.split, {});
     const FusedPath fused =
         fuse_path(judged.solved, fixes, guess, config.pairing, config.split, {});
-    if (rigid.found) judged.print(seed, "rigid", rigid, *fits[2].origin);
     if (fused.found) judged.print(seed, "fuse", fused, *fits[2].origin);
   }
   SatelliteSmoothingConfig smoothing;
@@ -237,7 +235,8 @@ int run_table(int argc, char** argv) {
   const std::string path = argv[2];
   const int from = std::atoi(argv[3]);
   const int to = std::atoi(argv[4]);
-  const std::vector<std::string> settings(argv + 5, argv + argc);
+  const bool fits_only = argc > 5 && std::string(argv[5]) == "--fits-only";
+  const std::vector<std::string> settings(argv + (fits_only ? 6 : 5), argv + argc);
   const SiteConfig site = load_site(argv[1], settings);
   const SimulatedWorld world(site);
   const double whole_s = std::floor(site.origin.start_time_s);
@@ -266,7 +265,7 @@ int run_table(int argc, char** argv) {
       "seed,method,east_m,north_m,up_m,turn_east_deg,turn_north_deg,turn_up_deg,rms_m,expected_m,"
       "n_turn_east,n_turn_north,n_turn_up,n_east,n_north,n_up\n");
   for (int seed = from; seed <= to; ++seed)
-    lay(judged, fixes_of(world, seed, start, stamps.back()), seed);
+    lay(judged, fixes_of(world, seed, start, stamps.back()), seed, fits_only);
   return 0;
 }
 
@@ -275,7 +274,7 @@ int run_table(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   if (argc < 5) {
-    std::fprintf(stderr, "georeference_table SITE PATH FROM TO [key=value ...]\n");
+    std::fprintf(stderr, "georeference_table SITE PATH FROM TO [--fits-only] [key=value ...]\n");
     return 2;
   }
   return understory::run_table(argc, argv);

@@ -20,14 +20,14 @@ struct Positions {
   GnssErrors errors;
 };
 
-GnssErrors errors_of(const SplitFit& seen) {
+GnssErrors errors_of(const SplitFit& seen, double step_s) {
   GnssErrors errors;
   errors.slow_plane_m = seen.plane_noise.slow_sd_m();
-  errors.fast_plane_m = std::max(seen.plane_noise.fast_sd_m(), kLeastErrorM);
+  errors.fast_plane_m = std::max(seen.plane_noise.white_fast_sd_m(step_s), kLeastErrorM);
   errors.correlation_s = seen.plane_noise.correlation_s();
   if (seen.height_known) {
     errors.slow_height_m = seen.height_noise.slow_sd_m();
-    errors.fast_height_m = std::max(seen.height_noise.fast_sd_m(), kLeastErrorM);
+    errors.fast_height_m = std::max(seen.height_noise.white_fast_sd_m(step_s), kLeastErrorM);
   }
   return errors;
 }
@@ -52,7 +52,7 @@ GnssErrors errors_of_good_receiver(const SplitFit& seen, const GnssErrors& shown
 // Each pair at the keyframe before it.
 std::vector<GnssObservation> observations_of(const SolvedRun& run,
                                              const std::vector<SatellitePair>& pairs,
-                                             TimeNs first_fix, const PairTimes& times) {
+                                             TimeNs first_fix, const SplitFit& seen) {
   std::vector<GnssObservation> observations;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const SatellitePair& pair = pairs[k];
@@ -65,37 +65,36 @@ std::vector<GnssObservation> observations_of(const SolvedRun& run,
         run.graph.world_from_keyframe[static_cast<std::size_t>(keyframe)].inverse() *
         pair.antenna_in_world;
     one.position_in_enu = pair.fix_in_enu;
-    one.has_height = pair.has_height;
+    one.has_height = seen.height_known;
     const auto row = static_cast<Eigen::Index>(k);
-    one.plane_scale = times.plane.scale(row);
-    one.height_scale = times.height.scale(row);
-    one.extra_plane_m = times.plane.extra_sd_m(row);
-    one.extra_height_m = times.height.extra_sd_m(row);
+    one.plane_scale = seen.plane_noise.relative_slow(seen.plane_times.scale(row));
+    one.extra_plane_m = seen.plane_times.extra_sd_m(row);
+    if (seen.height_known) {
+      one.height_scale = seen.height_noise.relative_slow(seen.height_times.scale(row));
+      one.extra_height_m = seen.height_times.extra_sd_m(row);
+    }
     observations.push_back(one);
   }
   return observations;
 }
 
 Positions positions_of(const SolvedRun& run, const std::vector<GnssFix>& fixes,
-                       const PairingConfig& pairing, const SplitFitConfig& split,
+                       PairingConfig pairing, const SplitFitConfig& split,
                        const FusedPathConfig& config) {
   Positions positions;
-  const SatellitePairs coarse = pair_by_time(run.trajectory, fixes, pairing);
-  positions.reason = coarse.reason;
+  pairing.most_pairs = static_cast<std::size_t>(config.most_positions);
+  const SatellitePairs all = pair_by_time(run.trajectory, fixes, pairing);
+  positions.reason = all.reason;
   if (!positions.reason.empty()) return positions;
-  const SplitFit seen = fit_split(of_one_kind(coarse.pairs), split);
+  const std::vector<SatellitePair> pairs = of_one_kind(all.pairs);
+  const SplitFit seen = fit_split(pairs, split);
   positions.reason = seen.reason;
   if (!seen.found) return positions;
-  positions.errors = errors_of_good_receiver(seen, errors_of(seen), split);
-  PairingConfig fine = pairing;
-  fine.most_pairs = static_cast<std::size_t>(config.most_positions);
-  const SatellitePairs all = pair_by_time(run.trajectory, fixes, fine);
-  std::vector<SatellitePair> pairs = of_one_kind(all.pairs);
-  for (SatellitePair& pair : pairs)
-    pair.has_height = seen.height_known;
+  const double step_s =
+      (pairs.back().time_s - pairs.front().time_s) / static_cast<double>(pairs.size() - 1);
+  positions.errors = errors_of_good_receiver(seen, errors_of(seen, step_s), split);
   const TimeNs first = all.first_fix + from_seconds(pairing.time_offset_s);
-  positions.observations =
-      observations_of(run, pairs, first, pair_times(pairs, seen.enu_from_world, split));
+  positions.observations = observations_of(run, pairs, first, seen);
   return positions;
 }
 
@@ -125,7 +124,6 @@ PoseGraphProblem settled(const PoseGraphProblem& solved, double odometry_scale) 
 void take_over(const GnssFusionResult& solved, const Positions& positions, FusedPath& path) {
   path.found = solved.converged;
   path.reason = solved.reason;
-  path.expected_error_m = solved.expected_error_m;
   path.errors = positions.errors;
   path.positions = positions.observations.size();
   for (const double weight : solved.weight)
@@ -151,6 +149,38 @@ double bent_m(const std::vector<Pose>& bent, const std::vector<Pose>& straight) 
   const Eigen::Matrix3d turn =
       Eigen::AngleAxisd(std::atan2(across, along), Vector3d::UnitZ()).toRotationMatrix();
   return std::sqrt((to - turn * from).squaredNorm() / static_cast<double>(to.cols()));
+}
+
+// Poses of the scans after their keyframes have moved. Between keyframes they move with the one
+// before them.
+std::vector<StampedPose> moved_scans(const SolvedRun& run, const std::vector<Pose>& moved) {
+  std::vector<StampedPose> scans;
+  for (const StampedPose& pose : run.trajectory) {
+    const auto after = std::upper_bound(run.stamps.begin(), run.stamps.end(), pose.stamp);
+    const auto k =
+        static_cast<std::size_t>(after == run.stamps.begin() ? 0 : after - run.stamps.begin() - 1);
+    scans.push_back(
+        {pose.stamp, moved[k] * run.graph.world_from_keyframe[k].inverse() * pose.world_from_body});
+  }
+  return scans;
+}
+
+// The path as a whole once more, by the fit that knows more kinds of errors.
+void lay_on_fixes(const SolvedRun& run, const std::vector<GnssFix>& fixes,
+                  const PairingConfig& pairing, const SplitFitConfig& split, FusedPath& path) {
+  path.enu_from_body = moved_scans(run, path.enu_from_keyframe);
+  const SatellitePairs all = pair_by_time(path.enu_from_body, fixes, pairing);
+  const SplitFit fit = fit_split(of_one_kind(all.pairs), split);
+  UNDERSTORY_CHECK(fit.found);  // as it was before the path was bent
+  for (Pose& pose : path.enu_from_keyframe)
+    pose = fit.enu_from_world * pose;
+  std::vector<Vector3d> places;
+  for (StampedPose& pose : path.enu_from_body) {
+    pose.world_from_body = fit.enu_from_world * pose.world_from_body;
+    places.emplace_back(pose.world_from_body.translation());
+  }
+  path.covariance = right_from_spread(fit.spread, Pose(), fit.middle);
+  path.expected_error_m = expected_error_m(fit.spread, fit.middle, places);
 }
 
 }  // namespace
@@ -194,36 +224,9 @@ FusedPath fuse_path(const SolvedRun& run, const std::vector<GnssFix>& fixes,
     path.enu_from_keyframe = solved.enu_from_keyframe;
     path.odometry_scale = scale;
   }
-  if (path.found) path.bent_m = bent_m(path.enu_from_keyframe, run.graph.world_from_keyframe);
-  return path;
-}
-
-FusedPath move_path(const SolvedRun& run, const std::vector<GnssFix>& fixes,
-                    const Pose& enu_from_world, const PairingConfig& pairing,
-                    const SplitFitConfig& split, const FusedPathConfig& config) {
-  UNDERSTORY_CHECK(!run.stamps.empty() &&
-                   run.stamps.size() == run.graph.world_from_keyframe.size());
-  FusedPath path;
-  Positions positions = positions_of(run, fixes, pairing, split, config);
-  path.reason = positions.reason;
-  if (!path.reason.empty()) return path;
-  // All hangs on one pose: that of the first keyframe.
-  const Pose& world_from_first = run.graph.world_from_keyframe.front();
-  for (GnssObservation& one : positions.observations) {
-    const auto k = static_cast<std::size_t>(one.keyframe);
-    one.antenna_in_keyframe =
-        world_from_first.inverse() * run.graph.world_from_keyframe[k] * one.antenna_in_keyframe;
-    one.keyframe = 0;
-  }
-  PoseGraphProblem rigid;
-  rigid.world_from_keyframe = {world_from_first};
-  const GnssFusionResult solved = fuse_gnss(rigid, {}, positions.observations, enu_from_world,
-                                            positions.errors, with_tilt(config, split));
-  take_over(solved, positions, path);
   if (!path.found) return path;
-  const Pose motion = solved.enu_from_keyframe.front() * world_from_first.inverse();
-  for (const Pose& pose : run.graph.world_from_keyframe)
-    path.enu_from_keyframe.push_back(motion * pose);
+  path.bent_m = bent_m(path.enu_from_keyframe, run.graph.world_from_keyframe);
+  lay_on_fixes(run, fixes, pairing, split, path);
   return path;
 }
 

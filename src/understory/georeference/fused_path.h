@@ -41,7 +41,10 @@ struct [[nodiscard]] FusedPath {
   bool found = false;
   std::string reason;  // if not
   std::vector<Pose> enu_from_keyframe;
-  double expected_error_m = 0.0;  // of a keyframe's place, root mean square
+  std::vector<StampedPose> enu_from_body;  // of the scans
+  // Of a small motion of the whole path: a right perturbation of its frame (rotation first).
+  Matrix6d covariance = Matrix6d::Zero();
+  double expected_error_m = 0.0;  // of a place on the path by that, root mean square
   // How far the positions moved the keyframes against the best rigid motion, root mean square.
   double bent_m = 0.0;
   double odometry_scale = 1.0;  // that the positions made probable
@@ -51,15 +54,11 @@ struct [[nodiscard]] FusedPath {
 };
 
 // The positions become factors of the graph (P2-6, P4-5). What the clouds say of its shape stays:
-// edges say again what the solved poses say, and are as stiff as the positions make probable.
-// `enu_from_world` is a rigid fit of the same path to the same fixes. Deterministic; thread-safe.
+// edges say again what the solved poses say, and are as stiff as the positions make probable. Then
+// the path as a whole is laid on the fixes by `fit_split`, which knows more kinds of errors than
+// the graph. `enu_from_world` is a rigid fit of the same path to the same fixes. Deterministic;
+// thread-safe.
 FusedPath fuse_path(const SolvedRun& run, const std::vector<GnssFix>& fixes,
-                    const Pose& enu_from_world, const PairingConfig& pairing,
-                    const SplitFitConfig& split, const FusedPathConfig& config);
-
-// One motion of the whole run, estimated with the receiver's slow errors as in fuse_path; its shape
-// stays. The keyframes are moved by it.
-FusedPath move_path(const SolvedRun& run, const std::vector<GnssFix>& fixes,
                     const Pose& enu_from_world, const PairingConfig& pairing,
                     const SplitFitConfig& split, const FusedPathConfig& config);
 

@@ -18,18 +18,41 @@ inline constexpr double kGapS = 2.0;
 }  // namespace satellite_pairs
 
 namespace receiver_noise {  // georeference/receiver_noise.cc
-// The grid: the slow error's standard deviation over that of the residuals. Residuals are smaller
-// than the error, since the fit takes a part of it away [bound: statistics]
-inline constexpr double kLarger[] = {0.25, 0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 1.9, 2.5, 3.5, 5.0, 8.0};
-// s: correlation times of the slow error [bound: from one pair to a long run]
-inline constexpr double kCorrelationsS[] = {2.0,   5.0,   10.0,  20.0,  40.0,  80.0,
-                                            120.0, 180.0, 260.0, 400.0, 700.0, 1200.0};
-// The independent error over the slow one [bound: from none to all]
-inline constexpr double kFastShares[] = {0.03, 0.1, 0.3, 1.0};
+// Unknowns of the noise are in standard deviations of their prior. Rounds of the search for the
+// most probable one, at most [bound: time]
+inline constexpr int kSearchRounds = 12;
+// A step to the vertex of a parabola is at most that many of those that made it [chosen]
+inline constexpr double kLongestStep = 2.0;
+// The search ends below that step [chosen]
+inline constexpr double kShortestStep = 0.2;
+// A round that adds less to the logarithm of the density halves the step [chosen]
+inline constexpr double kLittle = 0.5;
+// Correlation times of the slow error where the search begins [chosen: 150 s and 25 s]
+inline constexpr double kStarts[] = {0.0, -2.0};
+// Step of the differences that give the curvature [chosen]
+inline constexpr double kCurvatureStep = 0.2;
+// Curvature at least: that of the prior is 1 [chosen]
+inline constexpr double kLeastCurvature = 0.5;
+// Draws of the noise [bound: time]
+inline constexpr std::size_t kDraws = 160;
+// Degrees of freedom of the distribution they are drawn from [chosen: tails wider than normal]
+inline constexpr int kFreedom = 5;
+// Standard deviations of the prior beyond which no noise is drawn [chosen]
+inline constexpr double kFarthest = 6.0;
+// Seed of the draws: the same pairs give the same result [chosen]
+inline constexpr std::uint64_t kSeed = 1;
+// Noises that a belief is told by [bound: time of covariances]
+inline constexpr double kBelieved = 32.0;
+// `follows` at most [chosen: twice as bad as stated where four times as bad is stated]
+inline constexpr double kMostFollows = 1.5;
 // Columns that are made white at once, at most [bound: four parameters and a residual]
 inline constexpr std::ptrdiff_t kMostColumns = 8;
-// Probability below which a noise has no say in a covariance [bound: time]
-inline constexpr double kLeastWeight = 1e-3;
+// Error that is independent from fix to fix over the fast one [chosen: keeps equations regular]
+inline constexpr double kWhiteShare = 0.1;
+// Standard deviations of the fast error beyond which a pair is a runaway [chosen]
+inline constexpr double kFarOff = 4.0;
+// Correlation below which two errors are independent [bound: time]
+inline constexpr double kLeastCorrelation = 1e-3;
 }  // namespace receiver_noise
 
 namespace control_points {  // georeference/control_points.cc
@@ -79,7 +102,7 @@ inline constexpr double kCauchyWidth = 2.385;
 inline constexpr double kRayleighMedian = 1.1774;
 // Median of an absolute value over the standard deviation [bound: normal distribution]
 inline constexpr double kNormalMedian = 0.6745;
-// Standard deviations beyond which a pair is a runaway [chosen: slow errors of a few
+// Standard deviations beyond which a pair is a runaway at first [chosen: slow errors of a few
 // minutes are no outliers]
 inline constexpr double kFarOff = 4.0;
 // m: standard deviation of a height that nothing tells [bound: the earth]

@@ -1,6 +1,7 @@
 #include "understory/georeference/receiver_noise.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,18 +9,17 @@
 
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/error.h"
+#include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
 using namespace georeference_constants::receiver_noise;
 
+using Eigen::Matrix3d;
 using Eigen::MatrixXd;
+using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-double normal_log(double value, double median, double log_sd) {
-  return -0.5 * std::pow(std::log(value / median) / log_sd, 2.0);
-}
 
 // Standard deviation of the residuals after plain least squares.
 double plain_sd_m(const NoisyTimes& times, const std::vector<NoisySeries>& series,
@@ -48,17 +48,17 @@ double plain_sd_m(const NoisyTimes& times, const std::vector<NoisySeries>& serie
   return std::sqrt(std::max(1e-12, left / rows));
 }
 
-struct GridPoint {
-  double log_weight = 0.0;
+struct Solution {
+  double log_likelihood = 0.0;
   VectorXd mean;
   MatrixXd covariance;
 };
 
-GridPoint solve_with(const NoisyTimes& times, const std::vector<NoisySeries>& series,
-                     const MatrixXd& information, const ReceiverNoise& noise) {
+Solution solve_with(const NoisyTimes& times, const std::vector<NoisySeries>& series,
+                    const MatrixXd& information, const ReceiverNoise& noise) {
   const Eigen::Index n = information.cols();
   MatrixXd normal = MatrixXd::Zero(n + 1, n + 1);
-  GridPoint point;
+  Solution solution;
   double logs = 0.0;
   for (const NoisySeries& one : series) {
     MatrixXd columns(one.residual.size(), n + 1);
@@ -68,66 +68,270 @@ GridPoint solve_with(const NoisyTimes& times, const std::vector<NoisySeries>& se
   }
   const MatrixXd hessian = normal.topLeftCorner(n, n) + information;
   const Eigen::LDLT<MatrixXd> solver(hessian);
-  point.covariance = solver.solve(MatrixXd::Identity(n, n));
-  point.mean = solver.solve(normal.topRightCorner(n, 1));
-  const double cost = normal(n, n) - normal.topRightCorner(n, 1).col(0).dot(point.mean);
+  solution.covariance = solver.solve(MatrixXd::Identity(n, n));
+  solution.mean = solver.solve(normal.topRightCorner(n, 1));
+  const double cost = normal(n, n) - normal.topRightCorner(n, 1).col(0).dot(solution.mean);
   const double log_hessian =
       solver.vectorD().cwiseMax(std::numeric_limits<double>::min()).array().log().sum();
-  point.log_weight = -0.5 * (logs + log_hessian + cost);
-  return point;
+  solution.log_likelihood = -0.5 * (logs + log_hessian + cost);
+  return solution;
+}
+
+// What is left of the slow, the steady and the fast error after a time.
+Vector3d kept_after(const ReceiverNoise& noise, double step_s) {
+  const double slow = std::exp(-step_s / noise.correlation_s);
+  return {slow, slow, std::exp(-step_s / noise.fast_correlation_s)};
+}
+
+// The logarithms (and `follows`) of a noise in units of its prior: that is a standard normal one.
+constexpr int kUnknowns = 6;
+using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
+using Curvature = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+
+class Posterior {
+ public:
+  Posterior(const NoisyTimes& times, const std::vector<NoisySeries>& series,
+            const MatrixXd& information, const ReceiverPriorConfig& prior)
+      : times_(times), series_(series), information_(information), prior_(prior) {}
+
+  [[nodiscard]] ReceiverNoise noise(const Unknowns& u) const {
+    ReceiverNoise noise;
+    noise.slow_sd_m =
+        times_.stated_sd_m * prior_.overconfidence * std::exp(prior_.overconfidence_log * u(0));
+    noise.correlation_s = prior_.correlation_s * std::exp(prior_.correlation_log * u(1));
+    noise.fast_sd_m = noise.slow_sd_m * prior_.fast_share * std::exp(prior_.fast_share_log * u(2));
+    noise.steady_sd_m =
+        noise.slow_sd_m * prior_.steady_share * std::exp(prior_.steady_share_log * u(3));
+    noise.fast_correlation_s =
+        prior_.fast_correlation_s * std::exp(prior_.fast_correlation_log * u(5));
+    noise.follows = std::clamp(prior_.follows + prior_.follows_sd * u(4), 0.0, kMostFollows);
+    return noise;
+  }
+  [[nodiscard]] Solution solve(const Unknowns& u) const {
+    return solve_with(times_, series_, information_, noise(u));
+  }
+  [[nodiscard]] double log_density(const Unknowns& u) const {
+    return solve(u).log_likelihood - 0.5 * u.squaredNorm();
+  }
+  // Where slow errors alone explain the residuals of plain least squares.
+  [[nodiscard]] Unknowns start() const {
+    const double ratio = plain_sd_m(times_, series_, information_) / times_.stated_sd_m;
+    Unknowns u = Unknowns::Zero();
+    u(0) = std::clamp(std::log(ratio / prior_.overconfidence) / prior_.overconfidence_log,
+                      -kFarthest, kFarthest);
+    return u;
+  }
+
+ private:
+  const NoisyTimes& times_;
+  const std::vector<NoisySeries>& series_;
+  const MatrixXd& information_;
+  const ReceiverPriorConfig& prior_;
+};
+
+// The most probable noise and the curvature of the logarithm of the density there.
+struct Mode {
+  Unknowns at = Unknowns::Zero();
+  double log_density = 0.0;
+  Curvature covariance = Curvature::Identity();
+};
+
+// One unknown after the other, to the vertex of a parabola through three values. Steps become
+// shorter where they do not help.
+void search_along_axes(const Posterior& posterior, Mode& mode) {
+  double step = 1.0;
+  for (int round = 0; round < kSearchRounds && step > kShortestStep; ++round) {
+    const double began = mode.log_density;
+    for (int axis = 0; axis < kUnknowns; ++axis) {
+      const Unknowns along = step * Unknowns::Unit(axis);
+      const double before = posterior.log_density(mode.at - along);
+      const double after = posterior.log_density(mode.at + along);
+      const double bend = before - 2.0 * mode.log_density + after;
+      const double side = after > before ? kLongestStep : -kLongestStep;
+      const double vertex = bend < 0.0 ? 0.5 * (before - after) / bend : side;
+      Unknowns to = mode.at + std::clamp(vertex, -kLongestStep, kLongestStep) * along;
+      to(axis) = std::clamp(to(axis), -kFarthest, kFarthest);
+      const double there = posterior.log_density(to);
+      if (there > mode.log_density) {
+        mode.at = to;
+        mode.log_density = there;
+      }
+    }
+    if (mode.log_density < began + kLittle) step *= 0.5;
+  }
+}
+
+// The inverse of the negative curvature. The prior bends by 1 at least; where the likelihood bends
+// the other way, half of that stands.
+void measure_curvature(const Posterior& posterior, Mode& mode, Unknowns* slope) {
+  const double h = kCurvatureStep;
+  Unknowns forward;
+  Unknowns backward;
+  for (int i = 0; i < kUnknowns; ++i) {
+    forward(i) = posterior.log_density(mode.at + h * Unknowns::Unit(i));
+    backward(i) = posterior.log_density(mode.at - h * Unknowns::Unit(i));
+  }
+  Curvature bend;
+  for (int i = 0; i < kUnknowns; ++i) {
+    bend(i, i) = -(forward(i) - 2.0 * mode.log_density + backward(i)) / (h * h);
+    for (int j = 0; j < i; ++j) {
+      const double both =
+          posterior.log_density(mode.at + h * (Unknowns::Unit(i) + Unknowns::Unit(j)));
+      bend(i, j) = bend(j, i) = -(both - forward(i) - forward(j) + mode.log_density) / (h * h);
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Curvature> axes(bend);
+  const Unknowns widths = axes.eigenvalues().cwiseMax(kLeastCurvature).cwiseInverse();
+  mode.covariance = axes.eigenvectors() * widths.asDiagonal() * axes.eigenvectors().transpose();
+  if (slope) *slope = (forward - backward) / (2.0 * h);
+}
+
+Mode find_mode(const Posterior& posterior) {
+  Mode mode;
+  mode.log_density = -std::numeric_limits<double>::infinity();
+  // A short slow error and a long fast one look alike: the search begins on both sides.
+  for (const double correlation : kStarts) {
+    Mode one;
+    one.at = posterior.start();
+    one.at(1) = correlation;
+    one.log_density = posterior.log_density(one.at);
+    search_along_axes(posterior, one);
+    if (one.log_density > mode.log_density) mode = one;
+  }
+  Unknowns slope;
+  measure_curvature(posterior, mode, &slope);
+  const Unknowns to = mode.at + mode.covariance * slope;
+  const double there = posterior.log_density(to);
+  if (there <= mode.log_density) return mode;
+  mode.at = to;
+  mode.log_density = there;
+  measure_curvature(posterior, mode, nullptr);
+  return mode;
+}
+
+// Draws of the noise, weighted by how probable they are over how probably they are drawn.
+struct Draws {
+  std::vector<ReceiverNoise> noise;
+  std::vector<Solution> solution;
+  std::vector<double> weight;  // add up to one
+};
+
+// From Student's distribution around the mode, in pairs on both sides of it.
+Draws draw(const Posterior& posterior, const Mode& mode) {
+  const Curvature root = mode.covariance.llt().matrixL();
+  Random random(kSeed);
+  Draws draws;
+  std::vector<double> logs;
+  for (std::size_t pair = 0; pair < kDraws / 2; ++pair) {
+    Unknowns z;
+    double chi = 0.0;
+    for (int i = 0; i < kUnknowns; ++i)
+      z(i) = random.normal();
+    for (int i = 0; i < kFreedom; ++i)
+      chi += std::pow(random.normal(), 2.0);
+    z *= std::sqrt(kFreedom / chi);
+    const double log_drawn = -0.5 * (kFreedom + kUnknowns) * std::log1p(z.squaredNorm() / kFreedom);
+    for (const double side : {1.0, -1.0}) {
+      const Unknowns u = mode.at + side * root * z;
+      if (u.cwiseAbs().maxCoeff() > kFarthest) continue;
+      draws.noise.push_back(posterior.noise(u));
+      draws.solution.push_back(posterior.solve(u));
+      logs.push_back(draws.solution.back().log_likelihood - 0.5 * u.squaredNorm() - log_drawn);
+    }
+  }
+  const double best = *std::max_element(logs.begin(), logs.end());
+  double total = 0.0;
+  for (const double log : logs)
+    total += std::exp(log - best);
+  for (const double log : logs)
+    draws.weight.push_back(std::exp(log - best) / total);
+  return draws;
+}
+
+// So many draws that each stands for the same probability.
+NoiseBelief resampled(const Draws& draws) {
+  NoiseBelief belief;
+  double until = 0.0;
+  for (std::size_t k = 0; k < draws.noise.size(); ++k) {
+    until += draws.weight[k] * kBelieved;
+    while (static_cast<double>(belief.noise.size()) + 0.5 < until)
+      belief.noise.push_back(draws.noise[k]);
+  }
+  return belief;
 }
 
 }  // namespace
 
 double NoiseBelief::slow_sd_m() const {
   double sum = 0.0;
-  for (std::size_t k = 0; k < noise.size(); ++k)
-    sum += weight[k] * noise[k].slow_sd_m * noise[k].slow_sd_m;
-  return std::sqrt(sum);
+  for (const ReceiverNoise& one : noise)
+    sum += one.slow_sd_m * one.slow_sd_m + one.steady_sd_m * one.steady_sd_m;
+  return std::sqrt(sum / static_cast<double>(noise.size()));
 }
 
 double NoiseBelief::fast_sd_m() const {
   double sum = 0.0;
-  for (std::size_t k = 0; k < noise.size(); ++k)
-    sum += weight[k] * noise[k].fast_sd_m * noise[k].fast_sd_m;
-  return std::sqrt(sum);
+  for (const ReceiverNoise& one : noise)
+    sum += one.fast_sd_m * one.fast_sd_m;
+  return std::sqrt(sum / static_cast<double>(noise.size()));
+}
+
+double NoiseBelief::white_fast_sd_m(double step_s) const {
+  double sum = 0.0;
+  for (const ReceiverNoise& one : noise) {
+    const double kept = std::exp(-step_s / one.fast_correlation_s);
+    sum += one.fast_sd_m * one.fast_sd_m * (1.0 + kept) / (1.0 - kept);
+  }
+  return std::sqrt(sum / static_cast<double>(noise.size()));
 }
 
 double NoiseBelief::correlation_s() const {
   double sum = 0.0;
-  for (std::size_t k = 0; k < noise.size(); ++k)
-    sum += weight[k] * std::log(noise[k].correlation_s);
-  return std::exp(sum);
+  for (const ReceiverNoise& one : noise)
+    sum += std::log(one.correlation_s);
+  return std::exp(sum / static_cast<double>(noise.size()));
 }
 
+double NoiseBelief::relative_slow(double scale) const {
+  double sum = 0.0;
+  for (const ReceiverNoise& one : noise)
+    sum += std::pow(std::pow(scale, one.follows) * one.slow_sd_m, 2.0) +
+           one.steady_sd_m * one.steady_sd_m;
+  return std::sqrt(sum / static_cast<double>(noise.size())) / slow_sd_m();
+}
+
+// The states are the slow, the steady and the fast error, each in units of its standard deviation.
 double whiten(const NoisyTimes& times, const ReceiverNoise& noise, MatrixXd& columns) {
   UNDERSTORY_CHECK(columns.cols() <= kMostColumns);
-  const double slow = noise.slow_sd_m * noise.slow_sd_m;
-  const double fast = noise.fast_sd_m * noise.fast_sd_m;
-  std::array<double, kMostColumns> state{};
-  double variance = slow;
+  std::array<Vector3d, kMostColumns> state;
+  state.fill(Vector3d::Zero());
+  Matrix3d variance = Matrix3d::Identity();
   double logs = 0.0;
   for (Eigen::Index k = 0; k < columns.rows(); ++k) {
-    double kept = 1.0;
+    Vector3d kept = Vector3d::Zero();
     if (k > 0) {
       const auto now = static_cast<std::size_t>(k);
-      kept = std::exp(-(times.time_s[now] - times.time_s[now - 1]) / noise.correlation_s);
-      variance = kept * kept * variance + (1.0 - kept * kept) * slow;
+      kept = kept_after(noise, times.time_s[now] - times.time_s[now - 1]);
+      variance = kept.asDiagonal() * variance * kept.asDiagonal();
+      variance.diagonal().array() += 1.0 - kept.array().square();
     }
-    const double scale = times.scale(k);
-    const double extra = times.extra_sd_m(k) / scale;
-    const double total = variance + fast + extra * extra;
-    const double gain = variance / total;
+    const double scale = std::pow(times.scale(k), noise.follows);
+    const Vector3d seen(scale * noise.slow_sd_m, noise.steady_sd_m, scale * noise.fast_sd_m);
+    const Vector3d spread = variance * seen;
+    const double white = kWhiteShare * seen.z();
+    const double extra = times.extra_sd_m(k);
+    const double total = seen.dot(spread) + white * white + extra * extra;
+    const Vector3d gain = spread / total;
     const double root = 1.0 / std::sqrt(total);
     for (Eigen::Index column = 0; column < columns.cols(); ++column) {
-      double& now = state[static_cast<std::size_t>(column)];
-      now *= kept;
-      const double innovation = columns(k, column) / scale - now;
+      Vector3d& now = state[static_cast<std::size_t>(column)];
+      now = kept.cwiseProduct(now);
+      const double innovation = columns(k, column) - seen.dot(now);
       columns(k, column) = innovation * root;
       now += gain * innovation;
     }
-    variance *= 1.0 - gain;
-    logs += std::log(total * scale * scale);
+    variance -= gain * spread.transpose();
+    logs += std::log(total);
   }
   return logs;
 }
@@ -135,66 +339,63 @@ double whiten(const NoisyTimes& times, const ReceiverNoise& noise, MatrixXd& col
 MatrixXd noise_covariance(const NoisyTimes& times, const NoiseBelief& belief) {
   const auto n = static_cast<Eigen::Index>(times.time_s.size());
   MatrixXd covariance = MatrixXd::Zero(n, n);
-  for (std::size_t g = 0; g < belief.noise.size(); ++g) {
-    if (belief.weight[g] < kLeastWeight) continue;
-    const ReceiverNoise& noise = belief.noise[g];
-    const double slow = belief.weight[g] * noise.slow_sd_m * noise.slow_sd_m;
+  for (const ReceiverNoise& noise : belief.noise) {
+    const VectorXd scale = times.scale.array().pow(noise.follows);
+    const VectorXd slow = noise.slow_sd_m * scale;
+    const VectorXd fast = noise.fast_sd_m * scale;
+    const double steady = noise.steady_sd_m * noise.steady_sd_m;
     for (Eigen::Index i = 0; i < n; ++i) {
-      covariance(i, i) += slow + belief.weight[g] * noise.fast_sd_m * noise.fast_sd_m;
+      covariance(i, i) +=
+          slow(i) * slow(i) + steady + (1.0 + kWhiteShare * kWhiteShare) * fast(i) * fast(i);
       // Along a row the correlation is a product of steps.
-      double kept = slow;
+      Vector3d kept = Vector3d::Ones();
       for (Eigen::Index j = i; j-- > 0;) {
         const auto k = static_cast<std::size_t>(j);
-        kept *= std::exp(-(times.time_s[k + 1] - times.time_s[k]) / noise.correlation_s);
-        if (kept < kLeastWeight * slow) break;
-        covariance(i, j) += kept;
+        kept = kept.cwiseProduct(kept_after(noise, times.time_s[k + 1] - times.time_s[k]));
+        if (kept.maxCoeff() < kLeastCorrelation) break;
+        covariance(i, j) +=
+            kept.x() * slow(i) * slow(j) + kept.y() * steady + kept.z() * fast(i) * fast(j);
       }
     }
   }
+  covariance /= static_cast<double>(belief.noise.size());
   covariance = covariance.selfadjointView<Eigen::Lower>();
-  covariance = times.scale.asDiagonal() * covariance * times.scale.asDiagonal();
   covariance.diagonal() += times.extra_sd_m.cwiseAbs2();
   return covariance;
+}
+
+VectorXd runaways_m(const NoisyTimes& times, const ReceiverNoise& noise,
+                    const MatrixXd& residuals) {
+  NoisyTimes regular = times;
+  regular.extra_sd_m.setZero();
+  ReceiverNoise slow = noise;
+  slow.fast_sd_m = 0.0;
+  const MatrixXd left = residuals - noise_covariance(regular, {{slow}}) *
+                                        noise_covariance(times, {{noise}}).llt().solve(residuals);
+  VectorXd extra = left.rowwise().norm();
+  for (Eigen::Index k = 0; k < extra.size(); ++k) {
+    const double sd_m = std::pow(times.scale(k), noise.follows) * noise.fast_sd_m;
+    if (extra(k) <= kFarOff * sd_m) extra(k) = 0.0;
+  }
+  return extra;
 }
 
 NoisyEstimate estimate_under_noise(const NoisyTimes& times, const std::vector<NoisySeries>& series,
                                    const MatrixXd& information, const ReceiverPriorConfig& prior) {
   UNDERSTORY_CHECK(!series.empty() && !times.time_s.empty());
-  const double plain = plain_sd_m(times, series, information);
-  std::vector<GridPoint> points;
+  const Posterior posterior(times, series, information, prior);
+  const Draws draws = draw(posterior, find_mode(posterior));
   NoisyEstimate estimate;
-  double best = -std::numeric_limits<double>::infinity();
-  for (const double larger : kLarger) {
-    for (const double correlation_s : kCorrelationsS) {
-      for (const double share : kFastShares) {
-        ReceiverNoise noise;
-        noise.slow_sd_m = larger * plain;
-        noise.correlation_s = correlation_s;
-        noise.fast_sd_m = share * noise.slow_sd_m;
-        GridPoint point = solve_with(times, series, information, noise);
-        point.log_weight += normal_log(noise.slow_sd_m / times.stated_sd_m, prior.overconfidence,
-                                       prior.overconfidence_log) +
-                            normal_log(correlation_s, prior.correlation_s, prior.correlation_log) +
-                            normal_log(share, prior.fast_share, prior.fast_share_log);
-        best = std::max(best, point.log_weight);
-        estimate.noise.noise.push_back(noise);
-        points.push_back(std::move(point));
-      }
-    }
-  }
-  double total = 0.0;
-  for (const GridPoint& point : points)
-    total += std::exp(point.log_weight - best);
+  estimate.noise = resampled(draws);
+  const auto most = std::max_element(draws.weight.begin(), draws.weight.end());
+  estimate.likeliest = draws.noise[static_cast<std::size_t>(most - draws.weight.begin())];
   estimate.mean = VectorXd::Zero(information.cols());
-  for (const GridPoint& point : points) {
-    estimate.noise.weight.push_back(std::exp(point.log_weight - best) / total);
-    estimate.mean += estimate.noise.weight.back() * point.mean;
-  }
+  for (std::size_t k = 0; k < draws.weight.size(); ++k)
+    estimate.mean += draws.weight[k] * draws.solution[k].mean;
   estimate.covariance = MatrixXd::Zero(information.cols(), information.cols());
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const VectorXd off = points[k].mean - estimate.mean;
-    estimate.covariance +=
-        estimate.noise.weight[k] * (points[k].covariance + off * off.transpose());
+  for (std::size_t k = 0; k < draws.weight.size(); ++k) {
+    const VectorXd off = draws.solution[k].mean - estimate.mean;
+    estimate.covariance += draws.weight[k] * (draws.solution[k].covariance + off * off.transpose());
   }
   return estimate;
 }

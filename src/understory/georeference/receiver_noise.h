@@ -5,13 +5,16 @@
 
 namespace understory {
 
-// Errors of a receiver along one axis over time: a slow part, exponentially correlated, and a part
-// that is independent from pair to pair. Times a scale of each pair, where the receiver says that
-// one is better than another.
+// Errors of a receiver along one axis over time. The receiver says that some fixes are better than
+// others (`NoisyTimes::scale`). An error is scale^follows * (slow + fast) + steady. All three are
+// exponentially correlated (first-order Gauss-Markov processes).
 struct ReceiverNoise {
-  double slow_sd_m = 1.0;
-  double correlation_s = 60.0;  // the slow part's correlation falls to 1/e within this
-  double fast_sd_m = 0.1;
+  double slow_sd_m = 1.0;       // of a pair with scale 1
+  double correlation_s = 60.0;  // correlations fall to 1/e within this
+  double fast_sd_m = 0.1;       // of a pair with scale 1
+  double fast_correlation_s = 2.0;
+  double follows = 1.0;      // 1: errors go with what the receiver states; 0: not at all
+  double steady_sd_m = 0.0;  // slow error that is the same at all pairs
 };
 
 // The prior of a receiver before its fixes are compared with a path: medians, and the
@@ -23,17 +26,28 @@ struct ReceiverPriorConfig {
   double correlation_log = 0.9;
   double fast_share = 0.25;  // fast_sd_m over slow_sd_m
   double fast_share_log = 0.9;
+  double fast_correlation_s = 3.0;
+  double fast_correlation_log = 0.4;
+  double steady_share = 0.25;  // steady_sd_m over slow_sd_m
+  double steady_share_log = 0.7;
+  double follows = 0.8;  // mean, and standard deviation
+  double follows_sd = 0.4;
 };
 
-// Possible noises and how probable each is; the weights add up to one.
+// Noises that are equally probable.
 struct NoiseBelief {
   std::vector<ReceiverNoise> noise;
-  std::vector<double> weight;
 
-  // Root of the expected variances, and the expected logarithm's exponential.
-  [[nodiscard]] double slow_sd_m() const;
+  // Roots of the expected variances at a pair of scale 1, the exponential of the expected
+  // logarithm, and a mean.
+  [[nodiscard]] double slow_sd_m() const;  // with the steady part
   [[nodiscard]] double fast_sd_m() const;
+  // Of an error that is independent from pair to pair, each `step_s` after the other, and tells as
+  // little of a mean as the fast one.
+  [[nodiscard]] double white_fast_sd_m(double step_s) const;
   [[nodiscard]] double correlation_s() const;
+  // Standard deviation of the slow and steady error of a pair with that scale, over slow_sd_m().
+  [[nodiscard]] double relative_slow(double scale) const;
 };
 
 // One axis of a linear problem: residual = jacobian * parameters + noise, one row a pair.
@@ -45,7 +59,7 @@ struct NoisySeries {
 // When and how the pairs of all series were measured.
 struct NoisyTimes {
   std::vector<double> time_s;  // in order
-  Eigen::VectorXd scale;       // of the noise of each pair; 1 in the median
+  Eigen::VectorXd scale;       // what the receiver states of each pair; 1 in the median
   Eigen::VectorXd extra_sd_m;  // independent errors of pairs that lie far off; 0 for the others
   double stated_sd_m = 1.0;    // what the receiver states in the median
 };
@@ -55,6 +69,7 @@ struct NoisyEstimate {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;  // with what is not known of the noise
   NoiseBelief noise;
+  ReceiverNoise likeliest;  // of those drawn
 };
 
 // Divides the columns by the square root of the noise's covariance, in place, in one pass (the
@@ -64,10 +79,16 @@ double whiten(const NoisyTimes& times, const ReceiverNoise& noise, Eigen::Matrix
 // The covariance of the noise of all pairs, m^2, expected over the belief.
 [[nodiscard]] Eigen::MatrixXd noise_covariance(const NoisyTimes& times, const NoiseBelief& belief);
 
+// Of each pair the length of its residual (a column an axis) beside the slow and the steady errors
+// that the residuals make probable, where it is over four standard deviations of the fast error; 0
+// for the others. Pairs in time; metres.
+[[nodiscard]] Eigen::VectorXd runaways_m(const NoisyTimes& times, const ReceiverNoise& noise,
+                                         const Eigen::MatrixXd& residuals);
+
 // Generalised least squares over series that share one kind of noise. The noise is integrated out
-// over a grid around what the residuals show (restricted likelihood times prior), so few fixes with
-// independent errors give a wide covariance. `information` of a Gaussian prior about zero; it may
-// be singular where the series tell. Deterministic; thread-safe.
+// (restricted likelihood times prior, importance sampling around the most probable one), so few
+// fixes with independent errors give a wide covariance. `information` of a Gaussian prior about
+// zero; it may be singular where the series tell. Deterministic; thread-safe.
 [[nodiscard]] NoisyEstimate estimate_under_noise(const NoisyTimes& times,
                                                  const std::vector<NoisySeries>& series,
                                                  const Eigen::MatrixXd& information,

@@ -26,14 +26,22 @@ NoisyTimes times_of(int count, double step_s) {
 // Errors of one axis, drawn step by step.
 VectorXd drawn(const NoisyTimes& times, const ReceiverNoise& noise, Random& random) {
   VectorXd errors(static_cast<Eigen::Index>(times.time_s.size()));
-  double slow = noise.slow_sd_m * random.normal();
+  double slow = random.normal();
+  double steady = random.normal();
+  double fast = random.normal();
   for (Eigen::Index k = 0; k < errors.size(); ++k) {
     if (k > 0) {
       const auto i = static_cast<std::size_t>(k);
       const double kept = std::exp(-(times.time_s[i] - times.time_s[i - 1]) / noise.correlation_s);
-      slow = kept * slow + std::sqrt(1.0 - kept * kept) * noise.slow_sd_m * random.normal();
+      slow = kept * slow + std::sqrt(1.0 - kept * kept) * random.normal();
+      steady = kept * steady + std::sqrt(1.0 - kept * kept) * random.normal();
+      const double left =
+          std::exp(-(times.time_s[i] - times.time_s[i - 1]) / noise.fast_correlation_s);
+      fast = left * fast + std::sqrt(1.0 - left * left) * random.normal();
     }
-    errors(k) = times.scale(k) * (slow + noise.fast_sd_m * random.normal());
+    errors(k) = std::pow(times.scale(k), noise.follows) *
+                    (noise.slow_sd_m * slow + noise.fast_sd_m * fast) +
+                noise.steady_sd_m * steady;
   }
   return errors;
 }
@@ -48,9 +56,12 @@ TEST(ReceiverNoise, WhiteningIsTheInverseOfTheCovariance) {
     times.extra_sd_m(k) = k % 7 == 0 ? 3.0 : 0.0;
     columns.row(k) << random.normal(), random.normal();
   }
-  const ReceiverNoise noise{2.0, 25.0, 0.7};
-  const MatrixXd covariance = noise_covariance(times, {{noise}, {1.0}});
-  EXPECT_NEAR(covariance(3, 1), times.scale(3) * times.scale(1) * 4.0 * std::exp(-6.0 / 25.0),
+  const ReceiverNoise noise{2.0, 25.0, 0.7, 2.0, 0.5, 0.8};
+  const MatrixXd covariance = noise_covariance(times, {{noise}});
+  EXPECT_NEAR(covariance(3, 1),
+              std::sqrt(times.scale(3) * times.scale(1)) *
+                      (4.0 * std::exp(-6.0 / 25.0) + 0.49 * std::exp(-6.0 / 2.0)) +
+                  0.64 * std::exp(-6.0 / 25.0),
               1e-9);
   const MatrixXd expected = columns.transpose() * covariance.ldlt().solve(columns);
   MatrixXd white = columns;
@@ -62,39 +73,74 @@ TEST(ReceiverNoise, WhiteningIsTheInverseOfTheCovariance) {
 // A mean under slow errors: what is stated of its error holds over many receivers, though each
 // shows only a few independent errors.
 TEST(ReceiverNoise, TheStatedErrorOfAMeanHoldsOverManyReceivers) {
-  const NoisyTimes times = times_of(150, 4.0);
+  NoisyTimes times = times_of(300, 2.0);
   double squared = 0.0;
   double naive = 0.0;
   constexpr int kReceivers = 80;
   for (int receiver = 0; receiver < kReceivers; ++receiver) {
     Random random(static_cast<std::uint64_t>(100 + receiver));
+    for (Eigen::Index k = 0; k < 300; ++k)
+      times.scale(k) = std::exp(1.2 * std::sin(0.11 * static_cast<double>(k)));
     ReceiverPriorConfig prior;
     ReceiverNoise noise;
     noise.slow_sd_m = prior.overconfidence * std::exp(0.5 * random.normal());
     noise.correlation_s = 100.0 * std::exp(0.5 * random.normal());
     noise.fast_sd_m = 0.3 * noise.slow_sd_m;
+    noise.follows = random.uniform(0.4, 1.2);
+    noise.steady_sd_m = 0.25 * noise.slow_sd_m * std::exp(0.5 * random.normal());
     const VectorXd errors = drawn(times, noise, random);
-    const NoisyEstimate estimate = estimate_under_noise(times, {{errors, MatrixXd::Ones(150, 1)}},
+    const NoisyEstimate estimate = estimate_under_noise(times, {{errors, MatrixXd::Ones(300, 1)}},
                                                         MatrixXd::Zero(1, 1), prior);
     squared += estimate.mean(0) * estimate.mean(0) / estimate.covariance(0, 0) / kReceivers;
-    const double variance = (errors.array() - errors.mean()).square().mean() / 150.0;
+    const double variance = (errors.array() - errors.mean()).square().mean() / 300.0;
     naive += errors.mean() * errors.mean() / variance / kReceivers;
   }
-  EXPECT_GT(squared, 0.5);
+  EXPECT_GT(squared, 0.4);
   EXPECT_LT(squared, 1.4);
   EXPECT_GT(naive, 10.0);  // errors taken as independent promise far too much
 }
 
 TEST(ReceiverNoise, LearnsHowSlowTheErrorsAre) {
   const NoisyTimes times = times_of(400, 2.0);
-  for (const double correlation_s : {5.0, 80.0}) {
+  double before = 0.0;
+  for (const double correlation_s : {15.0, 80.0}) {
     Random random(7);
-    const VectorXd errors = drawn(times, {1.5, correlation_s, 0.1}, random);
+    const VectorXd errors = drawn(times, {1.5, correlation_s, 0.1, 1.0}, random);
     const NoisyEstimate estimate =
         estimate_under_noise(times, {{errors, MatrixXd::Ones(400, 1)}}, MatrixXd::Zero(1, 1), {});
     EXPECT_NEAR(std::log(estimate.noise.correlation_s() / correlation_s), 0.0, 0.8);
-    EXPECT_NEAR(estimate.noise.slow_sd_m(), 1.5, 0.6);
+    EXPECT_NEAR(estimate.noise.slow_sd_m(), 1.5, 0.8);
+    EXPECT_GT(estimate.noise.correlation_s(), 2.0 * before);
+    before = estimate.noise.correlation_s();
   }
+}
+
+// A receiver whose errors go with what it states, and one that states anything.
+TEST(ReceiverNoise, LearnsWhetherErrorsGoWithWhatIsStated) {
+  NoisyTimes times = times_of(400, 2.0);
+  for (Eigen::Index k = 0; k < 400; ++k)
+    times.scale(k) = std::exp(1.2 * std::sin(0.11 * static_cast<double>(k)));
+  for (const double follows : {0.0, 1.0}) {
+    Random random(8);
+    const VectorXd errors = drawn(times, {2.0, 60.0, 0.4, 2.0, follows, 0.2}, random);
+    const NoisyEstimate estimate =
+        estimate_under_noise(times, {{errors, MatrixXd::Ones(400, 1)}}, MatrixXd::Zero(1, 1), {});
+    EXPECT_NEAR(estimate.likeliest.follows, follows, 0.2);
+  }
+}
+
+TEST(ReceiverNoise, ARunawayIsNoSlowError) {
+  const NoisyTimes times = times_of(200, 2.0);
+  Random random(5);
+  const ReceiverNoise noise{2.0, 100.0, 0.3, 2.0};
+  VectorXd errors = drawn(times, noise, random);
+  EXPECT_EQ((runaways_m(times, noise, errors).array() > 0.0).count(), 0);
+  errors.segment(60, 5).array() += 20.0;
+  const VectorXd found = runaways_m(times, noise, errors);
+  EXPECT_GT(found.segment(60, 5).minCoeff(), 1.0);
+  EXPECT_GT(found.segment(60, 5).maxCoeff(), 4.0);
+  EXPECT_EQ(found.head(55).maxCoeff(), 0.0);
+  EXPECT_EQ(found.tail(130).maxCoeff(), 0.0);
 }
 
 TEST(ReceiverNoise, APriorHoldsWhatTheSeriesDoNotTell) {
@@ -105,7 +151,7 @@ TEST(ReceiverNoise, APriorHoldsWhatTheSeriesDoNotTell) {
   MatrixXd information = MatrixXd::Zero(2, 2);
   information(1, 1) = 4.0;
   const NoisyEstimate estimate = estimate_under_noise(
-      times, {{drawn(times, {1.0, 20.0, 0.2}, random), jacobian}}, information, {});
+      times, {{drawn(times, {1.0, 20.0, 0.2, 1.0}, random), jacobian}}, information, {});
   EXPECT_NEAR(estimate.mean(1), 0.0, 1e-9);
   EXPECT_NEAR(estimate.covariance(1, 1), 0.25, 1e-9);
 }

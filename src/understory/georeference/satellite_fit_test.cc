@@ -134,7 +134,8 @@ TEST(SatelliteFit, CovariancesHoldUnderSlowErrorsThatTheReceiverUnderstates) {
           std::pow(rms_error_m(fit, poses), 2.0) / kDraws;
     }
     for (const int axis : {2, 3, 4, 5}) {
-      EXPECT_GT(squares(axis), 0.4) << m << " " << axis;
+      // Wide: all pairs state the same error, so its steady part cannot be told from the slow one.
+      EXPECT_GT(squares(axis), 0.25) << m << " " << axis;
       EXPECT_LT(squares(axis), 1.9) << m << " " << axis;
     }
     if (m == 2) continue;  // the tilt of the split fit comes from the run, which is level here

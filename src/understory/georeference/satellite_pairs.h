@@ -22,7 +22,7 @@ struct PairingConfig {
   // Fixes of one interval become one pair. The interval is this long at least, and longer where
   // that gives more than `most_pairs` [bound: a path moves little in a second; time].
   double interval_s = 1.0;
-  std::size_t most_pairs = 250;
+  std::size_t most_pairs = 1000;
   FixCovarianceConfig covariance;
 };
 

@@ -84,6 +84,22 @@ NoisyTimes stated(const std::vector<SatellitePair>& pairs, bool plane, double mo
   return times;
 }
 
+// The residual of each pair that lies far off the others, both as it is and over what the receiver
+// states of it; 0 for the others.
+VectorXd far_off_m(const VectorXd& off_m, const VectorXd& scale, double median) {
+  const VectorXd relative = off_m.cwiseQuotient(scale);
+  const auto sd_of = [&](const VectorXd& all) {
+    return std::max(1e-6, upper_median(std::vector<double>(all.begin(), all.end())) / median);
+  };
+  const double sd_m = sd_of(off_m);
+  const double relative_sd = sd_of(relative);
+  VectorXd extra = VectorXd::Zero(scale.size());
+  for (Eigen::Index k = 0; k < extra.size(); ++k) {
+    if (off_m(k) > kFarOff * sd_m && relative(k) > kFarOff * relative_sd) extra(k) = off_m(k);
+  }
+  return extra;
+}
+
 class Splitter {
  public:
   Splitter(const std::vector<SatellitePair>& pairs, const SplitFitConfig& config)
@@ -96,12 +112,17 @@ class Splitter {
   SplitFit solve() {
     for (int step = 0; step < kSteps; ++step) {
       fit_.enu_from_world = about(middle(), tilt_, Vector3d(0.0, 0.0, up_)) * level_;
-      weigh();
+      if (step == 0)
+        weigh_at_first();
+      else
+        weigh_again();
       solve_height();
       solve_plane();
     }
     fit_.middle = middle();
     fit_.enu_from_world = about(fit_.middle, tilt_, Vector3d(0.0, 0.0, up_)) * level_;
+    for (Eigen::Index k = 0; k < fit_.plane_times.extra_sd_m.size(); ++k)
+      fit_.far_off.push_back(fit_.plane_times.extra_sd_m(k) > 0.0 ? 1 : 0);
     fit_.found = true;
     return fit_;
   }
@@ -114,11 +135,36 @@ class Splitter {
     return sum / static_cast<double>(pairs_.size());
   }
 
-  void weigh() {
-    PairTimes times = pair_times(pairs_, fit_.enu_from_world, config_);
-    fit_.plane_times = std::move(times.plane);
-    fit_.height_times = std::move(times.height);
-    fit_.far_off = std::move(times.far_off);
+  // What lies far off, at first by its residual alone.
+  void weigh_at_first() {
+    fit_.plane_times = stated(pairs_, true, config_.most_scale);
+    fit_.height_times = stated(pairs_, false, config_.most_scale);
+    if (config_.robust) {
+      const Eigen::Matrix3Xd off = residuals();
+      fit_.plane_times.extra_sd_m =
+          far_off_m(off.topRows<2>().colwise().norm(), fit_.plane_times.scale, kRayleighMedian);
+      fit_.height_times.extra_sd_m =
+          far_off_m(off.row(2).cwiseAbs(), fit_.height_times.scale, kNormalMedian);
+    }
+  }
+
+  // Then beside the slow errors that were found.
+  void weigh_again() {
+    if (!config_.robust) return;
+    const Eigen::Matrix3Xd off = residuals();
+    fit_.plane_times.extra_sd_m =
+        runaways_m(fit_.plane_times, plane_likeliest_, off.topRows<2>().transpose());
+    if (fit_.height_known)
+      fit_.height_times.extra_sd_m =
+          runaways_m(fit_.height_times, height_likeliest_, off.row(2).transpose());
+  }
+
+  [[nodiscard]] Eigen::Matrix3Xd residuals() const {
+    Eigen::Matrix3Xd off(3, static_cast<Eigen::Index>(pairs_.size()));
+    for (std::size_t k = 0; k < pairs_.size(); ++k)
+      off.col(static_cast<Eigen::Index>(k)) =
+          pairs_[k].fix_in_enu - fit_.enu_from_world * pairs_[k].antenna_in_world;
+    return off;
   }
 
   void solve_plane() {
@@ -152,6 +198,7 @@ class Splitter {
       fit_.time_offset_sd_s = std::sqrt(found.covariance(3, 3));
     }
     fit_.plane_noise = found.noise;
+    plane_likeliest_ = found.likeliest;
     fit_.spread.block<3, 3>(2, 2) = found.covariance.topLeftCorner<3, 3>();
   }
 
@@ -179,6 +226,7 @@ class Splitter {
     tilt_ = Vector3d(found.mean(0), found.mean(1), 0.0);
     up_ = found.mean(2);
     fit_.height_noise = found.noise;
+    height_likeliest_ = found.likeliest;
     const int at[] = {0, 1, 5};
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j)
@@ -191,6 +239,8 @@ class Splitter {
   Pose level_;  // without the tilt and the height that were found
   Vector3d tilt_ = Vector3d::Zero();
   double up_ = 0.0;
+  ReceiverNoise plane_likeliest_;
+  ReceiverNoise height_likeliest_;
   SplitFit fit_;
 };
 
@@ -199,31 +249,6 @@ Pose at(const Vector3d& middle) {
 }
 
 }  // namespace
-
-PairTimes pair_times(const std::vector<SatellitePair>& pairs, const Pose& enu_from_world,
-                     const SplitFitConfig& config) {
-  PairTimes times;
-  times.plane = stated(pairs, true, config.most_scale);
-  times.height = stated(pairs, false, config.most_scale);
-  times.far_off.assign(pairs.size(), 0);
-  if (!config.robust) return times;
-  std::vector<double> plane;
-  std::vector<double> up;
-  for (const SatellitePair& pair : pairs) {
-    const Vector3d r = pair.fix_in_enu - enu_from_world * pair.antenna_in_world;
-    plane.push_back(r.head<2>().norm());
-    up.push_back(std::abs(r.z()));
-  }
-  const double plane_sd = std::max(1e-6, upper_median(plane) / kRayleighMedian);
-  const double up_sd = std::max(1e-6, upper_median(up) / kNormalMedian);
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const auto row = static_cast<Eigen::Index>(k);
-    times.far_off[k] = plane[k] > kFarOff * plane_sd ? 1 : 0;
-    if (times.far_off[k] != 0) times.plane.extra_sd_m(row) = plane[k];
-    if (up[k] > kFarOff * up_sd) times.height.extra_sd_m(row) = up[k];
-  }
-  return times;
-}
 
 SplitFit fit_split(const std::vector<SatellitePair>& pairs, const SplitFitConfig& config) {
   SplitFit fit;

@@ -15,9 +15,8 @@ struct SplitFitConfig {
   // How far the run's up may be off gravity, one standard deviation about each level axis. With an
   // IMU a map is level [measured: docs/method/georeference.md].
   double tilt_sd_deg = 0.05;
-  // A pair counts as at most that many times as good or as bad as the median says: what a
-  // receiver states of a moment tells only a part of its error [tuned: the presets below].
-  double most_scale = 2.0;
+  // A pair counts as at most that many times as good or as bad as the median says [chosen].
+  double most_scale = 10.0;
   // The same for a run that was mapped without an IMU [chosen: a lidar that is carried by hand].
   double unlevel_tilt_sd_deg = 5.0;
   // How far the receiver's clock may be off beyond what is known; 0 holds it.
@@ -48,19 +47,6 @@ struct SplitFit {
   NoiseBelief height_noise;
   std::vector<char> far_off;  // of each pair: 1 if it hardly counts
 };
-
-// How well pairs tell a place, in the plane and in height: scale and extra error of each.
-struct PairTimes {
-  NoisyTimes plane;
-  NoisyTimes height;
-  std::vector<char> far_off;  // of each pair: 1 if it lies far off in the plane
-};
-
-// Scales are what the receiver states of each pair over the median. What lies far off
-// `enu_from_world` against the others gets an extra error of that size, unless `config.robust` is
-// off: a runaway must not draw its neighbours along. At least one pair.
-[[nodiscard]] PairTimes pair_times(const std::vector<SatellitePair>& pairs,
-                                   const Pose& enu_from_world, const SplitFitConfig& config);
 
 // Heading and place from the positions in the plane alone, height and tilt from the heights and
 // from how level the run's world is. The errors of the fixes are correlated in time, and their size

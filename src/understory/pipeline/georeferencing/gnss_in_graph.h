@@ -13,7 +13,7 @@ namespace understory {
 // What `map` does with the recording's positions by satellites.
 enum class GnssUse {
   kGeoreference,  // lays the finished map on them, by the method `auto`
-  kRigid,         // the same by one motion, estimated together with the receiver's slow errors
+  kRigid,         // the same by `split`: one motion, estimated with the receiver's slow errors
   kFuse           // they are factors of the pose graph: the world frame becomes east, north, up
 };
 

@@ -14,14 +14,12 @@
 namespace understory {
 namespace {
 
-constexpr const char* kBest = "auto";
-
-const PlacementMethod& best_method() {
+const PlacementMethod& method_of(GeoreferenceMethod wanted) {
   const std::vector<PlacementMethod>& methods = placement_methods();
-  const auto found = std::find_if(methods.begin(), methods.end(), [](const PlacementMethod& one) {
-    return std::string(one.name) == kBest;
-  });
-  return found != methods.end() ? *found : methods.front();
+  const auto found = std::find_if(methods.begin(), methods.end(),
+                                  [&](const PlacementMethod& one) { return one.method == wanted; });
+  UNDERSTORY_CHECK(found != methods.end());
+  return *found;
 }
 
 bool has_position(const GnssFix& fix) {
@@ -90,17 +88,20 @@ std::string said(const InputError& error) {
   return text.rfind(file, 0) == 0 ? text.substr(file.size()) : text;
 }
 
-FoundPlacement try_to_place(const MappedPath& run, const std::vector<GnssFix>& fixes, Log& log) {
+FoundPlacement try_to_place(const MappedPath& run, const std::vector<GnssFix>& fixes,
+                            const PlacementMethod& method, Log& log) {
   GeoreferenceRequest request;
   request.run = run.results;
-  request.method = best_method().method;
+  request.method = method.method;
   if (run.level) request.tilt_sd_deg = SplitFitConfig().tilt_sd_deg;
   MovableRun movable;
   movable.trajectory = run.trajectory;
   movable.fixes = fixes;
   movable.antenna_in_body = run.antenna_in_body;
   try {
-    return {best_method().place(request, movable, log), ""};
+    FoundPlacement found{method.place(request, movable, log), ""};
+    if (found.placement->method.empty()) found.placement->method = method.name;
+    return found;
   } catch (const InputError& error) {  // the fixes cannot be used: the map is as good as without
     return {std::nullopt, said(error)};
   }
@@ -109,7 +110,7 @@ FoundPlacement try_to_place(const MappedPath& run, const std::vector<GnssFix>& f
 // Fills in the frames of a run that was placed; says why where the system does not reach it.
 void lay_on_globe(const Placement& placement, const GeoreferenceConfig& config, PlacedMap& map,
                   Log& log) {
-  map.place.method = placement.method.empty() ? best_method().name : placement.method;
+  map.place.method = placement.method;
   map.place.enu_from_world = placement.target_from_world;
   map.place.origin = *placement.origin;
   map.place.heights = other_heights(placement);
@@ -131,13 +132,14 @@ std::vector<GnssFix> fixes_with_position(const std::vector<GnssFix>& all) {
   return fixes;
 }
 
-FoundPlacement find_placement(const MappedPath& run, const GeoreferenceConfig& config, Log& log) {
+FoundPlacement find_placement(const MappedPath& run, const GeoreferenceConfig& config,
+                              GeoreferenceMethod method, Log& log) {
   if (run.fixes.empty()) return {std::nullopt, "the recording has no satellite positions"};
   const std::vector<GnssFix> fixes = fixes_with_position(run.fixes);
   write_rows(run.results, rows_of(fixes, ""));  // a method names them as its input
   if (!config.enabled) return {std::nullopt, "georeference.enabled is off"};
   if (fixes.empty()) return {std::nullopt, "no message of the receiver has a position"};
-  return try_to_place(run, fixes, log);
+  return try_to_place(run, fixes, method_of(method), log);
 }
 
 PlacedMap place_map(const MappedPath& run, const FoundPlacement& found,
@@ -173,7 +175,7 @@ PlacedMap place_map(const MappedPath& run, const FoundPlacement& found,
 }
 
 PlacedMap place_map(const MappedPath& run, const GeoreferenceConfig& config, Log& log) {
-  return place_map(run, find_placement(run, config, log), config, log);
+  return place_map(run, find_placement(run, config, GeoreferenceMethod::kAuto, log), config, log);
 }
 
 }  // namespace understory

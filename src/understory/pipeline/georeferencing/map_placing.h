@@ -9,6 +9,7 @@
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/output/report.h"
+#include "understory/pipeline/georeferencing/georeferencing.h"
 #include "understory/pipeline/georeferencing/placement.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/sensor/gnss_fix.h"
@@ -42,17 +43,17 @@ struct FoundPlacement {
 // Those of `all` whose latitude and longitude are a place on the earth.
 [[nodiscard]] std::vector<GnssFix> fixes_with_position(const std::vector<GnssFix>& all);
 
-// By the method `auto`. Writes gnss.csv, which the placement names as its input. Throws
-// OutputError.
+// By a method that needs nothing but fixes. Writes gnss.csv, which the placement names as its
+// input. Throws OutputError.
 [[nodiscard]] FoundPlacement find_placement(const MappedPath& run, const GeoreferenceConfig& config,
-                                            Log& log);
+                                            GeoreferenceMethod method, Log& log);
 // Lays a run on the globe. Writes gnss.csv, with the fixes in the run's world frame and what became
 // of each. Where there are no fixes, or the fit is not to be trusted, the layers stay in the world
 // frame, with the reason; where there are fixes a warning says so. The run's status does not depend
 // on it. Throws OutputError.
 [[nodiscard]] PlacedMap place_map(const MappedPath& run, const FoundPlacement& found,
                                   const GeoreferenceConfig& config, Log& log);
-// Both.
+// Both, by the method `auto`.
 [[nodiscard]] PlacedMap place_map(const MappedPath& run, const GeoreferenceConfig& config,
                                   Log& log);
 
