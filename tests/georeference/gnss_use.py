@@ -56,6 +56,7 @@ def fused(folder):
     place = facts["georeference"]
     assert place["on_globe"] and place["method"] == "fuse", place
     assert place["enu_from_world"]["translation_m"] == [0, 0, 0] and turn(place["enu_from_world"]) == 0, place
+    assert "east, north and up of the place below" in (run / "report.html").read_text()
     figures = facts["quality"]
     assert [figures[f"motion_{axis}_m"] for axis in "xyz"] == [0, 0, 0], figures
     of_split = RUNS["good", "georeference"][2]["georeference"]["heading_sd_deg"]
@@ -92,6 +93,7 @@ def rigid(folder):
             assert (run / file).read_bytes() == (plain / file).read_bytes(), (name, file)
         assert facts["georeference"]["on_globe"] and facts["georeference"]["method"] == "split", facts["georeference"]
         assert facts["georeference"]["origin"] == other["georeference"]["origin"]
+        assert "are in the frame of the run.<" in (run / "report.html").read_text()
         place, figures = facts["georeference"], facts["quality"]
         moved = place["enu_from_world"]["translation_m"]
         assert [figures[f"motion_{axis}_m"] for axis in "xyz"] == moved, (name, figures)

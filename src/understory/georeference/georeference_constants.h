@@ -37,7 +37,7 @@ inline constexpr double kLeastCurvature = 0.5;
 inline constexpr std::size_t kDraws = 160;
 // Degrees of freedom of the distribution they are drawn from [chosen: tails wider than normal]
 inline constexpr int kFreedom = 5;
-// Standard deviations of the prior beyond which no noise is drawn [chosen]
+// Standard deviations of the prior at which a noise is held [chosen]
 inline constexpr double kFarthest = 6.0;
 // Seed of the draws: the same pairs give the same result [chosen]
 inline constexpr std::uint64_t kSeed = 1;

@@ -94,7 +94,9 @@ class Posterior {
             const MatrixXd& information, const ReceiverPriorConfig& prior)
       : times_(times), series_(series), information_(information), prior_(prior) {}
 
-  [[nodiscard]] ReceiverNoise noise(const Unknowns& u) const {
+  // Bounded: residuals of nothing would make ever smaller errors more probable.
+  [[nodiscard]] ReceiverNoise noise(const Unknowns& wanted) const {
+    const Unknowns u = wanted.cwiseMax(-kFarthest).cwiseMin(kFarthest);
     ReceiverNoise noise;
     noise.slow_sd_m =
         times_.stated_sd_m * prior_.overconfidence * std::exp(prior_.overconfidence_log * u(0));
@@ -216,12 +218,21 @@ struct Draws {
   std::vector<double> weight;  // add up to one
 };
 
-// From Student's distribution around the mode, in pairs on both sides of it.
+// The mode, and draws from Student's distribution around it in pairs on both sides.
 Draws draw(const Posterior& posterior, const Mode& mode) {
   const Curvature root = mode.covariance.llt().matrixL();
   Random random(kSeed);
   Draws draws;
   std::vector<double> logs;
+  const auto take = [&](const Unknowns& u, double log_drawn) {
+    const Solution solution = posterior.solve(u);
+    const double log = solution.log_likelihood - 0.5 * u.squaredNorm() - log_drawn;
+    if (!std::isfinite(log)) return;
+    draws.noise.push_back(posterior.noise(u));
+    draws.solution.push_back(solution);
+    logs.push_back(log);
+  };
+  take(mode.at, 0.0);
   for (std::size_t pair = 0; pair < kDraws / 2; ++pair) {
     Unknowns z;
     double chi = 0.0;
@@ -231,14 +242,10 @@ Draws draw(const Posterior& posterior, const Mode& mode) {
       chi += std::pow(random.normal(), 2.0);
     z *= std::sqrt(kFreedom / chi);
     const double log_drawn = -0.5 * (kFreedom + kUnknowns) * std::log1p(z.squaredNorm() / kFreedom);
-    for (const double side : {1.0, -1.0}) {
-      const Unknowns u = mode.at + side * root * z;
-      if (u.cwiseAbs().maxCoeff() > kFarthest) continue;
-      draws.noise.push_back(posterior.noise(u));
-      draws.solution.push_back(posterior.solve(u));
-      logs.push_back(draws.solution.back().log_likelihood - 0.5 * u.squaredNorm() - log_drawn);
-    }
+    for (const double side : {1.0, -1.0})
+      take(mode.at + side * root * z, log_drawn);
   }
+  UNDERSTORY_CHECK(!logs.empty());
   const double best = *std::max_element(logs.begin(), logs.end());
   double total = 0.0;
   for (const double log : logs)

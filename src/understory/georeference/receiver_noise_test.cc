@@ -129,6 +129,15 @@ TEST(ReceiverNoise, LearnsWhetherErrorsGoWithWhatIsStated) {
   }
 }
 
+// Far below what any receiver states: the prior ends somewhere, the estimate does not fail.
+TEST(ReceiverNoise, ResidualsOfNothingAreNoFailure) {
+  const NoisyTimes times = times_of(100, 1.0);
+  const NoisyEstimate estimate = estimate_under_noise(
+      times, {{VectorXd::Zero(100), MatrixXd::Ones(100, 1)}}, MatrixXd::Zero(1, 1), {});
+  EXPECT_EQ(estimate.mean(0), 0.0);
+  EXPECT_LT(estimate.covariance(0, 0), 0.01);
+}
+
 TEST(ReceiverNoise, ARunawayIsNoSlowError) {
   const NoisyTimes times = times_of(200, 2.0);
   Random random(5);

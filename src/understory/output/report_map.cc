@@ -196,7 +196,7 @@ std::string falls_svg(const std::vector<TreeFall>& falls, const View& view) {
 // The receiver's path, at most 2,000 fixes of it, those that were not used paler.
 std::string fixes_svg(const std::vector<ReportFix>& fixes, const View& view) {
   const std::size_t step = fixes.size() / 2000 + 1;
-  std::string svg = "<g class=\"fixes\" fill=\"#d98200\">";
+  std::string svg = "<g class=\"fixes\" fill=\"#8e3fb0\">";
   for (std::size_t i = 0; i < fixes.size(); i += step) {
     const Eigen::Vector2d at = view.at(fixes[i].position);
     if (!at.allFinite()) continue;
@@ -314,7 +314,7 @@ std::string map_section(const ReportInput& input) {
     }
   }
   if (!input.fixes.empty())
-    entry(" class=\"dot\"", "border-color:#d98200", "GNSS fix (pale: not used)");
+    entry(" class=\"dot\"", "border-color:#8e3fb0", "GNSS fix (pale: not used)");
   if (!input.loops.empty()) line("--loop", "loop closed");
   return "<section><h2>The map from above</h2>" + svg + legend + "</p></section>\n";
 }

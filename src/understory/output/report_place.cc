@@ -101,10 +101,12 @@ std::string place_section(const ReportInput& input) {
   add_origin(place, rows);
   if (!place.method.empty()) rows.add("found by the method", place.method);
   add_errors(input, place, rows);
+  const bool fused = place.enu_from_world.log().norm() == 0.0;
   return html +
          "<p>map.laz, the rasters and trees.gpkg are in the coordinate system. trajectory.tum and "
-         "trees.csv are in the frame of the run.</p>" +
-         rows.html() + "</section>\n";
+         "trees.csv are in the frame of the run" +
+         (fused ? ": metres east, north and up of the place below" : "") + ".</p>" + rows.html() +
+         "</section>\n";
 }
 
 }  // namespace understory
