@@ -35,6 +35,8 @@ namespace path_evidence {  // pipeline/judgement/path_evidence.cc
 inline constexpr double kShortestStepS = 1e-3;
 // Quantile of speeds and accelerations that is judged [chosen]
 inline constexpr double kUsual = 0.99;
+// Quantile of accelerations that tells a path that shakes [tuned: lake seed 91 without IMU]
+inline constexpr double kOften = 0.95;
 // ns before and after a jump that tell how fast the path was [chosen]
 inline constexpr std::int64_t kJumpBase = 500'000'000;
 // ns between impossible steps of one jump at most [chosen]

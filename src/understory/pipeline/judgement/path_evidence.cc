@@ -120,6 +120,7 @@ MotionEvidence PathEvidence::evidence() const {
   MotionEvidence motion;
   motion.steps = speeds_.size();
   motion.speed_p99_m_s = quantile(speeds_, kUsual);
+  motion.acceleration_p95_m_s2 = quantile(accelerations_, kOften);
   motion.acceleration_p99_m_s2 = quantile(accelerations_, kUsual);
   motion.turn_rate_p99_deg_s = quantile(turn_rates_, kUsual);
   motion.fastest_m_s = largest(speeds_);

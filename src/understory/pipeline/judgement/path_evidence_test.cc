@@ -34,6 +34,7 @@ TEST(PathEvidence, KnowsSpeedAccelerationAndTurnRate) {
   const MotionEvidence motion = gathered(circle(2.0));
   EXPECT_EQ(motion.steps, 199U);
   EXPECT_NEAR(motion.speed_p99_m_s, 2.0, 0.01);
+  EXPECT_NEAR(motion.acceleration_p95_m_s2, 4.0 / 5.0, 0.01);
   EXPECT_NEAR(motion.acceleration_p99_m_s2, 4.0 / 5.0, 0.01);
   EXPECT_NEAR(motion.turn_rate_p99_deg_s, 2.0 / 5.0 * 180.0 / M_PI, 0.1);
   EXPECT_NEAR(motion.longest_step_s, 0.1, 1e-9);

@@ -26,6 +26,7 @@ void put_motion(Figures& figures, const MotionEvidence& motion) {
   put(figures, "steps_impossible", motion.impossible);
   figures["speed_p99_m_s"] = motion.speed_p99_m_s;
   figures["speed_max_m_s"] = motion.fastest_m_s;
+  figures["acceleration_p95_m_s2"] = motion.acceleration_p95_m_s2;
   figures["acceleration_p99_m_s2"] = motion.acceleration_p99_m_s2;
   figures["acceleration_max_m_s2"] = motion.hardest_m_s2;
   figures["jump_max_m"] = motion.jump_m;

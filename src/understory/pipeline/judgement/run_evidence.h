@@ -31,6 +31,7 @@ struct SensorEvidence {
 struct MotionEvidence {
   std::uint64_t steps = 0;  // from scan to scan
   double speed_p99_m_s = 0.0;
+  double acceleration_p95_m_s2 = 0.0;
   double acceleration_p99_m_s2 = 0.0;
   double turn_rate_p99_deg_s = 0.0;
   double fastest_m_s = 0.0;

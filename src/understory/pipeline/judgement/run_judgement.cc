@@ -208,6 +208,14 @@ class Judge {
                       "before and behind do not fit together",
                       motion.jump_m, format_seconds(motion.jump_stamp)));
     }
+    if (!evidence_.imu_used && !evidence_.by_stems &&
+        motion.acceleration_p95_m_s2 > config_.max_shake_m_s2) {
+      missing(
+          fmt::format("without an IMU the path shakes from scan to scan (accelerations of {:.0f} "
+                      "m/s^2): single scans are up to some decimetres off in the map. Record the "
+                      "IMU, or move more slowly",
+                      motion.acceleration_p95_m_s2));
+    }
     const double impossible = share(motion.impossible, motion.steps);
     if (impossible <= config_.max_misplaced) return;
     const std::string found = fmt::format(
@@ -359,6 +367,8 @@ void describe(ConfigTable& table, JudgementConfig& config) {
             "partial: a larger share of the steps is a motion that no carrier makes");
   table.add("max_impossible", config.max_impossible, shares, "",
             "untrusted: the same; where times were assumed, max_misplaced is the limit");
+  table.add("max_shake_m_s2", config.max_shake_m_s2, {0.0, 1e6}, "m/s^2",
+            "partial: without an IMU one step in twenty is accelerated by more");
   table.add("max_jump_m", config.max_jump_m, {0.0, 1e6}, "m",
             "untrusted: the path goes astray by more over such steps and does not come back");
   const ConfigTable::Range ratios{-1e6, 1e6};

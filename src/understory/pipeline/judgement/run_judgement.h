@@ -32,6 +32,9 @@ struct JudgementConfig {
   // were assumed, it is untrusted.
   double max_misplaced = 0.01;
   double max_impossible = 0.04;
+  // Without an IMU nothing but matching tells the motion within a scan. A path that shakes from
+  // scan to scan bends the next scan by its own error: its map is blurred.
+  double max_shake_m_s2 = 10.0;
   // A scan at a wrong place comes back; a path that does not come back has come off its map.
   double max_jump_m = 1.0;
   // Motion within scans over motion between them, see ScanMotion: 1 is right.

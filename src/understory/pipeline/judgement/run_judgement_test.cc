@@ -151,6 +151,20 @@ TEST(RunJudgement, Matches) {
   expect(kUntrusted, "lost 1 time(s), first at 17.5 s", pieces);
 }
 
+TEST(RunJudgement, APathThatShakesWithoutAnImuIsPartial) {
+  RunEvidence evidence = good_run();
+  evidence.motion.acceleration_p95_m_s2 = 10.1;
+  expect_complete(evidence);  // the accelerometer has felt it
+  evidence.imu_used = false;
+  expect(RunStatus::kPartial, "shakes from scan to scan (accelerations of 10 m/s^2)", evidence);
+  evidence.by_stems = true;
+  evidence.stems.trees = 5;
+  expect_complete(evidence);
+  evidence.by_stems = false;
+  evidence.motion.acceleration_p95_m_s2 = 10.0;
+  expect_complete(evidence);
+}
+
 // A regression: a good recording of five scans that ends within a turn was untrusted.
 TEST(RunJudgement, ThePartOfATurnAtTheEndIsNoLoss) {
   RunEvidence evidence = good_run();
