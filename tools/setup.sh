@@ -53,7 +53,6 @@ install_packages() {
   mapfile -t wanted < <(missing "${all[@]}")
   say "set-up: installing ${#wanted[@]} packages: ${wanted[*]}"
   as_root env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o Dpkg::Use-Pty=0 \
-    -o Dpkg::Options::=--force-unsafe-io \
     install --no-install-recommends "${wanted[@]}" >"$log" 2>&1 ||
     { tail -n 30 "$log" >&2; fail "installing packages failed"; }
   rm -f "$log"

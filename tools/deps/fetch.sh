@@ -3,17 +3,23 @@
 # than this machine runs, through apt and from the mirror that the machine itself uses. apt checks
 # their signatures as it does for everything else. Needs no root: all of apt's own state for the
 # newer release lies in a private folder, so that the machine's package lists stay as they are.
+# A tarball reaches FOLDER only when it has the SHA-256 that sources.sha256 states for it.
 set -euo pipefail
+sums=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)/sources.sha256
 suite=${UNDERSTORY_SOURCE_SUITE:-trixie}
 folder=$1
 shift
 mkdir -p "$folder"
 
-have_all() {
-  local package
-  for package; do compgen -G "$folder/${package}_*.orig.tar.*" >/dev/null || return 1; done
+# sound_in FOLDER PACKAGE...: whether it holds the tarball of each, every byte as expected.
+sound_in() {
+  local where=$1 package
+  shift
+  for package; do
+    (cd "$where" && grep -F " ${package}_" "$sums" | sha256sum --check --status 2>/dev/null) || return 1
+  done
 }
-if have_all "$@"; then exit 0; fi
+if sound_in "$folder" "$@"; then exit 0; fi
 
 echo "fetch: source tarballs of $* from $suite, through apt"
 private=$(mktemp -d)
@@ -45,9 +51,11 @@ keyring=/usr/share/keyrings/debian-archive-keyring.gpg
 only_newer=("${in_private[@]}" -o "Dir::Etc::SourceList=/dev/null" -o "Dir::Etc::SourceParts=$private/parts")
 quietly() { "$@" >"$private/log" 2>&1 || { cat "$private/log" >&2; exit 1; }; }
 quietly apt-get -q "${only_newer[@]}" update
-cd "$folder"
+mkdir "$private/fetched"
+cd "$private/fetched"
 quietly apt-get -q "${only_newer[@]}" source --tar-only "$@"
-if ! have_all "$@"; then
-  echo "fetch.sh: $suite on this machine's mirror has no tarball of: $*" >&2
+if ! sound_in "$private/fetched" "$@"; then
+  echo "fetch.sh: $suite on this machine's mirror gave something else than $sums states for: $*" >&2
   exit 1
 fi
+cp -- *.orig.tar.* "$folder"

@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# lock-python.sh: writes the exact versions and hashes of the Python packages that tests and benchmarks
+# compare with, one file for each list and each Python of a Debian release. Versions stay as they are
+# where they can; --upgrade takes the newest.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+room=$(mktemp -d)
+trap 'rm -rf "$room"' EXIT
+python3 -m venv "$room/env"
+"$room/env/bin/python" -m pip install -q --disable-pip-version-check uv
+for list in tests benchmarks; do
+  for version in 3.11 3.13; do
+    say "locking $list/requirements.txt for Python $version"
+    "$room/env/bin/uv" pip compile -q "$@" --python-version "$version" --python-platform linux \
+      --no-config --generate-hashes --no-emit-index-url --no-emit-find-links --no-annotate \
+      --custom-compile-command tools/lock-python.sh \
+      --output-file "$top/$list/requirements-py$version.lock" "$top/$list/requirements.txt"
+  done
+done
