@@ -1,6 +1,6 @@
 # Every third-party library as an imported target, so that its headers count as system headers.
 #   Eigen3::Eigen TBB::tbb fmt::fmt understory::nanoflann understory::gdal understory::embree
-#   understory::lz4 understory::zstd understory::bz2 ZLIB::ZLIB SQLite::SQLite3 yaml-cpp
+#   understory::lz4 understory::zstd understory::bz2 ZLIB::ZLIB OpenSSL::Crypto SQLite::SQLite3 yaml-cpp
 #   CLI11::CLI11 nlohmann_json::nlohmann_json GTest::gtest_main understory::gtsam understory::laszip
 include(Gtsam)
 include(Laszip)
@@ -36,6 +36,7 @@ find_package(TBB REQUIRED)
 find_package(fmt REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(BZip2 REQUIRED)
+find_package(OpenSSL REQUIRED COMPONENTS Crypto)
 find_package(SQLite3 REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(CLI11 REQUIRED)

@@ -1,10 +1,12 @@
 #include <array>
-#include <bit>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <memory>
+#include <span>
 
 #include <fmt/format.h>
+#include <openssl/evp.h>
 
 #include "understory/output/run_summary.h"
 #include "understory/util/error.h"
@@ -13,94 +15,38 @@
 namespace understory {
 namespace {
 
-// SHA-256 after FIPS 180-4.
+// The SHA-256 of what was given so far, with the processor's own instructions where it has them.
 class Sha256 {
  public:
-  void update(const std::uint8_t* bytes, std::size_t count) {
-    length_ += count;
-    while (count > 0) {
-      const std::size_t part = std::min(count, block_.size() - filled_);
-      std::memcpy(block_.data() + filled_, bytes, part);
-      filled_ += part;
-      bytes += part;
-      count -= part;
-      if (filled_ < block_.size()) return;
-      digest_block();
-      filled_ = 0;
-    }
+  Sha256() : context_(EVP_MD_CTX_new()) {
+    check(context_ && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) == 1);
+  }
+
+  void update(const char* bytes, std::size_t count) {
+    check(EVP_DigestUpdate(context_.get(), bytes, count) == 1);
   }
 
   std::string finish() {
-    const std::uint64_t bits = length_ * 8;
-    const std::uint8_t one = 0x80;
-    const std::uint8_t zero = 0;
-    update(&one, 1);
-    while (filled_ != 56)
-      update(&zero, 1);
-    std::array<std::uint8_t, 8> tail{};
-    for (std::size_t i = 0; i < 8; ++i)
-      tail[i] = static_cast<std::uint8_t>(bits >> (56 - 8 * i));
-    update(tail.data(), tail.size());
+    std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+    unsigned int size = 0;
+    check(EVP_DigestFinal_ex(context_.get(), digest.data(), &size) == 1);
     std::string text;
-    for (const std::uint32_t word : state_)
-      text += fmt::format("{:08x}", word);
+    for (const unsigned char byte : std::span(digest).first(size))
+      text += fmt::format("{:02x}", byte);
     return text;
   }
 
  private:
-  void digest_block();
+  struct Free {
+    void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
+  };
 
-  // First 32 bits of the fractional parts of the square roots of the first primes.
-  std::array<std::uint32_t, 8> state_ = {0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a,
-                                         0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19};
-  std::array<std::uint8_t, 64> block_{};
-  std::size_t filled_ = 0;
-  std::uint64_t length_ = 0;
+  static void check(bool done) {
+    if (!done) throw InternalError("the cryptographic library computes no SHA-256");
+  }
+
+  std::unique_ptr<EVP_MD_CTX, Free> context_;
 };
-
-// Of the cube roots.
-constexpr std::array<std::uint32_t, 64> kRound = {
-    0x428a2f98, 0x71374491, 0xb5c0fbcf, 0xe9b5dba5, 0x3956c25b, 0x59f111f1, 0x923f82a4, 0xab1c5ed5,
-    0xd807aa98, 0x12835b01, 0x243185be, 0x550c7dc3, 0x72be5d74, 0x80deb1fe, 0x9bdc06a7, 0xc19bf174,
-    0xe49b69c1, 0xefbe4786, 0x0fc19dc6, 0x240ca1cc, 0x2de92c6f, 0x4a7484aa, 0x5cb0a9dc, 0x76f988da,
-    0x983e5152, 0xa831c66d, 0xb00327c8, 0xbf597fc7, 0xc6e00bf3, 0xd5a79147, 0x06ca6351, 0x14292967,
-    0x27b70a85, 0x2e1b2138, 0x4d2c6dfc, 0x53380d13, 0x650a7354, 0x766a0abb, 0x81c2c92e, 0x92722c85,
-    0xa2bfe8a1, 0xa81a664b, 0xc24b8b70, 0xc76c51a3, 0xd192e819, 0xd6990624, 0xf40e3585, 0x106aa070,
-    0x19a4c116, 0x1e376c08, 0x2748774c, 0x34b0bcb5, 0x391c0cb3, 0x4ed8aa4a, 0x5b9cca4f, 0x682e6ff3,
-    0x748f82ee, 0x78a5636f, 0x84c87814, 0x8cc70208, 0x90befffa, 0xa4506ceb, 0xbef9a3f7, 0xc67178f2};
-
-void Sha256::digest_block() {
-  std::array<std::uint32_t, 64> w{};
-  for (std::size_t i = 0; i < 16; ++i) {
-    w[i] = static_cast<std::uint32_t>(block_[4 * i]) << 24 |
-           static_cast<std::uint32_t>(block_[4 * i + 1]) << 16 |
-           static_cast<std::uint32_t>(block_[4 * i + 2]) << 8 |
-           static_cast<std::uint32_t>(block_[4 * i + 3]);
-  }
-  for (std::size_t i = 16; i < 64; ++i) {
-    const std::uint32_t s0 = std::rotr(w[i - 15], 7) ^ std::rotr(w[i - 15], 18) ^ (w[i - 15] >> 3);
-    const std::uint32_t s1 = std::rotr(w[i - 2], 17) ^ std::rotr(w[i - 2], 19) ^ (w[i - 2] >> 10);
-    w[i] = w[i - 16] + s0 + w[i - 7] + s1;
-  }
-  auto [a, b, c, d, e, f, g, h] = state_;
-  for (std::size_t i = 0; i < 64; ++i) {
-    const std::uint32_t s1 = std::rotr(e, 6) ^ std::rotr(e, 11) ^ std::rotr(e, 25);
-    const std::uint32_t t1 = h + s1 + ((e & f) ^ (~e & g)) + kRound[i] + w[i];
-    const std::uint32_t s0 = std::rotr(a, 2) ^ std::rotr(a, 13) ^ std::rotr(a, 22);
-    const std::uint32_t t2 = s0 + ((a & b) ^ (a & c) ^ (b & c));
-    h = g;
-    g = f;
-    f = e;
-    e = d + t1;
-    d = c;
-    c = b;
-    b = a;
-    a = t1 + t2;
-  }
-  const std::array<std::uint32_t, 8> sum = {a, b, c, d, e, f, g, h};
-  for (std::size_t i = 0; i < 8; ++i)
-    state_[i] += sum[i];
-}
 
 }  // namespace
 
@@ -114,7 +60,7 @@ InputHash hash_input(const std::filesystem::path& path) {
   while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
          file.gcount() > 0) {
     const auto count = static_cast<std::size_t>(file.gcount());
-    hash.update(reinterpret_cast<const std::uint8_t*>(buffer.data()), count);
+    hash.update(buffer.data(), count);
     result.bytes += count;
   }
   check_readable(file, path.string(), "at byte " + std::to_string(result.bytes));
