@@ -33,46 +33,58 @@ std::vector<std::array<std::uint8_t, 3>> palette() {
 MapPicture::MapPicture(double finest_cell_m, int largest_side)
     : cell_m_(finest_cell_m), largest_side_(largest_side) {}
 
+bool MapPicture::Box::contains(int column, int row) const {
+  return column >= column0 && row >= row0 && column < column0 + columns && row < row0 + rows;
+}
+
+bool MapPicture::Box::contains(const Box& other) const {
+  return contains(other.column0, other.row0) &&
+         contains(other.column0 + other.columns - 1, other.row0 + other.rows - 1);
+}
+
+std::size_t MapPicture::Box::at(int column, int row) const {
+  return static_cast<std::size_t>(row - row0) * static_cast<std::size_t>(columns) +
+         static_cast<std::size_t>(column - column0);
+}
+
 double MapPicture::x0() const {
-  return column0_ * cell_m_;
+  return seen_.column0 * cell_m_;
 }
 double MapPicture::y0() const {
-  return row0_ * cell_m_;
+  return seen_.row0 * cell_m_;
 }
 double MapPicture::width_m() const {
-  return columns_ * cell_m_;
+  return seen_.columns * cell_m_;
 }
 double MapPicture::height_m() const {
-  return rows_ * cell_m_;
+  return seen_.rows * cell_m_;
 }
 
 std::array<double, 4> MapPicture::content_box() const {
-  std::array<int, 4> box = {columns_, rows_, 0, 0};
-  for (int row = 0; row < rows_; ++row) {
-    for (int column = 0; column < columns_; ++column) {
-      const Cell& cell = cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                                static_cast<std::size_t>(column)];
+  const int column1 = seen_.column0 + seen_.columns;
+  const int row1 = seen_.row0 + seen_.rows;
+  std::array<int, 4> box = {column1, row1, seen_.column0, seen_.row0};
+  for (int row = seen_.row0; row < row1; ++row) {
+    for (int column = seen_.column0; column < column1; ++column) {
+      const Cell& cell = cells_[held_.at(column, row)];
       if (cell.ground + cell.vegetation == 0) continue;
       box = {std::min(box[0], column), std::min(box[1], row), std::max(box[2], column + 1),
              std::max(box[3], row + 1)};
     }
   }
-  return {(column0_ + box[0]) * cell_m_, (row0_ + box[1]) * cell_m_, (column0_ + box[2]) * cell_m_,
-          (row0_ + box[3]) * cell_m_};
+  return {box[0] * cell_m_, box[1] * cell_m_, box[2] * cell_m_, box[3] * cell_m_};
 }
 
 void MapPicture::add(double x, double y, double z, double height_m) {
   if (!std::isfinite(x) || !std::isfinite(y)) return;
   auto column = static_cast<int>(std::floor(x / cell_m_));
   auto row = static_cast<int>(std::floor(y / cell_m_));
-  while (cells_.empty() || column < column0_ || row < row0_ || column >= column0_ + columns_ ||
-         row >= row0_ + rows_) {
+  while (!seen_.contains(column, row)) {
     grow(column, row);
     column = static_cast<int>(std::floor(x / cell_m_));
     row = static_cast<int>(std::floor(y / cell_m_));
   }
-  Cell& cell = cells_[static_cast<std::size_t>(row - row0_) * static_cast<std::size_t>(columns_) +
-                      static_cast<std::size_t>(column - column0_)];
+  Cell& cell = cells_[held_.at(column, row)];
   ++count_;
   constexpr double kVegetation = 0.3;
   const auto height = static_cast<float>(std::isnan(height_m) ? 1.0 : height_m);
@@ -95,44 +107,53 @@ void MapPicture::grow(int column, int row) {
   int r0 = down(row);
   int c1 = c0 + kBlock;
   int r1 = r0 + kBlock;
-  if (!cells_.empty()) {
-    c0 = std::min(c0, column0_);
-    r0 = std::min(r0, row0_);
-    c1 = std::max(c1, column0_ + columns_);
-    r1 = std::max(r1, row0_ + rows_);
+  if (seen_.columns > 0) {
+    c0 = std::min(c0, seen_.column0);
+    r0 = std::min(r0, seen_.row0);
+    c1 = std::max(c1, seen_.column0 + seen_.columns);
+    r1 = std::max(r1, seen_.row0 + seen_.rows);
   }
   const int most = 2 * ((largest_side_ + kBlock - 1) / kBlock) * kBlock;
   if (c1 - c0 > most || r1 - r0 > most) {
     coarsen();
     return;  // the caller finds its cell anew
   }
-  std::vector<Cell> cells(static_cast<std::size_t>(c1 - c0) * static_cast<std::size_t>(r1 - r0));
-  for (int j = 0; j < rows_; ++j) {
-    std::copy_n(
-        cells_.begin() + static_cast<std::ptrdiff_t>(j) * columns_, columns_,
-        cells.begin() + static_cast<std::ptrdiff_t>(j + row0_ - r0) * (c1 - c0) + (column0_ - c0));
+  seen_ = {c0, r0, c1 - c0, r1 - r0};
+  if (held_.contains(seen_)) return;
+  // A quarter more on each side, no larger than the picture may become.
+  const int columns = std::min(most, seen_.columns + seen_.columns / 2);
+  const int rows = std::min(most, seen_.rows + seen_.rows / 2);
+  hold({c0 - (columns - seen_.columns) / 2, r0 - (rows - seen_.rows) / 2, columns, rows});
+}
+
+// Moves the cells into an array of that box; what lies outside of it is lost.
+void MapPicture::hold(const Box& box) {
+  std::vector<Cell> cells(static_cast<std::size_t>(box.columns) *
+                          static_cast<std::size_t>(box.rows));
+  const int column0 = std::max(box.column0, held_.column0);
+  const int column1 = std::min(box.column0 + box.columns, held_.column0 + held_.columns);
+  const int row0 = std::max(box.row0, held_.row0);
+  const int row1 = std::min(box.row0 + box.rows, held_.row0 + held_.rows);
+  for (int row = row0; row < row1 && column0 < column1; ++row) {
+    std::copy_n(cells_.begin() + static_cast<std::ptrdiff_t>(held_.at(column0, row)),
+                column1 - column0,
+                cells.begin() + static_cast<std::ptrdiff_t>(box.at(column0, row)));
   }
   cells_.swap(cells);
-  column0_ = c0;
-  row0_ = r0;
-  columns_ = c1 - c0;
-  rows_ = r1 - r0;
+  held_ = box;
 }
 
 void MapPicture::coarsen() {
   const auto half = [](int value) { return static_cast<int>(std::floor(value / 2.0)); };
-  const int c0 = half(column0_);
-  const int r0 = half(row0_);
-  const int columns = half(column0_ + columns_ - 1) - c0 + 1;
-  const int rows = half(row0_ + rows_ - 1) - r0 + 1;
-  std::vector<Cell> cells(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  for (int j = 0; j < rows_; ++j) {
-    for (int i = 0; i < columns_; ++i) {
-      const Cell& from = cells_[static_cast<std::size_t>(j) * static_cast<std::size_t>(columns_) +
-                                static_cast<std::size_t>(i)];
-      Cell& to =
-          cells[static_cast<std::size_t>(half(j + row0_) - r0) * static_cast<std::size_t>(columns) +
-                static_cast<std::size_t>(half(i + column0_) - c0)];
+  Box coarse{half(seen_.column0), half(seen_.row0), 0, 0};
+  coarse.columns = half(seen_.column0 + seen_.columns - 1) - coarse.column0 + 1;
+  coarse.rows = half(seen_.row0 + seen_.rows - 1) - coarse.row0 + 1;
+  std::vector<Cell> cells(static_cast<std::size_t>(coarse.columns) *
+                          static_cast<std::size_t>(coarse.rows));
+  for (int row = seen_.row0; row < seen_.row0 + seen_.rows; ++row) {
+    for (int column = seen_.column0; column < seen_.column0 + seen_.columns; ++column) {
+      const Cell& from = cells_[held_.at(column, row)];
+      Cell& to = cells[coarse.at(half(column), half(row))];
       if (from.ground > 0) {
         to.ground_z = to.ground == 0 ? from.ground_z : std::min(to.ground_z, from.ground_z);
       }
@@ -142,36 +163,34 @@ void MapPicture::coarsen() {
     }
   }
   cells_.swap(cells);
-  column0_ = c0;
-  row0_ = r0;
-  columns_ = columns;
-  rows_ = rows;
+  seen_ = coarse;
+  held_ = coarse;
   cell_m_ *= 2.0;
 }
 
 std::string MapPicture::png() const {
   MapPicture small = *this;
-  while (std::max(small.columns_, small.rows_) > largest_side_)
+  while (std::max(small.seen_.columns, small.seen_.rows) > largest_side_)
     small.coarsen();
+  small.hold(small.seen_);
   return small.encode();
 }
 
-// Ground as if lit from the north-west.
+// Ground as if lit from the north-west. The cells held must be those of the picture.
 std::string MapPicture::encode() const {
   const auto cell_at = [&](int column, int row) -> const Cell* {
-    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return nullptr;
-    return &cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                   static_cast<std::size_t>(column)];
+    if (column < 0 || row < 0 || column >= held_.columns || row >= held_.rows) return nullptr;
+    return &cells_[held_.at(held_.column0 + column, held_.row0 + row)];
   };
   float top = 1.0F;
   for (const Cell& cell : cells_)
     top = std::max(top, cell.top_m);
-  PalettePicture picture{columns_, rows_, palette(), {}};
+  PalettePicture picture{held_.columns, held_.rows, palette(), {}};
   picture.pixels.assign(cells_.size(), 0);
-  for (int row = 0; row < rows_; ++row) {
-    for (int column = 0; column < columns_; ++column) {
+  for (int row = 0; row < held_.rows; ++row) {
+    for (int column = 0; column < held_.columns; ++column) {
       const Cell& cell = *cell_at(column, row);
-      std::uint8_t& pixel = picture.at(column, rows_ - 1 - row);
+      std::uint8_t& pixel = picture.at(column, held_.rows - 1 - row);
       if (cell.vegetation > 0) {
         const double u = std::sqrt(static_cast<double>(cell.top_m / top));
         pixel = static_cast<std::uint8_t>(1 + kGreys + std::lround(u * (kGreens - 1)));

@@ -36,13 +36,22 @@ class MapPicture {
     std::uint32_t ground = 0;
     std::uint32_t vegetation = 0;
   };
+  // Cells from a first column and row on, in multiples of the cell.
+  struct Box {
+    int column0 = 0, row0 = 0, columns = 0, rows = 0;
+    [[nodiscard]] bool contains(int column, int row) const;
+    [[nodiscard]] bool contains(const Box& other) const;
+    [[nodiscard]] std::size_t at(int column, int row) const;
+  };
   void grow(int column, int row);
+  void hold(const Box& box);
   void coarsen();
   [[nodiscard]] std::string encode() const;
 
   double cell_m_;
   int largest_side_;
-  int column0_ = 0, row0_ = 0, columns_ = 0, rows_ = 0;
+  Box seen_;  // of the picture
+  Box held_;  // of cells_: larger, so that a growing map is not copied for each block
   std::vector<Cell> cells_;
   std::uint64_t count_ = 0;
 };
