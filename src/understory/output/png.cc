@@ -25,7 +25,7 @@ std::string deflated(const std::string& raw) {
   std::string packed(size, '\0');
   UNDERSTORY_CHECK(compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
                              reinterpret_cast<const Bytef*>(raw.data()),
-                             static_cast<uLong>(raw.size()), 9) == Z_OK);
+                             static_cast<uLong>(raw.size()), Z_DEFAULT_COMPRESSION) == Z_OK);
   packed.resize(size);
   return packed;
 }
