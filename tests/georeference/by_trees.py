@@ -177,7 +177,7 @@ def bad(folder):
     done = program("georeference", RUN, "--method", "trees", "-o", folder / "out")
     assert done.returncode == 2 and "--tree-map" in done.stderr, done.stderr
     done = program("georeference", RUN, "--method", "gnss-path", "--near", 1, 2, "-o", folder / "out")
-    assert done.returncode == 2 and "belong to trees" in done.stderr, done.stderr
+    assert done.returncode == 2 and "belong to auto, trees" in done.stderr, done.stderr
 
 
 cases.run()

@@ -40,11 +40,14 @@ struct GeoreferenceOptions {
 
 void check_trees(const GeoreferenceOptions& options, std::vector<std::string>& problems) {
   const bool trees = options.method == "trees";
+  const bool all = options.method == "auto";
   if (trees && options.tree_map.empty())
     problems.emplace_back("--method trees needs --tree-map FILE");
-  if (!trees &&
+  if (!trees && !all &&
       !(options.tree_map.empty() && options.near.empty() && options.tree_map_system.empty()))
-    problems.emplace_back("--tree-map, --tree-map-crs and --near belong to trees");
+    problems.emplace_back("--tree-map, --tree-map-crs and --near belong to auto, trees");
+  if (options.tree_map.empty() && !(options.near.empty() && options.tree_map_system.empty()))
+    problems.emplace_back("--near and --tree-map-crs need --tree-map FILE");
   if (trees && !(options.gnss.empty() && options.antenna_m.empty() && !options.plain))
     problems.emplace_back("--gnss, --antenna-m and --plain do not belong to trees");
 }
@@ -79,7 +82,8 @@ void check(const GeoreferenceOptions& options) {
   if (terrain && options.plain) problems.emplace_back("--plain does not belong to terrain");
   if (terrain && !options.antenna_m.empty())
     problems.emplace_back("--antenna-m does not belong to terrain");
-  if (!terrain && !options.terrain_model.empty()) problems.emplace_back("--dem belongs to terrain");
+  if (!terrain && options.method != "auto" && !options.terrain_model.empty())
+    problems.emplace_back("--dem belongs to auto, terrain");
   if (!terrain && !options.start.empty()) problems.emplace_back("--start belongs to terrain");
   if (!terrain && (options.terrain.place_sd_m > 0.0 || options.terrain.yaw_sd_deg > 0.0))
     problems.emplace_back("--place-sd-m and --yaw-sd-deg belong to terrain");
@@ -233,6 +237,8 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
   command->footer(
       "Examples:\n  understory georeference forest --method auto --gnss walk.pos -o placed\n"
       "  understory georeference forest --method gnss-path --gnss drive.nmea -o placed\n"
+      "  understory georeference forest --method auto --dem terrain.tif --tree-map stand.gpkg -o "
+      "placed\n"
       "  understory georeference placed --method terrain --dem terrain.tif -o levelled\n"
       "  understory georeference forest --method trees --tree-map stand.gpkg --near 563200 7024500 "
       "-o found");

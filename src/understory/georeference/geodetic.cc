@@ -58,4 +58,13 @@ GeodeticPlace EastNorthUp::to_place(const Eigen::Vector3d& point_in_enu) const {
   return {latitude / kDegree, std::atan2(p.y(), p.x()) / kDegree, height};
 }
 
+Pose change_of_frame(const GeodeticPlace& from, const GeodeticPlace& into) {
+  const EastNorthUp source(from);
+  const EastNorthUp target(into);
+  const Eigen::Matrix3d rotation = target.ecef_from_enu_.transpose() * source.ecef_from_enu_;
+  const Eigen::Vector3d shift =
+      target.ecef_from_enu_.transpose() * (source.origin_in_ecef_ - target.origin_in_ecef_);
+  return {Eigen::Quaterniond(rotation), shift};
+}
+
 }  // namespace understory

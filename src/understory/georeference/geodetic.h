@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "understory/geometry/pose.h"
+
 namespace understory {
 
 // A place on WGS 84. Degrees; height above the ellipsoid, metres.
@@ -25,6 +27,11 @@ class EastNorthUp {
   GeodeticPlace origin_;
   Eigen::Vector3d origin_in_ecef_;
   Eigen::Matrix3d ecef_from_enu_;
+
+  friend Pose change_of_frame(const GeodeticPlace& from, const GeodeticPlace& into);
 };
+
+// The motion that brings points of the frame east, north, up at `from` into the one at `into`.
+[[nodiscard]] Pose change_of_frame(const GeodeticPlace& from, const GeodeticPlace& into);
 
 }  // namespace understory

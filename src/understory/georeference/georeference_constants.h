@@ -86,6 +86,12 @@ inline constexpr double kGoodReceiverM = 0.15;
 inline constexpr double kScaleSteps[] = {0.0, 1.1, 2.2, 3.3};
 }  // namespace fused_path
 
+namespace combined_place {  // georeference/combined_place.cc
+// rad^-2 and m^-2: weight of the first place where no source tells anything [bound: keeps the
+// equations regular; 10 km]
+inline constexpr double kNothingKnown = 1e-8;
+}  // namespace combined_place
+
 namespace split_fit {  // georeference/split_fit.cc
 // Pairs at least [bound: three parameters in the plane]
 inline constexpr std::size_t kFewestPairs = 3;

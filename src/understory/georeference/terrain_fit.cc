@@ -79,14 +79,16 @@ Vector6d gradient_of(const Sample& sample) {
   return gradient;
 }
 
-// What is known of the motion from the start: rotation, translation.
-Vector6d prior_sd(const TerrainFitConfig& config) {
+// What is known of the motion from the start, about the pivot: rotation, translation.
+Matrix6d prior_information(const TerrainFitConfig& config, const Vector3d& pivot) {
+  if (config.known)
+    return information_about(config.known->information, config.known->middle, pivot);
   constexpr double kFree = 1e6;
   const double yaw = std::max(kFixed, config.yaw_sd_deg * M_PI / 180.0);
   const double place = std::max(kFixed, config.place_sd_m);
   Vector6d sd;
   sd << kFree, kFree, yaw, place, place, kFree;
-  return sd;
+  return sd.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
 struct Solution {
@@ -97,10 +99,9 @@ struct Solution {
 // One step of weighted least squares; `gone` is the motion so far, `alike` how many points count
 // as one.
 Solution solve(const std::vector<Sample>& samples, double centre, double spread, double alike,
-               const Vector6d& gone, const TerrainFitConfig& config) {
-  const Vector6d weights = prior_sd(config).cwiseAbs2().cwiseInverse();
-  Matrix6d information = weights.asDiagonal();
-  Vector6d right = -weights.cwiseProduct(gone);
+               const Vector6d& gone, const Matrix6d& prior) {
+  Matrix6d information = prior;
+  Vector6d right = -prior * gone;
   for (const Sample& sample : samples) {
     const double variance = spread * spread + sample.sd_m * sample.sd_m;
     const double weight =
@@ -180,6 +181,7 @@ TerrainFit fit_to_terrain(const std::vector<GroundPoint>& points, const Raster& 
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Vector3d shift = Vector3d::Zero();
   const auto motion = [&] { return Pose(rotation, pivot + shift - rotation * pivot); };
+  const Matrix6d prior = prior_information(config, pivot);
   Solution solution;
   constexpr int kSteps = 60;
   for (int step = 0; step < kSteps; ++step) {
@@ -193,7 +195,7 @@ TerrainFit fit_to_terrain(const std::vector<GroundPoint>& points, const Raster& 
     Vector6d gone;
     gone << so3_log(rotation), shift;
     solution =
-        solve(now, centre, spread_of(now, centre), alike(now, config.correlation_m), gone, config);
+        solve(now, centre, spread_of(now, centre), alike(now, config.correlation_m), gone, prior);
     rotation = so3_exp(solution.step.head<3>()) * rotation;
     shift += solution.step.tail<3>();
     if (solution.step.norm() < 1e-9) break;
@@ -203,6 +205,8 @@ TerrainFit fit_to_terrain(const std::vector<GroundPoint>& points, const Raster& 
   tell(before, samples_of(points, terrain, motion(), pivot + shift), fit);
   fit.tilt_deg =
       std::acos(std::clamp((rotation * Vector3d::UnitZ()).z(), -1.0, 1.0)) * 180.0 / M_PI;
+  fit.middle = pivot + shift;
+  fit.spread = solution.covariance;
   fit.place_sd_m = std::sqrt(solution.covariance.block<2, 2>(3, 3).trace());
   fit.yaw_sd_deg = std::sqrt(solution.covariance(2, 2)) * 180.0 / M_PI;
   return fit;

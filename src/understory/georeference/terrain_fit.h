@@ -1,11 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "understory/geometry/pose.h"
 #include "understory/geometry/raster.h"
+#include "understory/georeference/combined_place.h"
 
 namespace understory {
 
@@ -19,6 +21,9 @@ struct TerrainFitConfig {
   // Heights of a terrain model err together over that far, so points nearer to each other count as
   // one when it is judged how much the relief tells.
   double correlation_m = 5.0;
+  // What other sources know of the place that the points were laid on; place_sd_m and yaw_sd_deg
+  // do not count then.
+  std::optional<PlaceEvidence> known;
 };
 
 // A point on the ground; `sd_m` is how well its height is known.
@@ -42,6 +47,10 @@ struct TerrainFit {
   // What is still uncertain after the fit, one standard deviation.
   double place_sd_m = 0.0;
   double yaw_sd_deg = 0.0;
+  // The same for all degrees of freedom: the covariance of a turn through `middle` (the points'
+  // mean after the fit) about the axes of the terrain model (rad), then a shift (m).
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  Matrix6d spread = Matrix6d::Zero();
 };
 
 // Not found where fewer than ten points, or points on one line, lie on the terrain. Deterministic.

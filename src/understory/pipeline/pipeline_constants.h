@@ -97,6 +97,13 @@ inline constexpr double kMostHeadingSdDeg = 5.0;
 inline constexpr double kLongestArmM = 10.0;
 // m around the path whose ground is fitted [chosen]
 inline constexpr double kReachM = 30.0;
+// Trees are searched around the place by the fixes: expected errors [chosen]
+inline constexpr double kSearchedSigmas = 4.0;
+// and m beyond them [chosen: a few trees apart]
+inline constexpr double kSearchedAtLeastM = 20.0;
+// Of fixes and trees together: chi squared beyond which they contradict each other [tuned: the GNSS
+// presets of docs/method/georeference.md, seeds 1 to 19, are off by up to 9.5 standard deviations]
+inline constexpr double kMostDisagreement = 100.0;
 }  // namespace georeferencing
 
 namespace correction_figures {  // pipeline/correction/correction_figures.cc

@@ -6,13 +6,21 @@
 #include <variant>
 
 namespace understory {
+namespace {
+
+Placement place_by_auto(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {
+  const bool more = !request.tree_map.empty() || !request.terrain_model.empty();
+  return more ? place_by_all(request, run, log) : place_by_best(request, run, log);
+}
+
+}  // namespace
 
 const std::vector<PlacementMethod>& placement_methods() {
   static const std::vector<PlacementMethod> kMethods{
       {GeoreferenceMethod::kAuto, "auto",
        "the one of split, fit3, closed with the smallest expected error; gnss-path where no fix is "
-       "of the run's time",
-       place_by_best},
+       "of the run's time. With --tree-map or --dem all of them together",
+       place_by_auto},
       {GeoreferenceMethod::kSplit, "split",
        "heading and place from positions in the plane, height and tilt apart", place_by_split},
       {GeoreferenceMethod::kClosed, "closed", "closed form, all fixes alike", place_by_closed_form},

@@ -24,6 +24,10 @@ struct PlacementMethod {
 // georeferencing/place_by_auto.cc: the fit with the smallest expected error.
 [[nodiscard]] Placement place_by_best(const GeoreferenceRequest& request, const MovableRun& run,
                                       Log& log);
+// georeferencing/place_by_all.cc: by fixes, a map of trees and a terrain model together, as far as
+// the request names them.
+[[nodiscard]] Placement place_by_all(const GeoreferenceRequest& request, const MovableRun& run,
+                                     Log& log);
 // georeferencing/place_by_satellites.cc: fits by the times of the fixes.
 [[nodiscard]] Placement place_by_closed_form(const GeoreferenceRequest& request,
                                              const MovableRun& run, Log& log);

@@ -42,7 +42,8 @@ double extent_m(const Trajectory& trajectory) {
   return (high - low).norm();
 }
 
-void doubt(const MovableRun& run, const SatelliteFit& fit, Placement& placement) {
+void doubt(const GeoreferenceRequest& request, const MovableRun& run, const SatelliteFit& fit,
+           Placement& placement) {
   const double heading_sd_deg = std::get<double>(placement.figures.at("sd_heading_deg"));
   const double extent = extent_m(run.trajectory);
   if (heading_sd_deg > kMostHeadingSdDeg)
@@ -58,7 +59,7 @@ void doubt(const MovableRun& run, const SatelliteFit& fit, Placement& placement)
         "the tilt is uncertain by {:.1f} degrees (one standard deviation; {:.0f} at most): use "
         "--method split or auto",
         tilt_sd_deg, kMostHeadingSdDeg));
-  if (!fit.height_known)
+  if (!fit.height_known && request.terrain_model.empty())
     placement.doubt("the fixes have no heights: the height of the run is not that of the earth");
   if (fit.plane_rms_m > SatelliteFitConfig().most_misfit * extent)
     placement.doubt(fmt::format(
@@ -140,7 +141,7 @@ Placement placement_of(const GeoreferenceRequest& request, const MovableRun& run
   placement.expected_error_m = fit.expected_error_m;
   tell_figures(fit, placement);
   tell_placement(run.trajectory, placement);
-  doubt(run, fit, placement);
+  doubt(request, run, fit, placement);
   placement.gnss = rows_of(fit.fixes, "far off the others, or of another time");
   placement.summary = fmt::format(
       "{}: {} fixes at times of the path, {:.2f} m off it in the plane (root mean square); they "
