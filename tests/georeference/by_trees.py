@@ -106,6 +106,8 @@ def local(folder):
         told = json.loads(done.stdout)
         assert abs(told["trees_yaw_deg"] - math.degrees(TURN)) < 0.5, told
         assert told["trees_chance"] < 1e-6 and told["trees_paired"] > 90, told
+        assert 0.02 < told["sd_heading_deg"] < 0.5 and plane / 3 < 1.4 * told["sd_east_m"] < 0.5, told
+        assert told["expected_error_m"] > plane / 3, told
         text += f"{name}: {plane:.2f} m, height {height:.2f} m; "
     run = json.loads((folder / "near" / "run.json").read_text())
     assert run["status"] == "complete", run

@@ -3,7 +3,6 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <numbers>
 
 #include "understory/georeference/combined_place.h"
 #include "understory/georeference/split_fit.h"
@@ -56,29 +55,6 @@ PlaceEvidence evidence_of_fixes(const Placement& placed, const Vector3d& middle,
     evidence.information = spread.inverse();
   else
     evidence.information.topLeftCorner<5, 5>() = spread.topLeftCorner<5, 5>().inverse();
-  return evidence;
-}
-
-PlaceEvidence evidence_of_trees(const MovableRun& run, const TreeMatch& match, bool heights) {
-  double ground = 0.0;
-  for (const Tree& tree : run.trees)
-    ground += tree.z / static_cast<double>(run.trees.size());
-  const Eigen::Vector2d& centre = match.centre_in_source;
-  PlaceEvidence evidence{match.target_from_source,
-                         match.target_from_source * Vector3d(centre.x(), centre.y(), ground),
-                         Matrix6d::Zero()};
-  evidence.information.block<3, 3>(2, 2) = match.covariance.inverse();
-  if (heights && std::isfinite(match.height_sd_m))
-    evidence.information(5, 5) = 1.0 / (match.height_sd_m * match.height_sd_m);
-  return evidence;
-}
-
-// How level the run is, where no fit to fixes says so already.
-PlaceEvidence evidence_of_gravity(const Pose& target_from_world, const Vector3d& middle,
-                                  double tilt_sd_deg) {
-  PlaceEvidence evidence{target_from_world, middle, Matrix6d::Zero()};
-  const double sd = tilt_sd_deg * std::numbers::pi / 180.0;
-  evidence.information(0, 0) = evidence.information(1, 1) = 1.0 / (sd * sd);
   return evidence;
 }
 
@@ -179,8 +155,8 @@ void lay_on_terrain(const GeoreferenceRequest& request, const MovableRun& run,
   const LevelledRun levelled =
       level_run(request, run, combined.target_from_world, placement.origin, config);
   placement.target_from_world = levelled.target_from_world;
-  placement.covariance = right_from_spread(levelled.fit.spread, levelled.target_from_world,
-                                           levelled.fit.middle);
+  placement.covariance =
+      right_from_spread(levelled.fit.spread, levelled.target_from_world, levelled.fit.middle);
   placement.summary += "\n";
   gathered.methods.emplace_back("terrain");
   tell_levelled(request, levelled, placement);

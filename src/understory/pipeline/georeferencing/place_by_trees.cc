@@ -1,4 +1,8 @@
+#include <cmath>
+
+#include "understory/georeference/split_fit.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
+#include "understory/pipeline/georeferencing/satellite_placement.h"
 #include "understory/pipeline/georeferencing/tree_placement.h"
 
 namespace understory {
@@ -8,6 +12,13 @@ Placement place_by_trees(const GeoreferenceRequest& request, const MovableRun& r
   Placement placement;
   placement.target_from_world = found.match.target_from_source;
   placement.origin = found.target.origin;
+  if (std::isfinite(found.match.height_sd_m)) {
+    const PlaceEvidence trees = evidence_of_trees(run, found.match, true);
+    const CombinedPlace place =
+        combine_places({trees, evidence_of_gravity(trees.target_from_world, trees.middle,
+                                                   tilt_sd_deg(request, run))});
+    placement.covariance = right_from_spread(place.spread, place.target_from_world, place.middle);
+  }
   tell_trees(request, run, found, placement);
   return placement;
 }

@@ -75,10 +75,11 @@ LevelledRun level_run(const GeoreferenceRequest& request, const MovableRun& run,
     point.point_in_world = placed * point.point_in_world;
   double place_sd_m = config.place_sd_m;
   if (config.known) place_sd_m = kReachM / 3.0;
-  const Raster terrain = read_terrain(request.terrain_model,
-                                      area_of(points, 10.0 + 3.0 * place_sd_m), origin);
+  const Raster terrain =
+      read_terrain(request.terrain_model, area_of(points, 10.0 + 3.0 * place_sd_m), origin);
   LevelledRun levelled{fit_to_terrain(points, terrain, config), placed};
-  if (!levelled.fit.found) throw InputError(request.terrain_model.string(), "", levelled.fit.reason);
+  if (!levelled.fit.found)
+    throw InputError(request.terrain_model.string(), "", levelled.fit.reason);
   levelled.target_from_world = levelled.fit.terrain_from_world * placed;
   return levelled;
 }

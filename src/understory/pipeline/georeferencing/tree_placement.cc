@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -20,6 +21,7 @@ using georeference_constants::tree_match::kFewestTrees;
 
 namespace fs = std::filesystem;
 using Eigen::Vector2d;
+using Eigen::Vector3d;
 
 // Where the run is looked for: near a place that was given, near its fixes, else everywhere.
 TreeSearchArea area_of(const GeoreferenceRequest& request, const MovableRun& run,
@@ -153,6 +155,28 @@ void tell_trees(const GeoreferenceRequest& request, const MovableRun& run, const
                     found.match.reason +
                     ". It may be of another forest, or --near or the coordinate system is wrong");
   placement.inputs.push_back(hash_input(request.tree_map));
+}
+
+PlaceEvidence evidence_of_trees(const MovableRun& run, const TreeMatch& match, bool heights) {
+  double ground = 0.0;
+  for (const Tree& tree : run.trees)
+    ground += tree.z / static_cast<double>(run.trees.size());
+  const Eigen::Vector2d& centre = match.centre_in_source;
+  PlaceEvidence evidence{match.target_from_source,
+                         match.target_from_source * Vector3d(centre.x(), centre.y(), ground),
+                         Matrix6d::Zero()};
+  evidence.information.block<3, 3>(2, 2) = match.covariance.inverse();
+  if (heights && std::isfinite(match.height_sd_m))
+    evidence.information(5, 5) = 1.0 / (match.height_sd_m * match.height_sd_m);
+  return evidence;
+}
+
+PlaceEvidence evidence_of_gravity(const Pose& target_from_world, const Vector3d& middle,
+                                  double tilt_sd_deg) {
+  PlaceEvidence evidence{target_from_world, middle, Matrix6d::Zero()};
+  const double sd = tilt_sd_deg * std::numbers::pi / 180.0;
+  evidence.information(0, 0) = evidence.information(1, 1) = 1.0 / (sd * sd);
+  return evidence;
 }
 
 }  // namespace understory

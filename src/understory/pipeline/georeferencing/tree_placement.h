@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "understory/georeference/combined_place.h"
 #include "understory/georeference/geodetic.h"
 #include "understory/georeference/trees/tree_match.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
@@ -40,5 +41,12 @@ struct FoundTrees {
 // Figures, summary and inputs of a match.
 void tell_trees(const GeoreferenceRequest& request, const MovableRun& run, const FoundTrees& found,
                 Placement& placement);
+
+// What a match tells of the place: heading and the plane, and the height where `heights`.
+[[nodiscard]] PlaceEvidence evidence_of_trees(const MovableRun& run, const TreeMatch& match,
+                                              bool heights);
+// How level a run is that lies at `target_from_world`.
+[[nodiscard]] PlaceEvidence evidence_of_gravity(const Pose& target_from_world,
+                                                const Eigen::Vector3d& middle, double tilt_sd_deg);
 
 }  // namespace understory
