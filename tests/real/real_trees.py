@@ -3,8 +3,9 @@
 - chablais3: trees measured in the field are found in an airborne cloud of 9 points per square metre.
 - treematching_prf025: trees measured in the field are found among those of a mobile scanner.
 - spanner: the cloud of a mobile scanner, moved up to 30 m and to any heading, is brought back to the
-  airborne cloud by its trees. The pose that both come with is itself 0.2 to 0.6 m off. The limits
-  below, 1.3 m and 0.45 m, are what is reached: 0.8 m in the plane and 0.3 m in height are asked for.
+  airborne cloud by its trees and the terrain alone, within 0.8 m in the plane. 0.3 m in height is
+  reached in 19 of 20 starts. The pose that both come with is itself 0.2 to 0.6 m off. By stems alone,
+  without the canopy, the plane is off by 1.15 m.
 """
 
 import csv
@@ -154,23 +155,57 @@ def mobile_to_airborne(folder):
     _, offsets = starts_of("spanner", folder, places, heights, diameters, SPANNER / "ALS_Clip.laz",
                            1.3, 0.1, "--tree-map-crs", "EPSG:26912", "--crs", "EPSG:26912")
     assert np.abs(offsets[:, 2]).max() < 0.45, offsets
-    # The cloud itself is moved, and its trees are found anew.
+    # The cloud itself is moved and its trees and tops are found anew; the ground of the airborne cloud
+    # is the terrain model.
+    done = program("inventory", SPANNER / "ALS_Clip.laz", "-o", folder / "als")
+    assert done.returncode in (0, 4), done.stderr
+    ends, trusted = [], 0
+    for seed in range(100, 100 + STARTS):
+        end, sure, told = brought_back(seed, places, folder)
+        ends.append(end)
+        trusted += sure
+    off = np.array(ends) - guides(places)
+    between = max(np.linalg.norm((a - b)[:, :2], axis=1).max() for a in ends for b in ends)
+    plane, height = np.linalg.norm(off[:, :, :2], axis=2).mean(axis=1), np.abs(off[:, :, 2].mean(axis=1))
+    print(f"spanner, cloud moved, by {told['method']}, {told['trees_by']}: trusted {trusted} of {STARTS}; off by "
+          f"{plane.max():.2f} m in plane, {height.max():.2f} m in height; ends within {between:.3f} m")
+    assert trusted == STARTS and plane.max() < 0.8 and np.median(height) < 0.3 and height.max() < 0.45, (plane, height)
+
+
+def guides(places):
+    """Places on a bow over the plot, a path that can be told from the result."""
+    x, y, z = places.mean(axis=0)
+    return np.array([[x + 10 * math.cos(0.2 * k), y + 8 * math.sin(0.2 * k), z + 1.5] for k in range(16)])
+
+
+def path_of(path):
+    """x, y, z of the points of the path in trees.gpkg."""
+    with sqlite3.connect(path) as base:
+        blob, = base.execute("select geom from path").fetchone()
+    size = {0: 0, 1: 32, 2: 48, 3: 48, 4: 64}[(blob[3] >> 1) & 7]
+    kind, count = struct.unpack_from("<II", blob, 8 + size + 1)
+    assert kind in (1002, 2 + 0x80000000), kind
+    return np.array(struct.unpack_from(f"<{3 * count}d", blob, 8 + size + 9)).reshape(count, 3)
+
+
+def brought_back(seed, places, folder):
+    """The cloud after a motion, its inventory, and where auto lays the path that moved with it."""
     cloud = laspy.read(SPANNER / "MLS_Clip.laz")
-    points = np.column_stack([cloud.x, cloud.y, cloud.z])
     moved = laspy.LasData(laspy.LasHeader(point_format=0, version="1.2"))
     moved.header.scales = [0.001] * 3
-    motion = start(100, places.mean(axis=0))
-    moved.x, moved.y, moved.z = motion(points).T
+    motion = start(seed, places.mean(axis=0))
+    moved.x, moved.y, moved.z = motion(np.column_stack([cloud.x, cloud.y, cloud.z])).T
     moved.write(folder / "moved.laz")
-    again, heights, diameters = inventory(folder / "moved.laz", folder / "mls_moved")
-    run = write_run(folder / "again", again, heights, diameters)
-    sure, _ = found(run, SPANNER / "ALS_Clip.laz", folder / "again_out", "--tree-map-crs",
-                    "EPSG:26912", "--crs", "EPSG:26912")
-    end = placed(folder / "again_out" / "trees.gpkg")
-    near = [np.linalg.norm(places[:, :2] - p[:2], axis=1).min() for p in end]
-    print(f"spanner, cloud moved: trusted {sure}; {len(end)} trees, each within {max(near):.2f} m of "
-          f"its place, {np.median(near):.2f} m in the median")
-    assert sure and np.median(near) < 1.2, near
+    run = folder / f"moved{seed}"
+    done = program("inventory", folder / "moved.laz", "-o", run)
+    assert done.returncode in (0, 4), done.stderr
+    (run / "trajectory.tum").write_text("".join(
+        f"{t}.0 {x:.4f} {y:.4f} {z:.4f} 0 0 0 1\n" for t, (x, y, z) in enumerate(motion(guides(places)))))
+    done = program("georeference", run, "--method", "auto", "--tree-map", SPANNER / "ALS_Clip.laz", "--tree-map-crs",
+                   "EPSG:26912", "--dem", folder / "als" / "dtm.tif", "--crs", "EPSG:26912", "-o",
+                   folder / f"back{seed}", "--json")
+    assert done.returncode in (0, 4), (done.returncode, done.stderr)
+    return path_of(folder / f"back{seed}" / "trees.gpkg"), done.returncode == 0, json.loads(done.stdout)
 
 
 if not DATA.is_dir():

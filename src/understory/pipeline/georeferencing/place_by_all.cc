@@ -126,7 +126,7 @@ void gather_trees(const GeoreferenceRequest& request, const MovableRun& run, Log
     placement.summary += "\n";
   }
   gathered.methods.emplace_back("trees");
-  tell_trees(request, run, found, placement);
+  tell_trees(request, found, placement);
 }
 
 // The place by all that was gathered so far, and whether its sources agree.

@@ -19,7 +19,7 @@ Placement place_by_trees(const GeoreferenceRequest& request, const MovableRun& r
                                                    tilt_sd_deg(request, run))});
     placement.covariance = right_from_spread(place.spread, place.target_from_world, place.middle);
   }
-  tell_trees(request, run, found, placement);
+  tell_trees(request, found, placement);
   return placement;
 }
 

@@ -11,6 +11,7 @@
 #include "understory/georeference/gnss_fit.h"
 #include "understory/georeference/trees/tree_match.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
+#include "understory/pipeline/georeferencing/run_tops.h"
 #include "understory/util/error.h"
 #include "understory/util/median.h"
 
@@ -78,12 +79,21 @@ std::map<std::string, Figure> figures_of(const TreeMatch& match, const TreeTarge
   return figures;
 }
 
-std::string summary_of(const TreeMatch& match, std::size_t trees) {
+// Stems and tops are two views of one stand: the one that chance explains less counts.
+bool likelier(const TreeMatch& one, const TreeMatch& other) {
+  if (one.found != other.found) return one.found;
+  if (one.trusted != other.trusted) return one.trusted;
+  return one.found && one.score > other.score;
+}
+
+std::string summary_of(const FoundTrees& found) {
+  const TreeMatch& match = found.match;
   std::string text = fmt::format(
-      "{} of {} trees have a partner in the map, by chance {:.0f} would; pairs {:.2f} m apart "
+      "{} of {} {} have a partner in the map, by chance {:.0f} would; pairs {:.2f} m apart "
       "(root "
       "mean square); place to {:.2f} m, heading to {:.2f} degrees (one standard deviation)",
-      match.pairs.size(), trees, match.expected_by_chance, match.apart_rms_m,
+      match.pairs.size(), found.trees_of_run, found.by_tops ? "tops of the canopy" : "trees",
+      match.expected_by_chance, match.apart_rms_m,
       std::sqrt(match.covariance(1, 1) + match.covariance(2, 2)),
       degrees(std::sqrt(match.covariance(0, 0))));
   text += std::isfinite(match.height_sd_m) ? fmt::format("; height to {:.2f} m by {} feet",
@@ -141,15 +151,28 @@ FoundTrees find_trees(const GeoreferenceRequest& request, const MovableRun& run,
   found.target =
       read_tree_target(request.tree_map, request.tree_map_system, request.near, place, {}, log);
   const TreeSearchArea area = area_of(request, run, found.target, rough);
-  found.match = match_tree_maps(run.trees, found.target.trees, area, request.trees);
+  const std::vector<Tree> tops = tops_of_run(request.run, run);
+  const bool both = tops.size() >= kFewestTrees;
+  TreeMatchConfig config = request.trees;
+  if (both) config.most_chance /= 2.0;  // two searches, one of which chance may favour
+  found.match = match_tree_maps(run.trees, found.target.trees, area, config);
+  found.trees_of_run = run.trees.size();
+  if (both) {
+    const TreeMatch match = match_tree_maps(tops, found.target.trees, area, config);
+    if (likelier(match, found.match)) {
+      found.match = match;
+      found.trees_of_run = tops.size();
+      found.by_tops = true;
+    }
+  }
   if (!found.match.found) throw InputError(request.tree_map.string(), "", found.match.reason);
   return found;
 }
 
-void tell_trees(const GeoreferenceRequest& request, const MovableRun& run, const FoundTrees& found,
-                Placement& placement) {
+void tell_trees(const GeoreferenceRequest& request, const FoundTrees& found, Placement& placement) {
   placement.figures.merge(figures_of(found.match, found.target));
-  placement.summary += summary_of(found.match, run.trees.size());
+  placement.figures["trees_by"] = std::string(found.by_tops ? "tops" : "stems");
+  placement.summary += summary_of(found);
   if (!found.match.trusted)
     placement.doubt("the trees were not found in " + request.tree_map.filename().string() + ": " +
                     found.match.reason +

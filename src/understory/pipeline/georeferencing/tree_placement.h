@@ -24,6 +24,8 @@ struct RoughPlace {
 struct FoundTrees {
   TreeTarget target;
   TreeMatch match;
+  bool by_tops = false;          // of the run's canopy; else by its stems
+  std::size_t trees_of_run = 0;  // stems or tops that were given to the search
 };
 
 // From an earlier fit, else from the fixes of the run; nothing where there are none.
@@ -33,14 +35,14 @@ struct FoundTrees {
 // The middle of the run's trees, by medians; metres, world frame.
 [[nodiscard]] Eigen::Vector2d middle_of_trees(const MovableRun& run);
 
-// Looks for the run's trees near a rough place, or wherever the request says. Throws InputError
+// Looks for the run's trees near a rough place, or wherever the request says: by its stems and,
+// where it has a canopy model, by its tops. The likelier of both is the result. Throws InputError
 // where the run has too few trees, the map none near the place, or no place is found at all.
 [[nodiscard]] FoundTrees find_trees(const GeoreferenceRequest& request, const MovableRun& run,
                                     const std::optional<RoughPlace>& rough, Log& log);
 
 // Figures, summary and inputs of a match.
-void tell_trees(const GeoreferenceRequest& request, const MovableRun& run, const FoundTrees& found,
-                Placement& placement);
+void tell_trees(const GeoreferenceRequest& request, const FoundTrees& found, Placement& placement);
 
 // What a match tells of the place: heading and the plane, and the height where `heights`.
 [[nodiscard]] PlaceEvidence evidence_of_trees(const MovableRun& run, const TreeMatch& match,

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "understory/pipeline/georeferencing/movable_run.h"
+#include "understory/sensor/tree.h"
+
+namespace understory {
+
+// Tops of the run's own canopy model (chm.tif) as trees: x, y of the top, z of the ground below it
+// (dtm.tif; NaN where it is not known) and the height above it. World frame, metres. Maps from the
+// air hold tops, and a tree that leans has its top elsewhere than its foot. Empty where the folder
+// holds no canopy model. Throws InputError where it cannot be read.
+[[nodiscard]] std::vector<Tree> tops_of_run(const std::filesystem::path& folder,
+                                            const MovableRun& run);
+
+}  // namespace understory
