@@ -1,6 +1,6 @@
 # Every third-party library as an imported target, so that its headers count as system headers.
 #   Eigen3::Eigen TBB::tbb fmt::fmt understory::nanoflann understory::gdal understory::embree
-#   understory::lz4 understory::zstd understory::bz2 ZLIB::ZLIB OpenSSL::Crypto SQLite::SQLite3 yaml-cpp
+#   understory::deflate understory::lz4 understory::zstd understory::bz2 ZLIB::ZLIB OpenSSL::Crypto SQLite::SQLite3 yaml-cpp
 #   CLI11::CLI11 nlohmann_json::nlohmann_json GTest::gtest_main understory::gtsam understory::laszip
 include(Gtsam)
 include(Laszip)
@@ -48,6 +48,7 @@ if(NOT TARGET yaml-cpp)
   target_link_libraries(yaml-cpp INTERFACE yaml-cpp::yaml-cpp)
 endif()
 understory_find(nanoflann HEADER nanoflann.hpp)
+understory_find(deflate HEADER libdeflate.h LIBRARY deflate)
 understory_find(lz4 HEADER lz4frame.h LIBRARY lz4)
 understory_find(zstd HEADER zstd.h LIBRARY zstd)
 understory_find(gdal HEADER gdal_priv.h LIBRARY gdal SUFFIXES gdal)

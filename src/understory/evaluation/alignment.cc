@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -14,7 +15,6 @@ namespace {
 // Extents below this fraction of the largest are numerical noise, not geometry.
 constexpr double kRankTolerance = 1e-9;
 constexpr double kMostRotationSdDeg = 5.0;
-constexpr double kDegPerRad = 180.0 / M_PI;
 
 struct Moments {
   Eigen::Vector3d source_mean = Eigen::Vector3d::Zero();

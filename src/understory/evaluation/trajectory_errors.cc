@@ -5,13 +5,13 @@
 #include <limits>
 
 #include "understory/evaluation/association.h"
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kDegPerRad = 57.295779513082320876;
 constexpr double kLongRunM = 800.0;            // KITTI's longest segment
 constexpr std::size_t kSegmentStartStep = 10;  // pairs, as KITTI's development kit
 

@@ -30,14 +30,14 @@ void read_cell(const CsvReader& table, const TreeColumn& column, Tree& tree) {
   }
 }
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 double plane_distance(const Tree& a, const Tree& b) {
   return std::hypot(a.x - b.x, a.y - b.y);
 }
 
 double ratio(std::size_t part, std::size_t whole) {
-  return whole == 0 ? kNan : static_cast<double>(part) / static_cast<double>(whole);
+  return whole == 0 ? kUnknown : static_cast<double>(part) / static_cast<double>(whole);
 }
 
 // Root mean square and mean of the differences that are numbers.
@@ -51,9 +51,9 @@ struct Differences {
     sum_of_squares += d * d;
     ++n;
   }
-  [[nodiscard]] double mean() const { return n == 0 ? kNan : sum / static_cast<double>(n); }
+  [[nodiscard]] double mean() const { return n == 0 ? kUnknown : sum / static_cast<double>(n); }
   [[nodiscard]] double rms() const {
-    return n == 0 ? kNan : std::sqrt(sum_of_squares / static_cast<double>(n));
+    return n == 0 ? kUnknown : std::sqrt(sum_of_squares / static_cast<double>(n));
   }
 };
 

@@ -7,12 +7,11 @@
 #include <numbers>
 
 #include "understory/features/test_frames.h"
+#include "understory/util/angles.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // Tapered as stems are: a centimetre of diameter a metre.
 struct Cylinder {

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "understory/geometry/delaunay.h"
+#include "understory/util/index.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -15,10 +16,6 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double kCornersPerRadius = 25.0;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 class Union {
  public:

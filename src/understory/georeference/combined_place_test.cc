@@ -7,13 +7,12 @@
 #include <random>
 
 #include "understory/georeference/gnss_fit.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kDegree = M_PI / 180.0;
 
 Matrix6d information_of(const Vector6d& sd) {
   return sd.cwiseAbs2().cwiseInverse().asDiagonal();

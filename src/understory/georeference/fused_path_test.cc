@@ -4,8 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <numbers>
 
+#include "understory/util/angles.h"
 #include "understory/util/random.h"
 
 namespace understory {
@@ -13,7 +13,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 const GeodeticPlace kPlace{61.2, 25.1, 160.0};
 const Vector3d kArm(0.2, -0.3, 2.0);
 const Pose kEnuFromWorld(Eigen::Quaterniond(Eigen::AngleAxisd(2.2, Vector3d::UnitZ())),

@@ -1,12 +1,12 @@
 #include "understory/georeference/geodetic.h"
 
 #include <cmath>
-#include <numbers>
+
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kSemiMajor = 6378137.0;  // WGS 84
 constexpr double kFlattening = 1.0 / 298.257223563;
 constexpr double kEccentricity2 = kFlattening * (2.0 - kFlattening);

@@ -4,8 +4,8 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <numbers>
 
+#include "understory/util/angles.h"
 #include "understory/util/random.h"
 
 namespace understory {
@@ -13,7 +13,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 const Vector3d kAntenna(0.1, -0.2, 1.4);
 
 Matrix6d covariance(double rotation, double translation) {

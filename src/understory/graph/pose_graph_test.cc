@@ -10,13 +10,12 @@
 #include <sstream>
 
 #include "understory/graph/loops/loop_search.h"
+#include "understory/util/angles.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 Pose noise(Random& random, double rotation, double translation) {
   Vector6d xi;

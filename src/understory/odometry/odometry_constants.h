@@ -154,7 +154,7 @@ inline constexpr double kLongestStep = 2.0;
 
 namespace stem_imu {  // odometry/stems/stem_imu.cc
 // rad/s of the gyroscope [bound: data sheets of MEMS gyroscopes]
-inline constexpr double kLargestBias = 0.1;
+inline constexpr double kLargestGyroBias = 0.1;
 // rad by which a stand leans as a whole, one standard deviation [chosen]
 inline constexpr double kStandLeans = 0.3 * kRadPerDegree;
 }  // namespace stem_imu

@@ -4,16 +4,14 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <numbers>
 
 #include "understory/preprocess/machine_boxes.h"
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 #include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // Reads one file and gathers what is wrong with it.
 class BoxReader {

@@ -12,7 +12,7 @@
 namespace understory {
 namespace {
 
-constexpr std::size_t kBlock = 64;
+constexpr std::size_t kKeysAhead = 64;
 
 }  // namespace
 
@@ -80,9 +80,9 @@ void VoxelFilter::sort_into_voxels(const Points& points, double voxel_size_m,
   start(points.size());
   const auto scale = static_cast<float>(1.0 / voxel_size_m);
   // Keys a block ahead, so that the memory of the slots is asked for before it is needed.
-  std::array<std::uint64_t, kBlock> keys;
-  for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
-    const std::size_t end = std::min(points.size(), begin + kBlock);
+  std::array<std::uint64_t, kKeysAhead> keys;
+  for (std::size_t begin = 0; begin < points.size(); begin += kKeysAhead) {
+    const std::size_t end = std::min(points.size(), begin + kKeysAhead);
     for (std::size_t i = begin; i < end; ++i) {
       const Eigen::Vector3f& p = points[i];
       keys[i - begin] = voxel_key(voxel_floor(p.x() * scale), voxel_floor(p.y() * scale),

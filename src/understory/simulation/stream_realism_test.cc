@@ -1,17 +1,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "understory/simulation/simulator.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // The stream of a small site, with the sensors that a test asks for.
 struct Counts {

@@ -11,6 +11,7 @@ namespace understory {
 using TimeNs = std::int64_t;
 
 inline constexpr TimeNs kNsPerSecond = 1'000'000'000;
+inline constexpr TimeNs kNsPerDay = 86'400 * kNsPerSecond;
 
 // Duration in seconds; exact to 1 ns for durations up to about 100 days.
 [[nodiscard]] inline double to_seconds(TimeNs duration) {

@@ -4,15 +4,12 @@
 #include "understory/graph/loops/gain_queue.h"
 #include "understory/graph/self_correction/correction_methods.h"
 #include "understory/graph/stem_matching/pair_matching.h"
+#include "understory/util/index.h"
 #include "understory/util/median.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 struct Accepted {
   std::size_t row;  // of result.tried

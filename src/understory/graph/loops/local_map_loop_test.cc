@@ -3,14 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 #include "understory/registration/test_stand.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 testing::Stand stand(std::uint64_t seed) {
   testing::StandOptions options;

@@ -12,14 +12,13 @@
 #include "understory/geometry/rotation_between.h"
 #include "understory/graph/graph_constants.h"
 #include "understory/graph/self_correction/structure.h"
+#include "understory/util/angles.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
 using namespace graph_constants::loop_closure;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // A side of the loop, turned so that z is up.
 struct Side {

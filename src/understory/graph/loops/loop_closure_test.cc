@@ -3,18 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <numbers>
 
 #include "understory/geometry/voxel_key.h"
 #include "understory/registration/test_stand.h"
+#include "understory/util/angles.h"
 #include "understory/util/parallel.h"
 
 #include <unordered_set>
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 testing::Stand stand(std::uint64_t seed) {
   testing::StandOptions options;

@@ -8,14 +8,11 @@
 #include "understory/graph/loops/gain_queue.h"
 #include "understory/graph/stem_matching/pair_matching.h"
 #include "understory/graph/stem_matching/star_association.h"
+#include "understory/util/index.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 // Applies one correction after the other and ends with the sharpest map on the way: the stop rule
 // that the paper asks for in its section 4.

@@ -6,15 +6,12 @@
 #include <utility>
 
 #include "understory/util/error.h"
+#include "understory/util/index.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 // Different pairs (j, i) with gaps in the range, drawn at random, ascending.
 std::vector<std::pair<int, int>> drawn_pairs(int views, const PairConfig& config,

@@ -6,16 +6,13 @@
 #include "understory/graph/self_correction/correction_methods.h"
 #include "understory/graph/self_correction/path_process.h"
 #include "understory/graph/stem_matching/pair_matching.h"
+#include "understory/util/index.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
 using namespace graph_constants::gaussian_correction;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 // Of a step on average, diagonal. The views' frames and the world are level, and views look every
 // way, so what is in the plane is alike along and across.

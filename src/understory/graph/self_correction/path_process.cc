@@ -8,15 +8,12 @@
 
 #include "understory/graph/graph_constants.h"
 #include "understory/util/error.h"
+#include "understory/util/index.h"
 
 namespace understory {
 namespace {
 
 using namespace graph_constants::path_process;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d result;

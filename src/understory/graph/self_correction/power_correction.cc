@@ -4,13 +4,10 @@
 #include <cmath>
 
 #include "understory/util/error.h"
+#include "understory/util/index.h"
 
 namespace understory {
 namespace {
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 // Sums of `step(k)` for k = j + 1..l, over that for k = j + 1..i: from j + 1, as a step belongs to
 // the view that it leads to (the sums as printed begin at j and would not be 0 there).

@@ -5,14 +5,13 @@
 
 #include "understory/graph/graph_constants.h"
 #include "understory/registration/stems/tilt_about.h"
+#include "understory/util/angles.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
 using namespace graph_constants::stem_correction;
-
-constexpr double kDegree = M_PI / 180.0;
 
 // The views turned level by their own stems.
 struct LevelViews {

@@ -11,7 +11,7 @@ namespace {
 using namespace graph_constants::stem_sights;
 
 // The value that a share of all does not exceed; infinite for none.
-double quantile(std::vector<double> values, double of_none) {
+double usual_value(std::vector<double> values, double of_none) {
   if (values.empty()) return of_none;
   const auto at = static_cast<std::ptrdiff_t>(kShare * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + at, values.end());
@@ -42,8 +42,8 @@ std::vector<StemView> map_sights(const std::vector<StemView>& views,
       if (std::isfinite(stem.score)) scores.push_back(static_cast<double>(stem.score));
     }
   }
-  const double farthest = config.range_share * quantile(std::move(ranges), 0.0);
-  const double lowest = config.score_share * quantile(std::move(scores), 0.0);
+  const double farthest = config.range_share * usual_value(std::move(ranges), 0.0);
+  const double lowest = config.score_share * usual_value(std::move(scores), 0.0);
   std::vector<StemView> result = views;
   for (StemView& view : result) {
     std::erase_if(view.stems, [&](const Stem& stem) {

@@ -1,16 +1,14 @@
 #pragma once
 
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "understory/geometry/pose.h"
 #include "understory/sensor/stem_view.h"
+#include "understory/util/angles.h"
 #include "understory/util/random.h"
 
 namespace understory::test {
-
-inline constexpr double kDegree = std::numbers::pi / 180.0;
 
 // For tests: a road of 60 m through a stand on level ground, views of 210 degrees to 35 m from a
 // cabin that swings. Where nothing shows the ground, feet are guessed too high: by a centimetre a

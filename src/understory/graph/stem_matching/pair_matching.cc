@@ -5,15 +5,12 @@
 
 #include "understory/graph/graph_constants.h"
 #include "understory/registration/stems/tilt_about.h"
+#include "understory/util/index.h"
 
 namespace understory {
 namespace {
 
 using namespace graph_constants::pair_matching;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 void judge(const SparseTarget& target, const SparsePoints& source, const ConeOverlap& overlap,
            const SelfCorrectionConfig& config, PairMatch& match) {

@@ -2,15 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "understory/util/angles.h"
 
 namespace understory {
-namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
-
-}  // namespace
-
 GateVerdict judge_match(const MotionConfig& config, const ImuState& before,
                         const MotionPrediction& predicted, const ImuState& with_match,
                         const Pose& match) {

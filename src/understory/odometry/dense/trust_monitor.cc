@@ -4,17 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <string>
 
 #include "understory/odometry/odometry_constants.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
 using namespace odometry_constants::trust_monitor;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // What is left of the turns' squares if the gyroscope's axes are turned by `lidar_from_gyro`. A
 // constant difference may be its bias, up to what a bias can be, and is taken out.

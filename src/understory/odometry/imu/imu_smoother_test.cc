@@ -1,15 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <numbers>
 
 #include "understory/odometry/motion/motion_model.h"
 #include "understory/odometry/test_carrier.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 struct Outcome {
   double position_rmse = 0.0;  // of the smoothed state against the truth, after the start

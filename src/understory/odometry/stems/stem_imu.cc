@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "understory/odometry/odometry_constants.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
 using namespace odometry_constants::stem_imu;
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 }  // namespace
 
@@ -55,7 +53,7 @@ void StemImu::take(const Motion& motion, const std::optional<Eigen::Quaterniond>
       so3_log(matched->conjugate() * motion.previous_from_now) / motion.seconds;
   bias_seconds_ = std::min(bias_seconds_ + motion.seconds, config_.bias_time_s);
   gyro_bias_ += motion.seconds / bias_seconds_ * off;
-  gyro_bias_ = gyro_bias_.cwiseMax(-kLargestBias).cwiseMin(kLargestBias);
+  gyro_bias_ = gyro_bias_.cwiseMax(-kLargestGyroBias).cwiseMin(kLargestGyroBias);
 }
 
 Eigen::Vector3d StemImu::force_after(const Motion& motion) const {

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/util/angles.h"
+
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // An IMU with its z axis forward, on a body that stands pitched by 5 degrees and turns to and fro
 // about the vertical; its gyroscope has a bias.

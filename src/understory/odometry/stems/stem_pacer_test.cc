@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "understory/util/angles.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kPeriod = 0.2;
 
 struct Trunk {

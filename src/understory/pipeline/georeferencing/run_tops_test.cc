@@ -23,9 +23,8 @@ Raster raster_of(Height height) {
   raster.rows = 120;
   for (int row = 0; row < raster.rows; ++row) {
     for (int column = 0; column < raster.columns; ++column)
-      raster.values.push_back(
-          static_cast<float>(height(raster.x0 + (column + 0.5) * raster.cell_m,
-                                    raster.y0 + (row + 0.5) * raster.cell_m)));
+      raster.values.push_back(static_cast<float>(height(raster.x0 + (column + 0.5) * raster.cell_m,
+                                                        raster.y0 + (row + 0.5) * raster.cell_m)));
   }
   return raster;
 }

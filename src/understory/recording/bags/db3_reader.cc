@@ -17,7 +17,7 @@
 namespace understory {
 namespace {
 
-constexpr std::uint8_t kZstdMagic[4] = {0x28, 0xB5, 0x2F, 0xFD};
+constexpr std::uint8_t kZstdFrame[4] = {0x28, 0xB5, 0x2F, 0xFD};
 constexpr int kMostMissingRows = 20'000;
 
 struct CloseDatabase {
@@ -31,11 +31,11 @@ using Statement = std::unique_ptr<sqlite3_stmt, FinishStatement>;
 
 // Throws ReadError where the system cannot read the file.
 void read_through(const std::string& path) {
-  constexpr std::uint64_t kStep = 1U << 20;
+  constexpr std::uint64_t kSearchStep = 1U << 20;
   const auto file = open_file(path);
   std::vector<std::uint8_t> part;
-  for (std::uint64_t at = 0; at < file->size(); at += kStep)
-    file->read(at, kStep, part);
+  for (std::uint64_t at = 0; at < file->size(); at += kSearchStep)
+    file->read(at, kSearchStep, part);
 }
 
 class Db3Source : public MessageSource {
@@ -263,7 +263,7 @@ class Db3Source : public MessageSource {
     const auto* raw = static_cast<const std::uint8_t*>(sqlite3_column_blob(rows, column));
     const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows, column));
     const ByteSpan stored(raw, raw == nullptr ? 0 : size);
-    if (stored.size() < 4 || !std::equal(stored.begin(), stored.begin() + 4, kZstdMagic))
+    if (stored.size() < 4 || !std::equal(stored.begin(), stored.begin() + 4, kZstdFrame))
       return stored;
     const std::string problem = decompress(stored, "zstd", kLongestBlock, unpacked_);
     if (!problem.empty())

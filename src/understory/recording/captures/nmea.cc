@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "understory/recording/messages/event_bytes.h"
+#include "understory/util/files/csv.h"
 #include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {
 
-constexpr std::size_t kLongestLine = 1024;
-using Line = std::array<char, kLongestLine + 2>;
-constexpr TimeNs kDay = 86'400 * kNsPerSecond;
+constexpr std::size_t kLongestSentence = 1024;
+using Line = std::array<char, kLongestSentence + 2>;
 constexpr double kMetresPerSecondPerKnot = 1852.0 / 3600.0;
 
 // The next line, cut where it is too long; false at the end.
@@ -23,17 +23,6 @@ bool next_line(std::istream& stream, Line& line, const std::string& source, std:
   const bool any = stream.getline(line.data(), line.size()) || stream.gcount() > 0;
   check_readable(stream, source, "line " + std::to_string(number));
   return any;
-}
-
-std::vector<std::string_view> split(std::string_view text) {
-  std::vector<std::string_view> fields;
-  std::size_t begin = 0;
-  while (true) {
-    const std::size_t comma = text.find(',', begin);
-    fields.push_back(text.substr(begin, comma - begin));
-    if (comma == std::string_view::npos) return fields;
-    begin = comma + 1;
-  }
 }
 
 std::optional<double> number(std::string_view text) {
@@ -211,7 +200,7 @@ std::optional<NmeaSentence> parse_nmea(std::string_view line) {
   while (!line.empty() && (line.back() == '\r' || line.back() == '\n' || line.back() == ' '))
     line.remove_suffix(1);
   const std::size_t begin = line.find('$');
-  if (begin == std::string_view::npos || line.size() > kLongestLine) return std::nullopt;
+  if (begin == std::string_view::npos || line.size() > kLongestSentence) return std::nullopt;
   std::string_view body = line.substr(begin + 1);
   if (const std::size_t star = body.find('*'); star != std::string_view::npos) {
     unsigned stated = 0;
@@ -224,7 +213,7 @@ std::optional<NmeaSentence> parse_nmea(std::string_view line) {
     if (error != std::errc() || end != hex.data() + 2 || hex.size() != 2 || stated != sum)
       return std::nullopt;
   }
-  const Fields fields{split(body)};
+  const Fields fields{split(body, ",", false)};
   if (fields[0].size() < 5) return std::nullopt;
   NmeaSentence out;
   out.type = fields[0].substr(fields[0].size() - 3);
@@ -320,7 +309,7 @@ std::optional<GnssFix> NmeaLogReader::close_epoch() {
   if (!epoch.time_of_day) return std::nullopt;
   if (epoch.day) {
     day_ = *epoch.day;
-  } else if (day_ >= 0 && last_time_of_day_ - *epoch.time_of_day > kDay / 2) {
+  } else if (day_ >= 0 && last_time_of_day_ - *epoch.time_of_day > kNsPerDay / 2) {
     ++day_;  // midnight passed since the last dated epoch
   }
   last_time_of_day_ = *epoch.time_of_day;
@@ -331,7 +320,7 @@ std::optional<GnssFix> NmeaLogReader::close_epoch() {
                                          "left out");
     return std::nullopt;
   }
-  return nmea_fix(epoch, day_ * kDay + *epoch.time_of_day);
+  return nmea_fix(epoch, day_ * kNsPerDay + *epoch.time_of_day);
 }
 
 std::int64_t first_nmea_day(std::istream& stream, const std::string& source) {

@@ -9,12 +9,12 @@
 #include "understory/recording/captures/scan_assembly.h"
 #include "understory/recording/finding.h"
 #include "understory/recording/messages/event_bytes.h"
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kStandardGravity = 9.80665;  // the unit of Ouster's accelerometer
 constexpr std::size_t kPacketHeader = 32;
 constexpr std::uint16_t kLidarPacketType = 1;
@@ -94,10 +94,10 @@ void OusterDecoder::make_beams() {
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     const double altitude = metadata_.beam_altitude_deg[i];
-    const double azimuth = -metadata_.beam_azimuth_deg[i] * kRadPerDeg;
+    const double azimuth = -metadata_.beam_azimuth_deg[i] * kDegree;
     const auto rank = std::lower_bound(sorted.begin(), sorted.end(), altitude) - sorted.begin();
-    beams_.push_back({std::cos(altitude * kRadPerDeg), std::sin(altitude * kRadPerDeg),
-                      std::cos(azimuth), std::sin(azimuth), static_cast<std::uint16_t>(rank)});
+    beams_.push_back({std::cos(altitude * kDegree), std::sin(altitude * kDegree), std::cos(azimuth),
+                      std::sin(azimuth), static_cast<std::uint16_t>(rank)});
   }
 }
 
@@ -245,7 +245,7 @@ std::optional<ImuSample> OusterDecoder::add_imu_packet(const std::uint8_t* data,
   for (int i = 0; i < 3; ++i) {
     const auto step = static_cast<std::size_t>(4 * i);
     sample.specific_force[i] = read<float>(data + 24 + step) * kStandardGravity;
-    sample.angular_rate[i] = read<float>(data + 36 + step) * kRadPerDeg;
+    sample.angular_rate[i] = read<float>(data + 36 + step) * kDegree;
   }
   if (!sample.specific_force.allFinite() || !sample.angular_rate.allFinite() ||
       time >= kLargestTime) {

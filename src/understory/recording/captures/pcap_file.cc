@@ -18,18 +18,17 @@ constexpr std::uint32_t kByteOrder = 0x1A2B3C4D;
 constexpr std::uint32_t kInterfaceBlock = 1;
 constexpr std::uint32_t kSimplePacket = 3;
 constexpr std::uint32_t kEnhancedPacket = 6;
-constexpr std::uint32_t kLargestFrame = 262'144;
+constexpr std::uint32_t kLargestPacket = 262'144;
 constexpr std::uint32_t kLargestBlock = 16 * 1024 * 1024;
 constexpr std::size_t kMostInterfaces = 256;
 constexpr const char* kNoPlace = "expected the place where its reading stood";
-constexpr TimeNs kDay = 86'400 * kNsPerSecond;
 
 std::uint32_t swapped(std::uint32_t v) {
   return (v >> 24) | ((v >> 8) & 0xFF00U) | ((v << 8) & 0xFF'0000U) | (v << 24);
 }
 
 bool far_apart(TimeNs a, TimeNs b) {
-  return std::llabs(a - b) > kDay;
+  return std::llabs(a - b) > kNsPerDay;
 }
 
 std::uint32_t first_word(ByteSpan bytes) {
@@ -123,8 +122,8 @@ std::optional<PcapFile::Record> PcapFile::record_at(std::uint64_t position) {
   record.original = u32(position + 12);
   record.end = record.data + record.captured;
   if (fraction >= (nanoseconds_ ? 1'000'000'000U : 1'000'000U) || record.captured == 0 ||
-      record.captured > kLargestFrame || record.original < record.captured ||
-      record.original > 4 * kLargestFrame)
+      record.captured > kLargestPacket || record.original < record.captured ||
+      record.original > 4 * kLargestPacket)
     return std::nullopt;
   return record;
 }
@@ -180,7 +179,7 @@ std::optional<PcapFile::Record> PcapFile::frame_block(std::uint64_t position, st
     record.original = u32(position + 24);
     record.data = position + 28;
   }
-  if (record.captured == 0 || record.captured > kLargestFrame ||
+  if (record.captured == 0 || record.captured > kLargestPacket ||
       record.data + record.captured + 4 > end)
     return std::nullopt;
   return record;

@@ -16,9 +16,8 @@
 namespace understory {
 namespace {
 
-constexpr TimeNs kDayNs = 86'400 * kNsPerSecond;
-constexpr TimeNs kGpsEpochNs = 3'657 * kDayNs;  // 1980-01-06
-constexpr std::size_t kLongestLine = 1024;
+constexpr TimeNs kGpsEpochNs = 3'657 * kNsPerDay;  // 1980-01-06
+constexpr std::size_t kLongestRow = 1024;
 
 enum class Places { kDegrees, kDegreesMinutes, kEarthCentred };
 
@@ -39,7 +38,7 @@ constexpr std::array<int, 18> kLeapDays{4'199,  4'564,  4'929,  5'660,  6'574,  
 TimeNs utc_from_gps(TimeNs gps) {
   TimeNs ahead = 0;
   for (const int day : kLeapDays) {
-    if (gps - ahead - kNsPerSecond >= day * kDayNs) ahead += kNsPerSecond;
+    if (gps - ahead - kNsPerSecond >= day * kNsPerDay) ahead += kNsPerSecond;
   }
   return gps - ahead;
 }
@@ -64,7 +63,7 @@ std::optional<TimeNs> time_of(std::string_view first, std::string_view second) {
     const auto seconds = to_number(second);
     if (!week || !seconds || *week > 10'000 || !(*seconds >= 0.0) || *seconds > 604'800.0)
       return std::nullopt;
-    return kGpsEpochNs + static_cast<TimeNs>(*week) * 7 * kDayNs + from_seconds(*seconds);
+    return kGpsEpochNs + static_cast<TimeNs>(*week) * 7 * kNsPerDay + from_seconds(*seconds);
   }
   const auto clock = split(second, ":", false);
   if (day.size() != 3 || clock.size() != 3) return std::nullopt;
@@ -83,7 +82,7 @@ std::optional<TimeNs> time_of(std::string_view first, std::string_view second) {
                                         std::chrono::day(static_cast<unsigned>(*date))};
   if (!ymd.ok()) return std::nullopt;
   const auto days = std::chrono::sys_days(ymd).time_since_epoch().count();
-  return days * kDayNs + static_cast<TimeNs>(*hours * 3600 + *minutes * 60) * kNsPerSecond +
+  return days * kNsPerDay + static_cast<TimeNs>(*hours * 3600 + *minutes * 60) * kNsPerSecond +
          from_seconds(*seconds);
 }
 
@@ -185,7 +184,7 @@ std::vector<GnssFix> read_rtklib_solution(std::istream& stream, const std::strin
     if (format.baselines)
       throw InputError(source, "line " + std::to_string(number),
                        "expected positions: these are baselines to a base station (option outpos)");
-    auto fix = line.size() > kLongestLine ? std::nullopt : row_of(std::string(text), format);
+    auto fix = line.size() > kLongestRow ? std::nullopt : row_of(std::string(text), format);
     if (fix) {
       fixes.push_back(*fix);
     } else {
@@ -207,7 +206,7 @@ std::vector<GnssFix> read_rtklib_solution(const std::string& file, Log& log) {
 bool is_rtklib_solution(const std::string& file) {
   if (file.ends_with(".pos")) return true;
   std::ifstream stream(file, std::ios::binary);
-  std::string line(2 * kLongestLine, '\0');
+  std::string line(2 * kLongestRow, '\0');
   stream.read(line.data(), static_cast<std::streamsize>(line.size()));
   line.resize(static_cast<std::size_t>(stream.gcount()));
   return line.starts_with('%') &&

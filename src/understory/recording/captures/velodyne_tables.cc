@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 struct Beams {
   std::vector<double> elevation_deg;
@@ -57,8 +56,8 @@ std::vector<VelodyneTable::Laser> make_lasers(const Beams& beams, double laser_u
   for (std::size_t i = 0; i < lasers.size(); ++i) {
     const double elevation = beams.elevation_deg[i];
     VelodyneTable::Laser& laser = lasers[i];
-    laser.cos_elevation = std::cos(elevation * kRadPerDeg);
-    laser.sin_elevation = std::sin(elevation * kRadPerDeg);
+    laser.cos_elevation = std::cos(elevation * kDegree);
+    laser.sin_elevation = std::sin(elevation * kDegree);
     if (!beams.height_mm.empty()) laser.height_m = beams.height_mm[i] * 1e-3;
     if (!beams.azimuth_offset_deg.empty())
       laser.azimuth_offset_cdeg = beams.azimuth_offset_deg[i] * 100.0;

@@ -24,14 +24,14 @@ constexpr std::string_view kTimeNames[] = {
     "ts",         "gps_time",    "timestamp_offset"};
 constexpr std::string_view kReturnNames[] = {"return_index"};
 
-template <typename T>
-double load(const std::uint8_t* raw, bool swap) {
+template <typename Result, typename T>
+Result load(const std::uint8_t* raw, bool swap) {
   std::array<std::uint8_t, sizeof(T)> bytes;
   std::memcpy(bytes.data(), raw, sizeof(T));
   if (swap) std::reverse(bytes.begin(), bytes.end());
   T value;
   std::memcpy(&value, bytes.data(), sizeof(T));
-  return static_cast<double>(value);
+  return static_cast<Result>(value);
 }
 
 bool same_name(std::string_view field, std::string_view name) {
@@ -73,14 +73,37 @@ void for_each_point(const PointCloud2Message& cloud, const Visit& visit) {
   }
 }
 
-// False for NaN, infinite and zero-range points.
-bool read_position(const CloudLayout& layout, const std::uint8_t* raw, ScanPoint& point) {
-  point.x = static_cast<float>(layout.x().read(raw));
-  point.y = static_cast<float>(layout.y().read(raw));
-  point.z = static_cast<float>(layout.z().read(raw));
-  if (!std::isfinite(point.x) || !std::isfinite(point.y) || !std::isfinite(point.z)) return false;
-  return point.x != 0.0F || point.y != 0.0F || point.z != 0.0F;
+bool is_own_float(const CloudLayout::Slot& slot) {
+  return slot.type == FieldType::kFloat32 && !slot.swap;
 }
+
+// Reads the places of points. The types are looked at once a cloud, since a dense scan has 130,000
+// points and nearly every driver writes three floats.
+class PositionReader {
+ public:
+  explicit PositionReader(const CloudLayout& layout)
+      : layout_(layout),
+        floats_(is_own_float(layout.x()) && is_own_float(layout.y()) && is_own_float(layout.z())) {}
+
+  // False for NaN, infinite and zero-range points.
+  bool operator()(const std::uint8_t* raw, ScanPoint& point) const {
+    if (floats_) {
+      std::memcpy(&point.x, raw + layout_.x().offset, sizeof(float));
+      std::memcpy(&point.y, raw + layout_.y().offset, sizeof(float));
+      std::memcpy(&point.z, raw + layout_.z().offset, sizeof(float));
+    } else {
+      point.x = static_cast<float>(layout_.x().read(raw));
+      point.y = static_cast<float>(layout_.y().read(raw));
+      point.z = static_cast<float>(layout_.z().read(raw));
+    }
+    if (!std::isfinite(point.x) || !std::isfinite(point.y) || !std::isfinite(point.z)) return false;
+    return point.x != 0.0F || point.y != 0.0F || point.z != 0.0F;
+  }
+
+ private:
+  const CloudLayout& layout_;
+  bool floats_;
+};
 
 std::uint16_t to_ring(double value) {
   return value >= 0.0 && value < 65536.0 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
@@ -90,11 +113,16 @@ std::uint16_t to_ring(double value) {
 // first point.
 struct RelativeTimes {
   TimeConvention convention;
+  CloudLayout::Slot slot;
   TimeNs header = 0;
   TimeNs foreign_start = 0;  // first point's time on the foreign clock
 
-  [[nodiscard]] TimeNs operator()(double raw) const {
-    const TimeNs time = raw_time_to_ns(raw, convention.unit_s);
+  [[nodiscard]] TimeNs operator()(const std::uint8_t* raw) const {
+    // Whole numbers of 32 bits need no rounding: the usual case is computed without it.
+    const TimeNs time =
+        slot.type == FieldType::kUint32 && !slot.swap
+            ? load<TimeNs, std::uint32_t>(raw + slot.offset, false) * ns_per_unit(convention.unit_s)
+            : raw_time_to_ns(slot.read(raw), convention.unit_s);
     switch (convention.kind) {
       case TimeConvention::Kind::kOffset:
         return time + convention.shift;
@@ -120,8 +148,8 @@ void count_from_first(const std::vector<TimeNs>& relative, TimeNs header, Scan& 
 }  // namespace
 
 double CloudLayout::Slot::read(const std::uint8_t* point) const {
-  return visit_field_type(type,
-                          [&](auto zero) { return load<decltype(zero)>(point + offset, swap); });
+  return visit_field_type(
+      type, [&](auto zero) { return load<double, decltype(zero)>(point + offset, swap); });
 }
 
 std::optional<CloudLayout> CloudLayout::find(const PointCloud2Message& cloud) {
@@ -180,9 +208,10 @@ CloudTimes measure_times(const PointCloud2Message& cloud, const CloudLayout& lay
   times.log_time = log_time;
   if (layout.time().size == 0) return times;
   bool any = false;
+  const PositionReader read_position(layout);
   for_each_point(cloud, [&](const std::uint8_t* raw, std::size_t) {
     ScanPoint point;
-    if (!read_position(layout, raw, point)) return;
+    if (!read_position(raw, point)) return;
     const double time = layout.time().read(raw);
     if (!std::isfinite(time)) return;
     times.low = any ? std::min(times.low, time) : time;
@@ -200,7 +229,7 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
   scan.has_point_times = convention.kind != TimeConvention::Kind::kNone && layout.time().size > 0;
   scan.stamp = cloud.header.stamp + convention.shift;
   const bool rows_are_rings = !layout.has_ring() && cloud.height > 1 && cloud.height <= kMostRings;
-  RelativeTimes relative_time{convention, cloud.header.stamp, 0};
+  RelativeTimes relative_time{convention, layout.time(), cloud.header.stamp, 0};
   if (convention.kind == TimeConvention::Kind::kForeignClock)
     relative_time.foreign_start =
         raw_time_to_ns(measure_times(cloud, layout, 0).low, convention.unit_s);
@@ -210,14 +239,15 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
   scan.points.reserve(most);
   relative.reserve(scan.has_point_times ? most : 0);
   std::uint16_t highest_ring = 0;
+  const PositionReader read_position(layout);
   for_each_point(cloud, [&](const std::uint8_t* raw, std::size_t row) {
     ScanPoint point;
-    if (!read_position(layout, raw, point)) {
+    if (!read_position(raw, point)) {
       ++result.without_return;
       return;
     }
     if (scan.has_point_times) {
-      const TimeNs time = relative_time(layout.time().read(raw));
+      const TimeNs time = relative_time(raw);
       if (time < -kLongestScan || time > kLongestScan) {
         ++result.bad_times;
         return;

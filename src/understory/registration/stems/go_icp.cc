@@ -6,12 +6,11 @@
 #include <vector>
 
 #include "understory/registration/stems/go_icp_bounds.h"
+#include "understory/util/angles.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = M_PI / 180.0;
 
 struct Later {
   bool operator()(const GoIcpBox& a, const GoIcpBox& b) const {

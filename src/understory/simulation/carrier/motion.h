@@ -2,18 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "understory/simulation/carrier/carrier.h"
+#include "understory/util/angles.h"
 #include "understory/util/random.h"
 
 // What the plans of the different carriers are made of.
 namespace understory::motion {
 
 constexpr double kStep = 0.05;  // seconds between control points of the path
-constexpr double kTau = 2.0 * std::numbers::pi;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // From 0 to 1 with two continuous derivatives.
 inline double ease(double t) {

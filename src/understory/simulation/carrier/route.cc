@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "understory/simulation/sensors/counter_noise.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kTau = 2.0 * std::numbers::pi;
 
 // A closed curve of unit mean radius whose radius waves with a few harmonics. With several laps the
 // waves do not close after one, so that each lap takes another way and crosses the others.

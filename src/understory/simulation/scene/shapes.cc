@@ -5,11 +5,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/util/angles.h"
+
 namespace understory {
 namespace {
 
 using Vector = Eigen::Vector3d;
-constexpr double kTau = 2.0 * std::numbers::pi;
 
 void add_triangle(Shape& shape, const Vector& a, const Vector& b, const Vector& c) {
   const int first = static_cast<int>(shape.vertices.size());

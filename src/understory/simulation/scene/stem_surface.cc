@@ -9,7 +9,7 @@
 namespace understory {
 namespace {
 
-constexpr float kBreastHeight = 1.3F;
+constexpr float kDbhHeight = 1.3F;
 constexpr float kPlateWidth = 0.035F;  // metres around the stem
 constexpr float kPlateHeight = 0.11F;
 constexpr float kHalfSwelling = 0.06F;  // metres along the stem
@@ -108,7 +108,7 @@ float StemSurface::bark(float x, float y, float height_m) const {
 float StemSurface::offset(float x, float y, float height_m) const {
   if (round_) return 0.0F;
   const float up = std::clamp(height_m / height_m_, 0.0F, 1.0F);
-  const float radius = radius_m_ * std::min(1.3F, (1.0F - up) / (1.0F - kBreastHeight / height_m_));
+  const float radius = radius_m_ * std::min(1.3F, (1.0F - up) / (1.0F - kDbhHeight / height_m_));
   const float c2 = x * x - y * y;
   const float s2 = 2.0F * x * y;
   const float cosines[3] = {c2, x * c2 - y * s2, c2 * c2 - s2 * s2};

@@ -9,11 +9,10 @@
 #include <vector>
 
 #include "understory/simulation/scene/scene.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kTau = 2.0 * std::numbers::pi;
 
 GrownTree pine() {
   GrownTree tree;

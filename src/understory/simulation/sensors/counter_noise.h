@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <numbers>
 
+#include <Eigen/Core>
+
 #include "understory/util/random.h"
 
 namespace understory {
@@ -99,6 +101,14 @@ class NoiseRow {
  private:
   std::uint64_t base_;
 };
+
+// Three independent normal numbers of standard deviation one.
+[[nodiscard]] inline Eigen::Vector3d normal3(CounterNoise& noise) {
+  const double x = noise.normal();
+  const double y = noise.normal();
+  const double z = noise.normal();
+  return {x, y, z};
+}
 
 // Number streams of one seed, one per purpose, so that a change in one leaves the others alone.
 enum class NoiseStream : std::uint64_t {

@@ -8,8 +8,8 @@
 #include <cstring>
 #include <filesystem>
 #include <map>
-#include <numbers>
 
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -17,7 +17,6 @@ namespace {
 
 constexpr std::int64_t kFiringsPerPacket = 24;
 constexpr std::size_t kLasers = 16;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // With the system's reason: nothing else was asked of it since the stream failed.
 OutputError unwritten(const std::string& path) {

@@ -6,22 +6,15 @@
 
 #include "understory/simulation/sensors/counter_noise.h"
 #include "understory/simulation/sensors/scanner.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
-constexpr double kTau = 2.0 * std::numbers::pi;
 // Time constants of the parts of the bias instability, and the standard deviation of each for an
 // instability of 1: together they give an Allan deviation of 0.664 (within 3 % from 3 to 300 s).
 constexpr double kFlickerSeconds[] = {2.0, 20.0, 200.0, 2000.0};
 constexpr double kFlickerShare = 0.882;
-
-Eigen::Vector3d normal3(CounterNoise& noise) {
-  const double x = noise.normal();
-  const double y = noise.normal();
-  const double z = noise.normal();
-  return {x, y, z};
-}
 
 Eigen::Matrix3d scale_matrix(double sd, CounterNoise& noise) {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();

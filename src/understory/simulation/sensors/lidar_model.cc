@@ -3,13 +3,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kTau = 2.0 * std::numbers::pi;
 
 // Ouster's lasers fire together, in four staggered columns.
 struct OusterHead {

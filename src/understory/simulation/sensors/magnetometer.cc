@@ -1,22 +1,15 @@
 #include "understory/simulation/sensors/magnetometer.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "understory/simulation/sensors/counter_noise.h"
 #include "understory/simulation/sensors/scanner.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
 constexpr double kTesla = 1e-6;  // of a microtesla
-
-Eigen::Vector3d normal3(CounterNoise& noise) {
-  const double x = noise.normal();
-  const double y = noise.normal();
-  const double z = noise.normal();
-  return {x, y, z};
-}
 
 }  // namespace
 
@@ -27,7 +20,6 @@ Magnetometer::Magnetometer(const SiteConfig& config, const CarrierPath& path, Ti
       seed_(hash_numbers(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kMag))),
       imu_from_body_(
           mount_pose(config.imu.mount_m, config.imu.mount_rpy_deg).rotation().conjugate()) {
-  constexpr double kDegree = std::numbers::pi / 180.0;
   const double level = config_.field_ut * std::cos(config_.inclination_deg * kDegree);
   const double declination = config_.declination_deg * kDegree;
   field_in_world_ = {level * std::sin(declination), level * std::cos(declination),

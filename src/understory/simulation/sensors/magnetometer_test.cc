@@ -1,16 +1,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "understory/simulation/carrier/carrier.h"
 #include "understory/simulation/sensors/magnetometer.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 TEST(Magnetometer, PointsNorthUntilIronBendsIt) {
   SiteConfig site;

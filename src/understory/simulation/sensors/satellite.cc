@@ -5,10 +5,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "understory/util/angles.h"
+
 namespace understory {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kSemiMajor = 6378137.0;
 constexpr double kFlattening = 1.0 / 298.257223563;
 constexpr double kEccentricity2 = kFlattening * (2.0 - kFlattening);
@@ -20,13 +21,6 @@ Eigen::Vector3d ecef(double latitude, double longitude, double height) {
   return {(n + height) * std::cos(latitude) * std::cos(longitude),
           (n + height) * std::cos(latitude) * std::sin(longitude),
           (n * (1.0 - kEccentricity2) + height) * s};
-}
-
-Eigen::Vector3d normal3(CounterNoise& noise) {
-  const double x = noise.normal();
-  const double y = noise.normal();
-  const double z = noise.normal();
-  return {x, y, z};
 }
 
 }  // namespace

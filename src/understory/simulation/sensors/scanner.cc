@@ -8,13 +8,13 @@
 #include <span>
 #include <tuple>
 
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::int64_t kGroupFirings = 16;  // the stand changes between groups only
 constexpr std::size_t kMostBeams = 128;
 constexpr std::int64_t kBlockFirings = 64;  // at most, cast together

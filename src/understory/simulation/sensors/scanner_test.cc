@@ -6,16 +6,14 @@
 #include <cmath>
 #include <cstring>
 #include <map>
-#include <numbers>
 
 #include "understory/simulation/world.h"
+#include "understory/util/angles.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // A scanner with all that it needs, without noise.
 struct World : SimulatedWorld {

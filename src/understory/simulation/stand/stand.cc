@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "understory/simulation/sensors/counter_noise.h"
 #include "understory/simulation/stand/stand_drawing.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
-constexpr double kTau = 2.0 * std::numbers::pi;
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kBreastHeight = 1.3;
 
 // Shape of the stem: the share of the diameter at a height, not yet scaled to the dbh. A power of

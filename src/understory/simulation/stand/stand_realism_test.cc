@@ -12,12 +12,11 @@
 #include "understory/simulation/simulator.h"
 #include "understory/simulation/stand/stand.h"
 #include "understory/simulation/stand/stand_drawing.h"
+#include "understory/util/angles.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 TEST(Ground, HasSlopesDitchesAndSnowThatHidesThem) {
   TerrainConfig config;

@@ -7,13 +7,13 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <numbers>
 
 #include "understory/simulation/scene/scene.h"
 #include "understory/simulation/scene/terrain.h"
 #include "understory/simulation/site.h"
 #include "understory/simulation/stand/stand.h"
 #include "understory/simulation/stand/tree_cloud.h"
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 #include "understory/util/files/folder_test_support.h"
 #include "understory/util/random.h"
@@ -21,8 +21,6 @@
 
 namespace understory {
 namespace {
-
-constexpr double kTau = 2.0 * std::numbers::pi;
 
 // An oval stem (30 x 24 cm at the foot, tapering to 8 m) away from zero and leaning, with a ball of
 // foliage at 5 to 8 m: a shape that no grown stem has.

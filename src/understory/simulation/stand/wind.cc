@@ -1,14 +1,13 @@
 #include "understory/simulation/stand/wind.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "understory/simulation/sensors/counter_noise.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
-constexpr double kTau = 2.0 * std::numbers::pi;
 constexpr double kReferenceHeight = 15.0;  // metres
 constexpr double kWindSpeed = 4.0;         // at which gusts travel, m/s
 constexpr double kWindAzimuth = 0.6;       // radians from east to north

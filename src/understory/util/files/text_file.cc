@@ -18,16 +18,16 @@ constexpr std::size_t kLongestYaml = std::size_t{16} << 20;
 constexpr int kDeepestYaml = 64;
 constexpr std::size_t kMostYamlValues = 1'000'000;
 
-class Descriptor {
+class ReadOnlyFile {
  public:
-  explicit Descriptor(const std::string& path)
+  explicit ReadOnlyFile(const std::string& path)
       : value_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
     if (value_ < 0)
       throw InputError(path, "", std::string("cannot be opened: ") + std::strerror(errno));
   }
-  ~Descriptor() { ::close(value_); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
+  ~ReadOnlyFile() { ::close(value_); }
+  ReadOnlyFile(const ReadOnlyFile&) = delete;
+  ReadOnlyFile& operator=(const ReadOnlyFile&) = delete;
   [[nodiscard]] int value() const { return value_; }
 
  private:
@@ -58,7 +58,7 @@ ReadError::ReadError(const std::string& file, const std::string& position, int c
                  "cannot be read: " + std::error_code(code, std::generic_category()).message()) {}
 
 std::string read_text_file(const std::string& path, std::uint64_t max_bytes) {
-  const Descriptor file(path);
+  const ReadOnlyFile file(path);
   std::string text;
   std::vector<char> part(std::size_t{1} << 16);
   while (true) {
