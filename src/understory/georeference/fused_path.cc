@@ -187,13 +187,13 @@ void lay_on_fixes(const SolvedRun& run, const std::vector<GnssFix>& fixes,
 
 void describe(ConfigTable& table, FusedPathConfig& config) {
   describe(table, config.fusion);
-  table.add("odometry_scale", config.odometry_scale, {1e-3, 100.0}, "",
-            "standard deviations of the odometry over those of the graph, before the positions are "
-            "looked at");
+  table.add(
+      "odometry_scale", config.odometry_scale, {1e-3, 100.0}, "",
+      "factor on the odometry's standard deviations in the graph, before the positions are used");
   table.add("odometry_scale_log", config.odometry_scale_log, {0.0, 10.0}, "",
-            "standard deviation of the logarithm of that; 0: it is kept");
+            "standard deviation of the logarithm of that factor; 0: the factor is kept");
   table.add("most_positions", config.most_positions, {10, 100000}, "",
-            "positions in the graph at most; more are gathered over longer intervals");
+            "most positions in the graph; more are averaged over longer intervals");
 }
 
 FusedPath fuse_path(const SolvedRun& run, const std::vector<GnssFix>& fixes,

@@ -142,7 +142,7 @@ RigidFit fit_closed(const std::vector<PlacePair>& pairs) {
     spread += pair.weight * (pair.source - source).squaredNorm();
   }
   if (spread / total < kLeastSpreadM * kLeastSpreadM) {
-    fit.reason = "all places are one place";
+    fit.reason = "all positions lie at one place";
     return fit;
   }
   const Eigen::JacobiSVD<Matrix3d> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);

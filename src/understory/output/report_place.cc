@@ -20,12 +20,12 @@ struct Residual {
   int digits;
 };
 constexpr std::array<Residual, 12> kResiduals = {{
-    {"gnss_fixes_used_share", "fixes that had a weight", "%", 100.0, 0},
+    {"gnss_fixes_used_share", "share of the fixes that were used", "%", 100.0, 0},
     {"gnss_fixes_median_m", "distance of the fixes from the path, median", "m", 1.0, 2},
     {"gnss_fit_rms_m", "distance of path and fixes, root mean square", "m", 1.0, 2},
     {"gnss_plane_rms_m", "fixes off the path in the plane, root mean square", "m", 1.0, 2},
     {"gnss_height_rms_m", "fixes off the path in height, root mean square", "m", 1.0, 2},
-    {"gnss_independent_fixes", "independent fixes that would know the place as well", "", 1.0, 0},
+    {"gnss_independent_fixes", "number of independent fixes that would be as exact", "", 1.0, 0},
     {"trees_apart_rms_m", "trees from their partners, root mean square", "m", 1.0, 2},
     {"gnss_along_rms_m", "fixes along the path at their time, root mean square", "m", 1.0, 2},
     {"gnss_across_rms_m", "fixes across the path at their time, root mean square", "m", 1.0, 2},

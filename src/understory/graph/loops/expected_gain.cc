@@ -41,7 +41,7 @@ class GainCorrection {
     const auto budget =
         static_cast<int>(config_.largest_share * static_cast<double>(views_.targets.size()));
     std::size_t next_solve = 4;
-    result_.stopped_because = "no pair is expected to tell more";
+    result_.stopped_because = "no pair has a larger expected gain";
     while (static_cast<int>(accepted_.size()) < budget) {
       const auto best = queue.best();
       if (!best || queue.gain(*best) < config_.gain.min_gain) break;
@@ -56,7 +56,7 @@ class GainCorrection {
       next_solve *= 2;
     }
     if (static_cast<int>(accepted_.size()) >= budget)
-      result_.stopped_because = "as many corrections as are allowed";
+      result_.stopped_because = "the largest number of corrections was reached";
     solve();
     for (int round = 0; round < config_.gain.revisits && !accepted_.empty(); ++round) {
       revisit();
@@ -108,7 +108,7 @@ class GainCorrection {
     if (icp.status == SparseIcpStatus::kTooFewPoints) {
       match.reason = icp.reason;
     } else if (icp.overlap < config_.min_final_overlap) {
-      match.reason = "too few stems lie on stems";
+      match.reason = "too few stems found a partner";
     } else if (moved > config_.gain.largest_step_l0 * views_.l0_m) {
       match.reason = "too far from where the views were";
     } else {

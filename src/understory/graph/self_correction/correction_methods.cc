@@ -186,7 +186,8 @@ void correct_by_powers(const CorrectionViews& views, const SelfCorrectionConfig&
   const std::vector<CorrectionPair> pairs = chosen_pairs(views, config, result);
   PowerChain chain(views, config, power, result);
   for (const CorrectionPair& pair : pairs) {
-    if (chain.accepted() >= budget) return chain.finish("as many corrections as are allowed");
+    if (chain.accepted() >= budget)
+      return chain.finish("the largest number of corrections was reached");
     if (!chain.add(pair, match_pair)) return chain.finish("the map did not become sharper");
   }
   chain.finish("all chosen pairs were tried");
@@ -207,7 +208,7 @@ void correct_by_lattice(const CorrectionViews& views, const SelfCorrectionConfig
     if (overlap <= 0.0) continue;
     (void)chain.add(pair, match_lattice_pair);
   }
-  chain.finish("the lattice was tried");
+  chain.finish("all pairs of the lattice were tried");
 }
 
 void correct_by_pose_graph(const CorrectionViews& views, const SelfCorrectionConfig& config,

@@ -25,7 +25,7 @@ Vector6d mean_variances(const std::vector<Matrix6d>& covariances) {
   return sum;
 }
 
-// Loops are in the poses already; that they hold is told to the regression as well.
+// Loops are in the poses already. The regression takes them as observations as well.
 std::vector<PathObservation> observed_loops(const std::vector<PoseEdge>& loops) {
   const std::size_t count = std::min(loops.size(), kMostLoops);
   std::vector<PathObservation> result;
@@ -37,10 +37,11 @@ std::vector<PathObservation> observed_loops(const std::vector<PoseEdge>& loops) 
   return result;
 }
 
-std::string told_of(const PathProcessResult& regressed) {
-  char text[128];
+std::string account_of(const PathProcessResult& regressed) {
+  char text[160];
   std::snprintf(text, sizeof text,
-                "regressed: steps err alike over %.0f views, by %.2f times what they say",
+                "the path was regressed over the matches; errors of its steps are correlated over "
+                "%.0f views and %.2f times as large as stated",
                 regressed.length_views, regressed.scale);
   return text;
 }
@@ -89,7 +90,7 @@ void correct_by_gaussian_process(const CorrectionViews& views, const SelfCorrect
     }
     min_beta = beta;
     result.world_from_view = poses;
-    result.stopped_because = told_of(regressed);
+    result.stopped_because = account_of(regressed);
     for (std::size_t k = 0; k < rows.size(); ++k) {
       TriedCorrection& tried = result.tried[rows[k]];
       tried.kept = regressed.used[loops.size() + k] != 0;

@@ -175,7 +175,7 @@ SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
   if (corrected) {
     correct_by_method(problem, config, result);
   } else {
-    result.stopped_because = "not asked for, or too few views";
+    result.stopped_because = "the correction is switched off, or there are too few views";
   }
   if (config.eliminate_factor > 0.0) {
     const RegistrationNoise noise =

@@ -20,7 +20,7 @@ void judge(const SparseTarget& target, const SparsePoints& source, const ConeOve
   if (match.overlap < config.min_final_overlap) {
     match.reason = "too little overlap";
   } else if (!acceptable(match.error_m, match.overlap, config.pairs)) {
-    match.reason = "stems do not lie on stems";
+    match.reason = "too few stems found a partner";
   } else {
     match.accepted = true;
     match.reason.clear();
@@ -47,7 +47,7 @@ void require_better(PairMatch& match) {
   if (!match.accepted || std::isnan(match.error_before_m) || match.error_m < match.error_before_m)
     return;
   match.accepted = false;
-  match.reason = "no smaller error than before";
+  match.reason = "the error did not become smaller";
 }
 
 }  // namespace

@@ -19,9 +19,10 @@ void describe(ConfigTable& table, ScanMatchConfig& config) {
       "least share of a scan's points near the map for a match to count; of sparse scans 0.05");
   table.add("min_inlier_share", config.min_inlier_share, {0.0, 1.0}, "",
             "a match counts if it finds this share of what the matches before it found, or more");
-  table.add("coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "reaches",
-            "prediction error (1 sigma) above which matches begin from far. In reaches: the finest "
-            "cell of NDT");
+  table.add(
+      "coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "reaches",
+      "standard deviation of the prediction above which a match begins with its widest steps. A "
+      "reach is the finest cell of NDT");
   table.add("prior_weight", config.prior_weight, {0.0, 1.0}, "",
             "weight of the prediction inside the match");
 }

@@ -68,7 +68,7 @@ void describe_gate(ConfigTable& table, MotionConfig& config) {
 void describe(ConfigTable& table, MotionConfig& config) {
   table.add_enum("method", config.method,
                  {{"fixed_lag", SmootherMethod::kFixedLag}, {"isam2", SmootherMethod::kIsam2}},
-                 "smoother of the first graph");
+                 "smoother of the states at scan rate");
   table.add("window", config.window, {2, 200}, "states", "length of the fixed lag");
   table.add("iterations", config.iterations, {1, 20}, "", "Gauss-Newton steps per scan");
   table.add("isam2_restart", config.isam2_restart, {2, 10000}, "states",

@@ -32,8 +32,9 @@ void describe(ConfigTable& table, ViewChoiceConfig& config) {
                  "when a positioned scan is kept as a view of the map: after a fixed motion, by "
                  "overlap, or by convergence region");
   table.add("distance_m", config.distance_m, {0.0, 20.0}, "m",
-            "rule fixed: motion of the body since the last kept view ...");
-  table.add("turn_deg", config.turn_deg, {0.0, 180.0}, "deg", "rule fixed: ... or its turn");
+            "rule fixed: a view is kept after this motion of the body since the last one");
+  table.add("turn_deg", config.turn_deg, {0.0, 180.0}, "deg",
+            "rule fixed: a view is kept after this turn of the body since the last one");
   table.add("overlap", config.overlap, {0.0, 1.0}, "",
             "rule overlap: a view is kept when its overlap with the map falls to this share of "
             "that after the last kept view");

@@ -65,12 +65,13 @@ Placement placement_of(const SolvedRun& solved, const FusedPath& path, const Pai
 }  // namespace
 
 void describe(ConfigTable& table, GnssUseConfig& config) {
-  table.add_enum("use", config.use,
-                 {{"georeference", GnssUse::kGeoreference},
-                  {"rigid", GnssUse::kRigid},
-                  {"fuse", GnssUse::kFuse}},
-                 "what satellite positions are for: lay the finished map on the globe by the best "
-                 "method; by `split`; or bend the path as factors of the graph");
+  table.add_enum(
+      "use", config.use,
+      {{"georeference", GnssUse::kGeoreference},
+       {"rigid", GnssUse::kRigid},
+       {"fuse", GnssUse::kFuse}},
+      "what satellite positions do: lay the finished map on the globe by the best method "
+      "(georeference) or by split (rigid), or correct the path in the graph (fuse)");
   table.section("fusion", [&] { describe(table, config.path); });
 }
 

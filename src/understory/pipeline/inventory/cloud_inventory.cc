@@ -62,7 +62,7 @@ void name_system(const InventoryRequest& request, Stock& stock) {
   if (request.coordinate_system.empty()) return;
   std::string& own = stock.stand.cloud.coordinate_system;
   if (stock.of_run || !own.empty())
-    throw ConfigError({"--crs names the coordinate system of a cloud that says nothing of it; " +
+    throw ConfigError({"--crs is for a cloud that names no coordinate system; " +
                        stock.path.string() + " is in " +
                        (own.empty() ? "the frame of its run" : own.substr(0, 60))});
   own = request.coordinate_system;

@@ -30,9 +30,9 @@ void describe(ConfigTable& table, MotionLimits& config) {
   table.add("speed_m_s", config.speed_m_s, {0.1, 1000.0}, "m/s",
             "a faster step from scan to scan is one that no carrier makes");
   table.add("acceleration_m_s2", config.acceleration_m_s2, {0.1, 10000.0}, "m/s^2",
-            "the same for the change of speed over two steps");
+            "a larger acceleration over two steps is one that no carrier makes");
   table.add("turn_rate_deg_s", config.turn_rate_deg_s, {1.0, 100000.0}, "deg/s",
-            "the same for the turn from scan to scan");
+            "a faster turn from scan to scan is one that no carrier makes");
   table.add("min_bend_m", config.min_bend_m, {0.0, 10.0}, "m",
             "an acceleration counts where a scan lies farther than this off the line between its "
             "neighbours");

@@ -163,7 +163,7 @@ class Judge {
   }
 
   void judge_scale() {
-    if (!evidence_.imu_distrust.empty()) return;  // then the IMU is no witness
+    if (!evidence_.imu_distrust.empty()) return;  // then the IMU cannot be compared with
     if (evidence_.imu_motion_windows < config_.min_imu_windows ||
         evidence_.imu_motion_spread_m_s2 < config_.min_imu_spread_m_s2) {
       return;
@@ -339,9 +339,8 @@ class Judge {
 void describe(ConfigTable& table, JudgementConfig& config) {
   const ConfigTable::Range shares{0.0, 1.0};
   const ConfigTable::Range seconds{0.0, 1e6};
-  table.add(
-      "max_unused_scans", config.max_unused_scans, shares, "",
-      "partial: a larger share of the scans was dropped, late, unreadable or far off in time");
+  table.add("max_unused_scans", config.max_unused_scans, shares, "",
+            "partial: a larger share of scans was dropped, late, unreadable or far off in time");
   table.add("max_unused_s", config.max_unused_s, seconds, "s",
             "partial: another sensor was not used for longer");
   table.add("max_unmatched", config.max_unmatched, shares, "",
@@ -356,7 +355,7 @@ void describe(ConfigTable& table, JudgementConfig& config) {
       "untrusted: over a larger share of the time matched points lay no nearer than by chance");
   table.add(
       "max_blur_growth", config.max_blur_growth, {1.0, 1e6}, "",
-      "untrusted: distance of matched points at the end over that at the beginning is larger");
+      "untrusted: distance of matched points in the last third over that in the first is larger");
   table.add("longest_lidar_gap_s", config.longest_lidar_gap_s, seconds, "s",
             "untrusted: the lidar was silent for longer");
   table.add("max_smear_m", config.max_smear_m, {0.0, 100.0}, "m",
@@ -366,31 +365,32 @@ void describe(ConfigTable& table, JudgementConfig& config) {
   table.add("max_misplaced", config.max_misplaced, shares, "",
             "partial: a larger share of the steps is a motion that no carrier makes");
   table.add("max_impossible", config.max_impossible, shares, "",
-            "untrusted: the same; where times were assumed, max_misplaced is the limit");
+            "untrusted: a larger share of the steps is a motion that no carrier makes");
   table.add("max_shake_m_s2", config.max_shake_m_s2, {0.0, 1e6}, "m/s^2",
             "partial: without an IMU one step in twenty is accelerated by more");
   table.add("max_jump_m", config.max_jump_m, {0.0, 1e6}, "m",
-            "untrusted: the path goes astray by more over such steps and does not come back");
+            "untrusted: the path goes astray by more over such motions and does not come back");
   const ConfigTable::Range ratios{-1e6, 1e6};
   table.add(
       "min_scan_motion", config.min_scan_motion, ratios, "",
       "untrusted: within scans the sensor moves less than this share of the motion from scan to "
       "scan");
   table.add("max_scan_motion", config.max_scan_motion, ratios, "",
-            "the same: more than this share");
+            "untrusted: within scans the sensor moves more than this share of that motion");
   table.add("min_scan_motion_probes", config.min_scan_motion_probes, {1, 1000000}, "scans",
             "with fewer scans the motion within scans is not judged");
   table.add("min_imu_scale", config.min_imu_scale, ratios, "",
             "untrusted: accelerations by matching are less than this share of the accelerometer's");
-  table.add("max_imu_scale", config.max_imu_scale, ratios, "", "the same: more than this share");
+  table.add("max_imu_scale", config.max_imu_scale, ratios, "",
+            "untrusted: accelerations by matching are more than this share of the accelerometer's");
   table.add("min_imu_windows", config.min_imu_windows, {1, 1000000}, "windows",
-            "with fewer (thirds of a second) the scale is not judged");
+            "with fewer windows of a third of a second the accelerations are not judged");
   table.add("min_imu_spread_m_s2", config.min_imu_spread_m_s2, {0.0, 100.0}, "m/s^2",
-            "nor with accelerations of a smaller standard deviation");
+            "below this standard deviation the accelerations are not judged");
   table.add("min_imu_correlation", config.min_imu_correlation, {-1.0, 1.0}, "",
-            "untrusted: accelerations by matching and by the accelerometer correlate by less ...");
+            "untrusted, with the next: accelerations by matching and IMU correlate by less");
   table.add("max_imu_scatter_m_s2", config.max_imu_scatter_m_s2, {0.0, 1000.0}, "m/s^2",
-            "... and differ by more (standard deviation)");
+            "untrusted, with min_imu_correlation: they differ by a larger standard deviation");
   table.add("max_range_offset_m", config.max_range_offset_m, {0.0, 1000.0}, "m",
             "untrusted: all ranges seem to be too long or too short by more");
   table.add("min_range_pairs", config.min_range_pairs, {1, 1000000}, "pairs",

@@ -40,7 +40,7 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
     table.add("checkpoint_interval_s", config.loop.checkpoint_interval_s, {0.1, 5.0}, "s",
               "of recording between checkpoints");
     table.add("sparse_scan_points", config.sparse_scan_points, {0, 100000000}, "points",
-              "a lidar with fewer in a full scan has what nobody set adapted to it; 0: none");
+              "with fewer points in a full scan, settings are adapted to a sparse lidar; 0: never");
     table.add("lost_after_scans", config.lost_after_scans, {1, 100000}, "scans",
               "unmatched scans in a row after which a new piece of map begins");
     table.add("realtime_queue_scans", config.loop.realtime_queue_scans, {1, 1000}, "scans",
