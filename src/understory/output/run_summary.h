@@ -18,8 +18,8 @@
 
 namespace understory {
 
-// The verdict on a run. Partial: a part of the recording has no say; untrusted: the map is probably
-// wrong.
+// The verdict on a run. Partial: good, but incomplete or wrong in single scans; untrusted: the map
+// is probably wrong.
 enum class RunStatus { kComplete, kPartial, kUntrusted };
 // The name of a status in run.json.
 [[nodiscard]] std::string to_string(RunStatus status);

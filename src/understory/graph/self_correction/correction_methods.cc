@@ -33,7 +33,7 @@ class PowerChain {
     const PairMatch match =
         match_views(views_.targets[at(pair.j)], views_.problem.views[at(pair.i)],
                     poses_[at(pair.j)].inverse() * poses_[at(pair.i)], views_.overlap, config_);
-    TriedCorrection tried = told_match(pair, match, poses_);
+    TriedCorrection tried = tried_correction(pair, match, poses_);
     if (match.accepted) {
       apply_power_correction(poses_, views_.problem.step_errors, pair.j, pair.i, match.j_from_i,
                              power_);
@@ -129,8 +129,8 @@ double beta_of(const CorrectionViews& views, const std::vector<Pose>& poses,
   return blur_ratio(map_points(views.problem.map_views, poses, {}), config.sharpness);
 }
 
-TriedCorrection told_match(const CorrectionPair& pair, const PairMatch& match,
-                           const std::vector<Pose>& poses) {
+TriedCorrection tried_correction(const CorrectionPair& pair, const PairMatch& match,
+                                 const std::vector<Pose>& poses) {
   TriedCorrection tried;
   tried.pair = pair;
   tried.error_before_m = match.error_before_m;
@@ -225,7 +225,7 @@ void correct_by_pose_graph(const CorrectionViews& views, const SelfCorrectionCon
   graph.loops = views.problem.loops;
   std::vector<std::size_t> rows;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    result.tried.push_back(told_match(pairs[k], matches[k], poses));
+    result.tried.push_back(tried_correction(pairs[k], matches[k], poses));
     if (!matches[k].accepted) continue;
     rows.push_back(k);
     graph.loops.push_back({pairs[k].j, pairs[k].i, matches[k].j_from_i, matches[k].covariance});

@@ -32,14 +32,14 @@ struct CorrectionViews {
 [[nodiscard]] double beta_of(const CorrectionViews& views, const std::vector<Pose>& poses,
                              const SelfCorrectionConfig& config);
 
-// Pairs as the config asks for them, in its order; tells result.promising.
+// Pairs as the config asks for them, in its order; sets result.promising.
 [[nodiscard]] std::vector<CorrectionPair> chosen_pairs(const CorrectionViews& views,
                                                        const SelfCorrectionConfig& config,
                                                        SelfCorrectionResult& result);
 
 // What a match says, beside the poses that it began from.
-[[nodiscard]] TriedCorrection told_match(const CorrectionPair& pair, const PairMatch& match,
-                                         const std::vector<Pose>& poses);
+[[nodiscard]] TriedCorrection tried_correction(const CorrectionPair& pair, const PairMatch& match,
+                                               const std::vector<Pose>& poses);
 
 // Each fills result.world_from_view, tried, promising, kept and stopped_because; the first poses
 // are in result.world_from_view already.

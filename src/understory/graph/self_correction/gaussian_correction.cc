@@ -71,7 +71,7 @@ void correct_by_gaussian_process(const CorrectionViews& views, const SelfCorrect
     std::vector<PathObservation> observations = loops;
     std::vector<std::size_t> rows;
     for (std::size_t k = 0; k < pairs.size(); ++k) {
-      if (round == 0) result.tried.push_back(told_match(pairs[k], matches[k], first));
+      if (round == 0) result.tried.push_back(tried_correction(pairs[k], matches[k], first));
       // A match that finds nothing to mend the second time leaves what the first one said.
       if (matches[k].accepted) accepted[k] = matches[k];
       if (!accepted[k].accepted) continue;

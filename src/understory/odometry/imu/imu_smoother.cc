@@ -198,7 +198,7 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
   add_state(stamp, interval, lidar);
   MotionUpdate update;
   update.status = MotionStatus::kAccepted;
-  // Constant velocity is no witness against a match: a walker's quick turn would be dropped.
+  // Constant velocity does not refute a match: a walker's quick turn would be dropped.
   const bool previous = config_.velocity_gate_reference == VelocityGateReference::kPreviousState;
   if (!interval.samples.empty() || previous) {
     const GateVerdict verdict =

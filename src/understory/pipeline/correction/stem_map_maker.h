@@ -13,7 +13,7 @@
 
 namespace understory {
 
-// Where a map of stems is written, and who hears of it.
+// Where a map of stems is written, with its times, log and progress.
 struct StemMapPlace {
   std::filesystem::path run_folder;  // as the user named it
   std::filesystem::path results;     // where its files are written

@@ -48,7 +48,7 @@ Span span_of(const TopicReport& topic, const EventOrderer::StreamReport& stream)
 }
 
 // Why the IMU was not used, in words.
-std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicReport>& topics,
+std::string why_imu_unused(const ReadingFacts& facts, const std::vector<TopicReport>& topics,
                            const SensorEvidence& sensor) {
   std::string why;
   const auto add = [&](const std::string& what) { why += (why.empty() ? "" : "; ") + what; };
@@ -65,11 +65,11 @@ std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicRep
   const TopicReport* lidar = topic_of(topics, "lidar");
   if (imu != nullptr && lidar != nullptr) {
     const auto& streams = facts.time_repair->streams;
-    const Span heard = span_of(*imu, streams[EventOrderer::kImu]);
-    const Span scanned = span_of(*lidar, streams[EventOrderer::kLidar]);
-    const double late = to_seconds(heard.first - scanned.first);
+    const Span imu_span = span_of(*imu, streams[EventOrderer::kImu]);
+    const Span lidar_span = span_of(*lidar, streams[EventOrderer::kLidar]);
+    const double late = to_seconds(imu_span.first - lidar_span.first);
     if (late > kNoticeableS) add(fmt::format("it begins {:.1f} s after the lidar", late));
-    const double missing = to_seconds(facts.last_scan_end - heard.last);
+    const double missing = to_seconds(facts.last_scan_end - imu_span.last);
     if (missing > kNoticeableS) add(fmt::format("it stops {:.1f} s before the lidar", missing));
   }
   if (sensor.longest_gap_s > kNoticeableS) {
@@ -80,7 +80,7 @@ std::string silence_of_imu(const ReadingFacts& facts, const std::vector<TopicRep
 }
 
 // Why another sensor was not used, in words.
-std::string loss_of(const SensorEvidence& sensor) {
+std::string why_unused(const SensorEvidence& sensor) {
   return fmt::format(
       "of its {} messages {} came too late, {} had a stamp far off, {} were unreadable",
       sensor.received + sensor.unreadable, sensor.late, sensor.glitches, sensor.unreadable);
@@ -128,13 +128,13 @@ void gather_reading(const ReadingFacts& facts, RunEvidence& evidence) {
     sensor = sensor_of(facts.time_repair->streams[s]);
     const TopicReport* topic = topic_of(topics, kSensorRoles[s].name);
     if (topic != nullptr) sensor.unreadable = topic->unreadable;
-    sensor.unused_why = loss_of(sensor);
+    sensor.unused_why = why_unused(sensor);
   }
   if (facts.imu_wanted) {
     evidence.imu.unused_s =
         std::max(evidence.imu.unused_s, to_seconds(facts.imu_usage.without_place())) +
         to_seconds(facts.imu_usage.unusable());
-    evidence.imu.unused_why = silence_of_imu(facts, topics, evidence.imu);
+    evidence.imu.unused_why = why_imu_unused(facts, topics, evidence.imu);
   } else {
     evidence.imu.unused_s = 0.0;
   }
@@ -148,32 +148,32 @@ void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence) {
   evidence.imu_motion_windows = trust.motion_windows;
 }
 
-void gather_dense(const DenseFrontEnd& session, const RunFacts& facts, const Recording& source,
+void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
                   const Log& log, RunEvidence& evidence) {
-  const bool refused = !session.imu_refused().empty();
+  const bool refused = !front_end.imu_refused().empty();
   ReadingFacts reading;
   reading.source = &source;
   reading.time_repair = &facts.time_repair;
   reading.log = &log;
-  reading.last_scan_end = session.last_scan_end();
-  reading.imu_wanted = refused || session.imu_wanted();
-  reading.imu_usage = session.imu_usage();
+  reading.last_scan_end = front_end.last_scan_end();
+  reading.imu_wanted = refused || front_end.imu_wanted();
+  reading.imu_usage = front_end.imu_usage();
   gather_reading(reading, evidence);
   evidence.stopped = facts.stopped;
   evidence.unreadable = facts.unreadable;
   evidence.dropped_scans = facts.dropped_scans;
-  evidence.imu_used = session.odometry().uses_imu();
-  const ImuTrust trust = session.odometry().motion().imu_trust();
+  evidence.imu_used = front_end.odometry().uses_imu();
+  const ImuTrust trust = front_end.odometry().motion().imu_trust();
   if (refused) {
-    evidence.imu_distrust = imu_refusal(session.imu_refused());
+    evidence.imu_distrust = imu_refusal(front_end.imu_refused());
   } else if (!trust.trusted) {
     evidence.imu_distrust = trust.reason;
   }
   gather_motion_scale(trust, evidence);
-  const ScanMotion scan_motion = session.odometry().scan_motion();
+  const ScanMotion scan_motion = front_end.odometry().scan_motion();
   evidence.match.scan_motion_ratio = scan_motion.ratio;
   evidence.match.scan_motion_probes = scan_motion.probes;
-  const DenseCounts& counts = session.counts();
+  const DenseCounts& counts = front_end.counts();
   MatchEvidence& match = evidence.match;
   match.scans = counts.scans;
   match.unmatched = counts.unmatched + counts.gated;

@@ -28,7 +28,7 @@ void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence);
 
 // What the dense front end knows beside; `evidence.motion` and the figures of the finished path in
 // `evidence.match` are there already.
-void gather_dense(const DenseFrontEnd& session, const RunFacts& facts, const Recording& source,
+void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
                   const Log& log, RunEvidence& evidence);
 
 // What the sparse front end knows beside, the figures of the path included.

@@ -17,9 +17,9 @@ TimeNs first_of(const Recording& source, const std::string& role, TimeNs otherwi
   return otherwise;
 }
 
-void remark_on_imu(const DenseFrontEnd& session, const Recording& source,
+void remark_on_imu(const DenseFrontEnd& front_end, const Recording& source,
                    const EventOrderer::Report& repair, const std::string& name, Log& log) {
-  const std::optional<TimeNs> last = session.last_imu();
+  const std::optional<TimeNs> last = front_end.last_imu();
   if (!last) {
     log.warn("imu.none",
              name +
@@ -36,7 +36,7 @@ void remark_on_imu(const DenseFrontEnd& session, const Recording& source,
                          "from the scans alone",
                          name, late));
   }
-  const double missing = to_seconds(session.last_scan_end() - *last);
+  const double missing = to_seconds(front_end.last_scan_end() - *last);
   if (missing < kImuMissingS) return;
   log.warn("imu.stopped",
            fmt::format("{}: the IMU stopped at {} s; the last {:.1f} s are positioned by the scans "
@@ -51,9 +51,9 @@ void remark_on_lever_arms(const Rig& rig, const std::string& name, Log& log) {
     log.warn("recording.lever_arm", name + ": " + arm);
 }
 
-void remark_on_input(const DenseFrontEnd& session, const Recording& source,
+void remark_on_input(const DenseFrontEnd& front_end, const Recording& source,
                      const EventOrderer::Report& repair, const std::string& name, Log& log) {
-  remark_on_imu(session, source, repair, name, log);
+  remark_on_imu(front_end, source, repair, name, log);
   remark_on_lever_arms(source.rig(), name, log);
   for (const TopicReport& topic : source.topics()) {
     if (topic.empty_points == 0) continue;

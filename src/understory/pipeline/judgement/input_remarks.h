@@ -11,7 +11,7 @@ namespace understory {
 // At the end of a recording: warns of what only its whole can show, no IMU at all, an IMU that
 // stopped, points without a return. `name` is that of the recording, `repair`
 // what was done to its stamps.
-void remark_on_input(const DenseFrontEnd& session, const Recording& source,
+void remark_on_input(const DenseFrontEnd& front_end, const Recording& source,
                      const EventOrderer::Report& repair, const std::string& name, Log& log);
 
 // Warns of sensors that the extrinsics put more than 10 m from the body's origin or from the lidar:

@@ -10,7 +10,7 @@
 
 namespace understory {
 
-// What one sensor of the recording said, and what of it was heard.
+// The messages of one sensor of the recording, and how many of them were used.
 struct SensorEvidence {
   std::uint64_t received = 0;     // messages that could be decoded
   std::uint64_t unreadable = 0;   // messages that could not
