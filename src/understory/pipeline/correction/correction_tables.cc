@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "understory/graph/self_correction/spread_corrections.h"
 #include "understory/output/run_tables.h"
-#include "understory/pipeline/correction/spread_corrections.h"
 
 namespace understory {
 namespace {

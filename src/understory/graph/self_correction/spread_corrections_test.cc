@@ -1,4 +1,4 @@
-#include "understory/pipeline/correction/spread_corrections.h"
+#include "understory/graph/self_correction/spread_corrections.h"
 
 #include <gtest/gtest.h>
 
