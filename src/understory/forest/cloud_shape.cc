@@ -77,8 +77,8 @@ struct Columns {
 };
 
 Columns columns_of(const std::vector<Vector3d>& points) {
-  const Vector3d from = percentile(points, 0.002);
-  const Vector3d extent = percentile(points, 0.998) - from;
+  const Vector3d from = percentile(points, kOutliers);
+  const Vector3d extent = percentile(points, kUpperEnd) - from;
   const double area = extent.x() * extent.y();
   Columns columns;
   columns.cell = std::sqrt(area * std::max(1.0 / (kCellsAcross * kCellsAcross),
@@ -97,8 +97,8 @@ Columns columns_of(const std::vector<Vector3d>& points) {
   }
   for (std::vector<double>& cell : heights) {
     const bool enough = cell.size() >= kLeastPoints;
-    columns.low.push_back(enough ? quantile(cell, 0.01) : kNan);
-    columns.high.push_back(enough ? quantile(cell, 0.98) : kNan);
+    columns.low.push_back(enough ? quantile(cell, kLowQuantile) : kNan);
+    columns.high.push_back(enough ? quantile(cell, kHighQuantile) : kNan);
   }
   return columns;
 }
@@ -134,8 +134,8 @@ double column_height_of(const Columns& columns) {
     }
   }
   if (heights.size() < kLeastColumns) return kNan;
-  const double rise = rises.empty() ? 0.0 : quantile(rises, 0.75);
-  return std::max(0.0, quantile(heights, 0.9) - 2.0 * rise);
+  const double rise = rises.empty() ? 0.0 : quantile(rises, kRiseQuantile);
+  return std::max(0.0, quantile(heights, kHeightQuantile) - 2.0 * rise);
 }
 
 // Of the plane through the lowest points, fitted again to those near it.
@@ -150,8 +150,7 @@ Eigen::Vector2d slope_of(const Columns& columns) {
   if (lows.size() < kLeastSteps) return Eigen::Vector2d::Constant(kNan);
   Vector3d plane = Vector3d::Zero();  // z = a x + b y + c
   double width = std::numeric_limits<double>::infinity();
-  constexpr int kRounds = 6;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kPlaneRounds; ++round) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Vector3d right = Vector3d::Zero();
     std::vector<double> off;
@@ -166,7 +165,7 @@ Eigen::Vector2d slope_of(const Columns& columns) {
     plane = normal.colPivHouseholderQr().solve(right);
     for (std::size_t i = 0; i < lows.size(); ++i)
       off[i] = std::abs(lows[i].z() - Vector3d(lows[i].x(), lows[i].y(), 1.0).dot(plane));
-    width = 2.5 * quantile(off, 0.5);
+    width = kPlaneMedians * quantile(off, 0.5);
   }
   return plane.head<2>();
 }
@@ -239,7 +238,7 @@ CloudShape shape_of(const PointBlocks& cloud) {
   shape.column_height = shape.ground_slope_deg = kNan;
   shape.ground_slope.fill(kNan);
   if (points.size() < kLeastPoints) return shape;
-  shape.extent = percentile(points, 0.998) - percentile(points, 0.002);
+  shape.extent = percentile(points, kUpperEnd) - percentile(points, kOutliers);
   // A sample of surfaces is as much sparser as if its cubes were smaller by the root.
   shape.alone_share = alone_share_of(points, kCube * std::sqrt(static_cast<double>(sample.step)));
   for (std::size_t k = 0; k < kUpAxes.size(); ++k) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -9,6 +10,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 namespace understory::forest_constants {
 
@@ -65,6 +67,22 @@ inline constexpr double kLeastHeight = 2.0;
 inline constexpr double kCube = 3.0;
 // Columns at least for a height of the stand [chosen]
 inline constexpr std::size_t kLeastColumns = 4;
+// Share of the points at each end of an axis that do not count for the extent [not recorded]
+inline constexpr double kOutliers = 0.002;
+// The upper end of that range [not recorded]
+inline constexpr double kUpperEnd = 0.998;
+// Quantile of the heights in a cell that is its ground [not recorded]
+inline constexpr double kLowQuantile = 0.01;
+// Quantile of the heights in a cell that is its canopy [not recorded]
+inline constexpr double kHighQuantile = 0.98;
+// Quantile of the steps between cells that is the rise of the ground within one [not recorded]
+inline constexpr double kRiseQuantile = 0.75;
+// Quantile of the heights of columns that is the height of the stand [not recorded]
+inline constexpr double kHeightQuantile = 0.9;
+// Rounds in which the plane of the ground is fitted to what is near it [bound: convergence]
+inline constexpr int kPlaneRounds = 6;
+// Median distances from the plane beyond which a cell is not near it [not recorded]
+inline constexpr double kPlaneMedians = 2.5;
 }  // namespace cloud_shape
 
 namespace inventory {  // forest/inventory.cc
@@ -76,6 +94,11 @@ inline constexpr double kHighest = 120.0;
 inline constexpr double kMargin = 1.0;
 // m around a stem whose points are kept for a look at it [chosen]
 inline constexpr double kSegmentReach = 1.5;
+// Returns per square metre near breast height: with fewer, trees are missing [real clouds,
+// docs/method/forest.md]
+inline constexpr double kSparse = 20.0;
+// Share of the cells of the terrain that were seen: with less it is said [not recorded]
+inline constexpr double kLeastMeasured = 0.2;
 }  // namespace inventory
 
 namespace cloth {  // forest/ground/cloth.cc
@@ -94,6 +117,8 @@ namespace ground {  // forest/ground/ground.cc
 inline constexpr float kNear = 0.4F;
 // m: a point so far under its neighbours is a stray one [chosen]
 inline constexpr float kStrayDepth = 0.8F;
+// Cells: a touched place that sticks out by more is no ground [not recorded]
+inline constexpr double kBumpCells = 0.3;
 }  // namespace ground
 
 namespace low_noise {  // forest/ground/low_noise.cc
@@ -182,11 +207,71 @@ inline constexpr double kMostInside = 0.35;
 inline constexpr double kFewSlicesClutter = 0.25;
 // radii: error of its radius at most [tuned on simulated maps]
 inline constexpr double kFewSlicesSd = 0.35;
+// Slices that a thick one of the second search holds [not recorded]
+inline constexpr double kThickSlices = 3.0;
+// Thick slices that show a stem at least [not recorded]
+inline constexpr int kLeastThickSlices = 2;
+// m: distance of connected points in a thin slice [not recorded]
+inline constexpr double kThinReach = 0.08;
+// m: the same in a thick slice [not recorded]
+inline constexpr double kThickReach = 0.12;
+// m: half of the width of a circle's band in a thin slice [not recorded]
+inline constexpr double kThinBand = 0.02;
+// m: the same in a thick slice [not recorded]
+inline constexpr double kThickBand = 0.025;
+// Of the least diameter: radius of a circle at least, as the edge of a stem is blurred [not
+// recorded]
+inline constexpr double kLeastRadiusShare = 0.4;
+// Radii: scatter of a column that stands alone at most ... [not recorded]
+inline constexpr double kAloneScatterShare = 0.4;
+// ... and m, added [not recorded]
+inline constexpr double kAloneScatter = 0.006;
+// Share of the least arc that has to be seen evenly [not recorded]
+inline constexpr double kEvenArcOfLeast = 0.8;
+// Points a slice: more are many [not recorded]
+inline constexpr int kDensePointsPerSlice = 12;
+// m: scatter of a stem at most, or ... [not recorded]
+inline constexpr double kMostScatter = 0.012;
+// ... radii, whichever is more ... [not recorded]
+inline constexpr double kMostScatterShare = 0.2;
+// ... and m, added to either [not recorded]
+inline constexpr double kScatterSlack = 0.008;
+// Share of all slices that show a stem without a doubt [not recorded]
+inline constexpr double kShownByMost = 0.8;
+// Share of all slices below which a piece that was seen well is cut off [not recorded]
+inline constexpr double kShownByFew = 0.4;
+// Stems whose centres are nearer than this share of both radii are one [not recorded]
+inline constexpr double kSameOfBoth = 0.85;
+// So are stems whose centres are nearer than the larger radius and this share of the smaller one
+// [not recorded]
+inline constexpr double kSameOfSmaller = 0.3;
+// Scatters: points so near to the surface are those of the stem [not recorded]
+inline constexpr double kClaimScatters = 2.5;
+// m: the same at least [not recorded]
+inline constexpr double kClaimBand = 0.015;
+// m around the radius in which points of a leaning stem are looked for [not recorded]
+inline constexpr double kLeanReach = 1.2;
+// m beyond the radius whose points belong to a stem [not recorded]
+inline constexpr double kExplainedMargin = 0.06;
+// m beyond the radius of a start in which its points are looked for [not recorded]
+inline constexpr double kStartReach = 0.4;
+// m beyond the radius whose points enter the fit [not recorded]
+inline constexpr double kFitReach = 0.35;
 }  // namespace stem_detector
 
 namespace ring_linker {  // forest/stems/ring_linker.cc
 // m: edge of the cells in which rings of other slices are looked for [chosen]
 inline constexpr double kCell = 1.0;
+// m by which the radii of two rings of one stem differ at most ... [not recorded]
+inline constexpr double kSameRadius = 0.03;
+// ... and of the larger radius, added [not recorded]
+inline constexpr double kSameRadiusShare = 0.3;
+// m to the side of a ring where the next one of a vertical stem may lie [not recorded]
+inline constexpr double kBesideReach = 0.05;
+// m that a ring may lie off the line at most ... [not recorded]
+inline constexpr double kOffLine = 0.04;
+// ... and radii, added [not recorded]
+inline constexpr double kOffLineShare = 0.2;
 }  // namespace ring_linker
 
 namespace stem_fit {  // forest/stems/stem_fit.cc
@@ -210,6 +295,48 @@ inline constexpr double kLinear = 1.5;
 inline constexpr double kMapError = 0.002;
 // points that a fit takes [bound: time]
 inline constexpr std::size_t kEnoughPoints = 400;
+// Scatters beyond which a point has no weight (Tukey) [not recorded]
+inline constexpr double kReachScatters = 4.0;
+// m from the surface of the start: points that a fit takes [not recorded]
+inline constexpr double kSampleReach = 0.15;
+// Standard deviation over the median of absolute values [bound: normal distribution]
+inline constexpr double kMadToSd = 1.4826;
+// Scatters: points so near to the surface are on it [not recorded]
+inline constexpr double kBandScatters = 2.5;
+// m: the same at least [not recorded]
+inline constexpr double kLeastBand = 0.015;
+// Bands under the surface from which on a point is inside ... [not recorded]
+inline constexpr double kInsideBands = 2.0;
+// ... or radii under it, whichever is more [not recorded]
+inline constexpr double kInsideShare = 0.3;
+// m: radius of a thin start at least [not recorded]
+inline constexpr double kThinRadius = 0.02;
+// Spreads of the points in the plane that make its radius [not recorded]
+inline constexpr double kThinSpreads = 0.7;
+// m: scatter that a fit begins with at least [not recorded]
+inline constexpr double kFirstScatter = 0.015;
+// m from the surface: points that tell the scatter [not recorded]
+inline constexpr double kScatterReach = 0.05;
+// Steps of a fit at most [bound: convergence]
+inline constexpr int kMostSteps = 12;
+// m: a fit that steps farther has failed [not recorded]
+inline constexpr double kLongestStep = 0.3;
+// Of the least diameter: a fit with a smaller radius has failed [not recorded]
+inline constexpr double kLeastRadiusShare = 0.3;
+// Steps before the scatter is taken from the points [not recorded]
+inline constexpr int kFixedScatterSteps = 3;
+// m: a fit whose step is shorter has ended [not recorded]
+inline constexpr double kSettled = 2e-4;
+// m outside of the surface: points that the noisy cylinder is fitted to [not recorded]
+inline constexpr double kRefineReach = 0.1;
+// Radii: with more scatter a thin stem is tried as well [not recorded]
+inline constexpr double kThinTryScatter = 0.12;
+// Share of the directions that show a surface: with less a thin stem is tried [not recorded]
+inline constexpr double kThinTryFill = 0.7;
+// Share of the arc that is seen evenly: with less a thin stem is tried [not recorded]
+inline constexpr double kThinTryArc = 0.5;
+// Share of points off the surface that a thin stem may have more [not recorded]
+inline constexpr double kThinStrays = 0.05;
 }  // namespace stem_fit
 
 namespace noisy_cylinder {  // forest/stems/noisy_cylinder.cc
@@ -221,6 +348,41 @@ inline constexpr double kMostScatter = 0.06;
 inline constexpr int kViews = 24;
 // Share of a direction that gave nothing: keeps logarithms finite [bound: rounding]
 inline constexpr double kLeastView = 1e-4;
+// m: scatter that a fit begins with at least [not recorded]
+inline constexpr double kFirstScatterLeast = 0.01;
+// m: the same at most [not recorded]
+inline constexpr double kFirstScatterMost = 0.03;
+// m beyond the radius over which points of no stem are spread [not recorded]
+inline constexpr double kStrayReach = 0.1;
+// Points of a fit at least [bound: six parameters]
+inline constexpr std::size_t kFewestPoints = 8;
+// m: a fit whose step is shorter has ended [not recorded]
+inline constexpr double kSettled = 4e-5;
+// Times that an extrapolation goes beyond a step at most [not recorded]
+inline constexpr double kMostStretch = 6.0;
+// Scatters between places on the circumference: the scatter blurs the gaps [not recorded]
+inline constexpr double kBinScatters = 0.8;
+// Places on the circumference at least [not recorded]
+inline constexpr double kFewestBins = 24.0;
+// Places on the circumference at most [bound: time]
+inline constexpr double kMostBins = 160.0;
+// Standard deviations of the angle from which a point may have come [bound: the rest is below 0.1
+// %]
+inline constexpr double kBlurReach = 3.5;
+// Share of the points that must lie on the surface [not recorded]
+inline constexpr double kLeastWeight = 0.2;
+// m: a fit with a smaller radius has failed [not recorded]
+inline constexpr double kLeastRadius = 0.008;
+// m: a fit that goes farther from its start has failed [not recorded]
+inline constexpr double kFarthest = 0.5;
+// Share of points off the surface that a fit begins with [not recorded]
+inline constexpr double kFirstStrays = 0.05;
+// The same at least [not recorded]
+inline constexpr double kLeastStrays = 0.005;
+// The same at most [not recorded]
+inline constexpr double kMostStrays = 0.5;
+// Rounds in which the seen directions are found [bound: convergence]
+inline constexpr int kViewRounds = 4;
 }  // namespace noisy_cylinder
 
 namespace standing_direction {  // forest/stems/standing_direction.cc
@@ -261,6 +423,9 @@ inline constexpr double kCell = 1.0;
 inline constexpr int kLargestGap = 3;
 // m over the slices: less is no tree top [chosen]
 inline constexpr double kLeastAbove = 1.5;
+// m above breast height over which a stem leans as it does below; farther up it stands upright
+// [not recorded]
+inline constexpr double kStraight = 6.0;
 }  // namespace tree_heights
 
 namespace tree_segments {  // forest/trees/tree_segments.cc
@@ -271,5 +436,32 @@ inline constexpr double kThin = 0.05;
 // points of a picture [bound: size of the report]
 inline constexpr std::size_t kMostPoints = 60'000;
 }  // namespace tree_segments
+
+namespace circle_search {  // forest/stems/circle_search.cc
+// Pairs of points that are tried with a drawn one [bound: time]
+inline constexpr int kTriesPerDraw = 9;
+// m: edge of the cells that count points on a circle [bound: time]
+inline constexpr float kFineCell = 0.08F;
+// m: edge of the cells that points are drawn from [bound: time]
+inline constexpr float kCoarseCell = 0.3F;
+// Share of the seen arc that has to be seen evenly [not recorded]
+inline constexpr double kEvenArcShare = 0.3;
+// Bands: scatter of a circle at most, or ... [not recorded]
+inline constexpr double kMostScatterBands = 0.6;
+// ... radii, whichever is more [not recorded]
+inline constexpr double kMostScatterShare = 0.12;
+// m: distances of the three points that a circle is drawn through, in turn [not recorded]
+inline constexpr std::array<float, 4> kScales = {0.08F, 0.2F, 0.45F, 0.9F};
+// Draws of a group at least [bound: time]
+inline constexpr std::size_t kFewestDraws = 24;
+// Points of a group for each further draw [bound: time]
+inline constexpr std::size_t kPointsPerDraw = 8;
+// Draws of a group at most [bound: time]
+inline constexpr std::size_t kMostDraws = 150;
+// m: a circle counts by the power 0.7 of its radius and this [not recorded]
+inline constexpr double kLengthOffset = 0.15;
+// Points on a circle that one inside it outweighs [not recorded]
+inline constexpr double kInsideWeight = 1.5;
+}  // namespace circle_search
 
 }  // namespace understory::forest_constants

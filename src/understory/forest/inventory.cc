@@ -125,7 +125,7 @@ void remark(const Gathered& gathered, const InventoryConfig& config, InventoryRe
   for (const SlicePoint& point : result.slices)
     returns += point.returns;
   const double near_breast = static_cast<double>(returns) / std::max(1.0, result.area_m2);
-  result.too_sparse = near_breast < 20.0;
+  result.too_sparse = near_breast < kSparse;
   if (returns == 0) {
     result.remarks.push_back(fmt::format(
         "No point lies between {} and {} m above the lowest points: the ground below the trees is "
@@ -138,7 +138,7 @@ void remark(const Gathered& gathered, const InventoryConfig& config, InventoryRe
         "and canopy models are not affected.",
         near_breast, config.stems.lowest_m, config.stems.highest_m, per_m2));
   }
-  if (result.ground.measured_share < 0.2) {
+  if (result.ground.measured_share < kLeastMeasured) {
     result.remarks.push_back(fmt::format(
         "Ground was seen in only {:.0f} % of the terrain model's cells; between them it is "
         "interpolated, and with it the height at which diameters are taken.",

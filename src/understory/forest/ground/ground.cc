@@ -256,8 +256,8 @@ GroundModel estimate_ground(const PointBlocks& cloud, const GroundConfig& config
   for (std::size_t i = 0; i < floor.size(); ++i) {
     if (floor[i] - cloth[i] <= static_cast<float>(config.touch_m)) terrain.values[i] = floor[i];
   }
-  drop_bumps(terrain, static_cast<float>(0.3 * config.cell_m));
-  drop_bumps(terrain, static_cast<float>(0.3 * config.cell_m));
+  drop_bumps(terrain, static_cast<float>(kBumpCells * config.cell_m));
+  drop_bumps(terrain, static_cast<float>(kBumpCells * config.cell_m));
   fill_gaps(terrain, static_cast<int>(std::ceil(config.max_gap_m / config.cell_m)));
   model.measured_share = refine(cloud, config, terrain);
   return model;

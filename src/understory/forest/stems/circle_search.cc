@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
@@ -13,7 +14,8 @@
 namespace understory {
 namespace {
 
-constexpr int kTriesPerDraw = 9;
+using namespace forest_constants::circle_search;
+
 using PointList = std::vector<Eigen::Vector2f>;
 
 // Points sorted into square cells, so that those near a place are found without looking at all.
@@ -196,8 +198,8 @@ class GroupSearch {
     const Eigen::Vector2f extent = extent_of(points_);
     const int max_failures = 2 + static_cast<int>(0.5F * extent.x() * extent.y());
     while (static_cast<int>(points_.size()) >= config_.min_points && failures < max_failures) {
-      const CellIndex fine(points_, 0.08F);
-      const CellIndex coarse(points_, 0.3F);
+      const CellIndex fine(points_, kFineCell);
+      const CellIndex coarse(points_, kCoarseCell);
       const Circle sampled = sample(fine, coarse);
       if (sampled.on < config_.min_points) break;
       const Circle circle = refine_circle(points_, sampled, config_.band_m);
@@ -226,15 +228,15 @@ class GroupSearch {
   [[nodiscard]] bool acceptable(const Circle& circle) const {
     return circle.on >= config_.min_points && circle.radius_m >= config_.min_radius_m &&
            circle.radius_m <= config_.max_radius_m && circle.arc_deg >= config_.min_arc_deg &&
-           circle.even_deg >= 0.3 * circle.arc_deg && 2 * circle.inside <= circle.on &&
-           circle.rms_m <= std::max(0.6 * config_.band_m, 0.12 * circle.radius_m);
+           circle.even_deg >= kEvenArcShare * circle.arc_deg && 2 * circle.inside <= circle.on &&
+           circle.rms_m <=
+               std::max(kMostScatterBands * config_.band_m, kMostScatterShare * circle.radius_m);
   }
 
   // The best of many circles through three points near each other.
   Circle sample(const CellIndex& fine, const CellIndex& coarse) {
-    constexpr std::array<float, 4> kScales = {0.08F, 0.2F, 0.45F, 0.9F};
     const std::size_t n = points_.size();
-    const std::size_t draws = std::min<std::size_t>(24 + n / 8, 150);
+    const std::size_t draws = std::min<std::size_t>(kFewestDraws + n / kPointsPerDraw, kMostDraws);
     Circle best;
     double best_score = 0.0;
     for (std::size_t draw = 0; draw < draws; ++draw) {
@@ -276,7 +278,7 @@ class GroupSearch {
 
   // (0.15 m + radius)^0.7, nearly: products of roots are cheaper than powers.
   static double length_of(double radius_m) {
-    const double root = std::sqrt(0.15 + radius_m);
+    const double root = std::sqrt(kLengthOffset + radius_m);
     const double eighth = std::sqrt(std::sqrt(root));
     return root * eighth * std::sqrt(eighth);
   }
@@ -294,7 +296,7 @@ class GroupSearch {
     int possible = 0;
     for (const auto& [begin, end] : ring_)
       possible += static_cast<int>(end - begin);
-    if ((possible - 1.5 * inside) / length <= best) return 0.0;
+    if ((possible - kInsideWeight * inside) / length <= best) return 0.0;
     int on = 0;
     for (const auto& [begin, end] : ring_) {
       for (std::uint32_t i = begin; i < end; ++i) {

@@ -63,20 +63,20 @@ class Estimator {
     }
     radius_ = start.radius_m;
     taper_ = start.taper;
-    scatter_ = std::clamp(start.rms_m, 0.01, 0.03);
-    const double reach = radius_ + 0.1;
+    scatter_ = std::clamp(start.rms_m, kFirstScatterLeast, kFirstScatterMost);
+    const double reach = radius_ + kStrayReach;
     stray_density_ = 1.0 / (M_PI * reach * reach);
   }
 
   NoisyCylinder run() {
     NoisyCylinder result;
-    if (flat_.size() < 8) return result;
+    if (flat_.size() < kFewestPoints) return result;
     spread_bins();
     for (int cycle = 0; cycle < config_.cycles; ++cycle) {
       const Vector6 start = parameters();
       if (!step(result)) return result;
       const Vector6 first = parameters() - start;
-      if (first.norm() < 4e-5) break;
+      if (first.norm() < kSettled) break;
       const Vector6 once = parameters();
       if (!step(result)) return result;
       extrapolate(start, first, parameters() - once);
@@ -108,7 +108,7 @@ class Estimator {
   void extrapolate(const Vector6& start, const Vector6& first, const Vector6& second) {
     const Vector6 change = second - first;
     if (change.norm() < 1e-12) return;
-    const double length = std::clamp(first.norm() / change.norm(), 1.0, 6.0);
+    const double length = std::clamp(first.norm() / change.norm(), 1.0, kMostStretch);
     const Vector6 found = start + 2.0 * length * first + length * length * change;
     if (found[4] < 0.5 * radius_ || found[4] > 2.0 * radius_) return;
     centre_ = found.head<2>();
@@ -119,8 +119,8 @@ class Estimator {
 
   // Places on the circumference, near enough to each other that the scatter blurs the gaps.
   void spread_bins() {
-    const double wanted = 2.0 * M_PI * radius_ / (0.8 * scatter_);
-    const auto count = static_cast<std::size_t>(std::clamp(wanted, 24.0, 160.0));
+    const double wanted = 2.0 * M_PI * radius_ / (kBinScatters * scatter_);
+    const auto count = static_cast<std::size_t>(std::clamp(wanted, kFewestBins, kMostBins));
     visible_.assign(count, 1.0 / static_cast<double>(count));
     views_.assign(kViews, 1.0 / kViews);
     lobes_.assign(kViews, std::vector<double>(count));
@@ -156,7 +156,7 @@ class Estimator {
     const double distance = q.norm();
     // Only places near the point's own angle can have given it.
     const auto count = static_cast<int>(visible_.size());
-    const double width = 3.5 * scatter_ / std::sqrt(std::max(1e-8, r * distance));
+    const double width = kBlurReach * scatter_ / std::sqrt(std::max(1e-8, r * distance));
     const int reach =
         width >= M_PI ? count / 2 : static_cast<int>(width / (2.0 * M_PI) * count) + 1;
     const int middle =
@@ -215,7 +215,7 @@ class Estimator {
     std::vector<double> seen(visible_.size(), 0.0);
     for (const FlatPoint& point : flat_)
       add_point(point, sums, seen);
-    if (sums.weight < 0.2 * total_) return false;
+    if (sums.weight < kLeastWeight * total_) return false;
     result.log_likelihood = sums.log_likelihood / total_;
     const double s2 = scatter_ * scatter_;
     const auto prior = [&](int i, double value, double sd) {
@@ -228,14 +228,15 @@ class Estimator {
     const Matrix6 normal = sums.normal.selfadjointView<Eigen::Upper>();
     const Eigen::LDLT<Matrix6> solver(normal);
     const Vector6 found = solver.solve(sums.right);
-    if (!found.allFinite() || found[4] < 0.008 || found.head<2>().norm() > 0.5) return false;
+    if (!found.allFinite() || found[4] < kLeastRadius || found.head<2>().norm() > kFarthest)
+      return false;
     centre_ = found.head<2>();
     slope_ = found.segment<2>(2);
     radius_ = found[4];
     taper_ = found[5];
     result.covariance = s2 * solver.solve(Matrix6::Identity());
     scatter_ = std::clamp(std::sqrt(0.5 * sums.square / sums.weight), kLeastScatter, kMostScatter);
-    strays_ = std::clamp(1.0 - sums.weight / total_, 0.005, 0.5);
+    strays_ = std::clamp(1.0 - sums.weight / total_, kLeastStrays, kMostStrays);
     learn_views(seen);
     return true;
   }
@@ -244,8 +245,7 @@ class Estimator {
   // the cosine of their angle to it, and none beyond a right angle: what is seen is a sum of such
   // lobes. That ties the radius to the width seen where the side away from the scanner is unknown.
   void learn_views(const std::vector<double>& seen) {
-    constexpr int kRounds = 4;
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kViewRounds; ++round) {
       double sum = 0.0;
       for (std::size_t k = 0; k < views_.size(); ++k) {
         double gain = 0.0;
@@ -273,7 +273,7 @@ class Estimator {
   double radius_ = 0.0;
   double taper_ = 0.0;
   double scatter_ = 0.0;
-  double strays_ = 0.05;
+  double strays_ = kFirstStrays;
   double stray_density_ = 1.0;
   std::vector<double> visible_;  // share of the returns that come from each place
   std::vector<Eigen::Vector2d> outward_;

@@ -20,7 +20,7 @@ struct Line {
 
 bool rings_agree(const Ring& a, const Ring& b) {
   const double larger = std::max(a.circle.radius_m, b.circle.radius_m);
-  return std::abs(a.circle.radius_m - b.circle.radius_m) <= 0.03 + 0.3 * larger;
+  return std::abs(a.circle.radius_m - b.circle.radius_m) <= kSameRadius + kSameRadiusShare * larger;
 }
 
 // Rings by square of the ground.
@@ -133,10 +133,10 @@ class Linker {
     std::size_t slices = 1;
     for (auto& entry : best_in_slice_)
       entry.second = nullptr;
-    index_.near(seed.circle.centre, 0.05 + lean_ * span_m_, [&](std::uint32_t i) {
+    index_.near(seed.circle.centre, kBesideReach + lean_ * span_m_, [&](std::uint32_t i) {
       const Ring& ring = rings_[i];
       const double rise = std::abs(ring.height_m - seed.height_m);
-      const double reach = 0.05 + lean_ * rise;
+      const double reach = kBesideReach + lean_ * rise;
       if (used_[i] != 0 || !rings_agree(ring, seed) ||
           (ring.circle.centre - seed.circle.centre).squaredNorm() > reach * reach) {
         return;
@@ -164,7 +164,7 @@ class Linker {
   std::vector<const Ring*> supporters(const Line& line, const Ring& seed) {
     for (auto& entry : best_in_slice_)
       entry.second = nullptr;
-    const double most = 0.04 + 0.2 * seed.circle.radius_m;
+    const double most = kOffLine + kOffLineShare * seed.circle.radius_m;
     for (const Ring* ring : near_) {
       const Eigen::Vector2d place = line.at_breast + (ring->height_m - kBreastHeight) * line.slope;
       const double off = (ring->circle.centre - place).squaredNorm();

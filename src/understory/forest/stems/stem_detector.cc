@@ -74,8 +74,8 @@ class PointIndex {
 struct Cut {
   double thickness_m = 0.25;
   int min_slices = 3;
-  double reach_m = 0.08;
-  double band_m = 0.02;
+  double reach_m = kThinReach;
+  double band_m = kThinBand;
 };
 
 std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
@@ -93,7 +93,7 @@ std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
     slices[slice].emplace_back(points[i].x, points[i].y);
   }
   CircleSearchConfig search;
-  search.min_radius_m = 0.4 * config.min_dbh_m;
+  search.min_radius_m = kLeastRadiusShare * config.min_dbh_m;
   search.max_radius_m = 0.5 * config.max_dbh_m;
   search.reach_m = cut.reach_m;
   search.band_m = cut.band_m;
@@ -128,7 +128,7 @@ bool stands_alone(const StemFitResult& fit, double slices_between, double lean_d
   return fit.stem.radius_m <= kSlimRadius && e.outside_ratio <= kAloneOutside &&
          lean_deg <= kAloneLeanDeg && fit.stem.highest_m - fit.stem.lowest_m >= kAloneExtent &&
          e.slices >= kAloneSlices * slices_between && e.even_arc_deg >= kAloneArcDeg &&
-         e.scatter_m <= 0.4 * fit.stem.radius_m + 0.006;
+         e.scatter_m <= kAloneScatterShare * fit.stem.radius_m + kAloneScatter;
 }
 
 // Is it a stem, or a bush that a cone happens to fit?
@@ -151,21 +151,22 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
       extent < std::max(kLeastExtent, 2.0 * cut.thickness_m) ||
       stem.lowest_m > kBreastHeight + kBeginsAbove ||  // a branch or a crown, not a stem
       stem.arc_deg < config.min_arc_deg ||
-      e.even_arc_deg < std::max(0.8 * config.min_arc_deg, kEvenArcShare * stem.arc_deg) ||
+      e.even_arc_deg <
+          std::max(kEvenArcOfLeast * config.min_arc_deg, kEvenArcShare * stem.arc_deg) ||
       dbh_sd > kDbhSd + kDbhSdShare * dbh) {
     return false;
   }
   if (stands_alone(fit, slices_between, lean_deg)) return true;
   // Where points are many, a stem shows in thin slices; what only thick ones show has to be clean.
   const double clutter = e.inside_ratio + e.outside_ratio;
-  const bool dense = e.on > 12 * e.slices;
+  const bool dense = e.on > kDensePointsPerSlice * e.slices;
   if (cut.min_slices < config.min_slices && dense &&
       (clutter > kThickOnlyClutter || e.scatter_m > kThickOnlyScatter)) {
     return false;
   }
   return 4 * e.inside <= e.on && e.inside_ratio <= kMostInside &&
          clutter <= max_clutter(fit, lean_deg) &&
-         e.scatter_m <= std::max(0.012, 0.2 * stem.radius_m) + 0.008;
+         e.scatter_m <= std::max(kMostScatter, kMostScatterShare * stem.radius_m) + kScatterSlack;
 }
 
 // After the refined fit, which may have found a much thinner stem in the circle's edge. What shows
@@ -182,18 +183,19 @@ bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
     return false;
   }
   const double all = (config.highest_m - config.lowest_m) / config.slice_m;
-  if (e.slices >= 0.8 * all) return true;
+  if (e.slices >= kShownByMost * all) return true;
   const double sd = std::sqrt(std::max(0.0, stem.covariance(2, 2)));
   return e.inside_ratio + e.outside_ratio <= kFewSlicesClutter &&
          sd <= kFewSlicesSd * stem.radius_m &&
-         (e.slices >= 0.4 * all || e.returns < kWellSeen * e.slices);
+         (e.slices >= kShownByFew * all || e.returns < kWellSeen * e.slices);
 }
 
 bool same_stem(const StemFit& a, const StemFit& b) {
   const double larger = std::max(a.radius_m, b.radius_m);
   const double smaller = std::min(a.radius_m, b.radius_m);
   // Stems do not overlap; what does so by more than the fits' errors is one stem.
-  return (a.centre - b.centre).norm() < std::max(0.85 * (larger + smaller), larger + 0.3 * smaller);
+  return (a.centre - b.centre).norm() <
+         std::max(kSameOfBoth * (larger + smaller), larger + kSameOfSmaller * smaller);
 }
 
 // Best supported first: many returns, evenly on the parts that were seen.
@@ -212,9 +214,9 @@ void sort_by_support(std::vector<StemFitResult>& fits) {
 int unclaimed_returns(const StemFitResult& fit, const PointIndex& index,
                       const std::vector<SlicePoint>& points, const std::vector<char>& explained) {
   const StemAxis axis(fit.stem);
-  const double band = std::max(2.5 * fit.evidence.scatter_m, 0.015);
+  const double band = std::max(kClaimScatters * fit.evidence.scatter_m, kClaimBand);
   std::uint64_t returns = 0;
-  index.near(fit.stem.centre, fit.stem.radius_m + 1.2, [&](std::size_t i) {
+  index.near(fit.stem.centre, fit.stem.radius_m + kLeanReach, [&](std::size_t i) {
     if (explained[i] == 0 && std::abs(axis.surface_error(points[i])) <= band)
       returns += points[i].returns;
   });
@@ -225,8 +227,8 @@ int unclaimed_returns(const StemFitResult& fit, const PointIndex& index,
 void mark_explained(const StemFit& stem, const PointIndex& index,
                     const std::vector<SlicePoint>& points, std::vector<char>& explained) {
   const StemAxis axis(stem);
-  index.near(stem.centre, stem.radius_m + 1.2, [&](std::size_t i) {
-    if (axis.place(points[i]).distance_m <= stem.radius_m + 0.06) explained[i] = 1;
+  index.near(stem.centre, stem.radius_m + kLeanReach, [&](std::size_t i) {
+    if (axis.place(points[i]).distance_m <= stem.radius_m + kExplainedMargin) explained[i] = 1;
   });
 }
 
@@ -257,8 +259,9 @@ std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
   const PointIndex index(points);
   std::vector<char> explained(points.size(), 0);
   std::vector<StemFit> stems;
-  const std::vector<Cut> cuts = {{config.slice_m, config.min_slices, 0.08, 0.02},
-                                 {3.0 * config.slice_m, 2, 0.12, 0.025}};
+  const std::vector<Cut> cuts = {
+      {config.slice_m, config.min_slices, kThinReach, kThinBand},
+      {kThickSlices * config.slice_m, kLeastThickSlices, kThickReach, kThickBand}};
   for (const Cut& cut : cuts) {
     const std::vector<Ring> rings = find_rings(points, explained, cut, config);
     const std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
@@ -267,10 +270,10 @@ std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
     parallel_for(starts.size(), 1, [&](std::size_t i) {
       const StemFit& start = starts[i];
       const double reach =
-          start.radius_m + 0.4 + start.slope.norm() * (config.highest_m - kBreastHeight);
+          start.radius_m + kStartReach + start.slope.norm() * (config.highest_m - kBreastHeight);
       std::vector<SlicePoint> near;
       const StemAxis axis(start);
-      const double within = start.radius_m + 0.35;
+      const double within = start.radius_m + kFitReach;
       index.near(start.centre, reach, [&](std::size_t k) {
         if (explained[k] == 0 && axis.may_be_within(points[k], within) &&
             axis.place(points[k]).distance_m < within) {

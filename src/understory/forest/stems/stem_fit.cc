@@ -29,7 +29,7 @@ struct System {
 System build_system(const std::vector<SlicePoint>& points, const StemFit& stem,
                     const StemFit& start, double scatter) {
   System system;
-  const double reach = 4.0 * scatter;
+  const double reach = kReachScatters * scatter;
   const double upright = 1.0 / std::sqrt(1.0 + stem.slope.squaredNorm());
   const StemAxis axis(stem);
   for (const SlicePoint& point : points) {
@@ -62,11 +62,10 @@ System build_system(const std::vector<SlicePoint>& points, const StemFit& stem,
 
 // Enough points to fit by: those near the surface of the start, every n-th where they are many.
 std::vector<SlicePoint> sample_of(const std::vector<SlicePoint>& points, const StemFit& start) {
-  constexpr double kReach = 0.15;
   std::vector<SlicePoint> near;
   const StemAxis axis(start);
   for (const SlicePoint& point : points) {
-    if (std::abs(axis.surface_error(point)) < kReach) near.push_back(point);
+    if (std::abs(axis.surface_error(point)) < kSampleReach) near.push_back(point);
   }
   const std::size_t stride = near.size() / kEnoughPoints + 1;
   std::vector<SlicePoint> some;
@@ -94,7 +93,7 @@ double scatter_of(const std::vector<SlicePoint>& points, const StemFit& stem, do
   std::size_t middle = 0;
   for (; middle + 1 < kSteps && 2 * passed < returns; ++middle)
     passed += counts[middle];
-  return std::clamp(1.4826 * kStep * (static_cast<double>(middle) - 0.5), kLeastScatter,
+  return std::clamp(kMadToSd * kStep * (static_cast<double>(middle) - 0.5), kLeastScatter,
                     kMostScatter);
 }
 
@@ -159,8 +158,8 @@ void judge(const std::vector<SlicePoint>& points, const StemDetectorConfig& conf
   const double scatter = result.evidence.scatter_m;
   StemEvidence evidence;
   evidence.scatter_m = scatter;
-  const double band = std::max(2.5 * scatter, 0.015);
-  const double within = -std::max(2.0 * band, 0.3 * stem.radius_m);
+  const double band = std::max(kBandScatters * scatter, kLeastBand);
+  const double within = -std::max(kInsideBands * band, kInsideShare * stem.radius_m);
   ArcBins arc;
   Patches patches(config);
   int inner = 0;
@@ -226,8 +225,8 @@ StemFit thin_start(const std::vector<SlicePoint>& points, const StemFit& start) 
   if (weight <= 0.0) return thin;
   mean /= weight;
   thin.centre += mean;
-  thin.radius_m =
-      std::max(0.02, 0.7 * std::sqrt(std::max(0.0, square / weight - mean.squaredNorm())));
+  thin.radius_m = std::max(
+      kThinRadius, kThinSpreads * std::sqrt(std::max(0.0, square / weight - mean.squaredNorm())));
   return thin;
 }
 
@@ -259,20 +258,21 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
   stem = start;
   stem.taper = kUsualTaper;
   const std::vector<SlicePoint> some = sample_of(points, stem);
-  double scatter = std::max(0.015, scatter_of(some, stem, 0.05));
+  double scatter = std::max(kFirstScatter, scatter_of(some, stem, kScatterReach));
   System system;
-  for (int iteration = 0; iteration < 12; ++iteration) {
+  for (int iteration = 0; iteration < kMostSteps; ++iteration) {
     system = build_system(some, stem, start, scatter);
     if (system.used < 6) return result;
     const Vector6 step = -system.normal.ldlt().solve(system.gradient);
-    if (!step.allFinite() || step.head<2>().norm() > 0.3) return result;
+    if (!step.allFinite() || step.head<2>().norm() > kLongestStep) return result;
     stem.centre += step.head<2>();
     stem.slope += step.segment<2>(2);
     stem.radius_m += step[4];
     stem.taper += step[5];
-    if (stem.radius_m < 0.3 * config.min_dbh_m || stem.radius_m > config.max_dbh_m) return result;
-    if (iteration >= 3) scatter = scatter_of(some, stem, 0.05);
-    if (iteration > 4 && step.norm() < 2e-4) break;
+    if (stem.radius_m < kLeastRadiusShare * config.min_dbh_m || stem.radius_m > config.max_dbh_m)
+      return result;
+    if (iteration >= kFixedScatterSteps) scatter = scatter_of(some, stem, kScatterReach);
+    if (iteration > 4 && step.norm() < kSettled) break;
   }
   result.converged = true;
   result.evidence.scatter_m = scatter;
@@ -291,21 +291,20 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
 
 StemFitResult refine_stem(const std::vector<SlicePoint>& points, const StemFitResult& fit,
                           const StemDetectorConfig& config) {
-  constexpr double kReach = 0.1;
   StemFit start = fit.stem;
   start.rms_m = fit.evidence.scatter_m;
   std::vector<SlicePoint> near;
   const StemAxis axis(start);
   for (const SlicePoint& point : points) {
-    if (axis.surface_error(point) < kReach) near.push_back(point);
+    if (axis.surface_error(point) < kRefineReach) near.push_back(point);
   }
   NoisyCylinder best = fit_noisy_cylinder(near, start, {});
-  if (fit.evidence.scatter_m > 0.12 * start.radius_m || fit.evidence.fill < 0.7 ||
-      fit.evidence.even_arc_deg < 0.5 * start.arc_deg) {
+  if (fit.evidence.scatter_m > kThinTryScatter * start.radius_m ||
+      fit.evidence.fill < kThinTryFill || fit.evidence.even_arc_deg < kThinTryArc * start.arc_deg) {
     const NoisyCylinder thin = fit_noisy_cylinder(near, thin_start(near, start), {});
     // It must not win by leaving out the half of a stem that was seen in few points.
     if (thin.converged && (!best.converged || (thin.log_likelihood > best.log_likelihood &&
-                                               thin.strays < best.strays + 0.05)))
+                                               thin.strays < best.strays + kThinStrays)))
       best = thin;
   }
   StemFitResult result = fit;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "understory/forest/forest_constants.h"
+#include "understory/forest/stems/stem_axis.h"
 
 namespace understory {
 namespace {
@@ -23,7 +24,7 @@ std::uint64_t key(const Eigen::Vector2i& cell) {
 }  // namespace
 
 Eigen::Vector2d stem_place_at(const StemFit& stem, double height_m) {
-  return stem.centre + std::min(height_m - 1.3, 6.0) * stem.slope;
+  return stem.centre + std::min(height_m - kBreastHeight, kStraight) * stem.slope;
 }
 
 TreeColumns::TreeColumns(const std::vector<StemFit>& stems)
