@@ -10,6 +10,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 // The weights of the score of stems stand in stem_score.cc: benchmarks/stem_score.py fits them and
 // writes them there.
@@ -36,6 +37,8 @@ inline constexpr double kFitSd = 0.05;
 inline constexpr double kGrowth = 6.0;
 // m: error of a height where the ground hides [chosen]
 inline constexpr double kMostSd = 1.0;
+// m/m: scatter of lowest returns about a plane, growing with the distance [not recorded]
+inline constexpr double kReliefGrowth = 0.05;
 }  // namespace ground_guess
 
 namespace ring_view {  // features/ring_view.cc
@@ -49,6 +52,28 @@ inline constexpr double kDepthMargin = 0.3;
 inline constexpr float kGap = 1.6F;
 // steps of a ring: one lost return does not cut a run [chosen]
 inline constexpr float kBridged = 2.6F;
+// Steps of azimuth, and bends, that tell what is usual at least [not recorded]
+inline constexpr std::size_t kFewestSteps = 16;
+// Quantile of the steps that is a step without a lost return [not recorded]
+inline constexpr double kUsualQuantile = 0.2;
+// Times that: longer steps have lost a return [not recorded]
+inline constexpr double kMostSteps = 1.5;
+// Steps that three returns in a row span at most [not recorded]
+inline constexpr double kBendSteps = 2.5;
+// m: larger bends are edges [not recorded]
+inline constexpr double kMostBend = 0.2;
+// Median of the absolute value over the standard deviation [bound: normal distribution]
+inline constexpr double kNormalMedian = 0.67;
+// m: noise of a range at least [bound: lidars]
+inline constexpr double kLeastRangeSd = 0.005;
+// m: noise of a range at most [bound: lidars]
+inline constexpr double kMostRangeSd = 0.03;
+// m of range between two returns of one stem at most [not recorded]
+inline constexpr float kMostLink = 0.25F;
+// Standard deviations of a range between them at most, and ... [not recorded]
+inline constexpr float kLinkSds = 4.0F;
+// ... roots of m of their spacing, as a round surface falls off [not recorded]
+inline constexpr float kLinkDepth = 0.4F;
 }  // namespace ring_view
 
 namespace stem_chain {  // features/stem_chain.cc
@@ -65,6 +90,22 @@ inline constexpr double kMeanDepth = std::numbers::pi / 4.0;
 inline constexpr double kUsualTaper = -0.005;
 // m: error of the worst section's centre [chosen]
 inline constexpr double kWorstSection = 0.06;
+// m^2: variance of a centre along the sight at least [not recorded]
+inline constexpr double kLeastAlongVariance = 1e-5;
+// Radii: spread of the depth of a round surface seen from one side [bound: geometry]
+inline constexpr double kDepthSpread = 0.22;
+// m^2: variance of a centre across the sight, added [not recorded]
+inline constexpr double kLeastAcrossVariance = 1e-4;
+// Median widths beyond which something else has widened a section, and ... [not recorded]
+inline constexpr double kWidened = 1.6;
+// ... m, added [not recorded]
+inline constexpr double kWidenedBy = 0.02;
+// m: error of a radius that a stem shows by itself, added [not recorded]
+inline constexpr double kRadiusSd = 0.004;
+// Rounds in which the weights of sections are found [bound: convergence]
+inline constexpr int kFitRounds = 4;
+// Squared Mahalanobis distance that counts for the misfit at most [not recorded]
+inline constexpr double kMostSquare = 25.0;
 }  // namespace stem_chain
 
 namespace stem_segments {  // features/stem_segments.cc
@@ -81,6 +122,32 @@ inline constexpr double kDiameterKnown = 0.025;
 inline constexpr double kUpMatters = 0.03;
 // m above the ground: lowest point of a stem where the ground is unknown [chosen]
 inline constexpr double kUsualStart = 0.3;
+// m: error of a radius that counts for the usual one at most [not recorded]
+inline constexpr double kSureRadius = 0.02;
+// Median differences that make the spread of radii [bound: normal distribution, 1.48]
+inline constexpr double kSpreadMedians = 1.5;
+// m: spread of radii at least [not recorded]
+inline constexpr double kLeastSpread = 0.015;
+// m: spread of radii at most [not recorded]
+inline constexpr double kMostSpread = 0.1;
+// (m/m)^2: variance of a lean that counts for the usual one at most [not recorded]
+inline constexpr double kSureLean = 4e-4;
+// Median of a chi squared of 2 degrees over 2 [bound: statistics]
+inline constexpr double kChiMedian = 0.69;
+// m/m: usual lean at least [not recorded]
+inline constexpr double kLeastLean = 0.015;
+// m above the foot from which on sections tell the diameter [not recorded]
+inline constexpr double kBreastFrom = 0.5;
+// m above the foot up to which they do [not recorded]
+inline constexpr double kBreastTo = 2.3;
+// m beyond the larger radius: segments that are nearer stand at one place [not recorded]
+inline constexpr double kOnePlace = 0.15;
+// Of the least score: chains with less are dropped before what is usual is known [not recorded]
+inline constexpr double kWorthFitting = 0.05;
+// Of the least score: chains with less are dropped before the ground is looked for [not recorded]
+inline constexpr double kWorthGround = 0.3;
+// Score from which on a stem tells where up is [not recorded]
+inline constexpr double kSure = 0.8;
 }  // namespace stem_segments
 
 }  // namespace understory::features_constants

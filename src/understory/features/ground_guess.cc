@@ -78,7 +78,7 @@ std::vector<GroundGuess::Low> GroundGuess::lows_near(const Eigen::Vector2d& midd
       if (std::isnan(point.z())) continue;
       Low low{static_cast<double>(point.x()) - middle.x(),
               static_cast<double>(point.y()) - middle.y(), static_cast<double>(point.z()), 0.0};
-      low.sharpness = 1.0 / (kRelief + 0.05 * std::sqrt(low.x * low.x + low.y * low.y));
+      low.sharpness = 1.0 / (kRelief + kReliefGrowth * std::sqrt(low.x * low.x + low.y * low.y));
       near.push_back(low);
     }
   }

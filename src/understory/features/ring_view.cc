@@ -87,23 +87,24 @@ void RingView::calibrate() {
       if (step > 1e-5) steps.push_back(step);
     }
   }
-  if (steps.size() < 16) return;
-  const double low = median_of(steps, 0.2);
-  std::erase_if(steps, [&](double step) { return step > 1.5 * low; });
+  if (steps.size() < kFewestSteps) return;
+  const double low = median_of(steps, kUsualQuantile);
+  std::erase_if(steps, [&](double step) { return step > kMostSteps * low; });
   step_rad_ = median_of(steps);
   std::vector<double> bends;
   for (const Ring& ring : rings_) {
     for (std::size_t i = 2; i < ring.returns.size(); ++i) {
       const Return& a = ring.returns[i - 2];
       const Return& c = ring.returns[i];
-      if (static_cast<double>(c.azimuth - a.azimuth) > 2.5 * step_rad_) continue;
+      if (static_cast<double>(c.azimuth - a.azimuth) > kBendSteps * step_rad_) continue;
       const double bend = static_cast<double>(a.range - 2.0F * ring.returns[i - 1].range + c.range);
-      if (std::abs(bend) < 0.2) bends.push_back(std::abs(bend));
+      if (std::abs(bend) < kMostBend) bends.push_back(std::abs(bend));
     }
   }
   // A bend of independent errors has sqrt(6) times their spread; 0.67 is the median of |normal|.
-  range_sd_m_ = bends.size() < 16 ? 0.03 : median_of(bends) / (0.67 * std::sqrt(6.0));
-  range_sd_m_ = std::clamp(range_sd_m_, 0.005, 0.03);
+  range_sd_m_ = bends.size() < kFewestSteps ? kMostRangeSd
+                                            : median_of(bends) / (kNormalMedian * std::sqrt(6.0));
+  range_sd_m_ = std::clamp(range_sd_m_, kLeastRangeSd, kMostRangeSd);
 }
 
 // Whether two returns of a ring that follow each other may lie on one stem: its depth falls by up
@@ -113,8 +114,8 @@ bool RingView::linked(const Return& a, const Return& b) const {
   const auto step = static_cast<float>(step_rad_);
   if (b.azimuth - a.azimuth > kBridged * step) return false;
   const float spacing = step * std::min(a.range, b.range);
-  const float most =
-      std::min(0.25F, 4.0F * static_cast<float>(range_sd_m_) + 0.4F * std::sqrt(spacing));
+  const float most = std::min(
+      kMostLink, kLinkSds * static_cast<float>(range_sd_m_) + kLinkDepth * std::sqrt(spacing));
   return std::abs(b.range - a.range) <= most;
 }
 

@@ -27,11 +27,11 @@ Centre centre_of(const StemSection& section, double radius, double radius_sd, do
   const double s = section.spacing_m;
   Centre centre;
   centre.place = section.surface;
-  double along_var = range_sd * range_sd / n + 1e-5;
+  double along_var = range_sd * range_sd / n + kLeastAlongVariance;
   double across_var = 0.0;
   if (section.range_m > 0.0) {
     centre.place += kMeanDepth * radius * along;
-    along_var += std::pow(kMeanDepth * radius_sd, 2) + std::pow(0.22 * radius, 2) / n;
+    along_var += std::pow(kMeanDepth * radius_sd, 2) + std::pow(kDepthSpread * radius, 2) / n;
   }
   const bool hidden_left = section.left == Side::kHidden;
   const bool hidden_right = section.right == Side::kHidden;
@@ -48,7 +48,7 @@ Centre centre_of(const StemSection& section, double radius, double radius_sd, do
   } else {
     across_var = s * s / 24.0;
   }
-  across_var += 1e-4;
+  across_var += kLeastAcrossVariance;
   centre.covariance = along_var * along * along.transpose() + across_var * left * left.transpose();
   return centre;
 }
@@ -252,7 +252,7 @@ OwnRadius own_radius(const SectionView& view, const StemChain& chain, double fro
   }
   if (whole.empty()) return {};
   // Runs that something else has widened are left out.
-  const double most = 1.6 * upper_median(widths) + 0.02;
+  const double most = kWidened * upper_median(widths) + kWidenedBy;
   double sum = 0.0;
   double count = 0.0;
   double variance = 0.0;
@@ -278,7 +278,7 @@ OwnRadius own_radius(const SectionView& view, const StemChain& chain, double fro
   own.spacing_m = spacing / seen;
   own.radius_m = 0.5 * width;
   if (range > 0.0) own.radius_m *= 1.0 + kMeanDepth * own.radius_m / range;
-  own.sd_m = 0.5 * std::sqrt(variance) / count + 0.004;
+  own.sd_m = 0.5 * std::sqrt(variance) / count + kRadiusSd;
   return own;
 }
 
@@ -309,7 +309,7 @@ void fit_chain(const SectionView& view, const StemChainConfig& config, StemChain
   }
   Eigen::Matrix4d information;
   double squares = 0.0;
-  for (int round = 0; round < 4; ++round) {
+  for (int round = 0; round < kFitRounds; ++round) {
     information = prior;
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
     squares = 0.0;
@@ -320,7 +320,7 @@ void fit_chain(const SectionView& view, const StemChainConfig& config, StemChain
       const double distance = off.dot(inverse * off);
       // Student's t with 4 degrees of freedom.
       const double weight = 6.0 / (4.0 + distance);
-      squares += std::min(distance, 25.0);
+      squares += std::min(distance, kMostSquare);
       information += weight * h.transpose() * inverse * h;
       right += weight * h.transpose() * inverse * centres[k].place;
     }

@@ -31,13 +31,14 @@ StemChainConfig with_usual_radius(const SectionView& view, const std::vector<Ste
   for (const StemChain& chain : chains) {
     if (chain.sections.size() < 3 || chain.passed > 0) continue;
     const OwnRadius own = own_radius(view, chain);
-    if (own.radius_m > 0.0 && own.sd_m < 0.02) radii.push_back(own.radius_m);
+    if (own.radius_m > 0.0 && own.sd_m < kSureRadius) radii.push_back(own.radius_m);
   }
   if (radii.size() < 5) return config;
   config.usual_radius_m = upper_median(radii);
   for (double& radius : radii)
     radius = std::abs(radius - config.usual_radius_m);
-  config.radius_spread_m = std::clamp(1.5 * upper_median(radii), 0.015, 0.1);
+  config.radius_spread_m =
+      std::clamp(kSpreadMedians * upper_median(radii), kLeastSpread, kMostSpread);
   return config;
 }
 
@@ -47,12 +48,13 @@ double usual_lean(const std::vector<StemChain>& chains, double before) {
   std::vector<double> squares;
   for (const StemChain& chain : chains) {
     const double own = 0.5 * (chain.line.covariance(2, 2) + chain.line.covariance(3, 3));
-    if (chain.sections.size() < 5 || chain.passed > 0 || own > 4e-4) continue;
+    if (chain.sections.size() < 5 || chain.passed > 0 || own > kSureLean) continue;
     squares.push_back(0.5 * chain.line.state.tail<2>().squaredNorm() - own);
   }
   if (squares.size() < 8) return before;
   // Of two squared normals the mean is chi-squared with 2 degrees over 2: its median is 0.69.
-  return std::clamp(std::sqrt(std::max(0.0, upper_median(squares) / 0.69)), 0.015, before);
+  return std::clamp(std::sqrt(std::max(0.0, upper_median(squares) / kChiMedian)), kLeastLean,
+                    before);
 }
 
 // A chain with what is found out about it in the end.
@@ -83,7 +85,7 @@ StemSegment segment_of(const SectionView& view, double usual_radius_m, const Can
   segment.radius_sd_m = chain.radius_sd_m;
   segment.score = candidate.score;
   if (candidate.ground_m) {
-    const OwnRadius breast = own_radius(view, chain, foot + 0.5, foot + 2.3);
+    const OwnRadius breast = own_radius(view, chain, foot + kBreastFrom, foot + kBreastTo);
     if (breast.sections >= 2 && breast.spacing_m < kFineSpacing * usual_radius_m) {
       segment.dbh_m = 2.0 * breast.radius_m;
       segment.dbh_sd_m = 2.0 * breast.sd_m;
@@ -111,7 +113,7 @@ std::vector<StemSegment> without_doubles(std::vector<StemSegment> segments) {
   std::vector<StemSegment> kept;
   for (const StemSegment& segment : segments) {
     const bool taken = std::any_of(kept.begin(), kept.end(), [&](const StemSegment& other) {
-      const double near = 0.15 + std::max(segment.radius_m, other.radius_m);
+      const double near = kOnePlace + std::max(segment.radius_m, other.radius_m);
       const double middle = 0.5 * (segment.lowest_m + segment.highest_m);
       return (other.foot + middle * other.axis - segment.foot - middle * segment.axis)
                      .head<2>()
@@ -143,7 +145,7 @@ Chains chains_of(const SectionView& view, double min_score) {
   for (StemChain& chain : result.chains)
     fit_chain(view, result.config, chain);
   std::erase_if(result.chains, [&](const StemChain& chain) {
-    return score_without_ground(view, result, chain) < 0.05 * min_score;
+    return score_without_ground(view, result, chain) < kWorthFitting * min_score;
   });
   result.config = with_usual_radius(view, result.chains, result.config);
   result.config.slope_sd = usual_lean(result.chains, result.config.slope_sd);
@@ -158,7 +160,7 @@ std::vector<StemSegment> segments_of(const SectionView& view, Chains& all,
   GroundGuess ground(points);
   std::vector<StemSegment> segments;
   for (StemChain& chain : all.chains) {
-    if (score_without_ground(view, all, chain) < 0.3 * min_score) continue;
+    if (score_without_ground(view, all, chain) < kWorthGround * min_score) continue;
     Candidate candidate;
     const double lowest =
         view.sections()[static_cast<std::size_t>(chain.sections.front())].height_m;
@@ -181,7 +183,7 @@ std::vector<StemSegment> segments_of(const SectionView& view, Chains& all,
 Eigen::Vector3d up_of(const SectionView& view, const Chains& all) {
   std::vector<const StemChain*> sure;
   for (const StemChain& chain : all.chains) {
-    if (chain.sections.size() >= 4 && score_without_ground(view, all, chain) > 0.8)
+    if (chain.sections.size() >= 4 && score_without_ground(view, all, chain) > kSure)
       sure.push_back(&chain);
   }
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();

@@ -10,6 +10,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 namespace understory::graph_constants {
 
@@ -48,6 +49,16 @@ inline constexpr double kStepTilt = 0.2 * kRadPerDegree;
 inline constexpr double kStandLeans = 0.3 * kRadPerDegree;
 // m of way to each side whose views see the same trees [chosen]
 inline constexpr double kSameTrees = 10.0;
+// rad: tilt of a step with little overlap, one standard deviation [not recorded]
+inline constexpr double kWeakTilt = 0.5 * kRadPerDegree;
+// m: shift of such a step, one standard deviation [not recorded]
+inline constexpr double kWeakShift = 0.05;
+// rad: yaw that both views of a step get wrong alike, one standard deviation [not recorded]
+inline constexpr double kStepYaw = 0.02 * kRadPerDegree;
+// m: shift that they get wrong alike, one standard deviation ... [not recorded]
+inline constexpr double kStepShift = 0.005;
+// ... and of the length of the step, added [not recorded]
+inline constexpr double kStepShiftShare = 0.01;
 }  // namespace stem_correction
 
 namespace stem_loops {  // graph/loops/stem_loops.cc
@@ -55,6 +66,18 @@ namespace stem_loops {  // graph/loops/stem_loops.cc
 inline constexpr double kMergeL0 = 0.2;
 // views around a place, to each side, among which the nearest one is looked for [chosen]
 inline constexpr int kNeighbourhood = 30;
+// Factor on the covariance of ICP [not recorded]
+inline constexpr double kLoopVariance = 9.0;
+// rad: tilt of a loop, one standard deviation [not recorded]
+inline constexpr double kLoopTilt = 0.5 * std::numbers::pi / 180.0;
+// rad: yaw that both views of a loop get wrong alike, one standard deviation [not recorded]
+inline constexpr double kLoopYaw = 0.1 * std::numbers::pi / 180.0;
+// L0: shift that they get wrong alike, one standard deviation [not recorded]
+inline constexpr double kLoopShiftL0 = 0.02;
+// Of the overlap with the first view: the nearest one is taken if it has that much [not recorded]
+inline constexpr double kNearestOverlap = 0.8;
+// Of the least overlap: with less no other view is tried [not recorded]
+inline constexpr double kHopeless = 0.5;
 }  // namespace stem_loops
 
 namespace loop_closure {  // graph/loops/loop_closure.cc
@@ -64,6 +87,16 @@ inline constexpr std::size_t kScoringPoints = 1200;
 inline constexpr double kSamePlaceM = 1.0;
 // rad: and turned by less [chosen]
 inline constexpr double kSamePlaceRad = 3.0 * kRadPerDegree;
+// Factor on the distance of starts while they are too many [not recorded]
+inline constexpr double kStepGrowth = 1.2;
+// The same for their headings [not recorded]
+inline constexpr double kYawStepGrowth = 1.1;
+// Steps of the search: nearer starts are neighbours, if their headings are, too [not recorded]
+inline constexpr double kNeighbourSteps = 0.9;
+// Steps of the heading: the same [not recorded]
+inline constexpr double kNeighbourYawSteps = 1.5;
+// Directions in which clouds are shifted for the overlap by chance [bound: time]
+inline constexpr int kChanceShifts = 8;
 }  // namespace loop_closure
 
 namespace view_cone {  // graph/loops/view_cone.cc
@@ -78,6 +111,18 @@ inline constexpr double kAngleShare = 0.98;
 namespace pair_matching {  // graph/stem_matching/pair_matching.cc
 // Outlier ratio of a match at most [chosen]
 inline constexpr double kMostOutliers = 0.9;
+// Factor on the covariance of ICP [not recorded]
+inline constexpr double kMatchVariance = 4.0;
+// rad: tilt of a match, one standard deviation [docs/method/sparse.md: feet look higher the
+// farther they are]
+inline constexpr double kMatchTilt = 2.0 * std::numbers::pi / 180.0;
+// m: height of a match, one standard deviation [docs/method/sparse.md: with 0.15 m the correction
+// made lieksa3 worse in space]
+inline constexpr double kMatchHeight = 0.5;
+// rad: yaw that both views of a match get wrong alike, one standard deviation [not recorded]
+inline constexpr double kMatchYaw = 0.03 * std::numbers::pi / 180.0;
+// L0: shift that they get wrong alike, one standard deviation [not recorded]
+inline constexpr double kMatchShiftL0 = 0.02;
 }  // namespace pair_matching
 
 namespace tree_pattern {  // graph/stem_matching/tree_pattern.cc
@@ -86,5 +131,17 @@ inline constexpr std::size_t kMostStems = 65'535;
 // L0: side of a triangle at least; small triangles look alike [chosen]
 inline constexpr double kShortestSide = 1.0;
 }  // namespace tree_pattern
+
+namespace correction_methods {  // graph/self_correction/correction_methods.cc
+// Share in common that a pair counts with at least [bound: keeps variances finite]
+inline constexpr double kLeastOverlap = 0.05;
+}  // namespace correction_methods
+
+namespace correction_pairs {  // graph/self_correction/correction_pairs.cc
+// views: spacing of the grid of pairs at least [bound: pairs are whole views apart]
+inline constexpr double kLeastSpacing = 0.5;
+// Factor on the spacing from grid to grid [bound: time]
+inline constexpr double kSpacingStep = 0.8;
+}  // namespace correction_pairs
 
 }  // namespace understory::graph_constants

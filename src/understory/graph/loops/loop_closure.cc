@@ -61,8 +61,8 @@ std::vector<Pose> make_starts(const Pose& guess, const LoopInput& input,
     n = static_cast<int>(std::floor(reach / step + 0.5));
     turns = static_cast<int>(std::floor(yaw_reach / yaw_step + 0.5));
     if ((2 * n + 1) * (2 * n + 1) * (2 * turns + 1) <= std::max(config.max_starts, 1)) break;
-    step *= 1.2;
-    yaw_step *= 1.1;
+    step *= kStepGrowth;
+    yaw_step *= kYawStepGrowth;
   }
   std::vector<Pose> starts{guess};
   for (int x = -n; x <= n; ++x) {
@@ -106,8 +106,9 @@ std::vector<Pose> best_starts(const Side& target, const Side& source,
     if (static_cast<int>(best.size()) >= std::max(config.refined_starts, 1)) break;
     const auto near = [&](const Pose& other) {
       const Pose difference = other.inverse() * starts[i];
-      return (other.translation() - starts[i].translation()).norm() < config.search_step_m * 0.9 &&
-             difference.angle() < config.search_yaw_step_deg * kDegree * 1.5;
+      return (other.translation() - starts[i].translation()).norm() <
+                 config.search_step_m * kNeighbourSteps &&
+             difference.angle() < config.search_yaw_step_deg * kDegree * kNeighbourYawSteps;
     };
     if (std::none_of(best.begin(), best.end(), near)) best.push_back(starts[i]);
   }
@@ -133,15 +134,15 @@ bool same_place(const Pose& a, const Pose& b) {
 double chance_overlap(const Structure& target, const Points& source, const Pose& pose,
                       const LoopClosureConfig& config) {
   double sum = 0.0;
-  for (int i = 0; i < 8; ++i) {
-    const double angle = 2.0 * std::numbers::pi * i / 8.0;
+  for (int i = 0; i < kChanceShifts; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / kChanceShifts;
     const Pose shifted(
         pose.rotation(),
         pose.translation() +
             config.contrast_shift_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0));
     sum += target.overlap(source, shifted, static_cast<std::size_t>(config.min_structure_points));
   }
-  return sum / 8.0;
+  return sum / kChanceShifts;
 }
 
 // Matched from the best starts, judged by the structure found again; refined at the best.

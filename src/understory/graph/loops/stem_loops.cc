@@ -57,13 +57,12 @@ TreePatterns places_of(const std::vector<SparsePoints>& views, const std::vector
 // The covariance of a loop: its own noise, and what both views got wrong alike.
 Matrix6d loop_covariance(const SparseIcpResult& icp, const SparsePoints& source, double l0_m) {
   Matrix6d information = icp.information + 1e-6 * Matrix6d::Identity();
-  Matrix6d covariance = 9.0 * information.inverse();
-  const double tilt = 0.5 * M_PI / 180.0;
-  const double yaw = 0.1 * M_PI / 180.0;
-  const double shift = 0.02 * l0_m;
+  Matrix6d covariance = kLoopVariance * information.inverse();
+  const double shift = kLoopShiftL0 * l0_m;
   covariance.diagonal() +=
-      (Vector6d() << 0.0, 0.0, yaw * yaw, shift * shift, shift * shift, shift * shift).finished();
-  return covariance + tilt_about(middle_of(source), tilt);
+      (Vector6d() << 0.0, 0.0, kLoopYaw * kLoopYaw, shift * shift, shift * shift, shift * shift)
+          .finished();
+  return covariance + tilt_about(middle_of(source), kLoopTilt);
 }
 
 class Finder {
@@ -85,7 +84,7 @@ class Finder {
       const StemLoop loop = verify(views_, query, candidate.place, candidate.place_from_query);
       if (!best || loop.overlap > best->overlap) best = loop;
     }
-    if (!best || best->overlap < 0.5 * config_.min_overlap) return best;
+    if (!best || best->overlap < kHopeless * config_.min_overlap) return best;
     return confirmed(nearest(*best));
   }
 
@@ -124,7 +123,7 @@ class Finder {
     if (best == loop.match) return loop;
     const StemLoop moved = verify(views_, loop.query, best,
                                   pose(best).inverse() * pose(loop.match) * loop.match_from_query);
-    return moved.overlap >= 0.8 * loop.overlap ? moved : loop;
+    return moved.overlap >= kNearestOverlap * loop.overlap ? moved : loop;
   }
 
   // Views laid together find a place, and single ones tell how they lie to each other: where those

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <optional>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/graph/loops/gain_queue.h"
 #include "understory/graph/stem_matching/pair_matching.h"
 #include "understory/graph/stem_matching/star_association.h"
@@ -13,6 +14,8 @@
 
 namespace understory {
 namespace {
+
+using namespace graph_constants::correction_methods;
 
 // Applies one correction after the other and ends with the sharpest map on the way: the stop rule
 // that the paper asks for in its section 4.
@@ -173,7 +176,7 @@ std::vector<double> plane_variances_m2(const CorrectionViews& views) {
 std::vector<double> match_variances_m2(const std::vector<CorrectionPair>& pairs, double sd_m) {
   std::vector<double> variances;
   for (const CorrectionPair& pair : pairs)
-    variances.push_back(sd_m * sd_m / std::max(pair.overlap, 0.05));
+    variances.push_back(sd_m * sd_m / std::max(pair.overlap, kLeastOverlap));
   return variances;
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/util/error.h"
 #include "understory/util/index.h"
 #include "understory/util/parallel.h"
@@ -12,6 +13,8 @@
 
 namespace understory {
 namespace {
+
+using namespace graph_constants::correction_pairs;
 
 // Different pairs (j, i) with gaps in the range, drawn at random, ascending.
 std::vector<std::pair<int, int>> drawn_pairs(int views, const PairConfig& config,
@@ -135,8 +138,8 @@ std::vector<CorrectionPair> poisson_disk_choice(const std::vector<CorrectionPair
   const auto off = [&](const Grid& grid) {
     return std::abs(static_cast<double>(grid.size()) - wanted);
   };
-  while (best.size() < at(wanted) && spacing > 0.5) {
-    spacing *= 0.8;
+  while (best.size() < at(wanted) && spacing > kLeastSpacing) {
+    spacing *= kSpacingStep;
     Grid finer = rounded(spacing);
     const bool better = off(finer) < off(best);
     const bool past = finer.size() >= at(wanted);

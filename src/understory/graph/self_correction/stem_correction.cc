@@ -41,17 +41,16 @@ LevelViews level(const std::vector<StemView>& views, const std::vector<SparseSte
 // Of a step: what matching says, and what both views got wrong alike, which it cannot know: a
 // hundredth of the way. Tilt comes below.
 Matrix6d odometry_covariance(const SparseStep& step, const Pose& previous_from_body) {
-  constexpr double tilt = 0.5 * kDegree;  // where little matched
-  const double yaw = 0.02 * kDegree;
-  const double shift = 0.005 + 0.01 * previous_from_body.translation().norm();
+  const double shift = kStepShift + kStepShiftShare * previous_from_body.translation().norm();
   Matrix6d covariance = step.covariance;
   covariance.diagonal() +=
-      (Vector6d() << 0.0, 0.0, yaw * yaw, shift * shift, shift * shift, shift * shift).finished();
+      (Vector6d() << 0.0, 0.0, kStepYaw * kStepYaw, shift * shift, shift * shift, shift * shift)
+          .finished();
   // Little overlap may be the view's fault and the match still be right; without a match there is
   // nothing but the last motion.
   if (step.status == SparseStepStatus::kWeak) {
-    covariance.diagonal().head<3>().array() += tilt * tilt;
-    covariance.diagonal().tail<3>().array() += 0.05 * 0.05;
+    covariance.diagonal().head<3>().array() += kWeakTilt * kWeakTilt;
+    covariance.diagonal().tail<3>().array() += kWeakShift * kWeakShift;
   }
   if (step.status == SparseStepStatus::kUnmatched) covariance += Matrix6d::Identity();
   return covariance;

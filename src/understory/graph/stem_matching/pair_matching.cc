@@ -55,14 +55,12 @@ void require_better(PairMatch& match) {
 Matrix6d match_covariance(const Matrix6d& information, const SparsePoints& source,
                           double shift_sd_m) {
   // Heights and tilt hang on feet of stems, which look higher the farther away they are.
-  const double tilt = 2.0 * M_PI / 180.0;
-  const double height = 0.5;
-  const double yaw = 0.03 * M_PI / 180.0;
-  Matrix6d covariance = 4.0 * (information + 1e-6 * Matrix6d::Identity()).inverse();
+  Matrix6d covariance = kMatchVariance * (information + 1e-6 * Matrix6d::Identity()).inverse();
   const double shift = shift_sd_m * shift_sd_m;
   covariance.diagonal() +=
-      (Vector6d() << 0.0, 0.0, yaw * yaw, shift, shift, height * height).finished();
-  return covariance + tilt_about(middle_of(source), tilt);
+      (Vector6d() << 0.0, 0.0, kMatchYaw * kMatchYaw, shift, shift, kMatchHeight * kMatchHeight)
+          .finished();
+  return covariance + tilt_about(middle_of(source), kMatchTilt);
 }
 
 PairMatch match_pair(const SparseTarget& target, const SparsePoints& source, const Pose& j_from_i,
@@ -89,7 +87,7 @@ PairMatch match_pair(const SparseTarget& target, const SparsePoints& source, con
     judge(target, source, overlap, config, match);
   }
   match.outlier_ratio = icp.outlier_ratio;
-  match.covariance = match_covariance(icp.information, source, 0.02 * target.l0_m);
+  match.covariance = match_covariance(icp.information, source, kMatchShiftL0 * target.l0_m);
   require_better(match);
   return match;
 }
