@@ -2,19 +2,15 @@
 #include <cmath>
 #include <tuple>
 
+#include "understory/evaluation/evaluation_constants.h"
 #include "understory/evaluation/tree_errors.h"
 
 namespace understory {
 namespace {
 
-// Two trees of one list and their distance. Long pairs fix the heading better and are rarer, short
-// ones are more often both within the other list: these limits suit plots and strips alike.
-constexpr double kMinPairM = 4.0;
-constexpr double kMaxPairM = 25.0;
-constexpr std::size_t kMaxPairsOfA = 400;
-constexpr std::size_t kMaxHypotheses = 200'000;
-constexpr std::size_t kMinMatches = 3;
+using namespace evaluation_constants::tree_alignment;
 
+// Two trees of one list and their distance.
 struct Span {
   double length;
   std::size_t from;
@@ -160,7 +156,6 @@ std::optional<Pose> align_trees(const std::vector<Tree>& a, const std::vector<Tr
                                 Alignment alignment, double radius_m) {
   std::optional<Pose> b_from_a = best_hypothesis(a, b, radius_m);
   if (!b_from_a) return b_from_a;
-  constexpr int kMaxIterations = 20;
   std::vector<TreePair> previous;
   for (int k = 0; k < kMaxIterations; ++k) {
     const std::vector<TreePair> pairs = match_trees(moved(a, *b_from_a), b, radius_m);

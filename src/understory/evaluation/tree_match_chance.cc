@@ -9,6 +9,7 @@
 #include <iterator>
 #include <limits>
 
+#include "understory/evaluation/evaluation_constants.h"
 #include "understory/evaluation/tree_errors.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
@@ -16,12 +17,7 @@
 namespace understory {
 namespace {
 
-constexpr std::size_t kSearchedCopies = 3;
-constexpr std::size_t kShiftedCopies = 16;
-constexpr double kLeastSigmas = 4.0;
-constexpr double kLeastDiameterSigmas = 4.0;
-constexpr std::size_t kLeastPairs = 5;
-constexpr std::size_t kLeastDiameters = 8;
+using namespace evaluation_constants::tree_match_chance;
 
 double weight_of(const MergedTrees& merged, double radius_m) {
   const double share = radius_m > 0.0 ? std::pow(merged.apart_m / radius_m, 2.0) : 0.0;
@@ -31,7 +27,7 @@ double weight_of(const MergedTrees& merged, double radius_m) {
 // Shifted as a whole by more than a tree is looked for; what has no overlap any more is rare.
 std::vector<Tree> shifted(std::vector<Tree> trees, double reach_m, Random& random) {
   const double angle = random.uniform(0.0, 2.0 * M_PI);
-  const double length = random.uniform(2.0, 5.0) * reach_m;
+  const double length = random.uniform(kLeastShift, kMostShift) * reach_m;
   for (Tree& tree : trees) {
     tree.x += length * std::cos(angle);
     tree.y += length * std::sin(angle);
@@ -99,7 +95,6 @@ void judge_diameters(const std::vector<Tree>& s, const std::vector<Tree>& l,
   Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   for (const Eigen::Vector2d& pair : pairs)
     scatter += (pair - mean) * (pair - mean).transpose();
-  constexpr double kLeastSpreadM = 0.005;
   if (scatter.diagonal().minCoeff() < n * kLeastSpreadM * kLeastSpreadM) return;
   chance.diameter_correlation = scatter(0, 1) / std::sqrt(scatter(0, 0) * scatter(1, 1));
   chance.diameter_sigmas =

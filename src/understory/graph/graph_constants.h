@@ -40,6 +40,12 @@ inline constexpr double kShare = 0.9;
 namespace path_process {  // graph/self_correction/path_process.cc
 // Observations that length and scale are found from; the time is cubic in them [bound: time]
 inline constexpr std::size_t kEnough = 60;
+// views: lengths of the correlation that are tried [bound: time]
+inline constexpr double kLengths[] = {0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0};
+// Half powers of two that are tried as the scale of the odometry at least [bound: time]
+inline constexpr int kLeastHalfPowers = -8;
+// The same at most [bound: time]
+inline constexpr int kMostHalfPowers = 12;
 }  // namespace path_process
 
 namespace stem_correction {  // graph/self_correction/stem_correction.cc
@@ -130,6 +136,10 @@ namespace tree_pattern {  // graph/stem_matching/tree_pattern.cc
 inline constexpr std::size_t kMostStems = 65'535;
 // L0: side of a triangle at least; small triangles look alike [chosen]
 inline constexpr double kShortestSide = 1.0;
+// Triangles that have to agree on a place [not recorded]
+inline constexpr int kFewestVotes = 3;
+// Cells of the heading in which triangles vote [chosen: 15 degrees]
+inline constexpr int kYawCells = 24;
 }  // namespace tree_pattern
 
 namespace correction_methods {  // graph/self_correction/correction_methods.cc
@@ -143,5 +153,14 @@ inline constexpr double kLeastSpacing = 0.5;
 // Factor on the spacing from grid to grid [bound: time]
 inline constexpr double kSpacingStep = 0.8;
 }  // namespace correction_pairs
+
+namespace expected_gain {  // graph/loops/expected_gain.cc
+// L0: stems of joined views that are nearer are one [not recorded]
+inline constexpr double kGatherL0 = 0.15;
+// Factor on the variance of the odometry at least [not recorded]
+inline constexpr double kLeastScale = 0.1;
+// The same at most [not recorded]
+inline constexpr double kMostScale = 1e4;
+}  // namespace expected_gain
 
 }  // namespace understory::graph_constants

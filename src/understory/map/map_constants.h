@@ -9,6 +9,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 namespace understory::map_constants {
 
@@ -23,6 +24,11 @@ inline constexpr double kEnoughViews = 3.0;
 // Of these: seen together less often, two trees are one [tuned on lieksa2: the list falls from
 // 2,513 to 1,338 trees at the same recall]
 inline constexpr double kFew = 0.1;
+// Share of the views in whose sector a listed tree lies that have to show it
+// [docs/method/sparse.md: an eighth]
+inline constexpr double kListedPresence = 0.12;
+// m: listed trees that are nearer and never seen together are one [not recorded]
+inline constexpr double kListedDuplicate = 1.2;
 }  // namespace stem_map
 
 namespace keyframe_map {  // map/keyframe_map.cc

@@ -289,8 +289,8 @@ void describe(ConfigTable& table, StemMapConfig& config) {
 
 StemMapConfig tree_list_config() {
   StemMapConfig config;
-  config.min_presence = 0.12;
-  config.duplicate_m = 1.2;
+  config.min_presence = kListedPresence;
+  config.duplicate_m = kListedDuplicate;
   return config;
 }
 

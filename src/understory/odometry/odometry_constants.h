@@ -10,6 +10,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 namespace understory::odometry_constants {
 
@@ -128,6 +129,14 @@ inline constexpr double kVibrationForce = 0.25;
 inline constexpr double kLargestGyroBias = 0.1;
 // m/s^2 of the mean's length against gravity [bound: biases of MEMS accelerometers]
 inline constexpr double kForceTolerance = 0.5;
+// ns before and after a start in motion whose mean force is up [not recorded]
+inline constexpr std::int64_t kMotionHalfWindow = 300'000'000;
+// Length in the plane below which the x axis is upright and y gives the heading [chosen]
+inline constexpr double kUprightAxis = 0.2;
+// rad/s: error of the gyroscope's bias at rest at most [not recorded]
+inline constexpr double kStillBias = 0.005;
+// m/s: error of the velocity at rest [not recorded]
+inline constexpr double kStillVelocity = 0.5;
 }  // namespace initial_state
 
 namespace window_smoother {  // odometry/imu/window_smoother.cc
@@ -150,6 +159,8 @@ inline constexpr double kWindowS = 0.29;
 namespace stem_front_end {  // odometry/stems/stem_front_end.cc
 // s: a longer pause, and what moved before says nothing about now [chosen]
 inline constexpr double kLongestStep = 2.0;
+// Of the time since the last scan: a shorter scan is followed by a pause [not recorded]
+inline constexpr double kPause = 0.4;
 }  // namespace stem_front_end
 
 namespace stem_imu {  // odometry/stems/stem_imu.cc

@@ -9,6 +9,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 namespace understory::pipeline_constants {
 
@@ -28,6 +29,10 @@ inline constexpr double kFewOfUsual = 0.5;
 // a cube, from its middle); good maps of forests, streets and yards have 0.32 to 0.46 [bound:
 // geometry, and real clouds]
 inline constexpr double kByChance = 0.49;
+// ns: windows in which matches are judged [chosen]
+inline constexpr std::int64_t kWindow = 2'000'000'000;
+// Windows at the start of a run that are not judged: the map grows [chosen]
+inline constexpr std::int64_t kFirstWindow = 5;
 }  // namespace match_course
 
 namespace path_evidence {  // pipeline/judgement/path_evidence.cc

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "understory/preprocess/event_stamp.h"
+#include "understory/preprocess/preprocess_constants.h"
 #include "understory/recording/messages/event_bytes.h"
 #include "understory/util/error.h"
 
@@ -12,15 +13,7 @@ namespace understory {
 using namespace event_stamp;
 namespace {
 
-// A stream that talks this much, or for as long as the smallest jump, while no other does has
-// nobody to be compared with.
-constexpr std::size_t kMostSuspects = 1000;
-constexpr std::size_t kMostSuspectScans = 32;
-// A step of this many times the smallest jump tells nothing of a stream's rate.
-constexpr TimeNs kStartFactor = 5;
-// Messages that wait for a verdict on their clock; scans after which an IMU has fallen silent.
-constexpr std::size_t kMostHeld = 20'000;
-constexpr std::uint32_t kSilentScans = 10;
+using namespace preprocess_constants::event_orderer;
 
 }  // namespace
 

@@ -2,10 +2,12 @@
 
 #include <array>
 
+#include "understory/preprocess/preprocess_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr double kMostAlone = 0.5;  // share: beyond it the points are in no order
+using namespace preprocess_constants::isolated_points;
 
 }  // namespace
 

@@ -3,15 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/recording/recording_constants.h"
+
 namespace understory {
 namespace {
 
-constexpr TimeNs kWindow = kNsPerSecond / 2;
-constexpr TimeNs kLongestStep = kNsPerSecond / 10;
-// Sum of squared tilts, rad^2, below which nothing is said; about ten tilts by 8 degrees.
-constexpr double kEnoughTilt = 0.2;
-constexpr double kGoodFit = 0.4;    // of the squared tilts left unexplained
-constexpr double kFarBetter = 0.5;  // than with the axes as they are
+using namespace recording_constants::imu_axes;
 
 }  // namespace
 
@@ -63,10 +60,10 @@ void ImuAxisCheck::close_window() {
   const Eigen::Vector3d up_c = c.force.normalized();
   windows_.pop_front();
   const double tilt = (up_c - up_a).norm();
-  if (!up_a.allFinite() || !up_c.allFinite() || tilt < 0.05 || tilt > 0.7) return;
+  if (!up_a.allFinite() || !up_c.allFinite() || tilt < kLeastTilt || tilt > kMostTilt) return;
   // Accelerations of the carrier change the length of the force as well.
   if (std::abs(a.force.norm() / a.samples - c.force.norm() / c.samples) >
-      0.1 * a.force.norm() / a.samples)
+      kSameForce * a.force.norm() / a.samples)
     return;
   const Eigen::Vector3d seen = up_c - up_a;
   const Eigen::Vector3d middle = (up_a + up_c).normalized();
@@ -90,7 +87,7 @@ const ImuAxisCheck::Candidate* ImuAxisCheck::best() const {
   for (const Candidate& candidate : candidates_) {
     const double left = seen_ - explained(candidate);
     const double left_best = seen_ - explained(*best);
-    const double factor = best == &candidates_.front() ? kFarBetter : 0.98;
+    const double factor = best == &candidates_.front() ? kFarBetter : kBetter;
     if (left < factor * left_best && left < kGoodFit * seen_) best = &candidate;
   }
   return seen_ - explained(*best) < kGoodFit * seen_ ? best : nullptr;

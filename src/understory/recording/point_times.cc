@@ -1,4 +1,5 @@
 #include "understory/recording/point_times.h"
+#include "understory/recording/recording_constants.h"
 #include "understory/util/median.h"
 
 #include <algorithm>
@@ -9,11 +10,7 @@
 namespace understory {
 namespace {
 
-constexpr double kUsualPeriod = 0.1;
-// A share of the scan's duration within which two times count as the same.
-constexpr double kSame = 0.15;
-constexpr TimeNs kNoDelay = 1'000;
-constexpr std::size_t kCloudsForDelay = 4;
+using namespace recording_constants::point_times;
 
 std::string unit_name(double unit) {
   if (unit == 1.0) return "s";
@@ -41,7 +38,6 @@ double raw_span(const std::vector<CloudTimes>& clouds) {
 // The unit in which the clouds last about as long as the time between them: hardly longer, but much
 // shorter where scans are left out.
 std::optional<double> fitting_unit(double span, double period) {
-  constexpr double kLongest = 3.0;
   const double expected = period > 0.0 ? period : kUsualPeriod;
   for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
     const double share = span * unit / expected;
@@ -75,9 +71,9 @@ enum class Arrival { kUnknown, kAfterFullScan, kTooEarly };
 Arrival judge_arrival(const std::vector<CloudTimes>& clouds, const std::vector<TimeNs>& imu_delays,
                       double duration) {
   const auto delay = delay_behind_imu(clouds, imu_delays);
-  if (!delay || *delay < -0.5 * duration) return Arrival::kUnknown;
-  if (*delay < 0.6 * duration) return Arrival::kTooEarly;
-  return *delay < 5.0 * duration ? Arrival::kAfterFullScan : Arrival::kUnknown;
+  if (!delay || *delay < kEarly * duration) return Arrival::kUnknown;
+  if (*delay < kBeforeEnd * duration) return Arrival::kTooEarly;
+  return *delay < kLate * duration ? Arrival::kAfterFullScan : Arrival::kUnknown;
 }
 
 std::string stamp_text(TimeConvention::Stamp stamp) {

@@ -9,6 +9,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 namespace understory::registration_constants {
 
@@ -97,5 +98,17 @@ inline constexpr double kFreedom = 3.0;
 // high still finds its stem [chosen]
 inline constexpr double kUnsure = 0.05;
 }  // namespace sparse_icp
+
+namespace yaw_vote {  // registration/stems/yaw_vote.cc
+// Steps of yaw: peaks of the vote that are nearer are one, if ... [not recorded]
+inline constexpr double kSameYawSteps = 2.5;
+// ... cells of the shift are, too [not recorded]
+inline constexpr double kSameCells = 3.0;
+}  // namespace yaw_vote
+
+namespace go_icp {  // registration/stems/go_icp.cc
+// L0: pairs whose heights tell the height of a match are nearer [not recorded]
+inline constexpr double kHeightPairL0 = 0.15;
+}  // namespace go_icp
 
 }  // namespace understory::registration_constants

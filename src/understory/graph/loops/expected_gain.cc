@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/graph/graph_constants.h"
 #include "understory/graph/loops/gain_queue.h"
 #include "understory/graph/self_correction/correction_methods.h"
 #include "understory/graph/stem_matching/pair_matching.h"
@@ -10,6 +11,8 @@
 
 namespace understory {
 namespace {
+
+using namespace graph_constants::expected_gain;
 
 struct Accepted {
   std::size_t row;  // of result.tried
@@ -87,7 +90,7 @@ class GainCorrection {
 
   [[nodiscard]] SparsePoints gathered(int centre) const {
     return gather_views(views_.problem.views, poses_, centre, config_.gain.window_l0 * views_.l0_m,
-                        config_.gain.window_views, 0.15 * views_.l0_m);
+                        config_.gain.window_views, kGatherL0 * views_.l0_m);
   }
 
   [[nodiscard]] PairMatch match(const CorrectionPair& pair) const {
@@ -155,7 +158,7 @@ class GainCorrection {
       const double expected = walked_m2_[at(edge.to)] - walked_m2_[at(edge.from)];
       ratios.push_back(squared / (kMedian * std::max(expected, 1e-12)));
     }
-    return std::clamp(upper_median(ratios, 1.0), 0.1, 1e4);
+    return std::clamp(upper_median(ratios, 1.0), kLeastScale, kMostScale);
   }
 
   // All accepted pairs at once with the odometry; keeps the poses if the map is the sharpest yet.

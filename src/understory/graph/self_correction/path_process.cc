@@ -245,13 +245,13 @@ Fit most_likely(PathProcess& process, std::vector<std::size_t> rows,
       some.push_back(rows[k * rows.size() / kEnough]);
     rows = some;
   }
-  std::vector<double> lengths = {0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0};
+  std::vector<double> lengths(std::begin(kLengths), std::end(kLengths));
   if (config.length_views >= 0.0) lengths = {config.length_views};
   const Eigen::VectorXd seen = plane_of_vector(process.observed(rows));
   Fit best;
   for (const double length : lengths) {
     process.set_length(length);
-    for (int half = -8; half <= 12; ++half) {
+    for (int half = kLeastHalfPowers; half <= kMostHalfPowers; ++half) {
       const double scale = std::pow(2.0, 0.5 * half);
       process.set_scale(scale);
       const Eigen::LLT<Eigen::MatrixXd> factor(plane_of(process.covariance(rows)));

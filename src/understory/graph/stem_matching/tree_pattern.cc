@@ -203,8 +203,6 @@ class TreePatterns::Poll {
   }
 
  private:
-  static constexpr int kFewestVotes = 3;
-
   void count(const Entry& entry, const Triangle& triangle, const Eigen::Vector2d& side,
              const Eigen::Vector3d& middle) {
     for (std::size_t k = 0; k < 5; ++k) {
@@ -221,7 +219,6 @@ class TreePatterns::Poll {
     const Eigen::Vector3d turned(c * middle.x() - s * middle.y(), s * middle.x() + c * middle.y(),
                                  middle.z());
     const Eigen::Vector3d shift = (p0 + p1 + p2) / 3.0 - turned;
-    constexpr int kYawCells = 24;
     const int yaw_cell = static_cast<int>(std::lround(yaw / (2.0 * M_PI) * kYawCells));
     Votes& vote = votes_[{entry.place, (yaw_cell + kYawCells) % kYawCells,
                           static_cast<int>(std::floor(shift.x() / cell_m_)),

@@ -11,8 +11,6 @@ namespace {
 
 using namespace odometry_constants::initial_state;
 
-constexpr TimeNs kMotionHalfWindow = 300'000'000;
-
 struct Statistics {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
@@ -42,7 +40,7 @@ Eigen::Quaterniond levelled(const Eigen::Vector3d& up_in_body) {
   const auto level = rotation_between(up_in_body, Eigen::Vector3d::UnitZ());
   Eigen::Vector3d axis = level * Eigen::Vector3d::UnitX();
   double heading = 0.0;
-  if (axis.head<2>().norm() < 0.2) {
+  if (axis.head<2>().norm() < kUprightAxis) {
     axis = level * Eigen::Vector3d::UnitY();
     heading = std::acos(-1.0) / 2.0;
   }
@@ -86,8 +84,8 @@ InitialState find_initial_state(const std::vector<InertialSample>& samples, Time
   const Statistics s = statistics(used);
   if (initial.how == Initialisation::kStill) {
     initial.state.gyro_bias = s.rate;
-    initial.sigma.gyro_bias_rad_s = std::min(config.gyro_bias_sigma_rad_s, 0.005);
-    initial.sigma.velocity_m_s = 0.5;
+    initial.sigma.gyro_bias_rad_s = std::min(config.gyro_bias_sigma_rad_s, kStillBias);
+    initial.sigma.velocity_m_s = kStillVelocity;
   }
   if (s.force.norm() > 0.0) {
     const Pose body(levelled(body_from_imu.rotation() * s.force.normalized()),

@@ -124,7 +124,7 @@ StemFrontEnd::Guess StemFrontEnd::guess(const Scan& scan, int frame, const Rig& 
   // The step of a first try says how the body moved up to this scan; the scan itself lies half a
   // step later than the middle of that. Where scans follow each other without a pause, what is
   // taken out wrongly would come back larger by such an outlook, so there is none.
-  const bool pauses = to_seconds(scan.end() - scan.stamp) < 0.4 * since;
+  const bool pauses = to_seconds(scan.end() - scan.stamp) < kPause * since;
   SparseOdometry trial = odometry_;
   const SparseStep step =
       trial.track(view_of(scan, frame, rig, found, guess.motion_per_s), guess.step);

@@ -11,9 +11,6 @@ namespace {
 
 using namespace pipeline_constants::match_course;
 
-constexpr TimeNs kWindow = 2 * kNsPerSecond;
-constexpr TimeNs kBeginning = 5;  // windows
-
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -46,7 +43,7 @@ void MatchCourse::add(TimeNs stamp, bool matched, double inlier_ratio, double fi
 void MatchCourse::put(MatchEvidence& evidence) const {
   std::vector<double> inliers;
   std::vector<double> squares;  // of the windows with a match
-  for (auto it = windows_.lower_bound(kBeginning); it != windows_.end(); ++it) {
+  for (auto it = windows_.lower_bound(kFirstWindow); it != windows_.end(); ++it) {
     const Window& window = it->second;
     inliers.push_back(window.inliers / static_cast<double>(window.scans));
     if (window.matched > 0)

@@ -5,12 +5,15 @@
 #include <queue>
 #include <vector>
 
+#include "understory/registration/registration_constants.h"
 #include "understory/registration/stems/go_icp_bounds.h"
 #include "understory/util/angles.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
+
+using namespace registration_constants::go_icp;
 
 struct Later {
   bool operator()(const GoIcpBox& a, const GoIcpBox& b) const {
@@ -195,7 +198,7 @@ class Search {
     std::vector<double> heights;
     for (const Eigen::Vector3d& point : source_) {
       const Eigen::Vector3d at = pose * point;
-      const auto found = target_.grid.nearest(at, 0.15 * target_.l0_m, 0.0);
+      const auto found = target_.grid.nearest(at, kHeightPairL0 * target_.l0_m, 0.0);
       if (found.index >= 0)
         heights.push_back(target_.grid.points()[static_cast<std::size_t>(found.index)].z() -
                           at.z());

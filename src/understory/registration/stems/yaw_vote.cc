@@ -1,4 +1,5 @@
 #include "understory/registration/stems/yaw_vote.h"
+#include "understory/registration/registration_constants.h"
 #include "understory/util/median.h"
 
 #include <algorithm>
@@ -6,6 +7,8 @@
 
 namespace understory {
 namespace {
+
+using namespace registration_constants::yaw_vote;
 
 // The votes for one yaw, as a square of cells of shifts around the guess.
 struct Ballot {
@@ -131,8 +134,8 @@ std::vector<YawVoteCandidate> vote_yaw(const SparseTarget& target, const SparseP
   for (const Peak& peak : peaks) {
     if (static_cast<int>(chosen.size()) >= config.candidates) break;
     const bool known = std::any_of(chosen.begin(), chosen.end(), [&](const Peak& other) {
-      return angle_between(peak.yaw, other.yaw) < 2.5 * step &&
-             (peak.shift - other.shift).norm() < 3.0 * ballot.cell_m;
+      return angle_between(peak.yaw, other.yaw) < kSameYawSteps * step &&
+             (peak.shift - other.shift).norm() < kSameCells * ballot.cell_m;
     });
     if (!known) chosen.push_back(peak);
   }

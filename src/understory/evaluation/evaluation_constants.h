@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// The fitted and chosen numbers of the layer `evaluation` that are no settings, which stand in the
+// Config structs. One namespace for each file that uses them. A comment gives the unit (none: a
+// plain number), the meaning, and in brackets where the number comes from:
+//   chosen   by judgement, fitted to nothing
+//   bound    by physics, geometry, statistics, memory or time
+//   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
+// or real clouds and measurements by their page.
+namespace understory::evaluation_constants {
+
+namespace tree_match_chance {  // evaluation/tree_match_chance.cc
+// Copies that are mirrored and aligned anew [bound: time]
+inline constexpr std::size_t kSearchedCopies = 3;
+// Copies that are shifted [bound: time]
+inline constexpr std::size_t kShiftedCopies = 16;
+// Standard deviations above the copies from which on two maps are of one stand [110 pairs of maps,
+// docs/method/sparse.md]
+inline constexpr double kLeastSigmas = 4.0;
+// The same of the correlation of diameters [110 pairs of maps, docs/method/sparse.md]
+inline constexpr double kLeastDiameterSigmas = 4.0;
+// Pairs at least for two maps of one stand [not recorded]
+inline constexpr std::size_t kLeastPairs = 5;
+// Pairs with diameters that give a correlation at least [not recorded]
+inline constexpr std::size_t kLeastDiameters = 8;
+// Radii of a pair by which a copy is shifted at least: farther than a tree is looked for [bound:
+// geometry]
+inline constexpr double kLeastShift = 2.0;
+// The same at most: the overlap stays [bound: geometry]
+inline constexpr double kMostShift = 5.0;
+// m: spread of diameters that tells a correlation at least [not recorded]
+inline constexpr double kLeastSpreadM = 0.005;
+}  // namespace tree_match_chance
+
+namespace tree_alignment {  // evaluation/tree_alignment.cc
+// m between two trees of one list that are tried as a pair at least. Long pairs fix the heading
+// better and are rarer, short ones are more often both within the other list [chosen: suits plots
+// and strip roads]
+inline constexpr double kMinPairM = 4.0;
+// m between them at most [chosen: suits plots and strip roads]
+inline constexpr double kMaxPairM = 25.0;
+// Pairs of the first list that are tried at most [bound: time]
+inline constexpr std::size_t kMaxPairsOfA = 400;
+// Motions that are tried at most [bound: time]
+inline constexpr std::size_t kMaxHypotheses = 200'000;
+// Trees that have to lie on trees at least [bound: two are a pair that was tried]
+inline constexpr std::size_t kMinMatches = 3;
+// Steps of the last fit at most [bound: convergence]
+inline constexpr int kMaxIterations = 20;
+}  // namespace tree_alignment
+
+}  // namespace understory::evaluation_constants

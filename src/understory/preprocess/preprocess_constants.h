@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// The fitted and chosen numbers of the layer `preprocess` that are no settings, which stand in the
+// Config structs. One namespace for each file that uses them. A comment gives the unit (none: a
+// plain number), the meaning, and in brackets where the number comes from:
+//   chosen   by judgement, fitted to nothing
+//   bound    by physics, geometry, statistics, memory or time
+//   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
+// or real clouds and measurements by their page.
+namespace understory::preprocess_constants {
+
+namespace event_orderer {  // preprocess/event_orderer.cc
+// Messages of a stream while no other has any: it cannot be compared then [not recorded]
+inline constexpr std::size_t kMostSuspects = 1000;
+// Scans of the lidar while no other stream has a message: the same [not recorded]
+inline constexpr std::size_t kMostSuspectScans = 32;
+// Smallest jumps: a longer step tells nothing of the rate of a stream [not recorded]
+inline constexpr std::int64_t kStartFactor = 5;
+// Messages that wait for a verdict on their clock at most [bound: memory]
+inline constexpr std::size_t kMostHeld = 20'000;
+// Scans after which an IMU without a message is silent [not recorded]
+inline constexpr std::uint32_t kSilentScans = 10;
+}  // namespace event_orderer
+
+namespace isolated_points {  // preprocess/isolated_points.cc
+// Share of the points that stand alone: beyond it the points are in no order [not recorded]
+inline constexpr double kMostAlone = 0.5;
+}  // namespace isolated_points
+
+}  // namespace understory::preprocess_constants
