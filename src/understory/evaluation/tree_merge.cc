@@ -4,7 +4,7 @@
 
 #include "understory/evaluation/tree_errors.h"
 #include "understory/geometry/delaunay.h"
-#include "understory/registration/ndt/plane_grid.h"
+#include "understory/geometry/plane_grid.h"
 
 namespace understory {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "understory/evaluation/alignment.h"
 #include "understory/evaluation/tree_errors.h"
+#include "understory/geometry/plane_grid.h"
 #include "understory/geometry/symmetric_eigen.h"
-#include "understory/registration/ndt/plane_grid.h"
 
 namespace understory {
 namespace {

@@ -9,9 +9,9 @@
 #include <map>
 #include <utility>
 
+#include "understory/geometry/plane_grid.h"
 #include "understory/geometry/symmetric_eigen.h"
 #include "understory/georeference/georeference_constants.h"
-#include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/median.h"
 
 namespace understory {

@@ -4,9 +4,9 @@
 #include <limits>
 #include <vector>
 
+#include "understory/geometry/plane_grid.h"
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/ndt/plane_grid.h"
 
 namespace understory {
 

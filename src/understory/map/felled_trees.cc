@@ -4,9 +4,9 @@
 #include <cmath>
 #include <optional>
 
+#include "understory/geometry/plane_grid.h"
 #include "understory/graph/loops/view_cone.h"
 #include "understory/map/map_constants.h"
-#include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/error.h"
 
 namespace understory {

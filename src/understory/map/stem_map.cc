@@ -8,9 +8,9 @@
 #include <unordered_map>
 
 #include "understory/geometry/alpha_shape.h"
+#include "understory/geometry/plane_grid.h"
 #include "understory/graph/loops/view_cone.h"
 #include "understory/map/map_constants.h"
-#include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/error.h"
 
 namespace understory {

@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "understory/geometry/plane_grid.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/ndt/plane_grid.h"
 
 namespace understory {
 

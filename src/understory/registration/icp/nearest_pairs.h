@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "understory/registration/ndt/plane_grid.h"
+#include "understory/geometry/plane_grid.h"
 
 namespace understory {
 

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "understory/registration/ndt/plane_grid.h"
+#include "understory/geometry/plane_grid.h"
 
 namespace understory {
 

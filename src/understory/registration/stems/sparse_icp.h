@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "understory/geometry/plane_grid.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/ndt/plane_grid.h"
 #include "understory/util/config/config.h"
 
 namespace understory {

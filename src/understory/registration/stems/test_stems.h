@@ -2,8 +2,8 @@
 
 #include <random>
 
+#include "understory/geometry/plane_grid.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/ndt/plane_grid.h"
 
 namespace understory::testing {
 

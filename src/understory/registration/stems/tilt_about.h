@@ -1,7 +1,7 @@
 #pragma once
 
+#include "understory/geometry/plane_grid.h"
 #include "understory/geometry/pose.h"
-#include "understory/registration/ndt/plane_grid.h"
 
 namespace understory {
 

@@ -1,4 +1,4 @@
-#include "understory/registration/ndt/plane_grid.h"
+#include "understory/geometry/plane_grid.h"
 
 #include <algorithm>
 #include <cmath>
