@@ -1,5 +1,5 @@
-"""Pages: links lead somewhere, every page is reached, commands and options exist, no sentence has more
-than 25 words, and pages for users name papers by their titles."""
+"""Pages: links lead somewhere, every page is reached, commands, options and settings exist, no sentence has
+more than 25 words, and pages for users name papers by their titles."""
 
 import os
 import re
@@ -50,9 +50,9 @@ def printed(*words):
     return done.stdout
 
 
-def keys_of(*words):
+def keys_of(*words, option="--print-config"):
     path, keys = [], set()
-    for line in printed(*words, "--print-config").splitlines():
+    for line in printed(*words, option).splitlines():
         found = re.match(r"( *)(\w+):", line)
         path = path[:len(found[1]) // 2] + [found[2]]
         keys.add(".".join(path))
@@ -140,6 +140,17 @@ for words in (["map"], ["map", "--front-end", "sparse"], ["correct"], ["inventor
 for where, text in said.items():
     for found in re.finditer(r"\bP[0-4]\b.{0,20}|.{0,20}[ (]\(\d+\)", text):
         wrong.append(f"{where}: a paper without its title, or an equation: {found[0]}")
+
+# Settings (their last parts do) and kinds of warnings that a page names exist.
+FILES = r"csv|gz|tum|json|html|laz|las|tif|gpkg|yaml|mcap|md|h|cc|py|pcap|nmea|qgs|txt|sh|bin|g2o|truth|sensor"
+troubleshooting = (TOP / "docs" / "reference" / "troubleshooting.md").read_text()
+warnings = set(re.findall(r"\b[a-z]+\.[a-z_]+\b", " ".join(re.findall(r"^\| ([a-z_., ]+) \|", troubleshooting, re.M))))
+every = set().union(*keys.values(), keys_of("simulate", "handheld", option="--print-site"))
+ends = {".".join(parts[k:]) for parts in (key.split(".") for key in every) for k in range(len(parts))}
+for page in sorted(pages):
+    for name in re.findall(r"`([a-z_]+(?:\.[a-z_0-9]+)+)[=`:]", page.read_text()):
+        if name not in ends | warnings and not re.search(rf"\.({FILES})$|^python\.", name):
+            wrong.append(f"{page.relative_to(TOP)}: no setting and no warning {name}")
 
 # The settings that a page lists in tables, first column, exist.
 settings = TOP / "docs" / "reference" / "configuration.md"
