@@ -238,12 +238,12 @@ void LoopCloser::begin(const std::vector<Keyframe>& keyframes, std::size_t segme
   });
 }
 
-std::optional<LoopOutcome> LoopCloser::take(std::size_t keyframes, bool wait, bool at_once) {
+std::optional<LoopOutcome> LoopCloser::take(std::size_t keyframes, bool wait, bool when_found) {
   if (!running_) return std::nullopt;
   const bool ready =
       running_->outcome.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
   const auto due = running_->keyframes + static_cast<std::size_t>(config_.handover_keyframes);
-  if (!wait && !(at_once ? ready : keyframes >= due)) return std::nullopt;
+  if (!wait && !(when_found ? ready : keyframes >= due)) return std::nullopt;
   LoopOutcome outcome = running_->outcome.get();
   running_.reset();
   attempts_.insert(attempts_.end(), outcome.attempts.begin(), outcome.attempts.end());

@@ -74,8 +74,8 @@ class LoopCloser {
                                                             KeyframePoints& points,
                                                             const PresentMap& present);
   // The outcome of the running search, nothing if none is running or due. It is due at a fixed
-  // number of keyframes, and then waited for; `wait`: due now; `at_once`: due when it is there.
-  [[nodiscard]] std::optional<LoopOutcome> take(std::size_t keyframes, bool wait, bool at_once);
+  // number of keyframes, and then waited for; `wait`: due now; `when_found`: due when it is there.
+  [[nodiscard]] std::optional<LoopOutcome> take(std::size_t keyframes, bool wait, bool when_found);
 
   [[nodiscard]] const std::vector<LoopAttempt>& attempts() const { return attempts_; }
   // CPU time of all searches so far, that which is running included.

@@ -45,7 +45,7 @@ std::string adapted_table(const std::vector<ConfigAdaptation>& changes) {
   return html + "</table></div>";
 }
 
-// What a kind of warning means for the result, by the beginning of its key.
+// What a kind of warning means for the result, by the prefix of its key.
 std::string consequence_of(const std::string& key) {
   constexpr std::array<std::pair<const char*, const char*>, 23> kMeanings = {
       {{"recording.damaged", "That part of the recording is missing from the map."},
@@ -74,8 +74,8 @@ std::string consequence_of(const std::string& key) {
        {"loop", "Places seen twice may not lie exactly on each other."},
        {"match", "Positions there are less certain; see where the path is marked as weak."},
        {"recording.assumed_rate", "Times were assumed; speeds and deskewing depend on them."}}};
-  for (const auto& [beginning, meaning] : kMeanings) {
-    if (key.rfind(beginning, 0) == 0) return meaning;
+  for (const auto& [prefix, meaning] : kMeanings) {
+    if (key.rfind(prefix, 0) == 0) return meaning;
   }
   return "";
 }
