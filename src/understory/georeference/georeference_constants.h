@@ -41,8 +41,8 @@ inline constexpr int kFreedom = 5;
 inline constexpr double kFarthest = 6.0;
 // Seed of the draws: the same pairs give the same result [chosen]
 inline constexpr std::uint64_t kSeed = 1;
-// Noises that a belief is told by [bound: time of covariances]
-inline constexpr double kBelieved = 32.0;
+// Noises that a covariance is the mean over [bound: time]
+inline constexpr double kAveragedNoises = 32.0;
 // `follows` at most [chosen: twice as bad as stated where four times as bad is stated]
 inline constexpr double kMostFollows = 1.5;
 // Columns that are made white at once, at most [bound: four parameters and a residual]
@@ -80,7 +80,8 @@ inline constexpr double kCauchyWidth = 2.385;
 namespace fused_path {  // georeference/fused_path.cc
 // m: fast error of a receiver at least: graphs need a width [chosen]
 inline constexpr double kLeastErrorM = 0.005;
-// m: what a receiver states in the plane that may be believed [chosen: RTK, fixed or float]
+// m: error in the plane that a receiver states and that is taken as stated, at most [chosen: RTK,
+// fixed or float]
 inline constexpr double kGoodReceiverM = 0.15;
 // Steps of the logarithm of the odometry's scale, from the configured one [chosen: factors of 3]
 inline constexpr double kScaleSteps[] = {0.0, 1.1, 2.2, 3.3};

@@ -260,7 +260,7 @@ NoiseBelief resampled(const Draws& draws) {
   NoiseBelief belief;
   double until = 0.0;
   for (std::size_t k = 0; k < draws.noise.size(); ++k) {
-    until += draws.weight[k] * kBelieved;
+    until += draws.weight[k] * kAveragedNoises;
     while (static_cast<double>(belief.noise.size()) + 0.5 < until)
       belief.noise.push_back(draws.noise[k]);
   }
