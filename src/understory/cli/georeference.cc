@@ -134,10 +134,9 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
       "Fixes: a recording, an NMEA log, an RTKLIB .pos file or a CSV table (gnss.csv "
       "of the run if not given)");
   command
-      .add_option(
-          "--antenna-m", options.antenna_m,
-          "Where the GNSS antenna, or what stood on the points, is in the body frame: x y z "
-          "(if not given: of the run's own receiver as its run.json says, else the origin)")
+      .add_option("--antenna-m", options.antenna_m,
+                  "Position in the body frame of the GNSS antenna, or of what stood on the control "
+                  "points: x y z (if not given, that of the receiver in run.json, else the origin)")
       ->expected(3);
   command
       .add_option("--time-offset-s", options.time_offset_s,
@@ -146,16 +145,17 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
       ->capture_default_str();
   command
       .add_option("--time-offset-sd-s", options.time_offset_sd_s,
-                  "Standard deviation of that offset: the fit finds it (0 keeps it)")
+                  "Standard deviation of that offset, which the fit then estimates (0: it is kept)")
       ->check(CLI::Range(0.0, 60.0))
       ->capture_default_str();
   command
-      .add_option("--tilt-sd-deg", options.tilt_sd_deg,
-                  "How far the run's up may be off gravity, one standard deviation (0.05 for a run "
-                  "with an IMU, else 5)")
+      .add_option(
+          "--tilt-sd-deg", options.tilt_sd_deg,
+          "Standard deviation of the run's vertical about each axis (0.05 for a run with an "
+          "IMU, else 5)")
       ->check(CLI::Range(0.0, 45.0));
   command.add_flag("--plain", options.plain,
-                   "Plain least squares: fixes that are far off count like others");
+                   "Least squares without robust weights: fixes that are far off count fully");
   command.add_option("--recording", options.recording,
                      "With fit6: the recording whose IMU smooths the fixes (the one that run.json "
                      "names if not given)");
@@ -169,18 +169,21 @@ void add_terrain_options(CLI::App& command, GeoreferenceOptions& options) {
   command.add_option("--dem", options.terrain_model,
                      "Terrain model: GeoTIFF, ESRI ASCII grid, XYZ grid");
   command
-      .add_option("--start", options.start,
-                  "Where the run's origin lies on the terrain model and how its x axis is turned "
-                  "from east: x_m y_m yaw_deg")
+      .add_option(
+          "--start", options.start,
+          "Position of the run's origin on the terrain model, and the angle from east to its "
+          "x axis: x_m y_m yaw_deg")
       ->expected(3);
   command
-      .add_option("--place-sd-m", options.terrain.place_sd_m,
-                  "Standard deviation of the place: the relief moves it, too (0 keeps it)")
+      .add_option(
+          "--place-sd-m", options.terrain.place_sd_m,
+          "Standard deviation of the position, which the relief then corrects (0: it is kept)")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
   command
-      .add_option("--yaw-sd-deg", options.terrain.yaw_sd_deg,
-                  "Standard deviation of the heading: the relief turns it, too (0 keeps it)")
+      .add_option(
+          "--yaw-sd-deg", options.terrain.yaw_sd_deg,
+          "Standard deviation of the heading, which the relief then corrects (0: it is kept)")
       ->check(CLI::Range(0.0, 45.0))
       ->capture_default_str();
 }
@@ -194,8 +197,8 @@ void add_tree_options(CLI::App& command, GeoreferenceOptions& options) {
                      "Coordinate system of a tree map that states none, for instance EPSG:3067");
   command
       .add_option("--near", options.near,
-                  "Where the middle of the run's trees lies about, in the coordinates of the tree "
-                  "map: x y (by GNSS or all of the map if not given)")
+                  "Rough position of the middle of the run's trees, in the coordinates of the tree "
+                  "map: x y (if not given, by GNSS or anywhere in the map)")
       ->expected(2);
   command
       .add_option("--radius-m", options.radius_m,

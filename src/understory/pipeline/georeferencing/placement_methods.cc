@@ -18,23 +18,26 @@ Placement place_by_auto(const GeoreferenceRequest& request, const MovableRun& ru
 const std::vector<PlacementMethod>& placement_methods() {
   static const std::vector<PlacementMethod> kMethods{
       {GeoreferenceMethod::kAuto, "auto",
-       "the one of split, fit3, closed with the smallest expected error; gnss-path where no fix is "
-       "of the run's time. With --tree-map or --dem all of them together",
+       "split, fit3 or closed, by the smallest expected error; gnss-path where no fix has a time "
+       "of "
+       "the run; with --tree-map or --dem all sources together",
        place_by_auto},
       {GeoreferenceMethod::kSplit, "split",
-       "heading and place from positions in the plane, height and tilt apart", place_by_split},
-      {GeoreferenceMethod::kClosed, "closed", "closed form, all fixes alike", place_by_closed_form},
+       "heading and position from the fixes in the plane, height and tilt separately",
+       place_by_split},
+      {GeoreferenceMethod::kClosed, "closed", "closed form, all fixes with equal weight",
+       place_by_closed_form},
       {GeoreferenceMethod::kFit3, "fit3", "positions weighted by their covariances", place_by_fit3},
       {GeoreferenceMethod::kFit6, "fit6", "poses: positions smoothed with the IMU of the recording",
        place_by_fit6},
       {GeoreferenceMethod::kPoints, "points",
-       "surveyed points seen in the map, or of times stood on them", place_by_points},
+       "surveyed points that are seen in the map or were stood on at known times", place_by_points},
       {GeoreferenceMethod::kGnssPath, "gnss-path",
        "one motion in the plane between both paths, no common clock needed", place_by_gnss_path},
       {GeoreferenceMethod::kTerrain, "terrain", "height and tilt from a terrain model",
        place_by_terrain},
       {GeoreferenceMethod::kTrees, "trees",
-       "turn and shift by the pattern of the trees in a map of trees or a cloud from the air",
+       "heading and position by the pattern of trees in a map of trees or a cloud from the air",
        place_by_trees}};
   return kMethods;
 }
