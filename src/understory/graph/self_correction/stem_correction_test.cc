@@ -11,7 +11,6 @@
 namespace understory {
 namespace {
 
-using test::kDegree;
 using test::Road;
 
 struct Errors {

@@ -16,7 +16,7 @@ TEST(CorrectionFigures, ShowWhichPairsLieOnEachOther) {
   const test::Road road = test::drive(5);
   CorrectionRun run;
   run.views = road.views;
-  const Pose turn(so3_exp(Eigen::Vector3d(0.0, 0.0, 0.4 * test::kDegree)), Eigen::Vector3d::Zero());
+  const Pose turn(so3_exp(Eigen::Vector3d(0.0, 0.0, 0.4 * kDegree)), Eigen::Vector3d::Zero());
   for (std::size_t k = 0; k < road.truth.size(); ++k) {
     SparseStep step;
     step.world_from_body = road.truth[k];
