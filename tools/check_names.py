@@ -1,8 +1,11 @@
 #!/usr/bin/env python3
-"""Fails where two types of one name stand in one namespace of src/understory.
+"""Fails where one name of src/understory has two meanings, and no compiler or linker says a word.
 
-Each may be in order by itself, and no compiler or linker says a word; but their inline functions
-and the templates over them are one symbol, of which the linker keeps either.
+Two types of one name in one namespace: each may be in order by itself; but their inline functions and
+the templates over them are one symbol, of which the linker keeps either.
+
+A number of a table (x_constants.h) and a constant of another file of the layer: where eight files are
+compiled together, the constant hides the number, if it comes first. Layers that are APART are exempt.
 
     check_names.py [SOURCE_TREE]     exit 0: in order; 1: prints each pair; 2: no such tree
 """
@@ -15,6 +18,32 @@ OPENED = re.compile(r"^(?:inline )?namespace(?: ([\w:]+))? \{")
 CLOSED = re.compile(r"^\}  // namespace")
 TYPE = re.compile(r"^(?:struct|class|enum class|enum|union) (?:alignas\(\w+\) )?(\w+)(?: final)?"
                   r"(?: ?:[^:].*)?(?: \{.*)?$")
+TABLE = re.compile(r"^namespace (\w+) \{.*?\n(.*?)^\}  // namespace \1$", re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"inline constexpr [^=;]*?\b(k\w+)(?:\[\])? =")
+USED = re.compile(r"^using namespace (\w+_constants)::(\w+);", re.MULTILINE)
+CONSTANT = re.compile(r"^(?:static )?constexpr [^=;{(]*?\b(k\w+)\s*(?:\[[^\]]*\])?\s*[={]", re.MULTILINE)
+
+
+def hidden_numbers(layer):
+    """One line for each number of a table that a constant of another file of the layer may hide."""
+    lists = layer / "CMakeLists.txt"
+    if lists.is_file() and re.search(r"understory_layer\(\w+ APART", lists.read_text(encoding="utf-8")):
+        return
+    tables = {}
+    for path in layer.glob("*_constants.h"):
+        for name, body in TABLE.findall(path.read_text(encoding="utf-8")):
+            tables[(path.stem, name)] = NUMBER.findall(body)
+    sources = {path: path.read_text(encoding="utf-8") for path in sorted(layer.rglob("*.cc"))
+               if not path.name.endswith("_test.cc")}
+    own = {}
+    for path, text in sources.items():
+        for name in CONSTANT.findall(text):
+            own.setdefault(name, path)
+    for path, text in sources.items():
+        for table in USED.findall(text):
+            for name in tables.get(table, []):
+                if own.get(name, path) != path:
+                    yield f"{path.name}: {name} of its table is also a constant of {own[name].name}"
 
 
 def types_of(path):
@@ -33,7 +62,7 @@ def types_of(path):
 
 
 def check(tree):
-    """Yields one line for each type whose name another one has."""
+    """Yields one line for each name with two meanings."""
     root = tree / "src" / "understory"
     first = {}
     for path in sorted(p for p in root.rglob("*") if p.suffix in (".cc", ".h")):
@@ -42,6 +71,8 @@ def check(tree):
             if name in first:
                 yield f"{place}: {name} is also a type of {first[name]}"
             first.setdefault(name, place)
+    for layer in sorted(path for path in root.iterdir() if path.is_dir()):
+        yield from hidden_numbers(layer)
 
 
 def main():
@@ -51,7 +82,7 @@ def main():
         print(f"check_names.py: {tree} has no src/understory", file=sys.stderr)
         return 2
     pairs = list(check(tree))
-    print("\n".join(pairs) if pairs else "names: every type has one of its own")
+    print("\n".join(pairs) if pairs else "names: each has one meaning")
     return 1 if pairs else 0
 
 

@@ -57,6 +57,15 @@ class CheckNames(unittest.TestCase):
             "b/two.h": inside("u", "class Tree;\nstruct Wood::Tree {\n};"),
         }), [])
 
+    def test_a_constant_that_hides_a_number_of_another_files_table_is_an_error(self):
+        table = inside("u::a_constants", inside("one", "// m [chosen]\ninline constexpr double kNear = 1.0;"))
+        user = "namespace u {\nnamespace {\n\nusing namespace a_constants::one;\n}\n}\n"
+        other = "namespace u {\nnamespace {\nconstexpr double kNear = 2.0;\n}\n}\n"
+        files = {"a/a_constants.h": table, "a/one.cc": user, "a/x/two.cc": other}
+        self.assertEqual(findings(files), ["one.cc: kNear of its table is also a constant of two.cc"])
+        self.assertEqual(findings({**files, "a/CMakeLists.txt": "understory_layer(a APART\n"}), [])
+        self.assertEqual(findings({**files, "a/x/two.cc": "", "b/two.cc": other}), [])
+
 
 if __name__ == "__main__":
     unittest.main()

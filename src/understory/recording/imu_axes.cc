@@ -33,7 +33,7 @@ ImuAxisCheck::ImuAxisCheck() {
 void ImuAxisCheck::add(const ImuSample& sample) {
   const TimeNs step = sample.stamp - last_;
   last_ = sample.stamp;
-  if (step <= 0 || step > kLongestStep) {  // a gap, or the first one
+  if (step <= 0 || step > kLongestSampleStep) {  // a gap, or the first one
     window_ = {};
     windows_.clear();
     window_.start = sample.stamp;
@@ -42,7 +42,7 @@ void ImuAxisCheck::add(const ImuSample& sample) {
   window_.turn += sample.angular_rate * to_seconds(step);
   window_.force += sample.specific_force;
   ++window_.samples;
-  if (sample.stamp - window_.start >= kWindow) close_window();
+  if (sample.stamp - window_.start >= kTiltWindow) close_window();
 }
 
 // The mean force of a window stands for its middle; from the middle of the first to that of the

@@ -15,9 +15,9 @@ namespace understory::recording_constants {
 
 namespace imu_axes {  // recording/imu_axes.cc
 // ns over which forces and turns are summed [not recorded]
-inline constexpr std::int64_t kWindow = 500'000'000;
+inline constexpr std::int64_t kTiltWindow = 500'000'000;
 // ns between two samples at most [not recorded]
-inline constexpr std::int64_t kLongestStep = 100'000'000;
+inline constexpr std::int64_t kLongestSampleStep = 100'000'000;
 // rad^2: sum of squared tilts below which no verdict is given, about ten tilts by 8 degrees [not
 // recorded]
 inline constexpr double kEnoughTilt = 0.2;
