@@ -10,12 +10,21 @@ if(NOT UNDERSTORY_DEPS)
   set(UNDERSTORY_DEPS "${understory_deps_default}")
 endif()
 
-find_package(GTSAM 4.2 QUIET CONFIG)
-if(GTSAM_FOUND)
-  find_package(GTSAM_UNSTABLE 4.2 QUIET CONFIG)
+# The system's own CMake files of GTSAM name a library that Debian 13 does not ship (libCppUnitLite.a), so
+# headers and libraries are looked for here.
+find_path(GTSAM_HEADERS NAMES gtsam/nonlinear/ISAM2.h)
+find_library(GTSAM_LIBRARY gtsam)
+find_library(GTSAM_UNSTABLE_LIBRARY gtsam_unstable)
+mark_as_advanced(GTSAM_HEADERS GTSAM_LIBRARY GTSAM_UNSTABLE_LIBRARY)
+if(GTSAM_HEADERS AND GTSAM_LIBRARY)
+  find_package(Boost 1.67 REQUIRED COMPONENTS serialization timer)
+  find_package(TBB REQUIRED)
   add_library(understory_gtsam INTERFACE)
-  target_link_libraries(understory_gtsam INTERFACE
-                        gtsam $<$<TARGET_EXISTS:gtsam_unstable>:gtsam_unstable>)
+  target_link_libraries(understory_gtsam INTERFACE "${GTSAM_LIBRARY}" Boost::serialization Boost::timer
+                                                   TBB::tbb TBB::tbbmalloc)
+  if(GTSAM_UNSTABLE_LIBRARY)
+    target_link_libraries(understory_gtsam INTERFACE "${GTSAM_UNSTABLE_LIBRARY}")
+  endif()
   set(understory_march_default "")
 else()
   execute_process(COMMAND "${CMAKE_CURRENT_SOURCE_DIR}/tools/deps/build.sh" --march
