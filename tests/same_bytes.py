@@ -113,6 +113,7 @@ COMMANDS = {
     "evaluate": ("evaluate", "../../dense", "../../walk.truth", "--align", "se3", "--json"),
     "evaluate trees": ("evaluate", "trees", "../../dense", "../../walk.truth", "--align", "yaw", "--json"),
     "evaluate map": ("evaluate", "map", "../../stems/stems.csv.gz", "../../stems", "--json"),
+    "evaluate map of a cloud": ("evaluate", "map", "../../dense", "--json"),
     "georeference on a path": ("georeference", "../../ride", "-o", "placed", "--method", "gnss-path"),
 }
 for name, words in COMMANDS.items():

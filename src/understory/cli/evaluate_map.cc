@@ -9,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "understory/cli/evaluate_crispness.h"
 #include "understory/evaluation/strip_roads.h"
 #include "understory/evaluation/trajectory.h"
 #include "understory/graph/self_correction/stem_correction.h"
@@ -23,6 +24,7 @@ struct MapOptions {
   std::string stems;
   std::string trajectory;
   double tolerance_s = 0.01;
+  double radius_m = 0.3;
   bool json = false;
 };
 
@@ -138,24 +140,33 @@ int evaluate_map(const MapOptions& options, CommandContext& context) {
 
 void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
   auto* command = evaluate.add_subcommand(
-      "map", "Sharpness of the map of a recording's stems, placed by any trajectory");
+      "map", "Sharpness of a map without truth: of a cloud, or of stems placed by any trajectory");
   const auto options = std::make_shared<MapOptions>();
   command
-      ->add_option("STEMS", options->stems,
-                   "Stems of the views (stems.csv.gz), or a run folder that holds them")
+      ->add_option("RUN", options->stems,
+                   "Run folder or cloud (.laz, .las); with TRAJECTORY the stems of the views "
+                   "(stems.csv.gz), or a run folder that holds them")
       ->required();
-  command->add_option("TRAJECTORY", options->trajectory, "Run folder or trajectory (TUM)")
-      ->required();
+  command->add_option("TRAJECTORY", options->trajectory, "Run folder or trajectory (TUM)");
+  command
+      ->add_option("--radius-m", options->radius_m,
+                   "Of a cloud: neighbours of a point lie within it")
+      ->check(CLI::Range(0.01, 5.0));
   command->add_option("--tolerance-s", options->tolerance_s, "Largest difference of times")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--json", options->json, "Print one JSON object");
   command->footer(
-      "All three figures are small for a sharp map: the share of its area that is blurred, its\n"
-      "box dimension (0 points, 1 lines, 2 areas), and how far the sights of a tree lie from "
-      "their\n"
-      "mean.\n\nExample:\n  understory evaluate map stems.csv.gz forest");
+      "Of a cloud: the mean map entropy. It is small for a crisp map.\n"
+      "Of stems: all three figures are small for a sharp map: the share of its area that is\n"
+      "blurred, its box dimension (0 points, 1 lines, 2 areas), and how far the sights of a tree\n"
+      "lie from their mean.\n\nExamples:\n  understory evaluate map forest\n"
+      "  understory evaluate map stems.csv.gz forest");
   command->callback([&chosen, options] {
-    chosen = [options](CommandContext& context) { return evaluate_map(*options, context); };
+    chosen = [options](CommandContext& context) {
+      return options->trajectory.empty()
+                 ? evaluate_crispness(options->stems, options->radius_m, options->json, context)
+                 : evaluate_map(*options, context);
+    };
   });
 }
 

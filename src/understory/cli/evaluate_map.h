@@ -4,7 +4,7 @@
 
 namespace understory {
 
-// `understory evaluate map STEMS TRAJECTORY`
+// `understory evaluate map RUN` (a cloud) and `understory evaluate map STEMS TRAJECTORY`
 void add_evaluate_map_command(CLI::App& evaluate, Command& chosen);
 
 }  // namespace understory

@@ -16,6 +16,7 @@ constexpr std::uint64_t kBufferedPoints = 2'000'000;  // 48 MB over all tiles
 struct MapTiles::Record {
   float x, y, z;
   std::uint16_t intensity;
+  bool of_neighbour;
   TimeNs stamp;
 };
 
@@ -43,14 +44,32 @@ void MapTiles::add(const MapPoint& point) {
   const double j = std::floor(point.y / config_.tile_m);
   if (!(std::abs(i) < 1e9 && std::abs(j) < 1e9)) return;  // not a finite place
   const TileIndex index{static_cast<std::int32_t>(i), static_cast<std::int32_t>(j)};
-  tiles_[index].buffer.push_back({static_cast<float>(point.x - i * config_.tile_m),
-                                  static_cast<float>(point.y - j * config_.tile_m),
-                                  static_cast<float>(point.z), point.intensity, point.stamp});
+  add_to(index, point, false);
   ++points_added_;
-  if (++buffered_ < kBufferedPoints) return;
+  // Which neighbours are so near: -1, 0 or 1 tile further.
+  const auto side = [&](double value, double tile, int step) {
+    const double from_edge = value - tile * config_.tile_m;
+    return step == 0 || (step < 0 ? from_edge < config_.border_m
+                                  : config_.tile_m - from_edge <= config_.border_m);
+  };
+  for (int dx = -1; config_.border_m > 0.0 && dx <= 1; ++dx) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      if ((dx != 0 || dy != 0) && side(point.x, i, dx) && side(point.y, j, dy))
+        add_to({index.first + dx, index.second + dy}, point, true);
+    }
+  }
+  if (buffered_ < kBufferedPoints) return;
   for (auto& [at, tile] : tiles_)
     write_out(at, tile);
   buffered_ = 0;
+}
+
+void MapTiles::add_to(TileIndex index, const MapPoint& point, bool of_neighbour) {
+  tiles_[index].buffer.push_back({static_cast<float>(point.x - index.first * config_.tile_m),
+                                  static_cast<float>(point.y - index.second * config_.tile_m),
+                                  static_cast<float>(point.z), point.intensity, of_neighbour,
+                                  point.stamp});
+  ++buffered_;
 }
 
 std::filesystem::path MapTiles::file_of(TileIndex index) const {
@@ -124,7 +143,7 @@ void MapTiles::for_each(const std::function<void(TileIndex, const std::vector<Ma
     for (const Record& r : load(index, *tile)) {
       points.push_back({index.first * config_.tile_m + static_cast<double>(r.x),
                         index.second * config_.tile_m + static_cast<double>(r.y),
-                        static_cast<double>(r.z), r.stamp, r.intensity});
+                        static_cast<double>(r.z), r.stamp, r.intensity, r.of_neighbour});
     }
     visit(index, points);
   }

@@ -19,6 +19,7 @@ struct MapPoint {
   double z = 0.0;
   TimeNs stamp = 0;
   std::uint16_t intensity = 0;
+  bool of_neighbour = false;  // lies in another tile, within `border_m` of this one
 };
 
 // Sorts the points of a map of any size into square tiles, on disk where they are many, and hands
@@ -29,6 +30,8 @@ class MapTiles {
   struct Config {
     double tile_m = 20.0;
     double thin_m = 0.02;  // 0 = keep every point
+    double border_m =
+        0.0;  // a tile also gets its neighbours' points that are so near; below tile_m
   };
   using TileIndex = std::pair<std::int32_t, std::int32_t>;  // x, y in tiles
 
@@ -47,6 +50,7 @@ class MapTiles {
  private:
   struct Record;
   struct Tile;
+  void add_to(TileIndex index, const MapPoint& point, bool of_neighbour);
   void write_out(TileIndex index, Tile& tile);
   void thin_all();
   [[nodiscard]] std::filesystem::path file_of(TileIndex index) const;

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "understory/cli/command.h"
+
+namespace understory {
+
+// `understory evaluate map RUN|CLOUD`: the entropy of the cloud. Returns the exit code.
+[[nodiscard]] int evaluate_crispness(const std::string& run_or_cloud, double radius_m, bool json,
+                                     CommandContext& context);
+
+}  // namespace understory
