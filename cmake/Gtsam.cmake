@@ -12,6 +12,9 @@ endif()
 
 # The system's own CMake files of GTSAM name a library that Debian 13 does not ship (libCppUnitLite.a), so
 # headers and libraries are looked for here.
+execute_process(COMMAND "${CMAKE_CURRENT_SOURCE_DIR}/tools/deps/build.sh" --march
+                OUTPUT_VARIABLE understory_march_default OUTPUT_STRIP_TRAILING_WHITESPACE
+                COMMAND_ERROR_IS_FATAL ANY)
 find_path(GTSAM_HEADERS NAMES gtsam/nonlinear/ISAM2.h)
 find_library(GTSAM_LIBRARY gtsam)
 find_library(GTSAM_UNSTABLE_LIBRARY gtsam_unstable)
@@ -25,11 +28,10 @@ if(GTSAM_HEADERS AND GTSAM_LIBRARY)
   if(GTSAM_UNSTABLE_LIBRARY)
     target_link_libraries(understory_gtsam INTERFACE "${GTSAM_UNSTABLE_LIBRARY}")
   endif()
-  set(understory_march_default "")
+  # The system's GTSAM is built for every processor of the architecture, so its Eigen types are aligned to 16
+  # bytes. With the same alignment here, own code may use newer instructions.
+  target_compile_definitions(understory_flags INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
 else()
-  execute_process(COMMAND "${CMAKE_CURRENT_SOURCE_DIR}/tools/deps/build.sh" --march
-                  OUTPUT_VARIABLE understory_march_default OUTPUT_STRIP_TRAILING_WHITESPACE
-                  COMMAND_ERROR_IS_FATAL ANY)
   add_library(understory_gtsam INTERFACE)
   if(EXISTS "${UNDERSTORY_DEPS}/lib/cmake/gtsam/gtsam-targets.cmake")
     find_package(Boost 1.67 REQUIRED COMPONENTS serialization timer)
