@@ -55,6 +55,49 @@ inline constexpr double kFarOff = 4.0;
 inline constexpr double kLeastCorrelation = 1e-3;
 }  // namespace receiver_noise
 
+namespace receiver_filters {  // georeference/receiver_filters.cc
+// Standard deviations of the prior at which an error is held [chosen]
+inline constexpr double kFarthest = 6.0;
+// `follows` at most [chosen: twice as bad as stated where four times as bad is stated]
+inline constexpr double kMostFollows = 1.5;
+// A pair counts as at most that many times as good or as bad as the mean says [chosen]
+inline constexpr double kMostScale = 10.0;
+// Error that is independent from pair to pair over the fast one [chosen: keeps equations regular]
+inline constexpr double kWhiteShare = 0.1;
+// m: independent error at least [bound: GNSS]
+inline constexpr double kLeastErrorM = 0.003;
+// Kinds are drawn anew where fewer than this share of them have a say [chosen]
+inline constexpr double kRenewShare = 0.3;
+// Share of the spread of all kinds by which one is moved at random when it is drawn [tuned]
+inline constexpr double kKernel = 0.15;
+// Variance of the kinds at least, in units of the prior [bound: keeps the root real]
+inline constexpr double kLeastSpread = 1e-6;
+// Seed of the draws: the same pairs give the same result [chosen]
+inline constexpr std::uint64_t kSeed = 1;
+}  // namespace receiver_filters
+
+namespace online_georeference {  // georeference/online_georeference.cc
+// s between poses beyond which no place is interpolated [chosen]
+inline constexpr double kGapS = 2.0;
+// m: standard deviation of the place before the first fix, about that fix [bound: receivers]
+inline constexpr double kFarM = 1'000.0;
+// degrees: standard deviation of a heading that is told at most [chosen]
+inline constexpr double kMostHeadingDeg = 10.0;
+// Standard deviations in the plane over those of the filters, for receivers that are of no kind
+// [tuned: the four GNSS presets of docs/method/georeference.md, seeds up to 19]
+inline constexpr double kCautious = 1.35;
+// Steps to the most probable turn [bound: convergence to a microradian]
+inline constexpr int kCircleSteps = 5;
+// rad: a step at most [chosen]
+inline constexpr double kLongestTurn = 0.5;
+// Fixes that wait for a pose, at most; older ones are dropped [bound: memory]
+inline constexpr std::size_t kMostWaiting = 2'000;
+// m: pairs that are farther off than that, many in a row, are of another place [chosen]
+inline constexpr double kElsewhereM = 300.0;
+// Pairs in a row, that far off, after which all begins anew [chosen]
+inline constexpr std::uint64_t kElsewherePairs = 30;
+}  // namespace online_georeference
+
 namespace control_points {  // georeference/control_points.cc
 // m: points that are nearer tell no heading [chosen]
 inline constexpr double kLeastApartM = 1.0;

@@ -43,46 +43,18 @@ std::string no_common_time(const std::vector<StampedPose>& trajectory,
       moment(trajectory.back().stamp));
 }
 
-// The sums that become a pair.
-struct Gathered {
-  SatellitePair sum;
-  double time_s = 0.0;
-
-  void add(const SatellitePair& one) {
-    sum.time_s += one.time_s;
-    sum.antenna_in_world += one.antenna_in_world;
-    sum.velocity_in_world += one.velocity_in_world;
-    sum.fix_in_enu += one.fix_in_enu;
-    sum.has_height = (sum.fixes == 0 || sum.has_height) && one.has_height;
-    sum.covariance = sum.fixes == 0 ? one.covariance : sum.covariance + one.covariance;
-    ++sum.fixes;
-  }
-  [[nodiscard]] SatellitePair mean() const {
-    SatellitePair pair = sum;
-    const auto n = static_cast<double>(sum.fixes);
-    pair.time_s /= n;
-    pair.antenna_in_world /= n;
-    pair.velocity_in_world /= n;
-    pair.fix_in_enu /= n;
-    pair.covariance /= n;
-    return pair;
-  }
-};
-
 std::vector<SatellitePair> gathered(const std::vector<SatellitePair>& single,
                                     const PairingConfig& config) {
   const double whole_s = single.back().time_s - single.front().time_s;
   const double interval_s =
       std::max(config.interval_s, whole_s / static_cast<double>(config.most_pairs));
   std::vector<SatellitePair> pairs;
-  Gathered now;
-  double begin_s = single.front().time_s;
+  GatheredPair now;
   for (const SatellitePair& one : single) {
-    if (now.sum.fixes > 0 && one.time_s - begin_s >= interval_s) {
+    if (now.fixes() > 0 && one.time_s - now.begin_s() >= interval_s) {
       pairs.push_back(now.mean());
       now = {};
     }
-    if (now.sum.fixes == 0) begin_s = one.time_s;
     now.add(one);
   }
   pairs.push_back(now.mean());
@@ -90,6 +62,48 @@ std::vector<SatellitePair> gathered(const std::vector<SatellitePair>& single,
 }
 
 }  // namespace
+
+void GatheredPair::add(const SatellitePair& one) {
+  if (sum_.fixes == 0) begin_s_ = one.time_s;
+  sum_.time_s += one.time_s;
+  sum_.antenna_in_world += one.antenna_in_world;
+  sum_.velocity_in_world += one.velocity_in_world;
+  sum_.fix_in_enu += one.fix_in_enu;
+  sum_.has_height = (sum_.fixes == 0 || sum_.has_height) && one.has_height;
+  sum_.covariance = sum_.fixes == 0 ? one.covariance : sum_.covariance + one.covariance;
+  ++sum_.fixes;
+}
+
+SatellitePair GatheredPair::mean() const {
+  SatellitePair pair = sum_;
+  const auto n = static_cast<double>(sum_.fixes);
+  pair.time_s /= n;
+  pair.antenna_in_world /= n;
+  pair.velocity_in_world /= n;
+  pair.fix_in_enu /= n;
+  pair.covariance /= n;
+  return pair;
+}
+
+void GatheredPair::save(BinaryWriter& writer) const {
+  writer.put(begin_s_);
+  writer.put(sum_.time_s);
+  for (const Vector3d* v : {&sum_.antenna_in_world, &sum_.velocity_in_world, &sum_.fix_in_enu})
+    writer.put_doubles(v->data(), 3);
+  writer.put(sum_.has_height);
+  writer.put_doubles(sum_.covariance.data(), 9);
+  writer.put(static_cast<std::uint64_t>(sum_.fixes));
+}
+
+void GatheredPair::load(BinaryReader& reader) {
+  begin_s_ = reader.get<double>();
+  sum_.time_s = reader.get<double>();
+  for (Vector3d* v : {&sum_.antenna_in_world, &sum_.velocity_in_world, &sum_.fix_in_enu})
+    reader.get_doubles(v->data(), 3);
+  sum_.has_height = reader.get<bool>();
+  reader.get_doubles(sum_.covariance.data(), 9);
+  sum_.fixes = reader.get<std::uint64_t>();
+}
 
 std::optional<Vector3d> antenna_place(const std::vector<StampedPose>& trajectory,
                                       const Vector3d& antenna_in_body, TimeNs stamp) {

@@ -10,6 +10,7 @@
 #include "understory/georeference/fix_covariance.h"
 #include "understory/georeference/geodetic.h"
 #include "understory/sensor/gnss_fix.h"
+#include "understory/util/files/binary_io.h"
 
 namespace understory {
 
@@ -37,6 +38,24 @@ struct SatellitePair {
   // Mean covariance that the fixes state: errors within an interval are nearly the same.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   std::size_t fixes = 0;
+};
+
+// The fixes of one interval, as sums that become a pair.
+class GatheredPair {
+ public:
+  // `one`: a pair of a single fix.
+  void add(const SatellitePair& one);
+  [[nodiscard]] SatellitePair mean() const;  // there is a fix at least
+  [[nodiscard]] std::size_t fixes() const { return sum_.fixes; }
+  [[nodiscard]] double begin_s() const { return begin_s_; }  // time of the first one
+
+  // The state, bit for bit.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  SatellitePair sum_;
+  double begin_s_ = 0.0;
 };
 
 // All pairs of a run, in order of time. Frame east, north, up at the first fix.
