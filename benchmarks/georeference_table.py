@@ -28,6 +28,7 @@ PAPER = {"evo1": (5.84, 0.400, "pf3 5.01 m", "pf6 7.7"), "evo2": (10.64, 0.497, 
          "tuusniemi1": (10.41, 0.031, "pf3 6.84 m", "closed 1.8"),
          "tuusniemi3": (24.75, 1.215, "closed 24.75 m", "closed 69.6")}
 MARGIN = 1.1  # of the one best method over the seeds of a site
+AS_BAD = 2.0  # simulated receivers are as bad as the paper's within this factor, by closed form
 NORMALISED = ("n_turn_east", "n_turn_north", "n_turn_up", "n_east", "n_north", "n_up")
 
 
@@ -83,6 +84,10 @@ def floors(all_results):
                      f"({single[1]}, {single[0]:.2f} m).")
         if ratio > MARGIN:
             missed.append(f"{site}: auto {ratio:.2f} times {single[1]}")
+        closed = rms(map(combined, results["closed"])) / PAPER[site][0]
+        lines.append(f"- {site}: closed form errs {closed:.2f} times as far as in the paper.")
+        if not 1.0 / AS_BAD <= closed <= AS_BAD:
+            missed.append(f"{site}: closed form errs {closed:.2f} times as far as in the paper")
         for key in ("turn_east_deg", "turn_north_deg"):
             if rms(row[key] for row in results["auto"]) > 0.2:
                 missed.append(f"{site}: {key} {rms(row[key] for row in results['auto']):.2f} degrees")

@@ -39,15 +39,15 @@ const std::vector<SensorPreset>& gnss_presets() {
         "gnss.multipath_share=0.2", "gnss.height_factor=2", "gnss.reported_factor=0.5",
         "gnss.jump_interval_s=120", "gnss.jump_m=1"}},
       {"faitli_tuusniemi1",
-       {"gnss.open_sd_m=1", "gnss.canopy_sd_m=12", "gnss.correlation_s=600",
+       {"gnss.open_sd_m=2", "gnss.canopy_sd_m=24", "gnss.correlation_s=600",
         "gnss.multipath_share=0.2", "gnss.height_factor=1.4", "gnss.reported_factor=0.12",
-        "gnss.burst_interval_s=300", "gnss.burst_m=8", "gnss.jump_interval_s=200",
-        "gnss.jump_m=2"}},
+        "gnss.burst_interval_s=300", "gnss.burst_m=16", "gnss.jump_interval_s=200",
+        "gnss.jump_m=4"}},
       {"faitli_tuusniemi3",
-       {"gnss.open_sd_m=3", "gnss.canopy_sd_m=36", "gnss.correlation_s=500",
+       {"gnss.open_sd_m=5", "gnss.canopy_sd_m=60", "gnss.correlation_s=500",
         "gnss.multipath_share=0.2", "gnss.height_factor=1.2", "gnss.reported_factor=0.12",
-        "gnss.burst_interval_s=300", "gnss.burst_m=15", "gnss.jump_interval_s=200",
-        "gnss.jump_m=4"}}};
+        "gnss.burst_interval_s=300", "gnss.burst_m=25", "gnss.jump_interval_s=200",
+        "gnss.jump_m=6.5"}}};
   return presets;
 }
 
