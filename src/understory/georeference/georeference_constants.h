@@ -45,8 +45,11 @@ inline constexpr std::uint64_t kSeed = 1;
 inline constexpr double kAveragedNoises = 32.0;
 // `follows` at most [chosen: twice as bad as stated where four times as bad is stated]
 inline constexpr double kMostFollows = 1.5;
-// Columns that are made white at once, at most [bound: four parameters and a residual]
-inline constexpr std::ptrdiff_t kMostColumns = 8;
+// Columns that are made white at once, at most [bound: two axes of four parameters and a residual,
+// in blocks of four numbers]
+inline constexpr std::ptrdiff_t kMostColumns = 12;
+// s: steps between pairs that differ by less are the same [bound: no correlation changes by it]
+inline constexpr double kSameStepS = 1e-6;
 // Error that is independent from fix to fix over the fast one [chosen: keeps equations regular]
 inline constexpr double kWhiteShare = 0.1;
 // Standard deviations of the fast error beyond which a pair is a runaway [chosen]

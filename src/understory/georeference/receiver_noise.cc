@@ -54,18 +54,85 @@ struct Solution {
   MatrixXd covariance;
 };
 
-Solution solve_with(const NoisyTimes& times, const std::vector<NoisySeries>& series,
-                    const MatrixXd& information, const ReceiverNoise& noise) {
-  const Eigen::Index n = information.cols();
-  MatrixXd normal = MatrixXd::Zero(n + 1, n + 1);
-  Solution solution;
+// Columns of numbers, a row a pair, made white together; unused ones are zero.
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, kMostColumns, Eigen::RowMajor>;
+using Row = Eigen::Array<double, 1, kMostColumns>;
+
+// What is left of the slow, the steady and the fast error after a time.
+Vector3d kept_after(const ReceiverNoise& noise, double step_s) {
+  const double slow = std::exp(-step_s / noise.correlation_s);
+  const double steady = std::exp(-step_s / noise.steady_correlation_s);
+  return {slow, steady, std::exp(-step_s / noise.fast_correlation_s)};
+}
+
+// `scale` to the power `follows`.
+VectorXd followed_scale(const NoisyTimes& times, double follows) {
+  return (follows * times.scale.array().log()).exp();
+}
+
+// The states are the slow, the steady and the fast error, each in units of its standard deviation.
+double whiten_rows(const NoisyTimes& times, const ReceiverNoise& noise, Rows& rows) {
+  std::array<Row, 3> state = {Row::Zero(), Row::Zero(), Row::Zero()};
+  const VectorXd scale = followed_scale(times, noise.follows);
+  Vector3d kept = Vector3d::Zero();
+  Matrix3d variance = Matrix3d::Identity();
+  double last_step_s = -1.0;
   double logs = 0.0;
-  for (const NoisySeries& one : series) {
-    MatrixXd columns(one.residual.size(), n + 1);
-    columns << one.jacobian, one.residual;
-    logs += whiten(times, noise, columns);
-    normal += columns.transpose() * columns;
+  for (Eigen::Index k = 0; k < rows.rows(); ++k) {
+    if (k > 0) {
+      const auto now = static_cast<std::size_t>(k);
+      const double step_s = times.time_s[now] - times.time_s[now - 1];
+      if (std::abs(step_s - last_step_s) > kSameStepS) kept = kept_after(noise, step_s);
+      last_step_s = step_s;
+      variance = kept.asDiagonal() * variance * kept.asDiagonal();
+      variance.diagonal().array() += 1.0 - kept.array().square();
+    }
+    const Vector3d seen(scale(k) * noise.slow_sd_m, noise.steady_sd_m, scale(k) * noise.fast_sd_m);
+    const Vector3d spread = variance * seen;
+    const double white = kWhiteShare * seen.z();
+    const double extra = times.extra_sd_m(k);
+    const double total = seen.dot(spread) + white * white + extra * extra;
+    const Vector3d gain = spread / total;
+    Row innovation = rows.row(k).array();
+    for (int i = 0; i < 3; ++i) {
+      state[static_cast<std::size_t>(i)] *= kept(i);
+      innovation -= seen(i) * state[static_cast<std::size_t>(i)];
+    }
+    for (int i = 0; i < 3; ++i)
+      state[static_cast<std::size_t>(i)] += gain(i) * innovation;
+    rows.row(k) = innovation / std::sqrt(total);
+    variance -= gain * spread.transpose();
+    logs += std::log(total);
   }
+  return logs;
+}
+
+// Jacobian and residual of each series side by side.
+Rows side_by_side(const std::vector<NoisySeries>& series) {
+  Rows rows = Rows::Zero(series.front().residual.size(), kMostColumns);
+  Eigen::Index at = 0;
+  for (const NoisySeries& one : series) {
+    const Eigen::Index n = one.jacobian.cols();
+    UNDERSTORY_CHECK(at + n + 1 <= kMostColumns);
+    rows.middleCols(at, n) = one.jacobian;
+    rows.col(at + n) = one.residual;
+    at += n + 1;
+  }
+  return rows;
+}
+
+// `rows` are the series side by side.
+Solution solve_with(const NoisyTimes& times, Rows rows, const MatrixXd& information,
+                    const ReceiverNoise& noise, std::size_t series) {
+  const Eigen::Index n = information.cols();
+  const double logs = static_cast<double>(series) * whiten_rows(times, noise, rows);
+  const Eigen::Matrix<double, kMostColumns, kMostColumns> products = rows.transpose() * rows;
+  MatrixXd normal = MatrixXd::Zero(n + 1, n + 1);
+  for (std::size_t k = 0; k < series; ++k) {
+    const Eigen::Index at = static_cast<Eigen::Index>(k) * (n + 1);
+    normal += products.block(at, at, n + 1, n + 1);
+  }
+  Solution solution;
   const MatrixXd hessian = normal.topLeftCorner(n, n) + information;
   const Eigen::LDLT<MatrixXd> solver(hessian);
   solution.covariance = solver.solve(MatrixXd::Identity(n, n));
@@ -77,14 +144,8 @@ Solution solve_with(const NoisyTimes& times, const std::vector<NoisySeries>& ser
   return solution;
 }
 
-// What is left of the slow, the steady and the fast error after a time.
-Vector3d kept_after(const ReceiverNoise& noise, double step_s) {
-  const double slow = std::exp(-step_s / noise.correlation_s);
-  return {slow, slow, std::exp(-step_s / noise.fast_correlation_s)};
-}
-
 // The logarithms (and `follows`) of a noise in units of its prior: that is a standard normal one.
-constexpr int kUnknowns = 6;
+constexpr int kUnknowns = 7;
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 using Curvature = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
@@ -92,7 +153,11 @@ class Posterior {
  public:
   Posterior(const NoisyTimes& times, const std::vector<NoisySeries>& series,
             const MatrixXd& information, const ReceiverPriorConfig& prior)
-      : times_(times), series_(series), information_(information), prior_(prior) {}
+      : times_(times),
+        series_(series),
+        rows_(side_by_side(series)),
+        information_(information),
+        prior_(prior) {}
 
   // Bounded: residuals of nothing would make ever smaller errors more probable.
   [[nodiscard]] ReceiverNoise noise(const Unknowns& wanted) const {
@@ -102,15 +167,32 @@ class Posterior {
         times_.stated_sd_m * prior_.overconfidence * std::exp(prior_.overconfidence_log * u(0));
     noise.correlation_s = prior_.correlation_s * std::exp(prior_.correlation_log * u(1));
     noise.fast_sd_m = noise.slow_sd_m * prior_.fast_share * std::exp(prior_.fast_share_log * u(2));
-    noise.steady_sd_m =
-        noise.slow_sd_m * prior_.steady_share * std::exp(prior_.steady_share_log * u(3));
+    noise.steady_sd_m = usual_steady_m(noise.slow_sd_m) * std::exp(prior_.steady_share_log * u(3));
     noise.fast_correlation_s =
         prior_.fast_correlation_s * std::exp(prior_.fast_correlation_log * u(5));
+    noise.steady_correlation_s =
+        prior_.steady_correlation_s * std::exp(prior_.steady_correlation_log * u(6));
     noise.follows = std::clamp(prior_.follows + prior_.follows_sd * u(4), 0.0, kMostFollows);
     return noise;
   }
+  [[nodiscard]] Unknowns unknowns(const ReceiverNoise& noise) const {
+    const auto over = [](double value, double usual, double log_sd) {
+      return log_sd > 0.0 ? std::log(value / usual) / log_sd : 0.0;
+    };
+    Unknowns u;
+    u << over(noise.slow_sd_m, times_.stated_sd_m * prior_.overconfidence,
+              prior_.overconfidence_log),
+        over(noise.correlation_s, prior_.correlation_s, prior_.correlation_log),
+        over(noise.fast_sd_m, noise.slow_sd_m * prior_.fast_share, prior_.fast_share_log),
+        over(noise.steady_sd_m, usual_steady_m(noise.slow_sd_m), prior_.steady_share_log),
+        prior_.follows_sd > 0.0 ? (noise.follows - prior_.follows) / prior_.follows_sd : 0.0,
+        over(noise.fast_correlation_s, prior_.fast_correlation_s, prior_.fast_correlation_log),
+        over(noise.steady_correlation_s, prior_.steady_correlation_s,
+             prior_.steady_correlation_log);
+    return u.cwiseMax(-kFarthest).cwiseMin(kFarthest);
+  }
   [[nodiscard]] Solution solve(const Unknowns& u) const {
-    return solve_with(times_, series_, information_, noise(u));
+    return solve_with(times_, rows_, information_, noise(u), series_.size());
   }
   [[nodiscard]] double log_density(const Unknowns& u) const {
     return solve(u).log_likelihood - 0.5 * u.squaredNorm();
@@ -125,8 +207,15 @@ class Posterior {
   }
 
  private:
+  // The median of the steady error beside a slow one.
+  [[nodiscard]] double usual_steady_m(double slow_sd_m) const {
+    const double over = slow_sd_m / (times_.stated_sd_m * prior_.overconfidence);
+    return slow_sd_m * prior_.steady_share * std::pow(over, prior_.steady_power);
+  }
+
   const NoisyTimes& times_;
   const std::vector<NoisySeries>& series_;
+  const Rows rows_;
   const MatrixXd& information_;
   const ReceiverPriorConfig& prior_;
 };
@@ -188,27 +277,38 @@ void measure_curvature(const Posterior& posterior, Mode& mode, Unknowns* slope) 
   if (slope) *slope = (forward - backward) / (2.0 * h);
 }
 
-Mode find_mode(const Posterior& posterior) {
+Mode climb(const Posterior& posterior, const Unknowns& from) {
+  Mode mode;
+  mode.at = from;
+  mode.log_density = posterior.log_density(from);
+  search_along_axes(posterior, mode);
+  return mode;
+}
+
+Mode find_mode(const Posterior& posterior, const std::optional<ReceiverNoise>& near) {
+  if (near) return climb(posterior, posterior.unknowns(*near));
   Mode mode;
   mode.log_density = -std::numeric_limits<double>::infinity();
   // A short slow error and a long fast one look alike: the search begins on both sides.
   for (const double correlation : kStarts) {
-    Mode one;
-    one.at = posterior.start();
-    one.at(1) = correlation;
-    one.log_density = posterior.log_density(one.at);
-    search_along_axes(posterior, one);
+    Unknowns from = posterior.start();
+    from(1) = correlation;
+    const Mode one = climb(posterior, from);
     if (one.log_density > mode.log_density) mode = one;
   }
+  return mode;
+}
+
+// The curvature at the mode, or at the top of the paraboloid there if that is higher.
+void tell_curvature(const Posterior& posterior, Mode& mode) {
   Unknowns slope;
   measure_curvature(posterior, mode, &slope);
   const Unknowns to = mode.at + mode.covariance * slope;
   const double there = posterior.log_density(to);
-  if (there <= mode.log_density) return mode;
+  if (there <= mode.log_density) return;
   mode.at = to;
   mode.log_density = there;
   measure_curvature(posterior, mode, nullptr);
-  return mode;
 }
 
 // Draws of the noise, weighted by how probable they are over how probably they are drawn.
@@ -307,39 +407,12 @@ double NoiseBelief::relative_slow(double scale) const {
   return std::sqrt(sum / static_cast<double>(noise.size())) / slow_sd_m();
 }
 
-// The states are the slow, the steady and the fast error, each in units of its standard deviation.
 double whiten(const NoisyTimes& times, const ReceiverNoise& noise, MatrixXd& columns) {
   UNDERSTORY_CHECK(columns.cols() <= kMostColumns);
-  std::array<Vector3d, kMostColumns> state;
-  state.fill(Vector3d::Zero());
-  Matrix3d variance = Matrix3d::Identity();
-  double logs = 0.0;
-  for (Eigen::Index k = 0; k < columns.rows(); ++k) {
-    Vector3d kept = Vector3d::Zero();
-    if (k > 0) {
-      const auto now = static_cast<std::size_t>(k);
-      kept = kept_after(noise, times.time_s[now] - times.time_s[now - 1]);
-      variance = kept.asDiagonal() * variance * kept.asDiagonal();
-      variance.diagonal().array() += 1.0 - kept.array().square();
-    }
-    const double scale = std::pow(times.scale(k), noise.follows);
-    const Vector3d seen(scale * noise.slow_sd_m, noise.steady_sd_m, scale * noise.fast_sd_m);
-    const Vector3d spread = variance * seen;
-    const double white = kWhiteShare * seen.z();
-    const double extra = times.extra_sd_m(k);
-    const double total = seen.dot(spread) + white * white + extra * extra;
-    const Vector3d gain = spread / total;
-    const double root = 1.0 / std::sqrt(total);
-    for (Eigen::Index column = 0; column < columns.cols(); ++column) {
-      Vector3d& now = state[static_cast<std::size_t>(column)];
-      now = kept.cwiseProduct(now);
-      const double innovation = columns(k, column) - seen.dot(now);
-      columns(k, column) = innovation * root;
-      now += gain * innovation;
-    }
-    variance -= gain * spread.transpose();
-    logs += std::log(total);
-  }
+  Rows rows = Rows::Zero(columns.rows(), kMostColumns);
+  rows.leftCols(columns.cols()) = columns;
+  const double logs = whiten_rows(times, noise, rows);
+  columns = rows.leftCols(columns.cols());
   return logs;
 }
 
@@ -347,7 +420,7 @@ MatrixXd noise_covariance(const NoisyTimes& times, const NoiseBelief& belief) {
   const auto n = static_cast<Eigen::Index>(times.time_s.size());
   MatrixXd covariance = MatrixXd::Zero(n, n);
   for (const ReceiverNoise& noise : belief.noise) {
-    const VectorXd scale = times.scale.array().pow(noise.follows);
+    const VectorXd scale = followed_scale(times, noise.follows);
     const VectorXd slow = noise.slow_sd_m * scale;
     const VectorXd fast = noise.fast_sd_m * scale;
     const double steady = noise.steady_sd_m * noise.steady_sd_m;
@@ -388,11 +461,22 @@ VectorXd runaways_m(const NoisyTimes& times, const ReceiverNoise& noise,
 }
 
 NoisyEstimate estimate_under_noise(const NoisyTimes& times, const std::vector<NoisySeries>& series,
-                                   const MatrixXd& information, const ReceiverPriorConfig& prior) {
+                                   const MatrixXd& information, const ReceiverPriorConfig& prior,
+                                   const NoiseSearch& search) {
   UNDERSTORY_CHECK(!series.empty() && !times.time_s.empty());
   const Posterior posterior(times, series, information, prior);
-  const Draws draws = draw(posterior, find_mode(posterior));
+  Mode mode = find_mode(posterior, search.near);
   NoisyEstimate estimate;
+  if (!search.integrate) {
+    const Solution solution = posterior.solve(mode.at);
+    estimate.likeliest = posterior.noise(mode.at);
+    estimate.noise = {{estimate.likeliest}};
+    estimate.mean = solution.mean;
+    estimate.covariance = solution.covariance;
+    return estimate;
+  }
+  tell_curvature(posterior, mode);
+  const Draws draws = draw(posterior, mode);
   estimate.noise = resampled(draws);
   const auto most = std::max_element(draws.weight.begin(), draws.weight.end());
   estimate.likeliest = draws.noise[static_cast<std::size_t>(most - draws.weight.begin())];

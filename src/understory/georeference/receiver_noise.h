@@ -1,37 +1,45 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 namespace understory {
 
 // Errors of a receiver along one axis over time. The receiver says that some fixes are better than
 // others (`NoisyTimes::scale`). An error is scale^follows * (slow + fast) + steady. All three are
-// exponentially correlated (first-order Gauss-Markov processes).
+// exponentially correlated (first-order Gauss-Markov processes). The steady error stands for the
+// set of satellites: a receiver that changes it steps aside and stays there for minutes.
 struct ReceiverNoise {
   double slow_sd_m = 1.0;       // of a pair with scale 1
   double correlation_s = 60.0;  // correlations fall to 1/e within this
   double fast_sd_m = 0.1;       // of a pair with scale 1
   double fast_correlation_s = 2.0;
   double follows = 1.0;      // 1: errors go with what the receiver states; 0: not at all
-  double steady_sd_m = 0.0;  // slow error that is the same at all pairs
+  double steady_sd_m = 0.0;  // error whose size is the same at all pairs
+  double steady_correlation_s = 600.0;
 };
 
 // The prior of a receiver before its fixes are compared with a path: medians, and the
 // standard deviation of the natural logarithm.
 struct ReceiverPriorConfig {
-  double overconfidence = 2.2;  // slow_sd_m over what the receiver states
-  double overconfidence_log = 1.0;
-  double correlation_s = 150.0;
+  double overconfidence = 4.0;  // slow_sd_m over what the receiver states
+  double overconfidence_log = 0.75;
+  double correlation_s = 250.0;
   double correlation_log = 0.9;
   double fast_share = 0.25;  // fast_sd_m over slow_sd_m
-  double fast_share_log = 0.9;
-  double fast_correlation_s = 3.0;
-  double fast_correlation_log = 0.4;
-  double steady_share = 0.25;  // steady_sd_m over slow_sd_m
-  double steady_share_log = 0.7;
-  double follows = 0.8;  // mean, and standard deviation
-  double follows_sd = 0.4;
+  double fast_share_log = 0.4;
+  double fast_correlation_s = 4.0;
+  double fast_correlation_log = 0.35;
+  double steady_share = 0.35;  // steady_sd_m over slow_sd_m
+  double steady_share_log = 0.6;
+  // That share goes with this power of the overconfidence over its median: a receiver that
+  // understates its errors most does not notice wrong satellites either.
+  double steady_power = 0.8;
+  double steady_correlation_s = 600.0;
+  double steady_correlation_log = 0.7;
+  double follows = 0.9;  // mean, and standard deviation
+  double follows_sd = 0.3;
 };
 
 // Noises that are equally probable.
@@ -85,6 +93,14 @@ double whiten(const NoisyTimes& times, const ReceiverNoise& noise, Eigen::Matrix
 [[nodiscard]] Eigen::VectorXd runaways_m(const NoisyTimes& times, const ReceiverNoise& noise,
                                          const Eigen::MatrixXd& residuals);
 
+// How the noise is looked for.
+struct NoiseSearch {
+  // The search begins there, else at usual noises.
+  std::optional<ReceiverNoise> near;
+  // Integrates over the noises that are probable; else the most probable one counts alone.
+  bool integrate = true;
+};
+
 // Generalised least squares over series that share one kind of noise. The noise is integrated out
 // (restricted likelihood times prior, importance sampling around the most probable one), so few
 // fixes with independent errors give a wide covariance. `information` of a Gaussian prior about
@@ -92,6 +108,7 @@ double whiten(const NoisyTimes& times, const ReceiverNoise& noise, Eigen::Matrix
 [[nodiscard]] NoisyEstimate estimate_under_noise(const NoisyTimes& times,
                                                  const std::vector<NoisySeries>& series,
                                                  const Eigen::MatrixXd& information,
-                                                 const ReceiverPriorConfig& prior);
+                                                 const ReceiverPriorConfig& prior,
+                                                 const NoiseSearch& search = {});
 
 }  // namespace understory

@@ -34,7 +34,9 @@ VectorXd drawn(const NoisyTimes& times, const ReceiverNoise& noise, Random& rand
       const auto i = static_cast<std::size_t>(k);
       const double kept = std::exp(-(times.time_s[i] - times.time_s[i - 1]) / noise.correlation_s);
       slow = kept * slow + std::sqrt(1.0 - kept * kept) * random.normal();
-      steady = kept * steady + std::sqrt(1.0 - kept * kept) * random.normal();
+      const double stays =
+          std::exp(-(times.time_s[i] - times.time_s[i - 1]) / noise.steady_correlation_s);
+      steady = stays * steady + std::sqrt(1.0 - stays * stays) * random.normal();
       const double left =
           std::exp(-(times.time_s[i] - times.time_s[i - 1]) / noise.fast_correlation_s);
       fast = left * fast + std::sqrt(1.0 - left * left) * random.normal();
@@ -56,12 +58,12 @@ TEST(ReceiverNoise, WhiteningIsTheInverseOfTheCovariance) {
     times.extra_sd_m(k) = k % 7 == 0 ? 3.0 : 0.0;
     columns.row(k) << random.normal(), random.normal();
   }
-  const ReceiverNoise noise{2.0, 25.0, 0.7, 2.0, 0.5, 0.8};
+  const ReceiverNoise noise{2.0, 25.0, 0.7, 2.0, 0.5, 0.8, 90.0};
   const MatrixXd covariance = noise_covariance(times, {{noise}});
   EXPECT_NEAR(covariance(3, 1),
               std::sqrt(times.scale(3) * times.scale(1)) *
                       (4.0 * std::exp(-6.0 / 25.0) + 0.49 * std::exp(-6.0 / 2.0)) +
-                  0.64 * std::exp(-6.0 / 25.0),
+                  0.64 * std::exp(-6.0 / 90.0),
               1e-9);
   const MatrixXd expected = columns.transpose() * covariance.ldlt().solve(columns);
   MatrixXd white = columns;
@@ -100,6 +102,52 @@ TEST(ReceiverNoise, TheStatedErrorOfAMeanHoldsOverManyReceivers) {
   EXPECT_GT(naive, 10.0);  // errors taken as independent promise far too much
 }
 
+// A receiver that changes its satellites steps aside and stays there, on a clearing too. The fit
+// once gave such an error the correlation time of the slow one, and promised too much.
+TEST(ReceiverNoise, AnErrorThatStaysOnAClearingIsPartOfWhatIsStated) {
+  NoisyTimes times = times_of(250, 4.0);
+  for (Eigen::Index k = 0; k < 250; ++k)
+    times.scale(k) = std::exp(1.2 * std::sin(0.11 * static_cast<double>(k)));
+  ReceiverPriorConfig brief;
+  brief.steady_correlation_s = 40.0;
+  brief.steady_correlation_log = 0.01;
+  double squared = 0.0;
+  double squared_brief = 0.0;
+  constexpr int kReceivers = 60;
+  for (int receiver = 0; receiver < kReceivers; ++receiver) {
+    Random random(static_cast<std::uint64_t>(300 + receiver));
+    VectorXd errors = drawn(times, {3.0, 60.0, 0.7, 3.0, 1.0, 0.0}, random);
+    double step = random.normal();
+    for (Eigen::Index k = 0; k < 250; ++k) {
+      if (random.chance(4.0 / 800.0)) step = random.normal();
+      errors(k) += step;
+    }
+    const std::vector<NoisySeries> series = {{errors, MatrixXd::Ones(250, 1)}};
+    const auto normalised = [&](const ReceiverPriorConfig& prior) {
+      const NoisyEstimate found = estimate_under_noise(times, series, MatrixXd::Zero(1, 1), prior);
+      return found.mean(0) * found.mean(0) / found.covariance(0, 0) / kReceivers;
+    };
+    squared += normalised({});
+    squared_brief += normalised(brief);
+  }
+  EXPECT_GT(squared, 0.4);
+  EXPECT_LT(squared, 1.5);
+  EXPECT_GT(squared_brief, 1.5 * squared);
+}
+
+TEST(ReceiverNoise, ASearchNearTheMostProbableNoiseStaysThere) {
+  const NoisyTimes times = times_of(200, 2.0);
+  Random random(11);
+  const VectorXd errors = drawn(times, {2.0, 60.0, 0.4, 2.0}, random);
+  const std::vector<NoisySeries> series = {{errors, MatrixXd::Ones(200, 1)}};
+  const NoisyEstimate first =
+      estimate_under_noise(times, series, MatrixXd::Zero(1, 1), {}, {std::nullopt, false});
+  const NoisyEstimate again =
+      estimate_under_noise(times, series, MatrixXd::Zero(1, 1), {}, {first.likeliest, false});
+  EXPECT_NEAR(again.mean(0), first.mean(0), 0.1 * std::sqrt(first.covariance(0, 0)));
+  EXPECT_EQ(again.noise.noise.size(), 1U);
+}
+
 TEST(ReceiverNoise, LearnsHowSlowTheErrorsAre) {
   const NoisyTimes times = times_of(400, 2.0);
   double before = 0.0;
@@ -108,8 +156,8 @@ TEST(ReceiverNoise, LearnsHowSlowTheErrorsAre) {
     const VectorXd errors = drawn(times, {1.5, correlation_s, 0.1, 1.0}, random);
     const NoisyEstimate estimate =
         estimate_under_noise(times, {{errors, MatrixXd::Ones(400, 1)}}, MatrixXd::Zero(1, 1), {});
-    EXPECT_NEAR(std::log(estimate.noise.correlation_s() / correlation_s), 0.0, 0.8);
-    EXPECT_NEAR(estimate.noise.slow_sd_m(), 1.5, 0.8);
+    EXPECT_NEAR(std::log(estimate.noise.correlation_s() / correlation_s), 0.0, 1.2);
+    EXPECT_NEAR(estimate.noise.slow_sd_m(), 1.5, 1.1);
     EXPECT_GT(estimate.noise.correlation_s(), 2.0 * before);
     before = estimate.noise.correlation_s();
   }

@@ -116,6 +116,8 @@ class Splitter {
         weigh_at_first();
       else
         weigh_again();
+      // The noise of the last step counts; those before tell what lies far off.
+      height_search_.integrate = plane_search_.integrate = step + 1 == kSteps;
       solve_height();
       solve_plane();
     }
@@ -153,10 +155,10 @@ class Splitter {
     if (!config_.robust) return;
     const Eigen::Matrix3Xd off = residuals();
     fit_.plane_times.extra_sd_m =
-        runaways_m(fit_.plane_times, plane_likeliest_, off.topRows<2>().transpose());
+        runaways_m(fit_.plane_times, *plane_search_.near, off.topRows<2>().transpose());
     if (fit_.height_known)
       fit_.height_times.extra_sd_m =
-          runaways_m(fit_.height_times, height_likeliest_, off.row(2).transpose());
+          runaways_m(fit_.height_times, *height_search_.near, off.row(2).transpose());
   }
 
   [[nodiscard]] Eigen::Matrix3Xd residuals() const {
@@ -189,7 +191,7 @@ class Splitter {
     MatrixXd information = MatrixXd::Zero(clock ? 4 : 3, clock ? 4 : 3);
     if (clock) information(3, 3) = std::pow(config_.time_offset_sd_s, -2.0);
     const NoisyEstimate found =
-        estimate_under_noise(fit_.plane_times, series, information, config_.plane);
+        estimate_under_noise(fit_.plane_times, series, information, config_.plane, plane_search_);
     level_ = about(centre, Vector3d(0.0, 0.0, found.mean(0)),
                    Vector3d(found.mean(1), found.mean(2), 0.0)) *
              level_;
@@ -198,7 +200,7 @@ class Splitter {
       fit_.time_offset_sd_s = std::sqrt(found.covariance(3, 3));
     }
     fit_.plane_noise = found.noise;
-    plane_likeliest_ = found.likeliest;
+    plane_search_.near = found.likeliest;
     fit_.spread.block<3, 3>(2, 2) = found.covariance.topLeftCorner<3, 3>();
   }
 
@@ -221,12 +223,12 @@ class Splitter {
     }
     MatrixXd information = MatrixXd::Zero(3, 3);
     information(0, 0) = information(1, 1) = 1.0 / std::max(1e-12, tilt_sd * tilt_sd);
-    const NoisyEstimate found =
-        estimate_under_noise(fit_.height_times, {series}, information, config_.height);
+    const NoisyEstimate found = estimate_under_noise(fit_.height_times, {series}, information,
+                                                     config_.height, height_search_);
     tilt_ = Vector3d(found.mean(0), found.mean(1), 0.0);
     up_ = found.mean(2);
     fit_.height_noise = found.noise;
-    height_likeliest_ = found.likeliest;
+    height_search_.near = found.likeliest;
     const int at[] = {0, 1, 5};
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j)
@@ -239,8 +241,8 @@ class Splitter {
   Pose level_;  // without the tilt and the height that were found
   Vector3d tilt_ = Vector3d::Zero();
   double up_ = 0.0;
-  ReceiverNoise plane_likeliest_;
-  ReceiverNoise height_likeliest_;
+  NoiseSearch plane_search_;
+  NoiseSearch height_search_;
   SplitFit fit_;
 };
 
