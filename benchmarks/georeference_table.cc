@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/georeference/fused_path.h"
-#include "understory/georeference/gnss_fit.h"
-#include "understory/georeference/satellite_fit.h"
-#include "understory/georeference/satellite_smoothing.h"
+#include "understory/georeference/satellites/fused_path.h"
+#include "understory/georeference/satellites/gnss_fit.h"
+#include "understory/georeference/satellites/satellite_fit.h"
+#include "understory/georeference/satellites/satellite_smoothing.h"
 #include "understory/map/keyframe_map.h"
 #include "understory/simulation/sensors/inertial.h"
 #include "understory/simulation/sensors/satellite.h"

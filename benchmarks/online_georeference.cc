@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/georeference/online_georeference.h"
+#include "understory/georeference/satellites/online_georeference.h"
 #include "understory/simulation/sensors/satellite.h"
 #include "understory/simulation/world.h"
 #include "understory/util/random.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "understory/georeference/gnss_fit.h"
+#include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/util/angles.h"
 
 namespace understory {

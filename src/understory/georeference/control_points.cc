@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "understory/georeference/georeference_constants.h"
-#include "understory/georeference/split_fit.h"
+#include "understory/georeference/satellites/split_fit.h"
 #include "understory/util/median.h"
 
 namespace understory {

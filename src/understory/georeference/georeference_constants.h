@@ -12,12 +12,12 @@
 // or real clouds and measurements by their page.
 namespace understory::georeference_constants {
 
-namespace satellite_pairs {  // georeference/satellite_pairs.cc
+namespace satellite_pairs {  // georeference/satellites/satellite_pairs.cc
 // s between poses beyond which no place is interpolated [chosen]
 inline constexpr double kGapS = 2.0;
 }  // namespace satellite_pairs
 
-namespace receiver_noise {  // georeference/receiver_noise.cc
+namespace receiver_noise {  // georeference/satellites/receiver_noise.cc
 // Unknowns of the noise are in standard deviations of their prior. Rounds of the search for the
 // most probable one, at most [bound: time]
 inline constexpr int kSearchRounds = 12;
@@ -58,7 +58,7 @@ inline constexpr double kFarOff = 4.0;
 inline constexpr double kLeastCorrelation = 1e-3;
 }  // namespace receiver_noise
 
-namespace receiver_filters {  // georeference/receiver_filters.cc
+namespace receiver_filters {  // georeference/satellites/receiver_filters.cc
 // Standard deviations of the prior at which an error is held [chosen]
 inline constexpr double kFarthest = 6.0;
 // `follows` at most [chosen: twice as bad as stated where four times as bad is stated]
@@ -79,7 +79,7 @@ inline constexpr double kLeastSpread = 1e-6;
 inline constexpr std::uint64_t kSeed = 1;
 }  // namespace receiver_filters
 
-namespace online_georeference {  // georeference/online_georeference.cc
+namespace online_georeference {  // georeference/satellites/online_georeference.cc
 // s between poses beyond which no place is interpolated [chosen]
 inline constexpr double kGapS = 2.0;
 // m: standard deviation of the place before the first fix, about that fix [bound: receivers]
@@ -114,7 +114,7 @@ inline constexpr int kSteps = 6;
 inline constexpr double kPriorCoordinates = 4.0;
 }  // namespace control_points
 
-namespace rigid_fits {  // georeference/rigid_fits.cc
+namespace rigid_fits {  // georeference/satellites/rigid_fits.cc
 // Pairs of a rigid motion at least [bound: six degrees of freedom]
 inline constexpr std::size_t kFewestPairs = 3;
 // m: places that are nearer to their middle in the mean are one place [chosen]
@@ -123,7 +123,7 @@ inline constexpr double kLeastSpreadM = 0.01;
 inline constexpr double kCauchyWidth = 2.385;
 }  // namespace rigid_fits
 
-namespace fused_path {  // georeference/fused_path.cc
+namespace fused_path {  // georeference/satellites/fused_path.cc
 // m: fast error of a receiver at least: graphs need a width [chosen]
 inline constexpr double kLeastErrorM = 0.005;
 // m: error in the plane that a receiver states and that is taken as stated, at most [chosen: RTK,
@@ -139,7 +139,7 @@ namespace combined_place {  // georeference/combined_place.cc
 inline constexpr double kNothingKnown = 1e-8;
 }  // namespace combined_place
 
-namespace split_fit {  // georeference/split_fit.cc
+namespace split_fit {  // georeference/satellites/split_fit.cc
 // Pairs at least [bound: three parameters in the plane]
 inline constexpr std::size_t kFewestPairs = 3;
 // m: extent of the path at least [chosen]
@@ -162,7 +162,7 @@ inline constexpr double kFarOff = 4.0;
 inline constexpr double kUnknownHeightM = 1'000.0;
 }  // namespace split_fit
 
-namespace satellite_smoothing {  // georeference/satellite_smoothing.cc
+namespace satellite_smoothing {  // georeference/satellites/satellite_smoothing.cc
 // rad^-2: weight of the first guess of the attitude [bound: keeps the equations regular]
 inline constexpr double kAttitudeWeight = 1e-2;
 // m/s: of the first velocity [bound: carriers]
@@ -175,7 +175,7 @@ inline constexpr double kLongestGapS = 0.1;
 inline constexpr double kConverged = 1e-6;
 }  // namespace satellite_smoothing
 
-namespace satellite_fit {  // georeference/satellite_fit.cc
+namespace satellite_fit {  // georeference/satellites/satellite_fit.cc
 // s between poses beyond which no pose is interpolated [chosen]
 inline constexpr double kGapS = 2.0;
 // m: root mean square of residuals below which no mistake of the angles is looked for [chosen]
@@ -184,7 +184,7 @@ inline constexpr double kLeastMisfitM = 3.0;
 inline constexpr double kClearlyBetter = 0.5;
 }  // namespace satellite_fit
 
-namespace gnss_fit {  // georeference/gnss_fit.cc
+namespace gnss_fit {  // georeference/satellites/gnss_fit.cc
 // Fixes before and after one that tell its direction [chosen]
 inline constexpr std::size_t kReach = 12;
 // m between these: less tells no direction [chosen]
@@ -313,7 +313,7 @@ inline constexpr double kThickestM = 2.0;
 // Parts of the source that are tried [bound: time]
 inline constexpr std::size_t kParts = 3;
 }  // namespace tree_match
-namespace layer_frame {  // georeference/layer_frame.cc
+namespace layer_frame {  // georeference/systems/layer_frame.cc
 // m: nodes of the grid that points are interpolated in. The level plane leaves the ellipsoid by
 // the square of the distance over twice the radius of the earth: 0.04 mm in the middle of a cell
 // [bound: geometry]

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "understory/geometry/quiet_gdal.h"
-#include "understory/georeference/coordinate_system.h"
 #include "understory/georeference/georeference_constants.h"
+#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/util/error.h"
 #include "understory/util/files/text_file.h"
 

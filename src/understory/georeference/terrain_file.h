@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "understory/geometry/raster.h"
-#include "understory/georeference/geodetic.h"
+#include "understory/georeference/systems/geodetic.h"
 
 namespace understory {
 

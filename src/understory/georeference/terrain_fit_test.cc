@@ -7,7 +7,7 @@
 #include <fstream>
 #include <random>
 
-#include "understory/georeference/coordinate_system.h"
+#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/georeference/terrain_file.h"
 #include "understory/util/error.h"
 #include "understory/util/files/folder_test_support.h"

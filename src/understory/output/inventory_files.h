@@ -5,8 +5,8 @@
 #include <string>
 
 #include "understory/forest/inventory.h"
-#include "understory/georeference/layer_frame.h"
-#include "understory/output/map_picture.h"
+#include "understory/georeference/systems/layer_frame.h"
+#include "understory/output/report/map_picture.h"
 
 namespace understory {
 

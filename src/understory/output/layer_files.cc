@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "understory/georeference/coordinate_system.h"
+#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/qgis_project.h"
 
 namespace understory {

@@ -7,8 +7,8 @@
 
 #include "understory/geometry/raster.h"
 #include "understory/geometry/stamped_pose.h"
-#include "understory/georeference/layer_frame.h"
-#include "understory/georeference/moved_raster.h"
+#include "understory/georeference/systems/layer_frame.h"
+#include "understory/georeference/systems/moved_raster.h"
 #include "understory/output/geo_files.h"
 #include "understory/output/las_writer.h"
 #include "understory/sensor/tree.h"

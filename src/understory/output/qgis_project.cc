@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "understory/output/svg_plot.h"
+#include "understory/output/report/svg_plot.h"
 #include "understory/util/files/atomic_file.h"
 
 namespace understory {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
-#include "understory/georeference/geodetic.h"
+#include "understory/georeference/systems/geodetic.h"
 #include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
 #include "understory/util/timing.h"

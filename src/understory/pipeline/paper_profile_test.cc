@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "understory/odometry/motion/motion_model.h"
-#include "understory/pipeline/mapping/dense_mapping_config.h"
+#include "understory/pipeline/mapping/dense/dense_mapping_config.h"
 #include "understory/util/time.h"
 
 namespace understory {

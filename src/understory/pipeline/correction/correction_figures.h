@@ -1,6 +1,6 @@
 #pragma once
 
-#include "understory/output/report.h"
+#include "understory/output/report/report.h"
 #include "understory/pipeline/correction/correction_run.h"
 
 namespace understory {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/georeference/gnss_fit.h"
+#include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/output/run_summary.h"
 #include "understory/output/run_tables.h"
 #include "understory/sensor/gnss_fix.h"

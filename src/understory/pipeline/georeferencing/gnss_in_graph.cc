@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "understory/georeference/gnss_fit.h"
+#include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/pipeline/georeferencing/placement_figures.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
-#include "understory/georeference/fused_path.h"
+#include "understory/georeference/satellites/fused_path.h"
 #include "understory/pipeline/georeferencing/map_placing.h"
 #include "understory/util/config/config.h"
 #include "understory/util/log.h"

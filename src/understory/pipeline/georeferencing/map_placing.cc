@@ -5,7 +5,7 @@
 #include <iterator>
 #include <optional>
 
-#include "understory/georeference/split_fit.h"
+#include "understory/georeference/satellites/split_fit.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/output/report.h"
+#include "understory/output/report/report.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
 #include "understory/pipeline/georeferencing/placement.h"
 #include "understory/pipeline/georeferencing/run_place.h"

@@ -8,9 +8,9 @@
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/evaluation/tree_falls.h"
-#include "understory/georeference/geodetic.h"
-#include "understory/georeference/layer_frame.h"
-#include "understory/output/map_picture.h"
+#include "understory/georeference/systems/geodetic.h"
+#include "understory/georeference/systems/layer_frame.h"
+#include "understory/output/report/map_picture.h"
 #include "understory/pipeline/georeferencing/placement.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/judgement/inherited_trust.h"

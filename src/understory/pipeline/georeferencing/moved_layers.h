@@ -3,8 +3,8 @@
 #include <filesystem>
 
 #include "understory/geometry/pose.h"
-#include "understory/georeference/layer_frame.h"
-#include "understory/output/map_picture.h"
+#include "understory/georeference/systems/layer_frame.h"
+#include "understory/output/report/map_picture.h"
 #include "understory/util/log.h"
 
 namespace understory {

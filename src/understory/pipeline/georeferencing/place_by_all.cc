@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "understory/georeference/combined_place.h"
-#include "understory/georeference/split_fit.h"
+#include "understory/georeference/satellites/split_fit.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
 #include "understory/pipeline/georeferencing/satellite_placement.h"

@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "understory/georeference/satellite_smoothing.h"
+#include "understory/georeference/satellites/satellite_smoothing.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
 #include "understory/pipeline/georeferencing/satellite_placement.h"
 #include "understory/pipeline/source.h"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "understory/georeference/gnss_fit.h"
+#include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
 #include "understory/pipeline/georeferencing/satellite_placement.h"

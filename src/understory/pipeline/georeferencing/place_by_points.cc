@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "understory/georeference/control_points.h"
-#include "understory/georeference/coordinate_system.h"
-#include "understory/georeference/satellite_pairs.h"
+#include "understory/georeference/satellites/satellite_pairs.h"
+#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/pipeline/georeferencing/placement_figures.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
 #include "understory/pipeline/georeferencing/satellite_placement.h"

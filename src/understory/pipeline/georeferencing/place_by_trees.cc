@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "understory/georeference/split_fit.h"
+#include "understory/georeference/satellites/split_fit.h"
 #include "understory/pipeline/georeferencing/placement_methods.h"
 #include "understory/pipeline/georeferencing/satellite_placement.h"
 #include "understory/pipeline/georeferencing/tree_placement.h"

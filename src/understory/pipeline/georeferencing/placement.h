@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
-#include "understory/georeference/geodetic.h"
+#include "understory/georeference/systems/geodetic.h"
 #include "understory/output/run_summary.h"
 #include "understory/output/run_tables.h"
 

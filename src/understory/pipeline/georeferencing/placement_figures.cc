@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "understory/georeference/split_fit.h"
+#include "understory/georeference/satellites/split_fit.h"
 
 namespace understory {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "understory/georeference/coordinate_system.h"
+#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/util/error.h"
 #include "understory/util/files/text_file.h"
 

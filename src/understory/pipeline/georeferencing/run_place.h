@@ -4,8 +4,8 @@
 #include <memory>
 #include <optional>
 
-#include "understory/georeference/default_system.h"
-#include "understory/georeference/layer_frame.h"
+#include "understory/georeference/systems/default_system.h"
+#include "understory/georeference/systems/layer_frame.h"
 #include "understory/output/run_summary.h"
 #include "understory/util/config/config.h"
 #include "understory/util/log.h"

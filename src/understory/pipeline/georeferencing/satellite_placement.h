@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/georeference/satellite_fit.h"
+#include "understory/georeference/satellites/satellite_fit.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
 #include "understory/pipeline/georeferencing/placement.h"

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "understory/georeference/georeference_constants.h"
-#include "understory/georeference/gnss_fit.h"
+#include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/georeference/trees/tree_match.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
 #include "understory/pipeline/georeferencing/run_tops.h"

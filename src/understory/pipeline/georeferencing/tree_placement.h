@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "understory/georeference/combined_place.h"
-#include "understory/georeference/geodetic.h"
+#include "understory/georeference/systems/geodetic.h"
 #include "understory/georeference/trees/tree_match.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
 #include "understory/pipeline/georeferencing/movable_run.h"

@@ -9,7 +9,7 @@
 #include "understory/features/tree_tops.h"
 #include "understory/forest/ground/canopy.h"
 #include "understory/forest/ground/ground.h"
-#include "understory/georeference/coordinate_system.h"
+#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/georeference/trees/tree_map_file.h"
 #include "understory/pipeline/inventory/stand_cloud.h"
 #include "understory/util/error.h"

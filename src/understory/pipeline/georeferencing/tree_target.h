@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/georeference/geodetic.h"
+#include "understory/georeference/systems/geodetic.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/log.h"
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "understory/georeference/coordinate_system.h"
+#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/inventory_files.h"
 #include "understory/output/qgis_project.h"
 #include "understory/pipeline/georeferencing/run_place.h"

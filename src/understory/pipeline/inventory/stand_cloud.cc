@@ -10,7 +10,7 @@
 
 #include "understory/forest/cloud_shape.h"
 #include "understory/geometry/rotation_between.h"
-#include "understory/georeference/coordinate_system.h"
+#include "understory/georeference/systems/coordinate_system.h"
 
 namespace understory {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "understory/forest/inventory.h"
-#include "understory/georeference/layer_frame.h"
+#include "understory/georeference/systems/layer_frame.h"
 #include "understory/recording/clouds/cloud_file.h"
 
 namespace understory {

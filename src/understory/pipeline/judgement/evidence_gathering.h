@@ -3,9 +3,9 @@
 #include "understory/odometry/motion/motion_model.h"
 #include "understory/pipeline/judgement/imu_usage.h"
 #include "understory/pipeline/judgement/run_evidence.h"
-#include "understory/pipeline/mapping/dense_front_end.h"
+#include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/pipeline/mapping/run_facts.h"
-#include "understory/pipeline/mapping/sparse_front_end.h"
+#include "understory/pipeline/mapping/sparse/sparse_front_end.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 

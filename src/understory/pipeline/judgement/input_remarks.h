@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "understory/pipeline/mapping/dense_front_end.h"
+#include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "understory/pipeline/mapping/dense_mapping_config.h"
+#include "understory/pipeline/mapping/dense/dense_mapping_config.h"
 #include "understory/pipeline/mapping/sensor_traits.h"
-#include "understory/pipeline/mapping/sparse_mapping_config.h"
+#include "understory/pipeline/mapping/sparse/sparse_mapping_config.h"
 #include "understory/util/config/config_origins.h"
 #include "understory/util/files/binary_io.h"
 

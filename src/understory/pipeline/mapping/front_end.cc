@@ -1,7 +1,7 @@
 #include "understory/pipeline/mapping/front_end.h"
 
-#include "understory/pipeline/mapping/dense_front_end.h"
-#include "understory/pipeline/mapping/sparse_front_end.h"
+#include "understory/pipeline/mapping/dense/dense_front_end.h"
+#include "understory/pipeline/mapping/sparse/sparse_front_end.h"
 
 namespace understory {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "understory/pipeline/mapping/adaptation.h"
-#include "understory/pipeline/mapping/dense_mapping_config.h"
-#include "understory/pipeline/mapping/sparse_mapping_config.h"
+#include "understory/pipeline/mapping/dense/dense_mapping_config.h"
+#include "understory/pipeline/mapping/sparse/sparse_mapping_config.h"
 #include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/output/report.h"
+#include "understory/output/report/report.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/judgement/inherited_trust.h"

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/output/report.h"
+#include "understory/output/report/report.h"
 #include "understory/recording/recording.h"
 
 namespace understory {

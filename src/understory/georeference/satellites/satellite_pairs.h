@@ -1,0 +1,89 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/stamped_pose.h"
+#include "understory/georeference/satellites/fix_covariance.h"
+#include "understory/georeference/systems/geodetic.h"
+#include "understory/sensor/gnss_fix.h"
+#include "understory/util/files/binary_io.h"
+
+namespace understory {
+
+// How fixes and a path are brought together by time.
+struct PairingConfig {
+  // Where the antenna is in the body frame, metres.
+  Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();
+  // Added to the stamps of the fixes: negative where the receiver's are late.
+  double time_offset_s = 0.0;
+  // Fixes of one interval become one pair. The interval is this long at least, and longer where
+  // that gives more than `most_pairs` [bound: a path moves little in a second; time].
+  double interval_s = 1.0;
+  std::size_t most_pairs = 1000;
+  FixCovarianceConfig covariance;
+};
+
+// The antenna by the path and by the receiver, means over the fixes of one interval. The motion
+// that lays the path on the fixes takes the one mean to the other.
+struct SatellitePair {
+  double time_s = 0.0;  // since the first fix
+  Eigen::Vector3d antenna_in_world = Eigen::Vector3d::Zero();
+  Eigen::Vector3d velocity_in_world = Eigen::Vector3d::Zero();  // of the antenna, m/s
+  Eigen::Vector3d fix_in_enu = Eigen::Vector3d::Zero();
+  bool has_height = false;  // all its fixes have one; else z of the fix is no measurement
+  // Mean covariance that the fixes state: errors within an interval are nearly the same.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  std::size_t fixes = 0;
+};
+
+// The fixes of one interval, as sums that become a pair.
+class GatheredPair {
+ public:
+  // `one`: a pair of a single fix.
+  void add(const SatellitePair& one);
+  [[nodiscard]] SatellitePair mean() const;  // there is a fix at least
+  [[nodiscard]] std::size_t fixes() const { return sum_.fixes; }
+  [[nodiscard]] double begin_s() const { return begin_s_; }  // time of the first one
+
+  // The state, bit for bit.
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  SatellitePair sum_;
+  double begin_s_ = 0.0;
+};
+
+// All pairs of a run, in order of time. Frame east, north, up at the first fix.
+struct SatellitePairs {
+  std::optional<GeodeticPlace> origin;
+  std::vector<SatellitePair> pairs;
+  TimeNs first_fix = 0;           // where `time_s` of the pairs counts from
+  std::size_t fixes_in_time = 0;  // that have a place of the antenna
+  std::string reason;             // why there are none, for a person
+};
+
+// Where the antenna was at a time, world frame, linear between poses; nothing outside of the path
+// or where poses are more than two seconds apart. `trajectory` is in order of time.
+[[nodiscard]] std::optional<Eigen::Vector3d> antenna_place(
+    const std::vector<StampedPose>& trajectory, const Eigen::Vector3d& antenna_in_body,
+    TimeNs stamp);
+
+// Fixes without a finite latitude and longitude are passed over. Deterministic; thread-safe.
+[[nodiscard]] SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
+                                          const std::vector<GnssFix>& fixes,
+                                          const PairingConfig& config);
+
+// The pairs that have a height.
+[[nodiscard]] std::vector<SatellitePair> with_height(const std::vector<SatellitePair>& pairs);
+// Those where most have one; else all of them, and no height counts.
+[[nodiscard]] std::vector<SatellitePair> of_one_kind(const std::vector<SatellitePair>& pairs);
+
+// Diagonal of the box around the antenna's places in the plane, metres.
+[[nodiscard]] double plane_extent_m(const std::vector<SatellitePair>& pairs);
+
+}  // namespace understory

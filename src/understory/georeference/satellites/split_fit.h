@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+#include "understory/georeference/satellites/receiver_noise.h"
+#include "understory/georeference/satellites/satellite_pairs.h"
+
+namespace understory {
+
+// A fit of each degree of freedom to what knows it best (P4 section 5.3 and its future work).
+struct SplitFitConfig {
+  // How far the run's up may be off gravity, one standard deviation about each level axis. With an
+  // IMU a map is level [measured: docs/method/georeference.md].
+  double tilt_sd_deg = 0.05;
+  // A pair counts as at most that many times as good or as bad as the median says [chosen].
+  double most_scale = 10.0;
+  // The same for a run that was mapped without an IMU [chosen: a lidar that is carried by hand].
+  double unlevel_tilt_sd_deg = 5.0;
+  // How far the receiver's clock may be off beyond what is known; 0 holds it.
+  double time_offset_sd_s = 0.0;
+  // Pairs that lie far off the others get a larger error.
+  bool robust = true;
+  // Errors in the plane and in height before the fixes are looked at [tuned: the four GNSS presets
+  // of docs/method/georeference.md, seeds up to 19].
+  ReceiverPriorConfig plane;
+  ReceiverPriorConfig height;
+};
+
+// The motion that lays a run on its fixes and what is known of the receiver's errors.
+struct SplitFit {
+  bool found = false;
+  std::string reason;  // if not
+  Pose enu_from_world;
+  // The middle of the path, target frame. `spread` is the covariance of a small turn about the
+  // east, north and up axes through it (rad), then a shift east, north, up (m).
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  Matrix6d spread = Matrix6d::Zero();
+  bool height_known = false;   // false: no fix has a height, and that of the run is kept
+  double time_offset_s = 0.0;  // beyond that of the pairs
+  double time_offset_sd_s = 0.0;
+  NoisyTimes plane_times;  // as used, with the extra errors of what lies far off
+  NoisyTimes height_times;
+  NoiseBelief plane_noise;
+  NoiseBelief height_noise;
+  std::vector<char> far_off;  // of each pair: 1 if it hardly counts
+};
+
+// Heading and place from the positions in the plane alone, height and tilt from the heights and
+// from how level the run's world is. The errors of the fixes are correlated in time, and their size
+// is estimated along (`estimate_under_noise`). `pairs` all have heights or none counts. Not found
+// for fewer than three pairs, or where the path spans less than five metres. Deterministic;
+// thread-safe.
+[[nodiscard]] SplitFit fit_split(const std::vector<SatellitePair>& pairs,
+                                 const SplitFitConfig& config);
+
+// Covariance of a right perturbation of `target_from_source` (rotation first) from that of a turn
+// about the target's axes through `middle` and a shift (rotation first), and back.
+[[nodiscard]] Matrix6d right_from_spread(const Matrix6d& spread, const Pose& target_from_source,
+                                         const Eigen::Vector3d& middle);
+[[nodiscard]] Matrix6d spread_from_right(const Matrix6d& covariance, const Pose& target_from_source,
+                                         const Eigen::Vector3d& middle);
+
+// Root mean square over places (target frame) of the error that a spread makes one expect, metres.
+[[nodiscard]] double expected_error_m(const Matrix6d& spread, const Eigen::Vector3d& middle,
+                                      const std::vector<Eigen::Vector3d>& places);
+
+}  // namespace understory

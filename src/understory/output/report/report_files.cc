@@ -1,0 +1,61 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "understory/output/report/report_parts.h"
+#include "understory/output/report/svg_plot.h"
+
+namespace understory {
+namespace {
+
+struct ResultFile {
+  const char* name;
+  const char* content;
+  const char* opened_with;
+};
+
+// In the order in which a user wants them; docs/reference/outputs.md has their columns.
+constexpr std::array<ResultFile, 21> kResultFiles = {
+    {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
+     {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
+     {"trees.gpkg", "the same trees as points on a map, and the path",
+      "QGIS: drag the file into the window"},
+     {"felled.csv", "trees that were felled meanwhile", "a spreadsheet"},
+     {"map.laz", "all points; ground and vegetation have classes of their own",
+      "CloudCompare, QGIS"},
+     {"dtm.tif", "height of the ground", "QGIS"},
+     {"chm.tif", "height of the canopy above the ground", "QGIS"},
+     {"trajectory.tum", "the path of the scanner: time, place, attitude", "a text editor, evo"},
+     {"gnss.csv", "the fixes of the GNSS receiver", "a spreadsheet"},
+     {"run.json", "verdict, settings and all figures of this page", "a text editor"},
+     {"keyframes.tum", "poses of the keyframes, for checking", "a text editor, evo"},
+     {"states.csv.gz", "velocity and uncertainty of each scan, for checking", "a spreadsheet"},
+     {"graph.g2o", "the graph of poses, for checking", "g2o_viewer"},
+     {"stems.csv.gz", "the stems of each view", "understory correct"},
+     {"odometry.tum", "the path before it was corrected, for checking", "a text editor, evo"},
+     {"steps.csv", "how each view was matched, for checking", "a spreadsheet"},
+     {"loops.csv", "places seen again, for checking", "a spreadsheet"},
+     {"corrections.csv", "views that were matched again, for checking", "a spreadsheet"},
+     {"cuts.csv", "cuts of the harvester's head", "a spreadsheet"},
+     {"deformation.csv", "by how much one map was bent onto the other", "a spreadsheet"},
+     {"report.html", "this page", "a browser"}}};
+
+}  // namespace
+
+std::string files_section(const std::vector<std::string>& files) {
+  std::string rows;
+  for (const ResultFile& file : kResultFiles) {
+    if (std::find(files.begin(), files.end(), file.name) == files.end()) continue;
+    rows += fmt::format("<tr><td><code>{}</code></td><td>{}</td><td>{}</td></tr>", file.name,
+                        escape_html(file.content), escape_html(file.opened_with));
+  }
+  if (rows.empty()) return "";
+  return "<section><h2>The files of this folder</h2><p>They lie beside this page.</p><div "
+         "class=\"wide\"><table class=\"files\"><thead><tr><th>file</th><th>what it "
+         "holds</th><th>open it "
+         "with</th></tr></thead><tbody>" +
+         rows + "</tbody></table></div></section>\n";
+}
+
+}  // namespace understory

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "understory/output/report/report.h"
+
+namespace understory {
+
+// The sections of the report, as HTML; empty where there is nothing to show.
+[[nodiscard]] std::string report_style();
+[[nodiscard]] std::string report_script();
+[[nodiscard]] std::string verdict_section(const ReportInput& input);
+[[nodiscard]] std::string figures_section(const ReportInput& input);
+[[nodiscard]] std::string map_section(const ReportInput& input);
+// Where the run lies on the globe, how that was found and how sure it is.
+[[nodiscard]] std::string place_section(const ReportInput& input);
+[[nodiscard]] std::string distrust_section(const ReportInput& input);
+[[nodiscard]] std::string stand_section(const ReportInput& input);
+// What lies beside the report and how to open it; `files`: names.
+[[nodiscard]] std::string files_section(const std::vector<std::string>& files);
+[[nodiscard]] std::string matching_section(const ReportInput& input);
+[[nodiscard]] std::string loops_section(const ReportInput& input);
+[[nodiscard]] std::string correction_section(const ReportInput& input);
+// Its figures: pairs of views, sights before and after, trees over the distance from the way.
+[[nodiscard]] std::string correction_figures(const ReportCorrection& correction);
+[[nodiscard]] std::string truth_section(const ReportInput& input);
+[[nodiscard]] std::string time_section(const ReportInput& input);
+[[nodiscard]] std::string made_section(const ReportInput& input);
+
+// Length of the path over the scans, without the jitter of a sensor at rest, metres.
+[[nodiscard]] double path_length_m(const std::vector<ReportScan>& scans);
+// "1 h 05 min", "4 min 12 s", "8.3 s".
+[[nodiscard]] std::string duration_text(double seconds);
+// 12,345
+[[nodiscard]] std::string count_text(std::uint64_t value);
+
+}  // namespace understory

@@ -1,0 +1,112 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <variant>
+
+#include "understory/georeference/systems/coordinate_system.h"
+#include "understory/output/report/report_parts.h"
+#include "understory/output/report/svg_plot.h"
+
+namespace understory {
+namespace {
+
+// A figure of a fit that tells how well it holds.
+struct Residual {
+  const char* key;  // under "quality" in run.json
+  const char* name;
+  const char* unit;
+  double factor;
+  int digits;
+};
+constexpr std::array<Residual, 12> kResiduals = {{
+    {"gnss_fixes_used_share", "share of the fixes that were used", "%", 100.0, 0},
+    {"gnss_fixes_median_m", "distance of the fixes from the path, median", "m", 1.0, 2},
+    {"gnss_fit_rms_m", "distance of path and fixes, root mean square", "m", 1.0, 2},
+    {"gnss_plane_rms_m", "fixes off the path in the plane, root mean square", "m", 1.0, 2},
+    {"gnss_height_rms_m", "fixes off the path in height, root mean square", "m", 1.0, 2},
+    {"gnss_independent_fixes", "number of independent fixes that would be as exact", "", 1.0, 0},
+    {"trees_apart_rms_m", "trees from their partners, root mean square", "m", 1.0, 2},
+    {"gnss_along_rms_m", "fixes along the path at their time, root mean square", "m", 1.0, 2},
+    {"gnss_across_rms_m", "fixes across the path at their time, root mean square", "m", 1.0, 2},
+    {"terrain_rms_m", "ground above the terrain model, root mean square", "m", 1.0, 2},
+    {"terrain_median_m", "ground above the terrain model, median", "m", 1.0, 2},
+    {"terrain_tilt_deg", "tilt that the terrain model took out", "°", 1.0, 2},
+}};
+
+class Rows {
+ public:
+  void add(const std::string& name, const std::string& value) {
+    rows_ += "<tr><td>" + escape_html(name) + "</td><td>" + escape_html(value) + "</td></tr>";
+  }
+  [[nodiscard]] std::string html() const {
+    return "<div class=\"wide\"><table>" + rows_ + "</table></div>";
+  }
+
+ private:
+  std::string rows_;
+};
+
+void add_coordinates(const ReportInput& input, const RunPlace& place, Rows& rows) {
+  const CoordinateSystem* system = input.drawing == nullptr ? nullptr : input.drawing->system();
+  if (system == nullptr) return rows.add("coordinate system", place.coordinate_system);
+  rows.add("coordinate system", place.coordinate_system == system->name()
+                                    ? system->name()
+                                    : system->name() + " (" + place.coordinate_system + ")");
+  if (input.scans.empty()) return;
+  const Eigen::Vector3d at = input.drawing->from_world(input.scans.front().position.cast<double>());
+  rows.add("start of the path",
+           fmt::format("E {:.1f}, N {:.1f}, height {:.1f} m", at.x(), at.y(), at.z()));
+}
+
+void add_origin(const RunPlace& place, Rows& rows) {
+  rows.add("latitude, longitude of the place",
+           fmt::format("{:.6f}°, {:.6f}°", place.origin.latitude_deg, place.origin.longitude_deg));
+  rows.add("heights are", place.heights);
+  if (std::abs(place.north_deg) < 0.005) return;
+  rows.add("north",
+           fmt::format("Grid north is up. True north lies {:.2f}° to the {} of it.",
+                       std::abs(place.north_deg), place.north_deg > 0.0 ? "right" : "left"));
+}
+
+void add_errors(const ReportInput& input, const RunPlace& place, Rows& rows) {
+  if (std::isfinite(place.expected_error_m))
+    rows.add("expected error of the place, over the path",
+             fmt::format("{:.2f} m (root mean square)", place.expected_error_m));
+  if (std::isfinite(place.heading_sd_deg))
+    rows.add("uncertainty of the heading",
+             fmt::format("{:.2f}° (one standard deviation)", place.heading_sd_deg));
+  for (const Residual& residual : kResiduals) {
+    const auto found = input.summary.quality.find(residual.key);
+    if (found == input.summary.quality.end()) continue;
+    const double* value = std::get_if<double>(&found->second);
+    if (value == nullptr || !std::isfinite(*value)) continue;
+    rows.add(residual.name,
+             fmt::format("{:.{}f} {}", residual.factor * *value, residual.digits, residual.unit));
+  }
+}
+
+}  // namespace
+
+std::string place_section(const ReportInput& input) {
+  if (!input.summary.place) return "";
+  const RunPlace& place = *input.summary.place;
+  std::string html = "<section><h2>Where it is</h2>";
+  if (!place.on_globe)
+    return html +
+           "<p>The map has no place on the globe. Its layers are in a local frame in metres: " +
+           escape_html(place.reason) + ".</p></section>\n";
+  Rows rows;
+  add_coordinates(input, place, rows);
+  add_origin(place, rows);
+  if (!place.method.empty()) rows.add("found by the method", place.method);
+  add_errors(input, place, rows);
+  const bool fused = place.enu_from_world.log().norm() == 0.0;
+  return html +
+         "<p>map.laz, the rasters and trees.gpkg are in the coordinate system. trajectory.tum and "
+         "trees.csv are in the frame of the run" +
+         (fused ? ": metres east, north and up of the place below" : "") + ".</p>" + rows.html() +
+         "</section>\n";
+}
+
+}  // namespace understory

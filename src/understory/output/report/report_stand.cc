@@ -1,0 +1,361 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+
+#include "understory/output/report/png.h"
+#include "understory/output/report/report_parts.h"
+#include "understory/output/report/svg_plot.h"
+
+namespace understory {
+namespace {
+
+// P4-9: the layer of the cross sections, above the ground.
+constexpr float kCrossLow = 0.9F;
+constexpr float kCrossHigh = 1.9F;
+constexpr double kPanel = 30.0;  // metres of a cross section's side: stems are still to be seen
+constexpr std::size_t kMostPanels = 8;
+constexpr std::size_t kFewestPoints = 20;
+constexpr std::size_t kFewestPointsWithoutTree = 1'000;  // a stem that was missed may be there
+constexpr std::size_t kLongestTable = 3'000;
+
+std::string centimetres(double metres) {
+  return std::isfinite(metres) ? fmt::format("{:.1f}", 100.0 * metres) : "";
+}
+
+std::string metres(double value, int decimals) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "";
+}
+
+// A square (or smaller) part of the stand, relative to the inventory's origin.
+struct Panel {
+  double x0 = 0.0, y0 = 0.0, width = 0.0, height = 0.0;
+  std::size_t trees = 0;
+  std::size_t points = 0;
+};
+
+std::vector<Panel> panels_of(const InventoryResult& inventory) {
+  float x0 = 1e9F;
+  float y0 = 1e9F;
+  float x1 = -1e9F;
+  float y1 = -1e9F;
+  for (const SlicePoint& p : inventory.slices) {
+    x0 = std::min(x0, p.x);
+    y0 = std::min(y0, p.y);
+    x1 = std::max(x1, p.x);
+    y1 = std::max(y1, p.y);
+  }
+  if (x1 < x0) return {};
+  const auto parts = [](double length) {
+    return std::max(1, static_cast<int>(std::ceil(length / (1.2 * kPanel))));
+  };
+  const double width = static_cast<double>(x1 - x0) + 0.4;
+  const double height = static_cast<double>(y1 - y0) + 0.4;
+  const int columns = parts(width);
+  const int rows = parts(height);
+  std::vector<Panel> panels;
+  for (int row = rows - 1; row >= 0; --row) {
+    for (int column = 0; column < columns; ++column) {
+      panels.push_back({static_cast<double>(x0) - 0.2 + column * width / columns,
+                        static_cast<double>(y0) - 0.2 + row * height / rows, width / columns,
+                        height / rows});
+    }
+  }
+  const auto at = [&](double x, double y) -> Panel& {
+    const int column =
+        std::clamp(static_cast<int>((x - panels[0].x0) / (width / columns)), 0, columns - 1);
+    const int row = std::clamp(
+        static_cast<int>((y - (static_cast<double>(y0) - 0.2)) / (height / rows)), 0, rows - 1);
+    return panels[static_cast<std::size_t>((rows - 1 - row) * columns + column)];
+  };
+  for (const StemFit& stem : inventory.stems)
+    ++at(stem.centre.x(), stem.centre.y()).trees;
+  for (const SlicePoint& p : inventory.slices)
+    ++at(static_cast<double>(p.x), static_cast<double>(p.y)).points;
+  return panels;
+}
+
+std::string cross_section(const InventoryResult& inventory, const Panel& panel) {
+  const int width = 1100;
+  const double scale = width / panel.width;
+  const int height = std::max(1, static_cast<int>(panel.height * scale));
+  PalettePicture picture{width, height, {{255, 255, 255}, {45, 52, 48}}, {}};
+  picture.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 0);
+  for (const SlicePoint& p : inventory.slices) {
+    if (p.height_m < kCrossLow || p.height_m > kCrossHigh) continue;
+    const double x = (static_cast<double>(p.x) - panel.x0) * scale;
+    const double y = (panel.y0 + panel.height - static_cast<double>(p.y)) * scale;
+    if (x < 0 || y < 0 || x + 1 >= width || y + 1 >= height) continue;
+    for (int k = 0; k < 4; ++k)
+      picture.at(static_cast<int>(x) + k % 2, static_cast<int>(y) + k / 2) = 1;
+  }
+  std::string svg = fmt::format(
+      "<svg class=\"paper\" viewBox=\"0 0 {0} {1}\" role=\"img\" aria-label=\"cross "
+      "section\"><image width=\"{0}\" height=\"{1}\" href=\"data:image/png;base64,{2}\"/>",
+      width, height, base64(encode_png(picture)));
+  const auto out = std::back_inserter(svg);
+  for (std::size_t i = 0; i < inventory.stems.size(); ++i) {
+    const StemFit& stem = inventory.stems[i];
+    const double x = (stem.centre.x() - panel.x0) * scale;
+    const double y = (panel.y0 + panel.height - stem.centre.y()) * scale;
+    if (x < 0 || y < 0 || x > width || y > height) continue;
+    const double r = stem.radius_m * scale;
+    fmt::format_to(out,
+                   "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"none\" "
+                   "stroke=\"#d0342c\" stroke-width=\"2\"/><text x=\"{:.1f}\" y=\"{:.1f}\" "
+                   "font-size=\"20\" fill=\"#1552a8\">{}</text>",
+                   x, y, r, x + r + 3, y - r, inventory.trees[i].id);
+  }
+  const double bar = panel.width > 12.0 ? 5.0 : 1.0;
+  fmt::format_to(
+      out,
+      "<path d=\"M14 {0}v8h{1:.1f}v-8\" fill=\"none\" stroke=\"#111\" stroke-width=\"2.5\"/>"
+      "<text x=\"{2:.1f}\" y=\"{3}\" font-size=\"22\">{4:.0f} m</text></svg>",
+      height - 20, bar * scale, 22 + bar * scale, height - 10, bar);
+  return svg;
+}
+
+std::string cross_sections(const InventoryResult& inventory) {
+  std::vector<Panel> panels = panels_of(inventory);
+  // At the edge of the view a part may hold hardly more than noise.
+  std::erase_if(panels, [](const Panel& p) {
+    return p.points < (p.trees > 0 ? kFewestPoints : kFewestPointsWithoutTree);
+  });
+  if (panels.empty()) return "";
+  const std::size_t all = panels.size();
+  if (all > kMostPanels) {
+    std::stable_sort(panels.begin(), panels.end(),
+                     [](const Panel& a, const Panel& b) { return a.trees > b.trees; });
+    panels.resize(kMostPanels);
+  }
+  std::string html =
+      "<h3>Cross section 0.9–1.9 m above the ground</h3><p>Every dot is a point of the cloud. Red "
+      "circles are the measured stems at 1.3 m with their number. A ring of dots without a circle "
+      "is a stem that was missed.</p><div class=\"panels";
+  html += panels.size() == 1 ? " one\">" : "\">";
+  for (const Panel& panel : panels) {
+    html += "<figure>" + cross_section(inventory, panel) +
+            fmt::format(
+                "<figcaption>x {:.0f} to {:.0f} m, y {:.0f} to {:.0f} m</figcaption></figure>",
+                inventory.origin.x() + panel.x0, inventory.origin.x() + panel.x0 + panel.width,
+                inventory.origin.y() + panel.y0, inventory.origin.y() + panel.y0 + panel.height);
+  }
+  html += "</div>";
+  if (all > panels.size()) {
+    html += fmt::format("<p class=\"sub\">The {} parts with most trees of {} are shown.</p>",
+                        panels.size(), all);
+  }
+  return html;
+}
+
+// A tree from the side: ground grey, vegetation green, as far up as it was seen.
+std::string front_view(const TreeSegment& segment, double top_m) {
+  constexpr double kReach = 1.5;
+  constexpr int kPerMetre = 40;
+  const int width = static_cast<int>(2.0 * kReach * kPerMetre);
+  const int height = std::max(1, static_cast<int>((top_m + 0.6) * kPerMetre));
+  PalettePicture picture{width, height, {{255, 255, 255}, {150, 150, 150}, {47, 122, 60}}, {}};
+  picture.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 0);
+  for (const Eigen::Vector3f& p : segment.points) {
+    const auto x = static_cast<int>((static_cast<double>(p.x()) + kReach) * kPerMetre);
+    const auto y = static_cast<int>((top_m + 0.3 - static_cast<double>(p.z())) * kPerMetre);
+    if (x < 0 || y < 0 || x + 1 >= width || y + 1 >= height) continue;
+    for (int k = 0; k < 4; ++k)
+      picture.at(x + k % 2, y + k / 2) = p.z() < 0.2F ? 1 : 2;
+  }
+  std::string svg = fmt::format(
+      "<svg class=\"paper\" viewBox=\"-90 0 {3} {1}\" preserveAspectRatio=\"xMidYMax meet\" "
+      "style=\"height:420px\" role=\"img\" aria-label=\"front view\"><image width=\"{0}\" "
+      "height=\"{1}\" href=\"data:image/png;base64,{2}\"/>",
+      width, height, base64(encode_png(picture)), width + 90);
+  const double step = top_m > 12.0 ? 5.0 : 1.0;
+  const double size = 0.032 * height;
+  for (double h = 0.0; h <= top_m; h += step) {
+    const double y = (top_m + 0.3 - h) * kPerMetre;
+    svg += fmt::format(
+        "<line x1=\"-30\" x2=\"-5\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" stroke=\"#555\" "
+        "stroke-width=\"{1:.1f}\"/><text x=\"-36\" y=\"{2:.1f}\" text-anchor=\"end\" "
+        "font-size=\"{3:.1f}\">{4:.0f}</text>",
+        y, 0.08 * size, y + 0.35 * size, size, h);
+  }
+  return svg + "</svg>";
+}
+
+std::string section_of(const TreeSegment& segment, const Tree& tree, const StemFit& stem) {
+  constexpr double kReach = 0.6;
+  constexpr int kSide = 300;
+  constexpr double kScale = kSide / (2.0 * kReach);
+  PalettePicture picture{kSide, kSide, {{255, 255, 255}, {45, 52, 48}}, {}};
+  picture.pixels.assign(static_cast<std::size_t>(kSide) * kSide, 0);
+  for (const Eigen::Vector3f& p : segment.points) {
+    if (p.z() < kCrossLow || p.z() > kCrossHigh) continue;
+    const double rise = static_cast<double>(p.z());
+    // Along the lean, so that a leaning stem gives a circle and not a smear.
+    const double dx = static_cast<double>(p.x()) - rise * stem.slope.x();
+    const double dy = static_cast<double>(p.y()) - rise * stem.slope.y();
+    const auto x = static_cast<int>((dx + kReach) * kScale);
+    const auto y = static_cast<int>((kReach - dy) * kScale);
+    if (x < 0 || y < 0 || x + 1 >= kSide || y + 1 >= kSide) continue;
+    for (int k = 0; k < 4; ++k)
+      picture.at(x + k % 2, y + k / 2) = 1;
+  }
+  return fmt::format(
+      "<svg class=\"paper\" viewBox=\"0 0 {0} {0}\" role=\"img\" aria-label=\"cross "
+      "section\"><image width=\"{0}\" height=\"{0}\" href=\"data:image/png;base64,{1}\"/><circle "
+      "cx=\"{2}\" cy=\"{2}\" r=\"{3:.1f}\" fill=\"none\" stroke=\"#d0342c\" "
+      "stroke-width=\"2\"/><path d=\"M10 282v8h{4:.1f}v-8\" fill=\"none\" stroke=\"#111\" "
+      "stroke-width=\"2\"/><text x=\"{5:.1f}\" y=\"292\" font-size=\"20\">20 cm</text></svg>",
+      kSide, base64(encode_png(picture)), kSide / 2, 0.5 * tree.dbh_m * kScale, 0.2 * kScale,
+      16 + 0.2 * kScale);
+}
+
+std::string single_trees(const InventoryResult& inventory) {
+  if (inventory.segments.empty()) return "";
+  float top = 3.0F;
+  for (const TreeSegment& segment : inventory.segments) {
+    for (const Eigen::Vector3f& p : segment.points)
+      top = std::max(top, p.z());
+  }
+  std::string html =
+      "<h3>Some trees one by one</h3><p>Front view (height in metres), and the cross section of "
+      "its stem 0.9–1.9 m above the ground. A sharp map shows one thin ring. A double or thick "
+      "ring means that the scans do not lie on each other.</p><div class=\"trees\">";
+  for (const TreeSegment& segment : inventory.segments) {
+    const auto i = static_cast<std::size_t>(segment.tree_id - 1);
+    const Tree& tree = inventory.trees[i];
+    html += "<figure>" + front_view(segment, static_cast<double>(top)) +
+            section_of(segment, tree, inventory.stems[i]) +
+            fmt::format("<figcaption>tree {}: {} ± {} cm{}</figcaption></figure>", tree.id,
+                        centimetres(tree.dbh_m), centimetres(tree.dbh_sd_m),
+                        std::isfinite(tree.height_m) ? fmt::format(", {:.1f} m", tree.height_m)
+                                                     : std::string());
+  }
+  return html + "</div>";
+}
+
+std::string diameters(const std::vector<Tree>& trees) {
+  Histogram histogram;
+  histogram.x_label = "diameter at 1.3 m, cm";
+  histogram.y_label = "trees";
+  histogram.step = 4.0;
+  for (const Tree& tree : trees) {
+    if (!std::isfinite(tree.dbh_m)) continue;
+    const auto bin = static_cast<std::size_t>(100.0 * tree.dbh_m / histogram.step);
+    if (histogram.counts.size() <= bin) histogram.counts.resize(bin + 1, 0);
+    ++histogram.counts[bin];
+  }
+  histogram.counts.push_back(0);
+  return "<figure><h3>Diameters</h3>" + svg_histogram(histogram) + "</figure>";
+}
+
+// `stems`: their fits in the same order, or null. `of_cloud`: else trees come from sights of single
+// views, which have no heights.
+std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems,
+                       bool of_cloud) {
+  std::string html =
+      "<h3>All trees</h3><p class=\"so\">x, y and the height of the ground are those "
+      "of the stem's foot, as in trees.csv. ";
+  if (!of_cloud) html += "Views are the scans that show the stem.";
+  if (of_cloud) html += "Returns are laser points on the stem. ";
+  if (stems != nullptr) html += "Seen around is the part of its circumference that the laser saw.";
+  html +=
+      "</p><div class=\"scroll\"><table class=\"sort\"><thead><tr>"
+      "<th class=\"n\">no.</th><th class=\"n\">x, m</th><th class=\"n\">y, m</th><th "
+      "class=\"n\">ground, m</th><th class=\"n\">diameter, cm</th><th class=\"n\">± cm</th><th "
+      "class=\"n\">lean, °</th>";
+  html += of_cloud ? "<th class=\"n\">height, m</th><th class=\"n\">returns</th>"
+                   : "<th class=\"n\">views</th>";
+  if (stems != nullptr) html += "<th class=\"n\">seen around, °</th>";
+  html += "</tr></thead><tbody>";
+  const auto out = std::back_inserter(html);
+  for (std::size_t i = 0; i < std::min(trees.size(), kLongestTable); ++i) {
+    const Tree& t = trees[i];
+    std::vector<std::string> cells = {
+        std::to_string(t.id), metres(t.x, 2),          metres(t.y, 2),       metres(t.z, 2),
+        centimetres(t.dbh_m), centimetres(t.dbh_sd_m), metres(t.lean_deg, 1)};
+    if (of_cloud) cells.push_back(metres(t.height_m, 1));
+    cells.push_back(std::to_string(t.observations));
+    if (stems != nullptr) cells.push_back(metres((*stems)[i].arc_deg, 0));
+    fmt::format_to(out, "<tr>");
+    for (const std::string& cell : cells)
+      fmt::format_to(out, "<td class=\"n\">{}</td>", cell);
+    html += "</tr>";
+  }
+  html += "</tbody></table></div>";
+  if (trees.size() > kLongestTable) {
+    html += fmt::format("<p class=\"sub\">The first {} of {}; all are in trees.csv.</p>",
+                        kLongestTable, trees.size());
+  }
+  return html;
+}
+
+// `start`: of the recording.
+std::string fall_table(const std::vector<TreeFall>& falls, TimeNs start) {
+  if (falls.empty()) return "";
+  std::string html =
+      "<h3>Felled trees</h3><p>Trees that stood at first and were gone later, though they would "
+      "have been in view: crosses on the map.</p><div class=\"scroll\"><table "
+      "class=\"sort\"><thead><tr><th class=\"n\">no.</th><th class=\"n\">x, m</th><th "
+      "class=\"n\">y, m</th><th class=\"n\">seen until, s</th><th class=\"n\">gone since, "
+      "s</th><th class=\"n\">views without it</th></tr></thead><tbody>";
+  for (const TreeFall& fall : falls) {
+    html += "<tr>";
+    for (const std::string& cell :
+         {std::to_string(fall.tree_id), metres(fall.x, 2), metres(fall.y, 2),
+          metres(to_seconds(fall.seen_until - start), 0),
+          metres(to_seconds(fall.gone_since - start), 0), std::to_string(fall.missed)})
+      html += fmt::format("<td class=\"n\">{}</td>", cell);
+    html += "</tr>";
+  }
+  return html + "</tbody></table></div>";
+}
+
+// Trees of a cloud that is not at hand: of a run that was moved.
+std::string section_of_moved(const ReportInput& input) {
+  const std::vector<Tree>& trees = *input.trees;
+  return "<section><h2>Trees</h2><p>These are the trees of the run that was moved. Its own report "
+         "shows their cross sections. ± is one standard deviation of the diameter. A height is "
+         "given only where the top was seen.</p><div class=\"two\">" +
+         diameters(trees) + "</div>" +
+         fall_table(input.falls, input.scans.empty() ? 0 : input.scans.front().stamp) +
+         tree_table(trees, nullptr, true) + "</section>\n";
+}
+
+std::string section_of_views(const ReportInput& input) {
+  const std::vector<Tree>& trees = *input.trees;
+  const TimeNs start = input.scans.empty() ? 0 : input.scans.front().stamp;
+  return "<section><h2>Trees</h2><p>A tree is listed where many of the views that could see it saw "
+         "a stem. Its place is the mean of these sights. ± is one standard deviation of the "
+         "diameter. Heights are not measured.</p><div class=\"two\">" +
+         diameters(trees) + "</div>" + fall_table(input.falls, start) +
+         tree_table(trees, nullptr, false) + "</section>\n";
+}
+
+}  // namespace
+
+std::string stand_section(const ReportInput& input) {
+  if (input.inventory == nullptr)
+    return input.trees == nullptr || input.trees->empty() ? ""
+           : input.trees_of_cloud                         ? section_of_moved(input)
+                                                          : section_of_views(input);
+  const InventoryResult& inventory = *input.inventory;
+  std::string html = "<section><h2>Trees</h2>";
+  if (inventory.trees.empty()) {
+    html += "<p>No stem could be measured in this cloud.</p>";
+  } else {
+    html +=
+        "<p>A stem is listed where points show its surface at several heights around 1.3 m. "
+        "± is one standard deviation of the diameter, without the widening by the laser's beam. A "
+        "height is given only where points were seen above the stem and the lidar looked higher "
+        "still. Where foliage hid the top, the tree is higher.</p><div class=\"two\">" +
+        diameters(inventory.trees) + "</div>";
+  }
+  html += cross_sections(inventory);
+  if (!inventory.trees.empty())
+    html += single_trees(inventory) + tree_table(inventory.trees, &inventory.stems, true);
+  return html + "</section>\n";
+}
+
+}  // namespace understory

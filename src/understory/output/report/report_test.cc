@@ -1,0 +1,84 @@
+#include "understory/output/report/report.h"
+
+#include <gtest/gtest.h>
+
+namespace understory {
+namespace {
+
+ReportInput run_with_loops(int closed, int rejected, std::size_t not_listed) {
+  ReportInput input;
+  input.scans.resize(3);
+  input.loops_not_listed = not_listed;
+  for (int k = 0; k < closed + rejected; ++k) {
+    ReportLoop loop;
+    loop.accepted = k < closed;
+    input.loops.push_back(loop);
+  }
+  return input;
+}
+
+std::size_t count_of(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++count;
+  return count;
+}
+
+// "24 of 24 tried loops" stood over a run with 252 candidates that were not accepted.
+TEST(Report, CountsOfLoopsAreThoseOfTheTable) {
+  const std::string html = report_html(run_with_loops(24, 3, 252));
+  EXPECT_NE(html.find("279 views look like an earlier place"), std::string::npos);
+  EXPECT_NE(html.find("confirmed 27 of them"), std::string::npos);
+  EXPECT_NE(html.find("24 closed, 3 rejected"), std::string::npos);
+  EXPECT_NE(html.find("The other 252"), std::string::npos);
+  EXPECT_EQ(count_of(html, "<td>closed</td>"), 24U);
+  EXPECT_EQ(count_of(html, "<td>rejected</td>"), 3U);
+  EXPECT_EQ(count_of(html, "tried loops"), 0U);
+}
+
+TEST(Report, EveryLoopThatWasTriedIsInTheTable) {
+  const std::string html = report_html(run_with_loops(2, 5, 0));
+  EXPECT_NE(html.find("7 loops were tried (the table below): 2 closed, 5 rejected"),
+            std::string::npos);
+  EXPECT_EQ(count_of(html, "<td>closed</td>") + count_of(html, "<td>rejected</td>"), 7U);
+  const std::string many = report_html(run_with_loops(30, 60, 0));
+  EXPECT_NE(many.find("The first 40 of 90 are shown."), std::string::npos);
+}
+
+// A user looks for the trees first; the table names what lies there, and no file of others.
+TEST(Report, ListsTheFilesThatLieBesideIt) {
+  const std::string html = report_html(ReportInput(), {"run.json", "notes.txt", "trees.csv"});
+  const std::size_t trees = html.find("<code>trees.csv</code>");
+  const std::size_t run = html.find("<code>run.json</code>");
+  ASSERT_NE(trees, std::string::npos);
+  ASSERT_NE(run, std::string::npos);
+  EXPECT_LT(trees, run);
+  EXPECT_EQ(html.find("notes.txt"), std::string::npos);
+  EXPECT_EQ(html.find("<code>map.laz</code>"), std::string::npos);
+  EXPECT_EQ(report_html(ReportInput()).find("The files of this folder"), std::string::npos);
+}
+
+// "distance 20 cm; less is better" was taken for the error of the map.
+TEST(Report, TellsWhatTheDistanceOfMatchedPointsIs) {
+  ReportInput input;
+  input.scans.resize(2);
+  for (ReportScan& scan : input.scans)
+    scan.fitness_m2 = 0.04F;
+  input.map_cell_m = 0.5;
+  EXPECT_NE(report_html(input).find("mean place for each cube of 50 cm"), std::string::npos);
+  EXPECT_NE(report_html(input).find("16 to 23 cm are usual"), std::string::npos);
+  input.map_cell_m = 0.0;
+  EXPECT_NE(report_html(input).find("from the nearest surface of the map"), std::string::npos);
+  EXPECT_EQ(report_html(input).find("for each cube"), std::string::npos);
+}
+
+// Every figure at the top is explained below it.
+TEST(Report, EachFigureHasItsMeaning) {
+  const std::string html = report_html(run_with_loops(1, 0, 0));
+  EXPECT_GT(count_of(html, "<div class=\"tile\">"), 3U);
+  EXPECT_EQ(count_of(html, "<div class=\"tile\">"), count_of(html, "<dt>"));
+  EXPECT_EQ(count_of(html, "<dd></dd>"), 0U);
+}
+
+}  // namespace
+}  // namespace understory

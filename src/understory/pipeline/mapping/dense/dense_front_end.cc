@@ -1,0 +1,336 @@
+#include "understory/pipeline/mapping/dense/dense_front_end.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "understory/pipeline/mapping/scan_content.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kMostWaitingImu = 20'000;
+constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
+
+Points points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) {
+  const auto low = static_cast<float>(config.range_min_m);
+  const auto high = static_cast<float>(config.range_max_m);
+  Points points;
+  points.reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.range[i] >= low && cloud.range[i] <= high) points.push_back(cloud.points[i]);
+  }
+  return points;
+}
+
+}  // namespace
+
+DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTraits& traits,
+                             const RunConditions& conditions, std::filesystem::path folder,
+                             Log& log)
+    : config_(config),
+      traits_(traits),
+      folder_(std::move(folder)),
+      log_(log),
+      map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)),
+      recovery_(config.lost_after_scans),
+      imu_doubted_(conditions.imu_doubted),
+      opening_(std::make_unique<Opening>()) {
+  if (!conditions.imu_refused.empty()) refuse_imu(conditions.imu_refused);
+}
+
+void DenseFrontEnd::refuse_imu(const std::string& reason) {
+  UNDERSTORY_CHECK(!started());
+  imu_refused_ = reason;
+  config_.odometry.imu_enabled = false;
+}
+
+ImuFinding DenseFrontEnd::imu_finding() const {
+  if (!started() || !odometry_->uses_imu()) return {};
+  const ImuTrust trust = odometry_->motion().imu_trust();
+  if (!trust.usable) return {ImuFinding::Verdict::kWrong, trust.reason};
+  // A run that has doubted it from the start finds out who is right.
+  if (!imu_doubted_ && trust.on_probation) return {ImuFinding::Verdict::kSuspected, trust.reason};
+  return {};
+}
+
+FrontEndProgress DenseFrontEnd::progress() const {
+  return {"mapping", received_.counts.scans, fmt::format("{} keyframes", map_->keyframes().size())};
+}
+
+std::optional<TimeNs> DenseFrontEnd::last_imu() const {
+  if (received_.imu.empty()) return std::nullopt;
+  return received_.imu.back().stamp;
+}
+
+std::vector<TimeNs> DenseFrontEnd::handle(const Event& event, const Rig& rig) {
+  const TimeNs before = last_scan_end_;
+  take(event, rig);
+  if (last_scan_end_ == before) return {};
+  return {last_scan_end_};
+}
+
+void DenseFrontEnd::take(const Event& event, const Rig& rig) {
+  if (opening_ && started()) opening_->events.push_back(event);
+  if (started() && settled()) complete_rig(rig);
+  if (const auto* sample = std::get_if<ImuSample>(&event)) {
+    take_sample(*sample);
+  } else if (const auto* fix = std::get_if<GnssFix>(&event)) {
+    received_.fixes.push_back(*fix);
+  } else if (const auto* scan = std::get_if<ScanPtr>(&event)) {
+    if (!started()) {
+      opening_->events.push_back(event);
+      opening_->before = received_;
+      rig_ = rig;
+      start_anew();
+    }
+    on_scan(**scan);
+  }
+}
+
+void DenseFrontEnd::take_sample(const ImuSample& sample) {
+  ++received_.counts.imu_samples;
+  if (started())
+    received_.imu_usage.add(sample, rig_.body_from_imu.has_value(), config_.odometry.motion.imu);
+  received_.imu.push_back(sample);
+  const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
+  while (received_.imu.size() > most)
+    received_.imu.pop_front();
+  if (started()) odometry_->add_imu(sample);
+}
+
+// A sensor that begins late, or whose place is told late, is used from then on.
+void DenseFrontEnd::complete_rig(const Rig& rig) {
+  if (!rig_.body_from_gnss && rig.body_from_gnss) {
+    rig_.body_from_gnss = rig.body_from_gnss;
+    rig_.gnss_extrinsic_source = rig.gnss_extrinsic_source;
+  }
+  if (rig_.body_from_imu || !rig.body_from_imu) return;
+  rig_.body_from_imu = rig.body_from_imu;
+  rig_.imu_extrinsic_source = rig.imu_extrinsic_source;
+  const std::vector<ImuSample> recent(received_.imu.begin(), received_.imu.end());
+  odometry_->take_imu(*rig_.body_from_imu, recent);
+  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(recovery_.last_scan());
+}
+
+void DenseFrontEnd::make_odometry(const Rig& rig) {
+  rig_ = rig;
+  odometry_ = std::make_unique<DenseOdometry>(config_.odometry, rig_, times_, log_);
+}
+
+// An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
+void DenseFrontEnd::start_anew() {
+  journal_ = std::make_unique<Journal>(folder_ / kJournalFile);
+  clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, times_);
+  map_->start();
+  make_odometry(rig_);
+  if (opening_->rounds > 0) {
+    odometry_->set_initial_motion(opening_->motion.velocity_m_s,
+                                  opening_->motion.angular_rate_rad_s);
+  }
+  // What came after the first scan comes again.
+  received_ = opening_->before;
+  recovery_.forget_matches();
+  for (const ImuSample& waiting : received_.imu)
+    odometry_->add_imu(waiting);
+  const Scan& first = *std::get<ScanPtr>(opening_->events.front());
+  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(first.stamp);
+}
+
+// Whether the first scan was a smear or a part: then the recording's first scans are done again.
+void DenseFrontEnd::consider_opening(const Scan& scan, const DenseEstimate& estimate) {
+  if (received_.counts.scans < 2) return;
+  const Scan& first = *std::get<ScanPtr>(opening_->events.front());
+  if (received_.counts.parts == 0 && opening_->rounds == 0 && is_part_of_turn(first, scan)) {
+    leave_out_first();
+    return;
+  }
+  constexpr int kMostRounds = 6;
+  std::optional<AssumedMotion> better;
+  if (estimate.matched && opening_->rounds < kMostRounds) {
+    better = better_start(first, scan, map_->keyframes().front().world_from_body,
+                          estimate.match.target_from_source, opening_->motion,
+                          odometry_->uses_imu() && !imu_doubted_);
+  }
+  better ? begin_again(*better) : opening_.reset();
+}
+
+void DenseFrontEnd::begin_again(const AssumedMotion& motion) {
+  opening_->motion = motion;
+  ++opening_->rounds;
+  start_anew();
+  const std::vector<Event> events = std::exchange(opening_->events, {});
+  const Rig rig = rig_;
+  opening_->events.push_back(events.front());
+  on_scan(*std::get<ScanPtr>(events.front()));
+  for (std::size_t i = 1; i < events.size(); ++i)
+    take(events[i], rig);
+}
+
+// Begins with the second scan instead.
+void DenseFrontEnd::leave_out_first() {
+  const std::vector<Event> events = std::exchange(opening_->events, {});
+  const Scan& first = *std::get<ScanPtr>(events.front());
+  log_.warn("scan.part",
+            fmt::format("the recording begins within a turn of the lidar: its first scan, of {} "
+                        "points at {} s, is left out",
+                        first.points.size(), format_seconds(first.stamp)));
+  received_ = opening_->before;
+  received_.counts.parts = 1;
+  opening_ = std::make_unique<Opening>();
+  odometry_.reset();
+  const Rig rig = rig_;
+  for (std::size_t i = 1; i < events.size(); ++i)
+    take(events[i], rig);
+}
+
+// A new odometry from this scan on, put `about_there`, and an empty local map.
+DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_there) {
+  log_.warn("map.segment",
+            fmt::format("position lost at {} s: a new piece of map begins there. Its place "
+                        "relative to the old one is a guess",
+                        format_seconds(scan.stamp)));
+  const bool proven = odometry_->motion().imu_trust().proven;
+  make_odometry(rig_);
+  for (const ImuSample& sample : received_.imu)
+    odometry_->add_imu(sample);
+  if (odometry_->uses_imu() && !proven) odometry_->suspect_imu(scan.stamp);
+  // A better guess than standing still.
+  odometry_->set_initial_motion(recovery_.last_velocity_in_body(), Eigen::Vector3d::Zero());
+  map_->start_segment();
+  if (received_.counts.segments++ == 1) received_.counts.first_lost = scan.stamp;
+  received_.counts.lost_in_a_row = 0;
+  DenseEstimate estimate = odometry_->process(scan, map_->local_map());
+  put_at(about_there, *odometry_, estimate);
+  return estimate;
+}
+
+void DenseFrontEnd::on_scan(const Scan& scan) {
+  const ScopedTimer timer(times_, "scan");
+  const double cpu_start = process_cpu_seconds() - map_->search_cpu_seconds();
+  const NavState predicted =
+      recovery_.is_outage(scan.stamp) ? odometry_->motion().predict(scan.stamp) : NavState();
+  DenseEstimate estimate = odometry_->process(scan, map_->local_map());
+  if (estimate.update.status == MotionStatus::kIgnored) return;
+  if (!map_->keyframes().empty() && estimate.thinned.size() >= kFewPoints) {
+    if (recovery_.lost_over_outage(scan.stamp, estimate)) {
+      estimate = begin_segment(scan, recovery_.place_after_outage(predicted));
+    } else if (recovery_.lost(estimate, received_.counts.lost_in_a_row)) {
+      estimate = begin_segment(scan, recovery_.last_good());
+    }
+  }
+  recovery_.note_scan(scan.stamp);
+  const std::uint64_t content = content_of(scan);
+  received_.counts.repeated += is_repetition(content, received_.counts.last_content) ? 1 : 0;
+  received_.counts.last_content = content;
+  ScanRecord record;
+  record.stamp = scan.stamp;
+  record.points = static_cast<std::uint32_t>(scan.points.size());
+  record.matched_points = static_cast<std::uint32_t>(estimate.thinned.size());
+  note_outcome(estimate, record);
+  update_map(estimate, record);
+  record.wall_ms = static_cast<float>(timer.wall_ms());
+  record.cpu_ms =
+      static_cast<float>(1e3 * (process_cpu_seconds() - map_->search_cpu_seconds() - cpu_start));
+  journal_->append(record);
+  last_scan_end_ = estimate.scan_end;
+  if (opening_) consider_opening(scan, estimate);
+}
+
+void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& record) {
+  ++received_.counts.scans;
+  received_.counts.points += record.points;
+  record.fitness_m2 = static_cast<float>(estimate.match.fitness_m2);
+  record.inlier_ratio = static_cast<float>(estimate.match.inlier_ratio);
+  record.iterations = static_cast<std::uint16_t>(estimate.match.iterations);
+  record.degenerate_directions =
+      static_cast<std::uint8_t>(estimate.match.degenerate_directions.cols());
+  record.set_covariance(estimate.state.pose_covariance);
+  if (estimate.thinned.size() < kFewPoints) {
+    ++received_.counts.empty_scans;
+    log_.warn("scan.few_points",
+              fmt::format("scan at {} has only {} usable points", format_seconds(record.stamp),
+                          estimate.thinned.size()));
+  }
+  record.outcome = ScanOutcome::kMatched;
+  if (estimate.update.status == MotionStatus::kVelocityGate) {
+    record.outcome = ScanOutcome::kGated;
+    ++received_.counts.gated;
+    log_.warn("match.velocity_gate",
+              fmt::format("match of the scan at {} dropped: {}", format_seconds(record.stamp),
+                          estimate.update.reason));
+  } else if (!estimate.matched && map_->local_map() != nullptr) {
+    record.outcome = ScanOutcome::kUnmatched;
+    ++received_.counts.unmatched;
+    if (estimate.thinned.size() < kFewPoints) return;
+    log_.warn("match.none",
+              fmt::format("scan at {} could not be matched ({:.0f} % of its points "
+                          "near the map){}",
+                          format_seconds(record.stamp), 100.0 * estimate.match.inlier_ratio,
+                          estimate.match.reason.empty() ? "" : ": " + estimate.match.reason));
+  }
+}
+
+void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record) {
+  NavState state = estimate.state;
+  if (estimate.update.new_world_from_old_world) {
+    map_->move_world(*estimate.update.new_world_from_old_world);
+  }
+  const bool good =
+      record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
+  received_.counts.lost_in_a_row = good ? 0 : received_.counts.lost_in_a_row + 1;
+  if (good) recovery_.note_good(estimate);
+  const bool wanted = good && map_->wants(state.world_from_body);
+  // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop
+  // closure, levelling) moves the scans with them.
+  const bool first = map_->keyframes().empty();
+  const Pose reference = first ? state.world_from_body : map_->keyframes().back().world_from_body;
+  record.keyframe = first ? 0 : static_cast<std::int32_t>(map_->keyframes().size()) - 1;
+  const Pose keyframe_from_body = reference.inverse() * state.world_from_body;
+  record.set_pose(keyframe_from_body);
+  const Eigen::Quaterniond keyframe_from_world = reference.rotation().conjugate();
+  Eigen::Map<Eigen::Vector3d>(record.velocity.data()) =
+      keyframe_from_world * state.velocity_in_world;
+  Eigen::Map<Eigen::Vector3d>(record.gyro_bias.data()) = state.gyro_bias;
+  Eigen::Map<Eigen::Vector3d>(record.accel_bias.data()) = state.accel_bias;
+  if (!wanted) {
+    const auto keyframe = static_cast<std::size_t>(record.keyframe);
+    if (good && !first) offer_cloud(estimate, keyframe, keyframe_from_body);
+    return;
+  }
+  record.becomes_keyframe = 1;
+  offer_cloud(estimate, map_->keyframes().size(), Pose());
+  const auto moved = map_->add(record.stamp, state.world_from_body, map_points(estimate));
+  if (moved) odometry_->move_world(*moved);
+}
+
+// What the map takes from a scan: more than what is matched.
+Points DenseFrontEnd::map_points(const DenseEstimate& estimate) {
+  VoxelFilterConfig voxel = config_.odometry.voxel;
+  const double edge = config_.keyframe_map.keyframe.voxel_size_m;
+  if (edge == 0.0) return points_in_range(estimate.cloud, voxel);
+  voxel.voxel_size_m = std::min(voxel.voxel_size_m, edge);
+  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m) return estimate.thinned.points;
+  return cloud_filter_.filter(estimate.cloud, voxel).points;
+}
+
+ScanCloudsConfig DenseFrontEnd::clouds_config() const {
+  ScanCloudsConfig clouds;
+  clouds.enabled = config_.map_enabled;
+  clouds.distance_m = config_.cloud_distance_m;
+  clouds.thin_m = config_.keyframe_thin_m;
+  clouds.range_min_m = config_.odometry.voxel.range_min_m;
+  clouds.range_max_m = config_.map_range_max_m;
+  clouds.keyframe = config_.keyframe_map.keyframe;
+  return clouds;
+}
+
+// Perhaps keeps what a scan adds to the finished map.
+void DenseFrontEnd::offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
+                                const Pose& keyframe_from_body) {
+  clouds_->offer(estimate.cloud, estimate.state.world_from_body, keyframe, keyframe_from_body,
+                 map_->keyframes());
+}
+
+}  // namespace understory

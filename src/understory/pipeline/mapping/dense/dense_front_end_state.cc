@@ -1,0 +1,108 @@
+// What of a session lies on the disk, and its state to go on from.
+#include "understory/geometry/pose_io.h"
+#include "understory/pipeline/mapping/dense/dense_front_end.h"
+#include "understory/sensor/sensor_io.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+constexpr const char* kFixesFile = "fixes.bin";
+
+}  // namespace
+
+void DenseFrontEnd::sync() {
+  if (!fixes_file_ && !received_.fixes.empty())
+    fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile);
+  if (fixes_file_) {
+    for (std::size_t i = fixes_file_->count().records; i < received_.fixes.size(); ++i) {
+      BinaryWriter record;
+      put_fix(record, received_.fixes[i]);
+      fixes_file_->append({bytes_of(record.bytes())});
+    }
+    fixes_file_->sync();
+  }
+  if (!started()) return;
+  journal_->sync();
+  clouds_->sync();
+  map_->sync();
+}
+
+std::vector<CountedFile> DenseFrontEnd::files() const {
+  std::vector<CountedFile> files;
+  if (started()) {
+    files = map_->files();
+    files.push_back({kJournalFile, journal_->count()});
+    files.push_back({kCloudsFile, clouds_->clouds().count()});
+  }
+  if (fixes_file_) files.push_back({kFixesFile, fixes_file_->count()});
+  return files;
+}
+
+void DenseFrontEnd::save(BinaryWriter& writer) const {
+  UNDERSTORY_CHECK(settled() || !started());
+  writer.put(imu_refused_);
+  writer.put(imu_doubted_);
+  writer.put(fixes_file_ ? fixes_file_->count() : RecordCount());
+  writer.put(received_.counts);
+  received_.imu_usage.save(writer);
+  writer.put(last_scan_end_);
+  const ScanClouds::Last last_cloud = clouds_ ? clouds_->last() : ScanClouds::Last();
+  writer.put(last_cloud.keyframe);
+  put_pose(writer, last_cloud.keyframe_from_body);
+  recovery_.save(writer);
+  put_optional(writer, rig_.body_from_imu, put_pose);
+  put_optional(writer, rig_.body_from_gnss, put_pose);
+  writer.put(started());
+  writer.put(static_cast<std::uint64_t>(received_.imu.size()));
+  for (const ImuSample& sample : received_.imu)
+    put_imu(writer, sample);
+  if (!started()) return;
+  writer.put(journal_->count());
+  writer.put(clouds_->clouds().count());
+  map_->save(writer);
+  odometry_->save(writer);
+}
+
+void DenseFrontEnd::load_fixes(const RecordCount& known) {
+  fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile, known);
+  fixes_file_->for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
+    BinaryReader record({bytes.begin(), bytes.end()}, fixes_file_->path().string());
+    received_.fixes.push_back(get_fix(record));
+  });
+}
+
+void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
+  const std::string refused = reader.get_string();
+  if (!refused.empty()) refuse_imu(refused);
+  imu_doubted_ = reader.get<bool>();
+  const auto fixes = reader.get<RecordCount>();
+  if (fixes.records > 0) load_fixes(fixes);
+  received_.counts = reader.get<DenseCounts>();
+  received_.imu_usage.load(reader);
+  last_scan_end_ = reader.get<TimeNs>();
+  ScanClouds::Last last_cloud;
+  last_cloud.keyframe = reader.get<std::uint64_t>();
+  last_cloud.keyframe_from_body = get_pose(reader);
+  recovery_.load(reader);
+  const auto body_from_imu = get_optional(reader, get_pose);
+  const auto body_from_gnss = get_optional(reader, get_pose);
+  const bool was_started = reader.get<bool>();
+  const auto waiting = reader.get<std::uint64_t>();
+  for (std::uint64_t i = 0; i < waiting; ++i)
+    received_.imu.push_back(get_imu(reader));
+  if (!was_started) return;
+  journal_ = std::make_unique<Journal>(folder_ / kJournalFile, reader.get<RecordCount>());
+  const auto clouds = reader.get<RecordCount>();
+  clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, clouds, last_cloud,
+                                         times_);
+  opening_.reset();
+  rig_ = rig;
+  rig_.body_from_imu = body_from_imu;
+  rig_.body_from_gnss = body_from_gnss;
+  map_->load(reader);
+  make_odometry(Rig(rig_));
+  odometry_->load(reader);
+}
+
+}  // namespace understory

@@ -1,0 +1,121 @@
+// What the dense front end makes of a recording that was read.
+#include <fmt/format.h>
+
+#include "understory/pipeline/judgement/input_remarks.h"
+#include "understory/pipeline/mapping/dense/dense_front_end.h"
+#include "understory/pipeline/mapping/dense/dense_results.h"
+#include "understory/pipeline/mapping/finished_map.h"
+#include "understory/pipeline/mapping/finished_trajectory.h"
+#include "understory/pipeline/mapping/lidar_view.h"
+
+namespace understory {
+namespace {
+
+// The finished cloud as the forest layer wants it.
+PointBlocks blocks_of(MapTiles& tiles) {
+  return [&tiles](const PointVisitor& visit) {
+    std::vector<Eigen::Vector3d> block;
+    tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+      block.clear();
+      for (const MapPoint& p : points)
+        block.emplace_back(p.x, p.y, p.z);
+      visit(block);
+    });
+  };
+}
+
+std::vector<Pose> poses_of(const std::vector<Keyframe>& keyframes) {
+  std::vector<Pose> poses;
+  for (const Keyframe& keyframe : keyframes)
+    poses.push_back(keyframe.world_from_body);
+  return poses;
+}
+
+class DenseMap : public MapMaker {
+ public:
+  DenseMap(DenseFrontEnd& front_end, const ReadRecording& recording)
+      : front_end_(front_end), recording_(recording) {}
+
+  void close_loops() override {
+    front_end_.map().finish();
+    if (front_end_.config().gnss.use == GnssUse::kGeoreference) return;
+    const ScopedTimer timer(front_end_.times(), "finish_gnss");
+    const SolvedRun solved = solved_run();
+    RunWithPositions with_positions =
+        use_positions(mapped_path(recording_, front_end_, solved.trajectory), solved,
+                      front_end_.config().georeference, front_end_.config().gnss, recording_.log);
+    if (!with_positions.world_from_keyframe.empty())
+      front_end_.map().set_poses(with_positions.world_from_keyframe);
+    made_.placement = std::move(with_positions.found);
+  }
+  void finish_map() override {
+    if (!front_end_.config().map_enabled) return;
+    const ScopedTimer timer(front_end_.times(), "finish_gather_map");
+    made_.tiles =
+        make_finished_map(front_end_.clouds(), front_end_.map().keyframes(),
+                          front_end_.config().map, recording_.work / "tiles", recording_.progress);
+  }
+
+  void list_trees() override {
+    if (!made_.tiles) return;
+    const ScopedTimer timer(front_end_.times(), "finish_inventory");
+    const LidarView view = learn_view(front_end_.clouds(), front_end_.rig().body_from_lidar);
+    made_.inventory =
+        take_inventory(blocks_of(*made_.tiles), front_end_.config().inventory, recording_.progress,
+                       seen_from(view, poses_of(front_end_.map().keyframes())));
+    made_.lidar_view = figures_of(view);
+  }
+
+  RunOutcome write() override { return write_dense_results(recording_, front_end_, made_); }
+
+ private:
+  [[nodiscard]] SolvedRun solved_run() const {
+    const KeyframeMap& map = front_end_.map();
+    SolvedRun run{map.graph(), map.graph_loops_used(), {}, {}};
+    for (const Keyframe& keyframe : map.keyframes())
+      run.stamps.push_back(keyframe.stamp);
+    for_each_finished_scan(front_end_.journal(), map.keyframes(), [&](const FinishedScan& scan) {
+      run.trajectory.push_back({scan.record->stamp, scan.world_from_body});
+    });
+    return run;
+  }
+
+  DenseFrontEnd& front_end_;
+  ReadRecording recording_;
+  DenseProducts made_;
+};
+
+}  // namespace
+
+std::string DenseFrontEnd::why_no_map(const Recording& source) const {
+  std::string topics;
+  std::uint64_t empty = 0;
+  for (const TopicReport& topic : source.topics()) {
+    topics += (topics.empty() ? "" : ", ") + topic.name + " (" + topic.type + ")";
+    empty += topic.empty_points;
+  }
+  if (received_.counts.scans > 0) {
+    return fmt::format(
+        "none of its {} scans has points to map: {} points are not a number or at zero range, the "
+        "others too near, too far or on the machine",
+        received_.counts.scans, empty);
+  }
+  return "no lidar scan could be read from it" +
+         (topics.empty() ? std::string() : "; it holds " + topics);
+}
+
+std::unique_ptr<MapMaker> DenseFrontEnd::map_maker(const ReadRecording& recording) {
+  if (traits_.scan_points == 0) {
+    log_.warn("lidar.unknown",
+              recording.request.recording +
+                  ": no scan in the first messages shows what lidar this is: no setting was "
+                  "adapted to it");
+  }
+  if (!recording.facts.stopped) {
+    remark_on_input(*this, recording.source, recording.facts.time_repair,
+                    recording.request.recording, log_);
+  }
+  return std::make_unique<DenseMap>(*this, recording);
+}
+
+}  // namespace understory

@@ -1,0 +1,99 @@
+#include "understory/pipeline/mapping/dense/dense_mapping_config.h"
+
+#include <algorithm>
+
+#include "understory/pipeline/profiles.h"
+#include "understory/util/error.h"
+
+namespace understory {
+
+ConfigTable dense_mapping_table(DenseMappingConfig& config) {
+  ConfigTable table;
+  table.section("time_repair", [&] { EventOrderer::describe(table, config.loop.time_repair); });
+  describe(table, config.odometry);
+  table.section("registration", [&] {
+    describe(table, config.odometry.match);
+    describe(table, config.keyframe_map.local_map.matcher);
+  });
+  KeyframeMap::describe(table, config.keyframe_map);
+  table.section("map", [&] {
+    table.add("enabled", config.map_enabled, "write map.laz and what is made from it");
+    table.add("range_max_m", config.map_range_max_m, {1.0, 1000.0}, "m",
+              "farther returns do not enter the finished map");
+    table.add("keyframe_thin_m", config.keyframe_thin_m, {0.0, 1.0}, "m",
+              "one point per cube of this edge of each scan in it; 0: all");
+    table.add("cloud_distance_m", config.cloud_distance_m, {0.0, 100.0}, "m",
+              "distance between scans whose clouds make the finished map; turns count as for "
+              "keyframes; of sparse scans 0.1");
+    table.add("thin_m", config.map.thin_m, {0.0, 1.0}, "m",
+              "one point per cube of this edge of the finished map; 0: all");
+    table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
+  });
+  table.section("inventory", [&] { describe(table, config.inventory); });
+  table.section("georeference", [&] { describe(table, config.georeference); });
+  table.section("gnss", [&] { describe(table, config.gnss); });
+  table.section("judgement", [&] {
+    describe(table, config.judgement);
+    table.section("motion", [&] { describe(table, config.motion_limits); });
+  });
+  table.section("run", [&] {
+    table.add("checkpoint_interval_s", config.loop.checkpoint_interval_s, {0.1, 5.0}, "s",
+              "of recording between checkpoints");
+    table.add("sparse_scan_points", config.sparse_scan_points, {0, 100000000}, "points",
+              "with fewer points in a full scan, settings are adapted to a sparse lidar; 0: never");
+    table.add("lost_after_scans", config.lost_after_scans, {1, 100000}, "scans",
+              "unmatched scans in a row after which a new piece of map begins");
+    table.add("realtime_queue_scans", config.loop.realtime_queue_scans, {1, 1000}, "scans",
+              "--realtime: scans that may wait; older ones are dropped");
+  });
+  return table;
+}
+
+std::vector<std::string> profile_names() {
+  std::vector<std::string> names;
+  for (const auto& profile : shipped_profiles())
+    names.emplace_back(profile.name);
+  return names;
+}
+
+std::string profile_text(const std::string& name) {
+  for (const auto& profile : shipped_profiles()) {
+    if (name == profile.name) return std::string(profile.yaml);
+  }
+  std::string known;
+  for (const std::string& each : profile_names())
+    known += (known.empty() ? "" : ", ") + each;
+  throw ConfigError({"--profile " + name + ": unknown; there are " + known});
+}
+
+ReadConfig<DenseMappingConfig> read_dense_mapping_config(const std::string& profile,
+                                                         const std::string& file,
+                                                         const std::vector<std::string>& settings) {
+  DenseMappingConfig config;
+  ConfigTable table = dense_mapping_table(config);
+  ConfigProblems problems;
+  ConfigOrigins origins;
+  problems.gather([&] {
+    if (profile.empty()) return;
+    table.read_yaml(profile_text(profile), "profile " + profile);
+    note_yaml(table, profile_text(profile), "profile " + profile, origins);
+  });
+  problems.gather([&] {
+    if (file.empty()) return;
+    table.read_file(file);
+    note_file(table, file, origins);
+  });
+  problems.gather([&] { table.set(settings); });
+  note_settings(table, settings, origins);
+  problems.gather([&] { check(config.georeference); });
+  problems.throw_if_any();
+  return {config, origins};
+}
+
+void reread(DenseMappingConfig& config, const std::string& yaml, const std::string& origin,
+            const std::function<std::string(const std::string&)>& found) {
+  dense_mapping_table(config).read_yaml(yaml, origin);
+  config.odometry.machine_boxes_file = found(config.odometry.machine_boxes_file);
+}
+
+}  // namespace understory

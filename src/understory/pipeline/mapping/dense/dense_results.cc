@@ -1,0 +1,392 @@
+#include "understory/pipeline/mapping/dense/dense_results.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "understory/forest/inventory.h"
+#include "understory/output/las_writer.h"
+#include "understory/output/layer_files.h"
+#include "understory/output/report/map_picture.h"
+#include "understory/output/run_tables.h"
+#include "understory/pipeline/judgement/evidence_gathering.h"
+#include "understory/pipeline/judgement/match_course.h"
+#include "understory/pipeline/judgement/path_evidence.h"
+#include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/pipeline/mapping/finished_trajectory.h"
+#include "understory/pipeline/mapping/map_documents.h"
+#include "understory/pipeline/run_folder/run_truth.h"
+#include "understory/util/median.h"
+
+namespace understory {
+namespace {
+
+// What walking through the finished trajectory yields for report and run.json.
+struct TrajectoryFacts {
+  Trajectory trajectory;  // as a reader of trajectory.tum gets it
+  std::vector<ReportScan> scans;
+  std::vector<float> cpu_ms;  // of each scan, see ScanRecord
+  std::vector<float> wall_ms;
+  double length_m = 0.0;
+  double duration_s = 0.0;
+  double period_ms = 0.0;  // median time between scans
+  MotionEvidence motion;
+  MatchEvidence match;  // what the path and the matches say of it
+  std::uint64_t weak = 0;
+};
+
+ReportScan report_scan(const FinishedScan& scan) {
+  const ScanRecord& record = *scan.record;
+  ReportScan row;
+  row.stamp = record.stamp;
+  row.position = scan.world_from_body.translation().cast<float>();
+  row.wall_ms = record.wall_ms;
+  if (record.iterations > 0) {
+    row.inlier_ratio = record.inlier_ratio;
+    row.fitness_m2 = record.fitness_m2;
+  }
+  row.weak = record.outcome != ScanOutcome::kMatched || record.degenerate_directions > 0;
+  return row;
+}
+
+double median_period_ms(const std::vector<ReportScan>& scans) {
+  std::vector<TimeNs> steps;
+  for (std::size_t i = 1; i < scans.size(); ++i) {
+    steps.push_back(scans[i].stamp - scans[i - 1].stamp);
+  }
+  return 1e3 * to_seconds(upper_median(std::move(steps)));
+}
+
+// trajectory.tum and states.csv.gz.
+TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
+                                 const DenseFrontEnd& front_end, const DenseMappingConfig& config) {
+  TumWriter trajectory(folder / "trajectory.tum");
+  StatesWriter states(folder / "states.csv.gz");
+  TrajectoryFacts facts;
+  double inliers = 0.0;
+  double squares = 0.0;
+  std::vector<float> inlier_ratios;
+  PathEvidence path(config.motion_limits);
+  MatchCourse course(make_matcher(config.keyframe_map.local_map.matcher)->reach_m());
+  Pose last;
+  std::uint64_t empty_in_a_row = 0;
+  for_each_finished_scan(
+      front_end.journal(), front_end.map().keyframes(), [&](const FinishedScan& scan) {
+        const ScanRecord& record = *scan.record;
+        facts.trajectory.push_back(trajectory.add({record.stamp, scan.world_from_body}));
+        states.add({record.stamp, scan.velocity_in_world,
+                    Eigen::Vector3d::Map(record.gyro_bias.data()),
+                    Eigen::Vector3d::Map(record.accel_bias.data()), record.pose_covariance()});
+        facts.scans.push_back(report_scan(scan));
+        path.add({record.stamp, scan.world_from_body});
+        course.add(record.stamp, record.outcome == ScanOutcome::kMatched,
+                   static_cast<double>(record.inlier_ratio),
+                   static_cast<double>(record.fitness_m2));
+        facts.cpu_ms.push_back(record.cpu_ms);
+        facts.wall_ms.push_back(record.wall_ms);
+        empty_in_a_row = record.matched_points < kFewPoints ? empty_in_a_row + 1 : 0;
+        const Pose step = last.inverse() * scan.world_from_body;
+        if (facts.scans.size() > 1) {
+          facts.length_m += step.translation().norm();
+          facts.match.smear_m += smear_of(step);
+        }
+        last = scan.world_from_body;
+        if (record.iterations > 0) {
+          inlier_ratios.push_back(record.inlier_ratio);
+          inliers += static_cast<double>(record.inlier_ratio);
+          squares += static_cast<double>(record.fitness_m2);
+        }
+        if (facts.scans.back().weak) ++facts.weak;
+      });
+  trajectory.commit();
+  states.commit();
+  if (!inlier_ratios.empty()) {
+    const auto matched = static_cast<double>(inlier_ratios.size());
+    facts.match.inliers_mean = inliers / matched;
+    facts.match.fitness_rms_m = std::sqrt(squares / matched);
+    const auto low = inlier_ratios.begin() + static_cast<std::ptrdiff_t>(inlier_ratios.size() / 10);
+    std::nth_element(inlier_ratios.begin(), low, inlier_ratios.end());
+    facts.match.inliers_low = static_cast<double>(*low);
+  }
+  facts.motion = path.evidence();
+  course.put(facts.match);
+  facts.match.cut = empty_in_a_row == 1 ? 1 : 0;
+  if (facts.scans.size() > 1) facts.match.smear_m /= static_cast<double>(facts.scans.size() - 1);
+  facts.period_ms = median_period_ms(facts.scans);
+  facts.duration_s = to_seconds(facts.scans.back().stamp - facts.scans.front().stamp);
+  return facts;
+}
+
+void write_graph(const std::filesystem::path& folder, const KeyframeMap& map) {
+  TumWriter poses(folder / "keyframes.tum");
+  std::vector<GraphVertex> vertices;
+  std::vector<GraphEdge> edges;
+  for (const Keyframe& keyframe : map.keyframes()) {
+    const int id = static_cast<int>(vertices.size());
+    poses.add({keyframe.stamp, keyframe.world_from_body});
+    vertices.push_back({id, keyframe.world_from_body, id == 0});
+    if (id > 0) {
+      edges.push_back({id - 1, id, keyframe.previous_from_this, keyframe.covariance.inverse()});
+    }
+  }
+  for (std::size_t i = 0; i < map.loops().size(); ++i) {
+    if (!map.loops_used()[i]) continue;
+    const PoseEdge& edge = map.loops()[i].edge;
+    edges.push_back({edge.from, edge.to, edge.from_from_to, edge.covariance.inverse()});
+  }
+  poses.commit();
+  write_g2o(folder / "graph.g2o", vertices, edges);
+}
+
+std::vector<ReportLoop> report_loops(const KeyframeMap& map) {
+  std::vector<ReportLoop> rows;
+  for (std::size_t i = 0; i < map.loops().size(); ++i) {
+    const LoopAttempt& attempt = map.loops()[i];
+    const Keyframe& from = map.keyframes()[static_cast<std::size_t>(attempt.from)];
+    const Keyframe& to = map.keyframes()[static_cast<std::size_t>(attempt.to)];
+    ReportLoop row;
+    row.from = from.world_from_body.translation();
+    row.to = to.world_from_body.translation();
+    row.from_stamp = from.stamp;
+    row.to_stamp = to.stamp;
+    row.accepted = map.loops_used()[i] != 0;
+    row.correction_m = attempt.correction_m;
+    row.reason = row.accepted       ? ""
+                 : attempt.verified ? "contradicts the odometry or the other loops"
+                                    : attempt.reason;
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::string title_of(const ReadRecording& recording) {
+  return std::filesystem::path(recording.request.recording).filename().string();
+}
+
+std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
+                          const GroundModel& ground, const ResultFrames& frames,
+                          MapPicture& picture, const ProgressSink& progress) {
+  LasWriter writer(file, las_options(frames.layers));
+  double done = 0.0;
+  tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+    for (const MapPoint& p : points) {
+      const Eigen::Vector3d in_world(p.x, p.y, p.z);
+      const double height = ground.height_above(in_world);
+      const std::uint8_t las_class = ground.las_class(height);
+      const Eigen::Vector3d at = frames.layers.from_world(in_world);
+      writer.add({at.x(), at.y(), at.z(), p.stamp, p.intensity, las_class});
+      const Eigen::Vector3d drawn = frames.local ? frames.local->from_world(in_world) : at;
+      picture.add(drawn.x(), drawn.y(), drawn.z(), height);
+    }
+    done += static_cast<double>(points.size());
+    if (progress) progress({"writing map.laz", done / 1e3, 0.0, "thousand points", ""});
+  });
+  writer.commit();
+  return writer.points();
+}
+
+// map.laz, trees.csv, trees.gpkg, dtm.tif, chm.tif and map.qgs. Returns the number of points.
+std::uint64_t write_map(const ReadRecording& recording, DenseProducts& made,
+                        const Trajectory& trajectory, const ResultFrames& frames,
+                        MapPicture& picture) {
+  const std::filesystem::path& folder = recording.results;
+  const InventoryResult& inventory = made.inventory;
+  const std::uint64_t points = write_cloud(folder / "map.laz", *made.tiles, inventory.ground,
+                                           frames, picture, recording.progress);
+  write_trees_csv(folder / "trees.csv", inventory.trees);
+  write_tree_layers(folder, inventory.trees, trajectory, frames.layers);
+  write_raster_layers(folder, inventory.ground.terrain, inventory.canopy,
+                      change_into(frames.layers), frames.layers);
+  write_layer_project(folder, title_of(recording), trajectory, frames.layers);
+  return points;
+}
+
+void fill_streams(const EventOrderer::Report& time_repair, RunDocuments& documents) {
+  static constexpr const char* kNames[] = {"lidar", "imu", "gnss", "mag"};
+  for (std::size_t s = 0; s < EventOrderer::kStreams; ++s) {
+    const EventOrderer::StreamReport& stream = time_repair.streams[s];
+    const std::string name = kNames[s];
+    documents.count(name + "_duplicates", stream.duplicates);
+    documents.count(name + "_reordered", stream.reordered);
+    documents.count(name + "_too_late", stream.late);
+    documents.count(name + "_clock_jumps", stream.clock_jumps);
+    documents.count(name + "_gaps", stream.gaps);
+    if (stream.received == 0) continue;
+    documents.count(name + "_received", stream.received);
+    documents.count(name + "_released", stream.released);
+    documents.summary().quality[name + "_unused_s"] = to_seconds(stream.unused);
+    documents.summary().quality[name + "_clock_offset_s"] = to_seconds(stream.offset);
+  }
+  documents.count("scans_without_imu", time_repair.scans_without_imu);
+}
+
+void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
+  const DenseCounts& counts = front_end.counts();
+  documents.summary().scans = counts.scans;
+  documents.summary().poses = front_end.journal().size();
+  documents.count("keyframes", front_end.map().keyframes().size());
+  documents.count("scans_unmatched", counts.unmatched);
+  documents.count("scans_velocity_gated", counts.gated);
+  documents.count("scans_with_few_points", counts.empty_scans);
+  documents.count("segments", counts.segments);
+  const auto& used = front_end.map().loops_used();
+  documents.count("loops_tried", used.size());
+  documents.count("loops_closed",
+                  static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 1)));
+  documents.count("imu_samples", counts.imu_samples);
+  documents.count("gnss_fixes", front_end.fixes().size());
+  documents.count("lidar_points", counts.points);
+}
+
+// Whether the work on a scan grows with the length of the run.
+void fill_constancy(RunSummary& summary, const TrajectoryFacts& trajectory) {
+  const auto tenth = static_cast<std::ptrdiff_t>(trajectory.cpu_ms.size() / 10);
+  if (tenth == 0) return;
+  const auto fill = [&](const std::string& name, const std::vector<float>& ms) {
+    const auto count = static_cast<double>(tenth);
+    summary.quality[name + "_first_tenth"] =
+        std::accumulate(ms.begin(), ms.begin() + tenth, 0.0) / count;
+    summary.quality[name + "_last_tenth"] =
+        std::accumulate(ms.end() - tenth, ms.end(), 0.0) / count;
+  };
+  fill("scan_cpu_ms", trajectory.cpu_ms);
+  fill("scan_wall_ms", trajectory.wall_ms);
+}
+
+void fill_quality(const DenseFrontEnd& front_end, const TrajectoryFacts& trajectory,
+                  const RunFacts& facts, RunSummary& summary) {
+  fill_constancy(summary, trajectory);
+  if (facts.memory_mb.size() > 1) {
+    summary.quality["memory_mb_half"] = facts.memory_mb[facts.memory_mb.size() / 2];
+    summary.quality["memory_mb_end"] = facts.memory_mb.back();
+  }
+  summary.recording_s = trajectory.duration_s;
+  summary.quality["length_m"] = trajectory.length_m;
+  summary.quality["inlier_ratio_mean"] = trajectory.match.inliers_mean;
+  summary.quality["match_distance_rms_m"] = trajectory.match.fitness_rms_m;
+  summary.quality["weak_scans_percent"] =
+      100.0 * static_cast<double>(trajectory.weak) / static_cast<double>(trajectory.scans.size());
+  summary.quality["imu_without_place_s"] = to_seconds(front_end.imu_usage().without_place());
+  summary.quality["loop_search_cpu_s"] = front_end.map().search_cpu_seconds();
+}
+
+void check_ranges(DenseFrontEnd& front_end, MatchEvidence& evidence) {
+  const ScopedTimer timer(front_end.times(), "finish_check_ranges");
+  const RangeCheck check =
+      front_end.map().check_ranges(front_end.rig().body_from_lidar.translation());
+  evidence.range_offset_m = check.offset_m;
+  evidence.range_offset_error_m = check.standard_error_m;
+  evidence.range_pairs = check.pairs;
+}
+
+RunEvidence evidence_of(DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
+                        const TrajectoryFacts& trajectory, const Log& log) {
+  RunEvidence evidence;
+  evidence.motion = trajectory.motion;
+  evidence.match = trajectory.match;
+  check_ranges(front_end, evidence.match);
+  gather_dense(front_end, facts, source, log, evidence);
+  return evidence;
+}
+
+std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& trajectory,
+                             const InventoryResult& inventory,
+                             const std::filesystem::path& folder) {
+  std::string text = fmt::format("{} scans over {:.1f} m and {:.0f} s", summary.scans,
+                                 trajectory.length_m, trajectory.duration_s);
+  const auto scan = summary.stages.find("scan");
+  if (scan != summary.stages.end()) {
+    text += fmt::format(", {:.0f} ms a scan (99 %: {:.0f} ms)", scan->second.wall_ms.mean,
+                        scan->second.wall_ms.p99);
+  }
+  text += fmt::format("\n{} trees\n", inventory.trees.size());
+  for (const std::string& reason : summary.reasons) {
+    text += to_string(summary.status) + ": " + reason + "\n";
+  }
+  return text + "report: " + (folder / "report.html").string();
+}
+
+void fill_report(const ReadRecording& recording, const DenseFrontEnd& front_end,
+                 const TrajectoryFacts& trajectory, std::uint64_t scans, ReportInput& report) {
+  const std::string& model = recording.source.rig().lidar_model;
+  report.made_from = fmt::format("{}, {}{} scans", recording.facts.format,
+                                 model.empty() ? "" : model + ", ", scans);
+  report.scans = trajectory.scans;
+  report.sensor_period_ms = trajectory.period_ms;
+  const auto matcher = make_matcher(front_end.config().keyframe_map.local_map.matcher);
+  if (matcher->sums_up_points()) report.map_cell_m = matcher->reach_m();
+  report.loops = report_loops(front_end.map());
+  report.loop_closure_enabled = front_end.config().keyframe_map.loop_closure.enabled;
+}
+
+// The files of the map, if one was made.
+void add_map(const ReadRecording& recording, DenseProducts& made, const Trajectory& trajectory,
+             const ResultFrames& frames, MapPicture& picture, RunDocuments& documents) {
+  documents.count("trees", made.inventory.trees.size());
+  documents.summary().lidar_view = made.lidar_view;
+  if (!made.tiles) return;
+  documents.summary().quality["area_m2"] = made.inventory.area_m2;
+  documents.count("map_points", write_map(recording, made, trajectory, frames, picture));
+  if (!picture.empty()) documents.report().picture = &picture;
+  documents.report().inventory = &made.inventory;
+  for (const std::string& remark : made.inventory.remarks)
+    documents.remark("inventory", remark);
+}
+
+// Where the run lies on the globe, by its own fixes; gnss.csv.
+PlacedMap place_on_globe(const ReadRecording& recording, DenseFrontEnd& front_end,
+                         const DenseProducts& made, const Trajectory& trajectory,
+                         RunDocuments& documents) {
+  const ScopedTimer timer(front_end.times(), "finish_georeference");
+  const MappedPath path = mapped_path(recording, front_end, trajectory);
+  const GeoreferenceConfig& config = front_end.config().georeference;
+  PlacedMap map = made.placement ? place_map(path, *made.placement, config, recording.log)
+                                 : place_map(path, config, recording.log);
+  documents.summary().quality.merge(map.figures);
+  documents.report().fixes = std::move(map.fixes);
+  documents.report().has_fixes = !front_end.fixes().empty();
+  return map;
+}
+
+}  // namespace
+
+MappedPath mapped_path(const ReadRecording& recording, const DenseFrontEnd& front_end,
+                       const Trajectory& trajectory) {
+  MappedPath path{recording.results, trajectory, front_end.fixes()};
+  path.level = front_end.counts().imu_samples > 0;
+  if (const auto& antenna = front_end.rig().body_from_gnss)
+    path.antenna_in_body = antenna->translation();
+  return path;
+}
+
+RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& front_end,
+                               DenseProducts& made) {
+  const std::filesystem::path& folder = recording.results;
+  const RunFacts& facts = recording.facts;
+  const TrajectoryFacts trajectory = write_trajectory(folder, front_end, front_end.config());
+  write_graph(folder, front_end.map());
+  RunDocuments documents = map_documents(recording, front_end.times());
+  documents.judge(evidence_of(front_end, facts, recording.source, trajectory, recording.log),
+                  front_end.config().judgement);
+  fill_streams(facts.time_repair, documents);
+  fill_counts(front_end, documents);
+  fill_quality(front_end, trajectory, facts, documents.summary());
+  if (const auto truth = write_truth(recording.request.run_folder, recording.source))
+    documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
+  const PlacedMap map =
+      place_on_globe(recording, front_end, made, trajectory.trajectory, documents);
+  documents.place(map.place, map.frames);
+  MapPicture picture;
+  {
+    const ScopedTimer timer(front_end.times(), "finish_write_map");
+    add_map(recording, made, trajectory.trajectory, map.frames, picture, documents);
+  }
+  fill_report(recording, front_end, trajectory, documents.summary().scans, documents.report());
+  documents.write(folder);
+  return documents.outcome(terminal_summary(documents.summary(), trajectory, made.inventory,
+                                            recording.request.run_folder));
+}
+
+}  // namespace understory

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "understory/forest/inventory.h"
+#include "understory/map/map_tiles.h"
+#include "understory/output/run_summary.h"
+#include "understory/pipeline/georeferencing/map_placing.h"
+#include "understory/pipeline/mapping/dense/dense_front_end.h"
+#include "understory/pipeline/mapping/front_end.h"
+#include "understory/pipeline/run_folder/run_outcome.h"
+
+namespace understory {
+
+// What is made of the clouds of a run; empty where no map is wanted.
+struct DenseProducts {
+  std::unique_ptr<MapTiles> tiles;  // of the finished cloud
+  InventoryResult inventory;
+  LidarViewFigures lidar_view;
+  std::optional<FoundPlacement> placement;  // where it was found before the map was made
+};
+
+// How the front end's finished run lies against its fixes.
+[[nodiscard]] MappedPath mapped_path(const ReadRecording& recording, const DenseFrontEnd& front_end,
+                                     const Trajectory& trajectory);
+
+// Writes what the dense front end has found: trajectory, states, keyframes, graph, fixes, map,
+// trees, terrain, run.json, report. Throws OutputError.
+[[nodiscard]] RunOutcome write_dense_results(const ReadRecording& recording,
+                                             DenseFrontEnd& front_end, DenseProducts& made);
+
+}  // namespace understory

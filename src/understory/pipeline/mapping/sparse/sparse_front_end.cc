@@ -1,0 +1,144 @@
+#include "understory/pipeline/mapping/sparse/sparse_front_end.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "understory/geometry/pose_io.h"
+#include "understory/pipeline/mapping/scan_content.h"
+#include "understory/util/timing.h"
+
+namespace understory {
+namespace {
+
+constexpr const char* kViewsFile = "views.bin";
+
+}  // namespace
+
+SparseFrontEnd::SparseFrontEnd(const SparseMappingConfig& config, const RunConditions& conditions,
+                               const std::filesystem::path& folder, Log& log)
+    : config_(config), folder_(folder), pacer_(config.pace, config.front_end, &log) {
+  if (!conditions.imu_refused.empty()) refuse_imu(conditions.imu_refused);
+}
+
+std::vector<TimeNs> SparseFrontEnd::handle(const Event& event, const Rig& rig) {
+  if (journal_ == nullptr) journal_ = std::make_unique<ViewJournal>(folder_ / kViewsFile);
+  if (const auto* scan = std::get_if<ScanPtr>(&event)) return on_scan(*scan, rig);
+  if (const auto* fix = std::get_if<GnssFix>(&event)) {
+    journal_->on_fix(*fix);
+    on_fix(*fix);
+  }
+  if (const auto* sample = std::get_if<ImuSample>(&event)) on_sample(*sample, rig);
+  return {};
+}
+
+// The recording has said so where it does not know the IMU's place; it may learn it later.
+void SparseFrontEnd::on_sample(const ImuSample& sample, const Rig& rig) {
+  imu_usage_.add(sample, rig.body_from_imu.has_value(), ImuNoiseConfig());
+  if (rig.body_from_imu) pacer_.add(sample);
+}
+
+std::vector<TimeNs> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig) {
+  const ScopedTimer timer(times_, "scan");
+  ++scans_;
+  const std::uint64_t content = content_of(*scan);
+  repeated_ += is_repetition(content, last_content_) ? 1 : 0;
+  last_content_ = content;
+  last_scan_end_ = scan->end();
+  waiting_ends_.push_back(last_scan_end_);
+  return record(pacer_.add(scan, rig));
+}
+
+std::vector<TimeNs> SparseFrontEnd::record(const std::vector<StemScan>& results) {
+  std::vector<TimeNs> ends;
+  for (const StemScan& result : results) {
+    ends.push_back(waiting_ends_.front());
+    waiting_ends_.pop_front();
+    const StampedPose pose{result.view.stamp, result.step.world_from_body};
+    journal_->on_pose(pose, result.positioned);
+    on_pose(pose, result.positioned);
+    if (!result.positioned) continue;
+    last_stems_ = result.view.stems.size();
+    if (!result.keep) continue;
+    journal_->on_view(result.view, result.step);
+    on_view(result.view, result.step);
+  }
+  return ends;
+}
+
+void SparseFrontEnd::on_pose(const StampedPose& pose, bool positioned) {
+  path_.push_back(pose);
+  positioned_ += positioned ? 1 : 0;
+}
+
+void SparseFrontEnd::on_view(const StemView& view, const SparseStep& step) {
+  views_.push_back(view);
+  steps_.push_back(step);
+}
+
+void SparseFrontEnd::on_fix(const GnssFix& fix) {
+  fixes_.push_back(fix);
+}
+
+std::vector<TimeNs> SparseFrontEnd::finish(const Rig& rig) {
+  return record(pacer_.finish(rig));
+}
+
+ImuFinding SparseFrontEnd::imu_finding() const {
+  const ImuTrust trust = pacer_.imu_trust();
+  if (trust.trusted || !imu_refused_.empty()) return {};
+  return {ImuFinding::Verdict::kWrong, trust.reason};
+}
+
+FrontEndProgress SparseFrontEnd::progress() const {
+  return {"stems", scans_, fmt::format("{} stems", last_stems_)};
+}
+
+void SparseFrontEnd::hand_over(std::vector<StemView>& views, std::vector<SparseStep>& steps,
+                               std::vector<StampedPose>& path, std::vector<GnssFix>& fixes) {
+  views = std::move(views_);
+  steps = std::move(steps_);
+  path = std::move(path_);
+  fixes = std::move(fixes_);
+}
+
+void SparseFrontEnd::refuse_imu(const std::string& reason) {
+  imu_refused_ = reason;
+  pacer_.refuse_imu();
+}
+
+void SparseFrontEnd::sync() {
+  if (journal_ != nullptr) journal_->sync();
+}
+
+std::vector<CountedFile> SparseFrontEnd::files() const {
+  if (journal_ == nullptr) return {};
+  return {{kViewsFile, journal_->count()}};
+}
+
+void SparseFrontEnd::save(BinaryWriter& writer) const {
+  writer.put(journal_ != nullptr ? journal_->count() : RecordCount());
+  writer.put(last_scan_end_);
+  writer.put(imu_refused_);
+  imu_usage_.save(writer);
+  writer.put(repeated_);
+  writer.put(last_content_);
+  pacer_.save(writer);
+}
+
+void SparseFrontEnd::load(BinaryReader& reader, const Rig& /*rig*/) {
+  const auto known = reader.get<RecordCount>();
+  ViewSink& again = *this;
+  if (known.records > 0)
+    journal_ = std::make_unique<ViewJournal>(folder_ / kViewsFile, known, again);
+  scans_ = path_.size();
+  last_scan_end_ = reader.get<TimeNs>();
+  const std::string refused = reader.get_string();
+  if (!refused.empty()) refuse_imu(refused);
+  imu_usage_.load(reader);
+  repeated_ = reader.get<std::uint64_t>();
+  last_content_ = reader.get<std::uint64_t>();
+  pacer_.load(reader);
+}
+
+}  // namespace understory
