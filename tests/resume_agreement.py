@@ -9,8 +9,8 @@ import sys
 import tempfile
 import time
 
-DENSE = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "gnss.csv", "map.laz", "trees.csv"]
-STEMS = ["stems.csv.gz", "trajectory.tum", "odometry.tum", "steps.csv", "gnss.csv", "corrections.csv", "loops.csv",
+DENSE = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "gnss.csv", "global.csv.gz", "map.laz", "trees.csv"]
+STEMS = ["stems.csv.gz", "trajectory.tum", "odometry.tum", "steps.csv", "gnss.csv", "global.csv.gz", "corrections.csv", "loops.csv",
          "trees.csv", "felled.csv"]
 # Recording, a file that shows how far the run is, its least size then, options, files to compare.
 CASES = {

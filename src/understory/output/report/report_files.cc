@@ -16,7 +16,7 @@ struct ResultFile {
 };
 
 // In the order in which a user wants them; docs/reference/outputs.md has their columns.
-constexpr std::array<ResultFile, 21> kResultFiles = {
+constexpr std::array<ResultFile, 22> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
      {"trees.gpkg", "the same trees as points on a map, and the path",
@@ -28,6 +28,8 @@ constexpr std::array<ResultFile, 21> kResultFiles = {
      {"chm.tif", "height of the canopy above the ground", "QGIS"},
      {"trajectory.tum", "the path of the scanner: time, place, attitude", "a text editor, evo"},
      {"gnss.csv", "the fixes of the GNSS receiver", "a spreadsheet"},
+     {"global.csv.gz", "place on the globe at each scan, while the run went on",
+      "a spreadsheet, QGIS"},
      {"run.json", "verdict, settings and all figures of this page", "a text editor"},
      {"keyframes.tum", "poses of the keyframes, for checking", "a text editor, evo"},
      {"states.csv.gz", "velocity and uncertainty of each scan, for checking", "a spreadsheet"},

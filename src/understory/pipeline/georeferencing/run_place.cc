@@ -55,6 +55,8 @@ void describe(ConfigTable& table, GeoreferenceConfig& config) {
   table.add("enabled", config.enabled,
             "lay map.laz, rasters and trees.gpkg on the globe by the recording's satellite "
             "positions");
+  table.add("online", config.online,
+            "global coordinates at every scan by the fixes until then, in global.csv.gz");
   table.add("crs", config.coordinate_system,
             "coordinate system of these layers, EPSG:3067 or WKT; empty: ETRS-TM35FIN in Finland, "
             "else the UTM zone");

@@ -15,6 +15,7 @@ namespace understory {
 // How the layers of a run lie on the globe.
 struct GeoreferenceConfig {
   bool enabled = true;            // `map`: place the layers by the recording's own fixes
+  bool online = true;             // `map`: global coordinates at every scan while it runs
   std::string coordinate_system;  // "EPSG:3067", WKT; empty: chosen by the place
   HeightWish heights = HeightWish::kEllipsoid;
 };

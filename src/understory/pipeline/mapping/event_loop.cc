@@ -37,7 +37,8 @@ void EventLoop::begin() {
 void EventLoop::go_on() {
   adapt_to_recording();
   state_.find_place(*source_);
-  state_.restore(*front_end_, *orderer_, log_, source_->rig());
+  ResumablePair session(*front_end_, online_.get());
+  state_.restore(session, *orderer_, log_, source_->rig());
   stamps_trusted_ = orderer_->trusts_stamps(EventOrderer::kImu);
   events_ = state_.events();
 }
@@ -54,6 +55,9 @@ void EventLoop::adapt_to_recording() {
   front_end_.reset();  // lets go of its files
   front_end_ =
       parts_.front_end(request_.config, request_.traits, request_.conditions, state_.work(), log_);
+  online_.reset();
+  if (georeference_of(request_.config).online)
+    online_ = std::make_unique<OnlinePath>(state_.work());
 }
 
 void EventLoop::play_at_sensor_speed() {
@@ -107,23 +111,40 @@ std::optional<Event> EventLoop::next_event() {
 void EventLoop::handle_ready() {
   while (const auto ready = orderer_->pop()) {
     const TimeNs before = front_end_->last_scan_end();
+    take_fix_or_sample(*ready);
     note_positioned(front_end_->handle(*ready, source_->rig()));
     if (front_end_->last_scan_end() == before || !progress_) continue;
     const FrontEndProgress so_far = front_end_->progress();
     const double share = source_->progress();
     const auto done = static_cast<double>(so_far.scans);
-    progress_({so_far.stage, done, share > 0.0 ? done / share : 0.0, "scans", so_far.remark});
+    progress_({so_far.stage, done, share > 0.0 ? done / share : 0.0, "scans", remark(so_far)});
   }
 }
 
-void EventLoop::note_positioned(const std::vector<TimeNs>& scan_ends) {
-  if (player_ == nullptr) return;
-  for (const TimeNs scan_end : scan_ends)
-    latencies_ms_.push_back(player_->latency_ms(scan_end));
+// For the online georeference. Stems alone do not level the world by the IMU.
+void EventLoop::take_fix_or_sample(const Event& event) {
+  if (!online_) return;
+  const RunConditions& conditions = request_.conditions;
+  if (const auto* fix = std::get_if<GnssFix>(&event)) online_->take(*fix, source_->rig());
+  if (std::holds_alternative<ImuSample>(event) && depends_on_sensors(request_.config))
+    online_->set_level(conditions.imu_refused.empty() && !conditions.imu_doubted);
+}
+
+void EventLoop::note_positioned(const std::vector<PositionedScan>& scans) {
+  for (const PositionedScan& scan : scans) {
+    if (player_ != nullptr) latencies_ms_.push_back(player_->latency_ms(scan.end));
+    if (online_) online_->take(scan);
+  }
+}
+
+std::string EventLoop::remark(const FrontEndProgress& so_far) const {
+  const std::string on_globe = online_ ? online_->remark() : "";
+  return so_far.remark + (on_globe.empty() ? "" : ", " + on_globe);
 }
 
 void EventLoop::save_state() {
-  state_.save(request_, *front_end_, *orderer_, log_, *source_, events_);
+  ResumablePair session(*front_end_, online_.get());
+  state_.save(request_, session, *orderer_, log_, *source_, events_);
 }
 
 void EventLoop::save_state_if_due() {
@@ -171,7 +192,8 @@ void EventLoop::start_over() {
   source_ = parts_.open_recording(request_.recording, request_.open, log_);
   opened_ = source_.get();
   events_ = 0;
-  state_.begin_anew(request_, *front_end_, *orderer_, log_, *source_);
+  ResumablePair session(*front_end_, online_.get());
+  state_.begin_anew(request_, session, *orderer_, log_, *source_);
 }
 
 RunFacts EventLoop::facts() {
@@ -184,6 +206,7 @@ RunFacts EventLoop::facts() {
   facts.realtime = player_ != nullptr;
   facts.latencies_ms = latencies_ms_;
   facts.memory_mb = memory_mb_;
+  facts.online = online_.get();
   if (player_ == nullptr) return facts;
   facts.dropped_scans = player_->dropped_scans();
   if (facts.dropped_scans > 0) {

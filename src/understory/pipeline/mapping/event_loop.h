@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/pipeline/georeferencing/online_path.h"
 #include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/mapping/mapping_request.h"
 #include "understory/pipeline/mapping/realtime_player.h"
@@ -60,13 +61,15 @@ class EventLoop {
   [[nodiscard]] std::optional<Event> next_event();
   [[nodiscard]] bool stopped();
   void handle_ready();
-  void note_positioned(const std::vector<TimeNs>& scan_ends);
+  void take_fix_or_sample(const Event& event);
+  void note_positioned(const std::vector<PositionedScan>& scans);
   void save_state();
   void save_state_if_due();
   [[nodiscard]] bool start_over_for_imu();
   [[nodiscard]] bool start_over_for_stamps();
   void start_over();
   [[nodiscard]] RunFacts facts();
+  [[nodiscard]] std::string remark(const FrontEndProgress& so_far) const;
 
   MappingRequest request_;
   const FrontEndConfig asked_;
@@ -80,7 +83,8 @@ class EventLoop {
   RealtimePlayer* player_ = nullptr;  // source_, if it is one
   std::optional<EventOrderer> orderer_;
   std::unique_ptr<FrontEnd> front_end_;
-  std::uint64_t events_ = 0;  // taken from the recording
+  std::unique_ptr<OnlinePath> online_;  // null where it is switched off
+  std::uint64_t events_ = 0;            // taken from the recording
   bool stopped_ = false;
   bool stamps_trusted_ = false;  // of the IMU, against the order of arrival
   std::string unreadable_;       // where the recording could not be read any further, and why

@@ -85,7 +85,7 @@ class MadeUpFrontEnd : public FrontEnd {
   MadeUpFrontEnd(const Script& script, bool without_imu, Course& course)
       : script_(script), without_imu_(without_imu), course_(course) {}
 
-  std::vector<TimeNs> handle(const Event& event, const Rig& /*rig*/) override {
+  std::vector<PositionedScan> handle(const Event& event, const Rig& /*rig*/) override {
     const TimeNs time = event_time(event);
     if (std::holds_alternative<ScanPtr>(event)) {
       if (script_.throws_at != 0 && time >= script_.throws_at)
@@ -97,7 +97,7 @@ class MadeUpFrontEnd : public FrontEnd {
     ++events_;
     return {};
   }
-  std::vector<TimeNs> finish(const Rig& /*rig*/) override {
+  std::vector<PositionedScan> finish(const Rig& /*rig*/) override {
     ++course_.finished;
     return {};
   }

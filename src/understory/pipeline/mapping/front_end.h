@@ -8,6 +8,7 @@
 #include "understory/pipeline/mapping/front_end_config.h"
 #include "understory/pipeline/mapping/map_maker.h"
 #include "understory/pipeline/mapping/mapping_request.h"
+#include "understory/pipeline/mapping/positioned_scan.h"
 #include "understory/pipeline/mapping/run_facts.h"
 #include "understory/pipeline/run_folder/resumable.h"
 #include "understory/recording/recording.h"
@@ -51,11 +52,11 @@ struct ReadRecording {
 // whole state can be saved while it is settled. Not thread-safe.
 class FrontEnd : public Resumable {
  public:
-  // Takes one event. `rig`: what is known of the sensors by now. Returns the ends of the scans that
-  // have got their poses by it, in order.
-  virtual std::vector<TimeNs> handle(const Event& event, const Rig& rig) = 0;
+  // Takes one event. `rig`: what is known of the sensors by now. Returns the scans that have got
+  // their poses by it, in order.
+  virtual std::vector<PositionedScan> handle(const Event& event, const Rig& rig) = 0;
   // No event comes any more: positions what still waits. Returns as `handle`.
-  virtual std::vector<TimeNs> finish(const Rig& rig) = 0;
+  virtual std::vector<PositionedScan> finish(const Rig& rig) = 0;
   // --realtime, before the first event: what is found beside the scan loop counts at once.
   virtual void run_in_real_time() = 0;
 

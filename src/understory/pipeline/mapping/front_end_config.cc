@@ -44,6 +44,11 @@ const EventLoopConfig& loop_of(const FrontEndConfig& config) {
   return std::visit([](const auto& one) -> const EventLoopConfig& { return one.loop; }, config);
 }
 
+const GeoreferenceConfig& georeference_of(const FrontEndConfig& config) {
+  return std::visit([](const auto& one) -> const GeoreferenceConfig& { return one.georeference; },
+                    config);
+}
+
 std::vector<std::string> files_named_in(const FrontEndConfig& config) {
   return std::visit([](const auto& one) { return named_files(one); }, config);
 }

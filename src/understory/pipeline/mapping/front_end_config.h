@@ -26,6 +26,8 @@ using FrontEndConfig = std::variant<DenseMappingConfig, SparseMappingConfig>;
 [[nodiscard]] std::string yaml_of(const FrontEndConfig& config);
 // What the event loop takes from it.
 [[nodiscard]] const EventLoopConfig& loop_of(const FrontEndConfig& config);
+// How the run lies on the globe.
+[[nodiscard]] const GeoreferenceConfig& georeference_of(const FrontEndConfig& config);
 // Other files that it names; empty names for none: the machine's boxes, the log of the head.
 [[nodiscard]] std::vector<std::string> files_named_in(const FrontEndConfig& config);
 // Throws InputError where one of them cannot be used that is read only at the end.

@@ -1,5 +1,6 @@
 #include "understory/pipeline/mapping/map_documents.h"
 
+#include "understory/pipeline/georeferencing/online_path.h"
 #include "understory/pipeline/source.h"
 
 namespace understory {
@@ -10,6 +11,10 @@ RunDocuments map_documents(const ReadRecording& recording, const StageTimes& tim
   RunDocuments documents("map", request.config_record, times, recording.log, facts.elapsed_s);
   documents.add_inputs(hash_inputs(request.recording, recording.log));
   documents.report().title = std::filesystem::path(request.recording).filename().string();
+  if (facts.online != nullptr) {
+    const GeoreferenceConfig& config = georeference_of(request.config);
+    documents.summary().quality.merge(facts.online->write(recording.results, config));
+  }
   if (!facts.realtime) return documents;
   documents.count("scans_dropped", facts.dropped_scans);
   add_latency(distribution_of(facts.latencies_ms), documents.summary());

@@ -9,6 +9,8 @@
 
 namespace understory {
 
+class OnlinePath;
+
 // What the event loop knows of a run beside what the front end has found.
 struct RunFacts {
   bool stopped = false;    // before the end of the recording
@@ -19,7 +21,8 @@ struct RunFacts {
   bool realtime = false;
   std::vector<double> latencies_ms;  // from a scan's end to its pose, --realtime only
   std::uint64_t dropped_scans = 0;
-  std::vector<double> memory_mb;  // resident, at each checkpoint
+  std::vector<double> memory_mb;       // resident, at each checkpoint
+  const OnlinePath* online = nullptr;  // the event loop's; null where it is switched off
 };
 
 }  // namespace understory

@@ -29,4 +29,35 @@ class Resumable {
   [[nodiscard]] virtual TimeNs last_scan_end() const = 0;
 };
 
+// Two parts of a run as one. They must outlive it; the second may be missing.
+class ResumablePair : public Resumable {
+ public:
+  ResumablePair(Resumable& first, Resumable* second) : first_(first), second_(second) {}
+
+  void sync() override {
+    first_.sync();
+    if (second_ != nullptr) second_->sync();
+  }
+  void save(BinaryWriter& writer) const override {
+    first_.save(writer);
+    if (second_ != nullptr) second_->save(writer);
+  }
+  [[nodiscard]] std::vector<CountedFile> files() const override {
+    std::vector<CountedFile> files = first_.files();
+    if (second_ == nullptr) return files;
+    for (const CountedFile& file : second_->files())
+      files.push_back(file);
+    return files;
+  }
+  void load(BinaryReader& reader, const Rig& rig) override {
+    first_.load(reader, rig);
+    if (second_ != nullptr) second_->load(reader, rig);
+  }
+  [[nodiscard]] TimeNs last_scan_end() const override { return first_.last_scan_end(); }
+
+ private:
+  Resumable& first_;
+  Resumable* second_;
+};
+
 }  // namespace understory

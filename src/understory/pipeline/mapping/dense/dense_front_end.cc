@@ -64,11 +64,11 @@ std::optional<TimeNs> DenseFrontEnd::last_imu() const {
   return received_.imu.back().stamp;
 }
 
-std::vector<TimeNs> DenseFrontEnd::handle(const Event& event, const Rig& rig) {
+std::vector<PositionedScan> DenseFrontEnd::handle(const Event& event, const Rig& rig) {
   const TimeNs before = last_scan_end_;
   take(event, rig);
   if (last_scan_end_ == before) return {};
-  return {last_scan_end_};
+  return {positioned_};
 }
 
 void DenseFrontEnd::take(const Event& event, const Rig& rig) {
@@ -199,6 +199,7 @@ DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_t
   // A better guess than standing still.
   odometry_->set_initial_motion(recovery_.last_velocity_in_body(), Eigen::Vector3d::Zero());
   map_->start_segment();
+  positioned_.begins_piece = true;
   if (received_.counts.segments++ == 1) received_.counts.first_lost = scan.stamp;
   received_.counts.lost_in_a_row = 0;
   DenseEstimate estimate = odometry_->process(scan, map_->local_map());
@@ -209,6 +210,7 @@ DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_t
 void DenseFrontEnd::on_scan(const Scan& scan) {
   const ScopedTimer timer(times_, "scan");
   const double cpu_start = process_cpu_seconds() - map_->search_cpu_seconds();
+  positioned_ = {};
   const NavState predicted =
       recovery_.is_outage(scan.stamp) ? odometry_->motion().predict(scan.stamp) : NavState();
   DenseEstimate estimate = odometry_->process(scan, map_->local_map());
@@ -234,7 +236,7 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
   record.cpu_ms =
       static_cast<float>(1e3 * (process_cpu_seconds() - map_->search_cpu_seconds() - cpu_start));
   journal_->append(record);
-  last_scan_end_ = estimate.scan_end;
+  last_scan_end_ = positioned_.end = estimate.scan_end;
   if (opening_) consider_opening(scan, estimate);
 }
 
@@ -277,6 +279,8 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   if (estimate.update.new_world_from_old_world) {
     map_->move_world(*estimate.update.new_world_from_old_world);
   }
+  positioned_.pose = {record.stamp, state.world_from_body};
+  positioned_.new_world_from_old_world = estimate.update.new_world_from_old_world;
   const bool good =
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
   received_.counts.lost_in_a_row = good ? 0 : received_.counts.lost_in_a_row + 1;
@@ -302,7 +306,15 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   record.becomes_keyframe = 1;
   offer_cloud(estimate, map_->keyframes().size(), Pose());
   const auto moved = map_->add(record.stamp, state.world_from_body, map_points(estimate));
-  if (moved) odometry_->move_world(*moved);
+  if (moved) move_world(*moved);
+}
+
+// Loops have moved the present, too.
+void DenseFrontEnd::move_world(const Pose& new_world_from_old_world) {
+  odometry_->move_world(new_world_from_old_world);
+  std::optional<Pose>& so_far = positioned_.new_world_from_old_world;
+  so_far = so_far ? new_world_from_old_world * *so_far : new_world_from_old_world;
+  positioned_.pose.world_from_body = new_world_from_old_world * positioned_.pose.world_from_body;
 }
 
 // What the map takes from a scan: more than what is matched.

@@ -55,8 +55,8 @@ class DenseFrontEnd : public FrontEnd {
 
   // `rig` is looked at when the first scan comes, and for the places of sensors that become known
   // later: they are used from then on.
-  std::vector<TimeNs> handle(const Event& event, const Rig& rig) override;
-  std::vector<TimeNs> finish(const Rig& /*rig*/) override { return {}; }
+  std::vector<PositionedScan> handle(const Event& event, const Rig& rig) override;
+  std::vector<PositionedScan> finish(const Rig& /*rig*/) override { return {}; }
   // Loops are taken over as soon as they are found.
   void run_in_real_time() override { map_->take_loops_when_found(); }
   [[nodiscard]] TimeNs first_scan() const override { return traits_.first_scan; }
@@ -132,6 +132,7 @@ class DenseFrontEnd : public FrontEnd {
   void on_scan(const Scan& scan);
   [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
+  void move_world(const Pose& new_world_from_old_world);
   [[nodiscard]] Points map_points(const DenseEstimate& estimate);
   [[nodiscard]] ScanCloudsConfig clouds_config() const;
   void offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
@@ -152,6 +153,7 @@ class DenseFrontEnd : public FrontEnd {
   VoxelFilter cloud_filter_;
   std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced
   TimeNs last_scan_end_ = 0;
+  PositionedScan positioned_;  // the last one
   Recovery recovery_;
   std::string imu_refused_;
   bool imu_doubted_ = false;

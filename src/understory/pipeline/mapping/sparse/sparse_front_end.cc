@@ -21,7 +21,7 @@ SparseFrontEnd::SparseFrontEnd(const SparseMappingConfig& config, const RunCondi
   if (!conditions.imu_refused.empty()) refuse_imu(conditions.imu_refused);
 }
 
-std::vector<TimeNs> SparseFrontEnd::handle(const Event& event, const Rig& rig) {
+std::vector<PositionedScan> SparseFrontEnd::handle(const Event& event, const Rig& rig) {
   if (journal_ == nullptr) journal_ = std::make_unique<ViewJournal>(folder_ / kViewsFile);
   if (const auto* scan = std::get_if<ScanPtr>(&event)) return on_scan(*scan, rig);
   if (const auto* fix = std::get_if<GnssFix>(&event)) {
@@ -38,7 +38,7 @@ void SparseFrontEnd::on_sample(const ImuSample& sample, const Rig& rig) {
   if (rig.body_from_imu) pacer_.add(sample);
 }
 
-std::vector<TimeNs> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig) {
+std::vector<PositionedScan> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig) {
   const ScopedTimer timer(times_, "scan");
   ++scans_;
   const std::uint64_t content = content_of(*scan);
@@ -49,12 +49,12 @@ std::vector<TimeNs> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig)
   return record(pacer_.add(scan, rig));
 }
 
-std::vector<TimeNs> SparseFrontEnd::record(const std::vector<StemScan>& results) {
-  std::vector<TimeNs> ends;
+std::vector<PositionedScan> SparseFrontEnd::record(const std::vector<StemScan>& results) {
+  std::vector<PositionedScan> positioned;
   for (const StemScan& result : results) {
-    ends.push_back(waiting_ends_.front());
-    waiting_ends_.pop_front();
     const StampedPose pose{result.view.stamp, result.step.world_from_body};
+    positioned.push_back({waiting_ends_.front(), pose, std::nullopt, false});
+    waiting_ends_.pop_front();
     journal_->on_pose(pose, result.positioned);
     on_pose(pose, result.positioned);
     if (!result.positioned) continue;
@@ -63,7 +63,7 @@ std::vector<TimeNs> SparseFrontEnd::record(const std::vector<StemScan>& results)
     journal_->on_view(result.view, result.step);
     on_view(result.view, result.step);
   }
-  return ends;
+  return positioned;
 }
 
 void SparseFrontEnd::on_pose(const StampedPose& pose, bool positioned) {
@@ -80,7 +80,7 @@ void SparseFrontEnd::on_fix(const GnssFix& fix) {
   fixes_.push_back(fix);
 }
 
-std::vector<TimeNs> SparseFrontEnd::finish(const Rig& rig) {
+std::vector<PositionedScan> SparseFrontEnd::finish(const Rig& rig) {
   return record(pacer_.finish(rig));
 }
 

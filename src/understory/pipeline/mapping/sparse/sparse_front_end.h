@@ -22,8 +22,8 @@ class SparseFrontEnd : public FrontEnd, private ViewSink {
   SparseFrontEnd(const SparseMappingConfig& config, const RunConditions& conditions,
                  const std::filesystem::path& folder, Log& log);
 
-  std::vector<TimeNs> handle(const Event& event, const Rig& rig) override;
-  std::vector<TimeNs> finish(const Rig& rig) override;
+  std::vector<PositionedScan> handle(const Event& event, const Rig& rig) override;
+  std::vector<PositionedScan> finish(const Rig& rig) override;
   void run_in_real_time() override {}
 
   void sync() override;
@@ -58,10 +58,9 @@ class SparseFrontEnd : public FrontEnd, private ViewSink {
   [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
 
  private:
-  [[nodiscard]] std::vector<TimeNs> on_scan(const ScanPtr& scan, const Rig& rig);
+  [[nodiscard]] std::vector<PositionedScan> on_scan(const ScanPtr& scan, const Rig& rig);
   void on_sample(const ImuSample& sample, const Rig& rig);
-  // Returns the ends of these scans.
-  std::vector<TimeNs> record(const std::vector<StemScan>& results);
+  std::vector<PositionedScan> record(const std::vector<StemScan>& results);
   void refuse_imu(const std::string& reason);
   void on_pose(const StampedPose& pose, bool positioned) override;
   void on_view(const StemView& view, const SparseStep& step) override;
