@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <limits>
 
-#include "understory/georeference/online_georeference.h"
+#include "understory/georeference/satellites/online_georeference.h"
 #include "understory/util/files/atomic_file.h"
 
 namespace understory {

@@ -7,9 +7,9 @@
 #include <functional>
 #include <optional>
 
-#include "understory/georeference/coordinate_system.h"
-#include "understory/georeference/default_system.h"
 #include "understory/georeference/split_fit.h"
+#include "understory/georeference/systems/coordinate_system.h"
+#include "understory/georeference/systems/default_system.h"
 #include "understory/output/global_table.h"
 #include "understory/util/error.h"
 

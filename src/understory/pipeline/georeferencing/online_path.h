@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "understory/georeference/online_georeference.h"
+#include "understory/georeference/satellites/online_georeference.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/mapping/positioned_scan.h"
