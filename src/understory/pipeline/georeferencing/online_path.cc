@@ -7,7 +7,7 @@
 #include <functional>
 #include <optional>
 
-#include "understory/georeference/split_fit.h"
+#include "understory/georeference/satellites/split_fit.h"
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/georeference/systems/default_system.h"
 #include "understory/output/global_table.h"
