@@ -28,11 +28,9 @@ if(GTSAM_HEADERS AND GTSAM_LIBRARY)
   if(GTSAM_UNSTABLE_LIBRARY)
     target_link_libraries(understory_gtsam INTERFACE "${GTSAM_UNSTABLE_LIBRARY}")
   endif()
-  # The system's GTSAM is built for every processor of the architecture, so its Eigen types are aligned to 16
-  # bytes. With the same alignment here, own code may use newer instructions.
-  # Both settings count: Eigen allocates memory by the larger one.
-  target_compile_definitions(understory_flags INTERFACE EIGEN_MAX_ALIGN_BYTES=16
-                                                        EIGEN_MAX_STATIC_ALIGN_BYTES=16)
+  # The system's GTSAM is built for every processor of the architecture. Own code has to be, too: with AVX Eigen
+  # would allocate memory in another way than GTSAM frees it.
+  set(understory_march_default "")
 else()
   add_library(understory_gtsam INTERFACE)
   if(EXISTS "${UNDERSTORY_DEPS}/lib/cmake/gtsam/gtsam-targets.cmake")
