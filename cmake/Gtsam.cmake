@@ -12,9 +12,6 @@ endif()
 
 # The system's own CMake files of GTSAM name a library that Debian 13 does not ship (libCppUnitLite.a), so
 # headers and libraries are looked for here.
-execute_process(COMMAND "${CMAKE_CURRENT_SOURCE_DIR}/tools/deps/build.sh" --march
-                OUTPUT_VARIABLE understory_march_default OUTPUT_STRIP_TRAILING_WHITESPACE
-                COMMAND_ERROR_IS_FATAL ANY)
 find_path(GTSAM_HEADERS NAMES gtsam/nonlinear/ISAM2.h)
 find_library(GTSAM_LIBRARY gtsam)
 find_library(GTSAM_UNSTABLE_LIBRARY gtsam_unstable)
@@ -32,6 +29,9 @@ if(GTSAM_HEADERS AND GTSAM_LIBRARY)
   # would allocate memory in another way than GTSAM frees it.
   set(understory_march_default "")
 else()
+  execute_process(COMMAND "${CMAKE_CURRENT_SOURCE_DIR}/tools/deps/build.sh" --march
+                  OUTPUT_VARIABLE understory_march_default OUTPUT_STRIP_TRAILING_WHITESPACE
+                  COMMAND_ERROR_IS_FATAL ANY)
   add_library(understory_gtsam INTERFACE)
   if(EXISTS "${UNDERSTORY_DEPS}/lib/cmake/gtsam/gtsam-targets.cmake")
     find_package(Boost 1.67 REQUIRED COMPONENTS serialization timer)
