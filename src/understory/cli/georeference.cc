@@ -7,7 +7,7 @@
 #include "understory/cli/command.h"
 #include "understory/cli/outcome.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
-#include "understory/pipeline/georeferencing/placement_methods.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
 #include "understory/util/error.h"
 
 namespace understory {

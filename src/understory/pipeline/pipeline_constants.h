@@ -85,7 +85,7 @@ inline constexpr double kSparseCloudM = 0.1;
 inline constexpr double kSparseInlierRatio = 0.05;
 }  // namespace adaptation
 
-namespace lidar_view {  // pipeline/mapping/lidar_view.cc
+namespace lidar_view {  // pipeline/inventory/lidar_view.cc
 // Clouds that a view is learnt from [chosen]
 inline constexpr std::size_t kClouds = 60;
 // m from which a crown still gives enough returns [chosen]
@@ -94,7 +94,7 @@ inline constexpr double kReach = 60.0;
 inline constexpr double kStep = 1.0;
 }  // namespace lidar_view
 
-namespace georeferencing {  // pipeline/georeferencing/place_by_*.cc
+namespace georeferencing {  // pipeline/georeferencing/methods/place_by_*.cc
 // degrees: with a less certain heading a place 50 m from the path's middle is over 4 m off
 // [chosen]
 inline constexpr double kMostHeadingSdDeg = 5.0;

@@ -7,9 +7,9 @@
 
 #include "understory/evaluation/tree_falls.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/georeferencing/methods/placement_figures.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
-#include "understory/pipeline/georeferencing/placement_figures.h"
-#include "understory/pipeline/georeferencing/placement_methods.h"
 #include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/pipeline/source.h"

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "understory/georeference/satellites/gnss_fit.h"
-#include "understory/pipeline/georeferencing/placement_figures.h"
-#include "understory/pipeline/georeferencing/placement_methods.h"
+#include "understory/pipeline/georeferencing/methods/placement_figures.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
 
 namespace understory {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "understory/georeference/satellites/split_fit.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
-#include "understory/pipeline/georeferencing/placement_methods.h"
 #include "understory/util/error.h"
 
 namespace understory {

@@ -10,7 +10,7 @@
 #include "understory/evaluation/trajectory.h"
 #include "understory/output/report/report.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
-#include "understory/pipeline/georeferencing/placement.h"
+#include "understory/pipeline/georeferencing/methods/placement.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/util/log.h"

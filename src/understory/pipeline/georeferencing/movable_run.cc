@@ -1,7 +1,6 @@
 #include "understory/pipeline/georeferencing/movable_run.h"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "understory/evaluation/tree_errors.h"
@@ -9,23 +8,14 @@
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/head_cut_log.h"
 #include "understory/pipeline/georeferencing/moved_layers.h"
+#include "understory/pipeline/run_folder/run_json.h"
 #include "understory/util/error.h"
-#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
-
-// Squares with points of the run's map; 0 where its run.json does not tell.
-double area_of(const fs::path& run) {
-  if (!fs::exists(run / "run.json")) return 0.0;
-  const auto json = nlohmann::json::parse(read_text_file(run / "run.json"), nullptr, false);
-  const nlohmann::json::json_pointer place("/quality/area_m2");
-  if (json.is_discarded() || !json.contains(place) || !json.at(place).is_number()) return 0.0;
-  return json.at(place).get<double>();
-}
 
 void write_moved_path(const fs::path& from, const fs::path& to, const Pose& motion) {
   if (!fs::exists(from)) return;
@@ -62,7 +52,8 @@ MovableRun read_movable_run(const fs::path& folder) {
   run.antenna_in_body = read_antenna(folder);
   run.layers = std::make_shared<LayerFrame>(read_layer_frame(folder));
   run.of_cloud = fs::exists(folder / "map.laz") || fs::exists(folder / "dtm.tif");
-  run.area_m2 = area_of(folder);
+  const double area_m2 = RunJson(folder).find_number("/quality/area_m2");
+  run.area_m2 = std::isnan(area_m2) ? 0.0 : area_m2;
   run.trust = trust_of_run(folder);
   return run;
 }

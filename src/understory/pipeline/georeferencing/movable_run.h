@@ -11,7 +11,7 @@
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/georeference/systems/layer_frame.h"
 #include "understory/output/report/map_picture.h"
-#include "understory/pipeline/georeferencing/placement.h"
+#include "understory/pipeline/georeferencing/methods/placement.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/sensor/gnss_fix.h"

@@ -1,51 +1,39 @@
 #include "understory/pipeline/georeferencing/run_place.h"
 
-#include <array>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "understory/georeference/systems/coordinate_system.h"
-#include "understory/util/error.h"
-#include "understory/util/files/text_file.h"
+#include "understory/pipeline/run_folder/run_json.h"
 
 namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
-
-// An object; null where the file is missing or no JSON.
-Json read_run_json(const fs::path& run) {
-  if (!fs::exists(run / "run.json")) return nullptr;
-  Json json = Json::parse(read_text_file(run / "run.json"), nullptr, false);
-  return json.is_object() ? json : Json(nullptr);
-}
-
-std::string text_at(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
-
-Pose pose_of(const Json& json) {
-  const auto t = json.at("translation_m").get<std::array<double, 3>>();
-  const auto q = json.at("rotation_xyzw").get<std::array<double, 4>>();
-  return Pose::from_unit(Eigen::Quaterniond(q[3], q[0], q[1], q[2]), {t[0], t[1], t[2]});
-}
-
 // Of a run that an earlier version placed: its world frame is east, north, up.
-std::optional<RunPlace> place_by_figures(const Json& run) {
-  const auto quality = run.find("quality");
-  if (quality == run.end() || !quality->is_object()) return std::nullopt;
-  const auto number = [&](const char* key) {
-    const auto found = quality->find(key);
-    return found != quality->end() && found->is_number() ? found->get<double>() : std::nan("");
-  };
+std::optional<RunPlace> place_by_figures(const RunJson& json) {
   RunPlace place;
-  place.origin = {number("origin_latitude_deg"), number("origin_longitude_deg"),
-                  number("origin_height_m")};
+  place.origin = {json.find_number("/quality/origin_latitude_deg"),
+                  json.find_number("/quality/origin_longitude_deg"),
+                  json.find_number("/quality/origin_height_m")};
   place.on_globe =
       std::isfinite(place.origin.latitude_deg + place.origin.longitude_deg + place.origin.height_m);
   if (!place.on_globe) return std::nullopt;
+  return place;
+}
+
+// Of a run.json whose block "georeference" says that it has a place.
+std::optional<RunPlace> place_of(const RunJson& json) {
+  if (!json.has("/georeference")) return place_by_figures(json);
+  if (!json.get_flag("/georeference/on_globe")) return std::nullopt;
+  RunPlace place;
+  place.on_globe = true;
+  place.method = json.find_text("/georeference/method");
+  place.coordinate_system = json.find_text("/georeference/coordinate_system");
+  place.heights = json.find_text("/georeference/heights");
+  place.origin = {json.get_number("/georeference/origin/latitude_deg"),
+                  json.get_number("/georeference/origin/longitude_deg"),
+                  json.get_number("/georeference/origin/height_m")};
+  place.enu_from_world = json.get_pose("/georeference/enu_from_world");
   return place;
 }
 
@@ -94,45 +82,22 @@ ResultFrames frames_at(RunPlace& place, const GeoreferenceConfig& config, Log& l
 }
 
 std::optional<RunPlace> read_run_place(const fs::path& run) {
-  const Json json = read_run_json(run);
-  if (json.is_null()) return std::nullopt;
-  const auto block = json.find("georeference");
-  if (block == json.end()) return place_by_figures(json);
-  try {
-    if (!block->at("on_globe").get<bool>()) return std::nullopt;
-    RunPlace place;
-    place.on_globe = true;
-    place.method = text_at(*block, "method");
-    place.coordinate_system = text_at(*block, "coordinate_system");
-    place.heights = text_at(*block, "heights");
-    const Json& origin = block->at("origin");
-    place.origin = {origin.at("latitude_deg").get<double>(),
-                    origin.at("longitude_deg").get<double>(), origin.at("height_m").get<double>()};
-    place.enu_from_world = pose_of(block->at("enu_from_world"));
-    return place;
-  } catch (const Json::exception& error) {
-    throw InputError((run / "run.json").string(), "georeference", error.what());
-  }
+  return place_of(RunJson(run));
 }
 
 std::optional<Eigen::Vector3d> read_antenna(const fs::path& run) {
-  const Json json = read_run_json(run);
-  if (json.is_null() || !json.contains("georeference")) return std::nullopt;
-  const Json& block = json.at("georeference");
-  if (!block.is_object() || !block.contains("antenna_in_body_m")) return std::nullopt;
-  try {
-    const auto at = block.at("antenna_in_body_m").get<std::array<double, 3>>();
-    return Eigen::Vector3d(at[0], at[1], at[2]);
-  } catch (const Json::exception& error) {
-    throw InputError((run / "run.json").string(), "georeference", error.what());
-  }
+  const RunJson json(run);
+  if (!json.has("/georeference/antenna_in_body_m")) return std::nullopt;
+  const std::vector<double> at = json.get_numbers("/georeference/antenna_in_body_m", 3);
+  if (std::isnan(at[0] + at[1] + at[2])) return std::nullopt;
+  return Eigen::Vector3d(at[0], at[1], at[2]);
 }
 
 LayerFrame read_layer_frame(const fs::path& run) {
-  const Json json = read_run_json(run);
-  if (json.is_null() || !json.contains("georeference")) return {};
-  const std::optional<RunPlace> place = read_run_place(run);
-  const std::string wkt = text_at(json, "coordinate_system");
+  const RunJson json(run);
+  if (!json.has("/georeference")) return {};
+  const std::optional<RunPlace> place = place_of(json);
+  const std::string wkt = json.find_text("/coordinate_system");
   if (!place || wkt.empty()) return {};
   return {place->enu_from_world, place->origin, wkt};
 }

@@ -6,8 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "understory/pipeline/judgement/path_evidence.h"
-#include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/recording/finding.h"
 
@@ -104,20 +102,6 @@ void gather_findings(const Log& log, RunEvidence& evidence) {
   evidence.point_times_missing = found(log, Finding::kNoPointTimes).count > 0;
 }
 
-double mean_smear_m(const std::vector<StampedPose>& path) {
-  double sum = 0.0;
-  for (std::size_t i = 1; i < path.size(); ++i)
-    sum += smear_of(path[i - 1].world_from_body.inverse() * path[i].world_from_body);
-  return path.size() < 2 ? 0.0 : sum / static_cast<double>(path.size() - 1);
-}
-
-MotionEvidence motion_of(const std::vector<StampedPose>& path, const MotionLimits& limits) {
-  PathEvidence motion(limits);
-  for (const StampedPose& pose : path)
-    motion.add(pose);
-  return motion.evidence();
-}
-
 }  // namespace
 
 void gather_reading(const ReadingFacts& facts, RunEvidence& evidence) {
@@ -146,66 +130,6 @@ void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence) {
   evidence.imu_motion_correlation = trust.motion_correlation;
   evidence.imu_motion_spread_m_s2 = trust.motion_spread_m_s2;
   evidence.imu_motion_windows = trust.motion_windows;
-}
-
-void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
-                  const Log& log, RunEvidence& evidence) {
-  const bool refused = !front_end.imu_refused().empty();
-  ReadingFacts reading;
-  reading.source = &source;
-  reading.time_repair = &facts.time_repair;
-  reading.log = &log;
-  reading.last_scan_end = front_end.last_scan_end();
-  reading.imu_wanted = refused || front_end.imu_wanted();
-  reading.imu_usage = front_end.imu_usage();
-  gather_reading(reading, evidence);
-  evidence.stopped = facts.stopped;
-  evidence.unreadable = facts.unreadable;
-  evidence.dropped_scans = facts.dropped_scans;
-  evidence.imu_used = front_end.odometry().uses_imu();
-  const ImuTrust trust = front_end.odometry().motion().imu_trust();
-  if (refused) {
-    evidence.imu_distrust = imu_refusal(front_end.imu_refused());
-  } else if (!trust.trusted) {
-    evidence.imu_distrust = trust.reason;
-  }
-  gather_motion_scale(trust, evidence);
-  const ScanMotion scan_motion = front_end.odometry().scan_motion();
-  evidence.match.scan_motion_ratio = scan_motion.ratio;
-  evidence.match.scan_motion_probes = scan_motion.probes;
-  const DenseCounts& counts = front_end.counts();
-  MatchEvidence& match = evidence.match;
-  match.scans = counts.scans;
-  match.unmatched = counts.unmatched + counts.gated;
-  match.empty = counts.empty_scans;
-  match.repeated = counts.repeated;
-  match.segments = counts.segments;
-  if (counts.segments > 1) match.first_lost = format_seconds(counts.first_lost);
-}
-
-void gather_sparse(const SparseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
-                   const Log& log, RunEvidence& evidence) {
-  ReadingFacts reading;
-  reading.source = &source;
-  reading.time_repair = &facts.time_repair;
-  reading.log = &log;
-  reading.last_scan_end = front_end.last_scan_end();
-  reading.imu_wanted = front_end.config().front_end.imu.use;
-  reading.imu_usage = front_end.imu_usage();
-  gather_reading(reading, evidence);
-  evidence.stopped = facts.stopped;
-  evidence.unreadable = facts.unreadable;
-  evidence.dropped_scans = facts.dropped_scans;
-  const ImuTrust trust = front_end.imu_trust();
-  const std::string& refused = front_end.imu_refused();
-  evidence.imu_distrust = refused.empty() ? trust.reason : imu_refusal(refused);
-  evidence.imu_used =
-      reading.imu_wanted && source.rig().body_from_imu.has_value() && evidence.imu_distrust.empty();
-  gather_motion_scale(trust, evidence);
-  evidence.match.scans = front_end.path().size();
-  evidence.match.repeated = front_end.repeated();
-  evidence.match.smear_m = mean_smear_m(front_end.path());
-  evidence.motion = motion_of(front_end.path(), front_end.config().correction.motion_limits);
 }
 
 }  // namespace understory

@@ -3,9 +3,7 @@
 #include "understory/odometry/motion/motion_model.h"
 #include "understory/pipeline/judgement/imu_usage.h"
 #include "understory/pipeline/judgement/run_evidence.h"
-#include "understory/pipeline/mapping/dense/dense_front_end.h"
-#include "understory/pipeline/mapping/run_facts.h"
-#include "understory/pipeline/mapping/sparse/sparse_front_end.h"
+#include "understory/preprocess/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 
@@ -25,14 +23,5 @@ void gather_reading(const ReadingFacts& facts, RunEvidence& evidence);
 
 // Whether the accelerations by matching are those of the accelerometer.
 void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence);
-
-// What the dense front end knows beside; `evidence.motion` and the figures of the finished path in
-// `evidence.match` are there already.
-void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
-                  const Log& log, RunEvidence& evidence);
-
-// What the sparse front end knows beside, the figures of the path included.
-void gather_sparse(const SparseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
-                   const Log& log, RunEvidence& evidence);
 
 }  // namespace understory

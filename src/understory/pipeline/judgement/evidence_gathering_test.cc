@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "understory/pipeline/correction/correction_evidence.h"
-#include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/recording/finding.h"
 
 namespace understory {
@@ -99,22 +97,6 @@ TEST(EvidenceGathering, SamplesThatCannotBeUsedHaveNoSay) {
   facts.imu_wanted = false;
   gather_reading(facts, evidence);
   EXPECT_EQ(evidence.imu.unused_s, 0.0);
-}
-
-// By stems, too: what is 1.3 times too large was complete.
-TEST(EvidenceGathering, AScaleThatTheAccelerometerContradictsCountsByStems) {
-  CorrectionRun run;
-  run.trees.resize(5);
-  ImuTrust trust;
-  trust.motion_correlation = 0.99;
-  trust.motion_spread_m_s2 = 1.0;
-  trust.motion_windows = 200;
-  for (const double scale : {1.0, 1.3}) {
-    trust.motion_scale = scale;
-    gather_motion_scale(trust, run.evidence);
-    const RunJudgement judgement = judge_run(correction_evidence(run), JudgementConfig());
-    EXPECT_EQ(judgement.status, scale == 1.0 ? RunStatus::kComplete : RunStatus::kUntrusted);
-  }
 }
 
 TEST(EvidenceGathering, FindingsOfTheReaders) {

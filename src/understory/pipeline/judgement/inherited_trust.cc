@@ -1,10 +1,10 @@
 #include "understory/pipeline/judgement/inherited_trust.h"
 
 #include <algorithm>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <system_error>
+
+#include "understory/pipeline/run_folder/run_json.h"
 
 namespace understory {
 namespace {
@@ -44,27 +44,18 @@ InheritedTrust trust_of_run(const fs::path& run, bool expected) {
   const bool is_folder = fs::is_directory(run, ignored);
   const fs::path folder = is_folder ? run : fs::absolute(run).lexically_normal().parent_path();
   const std::string name = name_of(folder);
-  const fs::path path = folder / "run.json";
-  if (!fs::exists(path, ignored)) {
+  const RunJson json(folder);
+  if (!json.is_present()) {
     if (!is_folder || !(expected || has_to_be_a_run(folder))) return {};
     return unknown(name, "it holds no run.json");
   }
-  std::ifstream file(path);
-  const auto json = nlohmann::json::parse(file, nullptr, false);
   if (!json.is_object()) return unknown(name, "its run.json cannot be read");
-  const auto word = json.find("status");
-  const auto status = word != json.end() && word->is_string()
-                          ? status_from_name(word->get<std::string>())
-                          : std::nullopt;
+  const std::optional<RunStatus> status = status_from_name(json.find_text("/status"));
   if (!status) return unknown(name, "its run.json has no status");
   InheritedTrust trust{*status, {}};
   if (*status == RunStatus::kComplete) return trust;
-  const auto reasons = json.find("reasons");
-  if (reasons != json.end() && reasons->is_array()) {
-    for (const auto& reason : *reasons) {
-      if (reason.is_string()) trust.reasons.push_back(name + reason.get<std::string>());
-    }
-  }
+  for (const std::string& reason : json.find_texts("/reasons"))
+    trust.reasons.push_back(name + reason);
   if (trust.reasons.empty()) trust.reasons.push_back(name + "it is " + to_string(*status));
   return trust;
 }

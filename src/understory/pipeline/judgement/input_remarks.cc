@@ -17,10 +17,9 @@ TimeNs first_of(const Recording& source, const std::string& role, TimeNs otherwi
   return otherwise;
 }
 
-void remark_on_imu(const DenseFrontEnd& front_end, const Recording& source,
+void remark_on_imu(const LastStamps& last, const Recording& source,
                    const EventOrderer::Report& repair, const std::string& name, Log& log) {
-  const std::optional<TimeNs> last = front_end.last_imu();
-  if (!last) {
+  if (!last.imu) {
     log.warn("imu.none",
              name +
                  ": no IMU: positions come from the scans alone, and the vertical is that of the "
@@ -36,12 +35,12 @@ void remark_on_imu(const DenseFrontEnd& front_end, const Recording& source,
                          "from the scans alone",
                          name, late));
   }
-  const double missing = to_seconds(front_end.last_scan_end() - *last);
+  const double missing = to_seconds(last.scan_end - *last.imu);
   if (missing < kImuMissingS) return;
   log.warn("imu.stopped",
            fmt::format("{}: the IMU stopped at {} s; the last {:.1f} s are positioned by the scans "
                        "alone",
-                       name, format_seconds(*last), missing));
+                       name, format_seconds(*last.imu), missing));
 }
 
 }  // namespace
@@ -51,9 +50,9 @@ void remark_on_lever_arms(const Rig& rig, const std::string& name, Log& log) {
     log.warn("recording.lever_arm", name + ": " + arm);
 }
 
-void remark_on_input(const DenseFrontEnd& front_end, const Recording& source,
+void remark_on_input(const LastStamps& last, const Recording& source,
                      const EventOrderer::Report& repair, const std::string& name, Log& log) {
-  remark_on_imu(front_end, source, repair, name, log);
+  remark_on_imu(last, source, repair, name, log);
   remark_on_lever_arms(source.rig(), name, log);
   for (const TopicReport& topic : source.topics()) {
     if (topic.empty_points == 0) continue;

@@ -1,17 +1,24 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
-#include "understory/pipeline/mapping/dense/dense_front_end.h"
+#include "understory/preprocess/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 
 namespace understory {
 
+// Until when the sensors of a recording spoke, by the mended clocks.
+struct LastStamps {
+  std::optional<TimeNs> imu;  // nothing if there has been no sample
+  TimeNs scan_end = 0;
+};
+
 // At the end of a recording: warns of what only its whole can show, no IMU at all, an IMU that
-// stopped, points without a return. `name` is that of the recording, `repair`
-// what was done to its stamps.
-void remark_on_input(const DenseFrontEnd& front_end, const Recording& source,
+// stopped, points without a return. `name` is that of the recording, `repair` what was done to its
+// stamps.
+void remark_on_input(const LastStamps& last, const Recording& source,
                      const EventOrderer::Report& repair, const std::string& name, Log& log);
 
 // Warns of sensors that the extrinsics put more than 10 m from the body's origin or from the lidar:

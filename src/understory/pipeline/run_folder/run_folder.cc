@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "understory/pipeline/run_folder/run_json.h"
 #include "understory/pipeline/run_folder/run_results.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
@@ -23,11 +24,6 @@ namespace understory {
 namespace fs = std::filesystem;
 
 namespace {
-
-bool is_there(const fs::path& path) {
-  std::error_code error;
-  return fs::exists(fs::symlink_status(path, error));
-}
 
 // The process at work in a folder.
 std::string worker(long process) {
@@ -217,7 +213,7 @@ void RunFolder::commit(Log& log, bool keep_former) const {
     UNDERSTORY_CHECK(is_result_name(entry.path().filename().string()));
   }
   refuse_foreign_results(path());  // that came while the run was at work
-  list_results(results / "run.json", made);
+  write_file_list(results, made);
   own.insert(made.begin(), made.end());
   AtomicTextFile placed(placed_file(work()));
   for (const std::string& name : own)

@@ -23,7 +23,4 @@ struct FormerResults {
 [[nodiscard]] std::string foreign_result(const std::filesystem::path& folder,
                                          const std::set<std::string>& own);
 
-// Adds the list of a command's files to its run.json in the same folder. Throws OutputError.
-void list_results(const std::filesystem::path& run_json, const std::set<std::string>& names);
-
 }  // namespace understory

@@ -30,11 +30,6 @@ constexpr const char* kPlaced = "placed";  // names of results that are being pu
 constexpr const char* kMarkerTitle = "Understory: work folder of a run";
 constexpr int kFormat = 1;  // of the work folder
 
-bool is_there(const fs::path& path) {
-  std::error_code error;
-  return fs::exists(fs::symlink_status(path, error));
-}
-
 std::vector<fs::path> entries_of(const fs::path& folder) {
   std::vector<fs::path> entries;
   std::error_code error;
@@ -77,6 +72,11 @@ bool holds_nothing_yet(const fs::path& work) {
 }
 
 }  // namespace
+
+bool is_there(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(fs::symlink_status(path, error));
+}
 
 fs::path work_folder_of(const fs::path& run_folder) {
   return run_folder / kWork;

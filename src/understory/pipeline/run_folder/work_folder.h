@@ -4,6 +4,9 @@
 
 namespace understory {
 
+// Whether a name is taken: also by a link that leads to nothing.
+[[nodiscard]] bool is_there(const std::filesystem::path& path);
+
 // The part of a run folder that belongs to the command at work: RUN/.understory. Its content:
 //   marker        a text that names this program and the version of the format
 //   lock          held by the process at work; it falls with the process (util/files/file_lock.h)

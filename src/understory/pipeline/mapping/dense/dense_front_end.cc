@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "understory/pipeline/mapping/scan_content.h"
+#include "understory/pipeline/judgement/scan_content.h"
 #include "understory/util/error.h"
 
 namespace understory {

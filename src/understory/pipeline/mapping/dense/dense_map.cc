@@ -1,12 +1,12 @@
 // What the dense front end makes of a recording that was read.
 #include <fmt/format.h>
 
+#include "understory/pipeline/inventory/lidar_view.h"
 #include "understory/pipeline/judgement/input_remarks.h"
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/pipeline/mapping/dense/dense_results.h"
 #include "understory/pipeline/mapping/finished_map.h"
 #include "understory/pipeline/mapping/finished_trajectory.h"
-#include "understory/pipeline/mapping/lidar_view.h"
 
 namespace understory {
 namespace {
@@ -112,7 +112,7 @@ std::unique_ptr<MapMaker> DenseFrontEnd::map_maker(const ReadRecording& recordin
                   "adapted to it");
   }
   if (!recording.facts.stopped) {
-    remark_on_input(*this, recording.source, recording.facts.time_repair,
+    remark_on_input({last_imu(), last_scan_end()}, recording.source, recording.facts.time_repair,
                     recording.request.recording, log_);
   }
   return std::make_unique<DenseMap>(*this, recording);

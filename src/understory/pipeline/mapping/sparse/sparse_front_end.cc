@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "understory/geometry/pose_io.h"
-#include "understory/pipeline/mapping/scan_content.h"
+#include "understory/pipeline/judgement/scan_content.h"
 #include "understory/util/timing.h"
 
 namespace understory {

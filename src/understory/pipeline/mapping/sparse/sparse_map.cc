@@ -5,9 +5,9 @@
 
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/stem_map_maker.h"
-#include "understory/pipeline/judgement/evidence_gathering.h"
 #include "understory/pipeline/judgement/input_remarks.h"
 #include "understory/pipeline/mapping/map_documents.h"
+#include "understory/pipeline/mapping/sparse/sparse_evidence.h"
 #include "understory/pipeline/mapping/sparse/sparse_front_end.h"
 #include "understory/pipeline/run_folder/run_truth.h"
 

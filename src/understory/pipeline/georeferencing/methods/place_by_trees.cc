@@ -1,9 +1,9 @@
 #include <cmath>
 
 #include "understory/georeference/satellites/split_fit.h"
-#include "understory/pipeline/georeferencing/placement_methods.h"
-#include "understory/pipeline/georeferencing/satellite_placement.h"
-#include "understory/pipeline/georeferencing/tree_placement.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
+#include "understory/pipeline/georeferencing/methods/satellite_placement.h"
+#include "understory/pipeline/georeferencing/methods/tree_placement.h"
 
 namespace understory {
 

@@ -1,4 +1,4 @@
-#include "understory/pipeline/mapping/lidar_view.h"
+#include "understory/pipeline/inventory/lidar_view.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "understory/pipeline/georeferencing/placement_figures.h"
+#include "understory/pipeline/georeferencing/methods/placement_figures.h"
 
 #include <fmt/format.h>
 

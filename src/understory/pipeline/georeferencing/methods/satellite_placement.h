@@ -6,8 +6,8 @@
 
 #include "understory/georeference/satellites/satellite_fit.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
+#include "understory/pipeline/georeferencing/methods/placement.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
-#include "understory/pipeline/georeferencing/placement.h"
 #include "understory/util/log.h"
 
 namespace understory {

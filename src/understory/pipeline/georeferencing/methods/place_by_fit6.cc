@@ -1,18 +1,17 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include "understory/georeference/satellites/satellite_smoothing.h"
-#include "understory/pipeline/georeferencing/placement_methods.h"
-#include "understory/pipeline/georeferencing/satellite_placement.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
+#include "understory/pipeline/georeferencing/methods/satellite_placement.h"
+#include "understory/pipeline/run_folder/run_json.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
-#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {
@@ -27,14 +26,8 @@ struct InertialData {
 
 // The recording that the run's run.json names, if it is still there.
 std::string recording_of(const fs::path& run) {
-  if (!fs::exists(run / "run.json")) return "";
-  const auto json = nlohmann::json::parse(read_text_file(run / "run.json"), nullptr, false);
-  if (json.is_discarded() || !json.is_object() || !json.contains("inputs")) return "";
-  for (const auto& input : json["inputs"]) {
-    if (!input.is_object() || !input.contains("file") || !input["file"].is_string()) continue;
-    const auto file = input["file"].get<std::string>();
+  for (const std::string& file : RunJson(run).find_texts_of("/inputs", "file"))
     if (fs::exists(file)) return file;
-  }
   return "";
 }
 

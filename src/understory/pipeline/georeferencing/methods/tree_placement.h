@@ -6,9 +6,9 @@
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/georeference/trees/tree_match.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
+#include "understory/pipeline/georeferencing/methods/placement.h"
+#include "understory/pipeline/georeferencing/methods/tree_target.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
-#include "understory/pipeline/georeferencing/placement.h"
-#include "understory/pipeline/georeferencing/tree_target.h"
 #include "understory/util/log.h"
 
 namespace understory {

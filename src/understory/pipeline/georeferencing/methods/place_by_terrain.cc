@@ -1,7 +1,7 @@
 #include <cmath>
 
-#include "understory/pipeline/georeferencing/placement_methods.h"
-#include "understory/pipeline/georeferencing/terrain_placement.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
+#include "understory/pipeline/georeferencing/methods/terrain_placement.h"
 #include "understory/util/error.h"
 
 namespace understory {

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/pipeline/georeferencing/placement.h"
+#include "understory/pipeline/georeferencing/methods/placement.h"
 
 namespace understory {
 

@@ -1,4 +1,4 @@
-#include "understory/pipeline/georeferencing/terrain_placement.h"
+#include "understory/pipeline/georeferencing/methods/terrain_placement.h"
 
 #include <fmt/format.h>
 

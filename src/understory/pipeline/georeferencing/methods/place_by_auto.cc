@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "understory/pipeline/georeferencing/placement_methods.h"
-#include "understory/pipeline/georeferencing/satellite_placement.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
+#include "understory/pipeline/georeferencing/methods/satellite_placement.h"
 
 namespace understory {
 namespace {

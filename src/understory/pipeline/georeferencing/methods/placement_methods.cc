@@ -1,4 +1,4 @@
-#include "understory/pipeline/georeferencing/placement_methods.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
 
 #include <algorithm>
 #include <cmath>

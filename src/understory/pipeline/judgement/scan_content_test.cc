@@ -1,4 +1,4 @@
-#include "understory/pipeline/mapping/scan_content.h"
+#include "understory/pipeline/judgement/scan_content.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "understory/pipeline/georeferencing/tree_placement.h"
+#include "understory/pipeline/georeferencing/methods/tree_placement.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/georeference/trees/tree_match.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
-#include "understory/pipeline/georeferencing/run_tops.h"
+#include "understory/pipeline/georeferencing/methods/run_tops.h"
 #include "understory/util/error.h"
 #include "understory/util/median.h"
 

@@ -1,4 +1,4 @@
-#include "understory/pipeline/georeferencing/run_tops.h"
+#include "understory/pipeline/georeferencing/methods/run_tops.h"
 
 #include <gtest/gtest.h>
 

@@ -1,17 +1,16 @@
-#include "understory/pipeline/georeferencing/satellite_placement.h"
+#include "understory/pipeline/georeferencing/methods/satellite_placement.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
-#include "understory/pipeline/georeferencing/placement_figures.h"
+#include "understory/pipeline/georeferencing/methods/placement_figures.h"
 #include "understory/pipeline/pipeline_constants.h"
+#include "understory/pipeline/run_folder/run_json.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
-#include "understory/util/files/text_file.h"
 
 namespace understory {
 namespace {
@@ -23,13 +22,7 @@ namespace fs = std::filesystem;
 // Whether the run's up is that of gravity: it was mapped with an IMU, or laid on the earth before.
 bool is_level(const fs::path& folder, const MovableRun& run) {
   if (run.origin) return true;
-  if (!fs::exists(folder / "run.json")) return false;
-  const auto json = nlohmann::json::parse(read_text_file(folder / "run.json"), nullptr, false);
-  if (json.is_discarded() || !json.is_object()) return false;
-  const auto counts = json.find("counts");
-  if (counts == json.end() || !counts->is_object()) return false;
-  const auto samples = counts->find("imu_samples");
-  return samples != counts->end() && samples->is_number() && samples->get<double>() > 0.0;
+  return RunJson(folder).find_number("/counts/imu_samples") > 0.0;
 }
 
 double extent_m(const Trajectory& trajectory) {

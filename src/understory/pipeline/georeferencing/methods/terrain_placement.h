@@ -5,8 +5,8 @@
 
 #include "understory/georeference/terrain_fit.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
+#include "understory/pipeline/georeferencing/methods/placement.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
-#include "understory/pipeline/georeferencing/placement.h"
 
 namespace understory {
 

@@ -1,4 +1,4 @@
-#include "understory/pipeline/georeferencing/tree_target.h"
+#include "understory/pipeline/georeferencing/methods/tree_target.h"
 
 #include <fmt/format.h>
 

@@ -1,14 +1,12 @@
-#include "understory/pipeline/mapping/lidar_view.h"
+#include "understory/pipeline/inventory/lidar_view.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/pipeline/pipeline_constants.h"
-#include "understory/util/error.h"
-#include "understory/util/files/text_file.h"
+#include "understory/pipeline/run_folder/run_json.h"
 
 namespace understory {
 namespace {
@@ -85,22 +83,16 @@ LidarViewFigures figures_of(const LidarView& view) {
 }
 
 SeenTest seen_in_run(const std::filesystem::path& run) {
-  if (!std::filesystem::exists(run / "run.json")) return {};
-  const auto json = nlohmann::json::parse(read_text_file(run / "run.json"), nullptr, false);
-  if (!json.is_object() || !json.contains("lidar_view")) return {};
-  if (!std::filesystem::exists(run / "keyframes.tum")) return {};
+  const RunJson json(run);
+  if (!json.has("/lidar_view") || !std::filesystem::exists(run / "keyframes.tum")) return {};
   LidarView view;
-  try {
-    const auto& figures = json.at("lidar_view");
-    const auto matrix = figures.at("body_from_lidar").get<std::array<double, 16>>();
-    view.body_from_lidar = Pose::from_matrix(
-        Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix.data()));
-    const auto& highest = figures.at("highest_deg");
-    for (std::size_t i = 0; i < view.highest_deg.size(); ++i) {
-      if (!highest.at(i).is_null()) view.highest_deg[i] = highest.at(i).get<double>();
-    }
-  } catch (const nlohmann::json::exception& error) {
-    throw InputError((run / "run.json").string(), "lidar_view", error.what());
+  const std::vector<double> matrix = json.get_numbers("/lidar_view/body_from_lidar", 16);
+  view.body_from_lidar = Pose::from_matrix(
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix.data()));
+  const std::vector<double> highest =
+      json.get_numbers("/lidar_view/highest_deg", LidarView::kSectors);
+  for (std::size_t i = 0; i < highest.size(); ++i) {
+    if (!std::isnan(highest[i])) view.highest_deg[i] = highest[i];
   }
   std::vector<Pose> poses;
   for (const auto& pose : read_trajectory(run / "keyframes.tum"))

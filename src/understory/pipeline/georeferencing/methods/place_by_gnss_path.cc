@@ -4,8 +4,8 @@
 
 #include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
-#include "understory/pipeline/georeferencing/placement_methods.h"
-#include "understory/pipeline/georeferencing/satellite_placement.h"
+#include "understory/pipeline/georeferencing/methods/placement_methods.h"
+#include "understory/pipeline/georeferencing/methods/satellite_placement.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"

@@ -1,0 +1,43 @@
+#include "understory/pipeline/mapping/dense/dense_evidence.h"
+
+#include "understory/pipeline/judgement/evidence_gathering.h"
+#include "understory/pipeline/judgement/run_judgement.h"
+
+namespace understory {
+
+void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
+                  const Log& log, RunEvidence& evidence) {
+  const bool refused = !front_end.imu_refused().empty();
+  ReadingFacts reading;
+  reading.source = &source;
+  reading.time_repair = &facts.time_repair;
+  reading.log = &log;
+  reading.last_scan_end = front_end.last_scan_end();
+  reading.imu_wanted = refused || front_end.imu_wanted();
+  reading.imu_usage = front_end.imu_usage();
+  gather_reading(reading, evidence);
+  evidence.stopped = facts.stopped;
+  evidence.unreadable = facts.unreadable;
+  evidence.dropped_scans = facts.dropped_scans;
+  evidence.imu_used = front_end.odometry().uses_imu();
+  const ImuTrust trust = front_end.odometry().motion().imu_trust();
+  if (refused) {
+    evidence.imu_distrust = imu_refusal(front_end.imu_refused());
+  } else if (!trust.trusted) {
+    evidence.imu_distrust = trust.reason;
+  }
+  gather_motion_scale(trust, evidence);
+  const ScanMotion scan_motion = front_end.odometry().scan_motion();
+  evidence.match.scan_motion_ratio = scan_motion.ratio;
+  evidence.match.scan_motion_probes = scan_motion.probes;
+  const DenseCounts& counts = front_end.counts();
+  MatchEvidence& match = evidence.match;
+  match.scans = counts.scans;
+  match.unmatched = counts.unmatched + counts.gated;
+  match.empty = counts.empty_scans;
+  match.repeated = counts.repeated;
+  match.segments = counts.segments;
+  if (counts.segments > 1) match.first_lost = format_seconds(counts.first_lost);
+}
+
+}  // namespace understory
