@@ -261,7 +261,7 @@ inline constexpr double kFitReach = 0.35;
 
 namespace ring_linker {  // forest/stems/ring_linker.cc
 // m: edge of the cells in which rings of other slices are looked for [chosen]
-inline constexpr double kCell = 1.0;
+inline constexpr double kRingCell = 1.0;
 // m by which the radii of two rings of one stem differ at most ... [not recorded]
 inline constexpr double kSameRadius = 0.03;
 // ... and of the larger radius, added [not recorded]
@@ -299,8 +299,6 @@ inline constexpr std::size_t kEnoughPoints = 400;
 inline constexpr double kReachScatters = 4.0;
 // m from the surface of the start: points that a fit takes [not recorded]
 inline constexpr double kSampleReach = 0.15;
-// Standard deviation over the median of absolute values [bound: normal distribution]
-inline constexpr double kMadToSd = 1.4826;
 // Scatters: points so near to the surface are on it [not recorded]
 inline constexpr double kBandScatters = 2.5;
 // m: the same at least [not recorded]

@@ -12,10 +12,11 @@
 // or real clouds and measurements by their page.
 namespace understory::georeference_constants {
 
-namespace satellite_pairs {  // georeference/satellites/satellite_pairs.cc
-// s between poses beyond which no place is interpolated [chosen]
+namespace interpolation {  // georeference/satellites/: satellite_pairs, satellite_fit,
+                           // online_georeference
+// s between poses beyond which nothing is interpolated [chosen]
 inline constexpr double kGapS = 2.0;
-}  // namespace satellite_pairs
+}  // namespace interpolation
 
 namespace receiver_noise {  // georeference/satellites/receiver_noise.cc
 // Unknowns of the noise are in standard deviations of their prior. Rounds of the search for the
@@ -80,8 +81,6 @@ inline constexpr std::uint64_t kSeed = 1;
 }  // namespace receiver_filters
 
 namespace online_georeference {  // georeference/satellites/online_georeference.cc
-// s between poses beyond which no place is interpolated [chosen]
-inline constexpr double kGapS = 2.0;
 // m: standard deviation of the place before the first fix, about that fix [bound: receivers]
 inline constexpr double kFarM = 1'000.0;
 // degrees: standard deviation of a heading that is told at most [chosen]
@@ -119,8 +118,6 @@ namespace rigid_fits {  // georeference/satellites/rigid_fits.cc
 inline constexpr std::size_t kFewestPairs = 3;
 // m: places that are nearer to their middle in the mean are one place [chosen]
 inline constexpr double kLeastSpreadM = 0.01;
-// Width of Cauchy's weight in standard deviations: 95 % efficient [bound: statistics]
-inline constexpr double kCauchyWidth = 2.385;
 }  // namespace rigid_fits
 
 namespace fused_path {  // georeference/satellites/fused_path.cc
@@ -141,18 +138,13 @@ inline constexpr double kNothingKnown = 1e-8;
 
 namespace split_fit {  // georeference/satellites/split_fit.cc
 // Pairs at least [bound: three parameters in the plane]
-inline constexpr std::size_t kFewestPairs = 3;
+inline constexpr std::size_t kFewestPlanePairs = 3;
 // m: extent of the path at least [chosen]
 inline constexpr double kLeastExtentM = 5.0;
 // Steps of the first motion [bound: convergence to a micrometre]
 inline constexpr int kFirstSteps = 30;
 // Steps of the fit: each takes the noise anew [bound: convergence to a millimetre]
 inline constexpr int kSteps = 3;
-// Width of Cauchy's weight in standard deviations: 95 % efficient [bound: statistics]
-inline constexpr double kCauchyWidth = 2.385;
-// Median of a distance in the plane over the standard deviation of an axis [bound: normal
-// distribution]
-inline constexpr double kRayleighMedian = 1.1774;
 // Median of an absolute value over the standard deviation [bound: normal distribution]
 inline constexpr double kNormalMedian = 0.6745;
 // Standard deviations beyond which a pair is a runaway at first [chosen: slow errors of a few
@@ -167,8 +159,6 @@ namespace satellite_smoothing {  // georeference/satellites/satellite_smoothing.
 inline constexpr double kAttitudeWeight = 1e-2;
 // m/s: of the first velocity [bound: carriers]
 inline constexpr double kVelocitySdMS = 10.0;
-// Width of Cauchy's weight in standard deviations: 95 % efficient [bound: statistics]
-inline constexpr double kCauchyWidth = 2.385;
 // s without samples that still is an interval [chosen]
 inline constexpr double kLongestGapS = 0.1;
 // rad and m: a step below that is the last [chosen]
@@ -176,8 +166,6 @@ inline constexpr double kConverged = 1e-6;
 }  // namespace satellite_smoothing
 
 namespace satellite_fit {  // georeference/satellites/satellite_fit.cc
-// s between poses beyond which no pose is interpolated [chosen]
-inline constexpr double kGapS = 2.0;
 // m: root mean square of residuals below which no mistake of the angles is looked for [chosen]
 inline constexpr double kLeastMisfitM = 3.0;
 // Ratio of residuals below which swapped angles are the right ones [chosen]
@@ -199,7 +187,7 @@ namespace terrain_fit {  // georeference/terrain_fit.cc
 // points over the terrain model at least [bound: six parameters]
 inline constexpr std::size_t kLeastPoints = 10;
 // m: width of the biweight at least [chosen]
-inline constexpr double kLeastWidthM = 0.05;
+inline constexpr double kLeastTerrainWidthM = 0.05;
 }  // namespace terrain_fit
 
 namespace path_fit {  // georeference/path_fit.cc

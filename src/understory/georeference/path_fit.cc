@@ -129,7 +129,7 @@ class Fitter {
   [[nodiscard]] static double width_of(const Pairs& pairs) {
     std::vector<double> distances = pairs.distance_m;
     // The median of a Rayleigh distribution is 1.18 standard deviations of a coordinate.
-    return 4.685 * std::max(kLeastWidthM, upper_median(distances) / 1.1774);
+    return kBiweightReach * std::max(kLeastWidthM, upper_median(distances) / kRayleighMedian);
   }
   // The mean of (6), or of the biweight's loss.
   [[nodiscard]] static double value_of(const Pairs& pairs, double width_m) {

@@ -55,7 +55,7 @@ double spread_of(const std::vector<Sample>& samples, double centre) {
   std::vector<double> absolute;
   for (const Sample& sample : samples)
     absolute.push_back(std::abs(sample.above_m - centre));
-  return std::max(kLeastWidthM, 1.4826 * upper_median(std::move(absolute)));
+  return std::max(kLeastTerrainWidthM, kSdOverMad * upper_median(std::move(absolute)));
 }
 
 double centre_of(const std::vector<Sample>& samples) {
@@ -105,7 +105,7 @@ Solution solve(const std::vector<Sample>& samples, double centre, double spread,
   for (const Sample& sample : samples) {
     const double variance = spread * spread + sample.sd_m * sample.sd_m;
     const double weight =
-        biweight(sample.above_m - centre, 4.685 * std::sqrt(variance)) / variance / alike;
+        biweight(sample.above_m - centre, kBiweightReach * std::sqrt(variance)) / variance / alike;
     const Vector6d gradient = gradient_of(sample);
     information += weight * gradient * gradient.transpose();
     right -= weight * sample.above_m * gradient;
@@ -148,7 +148,7 @@ void tell(const std::vector<Sample>& before, const std::vector<Sample>& after, T
   for (const Sample& sample : after) {
     fit.rms_m += sample.above_m * sample.above_m / static_cast<double>(after.size());
     absolute.push_back(std::abs(sample.above_m));
-    const double width = 4.685 * std::hypot(spread, sample.sd_m);
+    const double width = kBiweightReach * std::hypot(spread, sample.sd_m);
     fit.used += biweight(sample.above_m, width) > 0.0 ? 1 : 0;
   }
   fit.rms_m = std::sqrt(fit.rms_m);

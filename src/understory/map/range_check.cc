@@ -73,7 +73,7 @@ RangeCheck combine(const std::vector<RangeOffset>& pairs) {
   std::vector<double> away;
   for (const double offset : offsets)
     away.push_back(std::abs(offset - middle));
-  const double spread = 1.4826 * upper_median(away);
+  const double spread = kSdOverMad * upper_median(away);
   double sum = 0.0;
   double weights = 0.0;
   double squares = 0.0;

@@ -47,8 +47,8 @@ class RingIndex {
   using Key = std::pair<int, int>;  // row, column
   using Entry = std::pair<Key, std::uint32_t>;
   static Key key_of(const Eigen::Vector2d& p) {
-    return {static_cast<int>(std::floor(p.y() / kCell)),
-            static_cast<int>(std::floor(p.x() / kCell))};
+    return {static_cast<int>(std::floor(p.y() / kRingCell)),
+            static_cast<int>(std::floor(p.x() / kRingCell))};
   }
   std::vector<Entry> cells_;
 };

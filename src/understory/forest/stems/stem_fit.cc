@@ -9,6 +9,7 @@
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -93,7 +94,7 @@ double scatter_of(const std::vector<SlicePoint>& points, const StemFit& stem, do
   std::size_t middle = 0;
   for (; middle + 1 < kSteps && 2 * passed < returns; ++middle)
     passed += counts[middle];
-  return std::clamp(kMadToSd * kStep * (static_cast<double>(middle) - 0.5), kLeastScatter,
+  return std::clamp(kSdOverMad * kStep * (static_cast<double>(middle) - 0.5), kLeastScatter,
                     kMostScatter);
 }
 

@@ -13,6 +13,7 @@
 namespace understory {
 namespace {
 
+using namespace georeference_constants::interpolation;
 using namespace georeference_constants::online_georeference;
 
 using Eigen::Matrix2d;

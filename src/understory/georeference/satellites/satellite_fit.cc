@@ -11,6 +11,7 @@
 namespace understory {
 namespace {
 
+using namespace georeference_constants::interpolation;
 using namespace georeference_constants::satellite_fit;
 
 using Eigen::MatrixXd;

@@ -12,7 +12,7 @@
 namespace understory {
 namespace {
 
-using namespace georeference_constants::satellite_pairs;
+using namespace georeference_constants::interpolation;
 
 using Eigen::Vector3d;
 

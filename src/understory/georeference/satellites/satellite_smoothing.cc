@@ -9,6 +9,7 @@
 #include "understory/georeference/georeference_constants.h"
 #include "understory/odometry/imu/imu_state.h"
 #include "understory/odometry/imu/preintegration.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {

@@ -254,7 +254,7 @@ Pose at(const Vector3d& middle) {
 
 SplitFit fit_split(const std::vector<SatellitePair>& pairs, const SplitFitConfig& config) {
   SplitFit fit;
-  if (pairs.size() < kFewestPairs) {
+  if (pairs.size() < kFewestPlanePairs) {
     fit.reason =
         fmt::format("expected fixes of three seconds at least at times of the path: there are {}",
                     pairs.size());

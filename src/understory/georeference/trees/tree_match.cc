@@ -210,8 +210,7 @@ void fit_height(std::span<const Tree> source, std::span<const Tree> target, Tree
   const double shift = upper_median(shifts);
   for (double& value : shifts)
     value = std::abs(value - shift);
-  // Of a median: 1.25 times that of a mean; from the median deviation: 1.48.
-  match.height_sd_m = 1.2533 * 1.4826 * upper_median(shifts) /
+  match.height_sd_m = kMedianSd * kSdOverMad * upper_median(shifts) /
                       std::sqrt(static_cast<double>(match.heights_compared));
   match.target_from_source =
       Pose(match.target_from_source.rotation(),
