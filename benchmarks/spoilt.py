@@ -17,8 +17,8 @@ because the program found them out and did without the IMU, are left out (`withs
 Good: a recording as it is whose map is not wrong by the same measure. One without its IMU is compared with
 the same recording with its IMU. Any other has nothing to be compared with: its error is 20 cm at most. A
 recording as it is whose map is wrong was lost without being spoilt: it counts as a map that must not
-be called complete. The table also tells how many of all recordings as they are were called untrusted, which
-is how good ones were counted before.
+be called complete. The table also tells how many of all recordings as they are were called untrusted, lost
+ones included.
 
 Floors: no wrong map is called complete, no good one untrusted, and in nine of ten wrong ones a reason
 names the cause.
@@ -359,7 +359,7 @@ def render(rows, seconds):
             f"| good ones: as they are, the map is not wrong | {len(good)} | |",
             f"| good ones called untrusted | {len(refused)} | floor 0 |",
             f"| recordings as they are called untrusted | {len(refused + of_status('untrusted', lost))} | "
-            "formerly counted as good ones |",
+            "lost ones included |",
             f"| good ones called partial | {len(partial)} | |", "",
             f"{len(WAYS) - len(left_out)} of {len(WAYS)} ways are in the plan. The others are left out, because they made "
             "no wrong map of seeds 1 and 2:", *(f"- {name}" for name in left_out), "",
