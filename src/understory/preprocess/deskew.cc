@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
@@ -81,20 +82,21 @@ void place(const ScanPoint& point, const Motion& motion, std::size_t to, BodyClo
 
 // One motion for each time step in which a point was measured: lidar at that time to body at t0.
 std::vector<Motion> motions_of_steps(const Scan& scan, const Rig& rig, const PoseTrack& track,
-                                     TimeNs step) {
+                                     std::uint32_t step) {
   std::uint32_t last = 0;
   for (const ScanPoint& point : scan.points)
     last = std::max(last, point.t_ns);
-  const std::size_t steps = static_cast<std::size_t>(last / step) + 1;
+  const std::size_t steps = last / step + 1;
   std::vector<std::uint8_t> used(steps, 0);
   for (const ScanPoint& point : scan.points)
-    used[static_cast<std::size_t>(point.t_ns / step)] = 1;
+    used[point.t_ns / step] = 1;
 
   const Pose body_from_world = track.at(scan.stamp).inverse();
   std::vector<Motion> motions(steps);
   parallel_for(steps, 256, [&](std::size_t i) {
     if (used[i] == 0) return;
-    const TimeNs middle = scan.stamp + static_cast<TimeNs>(i) * step + step / 2;
+    const TimeNs middle =
+        scan.stamp + static_cast<TimeNs>(i) * step + static_cast<TimeNs>(step / 2);
     motions[i] = motion_of(body_from_world * track.at(middle) * rig.body_from_lidar);
   });
   return motions;
@@ -111,7 +113,8 @@ DeskewResult deskew(const Scan& scan, const Rig& rig, std::span<const StampedPos
   result.deskewed = scan.has_point_times && poses.size() >= 2;
   if (scan.points.empty()) return result;
 
-  const auto step = static_cast<TimeNs>(config.time_step_ns);
+  const auto step =
+      static_cast<std::uint32_t>(std::min<std::int64_t>(config.time_step_ns, UINT32_MAX));
   std::vector<Motion> motions;
   if (result.deskewed) {
     const PoseTrack track(poses, config.max_extrapolation_s);
@@ -122,7 +125,6 @@ DeskewResult deskew(const Scan& scan, const Rig& rig, std::span<const StampedPos
     }
   }
   const Motion still = motion_of(rig.body_from_lidar);
-  const auto narrow_step = static_cast<std::uint32_t>(step);
   const std::vector<std::uint32_t> indices = kept_indices(scan.points.size(), keep);
   result.cloud.resize(indices.size());
   const std::size_t blocks = (indices.size() + kBlock - 1) / kBlock;
@@ -130,7 +132,7 @@ DeskewResult deskew(const Scan& scan, const Rig& rig, std::span<const StampedPos
     const std::size_t end = std::min(indices.size(), (b + 1) * kBlock);
     for (std::size_t i = b * kBlock; i < end; ++i) {
       const ScanPoint& point = scan.points[indices[i]];
-      place(point, result.deskewed ? motions[point.t_ns / narrow_step] : still, i, result.cloud);
+      place(point, result.deskewed ? motions[point.t_ns / step] : still, i, result.cloud);
     }
   });
   return result;

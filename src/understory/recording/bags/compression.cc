@@ -14,10 +14,11 @@ namespace {
 
 constexpr std::size_t kStep = 1U << 18;
 
-// Room in `out` for the next step, at most up to `limit`; 0 if the limit is reached.
+// Room in `out` for the next step, at most up to `limit`; 0 if the limit is reached. All that is
+// reserved is room: zstd unpacks a frame that fits straight into it, without a window of its own.
 std::size_t make_room(std::vector<std::uint8_t>& out, std::uint64_t limit) {
   const std::size_t used = out.size();
-  const std::size_t wanted = std::max(kStep, used / 2);
+  const std::size_t wanted = std::max({kStep, used / 2, out.capacity() - used});
   const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(limit, used + wanted));
   out.resize(size);
   return size - used;

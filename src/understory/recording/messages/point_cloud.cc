@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <string_view>
+#include <type_traits>
 
 namespace understory {
 namespace {
@@ -108,6 +109,26 @@ class PositionReader {
 std::uint16_t to_ring(double value) {
   return value >= 0.0 && value < 65536.0 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
 }
+
+// Reads a slot as T. The usual type of the slot, of the same width, is copied as it is.
+template <typename T, FieldType kUsual>
+class SlotReader {
+ public:
+  explicit SlotReader(const CloudLayout::Slot& slot)
+      : slot_(slot), usual_(slot.type == kUsual && !slot.swap) {}
+
+  T operator()(const std::uint8_t* raw) const {
+    if (usual_) return load<T, T>(raw + slot_.offset, false);
+    if constexpr (std::is_same_v<T, std::uint16_t>)
+      return to_ring(slot_.read(raw));
+    else
+      return static_cast<T>(slot_.read(raw));
+  }
+
+ private:
+  const CloudLayout::Slot& slot_;
+  bool usual_;
+};
 
 // Times of points in nanoseconds relative to the header stamp, before they are counted from the
 // first point.
@@ -240,6 +261,8 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
   relative.reserve(scan.has_point_times ? most : 0);
   std::uint16_t highest_ring = 0;
   const PositionReader read_position(layout);
+  const SlotReader<float, FieldType::kFloat32> read_intensity(layout.intensity());
+  const SlotReader<std::uint16_t, FieldType::kUint16> read_ring(layout.ring());
   for_each_point(cloud, [&](const std::uint8_t* raw, std::size_t row) {
     ScanPoint point;
     if (!read_position(raw, point)) {
@@ -255,10 +278,10 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
       relative.push_back(time);
     }
     if (layout.intensity().size > 0) {
-      const auto intensity = static_cast<float>(layout.intensity().read(raw));
+      const float intensity = read_intensity(raw);
       point.intensity = std::isfinite(intensity) ? intensity : 0.0F;
     }
-    if (layout.has_ring()) point.ring = to_ring(layout.ring().read(raw));
+    if (layout.has_ring()) point.ring = read_ring(raw);
     if (rows_are_rings) point.ring = static_cast<std::uint16_t>(row);
     if (layout.return_index().size > 0)
       point.return_index = static_cast<std::uint8_t>(to_ring(layout.return_index().read(raw)));
