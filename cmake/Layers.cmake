@@ -2,17 +2,19 @@ if(UNDERSTORY_TESTS)
   add_custom_target(layer_tests COMMENT "the test programs of the layers")
 endif()
 
-# understory_layer(<name> SOURCES ... [TESTS ...] [DEPENDS ...] [LIBRARIES ...] [PRIVATE_LIBRARIES ...])
+# understory_layer(<name> SOURCES ... [APART ...] [TESTS ...] [DEPENDS ...] [LIBRARIES ...]
+#                  [PRIVATE_LIBRARIES ...] [TEST_LIBRARIES ...])
 # One folder under src/understory is one static library understory_<name> (alias understory::<name>).
 #   SOURCES            explicit .cc files; without any the layer is headers only
+#   APART              further ones that are compiled by themselves, also with UNDERSTORY_UNITY: names in
+#                      them clash with others', or their loops are to be optimised for themselves
 #   TESTS              x_test.cc beside x.cc; together the GoogleTest program test_<name>
 #   DEPENDS            layers before it in the order of the top CMakeLists.txt (PUBLIC)
 #   LIBRARIES          third-party targets that its headers need (PUBLIC)
 #   PRIVATE_LIBRARIES  third-party targets that only its .cc files need
-#   APART              each file is compiled by itself, also with UNDERSTORY_UNITY
 function(understory_layer name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "APART" ""
-                        "SOURCES;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES;TEST_LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" ""
+                        "SOURCES;APART;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES;TEST_LIBRARIES")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "understory_layer(${name}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
   endif()
@@ -20,12 +22,8 @@ function(understory_layer name)
 
   set(target understory_${name})
   if(arg_SOURCES)
-    add_library(${target} STATIC)
-    if(arg_APART)
-      target_sources(${target} PRIVATE ${arg_SOURCES})
-    else()
-      understory_unite(${target} ${arg_SOURCES})
-    endif()
+    add_library(${target} STATIC ${arg_APART})
+    understory_unite(${target} ${arg_SOURCES})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE understory_own_code ${arg_PRIVATE_LIBRARIES})
     understory_precompile(${target})

@@ -5,7 +5,7 @@ Two types of one name in one namespace: each may be in order by itself; but thei
 the templates over them are one symbol, of which the linker keeps either.
 
 A number of a table (x_constants.h) and a constant of another file of the layer: where eight files are
-compiled together, the constant hides the number, if it comes first. Layers that are APART are exempt.
+compiled together, the constant hides the number, if it comes first. Files that are APART are exempt.
 
     check_names.py [SOURCE_TREE]     exit 0: in order; 1: prints each pair; 2: no such tree
 """
@@ -21,20 +21,21 @@ TYPE = re.compile(r"^(?:struct|class|enum class|enum|union) (?:alignas\(\w+\) )?
 TABLE = re.compile(r"^namespace (\w+) \{.*?\n(.*?)^\}  // namespace \1$", re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"inline constexpr [^=;]*?\b(k\w+)(?:\[\])? =")
 USED = re.compile(r"^using namespace (\w+_constants)::(\w+);", re.MULTILINE)
+APART = re.compile(r"^ +APART\s+((?:[\w/.]+\.cc\s+)+)", re.MULTILINE)
 CONSTANT = re.compile(r"^(?:static )?constexpr [^=;{(]*?\b(k\w+)\s*(?:\[[^\]]*\])?\s*[={]", re.MULTILINE)
 
 
 def hidden_numbers(layer):
     """One line for each number of a table that a constant of another file of the layer may hide."""
     lists = layer / "CMakeLists.txt"
-    if lists.is_file() and re.search(r"understory_layer\(\w+ APART", lists.read_text(encoding="utf-8")):
-        return
+    apart = APART.search(lists.read_text(encoding="utf-8")) if lists.is_file() else None
+    alone = {layer / name for name in apart.group(1).split()} if apart else set()
     tables = {}
     for path in layer.glob("*_constants.h"):
         for name, body in TABLE.findall(path.read_text(encoding="utf-8")):
             tables[(path.stem, name)] = NUMBER.findall(body)
     sources = {path: path.read_text(encoding="utf-8") for path in sorted(layer.rglob("*.cc"))
-               if not path.name.endswith("_test.cc")}
+               if not path.name.endswith("_test.cc") and path not in alone}
     own = {}
     for path, text in sources.items():
         for name in CONSTANT.findall(text):

@@ -63,7 +63,12 @@ class CheckNames(unittest.TestCase):
         other = "namespace u {\nnamespace {\nconstexpr double kNear = 2.0;\n}\n}\n"
         files = {"a/a_constants.h": table, "a/one.cc": user, "a/x/two.cc": other}
         self.assertEqual(findings(files), ["one.cc: kNear of its table is also a constant of two.cc"])
-        self.assertEqual(findings({**files, "a/CMakeLists.txt": "understory_layer(a APART\n"}), [])
+        layer = "understory_layer(a\n  SOURCES\n    {}\n  APART\n    {}\n  DEPENDS util)\n"
+        for together, alone in (("one.cc", "x/two.cc"), ("x/two.cc", "one.cc")):
+            lists = {"a/CMakeLists.txt": layer.format(together, alone)}
+            self.assertEqual(findings({**files, **lists}), [])
+        lists = {"a/CMakeLists.txt": layer.format("one.cc\n    x/two.cc", "three.cc")}
+        self.assertEqual(len(findings({**files, **lists})), 1)
         self.assertEqual(findings({**files, "a/x/two.cc": "", "b/two.cc": other}), [])
 
 

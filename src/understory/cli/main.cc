@@ -1,3 +1,5 @@
+#include <malloc.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -21,6 +23,14 @@ namespace {
 int complain(int code, const std::string& message) {
   std::fprintf(stderr, "error: %s\n", message.c_str());
   return code;
+}
+
+// Large arrays are made and freed for every scan. By default the C library gives their pages back
+// each time, and the system clears them anew: 4 % of the time of `map`.
+void keep_freed_memory() {
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_TRIM_THRESHOLD, 256 << 20);
+  mallopt(M_TOP_PAD, 16 << 20);
 }
 
 // The one place where errors become exit codes.
@@ -102,6 +112,7 @@ std::string unknown_option(const CLI::App& app, int argc, char** argv) {
 }
 
 int run(int argc, char** argv) {
+  keep_freed_memory();
   CLI::App app{"Lidar SLAM and tree mapping under the forest canopy", "understory"};
   app.set_version_flag("--version", kVersion);
   app.require_subcommand(1);
