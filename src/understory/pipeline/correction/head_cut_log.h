@@ -16,7 +16,7 @@ namespace understory {
 
 // What a harvester's computer noted of its head (P1 section 4): where and when it felled trees.
 struct HeadCutLogConfig {
-  std::string head_log;  // CSV (docs/method/sparse.md); empty: none
+  std::string head_log;  // CSV (docs/reference/machine.md); empty: none
   CutMatching cuts;
 };
 void describe(ConfigTable& table, HeadCutLogConfig& config);
