@@ -114,7 +114,7 @@ keys = {"map": keys_of("map"), "map by stems": keys_of("map", "--front-end", "sp
 guides = sorted((TOP / "docs" / "guides").glob("*.md"))
 assert len(guides) >= 5, guides
 checked = 0
-for page in [first, TOP / "docs" / "reference" / "configuration.md", *guides]:
+for page in [first, *guides, *sorted((TOP / "docs" / "reference").glob("*.md"))]:
     for words in commands(page):
         check_command(page, words, helps, keys)
         checked += 1

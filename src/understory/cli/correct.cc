@@ -22,6 +22,7 @@ struct CorrectOptions {
 int run_correct(const CorrectOptions& options, CommandContext& context) {
   CorrectionRequest request;
   ConfigTable table;
+  table.section("odometry", [&] { describe(table, request.odometry); });
   describe(table, request.config);
   request.config_record.origins = read_settings(table, options.config_file, options.settings);
   if (options.print_config) {

@@ -134,9 +134,11 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
       "Fixes: a recording, an NMEA log, an RTKLIB .pos file or a CSV table (gnss.csv "
       "of the run if not given)");
   command
-      .add_option("--antenna-m", options.antenna_m,
-                  "Position in the body frame of the GNSS antenna, or of what stood on the control "
-                  "points: x y z (if not given, that of the receiver in run.json, else the origin)")
+      .add_option(
+          "--antenna-m", options.antenna_m,
+          "Position in the body frame of the GNSS antenna, or of what stood on the control "
+          "points: x y z (if not given: where run.json has it, for the run's own fixes, else "
+          "the origin)")
       ->expected(3);
   command
       .add_option("--time-offset-s", options.time_offset_s,
@@ -152,7 +154,7 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
       .add_option(
           "--tilt-sd-deg", options.tilt_sd_deg,
           "Standard deviation of the run's vertical about each axis (0.05 for a run with an "
-          "IMU, else 5)")
+          "IMU, 1 for one by stems, else 5)")
       ->check(CLI::Range(0.0, 45.0));
   command.add_flag("--plain", options.plain,
                    "Least squares without robust weights: fixes that are far off count fully");

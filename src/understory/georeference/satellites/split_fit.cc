@@ -252,6 +252,17 @@ Pose at(const Vector3d& middle) {
 
 }  // namespace
 
+double tilt_sd_deg(LevelledBy what) {
+  switch (what) {
+    case LevelledBy::kGravity:
+      return 0.05;
+    case LevelledBy::kStems:
+      return 1.0;
+    default:
+      return 5.0;
+  }
+}
+
 SplitFit fit_split(const std::vector<SatellitePair>& pairs, const SplitFitConfig& config) {
   SplitFit fit;
   if (pairs.size() < kFewestPlanePairs) {

@@ -10,15 +10,23 @@
 
 namespace understory {
 
+// What holds a run's up.
+enum class LevelledBy {
+  kNothing,
+  kStems,    // the mean direction of the stems
+  kGravity,  // an IMU, or a place on the earth
+};
+// How far its up may be off gravity, degrees, one standard deviation about each level axis. By an
+// IMU 0.05 [measured: docs/method/georeference.md]. By stems 1.0 [chosen: six simulated runs of
+// three stands, seeds 3 and 7, are off by 0.11; the trees of a slope may lean alike]. By nothing
+// 5.0 [chosen: a lidar that is carried by hand].
+[[nodiscard]] double tilt_sd_deg(LevelledBy what);
+
 // A fit of each degree of freedom to what knows it best (P4 section 5.3 and its future work).
 struct SplitFitConfig {
-  // How far the run's up may be off gravity, one standard deviation about each level axis. With an
-  // IMU a map is level [measured: docs/method/georeference.md].
-  double tilt_sd_deg = 0.05;
+  double tilt_sd_deg = 0.05;  // of the run's up, see LevelledBy
   // A pair counts as at most that many times as good or as bad as the median says [chosen].
   double most_scale = 10.0;
-  // The same for a run that was mapped without an IMU [chosen: a lidar that is carried by hand].
-  double unlevel_tilt_sd_deg = 5.0;
   // How far the receiver's clock may be off beyond what is known; 0 holds it.
   double time_offset_sd_s = 0.0;
   // Pairs that lie far off the others get a larger error.

@@ -90,7 +90,7 @@ CorrectionInput read_stems(const CorrectionRequest& request, Log& log, StageTime
 void position_views(const CorrectionRequest& request, const ProgressSink& progress,
                     const StopRequested& stop_requested, StageTimes& times, CorrectionInput& input,
                     RunDocuments& documents) {
-  input.steps = position(input.views, request.config.odometry, progress, stop_requested, times);
+  input.steps = position(input.views, request.odometry, progress, stop_requested, times);
   if (std::filesystem::is_directory(request.stems))
     begin_from(request.stems / "trajectory.tum", input, documents);
   input.stopped = input.steps.size() < input.views.size();

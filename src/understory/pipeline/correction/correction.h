@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "understory/odometry/stems/sparse_odometry.h"
 #include "understory/pipeline/correction/correction_config.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/util/config/config_origins.h"
@@ -17,7 +18,8 @@ struct CorrectionRequest {
   // begins, and what is made of it has a row for each of its poses.
   std::filesystem::path stems;
   std::filesystem::path run_folder;
-  bool overwrite = false;  // what an earlier run left in the folder, finished or not
+  bool overwrite = false;         // what an earlier run left in the folder, finished or not
+  SparseOdometryConfig odometry;  // of views that have no trajectory yet
   CorrectionConfig config;
   ConfigRecord config_record;  // for run.json
 };

@@ -3,7 +3,6 @@
 namespace understory {
 
 void describe(ConfigTable& table, CorrectionConfig& config) {
-  table.section("odometry", [&] { describe(table, config.odometry); });
   describe(table, config.stems);
   table.section("tree_list", [&] { describe(table, config.tree_list); });
   table.section("harvester", [&] { describe(table, config.harvester); });

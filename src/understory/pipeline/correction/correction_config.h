@@ -2,7 +2,6 @@
 
 #include "understory/graph/self_correction/stem_correction.h"
 #include "understory/map/stem_map.h"
-#include "understory/odometry/stems/sparse_odometry.h"
 #include "understory/pipeline/correction/head_cut_log.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
@@ -10,9 +9,8 @@
 
 namespace understory {
 
-// All settings of `understory correct`.
+// What a correction can be told, by `understory correct` or at the end of `map` by stems.
 struct CorrectionConfig {
-  SparseOdometryConfig odometry;
   StemCorrectionConfig stems;
   StemMapConfig tree_list = tree_list_config();
   HeadCutLogConfig harvester;

@@ -55,6 +55,10 @@ std::vector<GnssFix> read_table(const std::string& file) {
     const double c[] = {table.number("c00"), table.number("c01"), table.number("c02"),
                         table.number("c11"), table.number("c12"), table.number("c22")};
     fix.covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+    // The table of a folder of clouds tells standard deviations instead.
+    const Eigen::Vector3d sd(table.number("sd_east_m"), table.number("sd_north_m"),
+                             table.number("sd_up_m"));
+    if (std::isnan(c[0]) && sd.allFinite()) fix.covariance = sd.cwiseAbs2().asDiagonal();
     fixes.push_back(fix);
   }
   return fixes;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
+#include "understory/georeference/satellites/split_fit.h"
 #include "understory/output/report/report.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
 #include "understory/pipeline/georeferencing/methods/placement.h"
@@ -23,7 +24,7 @@ struct MappedPath {
   const Trajectory& trajectory;   // world frame
   const std::vector<GnssFix>& fixes;
   std::optional<Eigen::Vector3d> antenna_in_body = {};  // metres; nothing where unknown
-  bool level = false;  // it was mapped with an IMU: its up is that of gravity
+  LevelledBy levelled_by = LevelledBy::kNothing;
 };
 
 // Where it lies on the globe.

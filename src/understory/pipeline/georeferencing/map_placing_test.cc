@@ -68,6 +68,23 @@ TEST(MapPlacing, AWalkWithBendsLandsOnTheGlobe) {
   EXPECT_NEAR(std::stod(column(folder / "gnss.csv", "x")[599]), 299.5, 1.5);
 }
 
+// A regression: the place of a run by stems was as uncertain in its tilt as one by nothing.
+TEST(MapPlacing, TheStatedTiltIsThatOfWhatHoldsItUp) {
+  Walk walk(300.0);
+  for (std::size_t k = 0; k < walk.fixes.size(); ++k)  // heights that tell no tilt
+    walk.fixes[k].height_m += 10.0 * std::sin(0.02 * static_cast<double>(k));
+  const auto tilt_deg = [&](LevelledBy what) {
+    const test::TemporaryFolder folder;
+    Log log;
+    const PlacedMap map = place_map({folder.path(), walk.path, walk.fixes, {}, what}, {}, log);
+    return std::get<double>(map.figures.at("sd_turn_east_deg"));
+  };
+  EXPECT_LT(tilt_deg(LevelledBy::kGravity), 0.051);
+  EXPECT_GT(tilt_deg(LevelledBy::kStems), 0.051);
+  EXPECT_LT(tilt_deg(LevelledBy::kStems), 1.01);
+  EXPECT_GT(tilt_deg(LevelledBy::kNothing), tilt_deg(LevelledBy::kStems));
+}
+
 TEST(MapPlacing, AWalkOnTheSpotStaysLocalAndSaysWhy) {
   const test::TemporaryFolder folder;
   const Walk walk(0.2);

@@ -100,7 +100,7 @@ struct Shares {
 
 void OnlinePath::begin() {
   OnlineGeoreferenceConfig config;
-  config.tilt_sd_deg = level_ ? SplitFitConfig().tilt_sd_deg : SplitFitConfig().unlevel_tilt_sd_deg;
+  config.tilt_sd_deg = tilt_sd_deg(levelled_by_);
   georeference_ = std::make_unique<OnlineGeoreference>(config);
 }
 
@@ -160,7 +160,7 @@ void OnlinePath::sync() {
 }
 
 void OnlinePath::save(BinaryWriter& writer) const {
-  writer.put(level_);
+  writer.put(levelled_by_);
   writer.put(last_scan_end_);
   writer.put(georeference_ != nullptr);
   if (!georeference_) return;
@@ -174,7 +174,7 @@ std::vector<CountedFile> OnlinePath::files() const {
 }
 
 void OnlinePath::load(BinaryReader& reader, const Rig& /*rig*/) {
-  level_ = reader.get<bool>();
+  levelled_by_ = reader.get_enum(LevelledBy::kGravity);
   last_scan_end_ = reader.get<TimeNs>();
   if (!reader.get<bool>()) return;
   begin();

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "understory/georeference/satellites/online_georeference.h"
+#include "understory/georeference/satellites/split_fit.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/mapping/positioned_scan.h"
@@ -23,8 +24,8 @@ class OnlinePath : public Resumable {
  public:
   explicit OnlinePath(const std::filesystem::path& work) : work_(work) {}
 
-  // Whether the world is level by an IMU; counts until the first fix that is taken.
-  void set_level(bool level) { level_ = georeference_ ? level_ : level; }
+  // Counts until the first fix that is taken.
+  void set_levelled_by(LevelledBy what) { levelled_by_ = georeference_ ? levelled_by_ : what; }
   void take(const GnssFix& fix, const Rig& rig);
   void take(const PositionedScan& scan);
   // "on the globe within 1.2 m" of the last scan; empty where it is not known.
@@ -45,7 +46,7 @@ class OnlinePath : public Resumable {
   void begin();
 
   std::filesystem::path work_;
-  bool level_ = false;
+  LevelledBy levelled_by_ = LevelledBy::kNothing;
   TimeNs last_scan_end_ = 0;
   std::unique_ptr<OnlineGeoreference> georeference_;  // from the first fix on
   std::unique_ptr<RecordFile> file_;

@@ -43,7 +43,7 @@ void walk(OnlinePath& path, int second) {
 TEST(OnlinePath, ARowAScanAndFigures) {
   const test::TemporaryFolder folder;
   OnlinePath path(folder.path());
-  path.set_level(true);
+  path.set_levelled_by(LevelledBy::kGravity);
   for (int second = 0; second < 40; ++second)
     walk(path, second);
   EXPECT_EQ(path.remark().rfind("on the globe within 0.", 0), 0U) << path.remark();

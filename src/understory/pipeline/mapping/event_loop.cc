@@ -56,8 +56,9 @@ void EventLoop::adapt_to_recording() {
   front_end_ =
       parts_.front_end(request_.config, request_.traits, request_.conditions, state_.work(), log_);
   online_.reset();
-  if (georeference_of(request_.config).online)
-    online_ = std::make_unique<OnlinePath>(state_.work());
+  if (!georeference_of(request_.config).online) return;
+  online_ = std::make_unique<OnlinePath>(state_.work());
+  if (!depends_on_sensors(request_.config)) online_->set_levelled_by(LevelledBy::kStems);
 }
 
 void EventLoop::play_at_sensor_speed() {
@@ -121,13 +122,15 @@ void EventLoop::handle_ready() {
   }
 }
 
-// For the online georeference. Stems alone do not level the world by the IMU.
+// For the online georeference. The world of a path by stems is level by these.
 void EventLoop::take_fix_or_sample(const Event& event) {
   if (!online_) return;
   const RunConditions& conditions = request_.conditions;
   if (const auto* fix = std::get_if<GnssFix>(&event)) online_->take(*fix, source_->rig());
-  if (std::holds_alternative<ImuSample>(event) && depends_on_sensors(request_.config))
-    online_->set_level(conditions.imu_refused.empty() && !conditions.imu_doubted);
+  if (std::holds_alternative<ImuSample>(event) && depends_on_sensors(request_.config)) {
+    const bool trusted = conditions.imu_refused.empty() && !conditions.imu_doubted;
+    online_->set_levelled_by(trusted ? LevelledBy::kGravity : LevelledBy::kNothing);
+  }
 }
 
 void EventLoop::note_positioned(const std::vector<PositionedScan>& scans) {

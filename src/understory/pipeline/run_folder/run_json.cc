@@ -57,8 +57,12 @@ RunJson::~RunJson() = default;
 RunJson::RunJson(RunJson&&) noexcept = default;
 RunJson& RunJson::operator=(RunJson&&) noexcept = default;
 
-bool RunJson::is_present() const { return content_->present; }
-bool RunJson::is_object() const { return content_->json.is_object(); }
+bool RunJson::is_present() const {
+  return content_->present;
+}
+bool RunJson::is_object() const {
+  return content_->json.is_object();
+}
 
 bool RunJson::is_ours() const {
   constexpr std::array<const char*, 5> kCommands = {"map", "correct", "inventory", "georeference",

@@ -109,8 +109,6 @@ void tell_points(const std::vector<ControlPoint>& points, const ControlFit& fit,
         fmt::format("{}: the control points do not agree ({:.2f} m), and fewer than "
                     "four cannot tell which of them is wrong",
                     file, std::sqrt(squares / static_cast<double>(used))));
-  if (fit.redundant < 1)
-    placement.doubt(file + ": nothing checks so few control points: expected three at least");
 }
 
 }  // namespace

@@ -19,10 +19,11 @@ using namespace pipeline_constants::georeferencing;
 
 namespace fs = std::filesystem;
 
-// Whether the run's up is that of gravity: it was mapped with an IMU, or laid on the earth before.
-bool is_level(const fs::path& folder, const MovableRun& run) {
-  if (run.origin) return true;
-  return RunJson(folder).find_number("/counts/imu_samples") > 0.0;
+LevelledBy levelled_by(const fs::path& folder, const MovableRun& run) {
+  if (run.origin) return LevelledBy::kGravity;
+  if (fs::exists(folder / "stems.csv.gz")) return LevelledBy::kStems;
+  const bool imu = RunJson(folder).find_number("/counts/imu_samples") > 0.0;
+  return imu ? LevelledBy::kGravity : LevelledBy::kNothing;
 }
 
 double extent_m(const Trajectory& trajectory) {
@@ -87,8 +88,7 @@ void tell_figures(const SatelliteFit& fit, Placement& placement) {
 
 double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run) {
   if (request.tilt_sd_deg) return *request.tilt_sd_deg;
-  return is_level(request.run, run) ? SplitFitConfig().tilt_sd_deg
-                                    : SplitFitConfig().unlevel_tilt_sd_deg;
+  return tilt_sd_deg(levelled_by(request.run, run));
 }
 
 Eigen::Vector3d antenna_of(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {

@@ -355,7 +355,7 @@ PlacedMap place_on_globe(const ReadRecording& recording, DenseFrontEnd& front_en
 MappedPath mapped_path(const ReadRecording& recording, const DenseFrontEnd& front_end,
                        const Trajectory& trajectory) {
   MappedPath path{recording.results, trajectory, front_end.fixes()};
-  path.level = front_end.counts().imu_samples > 0;
+  if (front_end.counts().imu_samples > 0) path.levelled_by = LevelledBy::kGravity;
   if (const auto& antenna = front_end.rig().body_from_gnss)
     path.antenna_in_body = antenna->translation();
   return path;
