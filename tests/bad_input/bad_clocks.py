@@ -4,13 +4,14 @@ offsets are mended and said, and whoever comes late is used from then on."""
 import contextlib
 import dataclasses
 import json
+import math
 import signal
 import subprocess
 import sys
 import time
 
 from program import PROGRAM, Cases, Outcome, error_m, good_recording, program
-from recordings import write_bag, write_db3, write_indexed_mcap, write_mcap
+from recordings import edit_imu, write_bag, write_db3, write_indexed_mcap, write_mcap
 
 FRONT_END = sys.argv[1]
 SECONDS = 16
@@ -191,6 +192,61 @@ def used_like_undisturbed(outcome):
     import gzip
     last = gzip.open(outcome.folder / "states.csv.gz", "rt").read().splitlines()[-1].split(",")
     assert any(abs(float(v)) > 1e-6 for v in last[4:10]), f"no biases of the IMU: {last[:10]}"
+
+
+def lidar_at(stamp_of):
+    """The recording with other stamps of its scans; they arrive as before."""
+    return [m.stamped(round(stamp_of(m))) if m.topic == "/lidar" else m for m in messages]
+
+
+for name, stamp_of in (("stands still after 8 s", lambda m: min(m.stamp, start + 8e9)),
+                       ("says 0", lambda m: 0),
+                       ("runs backwards", lambda m: 2 * start + SECONDS * 1e9 - m.stamp)):
+    @cases.case(f"a lidar whose clock {name}")
+    def lidar_clock(folder, stamp_of=stamp_of):
+        path = folder / "walk.mcap"
+        write_mcap(path, sorted(lidar_at(stamp_of), key=lambda m: m.time))
+        done = program("map", path, "-o", folder / "run", "--threads", 1, *OPTIONS)
+        outcome = Outcome(done.returncode, done.stdout, done.stderr, folder / "run")
+        if outcome.code == 3:  # by stems: too few views for a map
+            assert "clock" in outcome.said, outcome.said
+            return outcome.said.strip().splitlines()[-1]
+        assert outcome.run["status"] != "complete"
+        reasons = "; ".join(outcome.run["reasons"])
+        assert "with the stamp of another scan (the clock of the lidar" in reasons, reasons
+        return reasons
+
+
+@cases.case("scans recorded twice")
+def recorded_twice(folder):
+    twice = [copy for m in messages for copy in ((m, m) if m.topic == "/lidar" else (m,))]
+    outcome = mapped(folder, twice)
+    assert outcome.run["evidence"]["lidar_duplicates"] > 100
+    assert outcome.run["evidence"]["lidar_stamp_taken"] == 0
+    return near_undisturbed(outcome)
+
+
+@cases.case("a lidar that stops 4 s before the IMU and the receiver")
+def lidar_stops(folder):
+    outcome = mapped(folder, [m for m in messages if m.topic != "/lidar" or second(m) < SECONDS - 4])
+    reasons = "; ".join(outcome.run["reasons"])
+    assert outcome.code == 4 and outcome.run["status"] == "partial", reasons
+    assert "the lidar stopped 4.0 s before the " in reasons, reasons
+    return reasons
+
+
+@cases.case("an IMU of NaN")
+def imu_of_nan(folder):
+    """As without an IMU, and said."""
+    nothing = [math.nan] * 3
+    outcome = mapped(folder, [edit_imu(m, lambda rate, force: (nothing, nothing)) if m.topic == "/imu" else m
+                              for m in messages])
+    assert outcome.error < 1.5 * WITHOUT_IMU + 0.005, (outcome.error, WITHOUT_IMU)
+    if FRONT_END == "dense":
+        assert "no sample of the IMU can be used" in outcome.said, outcome.said
+    reasons = "; ".join(outcome.run["reasons"])
+    assert "messages of the IMU (100.0 %) were not used" in reasons, reasons
+    return reasons
 
 
 @cases.case("IMU that dies, and a lidar with gaps")

@@ -46,6 +46,7 @@ nlohmann::json topic_json(const TopicReport& topic) {
           {"backward_steps", topic.backward_steps},
           {"duplicates", topic.duplicates},
           {"unreadable", topic.unreadable},
+          {"not_numbers", topic.not_numbers},
           {"left_out", topic.left_out},
           {"points", topic.points},
           {"empty_points", topic.empty_points}};

@@ -42,14 +42,15 @@ PlaneGrid::PlaneGrid(const SparsePoints& points) : points_(points) {
         static_cast<int>(i);
 }
 
+// A number that is none lies in the first cell.
 int PlaneGrid::column(double x) const {
   const double cell = (x - low_.x()) / cell_m_;
-  return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(columns_ - 1)));
+  return cell > 0.0 ? static_cast<int>(std::min(cell, static_cast<double>(columns_ - 1))) : 0;
 }
 
 int PlaneGrid::row(double y) const {
   const double cell = (y - low_.y()) / cell_m_;
-  return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(rows_ - 1)));
+  return cell > 0.0 ? static_cast<int>(std::min(cell, static_cast<double>(rows_ - 1))) : 0;
 }
 
 PlaneGrid::Neighbour PlaneGrid::nearest(const Eigen::Vector3d& at, double limit_m,
@@ -84,7 +85,7 @@ PlaneGrid::Neighbour PlaneGrid::nearest(const Eigen::Vector3d& at, double limit_
 PlaneGrid::Lone PlaneGrid::nearest_and_others(const Eigen::Vector3d& at,
                                               double height_weight) const {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  if (points_.empty()) return {{}, kNone};
+  if (points_.empty() || !at.allFinite()) return {{}, kNone};
   // The far corner of the grid from here: a square that large holds every point.
   const double all = 2.0 * cell_m_ * (columns_ + rows_) + (at.head<2>() - low_).norm();
   for (double radius = 0.75 * cell_m_;; radius *= 2.0) {

@@ -26,7 +26,8 @@ class PlaneGrid {
 
   [[nodiscard]] const SparsePoints& points() const { return points_; }
   // Nearest point to `at`, not farther than `limit_m`: in the plane (`height_weight` 0) or in space
-  // (1); the squared distance is dx^2 + dy^2 + height_weight dz^2. Of equal ones the first.
+  // (1); the squared distance is dx^2 + dy^2 + height_weight dz^2. Of equal ones the first. Nothing
+  // is near a place that is no number.
   [[nodiscard]] Neighbour nearest(const Eigen::Vector3d& at, double limit_m,
                                   double height_weight) const;
   // The same without a limit; its distances are those of that metric.

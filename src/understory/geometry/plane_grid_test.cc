@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "understory/util/random.h"
@@ -51,6 +52,21 @@ TEST(PlaneGridSearch, NothingIsFoundBeyondTheLimitOrInAnEmptyGrid) {
   EXPECT_EQ(grid.nearest({4.0, 0.0, 0.0}, 4.1, 0.0).index, 0);
   EXPECT_EQ(PlaneGrid({}).nearest({0.0, 0.0, 0.0}, 1e9, 0.0).index, -1);
   EXPECT_EQ(PlaneGrid({}).nearest_and_others({0.0, 0.0, 0.0}, 0.0).nearest.index, -1);
+}
+
+// A regression: a pose of NaN, from two scans a nanosecond apart, led out of the cells.
+TEST(PlaneGridSearch, NothingIsNearAPlaceThatIsNoNumber) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const PlaneGrid grid({{0.0, 0.0, 0.0}, {10.0, 0.0, 0.0}, {10.0, 10.0, 0.0}});
+  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+    for (int axis = 0; axis < 2; ++axis) {
+      Eigen::Vector3d at(5.0, 5.0, 0.0);
+      at[axis] = bad;
+      EXPECT_EQ(grid.nearest(at, 100.0, 0.0).index, -1);
+      EXPECT_EQ(grid.nearest_and_others(at, 0.0).nearest.index, -1);
+    }
+  }
 }
 
 // Of two points at one distance the first one is found, so results do not depend on the cells.

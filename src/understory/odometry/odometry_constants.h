@@ -159,6 +159,9 @@ inline constexpr double kWindowS = 0.29;
 namespace stem_front_end {  // odometry/stems/stem_front_end.cc
 // s: a longer pause, and what moved before says nothing about now [chosen]
 inline constexpr double kLongestStep = 2.0;
+// s: a shorter step is a clock that was mended; a speed by it is noise [bound: no lidar takes a
+// thousand scans a second]
+inline constexpr double kShortestStep = 1e-3;
 // Of the time since the last scan: a shorter scan is followed by a pause [not recorded]
 inline constexpr double kPause = 0.4;
 }  // namespace stem_front_end

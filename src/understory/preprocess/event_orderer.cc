@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <tuple>
 
+#include "understory/preprocess/event_content.h"
 #include "understory/preprocess/event_stamp.h"
 #include "understory/preprocess/preprocess_constants.h"
 #include "understory/recording/messages/event_bytes.h"
@@ -196,17 +197,32 @@ void EventOrderer::note_step(Stream stream, TimeNs stamp) {
   }
 }
 
+// A message has the stamp of one before with this content.
+void EventOrderer::note_same_stamp(const Pending& pending, std::uint64_t content_before) {
+  StreamReport& report = report_.streams[pending.stream];
+  const std::string message =
+      std::string(kNames[pending.stream]) + ": second message at " + seconds(pending.stamp);
+  if (content_of(pending.event) == content_before) {
+    ++report.duplicates;
+    log_->warn("time.duplicate", message + " with the same content dropped");
+    return;
+  }
+  ++report.stamp_taken;
+  log_->warn("time.stamp_taken", message + " with other content dropped: its clock stands still");
+}
+
 bool EventOrderer::drop(const Pending& pending) {
   StreamReport& report = report_.streams[pending.stream];
   const Clock& clock = clocks_[pending.stream];
-  const auto same = [&](const Pending& other) {
+  if (clock.any_released && pending.stamp == clock.released) {
+    note_same_stamp(pending, clock.content);
+    return true;
+  }
+  const auto same = std::find_if(pending_.begin(), pending_.end(), [&](const Pending& other) {
     return other.stream == pending.stream && other.stamp == pending.stamp;
-  };
-  if ((clock.any_released && pending.stamp == clock.released) ||
-      std::any_of(pending_.begin(), pending_.end(), same)) {
-    ++report.duplicates;
-    log_->warn("time.duplicate", std::string(kNames[pending.stream]) + ": second message at " +
-                                     seconds(pending.stamp) + " dropped");
+  });
+  if (same != pending_.end()) {
+    note_same_stamp(pending, content_of(same->event));
     return true;
   }
   const bool late = clock.any_released && pending.stamp < clock.released;
@@ -234,6 +250,7 @@ void EventOrderer::accept(Event event, Stream stream) {
   clock.newest = clock.seen ? std::max(clock.newest, pending.stamp) : pending.stamp;
   clock.newest_time = clock.seen ? std::max(clock.newest_time, pending.time) : pending.time;
   clock.seen = true;
+  report_.streams[stream].newest = clock.newest_time;
   if (stream == kLidar || stream == kImu) {
     newest_ = any_seen_ ? std::max(newest_, pending.time) : pending.time;
     any_seen_ = true;
@@ -302,6 +319,7 @@ std::optional<Event> EventOrderer::pop() {
     clock.unbroken_since = at->stamp;
   clock.released = at->stamp;
   clock.any_released = true;
+  clock.content = content_of(at->event);
   ++report_.streams[at->stream].released;
   Event event = std::move(at->event);
   pending_.erase(at);

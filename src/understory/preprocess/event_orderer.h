@@ -28,8 +28,9 @@ namespace understory {
 // - A scan's time is its end, and it leaves right after the first IMU sample at or past that end,
 // so
 //   that deskewing never lacks samples; unless the IMU has been silent for `imu_silence_s`.
-// - Same stream and same stamp: the second is dropped. Earlier than what already left of the same
-//   stream: dropped.
+// - Same stream and same stamp: the second is dropped. With the same content it was recorded twice;
+//   with other content its clock stands still, and what it says is lost. Earlier than what already
+//   left of the same stream: dropped.
 // - A stream whose stamps step away by more than `clock_jump_s` from its own past and from the
 // other
 //   sensors has a clock jump: its stamps are shifted so that it goes on at its usual rate, until it
@@ -54,14 +55,17 @@ class EventOrderer {
     std::uint64_t received = 0;
     std::uint64_t released = 0;
     std::uint64_t reordered = 0;   // came after a later one, put right
-    std::uint64_t duplicates = 0;  // dropped
-    std::uint64_t late = 0;        // too late to be put right, dropped
+    std::uint64_t duplicates = 0;  // recorded twice: same stamp, same content; dropped
+    // The stamp of another message, but other content: the clock stands still. Dropped.
+    std::uint64_t stamp_taken = 0;
+    std::uint64_t late = 0;  // too late to be put right, dropped
     std::uint64_t clock_jumps = 0;
     std::uint64_t glitches = 0;  // single stamps far off, dropped
     std::uint64_t gaps = 0;
     TimeNs longest_gap = 0;
     TimeNs after_longest_gap = 0;  // stamp of the message that ended it
     TimeNs offset = 0;             // constant, added to its stamps to mend its clock
+    TimeNs newest = 0;             // event time of the newest message taken, on the mended clock
     // Time of the recording in which the sensor was not used although the recording holds messages
     // of it. Lidar: gaps, and scans that were dropped. IMU: scans that left without it, for
     // whatever reason. Others: messages that were dropped, by their usual step.
@@ -107,6 +111,7 @@ class EventOrderer {
     TimeNs offset = 0;       // mended = raw + offset
     TimeNs released = 0;     // stamp of the last one that left
     bool any_released = false;
+    std::uint64_t content = 0;      // of the last one that left, see event_content.h
     TimeNs unbroken_since = 0;      // stamp of the first that left after the last gap of an IMU
     bool trusted = false;           // stamps, against the order of arrival
     StreamOffset arrival;           // against the lidar's; not of the lidar itself
@@ -137,6 +142,7 @@ class EventOrderer {
   void note_glitches(Stream stream, TimeNs raw, std::size_t count);
   void note_step(Stream stream, TimeNs stamp);
   [[nodiscard]] bool drop(const Pending& pending);
+  void note_same_stamp(const Pending& pending, std::uint64_t content_before);
   [[nodiscard]] bool safe(const Pending& pending) const;
   [[nodiscard]] std::optional<std::size_t> next_to_leave();
   [[nodiscard]] bool covered(const Pending& scan);

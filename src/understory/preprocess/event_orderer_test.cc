@@ -66,6 +66,57 @@ TEST(EventOrderer, NothingLagsBehindWithoutImu) {
   EXPECT_FALSE(orderer.pop().has_value());
 }
 
+// A scan of other content than all others.
+ScanPtr scan_apart(TimeNs stamp, int number) {
+  auto made = std::make_shared<Scan>(*scan(stamp));
+  made->points[0].x = static_cast<float>(number);
+  return made;
+}
+
+// A message recorded twice loses nothing; a clock that stands still loses what the sensor saw.
+TEST(EventOrderer, AClockThatStandsStillIsNoMessageRecordedTwice) {
+  std::vector<Event> twice;
+  std::vector<Event> still;
+  for (int k = 0; k < 50; ++k) {
+    const ScanPtr each = scan_apart(kEpoch + k * 100 * kMs, k);
+    twice.emplace_back(each);
+    twice.emplace_back(std::make_shared<Scan>(*each));
+    still.emplace_back(scan_apart(kEpoch + std::min(k, 20) * 100 * kMs, k));
+    for (int i = 0; i < 10; ++i) {
+      const ImuSample sample = imu(kEpoch + (k * 100 + 10 * i) * kMs + 101 * kMs);
+      twice.emplace_back(sample);
+      still.emplace_back(sample);
+    }
+  }
+  const auto lidar_of = [](const std::vector<Event>& events) {
+    return run(events).report.streams[EventOrderer::kLidar];
+  };
+  EXPECT_EQ(lidar_of(twice).duplicates, 50U);
+  EXPECT_EQ(lidar_of(twice).stamp_taken, 0U);
+  EXPECT_EQ(lidar_of(twice).released, 50U);
+  EXPECT_EQ(lidar_of(still).duplicates, 0U);
+  EXPECT_EQ(lidar_of(still).stamp_taken, 29U);
+  EXPECT_EQ(lidar_of(still).released, 21U);
+}
+
+TEST(EventOrderer, SensorsWhoseClocksStandStillAreCounted) {
+  std::vector<Event> events = recording(3.0);
+  for (int k = 0; k < 7; ++k) {
+    GnssFix same = fix(kEpoch + 2000 * kMs);
+    same.latitude_deg = 61.0 + k;
+    events.emplace_back(same);
+  }
+  EXPECT_EQ(run(events).report.streams[EventOrderer::kGnss].stamp_taken, 7U);
+}
+
+TEST(EventOrderer, TellsWhereEachStreamEnds) {
+  const Outcome outcome = run(recording(3.0));
+  const auto& streams = outcome.report.streams;
+  EXPECT_EQ(streams[EventOrderer::kImu].newest, kEpoch + 2993 * kMs);
+  EXPECT_EQ(streams[EventOrderer::kLidar].newest, kEpoch + 2899 * kMs);
+  EXPECT_EQ(streams[EventOrderer::kMag].newest, 0);
+}
+
 TEST(EventOrderer, PutsShuffledMessagesInOrderAndDropsDuplicates) {
   const std::vector<Event> clean = recording(6.0);
   std::vector<Event> events = clean;

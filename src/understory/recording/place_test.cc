@@ -50,8 +50,9 @@ void expect_same_end(const Recording& a, const Recording& b) {
               std::tie(y.name, y.type, y.frame, y.role, y.conventions));
     EXPECT_EQ(std::tie(x.messages, x.first_stamp, x.last_stamp, x.longest_gap, x.backward_steps),
               std::tie(y.messages, y.first_stamp, y.last_stamp, y.longest_gap, y.backward_steps));
-    EXPECT_EQ(std::tie(x.duplicates, x.unreadable, x.left_out, x.points, x.empty_points),
-              std::tie(y.duplicates, y.unreadable, y.left_out, y.points, y.empty_points));
+    EXPECT_EQ(
+        std::tie(x.duplicates, x.unreadable, x.not_numbers, x.left_out, x.points, x.empty_points),
+        std::tie(y.duplicates, y.unreadable, y.not_numbers, y.left_out, y.points, y.empty_points));
   }
 }
 

@@ -18,6 +18,13 @@ TimeNs event_time(const Event& event) {
   return std::visit(TimeOf{}, event);
 }
 
+std::uint64_t unusable_messages(const Recording& recording, const std::string& role) {
+  std::uint64_t count = 0;
+  for (const TopicReport& topic : recording.topics())
+    count += topic.role == role ? topic.unreadable + topic.not_numbers : 0;
+  return count;
+}
+
 void Recording::skip(std::uint64_t count) {
   for (std::uint64_t i = 0; i < count; ++i) {
     if (!next()) return;

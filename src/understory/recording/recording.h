@@ -29,6 +29,7 @@ struct TopicReport {
   std::string frame;        // frame_id, empty if none
   std::string role;         // "lidar", "imu", "gnss", "mag", "tf", "ignored"
   std::string conventions;  // "t: uint32 ns since header stamp; stamp = first point"
+  bool beside = false;      // from a log beside the recording, which may end at another time
   std::uint64_t messages = 0;
   TimeNs first_stamp = 0;
   TimeNs last_stamp = 0;
@@ -36,6 +37,7 @@ struct TopicReport {
   std::uint64_t backward_steps = 0;  // stamps that go back in time
   std::uint64_t duplicates = 0;      // stamps equal to the one before
   std::uint64_t unreadable = 0;      // messages that could not be decoded
+  std::uint64_t not_numbers = 0;     // messages that measure NaN or infinity, dropped
   std::uint64_t left_out = 0;        // messages of another sensor on the same topic
   std::uint64_t points = 0;          // lidar only
   std::uint64_t empty_points = 0;    // lidar only: NaN or zero range, dropped
@@ -74,6 +76,10 @@ class Recording {
   // How much has been read, 0 to 1; 0 where not known.
   [[nodiscard]] virtual double progress() const = 0;
 };
+
+// How many messages of sensors with this role ("imu") were dropped so far because they are not
+// whole or measure no numbers.
+[[nodiscard]] std::uint64_t unusable_messages(const Recording& recording, const std::string& role);
 
 // What the user tells of a recording that it does not tell itself.
 struct OpenOptions {

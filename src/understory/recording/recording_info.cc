@@ -276,6 +276,10 @@ class RecordingSurvey::Impl {
       if (topic.unreadable > 0)
         info.warnings.push_back(topic.name + ": " + std::to_string(topic.unreadable) +
                                 " messages could not be read");
+      if (topic.not_numbers > 0)
+        info.warnings.push_back(topic.name + ": " + std::to_string(topic.not_numbers) + " of " +
+                                std::to_string(topic.messages) +
+                                " messages measure no numbers (NaN)");
     }
   }
 

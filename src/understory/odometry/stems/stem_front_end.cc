@@ -152,7 +152,7 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const Im
 
   StemScan result;
   const double since = last_ ? to_seconds(scan.stamp - last_->stamp) : 0.0;
-  const bool follows = last_ && since > 0.0 && since < kLongestStep;
+  const bool follows = last_ && since > kShortestStep && since < kLongestStep;
   Guess guess;
   if (follows) {
     result.expected = last_->world_from_body * Pose::exp(since * motion_per_s_);

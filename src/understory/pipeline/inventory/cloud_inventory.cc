@@ -12,6 +12,7 @@
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/inventory/lidar_view.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
+#include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/recording/finding.h"
@@ -36,14 +37,8 @@ void judge(const InventoryResult& inventory, const Log& log, RunDocuments& docum
   if (const Found damage = found(log, Finding::kDamage); damage.count > 0)
     documents.lower(RunStatus::kPartial, "the cloud is not whole: " + damage.first);
   if (!inventory.too_sparse) return;
-  if (inventory.trees.empty()) {
-    documents.lower(RunStatus::kUntrusted,
-                    "No stem could be measured: too few points lie near breast height. The list of "
-                    "trees is empty, but the stand need not be.");
-  } else {
-    documents.lower(RunStatus::kPartial,
-                    "Few points lie near breast height: trees are missing from the list.");
-  }
+  const bool any = !inventory.trees.empty();
+  documents.lower(any ? RunStatus::kPartial : RunStatus::kUntrusted, few_points_reason(any));
 }
 
 // A finished inventory and what it was made from.

@@ -20,6 +20,7 @@ SensorEvidence sensor_of(const EventOrderer::StreamReport& stream) {
   sensor.late = stream.late;
   sensor.glitches = stream.glitches;
   sensor.duplicates = stream.duplicates;
+  sensor.stamp_taken = stream.stamp_taken;
   sensor.reordered = stream.reordered;
   sensor.clock_jumps = stream.clock_jumps;
   sensor.unused_s = to_seconds(stream.unused);
@@ -31,9 +32,26 @@ SensorEvidence sensor_of(const EventOrderer::StreamReport& stream) {
 // A topic that has this role, or null.
 const TopicReport* topic_of(const std::vector<TopicReport>& topics, const std::string& role) {
   const auto found = std::find_if(topics.begin(), topics.end(), [&](const TopicReport& topic) {
-    return topic.role == role && topic.messages > 0;
+    return topic.role == role && topic.messages + topic.unreadable > 0;
   });
   return found == topics.end() ? nullptr : &*found;
+}
+
+// How long the sensors of a recording went on after each other's last message.
+void compare_ends(const EventOrderer::Report& report, const std::vector<TopicReport>& topics,
+                  RunEvidence& evidence) {
+  for (std::size_t s = 0; s < kSensorRoles.size(); ++s) {
+    if (report.streams[s].newest == 0) continue;
+    SensorEvidence& sensor = evidence.*kSensorRoles[s].evidence;
+    for (std::size_t other = 0; other < kSensorRoles.size(); ++other) {
+      const TopicReport* topic = topic_of(topics, kSensorRoles[other].name);
+      if (topic != nullptr && topic->beside) continue;
+      const double longer_s = to_seconds(report.streams[other].newest - report.streams[s].newest);
+      if (longer_s <= sensor.silent_at_end_s) continue;
+      sensor.silent_at_end_s = longer_s;
+      sensor.outlived_by = kSensorRoles[other].words;
+    }
+  }
 }
 
 // When the messages of a topic begin and end, by the mended clock of its stream.
@@ -111,9 +129,13 @@ void gather_reading(const ReadingFacts& facts, RunEvidence& evidence) {
     SensorEvidence& sensor = evidence.*kSensorRoles[s].evidence;
     sensor = sensor_of(facts.time_repair->streams[s]);
     const TopicReport* topic = topic_of(topics, kSensorRoles[s].name);
-    if (topic != nullptr) sensor.unreadable = topic->unreadable;
+    if (topic != nullptr) {
+      sensor.unreadable = topic->unreadable;
+      sensor.not_numbers = topic->not_numbers;
+    }
     sensor.unused_why = why_unused(sensor);
   }
+  compare_ends(*facts.time_repair, topics, evidence);
   if (facts.imu_wanted) {
     evidence.imu.unused_s =
         std::max(evidence.imu.unused_s, to_seconds(facts.imu_usage.without_place())) +

@@ -99,6 +99,43 @@ TEST(EvidenceGathering, SamplesThatCannotBeUsedHaveNoSay) {
   EXPECT_EQ(evidence.imu.unused_s, 0.0);
 }
 
+TEST(EvidenceGathering, WhatTheReadersCouldNotUse) {
+  TopicReport imu = topic("imu", 100.0, 160.0);
+  imu.not_numbers = 7;
+  TopicReport fixes = topic("gnss", 0.0, 0.0);
+  fixes.messages = 0;  // rows of a table of which none can be read
+  fixes.unreadable = 5;
+  const ReadRecording recording({topic("lidar", 100.0, 160.0), imu, fixes});
+  const EventOrderer::Report repair;
+  const Log log;
+  RunEvidence evidence;
+  gather_reading(facts_of(recording, repair, log), evidence);
+  EXPECT_EQ(evidence.imu.not_numbers, 7U);
+  EXPECT_EQ(evidence.gnss.unreadable, 5U);
+}
+
+TEST(EvidenceGathering, WhoWentOnAfterWhom) {
+  const ReadRecording recording({topic("lidar", 100.0, 160.0)});
+  EventOrderer::Report repair;
+  repair.streams[EventOrderer::kLidar].newest = from_seconds(157.0);
+  repair.streams[EventOrderer::kImu].newest = from_seconds(159.0);
+  repair.streams[EventOrderer::kGnss].newest = from_seconds(160.0);
+  const Log log;
+  RunEvidence evidence;
+  gather_reading(facts_of(recording, repair, log), evidence);
+  EXPECT_DOUBLE_EQ(evidence.lidar.silent_at_end_s, 3.0);
+  EXPECT_EQ(evidence.lidar.outlived_by, "GNSS");
+  EXPECT_DOUBLE_EQ(evidence.imu.silent_at_end_s, 1.0);
+  EXPECT_DOUBLE_EQ(evidence.gnss.silent_at_end_s, 0.0);
+  EXPECT_DOUBLE_EQ(evidence.mag.silent_at_end_s, 0.0);  // there is none
+  TopicReport log_beside = topic("gnss", 90.0, 1000.0);
+  log_beside.beside = true;
+  const ReadRecording folder({topic("lidar", 100.0, 160.0), log_beside});
+  RunEvidence of_folder;
+  gather_reading(facts_of(folder, repair, log), of_folder);
+  EXPECT_EQ(of_folder.lidar.outlived_by, "IMU");
+}
+
 TEST(EvidenceGathering, FindingsOfTheReaders) {
   const ReadRecording recording({topic("lidar", 100.0, 160.0)});
   const EventOrderer::Report repair;

@@ -20,9 +20,10 @@ TimeNs first_of(const Recording& source, const std::string& role, TimeNs otherwi
 void remark_on_imu(const LastStamps& last, const Recording& source,
                    const EventOrderer::Report& repair, const std::string& name, Log& log) {
   if (!last.imu) {
+    const bool numb = unusable_messages(source, "imu") > 0;
     log.warn("imu.none",
-             name +
-                 ": no IMU: positions come from the scans alone, and the vertical is that of the "
+             name + (numb ? ": no sample of the IMU can be used" : ": no IMU") +
+                 ": positions come from the scans alone, and the vertical is that of the "
                  "scanner at the first scan");
     return;
   }

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "understory/pipeline/judgement/scan_content.h"
+#include "understory/sensor/scan_content.h"
 
 namespace understory {
 namespace {

@@ -12,13 +12,16 @@ void put(Figures& figures, const std::string& name, std::uint64_t value) {
 void put_sensor(Figures& figures, const std::string& name, const SensorEvidence& sensor) {
   put(figures, name + "_received", sensor.received);
   put(figures, name + "_unreadable", sensor.unreadable);
+  put(figures, name + "_not_numbers", sensor.not_numbers);
   put(figures, name + "_late", sensor.late);
   put(figures, name + "_glitches", sensor.glitches);
   put(figures, name + "_duplicates", sensor.duplicates);
+  put(figures, name + "_stamp_taken", sensor.stamp_taken);
   put(figures, name + "_reordered", sensor.reordered);
   put(figures, name + "_clock_jumps", sensor.clock_jumps);
   figures[name + "_longest_gap_s"] = sensor.longest_gap_s;
   figures[name + "_unused_s"] = sensor.unused_s;
+  figures[name + "_silent_at_end_s"] = sensor.silent_at_end_s;
 }
 
 void put_motion(Figures& figures, const MotionEvidence& motion) {
@@ -60,6 +63,11 @@ void put_stems(Figures& figures, const StemRunEvidence& stems) {
   figures["loops_solved"] = stems.loops_solved;
 }
 
+void put_stand(Figures& figures, const StandEvidence& stand) {
+  figures["few_points_near_breast"] = stand.few_near_breast;
+  figures["map_upright"] = stand.not_upright.empty();
+}
+
 }  // namespace
 
 Figures figures_of(const RunEvidence& evidence) {
@@ -81,6 +89,7 @@ Figures figures_of(const RunEvidence& evidence) {
   figures["imu_motion_windows"] = std::int64_t{evidence.imu_motion_windows};
   put_motion(figures, evidence.motion);
   put_match(figures, evidence.match);
+  if (!evidence.by_stems) put_stand(figures, evidence.stand);
   if (evidence.by_stems) put_stems(figures, evidence.stems);
   return figures;
 }

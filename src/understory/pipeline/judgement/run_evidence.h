@@ -14,9 +14,11 @@ namespace understory {
 struct SensorEvidence {
   std::uint64_t received = 0;     // messages that could be decoded
   std::uint64_t unreadable = 0;   // messages that could not
+  std::uint64_t not_numbers = 0;  // messages that measure NaN or infinity, dropped
   std::uint64_t late = 0;         // too late to be put in order, dropped
   std::uint64_t glitches = 0;     // stamps far off, dropped
-  std::uint64_t duplicates = 0;   // the same stamp again, dropped
+  std::uint64_t duplicates = 0;   // recorded twice: same stamp, same content; dropped
+  std::uint64_t stamp_taken = 0;  // the stamp of another message, other content; dropped
   std::uint64_t reordered = 0;    // put in order
   std::uint64_t clock_jumps = 0;  // stamps shifted from there on
   double longest_gap_s = 0.0;
@@ -25,6 +27,9 @@ struct SensorEvidence {
   // was silent, or was not used; and why, in words.
   double unused_s = 0.0;
   std::string unused_why;
+  // How long another sensor went on after the last message of this one, and which, in words.
+  double silent_at_end_s = 0.0;
+  std::string outlived_by;
 };
 
 // How the carrier moved by the finished path.
@@ -83,6 +88,13 @@ struct StemRunEvidence {
   std::string loops_reason;
 };
 
+// Whether the finished map can be the ground for a list of trees. Without a map it says nothing.
+struct StandEvidence {
+  std::uint64_t trees = 0;
+  bool few_near_breast = false;  // too few points near breast height to see stems reliably
+  std::string not_upright;       // why z of the map is not up, in words; empty: nothing says so
+};
+
 // Everything that the judgement of a run rests on: numbers, and words only to say where. Filled by
 // evidence_gathering.h, judged by run_judgement.h, written to run.json as `evidence`.
 struct RunEvidence {
@@ -117,17 +129,20 @@ struct RunEvidence {
   MotionEvidence motion;
   MatchEvidence match;
   StemRunEvidence stems;
+  StandEvidence stand;
 };
 
 // The sensors by the names of their roles, in the order of EventOrderer's streams.
 struct SensorRole {
-  const char* name;
+  const char* name;   // in files
+  const char* words;  // in messages
   SensorEvidence RunEvidence::*evidence;
 };
-inline constexpr std::array<SensorRole, 4> kSensorRoles = {{{"lidar", &RunEvidence::lidar},
-                                                            {"imu", &RunEvidence::imu},
-                                                            {"gnss", &RunEvidence::gnss},
-                                                            {"mag", &RunEvidence::mag}}};
+inline constexpr std::array<SensorRole, 4> kSensorRoles = {
+    {{"lidar", "lidar", &RunEvidence::lidar},
+     {"imu", "IMU", &RunEvidence::imu},
+     {"gnss", "GNSS", &RunEvidence::gnss},
+     {"mag", "magnetometer", &RunEvidence::mag}}};
 
 // For run.json: the numbers by name, sensors before their figures ("lidar_late").
 [[nodiscard]] std::map<std::string, Figure> figures_of(const RunEvidence& evidence);

@@ -33,6 +33,7 @@ class Judge {
     judge_ending();
     judge_unused_scans();
     judge_unused_sensors();
+    judge_lidar_end();
     judge_damage();
     judge_times();
     judge_scan_motion();
@@ -44,6 +45,7 @@ class Judge {
     judge_course();
     judge_outages();
     judge_stems();
+    judge_stand();
     return judgement();
   }
 
@@ -65,35 +67,78 @@ class Judge {
     }
   }
 
+  // Counts and what they count, in words; those of nothing are left out.
+  using Parts = std::vector<std::pair<std::uint64_t, const char*>>;
+  static std::string text_of(const Parts& parts) {
+    std::string text;
+    for (const auto& [count, what] : parts) {
+      if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, what);
+    }
+    return text;
+  }
+  static std::uint64_t sum_of(const Parts& parts) {
+    std::uint64_t sum = 0;
+    for (const auto& part : parts)
+      sum += part.first;
+    return sum;
+  }
+
+  [[nodiscard]] Parts unused_scans() const {
+    const SensorEvidence& lidar = evidence_.lidar;
+    return {{evidence_.dropped_scans, "dropped because the machine could not keep up"},
+            {lidar.unreadable, "unreadable"},
+            {lidar.late, "too late to be put in order"},
+            {lidar.glitches, "with a stamp far off"},
+            {lidar.stamp_taken,
+             "with the stamp of another scan (the clock of the lidar or its driver stands still)"}};
+  }
+  [[nodiscard]] double unused_share() const { return share(sum_of(unused_scans()), sent_scans()); }
+  [[nodiscard]] std::uint64_t sent_scans() const {
+    return evidence_.dropped_scans + evidence_.lidar.received + evidence_.lidar.unreadable;
+  }
+
   // Of all that the lidar sent, what never reached the map.
   void judge_unused_scans() {
-    const SensorEvidence& lidar = evidence_.lidar;
-    const std::uint64_t all = evidence_.dropped_scans + lidar.received + lidar.unreadable;
-    const std::uint64_t unused =
-        evidence_.dropped_scans + lidar.unreadable + lidar.late + lidar.glitches;
-    if (share(unused, all) <= config_.max_unused_scans) return;
-    std::string parts;
-    const std::array<std::pair<std::uint64_t, const char*>, 4> kinds = {
-        {{evidence_.dropped_scans, "dropped because the machine could not keep up"},
-         {lidar.unreadable, "unreadable"},
-         {lidar.late, "too late to be put in order"},
-         {lidar.glitches, "with a stamp far off"}}};
-    for (const auto& [count, what] : kinds) {
-      if (count == 0) continue;
-      parts += fmt::format("{}{} {}", parts.empty() ? "" : ", ", count, what);
-    }
-    missing(fmt::format("{} of {} scans ({:.1f} %) are not in the map: {}", unused, all,
-                        percent(unused, all), parts));
+    if (unused_share() <= config_.max_unused_scans) return;
+    const std::uint64_t unused = sum_of(unused_scans());
+    missing(fmt::format("{} of {} scans ({:.1f} %) are not in the map: {}", unused, sent_scans(),
+                        percent(unused, sent_scans()), text_of(unused_scans())));
   }
 
   void judge_unused_sensors() {
-    const std::array<std::pair<const char*, const SensorEvidence*>, 3> sensors = {
-        {{"IMU", &evidence_.imu}, {"GNSS", &evidence_.gnss}, {"magnetometer", &evidence_.mag}}};
-    for (const auto& [name, sensor] : sensors) {
-      if (sensor->unused_s <= config_.max_unused_s) continue;
-      missing(fmt::format("the {} was not used for {:.1f} s: {}", name, sensor->unused_s,
-                          sensor->unused_why));
+    for (const SensorRole& role : kSensorRoles) {
+      if (role.evidence == &RunEvidence::lidar) continue;
+      const SensorEvidence& sensor = evidence_.*role.evidence;
+      if (sensor.unused_s > config_.max_unused_s) {
+        missing(fmt::format("the {} was not used for {:.1f} s: {}", role.words, sensor.unused_s,
+                            sensor.unused_why));
+      }
+      judge_unused_messages(role.words, sensor);
     }
+  }
+
+  // Messages that have no say, whatever time they stand for.
+  void judge_unused_messages(const char* name, const SensorEvidence& sensor) {
+    const Parts parts = {{sensor.unreadable, "unreadable"},
+                         {sensor.not_numbers, "not numbers (NaN)"},
+                         {sensor.stamp_taken,
+                          "with the stamp of another message (the sensor's clock stands still)"}};
+    const std::uint64_t unused = sum_of(parts);
+    const std::uint64_t all = sensor.received + sensor.unreadable + sensor.not_numbers;
+    if (share(unused, all) <= config_.max_unused_scans) return;
+    missing(fmt::format("{} of {} messages of the {} ({:.1f} %) were not used: {}", unused, all,
+                        name, percent(unused, all), text_of(parts)));
+  }
+
+  // The lidar stopped, and the others went on. Scans that were dropped have their own reason.
+  void judge_lidar_end() {
+    const SensorEvidence& lidar = evidence_.lidar;
+    if (unused_share() > config_.max_unused_scans) return;
+    if (evidence_.stopped || lidar.silent_at_end_s <= config_.max_unused_s) return;
+    missing(fmt::format(
+        "the lidar stopped {:.1f} s before the {}: what the carrier passed after that is not in "
+        "the map",
+        lidar.silent_at_end_s, lidar.outlived_by));
   }
 
   void judge_damage() {
@@ -247,8 +292,11 @@ class Judge {
                             "give --rate-hz or times.txt"
                           : ""));
     }
-    if (share(empty, match.scans) > config_.max_empty) {
-      hurt(fmt::format("{} of {} scans had hardly any usable point", empty, match.scans));
+    if (share(empty, match.scans) > config_.max_unused_scans) {
+      std::string few =
+          fmt::format("{} of {} scans had hardly any usable point", empty, match.scans);
+      share(empty, match.scans) > config_.max_empty ? hurt(std::move(few))
+                                                    : missing(std::move(few));
     }
     if (match.segments > 1) {
       hurt(
@@ -319,6 +367,16 @@ class Judge {
     }
   }
 
+  void judge_stand() {
+    const StandEvidence& stand = evidence_.stand;
+    if (!stand.not_upright.empty()) {
+      hurt("the map does not stand upright: " + stand.not_upright +
+           ". Without an IMU its vertical is that of the scanner at the first scan: record the "
+           "IMU, or bring the map upright with `understory inventory --up`");
+    }
+    if (stand.few_near_breast) missing(few_points_reason(stand.trees > 0));
+  }
+
   RunJudgement judgement() {
     RunJudgement judgement;
     if (!missing_.empty()) judgement.status = RunStatus::kPartial;
@@ -340,9 +398,9 @@ void describe(ConfigTable& table, JudgementConfig& config) {
   const ConfigTable::Range shares{0.0, 1.0};
   const ConfigTable::Range seconds{0.0, 1e6};
   table.add("max_unused_scans", config.max_unused_scans, shares, "",
-            "partial: a larger share of scans was dropped, late, unreadable or far off in time");
+            "partial: a larger share of the scans, or of another sensor's messages, was not used");
   table.add("max_unused_s", config.max_unused_s, seconds, "s",
-            "partial: another sensor was not used for longer");
+            "partial: another sensor was not used, or outlasted the lidar, for longer");
   table.add("max_unmatched", config.max_unmatched, shares, "",
             "untrusted: a larger share of the scans could not be matched");
   table.add("max_empty", config.max_empty, shares, "",
@@ -395,6 +453,12 @@ void describe(ConfigTable& table, JudgementConfig& config) {
             "untrusted: all ranges seem to be too long or too short by more");
   table.add("min_range_pairs", config.min_range_pairs, {1, 1000000}, "pairs",
             "with fewer pairs of views the ranges are not judged");
+}
+
+std::string few_points_reason(bool any_trees) {
+  return any_trees ? "few points lie near breast height: trees are missing from the list"
+                   : "no stem could be measured, as too few points lie near breast height: the "
+                     "list of trees is empty, but the stand need not be";
 }
 
 double smear_of(const Pose& step) {

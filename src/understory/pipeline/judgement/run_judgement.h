@@ -15,8 +15,8 @@ namespace understory {
 // `./run accuracy --spoilt --fit` shows what good and wrong maps have of each number.
 struct JudgementConfig {
   // Partial: what was not used.
-  double max_unused_scans = 0.01;  // share of the scans
-  double max_unused_s = 1.0;       // of any other sensor
+  double max_unused_scans = 0.01;  // share of the scans, and of the messages of any other sensor
+  double max_unused_s = 1.0;       // of any other sensor; of the lidar when the others end
   // Untrusted. A prediction bridges a scan or two without harm; beyond these shares the map has
   // weak places.
   double max_unmatched = 0.02;
@@ -68,6 +68,9 @@ struct RunJudgement {
 // is cut off, scans were dropped, a sensor was not used). Untrusted, whatever is missing: something
 // hurt the result.
 [[nodiscard]] RunJudgement judge_run(const RunEvidence& evidence, const JudgementConfig& config);
+
+// What a list of trees lacks where too few points lie near breast height, for the user.
+[[nodiscard]] std::string few_points_reason(bool any_trees);
 
 // How far a point 10 m away moves against the sensor on that step from scan to scan, metres.
 [[nodiscard]] double smear_of(const Pose& step);

@@ -61,7 +61,7 @@ void expect_limit(Owner RunEvidence::*owner, Value Owner::*figure, Value limit, 
 TEST(RunJudgement, AGoodRunIsComplete) {
   expect_complete(good_run());
   RunEvidence mended = good_run();
-  mended.lidar.duplicates = 500;
+  mended.lidar.duplicates = 500;  // recorded twice, and the content is known to be the same
   mended.lidar.reordered = 500;
   mended.lidar.clock_jumps = 3;
   mended.times_assumed = true;
@@ -87,6 +87,59 @@ TEST(RunJudgement, ScansWithoutASay) {
   expect(RunStatus::kPartial, "11 with a stamp far off", with(0, 0, 0, 11));
   expect_complete(with(3, 3, 2, 2));
   expect(RunStatus::kPartial, "12 of 1006 scans (1.2 %) are not in the map", with(3, 3, 3, 3));
+}
+
+// A regression: scans of a clock that stands still passed for messages recorded twice.
+TEST(RunJudgement, AClockThatStandsStill) {
+  expect_limit<SensorEvidence, std::uint64_t>(&RunEvidence::lidar, &SensorEvidence::stamp_taken, 10,
+                                              11, RunStatus::kPartial,
+                                              "11 with the stamp of another scan");
+  expect_limit<SensorEvidence, std::uint64_t>(
+      &RunEvidence::imu, &SensorEvidence::stamp_taken, 200, 201, RunStatus::kPartial,
+      "201 of 20000 messages of the IMU (1.0 %) were not used: 201 with the stamp of another");
+}
+
+// A regression: an IMU that sends NaN was no reason.
+TEST(RunJudgement, MessagesThatAreNoNumbers) {
+  RunEvidence evidence = good_run();
+  evidence.imu.received = 0;
+  evidence.imu.not_numbers = 20'000;
+  evidence.imu_used = false;
+  expect(RunStatus::kPartial,
+         "20000 of 20000 messages of the IMU (100.0 %) were not used: 20000 not numbers (NaN)",
+         evidence);
+  evidence = good_run();
+  evidence.gnss.received = 98;
+  evidence.gnss.unreadable = 1;
+  expect(RunStatus::kPartial, "1 of 99 messages of the GNSS", evidence);
+}
+
+// A regression: the run was complete, though the lidar had died long before its recording ended.
+TEST(RunJudgement, ALidarThatStopsBeforeTheOthers) {
+  RunEvidence evidence = good_run();
+  evidence.lidar.outlived_by = "IMU";
+  evidence.lidar.silent_at_end_s = 1.0;
+  expect_complete(evidence);
+  evidence.lidar.silent_at_end_s = 2.9;
+  expect(RunStatus::kPartial, "the lidar stopped 2.9 s before the IMU", evidence);
+  evidence.lidar.stamp_taken = 500;  // it went on, and its scans could not be used
+  expect(RunStatus::kPartial, "with the stamp of another scan", evidence);
+  RunEvidence stopped = good_run();
+  stopped.stopped = true;
+  stopped.lidar.silent_at_end_s = 2.9;
+  expect(RunStatus::kPartial, "stopped by the user", stopped);
+}
+
+TEST(RunJudgement, AMapThatIsNoGroundForAListOfTrees) {
+  RunEvidence evidence = good_run();
+  evidence.stand.trees = 20;
+  expect_complete(evidence);
+  evidence.stand.few_near_breast = true;
+  expect(RunStatus::kPartial, "trees are missing from the list", evidence);
+  evidence.stand.trees = 0;
+  expect(RunStatus::kPartial, "the list of trees is empty", evidence);
+  evidence.stand = {20, false, "z is not up"};
+  expect(RunStatus::kUntrusted, "the map does not stand upright: z is not up", evidence);
 }
 
 TEST(RunJudgement, SensorsWithoutASay) {
@@ -131,8 +184,13 @@ TEST(RunJudgement, Matches) {
   expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::unmatched, 20, 21,
                                              kUntrusted,
                                              "21 of 1000 scans (2.1 %) could not be matched");
-  expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::empty, 100, 101,
-                                             kUntrusted, "hardly any usable point");
+  expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::empty, 10, 11,
+                                             RunStatus::kPartial, "hardly any usable point");
+  RunEvidence covered = good_run();
+  covered.match.empty = 100;
+  expect(RunStatus::kPartial, "100 of 1000 scans had hardly any usable point", covered);
+  covered.match.empty = 101;
+  expect(kUntrusted, "101 of 1000 scans had hardly any usable point", covered);
   expect_limit<MatchEvidence, std::uint64_t>(&RunEvidence::match, &MatchEvidence::repeated, 10, 11,
                                              kUntrusted, "hold the same points as the scan before");
   expect_limit<MotionEvidence, std::uint64_t>(&RunEvidence::motion, &MotionEvidence::impossible, 9,

@@ -73,6 +73,8 @@ void suit_scans_alone(const DenseMappingConfig& config, const SensorTraits& trai
   double when_s = 0.0;
   if (!config.odometry.imu_enabled) {
     why = "the IMU is switched off";
+  } else if (traits.imu_is_numb) {
+    why = "the IMU's samples are not numbers";
   } else if (!traits.has_imu) {
     why = "no IMU whose place is known";
   } else if (!conditions.imu_refused.empty() || conditions.imu_doubted) {

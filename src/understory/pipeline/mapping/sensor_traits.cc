@@ -56,10 +56,12 @@ double median_period_s(const std::vector<TimeNs>& stamps) {
 std::unique_ptr<Recording> learn_traits(std::unique_ptr<Recording> source, SensorTraits& traits) {
   std::deque<Event> events;
   ScansSeen seen;
+  std::size_t samples = 0;
   while (!seen.enough() && events.size() < kMostEvents) {
     std::optional<Event> event = source->next();
     if (!event) break;
     if (const auto* scan = std::get_if<ScanPtr>(&*event)) seen.add(**scan);
+    samples += std::holds_alternative<ImuSample>(*event) ? 1 : 0;
     events.push_back(std::move(*event));
   }
   const Rig& rig = source->rig();
@@ -68,7 +70,8 @@ std::unique_ptr<Recording> learn_traits(std::unique_ptr<Recording> source, Senso
   traits.rings = seen.rings;
   traits.period_s = median_period_s(seen.stamps);
   if (!seen.stamps.empty()) traits.first_scan = seen.stamps.front();
-  traits.has_imu = rig.body_from_imu.has_value();
+  traits.imu_is_numb = samples == 0 && unusable_messages(*source, "imu") > 0;
+  traits.has_imu = rig.body_from_imu.has_value() && !traits.imu_is_numb;
   traits.lidar_in_body = rig.body_from_lidar.translation();
   return std::make_unique<ReadAhead>(std::move(source), std::move(events));
 }
@@ -79,6 +82,7 @@ std::string to_string(const SensorTraits& traits) {
   text += fmt::format("{} points a scan", traits.scan_points);
   if (traits.rings > 0) text += fmt::format(", {} rings", traits.rings);
   if (traits.period_s > 0.0) text += fmt::format(", {:.1f} scans a second", 1.0 / traits.period_s);
+  if (traits.imu_is_numb) return text + "; an IMU whose samples are not numbers";
   return text + (traits.has_imu ? "; with an IMU" : "; no IMU whose place is known");
 }
 
@@ -88,6 +92,7 @@ void put_traits(BinaryWriter& writer, const SensorTraits& traits) {
   writer.put(traits.period_s);
   writer.put(traits.first_scan);
   writer.put(traits.has_imu);
+  writer.put(traits.imu_is_numb);
   writer.put_doubles(traits.lidar_in_body.data(), 3);
 }
 
@@ -98,6 +103,7 @@ SensorTraits get_traits(BinaryReader& reader) {
   traits.period_s = reader.get<double>();
   traits.first_scan = reader.get<TimeNs>();
   traits.has_imu = reader.get<bool>();
+  traits.imu_is_numb = reader.get<bool>();
   reader.get_doubles(traits.lidar_in_body.data(), 3);
   return traits;
 }

@@ -18,7 +18,8 @@ struct SensorTraits {
   int rings = 0;                  // beams of the lidar; 0: unknown
   double period_s = 0.0;          // from scan to scan, median; 0: unknown
   TimeNs first_scan = 0;          // stamp
-  bool has_imu = false;           // one whose place on the carrier is known
+  bool has_imu = false;           // one whose place on the carrier is known, and that measures
+  bool imu_is_numb = false;       // there is one, and none of its first samples is a number
   Eigen::Vector3d lidar_in_body = Eigen::Vector3d::Zero();  // m
 };
 // One line for people: "lidar: 29184 points a scan, 16 rings, 10.0 scans a second; with an IMU".

@@ -72,6 +72,40 @@ TEST(SensorTraits, TellWhatTheSensorsAre) {
             "lidar: 29100 points a scan, 16 rings, 10.0 scans a second; with an IMU");
 }
 
+// Scans, and an IMU whose samples the reader drops.
+class ScansBesideNoNumbers : public ScansOf {
+ public:
+  using ScansOf::ScansOf;
+  std::optional<Event> next() override {
+    std::optional<Event> event = ScansOf::next();
+    while (event && std::holds_alternative<ImuSample>(*event)) {
+      ++dropped_;
+      event = ScansOf::next();
+    }
+    return event;
+  }
+  std::vector<TopicReport> topics() const override {
+    TopicReport imu;
+    imu.role = "imu";
+    imu.messages = imu.not_numbers = dropped_;
+    return {imu};
+  }
+
+ private:
+  std::uint64_t dropped_ = 0;
+};
+
+// A regression: such a run took the settings of one with an IMU and was worse than without.
+TEST(SensorTraits, AnImuThatSendsNoNumbersIsNone) {
+  SensorTraits traits;
+  static_cast<void>(learn_traits(
+      std::make_unique<ScansBesideNoNumbers>(std::vector<std::size_t>(5, 29'000)), traits));
+  EXPECT_FALSE(traits.has_imu);
+  EXPECT_TRUE(traits.imu_is_numb);
+  EXPECT_NE(to_string(traits).find("an IMU whose samples are not numbers"), std::string::npos);
+  EXPECT_FALSE(traits_of({29'000, 29'000}).imu_is_numb);
+}
+
 TEST(SensorTraits, WhatIsLookedAtIsStillThere) {
   const std::vector<std::size_t> sizes(15, 2'000);
   SensorTraits traits;

@@ -179,8 +179,12 @@ class CloudFolder : public Recording {
   const Rig& rig() const override { return rig_; }
   std::vector<TopicReport> topics() const override {
     std::vector<TopicReport> reports{lidar_.report()};
-    if (imu_) reports.push_back(imu_statistics_.report());
+    if (imu_) {
+      reports.push_back(imu_statistics_.report());
+      reports.back().unreadable = imu_->unreadable();
+    }
     if (fixes_ || nmea_) reports.push_back(fix_statistics_.report());
+    if (fixes_) reports.back().unreadable = fixes_->unreadable();
     return reports;
   }
   std::string format() const override {
@@ -299,6 +303,7 @@ class CloudFolder : public Recording {
     report.type = type;
     report.role = role;
     report.conventions = conventions;
+    report.beside = role == "gnss";
     return TopicStatistics(report);
   }
 
@@ -329,15 +334,14 @@ class CloudFolder : public Recording {
     return nmea_ ? nmea_->next() : std::nullopt;
   }
 
-  // The next cloud that can be read.
+  // The next cloud that can be read; it may hold no point, as a scan of a recording may.
   ScanPtr next_scan() {
     while (next_cloud_ < names_.size()) {
       const std::size_t i = next_cloud_++;
       try {
-        if (ScanPtr scan = read_scan(i)) {
-          any_scan_ = true;
-          return scan;
-        }
+        ScanPtr scan = read_scan(i);
+        any_scan_ |= !scan->points.empty();
+        return scan;
       } catch (const ReadError&) {
         throw;
       } catch (const InputError& error) {
@@ -368,7 +372,6 @@ class CloudFolder : public Recording {
     }
     if (converted.scan->points.empty()) {
       log_.warn("recording.empty_cloud", path(i) + ": holds no point");
-      return nullptr;
     }
     return converted.scan;
   }

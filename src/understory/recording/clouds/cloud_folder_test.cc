@@ -156,6 +156,23 @@ TEST(CloudFolder, GoesOnBehindACloudThatCannotBeRead) {
   EXPECT_EQ(test::count_of(log, "recording.other_clouds"), 1U);
 }
 
+// A regression: clouds of NaN were passed over, and the run knew nothing of them.
+TEST(CloudFolder, ACloudWithoutPointsIsAScanWithoutPoints) {
+  const test::TemporaryFolder folder;
+  const std::string header =
+      "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\n"
+      "HEIGHT 1\nPOINTS 2\nDATA ascii\n";
+  write_text(folder / "000000.pcd", header + "1 2 3\n4 5 6\n");
+  write_text(folder / "000001.pcd", header + "nan 2 3\nnan nan nan\n");
+  write_text(folder / "000002.pcd", header + "3 2 1\n6 5 4\n");
+  Log log;
+  const auto events = test::read_all(*open_cloud_folder(folder / "", {}, log));
+  ASSERT_EQ(events.size(), 3U);
+  EXPECT_EQ(std::get<ScanPtr>(events[1])->stamp, 100'000'000);
+  EXPECT_TRUE(std::get<ScanPtr>(events[1])->points.empty());
+  EXPECT_EQ(test::count_of(log, "recording.empty_cloud"), 1U);
+}
+
 TEST(CloudFolder, RefusesWhatHasNoUsableCloud) {
   const test::TemporaryFolder folder;
   Log log;

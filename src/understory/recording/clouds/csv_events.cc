@@ -41,6 +41,7 @@ std::optional<TimeNs> EventRows::time(std::size_t column) const {
 }
 
 void EventRows::damaged(const std::string& what) {
+  ++unreadable_;
   log_.warn("recording.damaged_line",
             table_.lines().file() + ": " + table_.lines().position() + ": " + what);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -36,12 +37,21 @@ class EventRows {
   // seconds.
   [[nodiscard]] std::optional<TimeNs> time(std::size_t column) const;
   void damaged(const std::string& what);
+  // Rows passed over so far.
+  [[nodiscard]] std::uint64_t unreadable() const { return unreadable_; }
   // Which rows have been read, and back to there.
-  void save(BinaryWriter& writer) const { table_.save(writer); }
-  void load(BinaryReader& reader) { table_.load(reader); }
+  void save(BinaryWriter& writer) const {
+    table_.save(writer);
+    writer.put(unreadable_);
+  }
+  void load(BinaryReader& reader) {
+    table_.load(reader);
+    unreadable_ = reader.get<std::uint64_t>();
+  }
 
  private:
   Log& log_;
+  std::uint64_t unreadable_ = 0;
   CsvReader table_;
 };
 
@@ -50,6 +60,7 @@ class CsvImuReader {
  public:
   CsvImuReader(const std::filesystem::path& path, Log& log);
   [[nodiscard]] std::optional<ImuSample> next();
+  [[nodiscard]] std::uint64_t unreadable() const { return rows_.unreadable(); }
   void save(BinaryWriter& writer) const { rows_.save(writer); }
   void load(BinaryReader& reader) { rows_.load(reader); }
 
@@ -66,6 +77,7 @@ class CsvGnssReader {
  public:
   CsvGnssReader(const std::filesystem::path& path, Log& log);
   [[nodiscard]] std::optional<GnssFix> next();
+  [[nodiscard]] std::uint64_t unreadable() const { return rows_.unreadable(); }
   void save(BinaryWriter& writer) const { rows_.save(writer); }
   void load(BinaryReader& reader) { rows_.load(reader); }
 

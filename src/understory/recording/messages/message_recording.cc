@@ -402,6 +402,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     note_frame(frames_.imu, imu->header.frame);
     topic.report().conventions = imu_text_ + (imu->sample.orientation ? "; with orientation" : "");
     if (!imu->sample.specific_force.allFinite() || !imu->sample.angular_rate.allFinite()) {
+      ++topic.report().not_numbers;
       log_.warn("imu.not_finite", file_ + ": " + topic.report().name + ": a sample at " +
                                       format_seconds(imu->sample.stamp) +
                                       " is not finite; dropped");
@@ -433,7 +434,11 @@ class MessageRecording : public Recording, public ArrivalTimes {
     topic.add_stamp(mag->sample.stamp);
     topic.report().frame = mag->header.frame;
     topic.report().conventions = "tesla";
-    if (mag->sample.field.allFinite()) events_.emplace_back(mag->sample);
+    if (mag->sample.field.allFinite()) {
+      events_.emplace_back(mag->sample);
+    } else {
+      ++topic.report().not_numbers;
+    }
     return true;
   }
 

@@ -34,7 +34,7 @@ class TopicStatistics {
       writer.put(text);
     for (const std::uint64_t count :
          {report_.messages, report_.backward_steps, report_.duplicates, report_.unreadable,
-          report_.left_out, report_.points, report_.empty_points})
+          report_.not_numbers, report_.left_out, report_.points, report_.empty_points})
       writer.put(count);
     for (const TimeNs time :
          {report_.first_stamp, report_.last_stamp, report_.longest_gap, previous_})
@@ -46,7 +46,7 @@ class TopicStatistics {
       *text = reader.get_string();
     for (std::uint64_t* count :
          {&report_.messages, &report_.backward_steps, &report_.duplicates, &report_.unreadable,
-          &report_.left_out, &report_.points, &report_.empty_points})
+          &report_.not_numbers, &report_.left_out, &report_.points, &report_.empty_points})
       *count = reader.get<std::uint64_t>();
     for (TimeNs* time :
          {&report_.first_stamp, &report_.last_stamp, &report_.longest_gap, &previous_})

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "understory/pipeline/judgement/scan_content.h"
+#include "understory/sensor/scan_content.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -83,6 +83,7 @@ void DenseFrontEnd::take(const Event& event, const Rig& rig) {
       opening_->events.push_back(event);
       opening_->before = received_;
       rig_ = rig;
+      if (without_samples()) rig_.body_from_imu.reset();
       start_anew();
     }
     on_scan(**scan);
@@ -100,13 +101,18 @@ void DenseFrontEnd::take_sample(const ImuSample& sample) {
   if (started()) odometry_->add_imu(sample);
 }
 
+// An IMU that sends no numbers is as none until it does.
+bool DenseFrontEnd::without_samples() const {
+  return traits_.imu_is_numb && received_.counts.imu_samples == 0;
+}
+
 // A sensor that begins late, or whose place is told late, is used from then on.
 void DenseFrontEnd::complete_rig(const Rig& rig) {
   if (!rig_.body_from_gnss && rig.body_from_gnss) {
     rig_.body_from_gnss = rig.body_from_gnss;
     rig_.gnss_extrinsic_source = rig.gnss_extrinsic_source;
   }
-  if (rig_.body_from_imu || !rig.body_from_imu) return;
+  if (rig_.body_from_imu || !rig.body_from_imu || without_samples()) return;
   rig_.body_from_imu = rig.body_from_imu;
   rig_.imu_extrinsic_source = rig.imu_extrinsic_source;
   const std::vector<ImuSample> recent(received_.imu.begin(), received_.imu.end());

@@ -124,6 +124,7 @@ class DenseFrontEnd : public FrontEnd {
   void load_fixes(const RecordCount& known);
   void make_odometry(const Rig& rig);
   void complete_rig(const Rig& rig);
+  [[nodiscard]] bool without_samples() const;
   void take_sample(const ImuSample& sample);
   void start_anew();
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);

@@ -1,6 +1,7 @@
 // What the dense front end makes of a recording that was read.
 #include <fmt/format.h>
 
+#include "understory/forest/cloud_shape.h"
 #include "understory/pipeline/inventory/lidar_view.h"
 #include "understory/pipeline/judgement/input_remarks.h"
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
@@ -64,6 +65,8 @@ class DenseMap : public MapMaker {
         take_inventory(blocks_of(*made_.tiles), front_end_.config().inventory, recording_.progress,
                        seen_from(view, poses_of(front_end_.map().keyframes())));
     made_.lidar_view = figures_of(view);
+    if (front_end_.counts().imu_samples == 0)
+      made_.not_upright = up_complaint(shape_of(blocks_of(*made_.tiles)));
   }
 
   RunOutcome write() override { return write_dense_results(recording_, front_end_, made_); }

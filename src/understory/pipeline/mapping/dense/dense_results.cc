@@ -209,6 +209,7 @@ void fill_streams(const EventOrderer::Report& time_repair, RunDocuments& documen
     const EventOrderer::StreamReport& stream = time_repair.streams[s];
     const std::string name = kNames[s];
     documents.count(name + "_duplicates", stream.duplicates);
+    documents.count(name + "_stamp_taken", stream.stamp_taken);
     documents.count(name + "_reordered", stream.reordered);
     documents.count(name + "_too_late", stream.late);
     documents.count(name + "_clock_jumps", stream.clock_jumps);
@@ -282,8 +283,10 @@ void check_ranges(DenseFrontEnd& front_end, MatchEvidence& evidence) {
 }
 
 RunEvidence evidence_of(DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
-                        const TrajectoryFacts& trajectory, const Log& log) {
+                        const TrajectoryFacts& trajectory, const DenseProducts& made,
+                        const Log& log) {
   RunEvidence evidence;
+  evidence.stand = {made.inventory.trees.size(), made.inventory.too_sparse, made.not_upright};
   evidence.motion = trajectory.motion;
   evidence.match = trajectory.match;
   check_ranges(front_end, evidence.match);
@@ -368,7 +371,7 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   const TrajectoryFacts trajectory = write_trajectory(folder, front_end, front_end.config());
   write_graph(folder, front_end.map());
   RunDocuments documents = map_documents(recording, front_end.times());
-  documents.judge(evidence_of(front_end, facts, recording.source, trajectory, recording.log),
+  documents.judge(evidence_of(front_end, facts, recording.source, trajectory, made, recording.log),
                   front_end.config().judgement);
   fill_streams(facts.time_repair, documents);
   fill_counts(front_end, documents);

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "understory/forest/inventory.h"
 #include "understory/map/map_tiles.h"
@@ -17,6 +18,7 @@ namespace understory {
 struct DenseProducts {
   std::unique_ptr<MapTiles> tiles;  // of the finished cloud
   InventoryResult inventory;
+  std::string not_upright;  // why z of the map is not up; empty: it is, or an IMU tells it
   LidarViewFigures lidar_view;
   std::optional<FoundPlacement> placement;  // where it was found before the map was made
 };

@@ -42,8 +42,8 @@ void gather_sparse(const SparseFrontEnd& front_end, const RunFacts& facts, const
   const ImuTrust trust = front_end.imu_trust();
   const std::string& refused = front_end.imu_refused();
   evidence.imu_distrust = refused.empty() ? trust.reason : imu_refusal(refused);
-  evidence.imu_used =
-      reading.imu_wanted && source.rig().body_from_imu.has_value() && evidence.imu_distrust.empty();
+  evidence.imu_used = reading.imu_wanted && source.rig().body_from_imu.has_value() &&
+                      evidence.imu.received > 0 && evidence.imu_distrust.empty();
   gather_motion_scale(trust, evidence);
   evidence.match.scans = front_end.path().size();
   evidence.match.repeated = front_end.repeated();

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "understory/geometry/pose_io.h"
-#include "understory/pipeline/judgement/scan_content.h"
+#include "understory/sensor/scan_content.h"
 #include "understory/util/timing.h"
 
 namespace understory {

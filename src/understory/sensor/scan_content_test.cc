@@ -1,4 +1,4 @@
-#include "understory/pipeline/judgement/scan_content.h"
+#include "understory/sensor/scan_content.h"
 
 #include <gtest/gtest.h>
 
