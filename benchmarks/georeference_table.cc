@@ -16,6 +16,7 @@
 #include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/georeference/satellites/satellite_fit.h"
 #include "understory/georeference/satellites/satellite_smoothing.h"
+#include "understory/georeference/satellites/split_fit.h"
 #include "understory/map/keyframe_map.h"
 #include "understory/simulation/sensors/inertial.h"
 #include "understory/simulation/sensors/satellite.h"
@@ -196,6 +197,7 @@ void lay(const Judged& judged, const std::vector<GnssFix>& fixes, int seed, bool
   SatelliteFitConfig config;
   const std::vector<double>& mount = judged.world.site.gnss.mount_m;
   config.pairing.antenna_in_body = {mount[0], mount[1], mount[2]};
+  config.split.tilt_sd_deg = tilt_sd_deg(LevelledBy::kGravity, straightness(judged.run));
   const std::vector<SatelliteFit> fits = fits_to_satellites(
       judged.run, fixes,
       {SatelliteMethod::kClosed, SatelliteMethod::kFit3, SatelliteMethod::kSplit}, config);

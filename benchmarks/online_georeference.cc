@@ -15,6 +15,7 @@
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/georeference/satellites/online_georeference.h"
+#include "understory/georeference/satellites/split_fit.h"
 #include "understory/simulation/sensors/satellite.h"
 #include "understory/simulation/world.h"
 #include "understory/util/random.h"
@@ -110,7 +111,9 @@ void replay(const SimulatedWorld& world, const Trajectory& run, const Trajectory
   const OriginConfig& at = world.site.origin;
   const EastNorthUp site_frame({at.latitude_deg, at.longitude_deg, at.height_m});
   const std::vector<double>& mount = world.site.gnss.mount_m;
-  OnlineGeoreference online{OnlineGeoreferenceConfig()};
+  OnlineGeoreferenceConfig config;
+  config.tilt_sd_deg = tilt_sd_deg(LevelledBy::kGravity, 1.0);  // as `map` does
+  OnlineGeoreference online(config);
   Counts counts;
   std::size_t next = 0;
   for (std::size_t k = 0; k < run.size(); ++k) {

@@ -93,6 +93,28 @@ double rms_error_m(const SatelliteFit& fit, const std::vector<StampedPose>& pose
   return std::sqrt(sum);
 }
 
+// A regression: a run that kept its heading said that it was level to 0.05 degrees, and was off by
+// up to 0.35.
+TEST(SatelliteFit, ARunThatKeptItsHeadingIsLessLevel) {
+  std::vector<StampedPose> straight;
+  std::vector<StampedPose> round;
+  for (int k = 0; k < 360; ++k) {
+    const Pose step(Eigen::Quaterniond::Identity(), {0.1 * k, 0.0, 0.0});
+    straight.push_back({k * kNsPerSecond, step});
+    const Eigen::AngleAxisd turn(k * M_PI / 180.0, Vector3d::UnitZ());
+    round.push_back({k * kNsPerSecond, Pose(Eigen::Quaterniond(turn), Vector3d::Zero())});
+  }
+  EXPECT_DOUBLE_EQ(straightness(straight), 1.0);
+  EXPECT_NEAR(straightness(round), 0.0, 1e-9);
+  EXPECT_EQ(straightness({}), 0.0);
+  const auto by_imu = [](const std::vector<StampedPose>& path) {
+    return tilt_sd_deg(LevelledBy::kGravity, straightness(path));
+  };
+  EXPECT_NEAR(by_imu(round), 0.05, 1e-6);
+  EXPECT_NEAR(by_imu(straight), 0.255, 1e-3);
+  EXPECT_EQ(tilt_sd_deg(LevelledBy::kStems, 1.0), tilt_sd_deg(LevelledBy::kStems, 0.0));
+}
+
 TEST(SatelliteFit, EveryMethodLaysAPathOnGoodFixes) {
   const auto poses = walk();
   const auto fixes = received(poses, {0.01, 5.0, 0.01}, 3);

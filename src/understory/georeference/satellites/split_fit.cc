@@ -252,10 +252,19 @@ Pose at(const Vector3d& middle) {
 
 }  // namespace
 
-double tilt_sd_deg(LevelledBy what) {
+double straightness(const std::vector<StampedPose>& path) {
+  Vector2d sum = Vector2d::Zero();
+  for (const StampedPose& pose : path) {
+    const Vector3d heading = pose.world_from_body.rotation() * Vector3d::UnitX();
+    sum += heading.head<2>().stableNormalized();
+  }
+  return path.empty() ? 0.0 : sum.norm() / static_cast<double>(path.size());
+}
+
+double tilt_sd_deg(LevelledBy what, double straightness) {
   switch (what) {
     case LevelledBy::kGravity:
-      return 0.05;
+      return std::hypot(kLevelSdDeg, kBiasTiltSdDeg * straightness);
     case LevelledBy::kStems:
       return 1.0;
     default:

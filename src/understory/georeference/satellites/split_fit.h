@@ -16,11 +16,15 @@ enum class LevelledBy {
   kStems,    // the mean direction of the stems
   kGravity,  // an IMU, or a place on the earth
 };
+// How straight a path is: the length of the mean of the body's headings, 0 to 1. 0: it turned
+// through all headings alike, or the path is empty. 1: it kept its heading.
+[[nodiscard]] double straightness(const std::vector<StampedPose>& path);
 // How far its up may be off gravity, degrees, one standard deviation about each level axis. By an
-// IMU 0.05 [measured: docs/method/georeference.md]. By stems 1.0 [chosen: six simulated runs of
-// three stands, seeds 3 and 7, are off by 0.11; the trees of a slope may lean alike]. By nothing
-// 5.0 [chosen: a lidar that is carried by hand].
-[[nodiscard]] double tilt_sd_deg(LevelledBy what);
+// IMU 0.05 where the carrier turned, and 0.25 where it kept its heading: then nothing tells a tilt
+// from the accelerometer's bias [tuned: docs/method/georeference.md]. By stems 1.0 [chosen: six
+// simulated runs of three stands, seeds 3 and 7, are off by 0.11; the trees of a slope may lean
+// alike]. By nothing 5.0 [chosen: a lidar that is carried by hand].
+[[nodiscard]] double tilt_sd_deg(LevelledBy what, double straightness);
 
 // A fit of each degree of freedom to what knows it best (P4 section 5.3 and its future work).
 struct SplitFitConfig {

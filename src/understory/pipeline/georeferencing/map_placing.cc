@@ -93,7 +93,7 @@ FoundPlacement try_to_place(const MappedPath& run, const std::vector<GnssFix>& f
   GeoreferenceRequest request;
   request.run = run.results;
   request.method = method.method;
-  request.tilt_sd_deg = tilt_sd_deg(run.levelled_by);
+  request.tilt_sd_deg = tilt_sd_deg(run.levelled_by, straightness(run.trajectory));
   MovableRun movable;
   movable.trajectory = run.trajectory;
   movable.fixes = fixes;

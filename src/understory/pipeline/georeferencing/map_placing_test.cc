@@ -79,8 +79,10 @@ TEST(MapPlacing, TheStatedTiltIsThatOfWhatHoldsItUp) {
     const PlacedMap map = place_map({folder.path(), walk.path, walk.fixes, {}, what}, {}, log);
     return std::get<double>(map.figures.at("sd_turn_east_deg"));
   };
-  EXPECT_LT(tilt_deg(LevelledBy::kGravity), 0.051);
-  EXPECT_GT(tilt_deg(LevelledBy::kStems), 0.051);
+  // The walk is straight: the bias of the accelerometer makes a tilt.
+  EXPECT_GT(tilt_deg(LevelledBy::kGravity), 0.051);
+  EXPECT_LT(tilt_deg(LevelledBy::kGravity), 0.26);
+  EXPECT_GT(tilt_deg(LevelledBy::kStems), 0.26);
   EXPECT_LT(tilt_deg(LevelledBy::kStems), 1.01);
   EXPECT_GT(tilt_deg(LevelledBy::kNothing), tilt_deg(LevelledBy::kStems));
 }

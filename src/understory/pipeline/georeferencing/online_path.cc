@@ -100,7 +100,7 @@ struct Shares {
 
 void OnlinePath::begin() {
   OnlineGeoreferenceConfig config;
-  config.tilt_sd_deg = tilt_sd_deg(levelled_by_);
+  config.tilt_sd_deg = tilt_sd_deg(levelled_by_, 1.0);  // the path has no turn yet
   georeference_ = std::make_unique<OnlineGeoreference>(config);
 }
 

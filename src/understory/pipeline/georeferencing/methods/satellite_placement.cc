@@ -88,7 +88,7 @@ void tell_figures(const SatelliteFit& fit, Placement& placement) {
 
 double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run) {
   if (request.tilt_sd_deg) return *request.tilt_sd_deg;
-  return tilt_sd_deg(levelled_by(request.run, run));
+  return tilt_sd_deg(levelled_by(request.run, run), straightness(run.trajectory));
 }
 
 Eigen::Vector3d antenna_of(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {
