@@ -442,6 +442,12 @@ inline constexpr int kTriesPerDraw = 9;
 inline constexpr float kFineCell = 0.08F;
 // m: edge of the cells that points are drawn from [bound: time]
 inline constexpr float kCoarseCell = 0.3F;
+// Cells of a row between which points are moved up where others are taken away [bound: time]
+inline constexpr int kStretch = 64;
+// m: around a sampled circle that points are gathered to fit it to, at first [bound: time]
+inline constexpr double kRefineMargin = 0.1;
+// Points of a group that are sorted anew when the lowest of them goes, at most [bound: time]
+inline constexpr std::size_t kMostSortedAnew = 500'000;
 // Share of the seen arc that has to be seen evenly [not recorded]
 inline constexpr double kEvenArcShare = 0.3;
 // Bands: scatter of a circle at most, or ... [not recorded]

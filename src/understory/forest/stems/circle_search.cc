@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/arc_bins.h"
+#include "understory/forest/stems/cell_index.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
@@ -17,111 +19,6 @@ namespace {
 using namespace forest_constants::circle_search;
 
 using PointList = std::vector<Eigen::Vector2f>;
-
-// Points sorted into square cells, so that those near a place are found without looking at all.
-class CellIndex {
- public:
-  CellIndex(const PointList& points, float cell_m) : cell_m_(cell_m) {
-    low_ = points.front();
-    Eigen::Vector2f high = low_;
-    for (const Eigen::Vector2f& point : points) {
-      low_ = low_.cwiseMin(point);
-      high = high.cwiseMax(point);
-    }
-    columns_ = static_cast<int>((high.x() - low_.x()) / cell_m) + 1;
-    rows_ = static_cast<int>((high.y() - low_.y()) / cell_m) + 1;
-    begin_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) + 1, 0);
-    for (const Eigen::Vector2f& point : points)
-      ++begin_[cell_of(point) + 1];
-    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
-    std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
-    sorted_.resize(points.size());
-    for (const Eigen::Vector2f& point : points)
-      sorted_[next[cell_of(point)]++] = point;
-  }
-
-  using Range = std::pair<std::uint32_t, std::uint32_t>;  // of `sorted`, without its end
-
-  // The points of all cells that touch the square around `centre`: one range a row.
-  std::uint32_t square(const Eigen::Vector2f& centre, float reach,
-                       std::vector<Range>& ranges) const {
-    ranges.clear();
-    const int c0 = std::max(0, column(centre.x() - reach));
-    const int c1 = std::min(columns_ - 1, column(centre.x() + reach));
-    const int r0 = std::max(0, row(centre.y() - reach));
-    const int r1 = std::min(rows_ - 1, row(centre.y() + reach));
-    std::uint32_t count = 0;
-    for (int r = r0; r <= r1 && c0 <= c1; ++r) {
-      ranges.push_back(cells_between(r, c0, c1));
-      count += ranges.back().second - ranges.back().first;
-    }
-    return count;
-  }
-
-  // The points in cells that touch the ring between `inner` and `outer`, as ranges; returns how
-  // many lie in cells wholly within `inner`. Cells of a row follow each other, so a row takes two
-  // steps.
-  std::uint32_t ring(const Eigen::Vector2f& centre, float inner, float outer,
-                     std::vector<Range>& ranges) const {
-    ranges.clear();
-    std::uint32_t within = 0;
-    const int r0 = std::max(0, row(centre.y() - outer));
-    const int r1 = std::min(rows_ - 1, row(centre.y() + outer));
-    for (int r = r0; r <= r1; ++r) {
-      const float low = low_.y() + static_cast<float>(r) * cell_m_ - centre.y();
-      const float high = low + cell_m_;
-      const float nearest = std::max({0.0F, low, -high});
-      const float farthest = std::max(-low, high);
-      const float wide = std::sqrt(std::max(0.0F, outer * outer - nearest * nearest));
-      const int c0 = std::max(0, column(centre.x() - wide));
-      const int c1 = std::min(columns_ - 1, column(centre.x() + wide));
-      if (c0 > c1) continue;
-      const float slim = inner > farthest ? std::sqrt(inner * inner - farthest * farthest) : -1.0F;
-      const int i0 = std::max(c0, column(centre.x() - slim) + 1);
-      const int i1 = std::min(c1, column(centre.x() + slim) - 1);
-      if (slim <= 0.0F || i0 > i1) {
-        add_range(cells_between(r, c0, c1), ranges);
-        continue;
-      }
-      add_range(cells_between(r, c0, i0 - 1), ranges);
-      add_range(cells_between(r, i1 + 1, c1), ranges);
-      const Range inside = cells_between(r, i0, i1);
-      within += inside.second - inside.first;
-    }
-    return within;
-  }
-  // The points in order of their cells.
-  [[nodiscard]] const PointList& sorted() const { return sorted_; }
-
- private:
-  [[nodiscard]] int column(float x) const {
-    return static_cast<int>(std::floor((x - low_.x()) / cell_m_));
-  }
-  [[nodiscard]] int row(float y) const {
-    return static_cast<int>(std::floor((y - low_.y()) / cell_m_));
-  }
-  static void add_range(const Range& range, std::vector<Range>& ranges) {
-    if (range.first < range.second) ranges.push_back(range);
-  }
-  [[nodiscard]] Range cells_between(int r, int c0, int c1) const {
-    const std::size_t base = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_);
-    return {begin_[base + static_cast<std::size_t>(c0)],
-            begin_[base + static_cast<std::size_t>(c1) + 1]};
-  }
-  [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& point) const {
-    const int c = std::clamp(column(point.x()), 0, columns_ - 1);
-    const int r = std::clamp(row(point.y()), 0, rows_ - 1);
-    return static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
-           static_cast<std::size_t>(c);
-  }
-
-  float cell_m_;
-  Eigen::Vector2f low_;
-  int columns_ = 0;
-  int rows_ = 0;
-  std::vector<std::uint32_t> begin_;
-  PointList sorted_;
-};
 
 // Groups of points that hang together: cells of `reach` that touch, also by a corner.
 std::vector<PointList> groups_of(const PointList& points, double reach, int min_points) {
@@ -186,155 +83,45 @@ bool circle_through(const Eigen::Vector2f& a, const Eigen::Vector2f& b, const Ei
   return true;
 }
 
-// A search for circles in one group.
-class GroupSearch {
- public:
-  GroupSearch(PointList points, const CircleSearchConfig& config, std::uint64_t seed)
-      : config_(config), points_(std::move(points)), random_(seed) {}
+// A square that holds all points that a fit is given; without a reach it holds the plane.
+struct Surroundings {
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  double reach_m = std::numeric_limits<double>::infinity();
 
-  std::vector<Circle> run() {
-    std::vector<Circle> found;
-    int failures = 0;
-    const Eigen::Vector2f extent = extent_of(points_);
-    const int max_failures = 2 + static_cast<int>(0.5F * extent.x() * extent.y());
-    while (static_cast<int>(points_.size()) >= config_.min_points && failures < max_failures) {
-      const CellIndex fine(points_, kFineCell);
-      const CellIndex coarse(points_, kCoarseCell);
-      const Circle sampled = sample(fine, coarse);
-      if (sampled.on < config_.min_points) break;
-      const Circle circle = refine_circle(points_, sampled, config_.band_m);
-      const bool good = acceptable(circle);
-      if (good) {
-        found.push_back(circle);
-      } else {
-        ++failures;
-      }
-      remove(good ? circle : sampled, good);
-    }
-    return found;
+  // Whether all that lies within `reach` of a place is among the points.
+  [[nodiscard]] bool hold(const Eigen::Vector2d& place, double reach) const {
+    return (place - centre).cwiseAbs().maxCoeff() + reach <= reach_m;
   }
-
- private:
-  static Eigen::Vector2f extent_of(const PointList& points) {
-    Eigen::Vector2f low = points.front();
-    Eigen::Vector2f high = low;
-    for (const Eigen::Vector2f& point : points) {
-      low = low.cwiseMin(point);
-      high = high.cwiseMax(point);
-    }
-    return high - low;
-  }
-
-  [[nodiscard]] bool acceptable(const Circle& circle) const {
-    return circle.on >= config_.min_points && circle.radius_m >= config_.min_radius_m &&
-           circle.radius_m <= config_.max_radius_m && circle.arc_deg >= config_.min_arc_deg &&
-           circle.even_deg >= kEvenArcShare * circle.arc_deg && 2 * circle.inside <= circle.on &&
-           circle.rms_m <=
-               std::max(kMostScatterBands * config_.band_m, kMostScatterShare * circle.radius_m);
-  }
-
-  // The best of many circles through three points near each other.
-  Circle sample(const CellIndex& fine, const CellIndex& coarse) {
-    const std::size_t n = points_.size();
-    const std::size_t draws = std::min<std::size_t>(kFewestDraws + n / kPointsPerDraw, kMostDraws);
-    Circle best;
-    double best_score = 0.0;
-    for (std::size_t draw = 0; draw < draws; ++draw) {
-      const Eigen::Vector2f& first = points_[random_.below(n)];
-      const float scale = kScales[draw % kScales.size()];
-      if (scale > 2.0 * config_.max_radius_m) continue;
-      const std::uint32_t near = coarse.square(first, scale, candidates_);
-      if (near < 3) continue;
-      for (int i = 0; i < kTriesPerDraw; ++i) {
-        Circle circle;
-        const Eigen::Vector2f& second = pick(coarse, near);
-        const Eigen::Vector2f& third = pick(coarse, near);
-        if ((second - first).squaredNorm() > scale * scale ||
-            (third - first).squaredNorm() > scale * scale ||
-            !circle_through(first, second, third, circle) ||
-            circle.radius_m < config_.min_radius_m || circle.radius_m > config_.max_radius_m) {
-          continue;
-        }
-        const double value = score(fine, circle, best_score);
-        if (value <= best_score) continue;
-        best_score = value;
-        best = circle;
-      }
-      // Most of the group lies on one clean circle: more draws would only find it again.
-      if (draw >= 8 && best.inside == 0 && 10 * best.on >= 6 * static_cast<int>(n)) break;
-    }
-    return best;
-  }
-
-  // One of the candidates, each as likely as any other.
-  const Eigen::Vector2f& pick(const CellIndex& index, std::uint32_t count) {
-    auto at = static_cast<std::uint32_t>(random_.below(count));
-    for (const auto& [begin, end] : candidates_) {
-      if (at < end - begin) return index.sorted()[begin + at];
-      at -= end - begin;
-    }
-    return index.sorted()[candidates_.front().first];
-  }
-
-  // (0.15 m + radius)^0.7, nearly: products of roots are cheaper than powers.
-  static double length_of(double radius_m) {
-    const double root = std::sqrt(kLengthOffset + radius_m);
-    const double eighth = std::sqrt(std::sqrt(root));
-    return root * eighth * std::sqrt(eighth);
-  }
-
-  // Points on the circle less those inside it, which a stem cannot have, about per
-  // length of the circumference: a large circle through a thicket and a stem in it collects more
-  // points than the stem, but hardly more per length. Gives up as soon as it cannot beat `best`.
-  double score(const CellIndex& index, Circle& circle, double best) {
-    const Eigen::Vector2f centre = circle.centre.cast<float>();
-    const auto radius = static_cast<float>(circle.radius_m);
-    const auto band = static_cast<float>(config_.band_m);
-    const double length = length_of(circle.radius_m);
-    auto inside = static_cast<int>(
-        index.ring(centre, std::max(0.0F, radius - 2.0F * band), radius + band, ring_));
-    int possible = 0;
-    for (const auto& [begin, end] : ring_)
-      possible += static_cast<int>(end - begin);
-    if ((possible - kInsideWeight * inside) / length <= best) return 0.0;
-    int on = 0;
-    for (const auto& [begin, end] : ring_) {
-      for (std::uint32_t i = begin; i < end; ++i) {
-        const float d = (index.sorted()[i] - centre).norm() - radius;
-        on += std::abs(d) <= band ? 1 : 0;
-        inside += d < -2.0F * band ? 1 : 0;
-      }
-    }
-    circle.on = on;
-    circle.inside = inside;
-    return (on - 1.5 * inside) / length;
-  }
-
-  // Takes away what the circle explains: its points and, of a stem, all within it.
-  void remove(const Circle& circle, bool stem) {
-    const double margin = 1.5 * config_.band_m;
-    const std::size_t before = points_.size();
-    std::erase_if(points_, [&](const Eigen::Vector2f& point) {
-      const double d = (point.cast<double>() - circle.centre).norm() - circle.radius_m;
-      return d <= margin && (stem || d >= -margin);
-    });
-    if (points_.size() == before) points_.clear();  // cannot happen twice without progress
-  }
-
-  const CircleSearchConfig& config_;
-  PointList points_;
-  Random random_;
-  std::vector<CellIndex::Range> candidates_;
-  std::vector<CellIndex::Range> ring_;
 };
 
-}  // namespace
+// The figures of a circle, counted anew.
+void count_points(const PointList& points, double band_m, Circle& circle) {
+  ArcBins bins;
+  double squares = 0.0;
+  circle.on = 0;
+  circle.inside = 0;
+  for (const Eigen::Vector2f& point : points) {
+    const Eigen::Vector2d q = point.cast<double>() - circle.centre;
+    const double e = q.norm() - circle.radius_m;
+    if (e < -2.0 * band_m) ++circle.inside;
+    if (std::abs(e) > band_m) continue;
+    ++circle.on;
+    squares += e * e;
+    bins.add(q.x(), q.y());
+  }
+  circle.arc_deg = bins.covered_deg();
+  circle.even_deg = bins.even_deg();
+  circle.rms_m = circle.on > 0 ? std::sqrt(squares / circle.on) : 0.0;
+}
 
-Circle refine_circle(const std::vector<Eigen::Vector2f>& points, const Circle& start,
-                     double band_m) {
-  Circle circle = start;
+// As refine_circle, with the points of the surroundings alone: the same bits as with all. False if
+// the circle moved to where points are missing.
+bool refine_among(const PointList& points, const Surroundings& around, double band_m,
+                  Circle& circle) {
+  const double reach = 2.0 * band_m;
+  const auto held = [&] { return around.hold(circle.centre, std::abs(circle.radius_m) + reach); };
   for (int iteration = 0; iteration < 12; ++iteration) {
-    const double reach = 2.0 * band_m;
+    if (!held()) return false;
     Eigen::Matrix3d normal = 1e-9 * Eigen::Matrix3d::Identity();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
     int used = 0;
@@ -357,28 +144,229 @@ Circle refine_circle(const std::vector<Eigen::Vector2f>& points, const Circle& s
     circle.radius_m += step.z();
     if (step.norm() < 1e-5) break;
   }
-  ArcBins bins;
-  double squares = 0.0;
-  circle.on = 0;
-  circle.inside = 0;
-  for (const Eigen::Vector2f& point : points) {
-    const Eigen::Vector2d q = point.cast<double>() - circle.centre;
-    const double e = q.norm() - circle.radius_m;
-    if (e < -2.0 * band_m) ++circle.inside;
-    if (std::abs(e) > band_m) continue;
-    ++circle.on;
-    squares += e * e;
-    bins.add(q.x(), q.y());
+  if (!held()) return false;
+  count_points(points, band_m, circle);
+  return true;
+}
+
+// A search for circles in one group. What a circle takes away is looked up by its place: the time
+// is nearly proportional to the points, also where a spoilt map hangs together as one group.
+class GroupSearch {
+ public:
+  GroupSearch(PointList points, const CircleSearchConfig& config, std::uint64_t seed)
+      : config_(config),
+        points_(std::move(points)),
+        live_(points_.size()),
+        low_(lowest()),
+        fine_(points_, live_, low_, kFineCell),
+        coarse_(points_, live_, low_, kCoarseCell),
+        random_(seed) {}
+
+  std::vector<Circle> run() {
+    std::vector<Circle> found;
+    int failures = 0;
+    const Eigen::Vector2f extent = highest() - low_;
+    const int max_failures = 2 + static_cast<int>(0.5F * extent.x() * extent.y());
+    work_ += 2 * points_.size();
+    while (static_cast<int>(live_.size()) >= config_.min_points && failures < max_failures) {
+      const Circle sampled = sample();
+      if (sampled.on < config_.min_points) break;
+      const Circle circle = refine(sampled);
+      const bool good = acceptable(circle);
+      if (good) {
+        found.push_back(circle);
+      } else {
+        ++failures;
+      }
+      remove(good ? circle : sampled, good);
+    }
+    return found;
   }
-  circle.arc_deg = bins.covered_deg();
-  circle.even_deg = bins.even_deg();
-  circle.rms_m = circle.on > 0 ? std::sqrt(squares / circle.on) : 0.0;
+
+  // Points that were sorted, fitted or taken away, each as often as it was.
+  [[nodiscard]] std::uint64_t work() const { return work_; }
+
+ private:
+  [[nodiscard]] Eigen::Vector2f lowest() const {
+    Eigen::Vector2f low = Eigen::Vector2f::Constant(std::numeric_limits<float>::max());
+    for (std::uint32_t i = 0; i < points_.size(); ++i) {
+      if (live_.holds(i)) low = low.cwiseMin(points_[i]);
+    }
+    return low;
+  }
+  [[nodiscard]] Eigen::Vector2f highest() const {
+    Eigen::Vector2f high = points_.front();
+    for (const Eigen::Vector2f& point : points_)
+      high = high.cwiseMax(point);
+    return high;
+  }
+
+  [[nodiscard]] bool acceptable(const Circle& circle) const {
+    return circle.on >= config_.min_points && circle.radius_m >= config_.min_radius_m &&
+           circle.radius_m <= config_.max_radius_m && circle.arc_deg >= config_.min_arc_deg &&
+           circle.even_deg >= kEvenArcShare * circle.arc_deg && 2 * circle.inside <= circle.on &&
+           circle.rms_m <=
+               std::max(kMostScatterBands * config_.band_m, kMostScatterShare * circle.radius_m);
+  }
+
+  // The best of many circles through three points near each other.
+  Circle sample() {
+    const std::size_t n = live_.size();
+    const std::size_t draws = std::min<std::size_t>(kFewestDraws + n / kPointsPerDraw, kMostDraws);
+    Circle best;
+    double best_score = 0.0;
+    for (std::size_t draw = 0; draw < draws; ++draw) {
+      const Eigen::Vector2f& first = points_[live_.at(random_.below(n))];
+      const float scale = kScales[draw % kScales.size()];
+      if (scale > 2.0 * config_.max_radius_m) continue;
+      const std::uint32_t near = coarse_.square(first, scale, candidates_);
+      if (near < 3) continue;
+      for (int i = 0; i < kTriesPerDraw; ++i) {
+        Circle circle;
+        const Eigen::Vector2f& second = pick(near);
+        const Eigen::Vector2f& third = pick(near);
+        if ((second - first).squaredNorm() > scale * scale ||
+            (third - first).squaredNorm() > scale * scale ||
+            !circle_through(first, second, third, circle) ||
+            circle.radius_m < config_.min_radius_m || circle.radius_m > config_.max_radius_m) {
+          continue;
+        }
+        const double value = score(circle, best_score);
+        if (value <= best_score) continue;
+        best_score = value;
+        best = circle;
+      }
+      // Most of the group lies on one clean circle: more draws would only find it again.
+      if (draw >= 8 && best.inside == 0 && 10 * best.on >= 6 * static_cast<int>(n)) break;
+    }
+    return best;
+  }
+
+  // One of the candidates, each as likely as any other.
+  const Eigen::Vector2f& pick(std::uint32_t count) {
+    auto at = static_cast<std::uint32_t>(random_.below(count));
+    for (const auto& [begin, end] : candidates_) {
+      if (at < end - begin) return coarse_.point(begin + at);
+      at -= end - begin;
+    }
+    return coarse_.point(candidates_.front().first);
+  }
+
+  // (0.15 m + radius)^0.7, nearly: products of roots are cheaper than powers.
+  static double length_of(double radius_m) {
+    const double root = std::sqrt(kLengthOffset + radius_m);
+    const double eighth = std::sqrt(std::sqrt(root));
+    return root * eighth * std::sqrt(eighth);
+  }
+
+  // Points on the circle less those inside it, which a stem cannot have, about per
+  // length of the circumference: a large circle through a thicket and a stem in it collects more
+  // points than the stem, but hardly more per length. Gives up as soon as it cannot beat `best`.
+  double score(Circle& circle, double best) {
+    const Eigen::Vector2f centre = circle.centre.cast<float>();
+    const auto radius = static_cast<float>(circle.radius_m);
+    const auto band = static_cast<float>(config_.band_m);
+    const double length = length_of(circle.radius_m);
+    auto inside = static_cast<int>(
+        fine_.ring(centre, std::max(0.0F, radius - 2.0F * band), radius + band, ring_));
+    int possible = 0;
+    for (const auto& [begin, end] : ring_)
+      possible += static_cast<int>(end - begin);
+    if ((possible - kInsideWeight * inside) / length <= best) return 0.0;
+    int on = 0;
+    for (const auto& [begin, end] : ring_) {
+      for (std::uint32_t i = begin; i < end; ++i) {
+        const float d = (fine_.point(i) - centre).norm() - radius;
+        on += std::abs(d) <= band ? 1 : 0;
+        inside += d < -2.0F * band ? 1 : 0;
+      }
+    }
+    circle.on = on;
+    circle.inside = inside;
+    return (on - 1.5 * inside) / length;
+  }
+
+  // Indices of the live points within a square around a place, in order.
+  const std::vector<std::uint32_t>& near(const Eigen::Vector2d& centre, double reach) {
+    near_.clear();
+    fine_.square(centre.cast<float>(), static_cast<float>(reach), ring_);
+    for (const auto& [begin, end] : ring_) {
+      for (std::uint32_t i = begin; i < end; ++i)
+        near_.push_back(fine_.id(i));
+    }
+    std::sort(near_.begin(), near_.end());
+    work_ += near_.size();
+    return near_;
+  }
+
+  Circle refine(const Circle& sampled) {
+    for (double margin = kRefineMargin;; margin *= 2.0) {
+      const Surroundings around{sampled.centre, sampled.radius_m + 2.0 * config_.band_m + margin};
+      fitted_.clear();
+      for (const std::uint32_t i : near(around.centre, around.reach_m + kFineCell))
+        fitted_.push_back(points_[i]);
+      const bool all = fitted_.size() == live_.size();
+      Circle circle = sampled;
+      if (refine_among(fitted_, all ? Surroundings() : around, config_.band_m, circle))
+        return circle;
+    }
+  }
+
+  // Takes away what the circle explains: its points and, of a stem, all within it.
+  void remove(const Circle& circle, bool stem) {
+    const double margin = 1.5 * config_.band_m;
+    const double reach = circle.radius_m + margin + kFineCell;
+    const std::size_t before = live_.size();
+    bool lowest_went = false;
+    for (const std::uint32_t i : near(circle.centre, reach)) {
+      const Eigen::Vector2f& point = points_[i];
+      const double d = (point.cast<double>() - circle.centre).norm() - circle.radius_m;
+      if (d > margin || (!stem && d < -margin)) continue;
+      live_.remove(i);
+      lowest_went = lowest_went || point.x() == low_.x() || point.y() == low_.y();
+    }
+    if (live_.size() == before) return live_.clear();  // cannot happen twice without progress
+    for (CellIndex* index : {&fine_, &coarse_}) {
+      work_ += index->forget(live_, circle.centre.cast<float>(), static_cast<float>(reach));
+    }
+    if (lowest_went && points_.size() <= kMostSortedAnew) sort_anew();
+  }
+
+  // Cells begin at the lowest points that are left.
+  void sort_anew() {
+    low_ = lowest();
+    work_ += points_.size();
+    if (live_.size() == 0) return;
+    fine_ = CellIndex(points_, live_, low_, kFineCell);
+    coarse_ = CellIndex(points_, live_, low_, kCoarseCell);
+    work_ += 2 * live_.size();
+  }
+
+  const CircleSearchConfig& config_;
+  PointList points_;
+  LivePoints live_;
+  Eigen::Vector2f low_;  // of the live points
+  CellIndex fine_;
+  CellIndex coarse_;
+  Random random_;
+  std::uint64_t work_ = 0;
+  std::vector<std::uint32_t> near_;
+  PointList fitted_;
+  std::vector<CellIndex::Range> candidates_;
+  std::vector<CellIndex::Range> ring_;
+};
+
+}  // namespace
+
+Circle refine_circle(const PointList& points, const Circle& start, double band_m) {
+  Circle circle = start;
+  static_cast<void>(refine_among(points, {}, band_m, circle));
   return circle;
 }
 
 std::vector<std::vector<Circle>> find_circles(const std::vector<PointList>& slices,
-                                              const CircleSearchConfig& config,
-                                              std::uint64_t seed) {
+                                              const CircleSearchConfig& config, std::uint64_t seed,
+                                              std::uint64_t* work) {
   std::vector<std::vector<PointList>> groups(slices.size());
   parallel_for(slices.size(), 1, [&](std::size_t s) {
     if (static_cast<int>(slices[s].size()) < config.min_points) return;
@@ -393,10 +381,14 @@ std::vector<std::vector<Circle>> find_circles(const std::vector<PointList>& slic
     for (std::size_t g = 0; g < groups[s].size(); ++g)
       jobs.emplace_back(s, g);
   }
+  std::vector<std::uint64_t> works(jobs.size(), 0);
   parallel_for(jobs.size(), 1, [&](std::size_t i) {
     const auto [s, g] = jobs[i];
-    found[s][g] = GroupSearch(std::move(groups[s][g]), config, hash_numbers(seed, s, g)).run();
+    GroupSearch search(std::move(groups[s][g]), config, hash_numbers(seed, s, g));
+    found[s][g] = search.run();
+    works[i] = search.work();
   });
+  if (work != nullptr) *work = std::accumulate(works.begin(), works.end(), std::uint64_t{0});
   std::vector<std::vector<Circle>> all(slices.size());
   for (std::size_t s = 0; s < slices.size(); ++s) {
     for (const std::vector<Circle>& part : found[s])
