@@ -5,12 +5,17 @@
 #include <filesystem>
 #include <system_error>
 
+#include "understory/pipeline/run_folder/run_json.h"
+#include "understory/pipeline/run_folder/work_folder.h"
+#include "understory/recording/bags/ros2_bag.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
+
+const std::vector<std::string> kCloudEndings = {".las", ".laz", ".ply", ".pcd"};
 
 // Optimal string alignment distance.
 std::size_t letters_apart(const std::string& a, const std::string& b) {
@@ -38,6 +43,39 @@ bool ends_with_one_of(const std::string& name, const std::vector<std::string>& e
                      [&](const std::string& ending) { return small.ends_with(ending); });
 }
 
+// The one cloud of a folder that holds no other scans; empty if there is none, or are several.
+std::string single_cloud(const std::string& folder) {
+  if (is_ros2_bag_folder(folder)) return {};
+  std::string found;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code ignored;
+    const std::string path = entry->path().string();
+    if (!entry->is_regular_file(ignored)) continue;
+    const bool cloud = ends_with_one_of(path, kCloudEndings);
+    if (ends_with_one_of(path, {".bin"}) || (cloud && !found.empty())) return {};
+    if (cloud) found = path;
+  }
+  return found;
+}
+
+// Error if the folder is that of a run, whose map would be taken for a scan.
+void refuse_run(const std::string& folder) {
+  const bool unfinished = holds_unfinished_run(folder);
+  if (!unfinished && !RunJson(folder).is_ours()) return;
+  std::error_code ignored;
+  const fs::path cloud = fs::path(folder) / "map.laz";
+  const bool has_cloud = fs::exists(cloud, ignored);
+  std::string advice;
+  if (has_cloud)
+    advice = "`understory inventory " + cloud.string() + " -o DIR` measures the trees of its map";
+  if (unfinished || !has_cloud)
+    advice += (advice.empty() ? "" : ", ") + ("`understory map --resume " + folder +
+                                              "` goes on with a run that is not finished");
+  throw InputError(folder, "", "is the folder of a run, no recording: " + advice);
+}
+
 }  // namespace
 
 std::string nearest_word(const std::string& given, const std::vector<std::string>& words) {
@@ -55,8 +93,15 @@ std::string nearest_word(const std::string& given, const std::vector<std::string
 
 void refuse_cloud(const std::string& recording) {
   std::error_code ignored;
-  if (!fs::is_regular_file(recording, ignored) ||
-      !ends_with_one_of(recording, {".las", ".laz", ".ply", ".pcd"}))
+  if (fs::is_directory(recording, ignored)) {
+    refuse_run(recording);
+    const std::string cloud = single_cloud(recording);
+    if (cloud.empty()) return;
+    throw InputError(recording, "",
+                     "holds one point cloud, and a map is made of many: `understory inventory " +
+                         cloud + " -o DIR` measures its trees");
+  }
+  if (!fs::is_regular_file(recording, ignored) || !ends_with_one_of(recording, kCloudEndings))
     return;
   throw InputError(
       recording, "",

@@ -10,7 +10,8 @@ namespace understory {
 [[nodiscard]] std::string nearest_word(const std::string& given,
                                        const std::vector<std::string>& words);
 
-// Error if `recording` is one point cloud, which makes no map: it names the command that takes it.
+// Error if `recording` is one point cloud, a folder with one, or the folder of a run, finished or
+// not. They make no map: the error names the command that takes them.
 void refuse_cloud(const std::string& recording);
 // Error if `cloud` is a recording, which has to be mapped first.
 void refuse_recording(const std::string& cloud);

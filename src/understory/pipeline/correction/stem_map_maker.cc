@@ -93,6 +93,7 @@ RunOutcome StemMapMaker::write() {
     cuts = place_cuts(run_.head_cuts, trajectory, place_.log);
   }
   summarise_correction(config_, run_, documents_);
+  documents_.judge_path();
   std::vector<TreeFall> falls =
       write_felled_trees(folder, {run_.seen, run_.seen_from, run_.stems, run_.trees}, cuts,
                          config_.harvester.cuts, documents_.summary());

@@ -83,6 +83,12 @@ void RunDocuments::judge(const RunEvidence& evidence, const JudgementConfig& con
   summary().evidence = figures_of(evidence);
 }
 
+void RunDocuments::judge_path() {
+  if (summary().poses != 1) return;
+  lower(RunStatus::kPartial,
+        "the path is a single pose: nothing was matched, and nothing shows whether the map is right");
+}
+
 void RunDocuments::inherit(const InheritedTrust& trust) {
   inherited_.push_back(trust);
 }

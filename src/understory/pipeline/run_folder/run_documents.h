@@ -56,6 +56,8 @@ class RunDocuments {
   void lower(RunStatus status, const std::string& reason);
   // Status and reasons by these numbers, which come under "evidence".
   void judge(const RunEvidence& evidence, const JudgementConfig& config);
+  // Partial where the path is one pose, by `summary().poses`: then nothing was matched.
+  void judge_path();
   // What a run has said that this command goes on from. Its reasons come before the command's own,
   // and those of a run that is named later before those of a run that is named earlier.
   void inherit(const InheritedTrust& trust);

@@ -375,6 +375,7 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
                   front_end.config().judgement);
   fill_streams(facts.time_repair, documents);
   fill_counts(front_end, documents);
+  documents.judge_path();
   fill_quality(front_end, trajectory, facts, documents.summary());
   if (const auto truth = write_truth(recording.request.run_folder, recording.source))
     documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));

@@ -1,0 +1,88 @@
+"""What is no recording, and words that no command knows: refused at once, and nothing is written."""
+
+import pathlib
+import shutil
+
+from program import Cases, program
+
+cases = Cases()
+walk = cases.folder / "walk.mcap"
+words = [word for setting in ("duration_s=1", "lidar.model=VLP-16", "gnss.enabled=false", "stand.size_x_m=30",
+                              "stand.size_y_m=30") for word in ("--set", setting)]
+for made in (("simulate", "demo", "-o", walk, *words), ("convert", walk, cases.folder / "clouds"),
+             ("map", walk, "-o", cases.folder / "run")):
+    done = program(*made)
+    assert done.returncode in (0, 4), done.stderr
+RUN, CLOUDS = cases.folder / "run", cases.folder / "clouds"
+
+
+def refused(code, *arguments):
+    done = program(*arguments)
+    assert done.returncode == code and done.stderr.startswith("error: ") and not done.stdout, (arguments, done)
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    return done.stderr.strip()
+
+
+# Its map was taken for a scan: a map of one pose, complete.
+@cases.case("a run is no recording")
+def run_as_recording(folder):
+    for recording in (RUN, f"{RUN}/"):
+        said = refused(3, "map", recording, "-o", folder / "a")
+        assert f"understory inventory {RUN}/map.laz" in said, said
+    assert not (folder / "a").exists()
+    unfinished = folder / "unfinished"
+    shutil.copytree(RUN, unfinished)
+    (unfinished / "map.laz").unlink()
+    said = refused(3, "map", unfinished, "-o", folder / "a")
+    assert f"map --resume {unfinished}" in said, said
+    clouds = folder / "clouds"  # of someone who keeps notes of other programs beside the scans
+    shutil.copytree(CLOUDS, clouds)
+    (clouds / "run.json").write_text("{}")
+    assert program("map", clouds, "-o", folder / "b").returncode == 4
+    return said.replace(str(folder), "")
+
+
+@cases.case("one cloud in a folder is one cloud")
+def one_cloud(folder):
+    scans = folder / "scans"
+    scans.mkdir()
+    cloud = scans / "000000.pcd"
+    shutil.copy(sorted(CLOUDS.glob("*.pcd"))[0], cloud)
+    said = refused(3, "map", scans, "-o", folder / "a")
+    assert f"understory inventory {cloud}" in said, said
+    assert "one point cloud" in refused(3, "map", cloud, "-o", folder / "a")
+    assert not (folder / "a").exists()
+
+
+@cases.case("a path of one pose is not complete")
+def one_pose(folder):
+    short = folder / "short.mcap"
+    assert program("simulate", "demo", "-o", short, *words[2:], "--set", "duration_s=0.1").returncode == 0
+    for front_end in ("dense", "sparse"):
+        run = folder / front_end
+        done = program("map", short, "-o", run, "--front-end", front_end)
+        poses = len((run / "trajectory.tum").read_text().splitlines())
+        assert poses == 1 and done.returncode == 4 and "single pose" in done.stderr, (poses, done)
+
+
+# They came without the word by which a script knows an error.
+@cases.case("words that no command knows")
+def unknown_words(folder):
+    here = pathlib.Path(folder)
+    for arguments, word in ((("map", "--bogus", "x"), "map has no option '--bogus'"),
+                            (("mapp",), "did you mean 'map'"),
+                            ((), "understory --help"),
+                            (("map", "--threads"), "understory map --help"),
+                            (("map", walk, "-o", here / "a", "--front-end", "odd"), "--front-end"),
+                            (("georeference", RUN, "-o", here / "a"), "--method"),
+                            (("map", walk, "more", "words"), "understory map --help"),
+                            (("register", walk), "two clouds"),
+                            (("inventory", RUN, "-o", here / "a", "--unit-m", "nan"), "--unit-m")):
+        said = refused(2, *arguments)
+        assert word in said, (arguments, said)
+    for page in (("--help",), ("map", "--help"), ("--version",)):
+        done = program(*page)
+        assert done.returncode == 0 and done.stdout and not done.stderr, page
+
+
+cases.run()
