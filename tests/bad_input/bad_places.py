@@ -45,7 +45,8 @@ def refused(recording, place, *words):
 @cases.case("folder below a file")
 def below_a_file(folder):
     (folder / "notes").write_text("mine")
-    said = refused(good, folder / "notes" / "run", "Not a directory")
+    said = refused(good, folder / "notes" / "run", f"{folder / 'notes'} is a file")
+    refused(good, folder / "notes" / "deep" / "run", f"{folder / 'notes'} is a file")
     refused(good, folder / "notes")
     assert (folder / "notes").read_text() == "mine"
     return said.replace(str(folder), "")

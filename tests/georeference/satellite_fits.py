@@ -206,9 +206,17 @@ def bad(folder):
 
     late = write_fixes(folder / "late.csv", received(), late_s=86400.0)
     for method in ("split", "fit3", "closed"):
-        refused(3, "2019-08-11 08:30:00", "--method", method, "--gnss", late)
+        refused(3, "2019-08-11T08:30:00Z to", "--method", method, "--gnss", late)
     done = georeference(RUN, "--method", "auto", "--gnss", late, "-o", folder / "late")
-    assert done.returncode == 4 and "2019-08-11" in done.stderr and "clock" in done.stdout, done
+    assert done.returncode == 4 and "2019-08-11T08:30:00Z" in done.stderr and "clock" in done.stdout, done
+    # Of the paths alone it said only that they are not the same.
+    elsewhere = write_fixes(folder / "elsewhere.csv", ((t, la + 0.01 * (t % 7), lo, h) for t, la, lo, h in received()),
+                            late_s=86400.0)
+    for fixes in (late, elsewhere):
+        done = georeference(RUN, "--method", "auto", "--gnss", fixes, "-o", folder / f"auto {fixes.stem}")
+        first = done.stderr.splitlines()[0]
+        assert "do not overlap in time" in first and "2019-08-10T08:30:00Z" in first, done
+    assert done.returncode == 3 and str(elsewhere) in first and not (folder / "auto elsewhere").exists(), done
     swapped = write_fixes(folder / "swapped.csv", ((t, lo, la, h) for t, la, lo, h in received()))
     refused(3, "seem to be swapped", "--method", "auto", "--gnss", swapped)
     still = folder / "still"

@@ -111,6 +111,13 @@ std::string unknown_option(const CLI::App& app, int argc, char** argv) {
   return {};
 }
 
+// What the parser says, as the program's own messages are: with the page that helps.
+std::string with_help(const CLI::App& app, const std::string& said) {
+  const auto chosen = app.get_subcommands();
+  const std::string name = chosen.empty() ? "" : chosen.front()->get_name() + " ";
+  return said + " (understory " + name + "--help)";
+}
+
 int run(int argc, char** argv) {
   keep_freed_memory();
   CLI::App app{"Lidar SLAM and tree mapping under the forest canopy", "understory"};
@@ -144,11 +151,10 @@ int run(int argc, char** argv) {
     check_finite(app);
   } catch (const CLI::ExtrasError& error) {
     const std::string complaint = unknown_option(app, argc, argv);
-    if (!complaint.empty()) return complain(kExitUsage, complaint);
-    (void)app.exit(error);
-    return kExitUsage;
+    return complain(kExitUsage, complaint.empty() ? with_help(app, error.what()) : complaint);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kExitDone : kExitUsage;
+    if (error.get_exit_code() != 0) return complain(kExitUsage, with_help(app, error.what()));
+    return app.exit(error);  // --help, --version
   }
   Log log(terminal_log(verbose, quiet));
   CommandContext context{log, terminal_progress(quiet), install_stop_handler(), threads};

@@ -20,13 +20,13 @@ bool has_place(const GnssFix& fix) {
   return std::isfinite(fix.latitude_deg) && std::isfinite(fix.longitude_deg);
 }
 
-// "2017-08-15 10:00:05", of what looks like a date.
+// "2017-08-15T10:00:05Z", of what looks like a date.
 std::string moment(TimeNs stamp) {
   const std::chrono::sys_seconds seconds{std::chrono::seconds(stamp / kNsPerSecond)};
   const auto day = std::chrono::floor<std::chrono::days>(seconds);
   const std::chrono::year_month_day date(day);
   const auto left = (seconds - day).count();
-  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02}:{:02}", static_cast<int>(date.year()),
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", static_cast<int>(date.year()),
                      static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
                      left / 3600, left / 60 % 60, left % 60);
 }
@@ -37,8 +37,8 @@ std::string no_common_time(const std::vector<StampedPose>& trajectory,
       std::minmax_element(fixes.begin(), fixes.end(),
                           [](const GnssFix& a, const GnssFix& b) { return a.stamp < b.stamp; });
   return fmt::format(
-      "the fixes are from {} to {}, and the run is from {} to {} (UTC): expected fixes of the same "
-      "time. --method gnss-path needs no common clock",
+      "the fixes and the path do not overlap in time: the fixes are from {} to {}, the path is from "
+      "{} to {}. Expected fixes of the same time; --method gnss-path needs no common clock",
       moment(first->stamp), moment(last->stamp), moment(trajectory.front().stamp),
       moment(trajectory.back().stamp));
 }

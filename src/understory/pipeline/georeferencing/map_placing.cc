@@ -81,13 +81,6 @@ std::string joined(const std::vector<std::string>& reasons) {
   return text;
 }
 
-// What an error says, without the file that it names first.
-std::string said(const InputError& error) {
-  const std::string text = error.what();
-  const std::string file = error.file() + ": ";
-  return text.rfind(file, 0) == 0 ? text.substr(file.size()) : text;
-}
-
 FoundPlacement try_to_place(const MappedPath& run, const std::vector<GnssFix>& fixes,
                             const PlacementMethod& method, Log& log) {
   GeoreferenceRequest request;
@@ -103,7 +96,7 @@ FoundPlacement try_to_place(const MappedPath& run, const std::vector<GnssFix>& f
     if (found.placement->method.empty()) found.placement->method = method.name;
     return found;
   } catch (const InputError& error) {  // the fixes cannot be used: the map is as good as without
-    return {std::nullopt, said(error)};
+    return {std::nullopt, reason_of(error)};
   }
 }
 

@@ -35,6 +35,7 @@ void refuse_foreign_place(const fs::path& folder) {
   const fs::file_status status = fs::status(folder, error);
   if (fs::exists(status) && !fs::is_directory(status))
     throw RefusedOutput(folder.string(), "is not a folder");
+  refuse_folder_in_file(folder);
 }
 
 void refuse_running(const fs::path& folder) {

@@ -97,6 +97,19 @@ void refuse_input_as_output(const fs::path& output, const std::vector<fs::path>&
   }
 }
 
+void refuse_folder_in_file(const fs::path& folder) {
+  std::error_code error;
+  fs::path at = fs::absolute(folder, error).parent_path();
+  fs::path named = folder.parent_path();
+  for (; at != at.parent_path(); at = at.parent_path(), named = named.parent_path()) {
+    const fs::file_status status = fs::status(at, error);
+    if (!fs::exists(status)) continue;
+    if (fs::is_directory(status)) return;
+    throw RefusedOutput(folder.string(), "cannot be made: " + named.string() +
+                                             " is a file: expected a place outside of it");
+  }
+}
+
 fs::path place_of_file(const fs::path& path, bool overwrite) {
   if (path.empty()) throw ConfigError({"the name of the output is empty"});
   if (!path.has_filename()) throw RefusedOutput(path.string(), "is the name of a folder");

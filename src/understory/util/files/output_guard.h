@@ -24,6 +24,10 @@ class RefusedOutput : public OutputError {
 void refuse_input_as_output(const std::filesystem::path& output,
                             const std::vector<std::filesystem::path>& inputs);
 
+// Refuses a folder of results that cannot be made, because a part of its path is a file. Touches
+// nothing. Throws RefusedOutput.
+void refuse_folder_in_file(const std::filesystem::path& folder);
+
 // The place of a single file to be written. Its folder must be there. A file that is there already
 // is replaced only if `overwrite` is set; anything but a regular file never is. Returns the path
 // behind symbolic links, which is what has to be replaced. Touches nothing. Throws RefusedOutput,

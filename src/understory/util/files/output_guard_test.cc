@@ -150,5 +150,21 @@ TEST_F(OutputGuard, ALockIsHeldByOneAndFallsWithItsProcess) {
   EXPECT_TRUE(FileLock::take(path).has_value());
 }
 
+// It was said of a hidden folder below it that it cannot be made.
+TEST_F(OutputGuard, NamesTheFileThatAFolderWouldLieIn) {
+  for (const fs::path& output : {walk_ / "run", walk_ / "a" / "run", fs::relative(walk_) / "run"}) {
+    try {
+      refuse_folder_in_file(output);
+      ADD_FAILURE() << output << " was taken";
+    } catch (const RefusedOutput& refusal) {
+      EXPECT_NE(std::string(refusal.what()).find("walk.mcap is a file"), std::string::npos)
+          << refusal.what();
+    }
+  }
+  EXPECT_NO_THROW(refuse_folder_in_file(home_ / "data" / "run"));
+  EXPECT_NO_THROW(refuse_folder_in_file(home_ / "not there" / "run"));
+  EXPECT_NO_THROW(refuse_folder_in_file("run"));
+}
+
 }  // namespace
 }  // namespace understory

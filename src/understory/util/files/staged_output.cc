@@ -54,7 +54,7 @@ StagedFolder::StagedFolder(const fs::path& path, const NameTest& may_replace) : 
 void StagedFolder::check(const NameTest& may_replace) {
   std::error_code error;
   const fs::file_status named = fs::symlink_status(path_, error);
-  if (!fs::exists(named)) return;
+  if (!fs::exists(named)) return refuse_folder_in_file(path_);
   if (!fs::is_directory(fs::status(path_, error)))
     throw RefusedOutput(path_.string(), "is there and is not a folder");
   path_ = fs::canonical(path_);

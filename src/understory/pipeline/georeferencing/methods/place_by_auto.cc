@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "understory/pipeline/georeferencing/methods/placement_methods.h"
 #include "understory/pipeline/georeferencing/methods/satellite_placement.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -27,6 +29,29 @@ std::string account_of(const std::vector<TriedMethod>& tried, const TriedMethod&
   return text;
 }
 
+// What keeps the methods by time from these fixes.
+struct NoCommonTime {
+  std::filesystem::path file;
+  std::string reason;
+};
+
+// The times are the first thing to look at: what the paths alone tell comes behind.
+Placement place_without_clock(const GeoreferenceRequest& request, const MovableRun& run,
+                              const NoCommonTime& times, Log& log) {
+  try {
+    Placement placement = place_by_gnss_path(request, run, log);
+    placement.method = "gnss-path";
+    placement.summary =
+        "auto: no fix is of a time of the run, so the paths were compared without a clock\n" +
+        placement.summary;
+    placement.doubts.insert(placement.doubts.begin(), times.reason);
+    return placement;
+  } catch (const InputError& error) {
+    throw InputError(times.file.string(), "",
+                     times.reason + " (tried: " + reason_of(error) + ")");
+  }
+}
+
 }  // namespace
 
 Placement place_by_best(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {
@@ -43,15 +68,8 @@ Placement place_by_best(const GeoreferenceRequest& request, const MovableRun& ru
     if (one.fit.found && (best == nullptr || one.fit.expected_error_m < best->fit.expected_error_m))
       best = &one;
   }
-  if (best == nullptr && tried.front().fit.fixes_in_time == 0) {
-    Placement placement = place_by_gnss_path(request, run, log);
-    placement.method = "gnss-path";
-    placement.summary =
-        "auto: no fix is of a time of the run, so the paths were compared without a clock\n" +
-        placement.summary;
-    placement.doubt(tried.front().fit.reason);
-    return placement;
-  }
+  if (best == nullptr && tried.front().fit.fixes_in_time == 0)
+    return place_without_clock(request, run, {input.file, tried.front().fit.reason}, log);
   if (best == nullptr)
     return placement_of(request, run, input, tried.front().fit, tried.front().name, log);
   Placement placement = placement_of(request, run, input, best->fit, best->name, log);

@@ -11,6 +11,7 @@
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/output/run_summary.h"
 #include "understory/output/run_tables.h"
+#include "understory/util/error.h"
 
 namespace understory {
 
@@ -44,6 +45,8 @@ struct Placement {
   void doubt(const std::string& reason) { doubts.push_back(reason); }
 };
 
+// What an error says, without the file that it names first.
+[[nodiscard]] std::string reason_of(const InputError& error);
 // What heights are above where it is not the ellipsoid: no fix may have a height. Else empty.
 [[nodiscard]] std::string other_heights(const Placement& placement);
 // Standard deviation of the heading, degrees; NaN where the method does not tell it.

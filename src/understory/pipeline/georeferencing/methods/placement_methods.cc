@@ -42,6 +42,12 @@ const std::vector<PlacementMethod>& placement_methods() {
   return kMethods;
 }
 
+std::string reason_of(const InputError& error) {
+  const std::string text = error.what();
+  const std::string file = error.file() + ": ";
+  return text.rfind(file, 0) == 0 ? text.substr(file.size()) : text;
+}
+
 std::string other_heights(const Placement& placement) {
   const bool told = placement.gnss.empty() ||
                     std::any_of(placement.gnss.begin(), placement.gnss.end(),
