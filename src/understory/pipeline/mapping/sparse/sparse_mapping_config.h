@@ -17,7 +17,7 @@ namespace understory {
 
 // Everything that can be set for `understory map --front-end sparse`.
 struct SparseMappingConfig {
-  EventLoopConfig loop{{}, 10.0};
+  EventLoopConfig loop;
   std::string machine_boxes_file;  // YAML, the same as for the dense front end; empty: none
   StemFrontEndConfig front_end;
   StemPaceConfig pace;
