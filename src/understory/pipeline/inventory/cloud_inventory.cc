@@ -32,13 +32,15 @@ fs::path cloud_of(const std::string& given) {
   return fs::is_directory(path) ? path / "map.laz" : path;
 }
 
-// What the user has to know before using the numbers.
-void judge(const InventoryResult& inventory, const Log& log, RunDocuments& documents) {
+// What the user has to know before using the numbers. The map of a run is judged as `map` does.
+void judge(const InventoryResult& inventory, bool of_run, const Log& log, RunDocuments& documents) {
   if (const Found damage = found(log, Finding::kDamage); damage.count > 0)
     documents.lower(RunStatus::kPartial, "the cloud is not whole: " + damage.first);
   if (!inventory.too_sparse) return;
   const bool any = !inventory.trees.empty();
-  documents.lower(any ? RunStatus::kPartial : RunStatus::kUntrusted, few_points_reason(any));
+  if (any && of_run) return;
+  documents.lower(any || of_run ? RunStatus::kPartial : RunStatus::kUntrusted,
+                  few_points_reason(any));
 }
 
 // A finished inventory and what it was made from.
@@ -131,7 +133,7 @@ void describe(const InventoryRequest& request, const Stock& stock, const Log& lo
   documents.count("trees", inventory.trees.size());
   documents.summary().quality["area_m2"] = inventory.area_m2;
   documents.summary().quality["ground_measured_share"] = inventory.ground.measured_share;
-  judge(inventory, log, documents);
+  judge(inventory, stock.of_run, log, documents);
   if (!stock.stand.doubt.empty()) documents.inherit({RunStatus::kUntrusted, {stock.stand.doubt}});
   if (!stock.stand.suspicion.empty() && !stock.of_run)
     documents.inherit({RunStatus::kUntrusted, {stock.stand.suspicion}});

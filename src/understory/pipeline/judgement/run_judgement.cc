@@ -374,7 +374,9 @@ class Judge {
            ". Without an IMU its vertical is that of the scanner at the first scan: record the "
            "IMU, or bring the map upright with `understory inventory --up`");
     }
-    if (stand.few_near_breast) missing(few_points_reason(stand.trees > 0));
+    // Around a path lie areas that were seen from afar alone, so few points in the mean are no harm
+    // by themselves.
+    if (stand.few_near_breast && stand.trees == 0) missing(few_points_reason(false));
   }
 
   RunJudgement judgement() {
