@@ -38,7 +38,7 @@ def run_as_recording(folder):
     clouds = folder / "clouds"  # of someone who keeps notes of other programs beside the scans
     shutil.copytree(CLOUDS, clouds)
     (clouds / "run.json").write_text("{}")
-    assert program("map", clouds, "-o", folder / "b").returncode == 4
+    assert program("map", clouds, "-o", folder / "b").returncode == 0
     return said.replace(str(folder), "")
 
 
@@ -57,7 +57,7 @@ def one_cloud(folder):
 @cases.case("a path of one pose is not complete")
 def one_pose(folder):
     short = folder / "short.mcap"
-    assert program("simulate", "demo", "-o", short, *words[2:], "--set", "duration_s=0.1").returncode == 0
+    assert program("simulate", "demo", "-o", short, *words[2:], "--set", "duration_s=0.15").returncode == 0
     for front_end in ("dense", "sparse"):
         run = folder / front_end
         done = program("map", short, "-o", run, "--front-end", front_end)

@@ -25,6 +25,11 @@ struct CommandContext {
   ProgressSink progress;
   StopRequested stop_requested;  // true after Ctrl-C
   int threads = 0;               // 0 = all of the machine
+  // A command that writes no files calls it first: from then on Ctrl-C needs no clean end.
+  std::function<void()> stop_at_once = [] {};
+
+  // For work that has no result before its end: Ctrl-C ends it by Stopped.
+  [[nodiscard]] ProgressSink until_stopped() const { return progress.stopped_by(stop_requested); }
 };
 
 // The work of the chosen subcommand; returns an exit code or throws an Error.

@@ -35,12 +35,13 @@ void write(const StemSegments& found, const Pose& body_from_points, int frame, T
 
 int convert_cloud_to_stems(const std::string& input, const std::string& output, StagedFile& staged,
                            CommandContext& context) {
-  const StandCloud stand = read_stand(input, {}, context.log);
+  const StandCloud stand = read_stand(input, {}, context.log, context.until_stopped());
   if (!stand.doubt.empty()) throw InputError(input, "", "expected metres and z up: " + stand.doubt);
   if (!stand.suspicion.empty()) context.log.info(stand.suspicion);
   InventoryConfig config;
   config.segments = 0;
-  const InventoryResult found = take_inventory(blocks_of(stand.cloud), config, context.progress);
+  const InventoryResult found =
+      take_inventory(blocks_of(stand.cloud), config, context.until_stopped());
   if (found.stems.empty())
     throw InputError(input, "", fmt::format("no upright stems among its {} points", found.points));
   // Positions of a table of stems lie within 10 km of its zero.

@@ -287,7 +287,10 @@ void add_evaluate_command(CLI::App& app, Command& chosen) {
       "  understory evaluate trees run walk.truth --align yaw");
   command->callback([&chosen, options, command] {
     if (!command->get_subcommands().empty()) return;
-    chosen = [options](CommandContext& context) { return evaluate(*options, context); };
+    chosen = [options](CommandContext& context) {
+      context.stop_at_once();
+      return evaluate(*options, context);
+    };
   });
   add_evaluate_map_command(*command, chosen);
   add_evaluate_trees_command(*command, chosen);

@@ -163,6 +163,7 @@ void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
       "  understory evaluate map stems.csv.gz forest");
   command->callback([&chosen, options] {
     chosen = [options](CommandContext& context) {
+      context.stop_at_once();
       return options->trajectory.empty()
                  ? evaluate_crispness(options->stems, options->radius_m, options->json, context)
                  : evaluate_map(*options, context);

@@ -260,7 +260,10 @@ void add_evaluate_trees_command(CLI::App& evaluate, Command& chosen) {
       "  understory evaluate trees run walk.truth --align yaw --truth-returns walk.truth --path "
       "walk.truth");
   command->callback([&chosen, options] {
-    chosen = [options](CommandContext& context) { return evaluate_trees(*options, context); };
+    chosen = [options](CommandContext& context) {
+      context.stop_at_once();
+      return evaluate_trees(*options, context);
+    };
   });
 }
 

@@ -117,7 +117,8 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
     request.antenna_in_body = {options.antenna_m[0], options.antenna_m[1], options.antenna_m[2]};
   if (!options.start.empty())
     request.start = {options.start[0], options.start[1], options.start[2]};
-  const GeoreferenceOutcome outcome = run_georeferencing(request, context.log);
+  const GeoreferenceOutcome outcome =
+      run_georeferencing(request, context.log, context.until_stopped());
   if (!options.json) return report_outcome(outcome);
   nlohmann::ordered_json json{{"status", to_string(outcome.status)},
                               {"reasons", outcome.reasons},

@@ -46,7 +46,7 @@ int run(const InventoryOptions& options, CommandContext& context) {
   }
   refuse_recording(request.cloud);
   request.config_record.asked_yaml = table.to_yaml(false);
-  return report_outcome(run_inventory(request, context.log, context.progress));
+  return report_outcome(run_inventory(request, context.log, context.until_stopped()));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "understory/cli/command.h"
+#include "understory/cli/outcome.h"
 #include "understory/cli/suggestion.h"
 #include "understory/cli/terminal.h"
 #include "understory/util/error.h"
@@ -39,6 +40,8 @@ int run_guarded(const Command& command, CommandContext& context) {
     int code = kExitDone;
     with_threads(context.threads, [&] { code = command(context); });
     return code;
+  } catch (const Stopped&) {
+    return report_stop("nothing was written, and what was there before is as it was");
   } catch (const ConfigError& error) {
     return complain(kExitUsage, error.what());
   } catch (const InputError& error) {
@@ -157,7 +160,8 @@ int run(int argc, char** argv) {
     return app.exit(error);  // --help, --version
   }
   Log log(terminal_log(verbose, quiet));
-  CommandContext context{log, terminal_progress(quiet), install_stop_handler(), threads};
+  CommandContext context{log, terminal_progress(quiet), install_stop_handler(), threads,
+                         stop_at_once};
   return run_guarded(chosen, context);
 }
 

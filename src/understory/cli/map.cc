@@ -31,10 +31,15 @@ struct MapOptions {
   OpenOptions open;
 };
 
-// What a run that could not be written can do about it.
+// What a run that was stopped or could not be written can do about it.
 int with_advice(const std::string& run_folder, const std::function<int()>& work) {
   try {
     return work();
+  } catch (const Stopped&) {
+    if (!holds_unfinished_run(run_folder)) throw;
+    return report_stop(
+        "the scans are positioned, and no map was made; go on with `understory map --resume " +
+        run_folder + "`");
   } catch (const RefusedOutput&) {
     throw;
   } catch (const OutputError& error) {

@@ -40,7 +40,7 @@ nlohmann::ordered_json to_json(const MergeOutcome& outcome, double weight) {
 }
 
 int merge(const MergeOptions& options, CommandContext& context) {
-  const MergeOutcome outcome = run_merging(options.request, context.log);
+  const MergeOutcome outcome = run_merging(options.request, context.log, context.until_stopped());
   if (!options.json) return report_outcome(outcome);
   return report_outcome(to_json(outcome, options.request.weight).dump(2), outcome.status,
                         outcome.reasons);

@@ -14,4 +14,9 @@ int report_outcome(const std::string& summary, RunStatus status,
   return status == RunStatus::kComplete ? kExitDone : kExitUntrusted;
 }
 
+int report_stop(const std::string& what_is_left) {
+  std::fprintf(stderr, "warning: stopped by the user: %s\n", what_is_left.c_str());
+  return kExitUntrusted;
+}
+
 }  // namespace understory

@@ -15,4 +15,7 @@ template <typename Outcome>
   return report_outcome(outcome.summary, outcome.status, outcome.reasons);
 }
 
+// Says that the user stopped the command, and what is left of its work; returns the exit code.
+[[nodiscard]] int report_stop(const std::string& what_is_left);
+
 }  // namespace understory

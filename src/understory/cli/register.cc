@@ -153,6 +153,7 @@ int run_register(const RegisterOptions& options, CommandContext& context) {
   }
   if (options.target.empty() || options.source.empty())
     throw ConfigError({"register: expected two clouds, A and B"});
+  context.stop_at_once();
   // Both clouds relative to A's origin, so that single precision is enough in any coordinate
   // system.
   const Loaded target = load(options.target, nullptr, context.log);

@@ -11,15 +11,25 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <string_view>
+
+#include "understory/cli/command.h"
 
 namespace understory {
 namespace {
 
 // A signal handler can reach nothing but static storage.
-volatile std::sig_atomic_t stop_signal = 0;  // NOLINT: the one global of the program
+volatile std::sig_atomic_t stop_signal = 0;  // NOLINT: the globals of the program are this
+
+volatile std::sig_atomic_t at_once = 0;  // NOLINT: and this one beside it
 
 void on_stop_signal(int signal) {
   if (stop_signal != 0) _exit(128 + signal);
+  if (at_once != 0) {
+    constexpr std::string_view kSaid = "warning: stopped by the user: there is no result\n";
+    (void)!::write(STDERR_FILENO, kSaid.data(), kSaid.size());
+    _exit(kExitUntrusted);
+  }
   stop_signal = 1;
 }
 
@@ -132,6 +142,10 @@ StopRequested install_stop_handler() {
   std::signal(SIGXFSZ,
               SIG_IGN);  // a file that may grow no more is an error of writing, like a full disk
   return [] { return stop_signal != 0; };
+}
+
+void stop_at_once() {
+  at_once = 1;
 }
 
 }  // namespace understory

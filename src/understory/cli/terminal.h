@@ -14,5 +14,8 @@ namespace understory {
 
 // Makes Ctrl-C (and SIGTERM) ask for a clean end; a second one ends the program at once.
 [[nodiscard]] StopRequested install_stop_handler();
+// From now on the first one does, with the exit code of a stopped command: for commands that leave
+// no files.
+void stop_at_once();
 
 }  // namespace understory

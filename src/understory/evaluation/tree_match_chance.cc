@@ -47,11 +47,13 @@ std::vector<Tree> scrambled(std::vector<Tree> trees, double max_m, Random& rando
 }
 
 void judge_copies(const std::vector<Tree>& s, const std::vector<Tree>& l, double weight,
-                  const TreeMergeConfig& config, bool searched, MatchChance& chance) {
+                  const TreeMergeConfig& config, bool searched, const ProgressSink& progress,
+                  MatchChance& chance) {
   constexpr std::uint64_t kSeed = 20'210'707;
   std::vector<double> found(searched ? kSearchedCopies : kShiftedCopies,
                             std::numeric_limits<double>::quiet_NaN());
   parallel_for(found.size(), 1, [&](std::size_t k) {
+    progress.poll();
     Random random(kSeed, k);
     std::vector<Tree> copy = searched ? scrambled(l, k == 0 ? 0.0 : 2.0 * config.reach_m, random)
                                       : shifted(l, config.reach_m, random);
@@ -105,12 +107,12 @@ void judge_diameters(const std::vector<Tree>& s, const std::vector<Tree>& l,
 
 MatchChance match_chance(const std::vector<Tree>& s, const std::vector<Tree>& l,
                          const MergedTrees& merged, double weight, const TreeMergeConfig& config,
-                         bool searched) {
+                         bool searched, const ProgressSink& progress) {
   MatchChance chance;
   chance.pairs = merged.joined;
   chance.weight = weight_of(merged, config.duplicate_m);
   if (merged.joined == 0) return chance;
-  judge_copies(s, l, weight, config, searched, chance);
+  judge_copies(s, l, weight, config, searched, progress, chance);
   chance.sigmas = (chance.weight - chance.chance_weight) /
                   std::max({1.0, chance.chance_sd, std::sqrt(chance.chance_weight)});
   judge_diameters(s, l, merged, chance);

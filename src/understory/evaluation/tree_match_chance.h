@@ -6,6 +6,7 @@
 
 #include "understory/evaluation/tree_merge.h"
 #include "understory/sensor/tree.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -31,11 +32,12 @@ struct MatchChance {
 };
 
 // `s` and `l` as they are merged. `searched`: `l` was first laid on `s` by the trees alone
-// (align_trees by heading), so each copy is, too. Deterministic. Thresholds:
-// docs/method/sparse.md.
+// (align_trees by heading), so each copy is, too. Deterministic. Polls `progress`.
+// Thresholds: docs/method/sparse.md.
 [[nodiscard]] MatchChance match_chance(const std::vector<Tree>& s, const std::vector<Tree>& l,
                                        const MergedTrees& merged, double weight,
-                                       const TreeMergeConfig& config, bool searched);
+                                       const TreeMergeConfig& config, bool searched,
+                                       const ProgressSink& progress = {});
 
 // Why the maps may be of different stands, in words for the user; empty if they are of one.
 [[nodiscard]] std::string chance_complaint(const MatchChance& chance);

@@ -169,14 +169,15 @@ void describe(ConfigTable& table, InventoryConfig& config) {
             "number of trees that the report shows one by one");
 }
 
-InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& config,
+InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig& config,
                                const ProgressSink& progress, const SeenTest& in_view) {
+  const PointBlocks cloud = polled(unasked, progress);
   const auto tell = [&](const char* stage, double done) {
-    if (progress) progress({stage, done, 6.0, "passes", ""});
+    progress({stage, done, 6.0, "passes", ""});
   };
   InventoryResult result;
   tell("ground", 0.0);
-  result.ground = estimate_ground(cloud, config.ground);
+  result.ground = estimate_ground(unasked, config.ground, progress);
   if (result.ground.terrain.empty()) {
     result.remarks.emplace_back("The cloud holds no points.");
     return result;
@@ -189,7 +190,7 @@ InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& 
   result.points = gathered.points;
   result.slices = gathered.slices.take();
   tell("stems", 3.0);
-  result.stems = detect_stems(result.slices, config.stems);
+  result.stems = detect_stems(result.slices, config.stems, progress);
   tell("tops", 4.0);
   CanopyGrid canopy(config.canopy_cell_m);
   TreeColumns columns(result.stems);

@@ -44,7 +44,8 @@ struct InventoryResult {
 using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
 
 // Ground, canopy, trees of a whole cloud: seven runs through it. With a test of what was in view,
-// trees that may go on above it have no height. Deterministic for any number of threads.
+// trees that may go on above it have no height. Deterministic for any number of threads. Throws
+// Stopped.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,
                                              const ProgressSink& progress = {},

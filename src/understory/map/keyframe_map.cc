@@ -164,9 +164,9 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
   return moved;
 }
 
-void KeyframeMap::finish() {
+void KeyframeMap::finish(const ProgressSink& progress) {
   if (keyframes_.empty()) return;
-  if (auto outcome = loops_.take(keyframes_.size(), true, true)) {
+  if (auto outcome = loops_.take(keyframes_.size(), true, true, progress)) {
     static_cast<void>(take_over(std::move(*outcome)));
   }
   const PoseGraphResult result = loops_.optimise(keyframes_);
@@ -180,20 +180,23 @@ void KeyframeMap::finish() {
   }
   snapshot_.reset();
   local_map_.clear();
-  if (config_.first_keyframes.enabled) refine_first_keyframes_of_segments();
+  if (config_.first_keyframes.enabled) refine_first_keyframes_of_segments(progress);
   points_->forget();
   give_free_memory_back();
 }
 
-void KeyframeMap::refine_first_keyframes_of_segments() {
+void KeyframeMap::refine_first_keyframes_of_segments(const ProgressSink& progress) {
   for (std::size_t s = 0; s < segment_starts_.size(); ++s) {
     const std::size_t first = segment_starts_[s];
     const bool is_last = s + 1 == segment_starts_.size();
     const std::size_t end = is_last ? keyframes_.size() : segment_starts_[s + 1];
     const std::vector<Pose> refined = refine_first_keyframes(
         std::span(keyframes_).subspan(first, end - first),
-        [&](std::size_t i) { return points_->get(first + i); }, config_.local_map,
-        config_.first_keyframes);
+        [&](std::size_t i) {
+          progress.poll();
+          return points_->get(first + i);
+        },
+        config_.local_map, config_.first_keyframes);
     if (refined.empty()) continue;
     for (std::size_t i = 0; i < refined.size(); ++i)
       keyframes_[first + i].world_from_body = refined[i];
@@ -259,10 +262,14 @@ void KeyframeMap::start_segment() {
   insert_all();
 }
 
-RangeCheck KeyframeMap::check_ranges(const Eigen::Vector3d& lidar_in_body) const {
-  const RangeCheck check = understory::check_ranges(
-      keyframes_, segment_starts_, [this](std::size_t i) { return points_->get(i); }, lidar_in_body,
-      config_.range_check);
+RangeCheck KeyframeMap::check_ranges(const Eigen::Vector3d& lidar_in_body,
+                                     const ProgressSink& progress) const {
+  const auto points_of = [&](std::size_t i) {
+    progress.poll();
+    return points_->get(i);
+  };
+  const RangeCheck check = understory::check_ranges(keyframes_, segment_starts_, points_of,
+                                                    lidar_in_body, config_.range_check);
   points_->forget();
   return check;
 }

@@ -18,6 +18,7 @@
 #include "understory/util/config/config.h"
 #include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 #include "understory/util/time.h"
 #include "understory/util/timing.h"
 
@@ -77,10 +78,13 @@ class KeyframeMap {
   void start_segment();
   // The recording is over: waits for what is running, optimises, positions the first keyframes of
   // each segment again, and frees what only scans needed: there is no local map any more.
-  void finish();
+  // Polls `progress`.
+  void finish(const ProgressSink& progress = {});
   // Of the finished map: whether its clouds tell of ranges that are all too long or too short.
   //   lidar_in_body: where the beams begin, metres
-  [[nodiscard]] RangeCheck check_ranges(const Eigen::Vector3d& lidar_in_body) const;
+  // Polls `progress`.
+  [[nodiscard]] RangeCheck check_ranges(const Eigen::Vector3d& lidar_in_body,
+                                        const ProgressSink& progress = {}) const;
   // Of the finished map: its graph at its poses, and which of the graph's loops it accepted.
   [[nodiscard]] PoseGraphProblem graph() const { return loops_.problem_of(keyframes_); }
   [[nodiscard]] std::vector<char> graph_loops_used() const;
@@ -107,7 +111,7 @@ class KeyframeMap {
   void load(BinaryReader& reader);
 
  private:
-  void refine_first_keyframes_of_segments();
+  void refine_first_keyframes_of_segments(const ProgressSink& progress);
   [[nodiscard]] std::size_t segment_start() const { return segment_starts_.back(); }
   void update_local_map(std::size_t keyframe);
   void insert(std::size_t keyframe);

@@ -7,12 +7,15 @@
 #include <utility>
 
 #include "understory/graph/loops/local_map_loop.h"
+#include "understory/map/map_constants.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
+
+using namespace map_constants::loop_closer;
 
 // Everything that a search needs, of its own, so that it can run beside the scan loop.
 struct Search {
@@ -134,12 +137,14 @@ void apply_loops(Search& search, LoopOutcome& outcome) {
     outcome.world_from_keyframe = std::move(result.world_from_keyframe);
 }
 
-LoopOutcome run_search(Search search) {
+// `abandoned` ends it at the next candidate, with whatever it has.
+LoopOutcome run_search(Search search, const std::atomic<bool>& abandoned) {
   LoopOutcome outcome;
   outcome.keyframes = search.problem.world_from_keyframe.size();
   const std::size_t query = outcome.keyframes - 1;
   for (const LoopCandidate& candidate :
        find_loop_candidates(search.problem, query, search.config.search)) {
+    if (abandoned) return outcome;
     if (static_cast<std::size_t>(candidate.keyframe) < search.segment_start) continue;
     outcome.attempts.push_back(try_loop(search, query, candidate));
   }
@@ -173,6 +178,7 @@ LoopCloser::LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& loc
     : config_(config), local_map_config_(local_map) {}
 
 LoopCloser::~LoopCloser() {
+  abandoned_ = true;
   if (running_) running_->outcome.wait();  // it uses the caller's points and work_
 }
 
@@ -233,17 +239,20 @@ void LoopCloser::begin(const std::vector<Keyframe>& keyframes, std::size_t segme
     const SideWork::Scope working(work_);
     LoopOutcome outcome;
     // One thread: the others belong to the scan loop.
-    in_arena(1, [&] { outcome = run_search(std::move(search)); });
+    in_arena(1, [&] { outcome = run_search(std::move(search), abandoned_); });
     return outcome;
   });
 }
 
-std::optional<LoopOutcome> LoopCloser::take(std::size_t keyframes, bool wait, bool when_found) {
+std::optional<LoopOutcome> LoopCloser::take(std::size_t keyframes, bool wait, bool when_found,
+                                            const ProgressSink& progress) {
   if (!running_) return std::nullopt;
   const bool ready =
       running_->outcome.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
   const auto due = running_->keyframes + static_cast<std::size_t>(config_.handover_keyframes);
   if (!wait && !(when_found ? ready : keyframes >= due)) return std::nullopt;
+  while (running_->outcome.wait_for(kPollInterval) != std::future_status::ready)
+    progress.poll();
   LoopOutcome outcome = running_->outcome.get();
   running_.reset();
   attempts_.insert(attempts_.end(), outcome.attempts.begin(), outcome.attempts.end());

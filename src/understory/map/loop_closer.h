@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <future>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "understory/util/config/config.h"
 #include "understory/util/files/binary_io.h"
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 #include "understory/util/timing.h"
 
 namespace understory {
@@ -75,7 +77,9 @@ class LoopCloser {
                                                             const PresentMap& present);
   // The outcome of the running search, nothing if none is running or due. It is due at a fixed
   // number of keyframes, and then waited for; `wait`: due now; `when_found`: due when it is there.
-  [[nodiscard]] std::optional<LoopOutcome> take(std::size_t keyframes, bool wait, bool when_found);
+  // Waiting polls `progress`.
+  [[nodiscard]] std::optional<LoopOutcome> take(std::size_t keyframes, bool wait, bool when_found,
+                                                const ProgressSink& progress = {});
 
   [[nodiscard]] const std::vector<LoopAttempt>& attempts() const { return attempts_; }
   // CPU time of all searches so far, that which is running included.
@@ -106,6 +110,7 @@ class LoopCloser {
   std::vector<LoopAttempt> attempts_;
   SideWork work_;
   TimeNs last_search_ = kNoSearchYet;
+  std::atomic<bool> abandoned_ = false;  // nobody waits for what the running search finds
   std::optional<Running> running_;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 
@@ -30,6 +31,11 @@ inline constexpr double kListedPresence = 0.12;
 // m: listed trees that are nearer and never seen together are one [not recorded]
 inline constexpr double kListedDuplicate = 1.2;
 }  // namespace stem_map
+
+namespace loop_closer {  // map/loop_closer.cc
+// Between two questions whether to go on waiting for a search [bound: a user's patience]
+inline constexpr std::chrono::milliseconds kPollInterval{50};
+}  // namespace loop_closer
 
 namespace keyframe_map {  // map/keyframe_map.cc
 // Keyframes whose points stay in memory, about 60 MB [bound: memory]

@@ -50,7 +50,7 @@ class Sha256 {
 
 }  // namespace
 
-InputHash hash_input(const std::filesystem::path& path) {
+InputHash hash_input(const std::filesystem::path& path, const ProgressSink& progress) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(path.string(), "", std::strerror(errno));
   Sha256 hash;
@@ -59,6 +59,7 @@ InputHash hash_input(const std::filesystem::path& path) {
   std::vector<char> buffer(1U << 20);
   while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
          file.gcount() > 0) {
+    progress.poll();
     const auto count = static_cast<std::size_t>(file.gcount());
     hash.update(buffer.data(), count);
     result.bytes += count;

@@ -14,6 +14,7 @@
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 #include "understory/util/timing.h"
 
 namespace understory {
@@ -31,8 +32,10 @@ struct InputHash {
   std::string sha256;  // empty: it could not be read any more
 };
 
-// SHA-256 of a file's bytes, lower-case hexadecimal. Throws InputError if it cannot be read.
-[[nodiscard]] InputHash hash_input(const std::filesystem::path& path);
+// SHA-256 of a file's bytes, lower-case hexadecimal. Polls `progress`. Throws InputError if it
+// cannot be read.
+[[nodiscard]] InputHash hash_input(const std::filesystem::path& path,
+                                   const ProgressSink& progress = {});
 
 // Time that one stage took, over all its runs.
 struct StageSummary {

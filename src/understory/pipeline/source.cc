@@ -113,7 +113,8 @@ std::string named_from(const std::filesystem::path& folder, const std::string& n
   return from_there;
 }
 
-std::vector<InputHash> hash_inputs(const std::string& recording, Log& log) {
+std::vector<InputHash> hash_inputs(const std::string& recording, Log& log,
+                                   const ProgressSink& progress) {
   std::vector<InputHash> hashes;
   if (is_simulation(recording)) return hashes;
   const auto lost = [&](const std::string& said) {
@@ -122,7 +123,7 @@ std::vector<InputHash> hash_inputs(const std::string& recording, Log& log) {
   };
   for (const auto& file : plain_files(recording, lost)) {
     try {
-      hashes.push_back(hash_input(file));
+      hashes.push_back(hash_input(file, progress));
     } catch (const InputError& error) {
       lost(error.what());
       hashes.push_back({file.filename().string(), 0, ""});

@@ -7,6 +7,7 @@
 
 #include "understory/output/run_summary.h"
 #include "understory/recording/recording.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -23,8 +24,10 @@ namespace understory {
 [[nodiscard]] std::string named_from(const std::filesystem::path& folder, const std::string& name);
 
 // Hashes of the recording's files, in order of their names; none for the simulator. What cannot be
-// read any more at the end of a run has no hash, with a warning (key "recording.no_hash").
-[[nodiscard]] std::vector<InputHash> hash_inputs(const std::string& recording, Log& log);
+// read any more at the end of a run has no hash, with a warning (key "recording.no_hash"). Polls
+// `progress`.
+[[nodiscard]] std::vector<InputHash> hash_inputs(const std::string& recording, Log& log,
+                                                 const ProgressSink& progress = {});
 
 // The files and folders that opening a recording reads: itself, parts of a bag that lie outside its
 // folder, the metadata and extrinsics that were named, and the site and the trees of a simulation.

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <concepts>
+#include <exception>
 #include <functional>
 #include <string>
+#include <utility>
 
 namespace understory {
 
@@ -14,10 +17,47 @@ struct ProgressReport {
   std::string remark;  // "3 loops", empty if nothing to say
 };
 
-// Passed into long work; called from the working thread, often. The receiver limits its own rate.
-using ProgressSink = std::function<void(const ProgressReport&)>;
-
-// Asked between units of work; true ends the work cleanly with what there is so far.
+// Asked between units of work; true: the user wants the work to end. May be asked from any thread.
 using StopRequested = std::function<bool()>;
+
+// The user stopped work that has no result before its end: what it wrote so far goes, what was
+// there before stays. No error, so that nothing but cli/ catches it.
+class Stopped : public std::exception {
+ public:
+  [[nodiscard]] const char* what() const noexcept override { return "stopped by the user"; }
+};
+
+// Passed into long work: takes its reports, and ends it where the user has asked for that. Called
+// from the working thread, often; the receiver limits its own rate. `poll` may be called from any
+// thread.
+class ProgressSink {
+ public:
+  using Receiver = std::function<void(const ProgressReport&)>;
+
+  ProgressSink() = default;
+  template <std::invocable<const ProgressReport&> Function>
+  ProgressSink(Function receiver) : receiver_(std::move(receiver)) {}  // NOLINT: as a function is
+
+  // The same reports of work that is ended by `poll` as soon as `stop` says so.
+  [[nodiscard]] ProgressSink stopped_by(StopRequested stop) const {
+    ProgressSink sink = *this;
+    sink.stop_ = std::move(stop);
+    return sink;
+  }
+
+  // Throws Stopped if the user has asked for it. Cheap: a look at a flag.
+  void poll() const {
+    if (stop_ && stop_()) throw Stopped();
+  }
+  // Polls, too.
+  void operator()(const ProgressReport& report) const {
+    poll();
+    if (receiver_) receiver_(report);
+  }
+
+ private:
+  Receiver receiver_;
+  StopRequested stop_;
+};
 
 }  // namespace understory

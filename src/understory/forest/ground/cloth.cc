@@ -116,11 +116,12 @@ class Cloth {
 }  // namespace
 
 std::vector<float> settle_cloth(const std::vector<float>& floor, int columns, int rows,
-                                const ClothConfig& config) {
+                                const ClothConfig& config, const ProgressSink& progress) {
   if (std::none_of(floor.begin(), floor.end(), [](float z) { return std::isfinite(z); }))
     return floor;
   Cloth cloth(floor, columns, rows);
   for (int i = 0; i < config.steps; ++i) {
+    progress.poll();
     if (cloth.step(config.stiffness) < kSettled) break;
   }
   return cloth.height();

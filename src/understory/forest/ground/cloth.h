@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "understory/util/progress.h"
+
 namespace understory {
 
 // A cloth under a terrain, hanging upwards (the cloud turned upside down): it rises until it meets
@@ -13,8 +15,9 @@ struct ClothConfig {
 
 // `floor` are the lowest heights per node (NaN where none), row by row. Returns the height of the
 // cloth at every node. W. Zhang et al. 2016, eqs. (4)-(7), with all nodes of a step moved at once,
-// so that the result does not depend on the order of nodes or threads.
+// so that the result does not depend on the order of nodes or threads. Polls `progress`.
 [[nodiscard]] std::vector<float> settle_cloth(const std::vector<float>& floor, int columns,
-                                              int rows, const ClothConfig& config);
+                                              int rows, const ClothConfig& config,
+                                              const ProgressSink& progress = {});
 
 }  // namespace understory

@@ -243,15 +243,17 @@ std::uint8_t GroundModel::las_class(double height_above_ground) const {
   return height_above_ground <= 2.0 ? 4 : 5;
 }
 
-GroundModel estimate_ground(const PointBlocks& cloud, const GroundConfig& config) {
+GroundModel estimate_ground(const PointBlocks& unasked, const GroundConfig& config,
+                            const ProgressSink& progress) {
+  const PointBlocks cloud = polled(unasked, progress);
   GroundModel model;
   model.config = config;
   Raster& terrain = model.terrain;
   const std::vector<LowCell> low = lowest_points(cloud, config.cell_m, terrain);
   if (low.empty()) return model;
   const std::vector<float> floor = floor_heights(terrain, low);
-  const std::vector<float> cloth =
-      settle_cloth(floor, terrain.columns, terrain.rows, {config.stiffness, config.steps});
+  const std::vector<float> cloth = settle_cloth(floor, terrain.columns, terrain.rows,
+                                                {config.stiffness, config.steps}, progress);
   terrain.values.assign(floor.size(), kNan);
   for (std::size_t i = 0; i < floor.size(); ++i) {
     if (floor[i] - cloth[i] <= static_cast<float>(config.touch_m)) terrain.values[i] = floor[i];

@@ -7,6 +7,7 @@
 #include "understory/forest/point_blocks.h"
 #include "understory/geometry/raster.h"
 #include "understory/util/config/config.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -39,7 +40,8 @@ struct GroundModel {
 };
 
 // Memory grows with the area, not with the number of points. Deterministic for any number of
-// threads. The result has an empty terrain if there are no points.
-[[nodiscard]] GroundModel estimate_ground(const PointBlocks& cloud, const GroundConfig& config);
+// threads. The result has an empty terrain if there are no points. Polls `progress`.
+[[nodiscard]] GroundModel estimate_ground(const PointBlocks& cloud, const GroundConfig& config,
+                                          const ProgressSink& progress = {});
 
 }  // namespace understory

@@ -162,13 +162,14 @@ class GroupSearch {
         coarse_(points_, live_, low_, kCoarseCell),
         random_(seed) {}
 
-  std::vector<Circle> run() {
+  std::vector<Circle> run(const ProgressSink& progress) {
     std::vector<Circle> found;
     int failures = 0;
     const Eigen::Vector2f extent = highest() - low_;
     const int max_failures = 2 + static_cast<int>(0.5F * extent.x() * extent.y());
     work_ += 2 * points_.size();
     while (static_cast<int>(live_.size()) >= config_.min_points && failures < max_failures) {
+      progress.poll();
       const Circle sampled = sample();
       if (sampled.on < config_.min_points) break;
       const Circle circle = refine(sampled);
@@ -366,7 +367,7 @@ Circle refine_circle(const PointList& points, const Circle& start, double band_m
 
 std::vector<std::vector<Circle>> find_circles(const std::vector<PointList>& slices,
                                               const CircleSearchConfig& config, std::uint64_t seed,
-                                              std::uint64_t* work) {
+                                              const ProgressSink& progress, std::uint64_t* work) {
   std::vector<std::vector<PointList>> groups(slices.size());
   parallel_for(slices.size(), 1, [&](std::size_t s) {
     if (static_cast<int>(slices[s].size()) < config.min_points) return;
@@ -385,7 +386,7 @@ std::vector<std::vector<Circle>> find_circles(const std::vector<PointList>& slic
   parallel_for(jobs.size(), 1, [&](std::size_t i) {
     const auto [s, g] = jobs[i];
     GroupSearch search(std::move(groups[s][g]), config, hash_numbers(seed, s, g));
-    found[s][g] = search.run();
+    found[s][g] = search.run(progress);
     works[i] = search.work();
   });
   if (work != nullptr) *work = std::accumulate(works.begin(), works.end(), std::uint64_t{0});

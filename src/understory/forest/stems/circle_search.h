@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "understory/util/progress.h"
+
 namespace understory {
 
 // A circle among the points of one horizontal slice.
@@ -29,11 +31,12 @@ struct CircleSearchConfig {
 
 // All circles of each slice, by repeated sampling (RANSAC) in each group of points that hang
 // together and robust least squares (Gauss-Newton on the geometric distance). `seed` and the points
-// decide the result; threads do not. The time is nearly proportional to the number of points.
-// `work` is told how many points were sorted, fitted and taken away, each as often as it was.
+// decide the result; threads do not. The time is nearly proportional to the number of points. Polls
+// `progress`. `work` is told how many points were sorted, fitted and taken away, each as often as
+// it was.
 [[nodiscard]] std::vector<std::vector<Circle>> find_circles(
     const std::vector<std::vector<Eigen::Vector2f>>& slices, const CircleSearchConfig& config,
-    std::uint64_t seed, std::uint64_t* work = nullptr);
+    std::uint64_t seed, const ProgressSink& progress = {}, std::uint64_t* work = nullptr);
 
 // Least-squares circle through the points near `start`, with Tukey weights over `band_m`; its
 // figures are counted anew. on = 0 if it fails.

@@ -131,7 +131,7 @@ TEST(CircleSearch, TheWorkInAHugeGroupIsNearlyProportionalToItsPoints) {
   for (const int side : {8, 24}) {
     const Slice slice = spoilt_stand(side, random);
     std::uint64_t work = 0;
-    EXPECT_GT(find_circles({slice}, {}, 7, &work)[0].size(), 0.5 * side * side);
+    EXPECT_GT(find_circles({slice}, {}, 7, {}, &work)[0].size(), 0.5 * side * side);
     work_per_point.push_back(static_cast<double>(work) / static_cast<double>(slice.size()));
   }
   RecordProperty("work_per_point", std::to_string(work_per_point[1]));

@@ -80,7 +80,7 @@ struct Cut {
 
 std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
                              const std::vector<char>& explained, const Cut& cut,
-                             const StemDetectorConfig& config) {
+                             const StemDetectorConfig& config, const ProgressSink& progress) {
   const double span = config.highest_m - config.lowest_m;
   const auto count = static_cast<std::size_t>(std::max(1.0, std::round(span / cut.thickness_m)));
   std::vector<std::vector<Eigen::Vector2f>> slices(count);
@@ -99,7 +99,7 @@ std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
   search.band_m = cut.band_m;
   std::vector<Ring> rings;
   const std::vector<std::vector<Circle>> circles =
-      find_circles(slices, search, hash_numbers(count, 0));
+      find_circles(slices, search, hash_numbers(count, 0), progress);
   for (std::size_t s = 0; s < count; ++s) {
     const double middle =
         config.lowest_m + (static_cast<double>(s) + 0.5) * span / static_cast<double>(count);
@@ -254,8 +254,8 @@ void describe(ConfigTable& table, StemDetectorConfig& config) {
             "largest lean of a stem from the vertical");
 }
 
-std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
-                                  const StemDetectorConfig& config) {
+std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points, const StemDetectorConfig& config,
+                                  const ProgressSink& progress) {
   const PointIndex index(points);
   std::vector<char> explained(points.size(), 0);
   std::vector<StemFit> stems;
@@ -263,11 +263,12 @@ std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
       {config.slice_m, config.min_slices, kThinReach, kThinBand},
       {kThickSlices * config.slice_m, kLeastThickSlices, kThickReach, kThickBand}};
   for (const Cut& cut : cuts) {
-    const std::vector<Ring> rings = find_rings(points, explained, cut, config);
+    const std::vector<Ring> rings = find_rings(points, explained, cut, config, progress);
     const std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
     std::vector<StemFitResult> fits(starts.size());
     std::vector<char> accepted(starts.size(), 0);
     parallel_for(starts.size(), 1, [&](std::size_t i) {
+      progress.poll();
       const StemFit& start = starts[i];
       const double reach =
           start.radius_m + kStartReach + start.slope.norm() * (config.highest_m - kBreastHeight);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/util/config/config.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -62,8 +63,9 @@ struct StemFit {
 
 // Stems among the points of the slices. Points may be in any order, and come back sorted by place:
 // there are too many for a second copy. The same points give the same stems for any number of
-// threads. Stems come sorted by x, then y.
+// threads. Stems come sorted by x, then y. Polls `progress`.
 [[nodiscard]] std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
-                                                const StemDetectorConfig& config);
+                                                const StemDetectorConfig& config,
+                                                const ProgressSink& progress = {});
 
 }  // namespace understory

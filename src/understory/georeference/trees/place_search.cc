@@ -264,7 +264,8 @@ double TreeLikeness::rank_ratio(double source_rank, double target_rank) const {
 }
 
 PlaceSearch search_places(const std::vector<PatternTree>& source, const PatternGrid& target,
-                          const SearchDisc& disc, const TreeLikeness& likeness) {
+                          const SearchDisc& disc, const TreeLikeness& likeness,
+                          const ProgressSink& progress) {
   double reach = 0.0;
   double spread = 0.0;
   bool sizes = false;
@@ -280,6 +281,7 @@ PlaceSearch search_places(const std::vector<PatternTree>& source, const PatternG
   const double step = 2.0 * std::numbers::pi / static_cast<double>(headings);
   std::vector<std::vector<PlaceCandidate>> found(headings);
   parallel_for(headings, 1, [&](std::size_t k) {
+    progress.poll();
     found[k] = Heading(source, rasters, disc, step * static_cast<double>(k)).best(kOfHeading);
   });
   std::vector<PlaceCandidate> all;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "understory/georeference/trees/pattern_grid.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -49,9 +50,10 @@ struct PlaceSearch {
 // Goes through all headings and all places of the disc on a grid of 1 m. At each pose every tree of
 // the source adds the logarithm of how much likelier trees of the target there are than by chance:
 // a correlation of the source with one raster of the target. `source` lies around its origin.
-// Needs trees in both. Uses all threads; the same result for any number of them.
+// Needs trees in both. Uses all threads; the same result for any number of them. Polls `progress`.
 [[nodiscard]] PlaceSearch search_places(const std::vector<PatternTree>& source,
                                         const PatternGrid& target, const SearchDisc& disc,
-                                        const TreeLikeness& likeness);
+                                        const TreeLikeness& likeness,
+                                        const ProgressSink& progress = {});
 
 }  // namespace understory

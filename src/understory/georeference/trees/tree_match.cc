@@ -227,12 +227,13 @@ struct Task {
 };
 
 PartOnTarget find_part(const SourcePart& part, const PatternGrid& target,
-                       const TreeSearchArea& area, const TreeLikeness& likeness) {
+                       const TreeSearchArea& area, const TreeLikeness& likeness,
+                       const ProgressSink& progress) {
   PartOnTarget finding;
   finding.part = part;
   const SearchDisc disc{area.target_point,
                         area.radius_m + (part.centre - area.source_point).norm()};
-  const PlaceSearch search = search_places(part.trees, target, disc, likeness);
+  const PlaceSearch search = search_places(part.trees, target, disc, likeness, progress);
   finding.poses = search.poses;
   finding.fits = refined(part.trees, target, search, likeness, part.reach_m);
   finding.chance = chance_of(finding.fits, search.poses);
@@ -294,7 +295,8 @@ void judge(const PartOnTarget& finding, const TreeMatchConfig& config, TreeMatch
 }  // namespace
 
 TreeMatch match_tree_maps(std::span<const Tree> source, std::span<const Tree> target,
-                          const TreeSearchArea& area, const TreeMatchConfig& config) {
+                          const TreeSearchArea& area, const TreeMatchConfig& config,
+                          const ProgressSink& progress) {
   TreeMatch match;
   Task task{source, target, usable(source), {}, {config.noise_m, config.share, 0.0}};
   if (task.of_source.size() < kFewestTrees) {
@@ -327,7 +329,7 @@ TreeMatch match_tree_maps(std::span<const Tree> source, std::span<const Tree> ta
   const std::vector<PatternTree> pattern = pattern_of(source, large, sizes.source);
   std::optional<PartOnTarget> best;
   for (const SourcePart& part : parts_of(pattern, config.most_trees, kParts)) {
-    PartOnTarget finding = find_part(part, grid, area, task.likeness);
+    PartOnTarget finding = find_part(part, grid, area, task.likeness, progress);
     if (finding.fits.empty()) continue;
     if (!best || finding.chance < best->chance) best = std::move(finding);
     if (best->chance <= config.most_chance) break;

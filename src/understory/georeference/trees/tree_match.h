@@ -9,6 +9,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/sensor/tree.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -69,8 +70,9 @@ struct TreeMatch {
 // diameters. Trees with a position that is not finite are passed over.
 //
 // Not found where either map has too few trees or the area holds none. Deterministic, the same for
-// any number of threads. Throws nothing.
+// any number of threads. Polls `progress`, and throws nothing else.
 [[nodiscard]] TreeMatch match_tree_maps(std::span<const Tree> source, std::span<const Tree> target,
-                                        const TreeSearchArea& area, const TreeMatchConfig& config);
+                                        const TreeSearchArea& area, const TreeMatchConfig& config,
+                                        const ProgressSink& progress = {});
 
 }  // namespace understory

@@ -94,6 +94,7 @@ class GainCorrection {
   }
 
   [[nodiscard]] PairMatch match(const CorrectionPair& pair) const {
+    views_.progress.poll();
     const SparseTarget target(gathered(pair.j));
     const SparsePoints source = gathered(pair.i);
     const Pose guess = poses_[at(pair.j)].inverse() * poses_[at(pair.i)];

@@ -168,13 +168,15 @@ void describe(ConfigTable& table, StemLoopConfig& config) {
 
 std::vector<StemLoop> find_stem_loops(const std::vector<SparsePoints>& level_views,
                                       const std::vector<Pose>& world_from_level,
-                                      const StemLoopConfig& config) {
+                                      const StemLoopConfig& config, const ProgressSink& progress) {
   UNDERSTORY_CHECK(level_views.size() == world_from_level.size());
   const std::vector<SparsePoints> gathered = gathered_views(level_views, world_from_level, config);
   const Finder finder(level_views, gathered, world_from_level, config);
   std::vector<std::optional<StemLoop>> found(level_views.size());
-  parallel_for(level_views.size(), 4,
-               [&](std::size_t i) { found[i] = finder.find(static_cast<int>(i)); });
+  parallel_for(level_views.size(), 4, [&](std::size_t i) {
+    progress.poll();
+    found[i] = finder.find(static_cast<int>(i));
+  });
   std::vector<StemLoop> loops;
   for (const std::optional<StemLoop>& loop : found) {
     if (loop) loops.push_back(*loop);

@@ -33,6 +33,7 @@ class PowerChain {
   // False: no sharper map for longer than patience allows.
   template <typename Match>
   [[nodiscard]] bool add(const CorrectionPair& pair, const Match& match_views) {
+    views_.progress.poll();
     const PairMatch match =
         match_views(views_.targets[at(pair.j)], views_.problem.views[at(pair.i)],
                     poses_[at(pair.j)].inverse() * poses_[at(pair.i)], views_.overlap, config_);
@@ -220,6 +221,7 @@ void correct_by_pose_graph(const CorrectionViews& views, const SelfCorrectionCon
   const std::vector<Pose>& poses = views.problem.world_from_view;
   std::vector<PairMatch> matches(pairs.size());
   parallel_for(pairs.size(), 1, [&](std::size_t k) {
+    views.progress.poll();
     const CorrectionPair& pair = pairs[k];
     matches[k] = match_pair(views.targets[at(pair.j)], views.problem.views[at(pair.i)],
                             poses[at(pair.j)].inverse() * poses[at(pair.i)], views.overlap, config);

@@ -5,14 +5,16 @@
 #include "understory/graph/loops/view_cone.h"
 #include "understory/graph/self_correction/self_correction.h"
 #include "understory/graph/stem_matching/pair_matching.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
 // What the methods of self_correct share.
 struct CorrectionViews {
-  explicit CorrectionViews(const SelfCorrectionProblem& problem);
+  CorrectionViews(const SelfCorrectionProblem& problem, const ProgressSink& progress);
 
   const SelfCorrectionProblem& problem;
+  const ProgressSink& progress;  // polled before each match
   std::vector<SparseTarget> targets;
   ConeOverlap overlap;
   double l0_m = 0.0;  // median over the views

@@ -63,6 +63,7 @@ void correct_by_gaussian_process(const CorrectionViews& views, const SelfCorrect
   for (int round = 0; round < kRounds; ++round) {
     std::vector<PairMatch> matches(pairs.size());
     parallel_for(pairs.size(), 1, [&](std::size_t k) {
+      views.progress.poll();
       const CorrectionPair& pair = pairs[k];
       matches[k] =
           match_pair(views.targets[at(pair.j)], views.problem.views[at(pair.i)],

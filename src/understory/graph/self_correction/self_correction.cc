@@ -101,8 +101,11 @@ void describe(ConfigTable& table, SelfCorrectionConfig& config) {
   table.add("seed", config.seed, {0, 1'000'000'000}, "", "seed of the pairs drawn at random");
 }
 
-CorrectionViews::CorrectionViews(const SelfCorrectionProblem& given)
-    : problem(given), targets(targets_of(given.views)), overlap(estimate_view_cone(given.views)) {
+CorrectionViews::CorrectionViews(const SelfCorrectionProblem& given, const ProgressSink& asked)
+    : problem(given),
+      progress(asked),
+      targets(targets_of(given.views)),
+      overlap(estimate_view_cone(given.views)) {
   std::vector<double> spacings;
   for (const SparseTarget& target : targets) {
     if (target.l0_m > 0.0) spacings.push_back(target.l0_m);
@@ -128,9 +131,8 @@ PoseGraphProblem chain_problem(const SelfCorrectionProblem& problem,
 
 namespace {
 
-void correct_by_method(const SelfCorrectionProblem& problem, const SelfCorrectionConfig& config,
+void correct_by_method(const CorrectionViews& views, const SelfCorrectionConfig& config,
                        SelfCorrectionResult& result) {
-  const CorrectionViews views(problem);
   switch (config.method) {
     case CorrectionMethod::kNone:
       break;
@@ -160,7 +162,8 @@ void correct_by_method(const SelfCorrectionProblem& problem, const SelfCorrectio
 }  // namespace
 
 SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
-                                  const SelfCorrectionConfig& config) {
+                                  const SelfCorrectionConfig& config,
+                                  const ProgressSink& progress) {
   UNDERSTORY_CHECK(problem.views.size() == problem.world_from_view.size());
   UNDERSTORY_CHECK(problem.views.size() == problem.map_views.size());
   UNDERSTORY_CHECK(problem.views.size() == problem.steps.size());
@@ -173,7 +176,7 @@ SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
   result.after = result.before;
   const bool corrected = config.method != CorrectionMethod::kNone && problem.views.size() >= 3;
   if (corrected) {
-    correct_by_method(problem, config, result);
+    correct_by_method(CorrectionViews(problem, progress), config, result);
   } else {
     result.stopped_because = "the correction is switched off, or there are too few views";
   }

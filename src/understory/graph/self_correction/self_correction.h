@@ -12,6 +12,7 @@
 #include "understory/registration/stems/go_icp.h"
 #include "understory/registration/stems/sparse_icp.h"
 #include "understory/util/config/config.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -109,8 +110,10 @@ struct [[nodiscard]] SelfCorrectionResult {
 
 // Corrects a map by itself. The map is never left blurrier (beta) than it was. Too few views or
 // stems are no error: nothing is tried then. Deterministic; same result for any number of threads.
+// Polls `progress`.
 SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
-                                  const SelfCorrectionConfig& config);
+                                  const SelfCorrectionConfig& config,
+                                  const ProgressSink& progress = {});
 
 // Odometry as edges between the poses given, with the problem's covariances of the steps.
 [[nodiscard]] PoseGraphProblem chain_problem(const SelfCorrectionProblem& problem,

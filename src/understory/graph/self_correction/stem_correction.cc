@@ -109,9 +109,9 @@ SelfCorrectionProblem problem_of(LevelViews& level, const std::vector<SparseStep
 }
 
 // Loops over the odometry; leaves the poses and the accepted loops in the problem.
-void close_loops(const StemCorrectionConfig& config, SelfCorrectionProblem& problem,
-                 StemCorrection& result) {
-  result.loops = find_stem_loops(problem.views, problem.world_from_view, config.loops);
+void close_loops(const StemCorrectionConfig& config, const ProgressSink& progress,
+                 SelfCorrectionProblem& problem, StemCorrection& result) {
+  result.loops = find_stem_loops(problem.views, problem.world_from_view, config.loops, progress);
   result.accepted.assign(result.loops.size(), 0);
   result.loop_shift_m.assign(result.loops.size(), 0.0);
   PoseGraphProblem graph = chain_problem(problem, problem.world_from_view);
@@ -149,7 +149,8 @@ void describe(ConfigTable& table, StemCorrectionConfig& config) {
 
 StemCorrection correct_stems(const std::vector<StemView>& views,
                              const std::vector<SparseStep>& steps,
-                             const StemCorrectionConfig& config, StageTimes& times) {
+                             const StemCorrectionConfig& config, StageTimes& times,
+                             const ProgressSink& progress) {
   LevelViews leveled = level(views, steps);
   SelfCorrectionProblem problem = problem_of(leveled, steps);
   const std::vector<StemView> sights = map_sights(views, config.map);
@@ -158,11 +159,11 @@ StemCorrection correct_stems(const std::vector<StemView>& views,
   StemCorrection result;
   if (config.close_loops) {
     const ScopedTimer timer(times, "loops");
-    close_loops(config, problem, result);
+    close_loops(config, progress, problem, result);
   }
   {
     const ScopedTimer timer(times, "self_correction");
-    result.self = self_correct(problem, config.correction);
+    result.self = self_correct(problem, config.correction, progress);
   }
   for (std::size_t i = 0; i < views.size(); ++i)
     result.world_from_body.push_back(result.self.world_from_view[i] * leveled.level_from_body[i]);

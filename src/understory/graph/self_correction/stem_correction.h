@@ -8,6 +8,7 @@
 #include "understory/graph/self_correction/stem_sights.h"
 #include "understory/odometry/stems/sparse_odometry.h"
 #include "understory/sensor/stem_view.h"
+#include "understory/util/progress.h"
 #include "understory/util/timing.h"
 
 namespace understory {
@@ -36,10 +37,12 @@ struct StemCorrection {
 
 // Finds loops by tree pattern and solves the pose graph of odometry and loops, wrong loops
 // rejected; then the map corrects itself (graph/self_correction/self_correction.h). Wall time goes
-// to the stages "loops" and "self_correction". Same result for any number of threads.
+// to the stages "loops" and "self_correction". Same result for any number of threads. Polls
+// `progress`.
 [[nodiscard]] StemCorrection correct_stems(const std::vector<StemView>& views,
                                            const std::vector<SparseStep>& steps,
-                                           const StemCorrectionConfig& config, StageTimes& times);
+                                           const StemCorrectionConfig& config, StageTimes& times,
+                                           const ProgressSink& progress = {});
 
 // Sharpness of the map of these views placed by these poses (of the body), of all their stems.
 [[nodiscard]] MapSharpness stem_sharpness(const std::vector<StemView>& views,

@@ -27,9 +27,8 @@ std::vector<SparseStep> position(const std::vector<StemView>& views,
     if (stop_requested && stop_requested()) break;
     const ScopedTimer timer(times, "scan");
     steps.push_back(odometry.add(view));
-    if (progress)
-      progress({"odometry", static_cast<double>(steps.size()), static_cast<double>(views.size()),
-                "views", ""});
+    progress({"odometry", static_cast<double>(steps.size()), static_cast<double>(views.size()),
+              "views", ""});
   }
   return steps;
 }
@@ -116,13 +115,16 @@ RunOutcome run_correction(const CorrectionRequest& request, Log& log, const Prog
   CorrectionInput input = read_stems(request, log, times, documents);
   position_views(request, progress, stop_requested, times, input, documents);
   const std::filesystem::path results = folder.begin_results();
+  // Who stops the positioning gets the map of what was positioned.
+  const bool stopped = input.stopped;
+  const ProgressSink sink = stopped ? progress : progress.stopped_by(stop_requested);
   StemMapMaker map(std::move(input), std::move(documents), request.config,
-                   {request.run_folder, results, times, log, progress, {}});
+                   {request.run_folder, results, times, log, sink, {}});
   map.close_loops();
   map.finish_map();
   map.list_trees();
   RunOutcome outcome = map.write();
-  folder.commit(log, stop_requested && stop_requested());
+  folder.commit(log, stopped);
   folder.forget_state();  // of an unfinished run that this one replaces
   return outcome;
 }

@@ -25,7 +25,8 @@ struct CorrectionRequest {
 };
 
 // From the stems of a recording to the run folder: odometry, loops, trajectory, tree map.
-// Throws InputError or OutputError.
+// Throws InputError or OutputError, and Stopped where the user stops it once the views are
+// positioned: the folder is as it was.
 [[nodiscard]] RunOutcome run_correction(const CorrectionRequest& request, Log& log,
                                         const ProgressSink& progress,
                                         const StopRequested& stop_requested);

@@ -52,8 +52,9 @@ void StemMapMaker::close_loops() {
       run_.correction.world_from_body.push_back(step.world_from_body);
     return;
   }
-  if (place_.progress) place_.progress({"correction", 0.0, 0.0, "", ""});
-  run_.correction = correct_stems(run_.views, run_.steps, config_.stems, place_.times);
+  place_.progress({"correction", 0.0, 0.0, "", ""});
+  run_.correction =
+      correct_stems(run_.views, run_.steps, config_.stems, place_.times, place_.progress);
 }
 
 void StemMapMaker::finish_map() {

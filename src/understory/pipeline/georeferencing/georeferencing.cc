@@ -146,13 +146,15 @@ MovedRun moved_run(const MovableRun& run, const Placement& placement) {
 
 }  // namespace
 
-GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& log) {
+GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& log,
+                                       const ProgressSink& progress) {
   std::vector<fs::path> inputs = files_of(given.gnss, {});
   inputs.insert(inputs.end(), {given.run, given.terrain_model, given.tree_map, given.points});
   refuse_input_as_output(given.result, inputs);
   const RunFolder place = RunFolder::claim(given.result, given.overwrite);
   GeoreferenceRequest request = given;
   request.result = place.begin_results();
+  request.progress = progress;
   check(request.layers);
   StageTimes times;
   RunDocuments documents("georeference", {yaml_of(given), {}, "", {}}, times, log);
@@ -163,7 +165,7 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& lo
     request.layers.coordinate_system = run.layers->wkt();
   timer.emplace(times, "fit");
   const Placement placement = find_placement(request, run, log);
-  documents.add_input(request.run / "trajectory.tum");
+  documents.add_input(request.run / "trajectory.tum", progress);
   if (run.has_trees) documents.add_input(request.run / "trees.csv");
   documents.add_inputs(placement.inputs);
   timer.emplace(times, "writing");
@@ -172,11 +174,12 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& lo
   ResultFrames frames;
   if (on_globe.on_globe) frames = frames_at(on_globe, request.layers, log);
   MapPicture picture;
-  write_moved_run(request.run, request.result, moved, frames, picture, log);
+  write_moved_run({request.run, request.result, progress}, moved, frames, picture, log);
   timer.reset();
   describe(request, moved, documents);
   documents.place(std::move(on_globe), frames);
   if (!picture.empty()) documents.report().picture = &picture;
+  progress.poll();
   documents.write(request.result);
   place.commit(log);
   place.forget_state();

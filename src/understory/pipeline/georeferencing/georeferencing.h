@@ -14,6 +14,7 @@
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -59,6 +60,7 @@ struct GeoreferenceRequest {
   double near_radius_m = 200.0;  // how far off that may be
   TreeMatchConfig trees;
   GeoreferenceConfig layers;  // their coordinate system
+  ProgressSink progress;      // polled by the methods; run_georeferencing sets it
 };
 
 // What `understory georeference` tells when it is done.
@@ -68,7 +70,8 @@ struct GeoreferenceOutcome : RunOutcome {
 
 // Moves a run by a fit after it was made: reads trajectory.tum and what else can be moved of the
 // run folder and writes all of it, moved, to another one. Throws InputError, OutputError or
-// ConfigError.
-[[nodiscard]] GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& log);
+// ConfigError, and Stopped where the user stops it: the folder of the result is as it was.
+[[nodiscard]] GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& log,
+                                                     const ProgressSink& progress = {});
 
 }  // namespace understory

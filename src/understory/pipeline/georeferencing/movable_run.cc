@@ -72,12 +72,13 @@ std::vector<Tree> moved_trees(const std::vector<Tree>& trees, const Pose& motion
   return result;
 }
 
-void write_moved_run(const fs::path& from, const fs::path& to, const MovedRun& moved,
+void write_moved_run(const MovingFolders& folders, const MovedRun& moved,
                      const ResultFrames& frames, MapPicture& picture, Log& log) {
+  const auto& [from, to, progress] = folders;
   const MovableRun& run = moved.run;
   const Pose& motion = moved.placement.target_from_world;
-  write_moved_layers({from, *run.layers}, motion, {to, frames.layers}, frames.drawing(), picture,
-                     log);
+  write_moved_layers({from, *run.layers, progress}, motion, {to, frames.layers}, frames.drawing(),
+                     picture, log);
   for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum"})
     write_moved_path(from / name, to / name, motion);
   write_moved_cuts(from / "cuts.csv", to / "cuts.csv", motion);

@@ -17,6 +17,7 @@
 #include "understory/sensor/gnss_fix.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -53,10 +54,15 @@ struct MovedRun {
   Trajectory trajectory;
   std::vector<Tree> trees;
 };
-// Writes every file of the run in `from`, moved, to the folder `to`; the cloud is drawn into
+// From which run folder to which folder a run is moved.
+struct MovingFolders {
+  const std::filesystem::path& from;
+  const std::filesystem::path& to;
+  const ProgressSink& progress;  // polled by each point of the cloud
+};
+// Writes every file of the run in `folders.from`, moved, to the other; the cloud is drawn into
 // `picture`. Throws InputError or OutputError.
-void write_moved_run(const std::filesystem::path& from, const std::filesystem::path& to,
-                     const MovedRun& moved, const ResultFrames& frames, MapPicture& picture,
-                     Log& log);
+void write_moved_run(const MovingFolders& folders, const MovedRun& moved,
+                     const ResultFrames& frames, MapPicture& picture, Log& log);
 
 }  // namespace understory

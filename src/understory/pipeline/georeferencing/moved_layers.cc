@@ -40,6 +40,7 @@ struct Move {
   const LayerFrame& from;
   const Pose& target_from_world;
   const LayerFrame& to;
+  const ProgressSink& progress;
   Pose world_from_target = target_from_world.inverse();
 
   [[nodiscard]] Vector3d to_target_world(const Vector3d& point_in_layer) const {
@@ -60,6 +61,7 @@ void move_cloud(const fs::path& from, const fs::path& to, const Move& move, cons
   const LasHeader header = read_las_header(*file);
   LasWriter writer(to, las_options(move.to));
   read_las_points(*file, header, log, [&](const LasPoint& point) {
+    move.progress.poll();
     LasRecord record;
     const Vector3d in_world = move.to_target_world(point.position);
     const Vector3d at = move.to.from_world(in_world);
@@ -85,7 +87,7 @@ void move_cloud(const fs::path& from, const fs::path& to, const Move& move, cons
 
 void write_moved_layers(const RunLayers& from, const Pose& target_from_world, const RunLayers& to,
                         const LayerFrame& drawing, MapPicture& picture, Log& log) {
-  const Move move{from.frame, target_from_world, to.frame};
+  const Move move{from.frame, target_from_world, to.frame, from.progress};
   const Raster ground = read_layer(from.folder / "dtm.tif");
   if (fs::exists(from.folder / "map.laz"))
     move_cloud(from.folder / "map.laz", to.folder / "map.laz", move, ground, drawing, picture, log);

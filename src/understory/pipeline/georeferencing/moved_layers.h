@@ -6,6 +6,7 @@
 #include "understory/georeference/systems/layer_frame.h"
 #include "understory/output/report/map_picture.h"
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -13,6 +14,7 @@ namespace understory {
 struct RunLayers {
   std::filesystem::path folder;
   const LayerFrame& frame;
+  ProgressSink progress = {};  // polled by each point that is read
 };
 
 // Writes what a run folder holds of map.laz, dtm.tif and chm.tif to another, moved: the cloud point

@@ -98,8 +98,9 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
                 const ProgressSink& progress, StageTimes& times, Stock& stock) {
   {
     const ScopedTimer timer(times, "reading");
-    stock.stand = stock.of_run ? read_run_map(stock.path, stock.frames.layers, request.frame, log)
-                               : read_stand(stock.path, request.frame, log);
+    stock.stand = stock.of_run
+                      ? read_run_map(stock.path, stock.frames.layers, request.frame, log, progress)
+                      : read_stand(stock.path, request.frame, log, progress);
     name_system(request, stock);
   }
   // The map of a run is in metres, and what is wrong with it is a matter of trust.
@@ -112,7 +113,7 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
                                      stock.of_run ? seen_in_run(request.cloud) : SeenTest());
   }
   const ScopedTimer timer(times, "writing");
-  blocks([&](std::span<const Eigen::Vector3d> points) {
+  polled(blocks, progress)([&](std::span<const Eigen::Vector3d> points) {
     add_to_picture(stock.picture, points, stock.inventory.ground, stock.frames.drawing());
   });
   if (stock.of_run) {
@@ -124,10 +125,10 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
 }
 
 void describe(const InventoryRequest& request, const Stock& stock, const Log& log,
-              RunDocuments& documents) {
+              const ProgressSink& progress, RunDocuments& documents) {
   const InventoryResult& inventory = stock.inventory;
   const PointCloudFile& cloud = stock.stand.cloud;
-  documents.add_input(stock.path);
+  documents.add_input(stock.path, progress);
   if (!stock.of_run) documents.summary().crs_wkt = cloud.coordinate_system;
   documents.count("points", inventory.points);
   documents.count("trees", inventory.trees.size());
@@ -162,7 +163,8 @@ RunOutcome run_inventory(const InventoryRequest& request, Log& log, const Progre
   const RunFolder place = RunFolder::claim(request.run_folder, request.overwrite);
   const fs::path results = place.begin_results();
   take_stock(request, results, log, progress, times, stock);
-  describe(request, stock, log, documents);
+  describe(request, stock, log, progress, documents);
+  progress.poll();
   for (const std::string& remark : stock.inventory.remarks)
     log.info(remark);
   documents.write(results);

@@ -123,13 +123,14 @@ PointBlocks blocks_of(const PointCloudFile& cloud) {
 namespace {
 
 StandCloud checked_stand(PointCloudFile cloud, const std::string& name, const CloudFrame& frame,
-                         Log& log) {
+                         Log& log, const ProgressSink& progress) {
   StandCloud stand;
   stand.cloud = std::move(cloud);
   const std::string system = stand.cloud.coordinate_system;
   bring_upright(frame, name, stand.cloud, log);
   if (frame.unit_m > 0.0 && !frame.up.empty()) return stand;
-  const CloudShape shape = shape_of(blocks_of(stand.cloud));
+  const PointBlocks blocks = blocks_of(stand.cloud);
+  const CloudShape shape = shape_of(polled(blocks, progress));
   stand.doubt = doubt_of(shape, system, frame);
   stand.suspicion = suspicion_of(shape, system, frame);
   return stand;
@@ -146,15 +147,17 @@ void bring_to_world(const LayerFrame& layers, PointCloudFile& cloud) {
 
 }  // namespace
 
-StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame, Log& log) {
-  return checked_stand(read_cloud(path.string(), log), path.string(), frame, log);
+StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame, Log& log,
+                      const ProgressSink& progress) {
+  return checked_stand(read_cloud(path.string(), log, progress), path.string(), frame, log,
+                       progress);
 }
 
 StandCloud read_run_map(const std::filesystem::path& path, const LayerFrame& layers,
-                        const CloudFrame& frame, Log& log) {
-  PointCloudFile cloud = read_cloud(path.string(), log);
+                        const CloudFrame& frame, Log& log, const ProgressSink& progress) {
+  PointCloudFile cloud = read_cloud(path.string(), log, progress);
   bring_to_world(layers, cloud);
-  return checked_stand(std::move(cloud), path.string(), frame, log);
+  return checked_stand(std::move(cloud), path.string(), frame, log, progress);
 }
 
 }  // namespace understory

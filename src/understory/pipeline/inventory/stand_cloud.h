@@ -6,6 +6,7 @@
 #include "understory/forest/inventory.h"
 #include "understory/georeference/systems/layer_frame.h"
 #include "understory/recording/clouds/cloud_file.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -30,11 +31,12 @@ struct StandCloud {
   std::string suspicion;  // that it is in feet; empty: none
 };
 // Reads a cloud and turns and scales it as `frame` says; then its coordinate system is dropped,
-// with a warning. Throws InputError where read_cloud does, and for a recording.
+// with a warning. Polls `progress`. Throws InputError where read_cloud does, and for a recording.
 [[nodiscard]] StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame,
-                                    Log& log);
+                                    Log& log, const ProgressSink& progress = {});
 // The map of a run, brought back from the frame of its layers to the world frame.
 [[nodiscard]] StandCloud read_run_map(const std::filesystem::path& path, const LayerFrame& layers,
-                                      const CloudFrame& frame, Log& log);
+                                      const CloudFrame& frame, Log& log,
+                                      const ProgressSink& progress = {});
 
 }  // namespace understory

@@ -114,7 +114,7 @@ void EventLoop::handle_ready() {
     const TimeNs before = front_end_->last_scan_end();
     take_fix_or_sample(*ready);
     note_positioned(front_end_->handle(*ready, source_->rig()));
-    if (front_end_->last_scan_end() == before || !progress_) continue;
+    if (front_end_->last_scan_end() == before) continue;
     const FrontEndProgress so_far = front_end_->progress();
     const double share = source_->progress();
     const auto done = static_cast<double>(so_far.scans);

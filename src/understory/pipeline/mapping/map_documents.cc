@@ -9,7 +9,7 @@ RunDocuments map_documents(const ReadRecording& recording, const StageTimes& tim
   const MappingRequest& request = recording.request;
   const RunFacts& facts = recording.facts;
   RunDocuments documents("map", request.config_record, times, recording.log, facts.elapsed_s);
-  documents.add_inputs(hash_inputs(request.recording, recording.log));
+  documents.add_inputs(hash_inputs(request.recording, recording.log, recording.progress));
   documents.report().title = std::filesystem::path(request.recording).filename().string();
   if (facts.online != nullptr) {
     const GeoreferenceConfig& config = georeference_of(request.config);

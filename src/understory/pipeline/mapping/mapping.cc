@@ -16,6 +16,14 @@ RunOutcome nothing_to_map(const FrontEnd& front_end, const Recording& recording,
   return {RunStatus::kPartial, {reason}, reason};
 }
 
+// Who stops the reading gets the map of what was read. Who stops the making of the map gets none:
+// the state on the disk is what the run goes on from.
+ProgressSink until_stopped(const RunFacts& facts, const ProgressSink& progress,
+                           const StopRequested& stop_requested) {
+  const bool stopped_reading = facts.stopped && facts.unreadable.empty();
+  return stopped_reading ? progress : progress.stopped_by(stop_requested);
+}
+
 }  // namespace
 
 RunOutcome run_mapping(MappingRun run, Log& log, const ProgressSink& progress,
@@ -34,8 +42,9 @@ RunOutcome run_mapping(MappingRun run, Log& log, const ProgressSink& progress,
   // Make the map of them.
   const RunFolder& folder = run.state.folder();
   const std::filesystem::path results = folder.begin_results();
+  const ProgressSink sink = until_stopped(facts, progress, stop_requested);
   const auto map = front_end.map_maker(
-      {loop.request(), facts, loop.recording(), folder.work(), results, log, progress});
+      {loop.request(), facts, loop.recording(), folder.work(), results, log, sink});
   map->close_loops();
   map->finish_map();
   map->list_trees();

@@ -25,7 +25,8 @@ struct MappingRun {
 [[nodiscard]] MappingRun reopen_mapping(const std::filesystem::path& run_folder);
 
 // From a raw recording to the run folder: the main job, and the function to read first. Throws
-// InputError or OutputError where nothing usable can be made; what a killed run leaves behind is
+// InputError or OutputError where nothing usable can be made, and Stopped where the user stops it
+// once the recording is read; what a killed run leaves behind is
 // finished by way of `reopen_mapping`.
 [[nodiscard]] RunOutcome run_mapping(MappingRun run, Log& log, const ProgressSink& progress,
                                      const StopRequested& stop_requested);

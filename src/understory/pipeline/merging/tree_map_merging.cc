@@ -29,9 +29,11 @@ constexpr const char* kFelled = "felled.csv";
 
 // By steps of 0.05 (P1 found the best weight at -0.15).
 BestWeight best_weight(const std::vector<Tree>& a, const std::vector<Tree>& b,
-                       const std::vector<Tree>& reference, const TreeMergeConfig& config) {
+                       const std::vector<Tree>& reference, const TreeMergeConfig& config,
+                       const ProgressSink& progress) {
   BestWeight best{0.0, std::numeric_limits<double>::infinity()};
   for (int k = -10; k <= 30; ++k) {
+    progress.poll();
     const double w = 0.05 * k;
     const double rmse =
         compare_trees(merge_trees(a, b, w, config).trees, reference, 1.0).position_rmse_m;
@@ -79,7 +81,7 @@ struct Merge {
   MatchChance chance;
 };
 
-Merge merge_maps(const MergeRequest& request, StageTimes& times) {
+Merge merge_maps(const MergeRequest& request, const ProgressSink& progress, StageTimes& times) {
   Merge m;
   std::vector<Tree> reference;
   {
@@ -89,11 +91,15 @@ Merge merge_maps(const MergeRequest& request, StageTimes& times) {
     if (!request.reference.empty()) reference = beside(request.reference, m.a, request);
   }
   const ScopedTimer timer(times, "merging");
+  progress.poll();
   m.field = deformation_field(m.b, m.a, request.merge);
+  progress.poll();
   m.merged = merge_trees(m.a, m.b, request.weight, request.merge);
   m.falls = merged_falls(m.merged, m.a, falls_in(request.a), m.b, falls_in(request.b));
-  if (!request.reference.empty()) m.best = best_weight(m.a, m.b, reference, request.merge);
-  m.chance = match_chance(m.a, m.b, m.merged, request.weight, request.merge, request.align);
+  if (!request.reference.empty())
+    m.best = best_weight(m.a, m.b, reference, request.merge, progress);
+  m.chance =
+      match_chance(m.a, m.b, m.merged, request.weight, request.merge, request.align, progress);
   return m;
 }
 
@@ -184,15 +190,16 @@ std::string text_of(const Merge& m) {
 
 }  // namespace
 
-MergeOutcome run_merging(const MergeRequest& request, Log& log) {
+MergeOutcome run_merging(const MergeRequest& request, Log& log, const ProgressSink& progress) {
   refuse_input_as_output(request.folder, {request.a, request.b, request.reference});
   const RunFolder place = RunFolder::claim(request.folder, request.overwrite);
   StageTimes times;
   RunDocuments documents("merge", {yaml_of(request), {}, "", {}}, times, log);
-  const Merge m = merge_maps(request, times);
+  const Merge m = merge_maps(request, progress, times);
   const fs::path results = place.begin_results();
   write_tables(results, m, times);
   describe(request, m, documents);
+  progress.poll();
   documents.write(results);
   place.commit(log);
   place.forget_state();

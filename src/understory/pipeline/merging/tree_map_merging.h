@@ -9,6 +9,7 @@
 #include "understory/evaluation/tree_merge.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -44,7 +45,9 @@ struct MergeOutcome : RunOutcome {
 };
 
 // Joins two tree maps and writes trees.csv, felled.csv, deformation.csv, run.json and report.html.
-// Untrusted where nothing tells that both maps are of one place. Throws InputError or OutputError.
-[[nodiscard]] MergeOutcome run_merging(const MergeRequest& request, Log& log);
+// Untrusted where nothing tells that both maps are of one place. Throws InputError or OutputError,
+// and Stopped where the user stops it: the folder is as it was.
+[[nodiscard]] MergeOutcome run_merging(const MergeRequest& request, Log& log,
+                                       const ProgressSink& progress = {});
 
 }  // namespace understory

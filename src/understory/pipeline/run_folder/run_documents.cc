@@ -41,8 +41,8 @@ RunDocuments::RunDocuments(const std::string& command, ConfigRecord config, cons
   summary().config = std::move(config);
 }
 
-void RunDocuments::add_input(const std::filesystem::path& file) {
-  summary().inputs.push_back(hash_input(file));
+void RunDocuments::add_input(const std::filesystem::path& file, const ProgressSink& progress) {
+  summary().inputs.push_back(hash_input(file, progress));
 }
 
 void RunDocuments::add_inputs(const std::vector<InputHash>& files) {
@@ -85,8 +85,9 @@ void RunDocuments::judge(const RunEvidence& evidence, const JudgementConfig& con
 
 void RunDocuments::judge_path() {
   if (summary().poses != 1) return;
-  lower(RunStatus::kPartial,
-        "the path is a single pose: nothing was matched, and nothing shows whether the map is right");
+  lower(
+      RunStatus::kPartial,
+      "the path is a single pose: nothing was matched, and nothing shows whether the map is right");
 }
 
 void RunDocuments::inherit(const InheritedTrust& trust) {

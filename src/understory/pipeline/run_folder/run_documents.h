@@ -15,6 +15,7 @@
 #include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 #include "understory/util/timing.h"
 
 namespace understory {
@@ -38,8 +39,8 @@ class RunDocuments {
   // until `write`.
   [[nodiscard]] ReportInput& report() { return report_; }
 
-  // A file that the result was computed from. Throws InputError.
-  void add_input(const std::filesystem::path& file);
+  // A file that the result was computed from. Polls `progress`. Throws InputError.
+  void add_input(const std::filesystem::path& file, const ProgressSink& progress = {});
   void add_inputs(const std::vector<InputHash>& files);
   // A number of things under "counts".
   void count(const std::string& name, std::uint64_t value);

@@ -33,7 +33,7 @@ class Collector {
   PointCloudFile& cloud_;
 };
 
-PointCloudFile read_las_cloud(ByteSource& file, Log& log) {
+PointCloudFile read_las_cloud(ByteSource& file, Log& log, const ProgressSink& progress) {
   const LasHeader header = read_las_header(file);
   PointCloudFile cloud;
   cloud.coordinate_system = header.coordinate_system;
@@ -42,6 +42,7 @@ PointCloudFile read_las_cloud(ByteSource& file, Log& log) {
                  std::to_string(header.point_format);
   Collector collector(cloud);
   read_las_points(file, header, log, [&](const LasPoint& point) {
+    progress.poll();
     if (!collector.add(point.position)) return;
     cloud.intensity.push_back(point.intensity);
     cloud.classification.push_back(point.classification);
@@ -70,11 +71,11 @@ PointCloudFile from_table(const CloudTable& table, const std::string& name) {
 
 }  // namespace
 
-PointCloudFile read_cloud(ByteSource& file, Log& log) {
+PointCloudFile read_cloud(ByteSource& file, Log& log, const ProgressSink& progress) {
   PointCloudFile cloud;
   switch (cloud_format(file)) {
     case CloudFormat::kLas:
-      cloud = read_las_cloud(file, log);
+      cloud = read_las_cloud(file, log, progress);
       break;
     case CloudFormat::kPcd:
       cloud = from_table(read_pcd(file, log), file.name());
@@ -92,10 +93,10 @@ PointCloudFile read_cloud(ByteSource& file, Log& log) {
   return cloud;
 }
 
-PointCloudFile read_cloud(const std::string& path, Log& log) {
+PointCloudFile read_cloud(const std::string& path, Log& log, const ProgressSink& progress) {
   const auto file = open_file(path);
   if (file->size() == 0) throw InputError(path, "", "the file is empty");
-  return read_cloud(*file, log);
+  return read_cloud(*file, log, progress);
 }
 
 }  // namespace understory

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -26,8 +27,11 @@ struct PointCloudFile {
 
 // Reads .las, .laz, .pcd, .ply or KITTI .bin (told by content, .bin by name). Points that are NaN
 // or infinite are left out. A file that breaks off gives the points up to there and a warning
-// ("recording.damaged"); throws InputError if no point can be had from it.
-[[nodiscard]] PointCloudFile read_cloud(const std::string& path, Log& log);
-[[nodiscard]] PointCloudFile read_cloud(ByteSource& file, Log& log);
+// ("recording.damaged"); throws InputError if no point can be had from it. Of LAS and LAZ each
+// point polls `progress`.
+[[nodiscard]] PointCloudFile read_cloud(const std::string& path, Log& log,
+                                        const ProgressSink& progress = {});
+[[nodiscard]] PointCloudFile read_cloud(ByteSource& file, Log& log,
+                                        const ProgressSink& progress = {});
 
 }  // namespace understory

@@ -47,8 +47,7 @@ Placement place_without_clock(const GeoreferenceRequest& request, const MovableR
     placement.doubts.insert(placement.doubts.begin(), times.reason);
     return placement;
   } catch (const InputError& error) {
-    throw InputError(times.file.string(), "",
-                     times.reason + " (tried: " + reason_of(error) + ")");
+    throw InputError(times.file.string(), "", times.reason + " (tried: " + reason_of(error) + ")");
   }
 }
 

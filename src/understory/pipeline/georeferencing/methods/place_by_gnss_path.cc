@@ -45,7 +45,7 @@ Placement place_by_gnss_path(const GeoreferenceRequest& request, const MovableRu
   if (request.gnss.empty())
     placement.inputs.push_back(hash_input(named.file));
   else
-    placement.inputs = hash_inputs(request.gnss, log);
+    placement.inputs = hash_inputs(request.gnss, log, request.progress);
   return placement;
 }
 

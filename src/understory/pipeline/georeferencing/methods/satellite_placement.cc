@@ -145,7 +145,7 @@ Placement placement_of(const GeoreferenceRequest& request, const MovableRun& run
   if (request.gnss.empty())
     placement.inputs.push_back(hash_input(input.file));
   else
-    placement.inputs = hash_inputs(request.gnss, log);
+    placement.inputs = hash_inputs(request.gnss, log, request.progress);
   return placement;
 }
 

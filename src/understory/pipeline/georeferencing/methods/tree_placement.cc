@@ -148,17 +148,18 @@ FoundTrees find_trees(const GeoreferenceRequest& request, const MovableRun& run,
   std::optional<GeodeticPlace> place;
   if (rough) place = rough->place;
   FoundTrees found;
-  found.target =
-      read_tree_target(request.tree_map, request.tree_map_system, request.near, place, {}, log);
+  found.target = read_tree_target(request.tree_map, request.tree_map_system, request.near, place,
+                                  {}, log, request.progress);
   const TreeSearchArea area = area_of(request, run, found.target, rough);
   const std::vector<Tree> tops = tops_of_run(request.run, run);
   const bool both = tops.size() >= kFewestTrees;
   TreeMatchConfig config = request.trees;
   if (both) config.most_chance /= 2.0;  // two searches, one of which chance may favour
-  found.match = match_tree_maps(run.trees, found.target.trees, area, config);
+  found.match = match_tree_maps(run.trees, found.target.trees, area, config, request.progress);
   found.trees_of_run = run.trees.size();
   if (both) {
-    const TreeMatch match = match_tree_maps(tops, found.target.trees, area, config);
+    const TreeMatch match =
+        match_tree_maps(tops, found.target.trees, area, config, request.progress);
     if (likelier(match, found.match)) {
       found.match = match;
       found.trees_of_run = tops.size();
@@ -177,7 +178,7 @@ void tell_trees(const GeoreferenceRequest& request, const FoundTrees& found, Pla
     placement.doubt("the trees were not found in " + request.tree_map.filename().string() + ": " +
                     found.match.reason +
                     ". It may be of another forest, or --near or the coordinate system is wrong");
-  placement.inputs.push_back(hash_input(request.tree_map));
+  placement.inputs.push_back(hash_input(request.tree_map, request.progress));
 }
 
 PlaceEvidence evidence_of_trees(const MovableRun& run, const TreeMatch& match, bool heights) {

@@ -52,12 +52,13 @@ Raster canopy_of(const PointBlocks& blocks, const GroundModel& ground, const Vec
 }
 
 TreeMapFile tops_of(const std::filesystem::path& path, const std::string& system,
-                    const TreeTargetConfig& config, Log& log) {
-  const StandCloud stand = read_stand(path, {}, log);
+                    const TreeTargetConfig& config, Log& log, const ProgressSink& progress) {
+  const StandCloud stand = read_stand(path, {}, log, progress);
   if (!stand.doubt.empty())
     throw InputError(path.string(), "", "expected a cloud in metres with z up: " + stand.doubt);
-  const PointBlocks blocks = blocks_of(stand.cloud);
-  const GroundModel ground = estimate_ground(blocks, {});
+  const PointBlocks unasked = blocks_of(stand.cloud);
+  const PointBlocks blocks = polled(unasked, progress);
+  const GroundModel ground = estimate_ground(unasked, {}, progress);
   TreeMapFile map;
   map.coordinate_system =
       stand.cloud.coordinate_system.empty() ? system : stand.cloud.coordinate_system;
@@ -126,13 +127,14 @@ void bring_home(const TreeMapFile& map, const std::filesystem::path& path,
 TreeTarget read_tree_target(const std::filesystem::path& path, const std::string& system,
                             const std::optional<Vector2d>& near,
                             const std::optional<GeodeticPlace>& place,
-                            const TreeTargetConfig& config, Log& log) {
+                            const TreeTargetConfig& config, Log& log,
+                            const ProgressSink& progress) {
   TreeTarget target;
   target.from_cloud = is_cloud(path);
   if (!std::filesystem::exists(path))
     throw InputError(path.string(), "", "expected a map of trees: no such file");
-  const TreeMapFile map =
-      target.from_cloud ? tops_of(path, system, config, log) : read_tree_map(path, system);
+  const TreeMapFile map = target.from_cloud ? tops_of(path, system, config, log, progress)
+                                            : read_tree_map(path, system);
   for (const std::string& remark : map.remarks)
     log.info(path.string() + ": " + remark);
   target.trees = map.trees;

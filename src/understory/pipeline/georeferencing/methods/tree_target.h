@@ -9,6 +9,7 @@
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/log.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -34,11 +35,13 @@ struct TreeTarget {
 
 // Reads a map of trees, or finds the tops in a cloud from the air. `system` is the coordinate
 // system of a file that states none. `near` is a place in the file's coordinates. `place` is where
-// the run is known to be: the frame's origin then. Throws InputError or ConfigError.
+// the run is known to be: the frame's origin then. Polls `progress`. Throws InputError or
+// ConfigError.
 [[nodiscard]] TreeTarget read_tree_target(const std::filesystem::path& path,
                                           const std::string& system,
                                           const std::optional<Eigen::Vector2d>& near,
                                           const std::optional<GeodeticPlace>& place,
-                                          const TreeTargetConfig& config, Log& log);
+                                          const TreeTargetConfig& config, Log& log,
+                                          const ProgressSink& progress);
 
 }  // namespace understory

@@ -38,7 +38,7 @@ class DenseMap : public MapMaker {
       : front_end_(front_end), recording_(recording) {}
 
   void close_loops() override {
-    front_end_.map().finish();
+    front_end_.map().finish(recording_.progress);
     if (front_end_.config().gnss.use == GnssUse::kGeoreference) return;
     const ScopedTimer timer(front_end_.times(), "finish_gnss");
     const SolvedRun solved = solved_run();
@@ -66,7 +66,7 @@ class DenseMap : public MapMaker {
                        seen_from(view, poses_of(front_end_.map().keyframes())));
     made_.lidar_view = figures_of(view);
     if (front_end_.counts().imu_samples == 0)
-      made_.not_upright = up_complaint(shape_of(blocks_of(*made_.tiles)));
+      made_.not_upright = up_complaint(shape_of(polled(blocks_of(*made_.tiles), recording_.progress)));
   }
 
   RunOutcome write() override { return write_dense_results(recording_, front_end_, made_); }

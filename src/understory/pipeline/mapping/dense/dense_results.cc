@@ -181,7 +181,7 @@ std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
       picture.add(drawn.x(), drawn.y(), drawn.z(), height);
     }
     done += static_cast<double>(points.size());
-    if (progress) progress({"writing map.laz", done / 1e3, 0.0, "thousand points", ""});
+    progress({"writing map.laz", done / 1e3, 0.0, "thousand points", ""});
   });
   writer.commit();
   return writer.points();
@@ -273,24 +273,23 @@ void fill_quality(const DenseFrontEnd& front_end, const TrajectoryFacts& traject
   summary.quality["loop_search_cpu_s"] = front_end.map().search_cpu_seconds();
 }
 
-void check_ranges(DenseFrontEnd& front_end, MatchEvidence& evidence) {
+void check_ranges(DenseFrontEnd& front_end, const ProgressSink& progress, MatchEvidence& evidence) {
   const ScopedTimer timer(front_end.times(), "finish_check_ranges");
   const RangeCheck check =
-      front_end.map().check_ranges(front_end.rig().body_from_lidar.translation());
+      front_end.map().check_ranges(front_end.rig().body_from_lidar.translation(), progress);
   evidence.range_offset_m = check.offset_m;
   evidence.range_offset_error_m = check.standard_error_m;
   evidence.range_pairs = check.pairs;
 }
 
-RunEvidence evidence_of(DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
-                        const TrajectoryFacts& trajectory, const DenseProducts& made,
-                        const Log& log) {
+RunEvidence evidence_of(const ReadRecording& recording, DenseFrontEnd& front_end,
+                        const TrajectoryFacts& trajectory, const DenseProducts& made) {
   RunEvidence evidence;
   evidence.stand = {made.inventory.trees.size(), made.inventory.too_sparse, made.not_upright};
   evidence.motion = trajectory.motion;
   evidence.match = trajectory.match;
-  check_ranges(front_end, evidence.match);
-  gather_dense(front_end, facts, source, log, evidence);
+  check_ranges(front_end, recording.progress, evidence.match);
+  gather_dense(front_end, recording.facts, recording.source, recording.log, evidence);
   return evidence;
 }
 
@@ -371,7 +370,7 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   const TrajectoryFacts trajectory = write_trajectory(folder, front_end, front_end.config());
   write_graph(folder, front_end.map());
   RunDocuments documents = map_documents(recording, front_end.times());
-  documents.judge(evidence_of(front_end, facts, recording.source, trajectory, made, recording.log),
+  documents.judge(evidence_of(recording, front_end, trajectory, made),
                   front_end.config().judgement);
   fill_streams(facts.time_repair, documents);
   fill_counts(front_end, documents);

@@ -1,0 +1,168 @@
+"""Ctrl-C and SIGTERM at many moments, in every command that takes long: it ends soon, with exit code 4, leaves
+nothing half written, and former results stay. What `map` had positioned is gone on with."""
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+from program import PROGRAM, Cases, good_recording, program
+
+cases = Cases()
+FILES = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "map.laz", "trees.csv"]
+STEM_FILES = ["trajectory.tum", "odometry.tum", "stems.csv.gz", "trees.csv"]
+PATIENCE_S = 30  # far more than a stop takes on a busy machine, far less than the work that is left
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+good, messages, truth = good_recording(cases.folder, seconds=20, more=("stand.size_x_m=80", "stand.size_y_m=80"))
+RUN, STEMS = cases.folder / "whole", cases.folder / "stems"
+assert program("map", good, "-o", RUN).returncode == 0
+done = program("map", good, "-o", STEMS, "--front-end", "sparse")
+assert done.returncode in (0, 4), done.stderr
+FIXES = cases.folder / "fixes.csv"
+FIXES.write_text("timestamp,latitude_deg,longitude_deg,height_m\n" + "".join(
+    f"{line.split()[0]},{62 + float(line.split()[2]) / 111e3:.9f},{29 + float(line.split()[1]) / 52e3:.9f},100\n"
+    for line in (RUN / "trajectory.tum").read_text().splitlines()[::10]))
+
+
+def snapshot(folder):
+    """All that lies below it; of folders that they are there, since working in one changes its time."""
+    return {path: path.is_dir() or (os.lstat(path).st_ino, os.lstat(path).st_size, os.lstat(path).st_mtime_ns)
+            for path in sorted(folder.rglob("*"))}
+
+
+def stop_at(stage, sent, *words):
+    """Sends the signal as soon as the program reports that stage; what it came to and said."""
+    process = subprocess.Popen([PROGRAM, *map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    said, reached = "", False
+    for line in process.stderr:
+        said += line
+        if line.startswith(stage):
+            process.send_signal(sent)
+            reached = True
+            break
+    said += process.communicate(timeout=PATIENCE_S)[1]
+    assert reached, f"no stage {stage!r}: {said}"
+    return process.returncode, said
+
+
+def stop_after(seconds, sent, *words):
+    process = subprocess.Popen([PROGRAM, "--quiet", *map(str, words)], stdout=subprocess.DEVNULL,
+                               stderr=subprocess.PIPE, text=True)
+    time.sleep(seconds)
+    process.send_signal(sent)
+    said = process.communicate(timeout=PATIENCE_S)[1]
+    return process.returncode, said
+
+
+# Once the recording was read, the signal waited for the end of all work.
+def map_stopped(folder, stages, files, whole, *options):
+    for k, stage in enumerate(stages):
+        run = folder / f"run {k}"
+        code, said = stop_at(stage, SIGNALS[k % 2], "map", good, "-o", run, *options)
+        assert code == 4 and "stopped by the user" in said and f"map --resume {run}" in said, (stage, code, said)
+        assert [path.name for path in run.iterdir()] == [".understory"], stage
+        assert not (run / ".understory" / "results").exists(), stage
+        if k % 3 == 0:
+            done = program("map", "--resume", run)
+            assert done.returncode in (0, 4), done.stderr
+            assert all((run / name).read_bytes() == (whole / name).read_bytes() for name in files), stage
+            assert not (run / ".understory").exists(), stage
+    return ", ".join(stages)
+
+
+@cases.case("map, once the scans are positioned")
+def mapping(folder):
+    stages = ("gathering the map", "ground", "heights", "stems", "tops", "segments", "writing map.laz")
+    return map_stopped(folder, stages, FILES, RUN)
+
+
+@cases.case("map by stems, once the scans are positioned")
+def mapping_stems(folder):
+    return map_stopped(folder, ("correction",), STEM_FILES, STEMS, "--front-end", "sparse")
+
+
+@cases.case("map --resume, once the scans are positioned")
+def resumed(folder):
+    run = folder / "run"
+    for _ in range(2):
+        words = ("--resume", run) if run.exists() else (good, "-o", run)
+        code, said = stop_at("stems", signal.SIGINT, "map", *words)
+        assert code == 4 and f"map --resume {run}" in said, said
+    assert program("map", "--resume", run).returncode == 0
+    assert all((run / name).read_bytes() == (RUN / name).read_bytes() for name in FILES)
+
+
+@cases.case("map in a folder with former results")
+def former(folder):
+    run = folder / "run"
+    shutil.copytree(RUN, run)
+    before = snapshot(run)
+    code, said = stop_at("stems", signal.SIGTERM, "map", good, "-o", run, "--overwrite")
+    assert code == 4 and "--resume" in said, said
+    after = snapshot(run)
+    assert {path: after[path] for path in before if path.is_file()} == {p: s for p, s in before.items() if p.is_file()}
+
+
+@cases.case("inventory")
+def inventory(folder):
+    for stage in ("ground", "heights", "stems", "tops", "segments"):
+        code, said = stop_at(stage, signal.SIGINT, "inventory", RUN / "map.laz", "-o", folder / "plot")
+        assert code == 4 and "stopped by the user" in said, (stage, code, said)
+        assert not list(folder.iterdir()), stage
+    plot = folder / "plot"
+    assert program("inventory", RUN / "map.laz", "-o", plot).returncode in (0, 4)
+    before = snapshot(plot)
+    code, _ = stop_at("stems", signal.SIGTERM, "inventory", RUN / "map.laz", "-o", plot, "--overwrite")
+    assert code == 4 and snapshot(plot) == before
+    code, said = stop_at("stems", signal.SIGINT, "convert", RUN / "map.laz", folder / "stems.csv.gz")
+    assert code == 4 and sorted(path.name for path in folder.iterdir()) == ["plot"], said
+
+
+COMMANDS = {
+    "inventory of a run": ["inventory", RUN, "-o", "OUT"],
+    "georeference": ["georeference", RUN, "--method", "auto", "--gnss", FIXES, "-o", "OUT"],
+    "georeference by trees": ["georeference", RUN, "--method", "trees", "--tree-map", RUN / "map.laz", "-o", "OUT"],
+    "merge": ["merge", RUN, STEMS, "--align", "--reference", truth / "trees.csv", "-o", "OUT"],
+    "correct": ["correct", STEMS / "stems.csv.gz", "-o", "OUT"],
+    "register": ["register", RUN / "map.laz", RUN / "map.laz", "--guess", "0.2,0.1,0"],
+    "evaluate map": ["evaluate", "map", RUN],
+    "evaluate": ["evaluate", RUN, truth],
+}
+
+
+def stopped_at_any_time(folder, words):
+    out = folder / "out"
+    words = [out if word == "OUT" else word for word in words]
+    began = time.monotonic()
+    done = program(*words)
+    took = time.monotonic() - began
+    assert done.returncode in (0, 4), done.stderr
+    before = snapshot(folder)
+    stopped = 0
+    for k in range(1, 5):
+        fresh = folder / "fresh"
+        again = [fresh if word == out else word for word in words]
+        over = [*words, "--overwrite"] if out.exists() else words
+        for case in (again, over):
+            code, said = stop_after(took * k / 5, SIGNALS[k % 2], *case)
+            ended = "stopped by the user" in said
+            stopped += ended
+            assert code == 4 if ended else code in (0, 4, -SIGNALS[k % 2]), (k, code, said)
+            assert not ended or not fresh.exists(), (k, said)
+            shutil.rmtree(fresh, ignore_errors=True)
+            left = snapshot(folder)
+            if ended:
+                assert left == before, (k, set(left) ^ set(before))
+            before = left
+    assert stopped > 0 or took < 0.3, f"never stopped in {took:.1f} s"
+    return f"{stopped} of 8 stops within {took:.1f} s"
+
+
+for name, command in COMMANDS.items():
+    @cases.case(name)
+    def command_stopped(folder, command=command):
+        return stopped_at_any_time(folder, command)
+
+
+cases.run()
