@@ -124,7 +124,7 @@ std::size_t count_near(const std::vector<Tree>& a, const Pose& b_from_a, const T
 }
 
 std::optional<Pose> best_hypothesis(const std::vector<Tree>& a, const std::vector<Tree>& b,
-                                    double radius_m) {
+                                    double radius_m, const ProgressSink& progress) {
   std::vector<Span> spans_b = spans(b, true);
   std::sort(spans_b.begin(), spans_b.end(), [](const Span& p, const Span& q) {
     return std::tie(p.length, p.from, p.to) < std::tie(q.length, q.from, q.to);
@@ -134,6 +134,7 @@ std::optional<Pose> best_hypothesis(const std::vector<Tree>& a, const std::vecto
   std::size_t best_count = kMinMatches - 1;
   std::size_t tried = 0;
   for (const Span& span : thinned(spans(a, false), kMaxPairsOfA)) {
+    progress.poll();
     const double slack = 0.5 * radius_m;
     auto at = std::lower_bound(
         spans_b.begin(), spans_b.end(), span.length - slack,
@@ -153,8 +154,9 @@ std::optional<Pose> best_hypothesis(const std::vector<Tree>& a, const std::vecto
 }  // namespace
 
 std::optional<Pose> align_trees(const std::vector<Tree>& a, const std::vector<Tree>& b,
-                                Alignment alignment, double radius_m) {
-  std::optional<Pose> b_from_a = best_hypothesis(a, b, radius_m);
+                                Alignment alignment, double radius_m,
+                                const ProgressSink& progress) {
+  std::optional<Pose> b_from_a = best_hypothesis(a, b, radius_m, progress);
   if (!b_from_a) return b_from_a;
   std::vector<TreePair> previous;
   for (int k = 0; k < kMaxIterations; ++k) {

@@ -9,6 +9,7 @@
 #include "understory/evaluation/alignment.h"
 #include "understory/evaluation/trajectory.h"
 #include "understory/sensor/tree.h"
+#include "understory/util/progress.h"
 
 namespace understory {
 
@@ -28,10 +29,10 @@ using TreePair = std::pair<std::size_t, std::size_t>;
 // Finds the motion that lays A on B without a start value: hypotheses from pairs of trees of A and
 // equally distant pairs of B, the one with most matches, then least squares over the matches until
 // they stay the same. `yaw` turns about the vertical and shifts; `se3` uses heights and turns
-// fully. Empty if no hypothesis matches three trees.
+// fully. Empty if no hypothesis matches three trees. Polls `progress`.
 [[nodiscard]] std::optional<Pose> align_trees(const std::vector<Tree>& a,
                                               const std::vector<Tree>& b, Alignment alignment,
-                                              double radius_m);
+                                              double radius_m, const ProgressSink& progress = {});
 
 // The trees' feet and leans after a motion; sizes stay.
 [[nodiscard]] std::vector<Tree> moved(const std::vector<Tree>& trees,

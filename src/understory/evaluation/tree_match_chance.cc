@@ -58,7 +58,7 @@ void judge_copies(const std::vector<Tree>& s, const std::vector<Tree>& l, double
     std::vector<Tree> copy = searched ? scrambled(l, k == 0 ? 0.0 : 2.0 * config.reach_m, random)
                                       : shifted(l, config.reach_m, random);
     if (searched) {
-      const auto motion = align_trees(copy, s, Alignment::kYaw, config.reach_m);
+      const auto motion = align_trees(copy, s, Alignment::kYaw, config.reach_m, progress);
       if (!motion) return;
       copy = moved(copy, *motion);
     }

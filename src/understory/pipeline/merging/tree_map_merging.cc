@@ -55,10 +55,10 @@ void write_field(const fs::path& path, const std::vector<Tree>& b, const Deforma
 
 // A tree list, laid on the trees of A if that was asked for.
 std::vector<Tree> beside(const std::string& file, const std::vector<Tree>& a,
-                         const MergeRequest& request) {
+                         const MergeRequest& request, const ProgressSink& progress) {
   std::vector<Tree> trees = read_trees(file_in_folder(file, kTrees));
   if (!request.align) return trees;
-  const auto a_from_these = align_trees(trees, a, Alignment::kYaw, request.merge.reach_m);
+  const auto a_from_these = align_trees(trees, a, Alignment::kYaw, request.merge.reach_m, progress);
   if (!a_from_these)
     throw InputError(file, "", "expected trees of which three lie like trees of " + request.a);
   return moved(trees, *a_from_these);
@@ -87,8 +87,8 @@ Merge merge_maps(const MergeRequest& request, const ProgressSink& progress, Stag
   {
     const ScopedTimer timer(times, "reading");
     m.a = read_trees(file_in_folder(request.a, kTrees));
-    m.b = beside(request.b, m.a, request);
-    if (!request.reference.empty()) reference = beside(request.reference, m.a, request);
+    m.b = beside(request.b, m.a, request, progress);
+    if (!request.reference.empty()) reference = beside(request.reference, m.a, request, progress);
   }
   const ScopedTimer timer(times, "merging");
   progress.poll();
