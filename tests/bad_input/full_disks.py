@@ -1,0 +1,102 @@
+"""A disk that becomes full at any point, in the commands that write a folder from other results: the exit code is 3 and
+the message names the place, nothing is left behind, former results stay as they are, and with room it is done."""
+
+import os
+import resource
+import shutil
+import subprocess
+
+from program import Cases, good_recording, program
+
+cases = Cases()
+good, messages, truth = good_recording(cases.folder, seconds=10, more=("stand.size_x_m=40", "stand.size_y_m=40"))
+RUN, STEMS = cases.folder / "run", cases.folder / "stems"
+assert program("map", good, "-o", RUN).returncode == 0
+done = program("map", good, "-o", STEMS, "--front-end", "sparse")
+assert done.returncode in (0, 4), done.stderr
+FIXES = cases.folder / "fixes.csv"
+FIXES.write_text("timestamp,latitude_deg,longitude_deg,height_m\n" + "".join(
+    f"{line.split()[0]},{62 + float(line.split()[2]) / 111e3:.9f},{29 + float(line.split()[1]) / 52e3:.9f},100\n"
+    for line in (RUN / "trajectory.tum").read_text().splitlines()[::10]))
+COMMANDS = {
+    "inventory": ["inventory", RUN / "map.laz"],
+    "inventory of a run": ["inventory", RUN],
+    "georeference": ["georeference", RUN, "--method", "auto", "--gnss", FIXES],
+    "merge": ["merge", RUN, truth / "trees.csv"],
+    "correct": ["correct", STEMS / "stems.csv.gz"],
+}
+STEPS = 5
+
+
+def snapshot(folder):
+    """All that lies below it; of folders that they are there, since working in one changes its time."""
+    return {path: path.is_dir() or (os.lstat(path).st_ino, os.lstat(path).st_size, os.lstat(path).st_mtime_ns)
+            for path in sorted(folder.rglob("*"))}
+
+
+def refused(words, out, **options):
+    done = program(*words, "-o", out, **options)
+    if done.returncode in (0, 4):
+        return False
+    said = done.stderr.strip().splitlines()[-1]
+    assert done.returncode == 3 and said.startswith(f"error: {out}"), (done.returncode, done.stderr)
+    assert "space" in said or "large" in said or "written" in said, said
+    return True
+
+
+def bytes_of(folder):
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+for name, command in COMMANDS.items():
+    @cases.case(f"full disk: {name}")
+    def full_disk(folder, words=command):
+        place = folder / "disk"
+        place.mkdir()
+        whole = folder / "whole"
+        assert program(*words, "-o", whole).returncode in (0, 4)
+        needed = bytes_of(whole)
+        size = 3 * needed // 1024 + 512  # KiB
+        mount = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(place)]
+        if subprocess.run(mount, capture_output=True).returncode != 0:
+            return "not tried: nothing can be mounted (see the limit on files)"
+        times = 0
+        try:
+            for step in range(STEPS):
+                filled = place / "filled"
+                filled.write_bytes(b"0" * (size * 1024 - needed * step // STEPS - 8192))
+                before = snapshot(place)
+                if not refused(words, place / "out"):
+                    break
+                times += 1
+                assert snapshot(place) == before, "something was left on the full disk"
+            filled.unlink()
+            # Over results of its own, with no room for a second copy.
+            done = program(*words, "-o", place / "out", "--overwrite")
+            assert done.returncode in (0, 4), done.stderr
+            filled.write_bytes(b"0" * max(0, size * 1024 - bytes_of(place / "out") - needed // 2))
+            before = snapshot(place)
+            over = refused([*words, "--overwrite"], place / "out")
+            assert not over or snapshot(place) == before, "former results were touched"
+        finally:
+            subprocess.run(["umount", str(place)], check=True)
+        assert times > 0, "the disk was never full"
+        return f"full {times} times, over former results {'too' if over else 'never'}"
+
+    @cases.case(f"files that may not grow: {name}")
+    def limited(folder, words=command):
+        whole = folder / "whole"
+        assert program(*words, "-o", whole).returncode in (0, 4)
+        sizes = sorted({path.stat().st_size for path in whole.rglob("*") if path.is_file()})
+        before = snapshot(whole)
+        for size in sizes[:: max(1, len(sizes) // 4)]:
+            limit = lambda most=size // 2: resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
+            assert refused(words, folder / "out", preexec_fn=limit), size
+            assert not (folder / "out").exists(), f"left {list((folder / 'out').rglob('*'))}"
+            assert refused([*words, "--overwrite"], whole, preexec_fn=limit), size
+            assert snapshot(whole) == before, "former results were touched"
+        shutil.rmtree(whole)
+        return f"limits of {sizes[0]} to {sizes[-1]} bytes"
+
+
+cases.run()
