@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "drifted_path.h"
 #include "understory/evaluation/trajectory.h"
 #include "understory/georeference/satellites/fused_path.h"
 #include "understory/georeference/satellites/gnss_fit.h"
@@ -21,47 +22,11 @@
 #include "understory/simulation/sensors/inertial.h"
 #include "understory/simulation/sensors/satellite.h"
 #include "understory/simulation/world.h"
-#include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
 using Eigen::Vector3d;
-
-Trajectory true_path(const SimulatedWorld& world, const std::vector<TimeNs>& stamps, TimeNs start) {
-  Trajectory path;
-  for (const TimeNs stamp : stamps)
-    path.push_back({stamp, world.plan.path.pose(to_seconds(stamp - start))});
-  return path;
-}
-
-// The truth as a map would have it: in the frame of its first pose, level to 0.05 degrees, with
-// errors that grow with the way.
-Trajectory drifted_path(const Trajectory& truth, std::uint64_t seed) {
-  Random random(seed, 7);
-  const auto normal = [&](double sd) {
-    return Vector3d(random.normal(0.0, sd), random.normal(0.0, sd), random.normal(0.0, sd));
-  };
-  const Pose first = truth.front().world_from_body;
-  const Vector3d heading = first.rotation() * Vector3d::UnitX();
-  const Pose level(Eigen::Quaterniond(
-                       Eigen::AngleAxisd(std::atan2(heading.y(), heading.x()), Vector3d::UnitZ())),
-                   first.translation());
-  const Pose world_from_truth =
-      Pose(so3_exp(normal(0.05 * M_PI / 180.0)), Vector3d::Zero()) * level.inverse();
-  Trajectory path;
-  Pose now = world_from_truth * first;
-  path.push_back({truth.front().stamp, now});
-  for (std::size_t k = 1; k < truth.size(); ++k) {
-    const Pose step = truth[k - 1].world_from_body.inverse() * truth[k].world_from_body;
-    const double root_m = std::sqrt(step.translation().norm());
-    Vector6d error;
-    error << normal(5e-5 * root_m), normal(2e-3 * root_m);
-    now = now * step * Pose::exp(error);
-    path.push_back({truth[k].stamp, now});
-  }
-  return path;
-}
 
 // The motion that lays the run on the truth, from all its poses.
 Pose reference_motion(const Trajectory& run, const Trajectory& truth) {

@@ -1,9 +1,8 @@
 #include "understory/registration/gicp/gicp_matcher.h"
+#include "understory/registration/icp/icp_map_builder.h"
 
 #include <algorithm>
 #include <utility>
-
-#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -71,33 +70,24 @@ IcpMapConfig map_config(const GicpMatcherConfig& config) {
   return map;
 }
 
-class GicpTargetBuilder : public TargetBuilder {
+class GicpTargetBuilder : public internal::IcpMapTargetBuilder {
  public:
   explicit GicpTargetBuilder(const GicpMatcherConfig& config)
-      : config_(config), builder_(map_config(config)) {}
+      : IcpMapTargetBuilder(map_config(config)), config_(config) {}
 
-  void insert(const Points& points_in_source, const Pose& target_from_source,
-              std::optional<double> forget_beyond_m) override {
-    builder_.insert(points_in_source, target_from_source);
-    if (forget_beyond_m) builder_.remove_beyond(target_from_source.translation(), *forget_beyond_m);
-  }
-  void clear() override { builder_.clear(); }
   [[nodiscard]] MatchTargetPtr snapshot() override {
-    return std::make_shared<GicpTarget>(builder_.snapshot(), config_);
+    return std::make_shared<GicpTarget>(map(), config_);
   }
 
  private:
   GicpMatcherConfig config_;
-  IcpMapBuilder builder_;
 };
 
 class GicpMatcher : public Matcher {
  public:
   explicit GicpMatcher(const GicpMatcherConfig& config) : config_(config) {
-    const double most = IcpMap::kMaxReach * config.map.cube_m;
-    if (std::max(config.steps.max_distance_m, config.far_distance_m) > most + 1e-9)
-      throw ConfigError({"gicp: max_distance_m and far_distance_m: expected at most " +
-                         std::to_string(IcpMap::kMaxReach) + " times map_cube_m"});
+    internal::check_reach(
+        {"gicp", "max_distance_m", config.steps.max_distance_m, config.far_distance_m}, config.map);
   }
   [[nodiscard]] std::unique_ptr<TargetBuilder> make_builder(const Viewpoint&) const override {
     return std::make_unique<GicpTargetBuilder>(config_);
@@ -113,14 +103,10 @@ class GicpMatcher : public Matcher {
 
 void describe(ConfigTable& table, GicpMatcherConfig& config) {
   describe(table, config.steps);
-  table.add("far_distance_m", config.far_distance_m, {0.0, 20.0}, "m",
-            "max_distance_m of the first steps where the guess may be far off; 0: no such steps");
+  internal::describe_far_distance(table, config.far_distance_m);
   table.add("far_kernel_sigmas", config.far_kernel_sigmas, {0.1, 1000.0}, "",
             "kernel_sigmas of those steps");
-  table.add("map_cube_m", config.map.cube_m, {0.05, 5.0}, "m",
-            "a target has one point per cube of this edge");
-  table.add("map_growth", config.map.growth, {0.0, 10.0}, "",
-            "share of new points at which that point is computed again");
+  internal::describe_map(table, "a target has one point per cube of this edge", config.map);
 }
 
 std::unique_ptr<const Matcher> make_matcher(const GicpMatcherConfig& config) {

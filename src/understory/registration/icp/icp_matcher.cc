@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "understory/registration/icp/icp_map_builder.h"
 #include "understory/registration/icp/icp_match.h"
-#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -80,27 +80,20 @@ class IcpMatchTarget : public MatchTarget {
   IcpConfig far_steps_;
 };
 
-class IcpTargetBuilder : public TargetBuilder {
+class IcpTargetBuilder : public internal::IcpMapTargetBuilder {
  public:
   explicit IcpTargetBuilder(const IcpMatcherConfig& config)
-      : config_(config), steps_(config.steps), builder_(map_config(config)) {
+      : IcpMapTargetBuilder(map_config(config)), config_(config), steps_(config.steps) {
     steps_.max_distance_m = config.map_max_distance_m;
   }
 
-  void insert(const Points& points_in_source, const Pose& target_from_source,
-              std::optional<double> forget_beyond_m) override {
-    builder_.insert(points_in_source, target_from_source);
-    if (forget_beyond_m) builder_.remove_beyond(target_from_source.translation(), *forget_beyond_m);
-  }
-  void clear() override { builder_.clear(); }
   [[nodiscard]] MatchTargetPtr snapshot() override {
-    return std::make_shared<IcpMatchTarget<IcpMap>>(builder_.snapshot(), steps_, config_);
+    return std::make_shared<IcpMatchTarget<IcpMap>>(map(), steps_, config_);
   }
 
  private:
   IcpMatcherConfig config_;
   IcpConfig steps_;
-  IcpMapBuilder builder_;
 };
 
 class IcpMatcher : public Matcher {
@@ -108,10 +101,9 @@ class IcpMatcher : public Matcher {
   explicit IcpMatcher(const IcpMatcherConfig& config) : config_(config) {}
 
   [[nodiscard]] std::unique_ptr<TargetBuilder> make_builder(const Viewpoint&) const override {
-    const double most = IcpMap::kMaxReach * config_.map.cube_m;
-    if (std::max(config_.map_max_distance_m, config_.far_distance_m) > most + 1e-9)
-      throw ConfigError({"icp: map_max_distance_m and far_distance_m: expected at most " +
-                         std::to_string(IcpMap::kMaxReach) + " times map_cube_m"});
+    internal::check_reach(
+        {"icp", "map_max_distance_m", config_.map_max_distance_m, config_.far_distance_m},
+        config_.map);
     return std::make_unique<IcpTargetBuilder>(config_);
   }
   [[nodiscard]] MatchTargetPtr make_target(const Points& points) const override {
@@ -129,13 +121,10 @@ class IcpMatcher : public Matcher {
 
 void describe(ConfigTable& table, IcpMatcherConfig& config) {
   describe(table, config.steps);
-  table.add("far_distance_m", config.far_distance_m, {0.0, 20.0}, "m",
-            "max_distance_m of the first steps where the guess may be far off; 0: no such steps");
+  internal::describe_far_distance(table, config.far_distance_m);
   table.add("far_kernel_m", config.far_kernel_m, {0.005, 10.0}, "m", "kernel_m of those steps");
-  table.add("map_cube_m", config.map.cube_m, {0.05, 5.0}, "m",
-            "a map of keyframes has one point per cube of this edge");
-  table.add("map_growth", config.map.growth, {0.0, 10.0}, "",
-            "share of new points at which that point is computed again");
+  internal::describe_map(table, "a map of keyframes has one point per cube of this edge",
+                         config.map);
   table.add("map_max_distance_m", config.map_max_distance_m, {0.05, 20.0}, "m",
             "max_distance_m in a map of keyframes");
 }
