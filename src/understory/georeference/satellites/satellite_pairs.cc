@@ -37,7 +37,8 @@ std::string no_common_time(const std::vector<StampedPose>& trajectory,
       std::minmax_element(fixes.begin(), fixes.end(),
                           [](const GnssFix& a, const GnssFix& b) { return a.stamp < b.stamp; });
   return fmt::format(
-      "the fixes and the path do not overlap in time: the fixes are from {} to {}, the path is from "
+      "the fixes and the path do not overlap in time: the fixes are from {} to {}, the path is "
+      "from "
       "{} to {}. Expected fixes of the same time; --method gnss-path needs no common clock",
       moment(first->stamp), moment(last->stamp), moment(trajectory.front().stamp),
       moment(trajectory.back().stamp));
