@@ -71,8 +71,8 @@ void refuse_run(const std::string& folder) {
   if (has_cloud)
     advice = "`understory inventory " + cloud.string() + " -o DIR` measures the trees of its map";
   if (unfinished || !has_cloud)
-    advice += (advice.empty() ? "" : ", ") + ("`understory map --resume " + folder +
-                                              "` goes on with a run that is not finished");
+    advice += (advice.empty() ? "" : ", ") +
+              ("`understory map --resume " + folder + "` goes on with a run that is not finished");
   throw InputError(folder, "", "is the folder of a run, no recording: " + advice);
 }
 
