@@ -58,9 +58,9 @@ class Judge {
       missing("the recording could not be read any further: " + evidence_.unreadable +
               "; once it can be, go on with `understory map --resume RUN`");
     } else if (evidence_.stopped) {
-      missing(
-          "stopped by the user before the end of the recording; go on with "
-          "`understory map --resume RUN`");
+      const std::string stopped = "stopped by the user before the end of the recording";
+      missing(stopped + (evidence_.resumable ? "; go on with `understory map --resume RUN`"
+                                             : "; run the command again for the whole of it"));
     }
     if (evidence_.cut_off) {
       missing("the recording is cut off, and the rest is missing: " + evidence_.where_cut_off);
