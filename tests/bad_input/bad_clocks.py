@@ -235,6 +235,23 @@ def lidar_stops(folder):
     return reasons
 
 
+if FRONT_END == "dense":
+    @cases.case("an IMU of ten samples a second")
+    def slow_imu(folder):
+        """Too few to integrate: the run does without, and says so."""
+        kept, last = [], 0
+        for m in messages:
+            if m.topic == "/imu" and m.stamp - last < 99e6:
+                continue
+            last = m.stamp if m.topic == "/imu" else last
+            kept.append(m)
+        outcome = mapped(folder, kept)
+        reasons = "; ".join(outcome.run["reasons"])
+        assert outcome.code == 4 and "the IMU was not used for" in reasons, reasons
+        assert "too far apart" in reasons, reasons
+        return reasons
+
+
 @cases.case("an IMU of NaN")
 def imu_of_nan(folder):
     """As without an IMU, and said."""

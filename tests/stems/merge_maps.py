@@ -199,6 +199,10 @@ def nothing(folder):
     far = write(folder / "far.csv", [(x + 5000, y) for x, y in stand(50)])
     done = program("merge", a, far, "-o", folder / "both")
     assert done.returncode == 4 and "--align" in done.stderr, done
+    copy = write(folder / "copy.csv", stand(50))
+    done = program("merge", a, copy, "-o", folder / "twice")
+    assert done.returncode == 3 and "both hold the same trees" in done.stderr, done
+    assert not (folder / "twice").exists()
     (folder / "bad.csv").write_text("name\nspruce\n")
     done = program("merge", a, folder / "bad.csv", "-o", folder / "bad")
     assert done.returncode == 3 and "bad.csv" in done.stderr, done

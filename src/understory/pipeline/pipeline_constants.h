@@ -85,6 +85,11 @@ inline constexpr double kSparseCloudM = 0.1;
 inline constexpr double kSparseInlierRatio = 0.05;
 }  // namespace adaptation
 
+namespace stand_cloud {  // pipeline/inventory/stand_cloud.cc
+// m by which places may be rounded: a tenth of a thin stem [chosen]
+inline constexpr double kCoarsestStepM = 0.01;
+}  // namespace stand_cloud
+
 namespace lidar_view {  // pipeline/inventory/lidar_view.cc
 // Clouds that a view is learnt from [chosen]
 inline constexpr std::size_t kClouds = 60;

@@ -11,6 +11,7 @@ ImuTrust ImuWatch::trust() const {
   trust.motion_correlation = scale_.correlation();
   trust.motion_spread_m_s2 = scale_.spread_m_s2();
   trust.motion_windows = scale_.windows();
+  trust.without_samples_s = to_seconds(without_);
   return trust;
 }
 
@@ -80,6 +81,7 @@ void ImuWatch::note_samples(bool any, TimeNs from, TimeNs to) {
                                  "even");
   }
   silent_ = silent;
+  if (silent) without_ += to - from;
 }
 
 void ImuWatch::save(BinaryWriter& writer) const {
@@ -87,6 +89,7 @@ void ImuWatch::save(BinaryWriter& writer) const {
   scale_.save(writer);
   writer.put(compared_);
   writer.put(silent_);
+  writer.put(without_);
 }
 
 void ImuWatch::load(BinaryReader& reader) {
@@ -94,6 +97,7 @@ void ImuWatch::load(BinaryReader& reader) {
   scale_.load(reader);
   compared_ = reader.get<TimeNs>();
   silent_ = reader.get<bool>();
+  without_ = reader.get<TimeNs>();
 }
 
 }  // namespace understory

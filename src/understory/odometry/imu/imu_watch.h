@@ -33,7 +33,8 @@ class ImuWatch {
   // Two matches in a row and the samples between them (not empty), with ends at the two stamps.
   void compare(const ImuMatch& from, const ImuMatch& to,
                const std::vector<InertialSample>& samples);
-  // Whether there were any samples between two scans.
+  // Whether there were any usable samples between two scans: none where a gap is longer than the
+  // filter bridges, or while the IMU is left out.
   void note_samples(bool any, TimeNs from, TimeNs to);
 
   void save(BinaryWriter& writer) const;
@@ -49,6 +50,7 @@ class ImuWatch {
   TimeNs compared_ = 0;  // stamp of the last match in it
   Log* log_;
   bool silent_ = false;  // no samples over the last interval
+  TimeNs without_ = 0;   // intervals without usable samples, in all
 };
 
 }  // namespace understory

@@ -55,6 +55,12 @@ TEST_F(ImuWatchTest, SilenceIsSaidOncePerStretch) {
   EXPECT_EQ(warned("imu.silent"), 2U);
 }
 
+TEST_F(ImuWatchTest, TimeWithoutSamplesIsSummedUp) {
+  for (const bool any : {true, false, false, true, false})
+    watch_.note_samples(any, 0, kStep);
+  EXPECT_DOUBLE_EQ(watch_.trust().without_samples_s, 3.0 * to_seconds(kStep));
+}
+
 TEST_F(ImuWatchTest, AnImuThatIsLeftOutIsNotCalledSilent) {
   watch_.suspect(0);
   watch_.note_samples(false, 0, kStep);

@@ -69,6 +69,8 @@ struct ImuTrust {
   double motion_correlation = 0.0;
   double motion_spread_m_s2 = 0.0;
   int motion_windows = 0;
+  // Time between scans in which an IMU that is usable had no samples, or too few to go by.
+  double without_samples_s = 0.0;
 };
 
 // The first graph of P4 F2: a state for every scan, prediction in between. One per run, not

@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kGreys = 96;
 constexpr int kGreens = 128;
+constexpr double kFarthestM = 4e7;  // so that differences of columns stay integers
 constexpr int kBlock = 64;  // the grid grows by whole blocks, so that it does not grow often
 
 std::vector<std::array<std::uint8_t, 3>> palette() {
@@ -76,7 +77,7 @@ std::array<double, 4> MapPicture::content_box() const {
 }
 
 void MapPicture::add(double x, double y, double z, double height_m) {
-  if (!std::isfinite(x) || !std::isfinite(y)) return;
+  if (!(std::abs(x) < kFarthestM && std::abs(y) < kFarthestM)) return;
   auto column = static_cast<int>(std::floor(x / cell_m_));
   auto row = static_cast<int>(std::floor(y / cell_m_));
   while (!seen_.contains(column, row)) {

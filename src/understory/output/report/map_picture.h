@@ -14,7 +14,8 @@ class MapPicture {
  public:
   explicit MapPicture(double finest_cell_m = 0.05, int largest_side = 1400);
 
-  // `height_m` above ground, NaN where the ground is unknown.
+  // `height_m` above ground, NaN where the ground is unknown. A point farther from the origin than
+  // 40,000 km along an axis is left out, and so is one that is no number.
   void add(double x, double y, double z, double height_m);
 
   [[nodiscard]] bool empty() const { return count_ == 0; }

@@ -46,6 +46,20 @@ TEST(MapPicture, NorthIsUpAndEastIsRight) {
       << "the higher, the lighter";
 }
 
+// A regression: the column of a point 10^10 m away is no integer, and the program ended.
+TEST(MapPicture, PointsFarBeyondTheEarthAreLeftOut) {
+  MapPicture picture(0.5);
+  for (const double far : {1e9, 1e10, 1e30, std::numeric_limits<double>::infinity(),
+                           std::numeric_limits<double>::quiet_NaN()}) {
+    picture.add(far, 0.0, 0.0, 0.0);
+    picture.add(0.0, -far, 0.0, 0.0);
+  }
+  EXPECT_TRUE(picture.empty());
+  picture.add(3.9e7, 3.9e7, 0.0, 0.0);
+  picture.add(-3.9e7, -3.9e7, 0.0, 0.0);
+  EXPECT_FALSE(picture.empty());
+}
+
 TEST(MapPicture, TheGroundIsLitFromTheNorthWest) {
   MapPicture picture(0.5);
   for (int j = -10; j < 10; ++j) {

@@ -18,7 +18,7 @@ TEST(CorrectionEvidence, AScaleThatTheAccelerometerContradictsCounts) {
   trust.motion_windows = 200;
   for (const double scale : {1.0, 1.3}) {
     trust.motion_scale = scale;
-    gather_motion_scale(trust, run.evidence);
+    gather_imu_trust(trust, run.evidence);
     const RunJudgement judgement = judge_run(correction_evidence(run), JudgementConfig());
     EXPECT_EQ(judgement.status, scale == 1.0 ? RunStatus::kComplete : RunStatus::kUntrusted);
   }

@@ -11,9 +11,13 @@
 #include "understory/forest/cloud_shape.h"
 #include "understory/geometry/rotation_between.h"
 #include "understory/georeference/systems/coordinate_system.h"
+#include "understory/pipeline/pipeline_constants.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
+
+using namespace pipeline_constants::stand_cloud;
 
 // Three numbers; nothing if it is none of a direction.
 std::optional<Eigen::Vector3d> direction_of(const std::string& text) {
@@ -122,8 +126,26 @@ PointBlocks blocks_of(const PointCloudFile& cloud) {
 
 namespace {
 
+// Coordinates of a system do not fit into single precision.
+void refuse_rounded(const PointCloudFile& cloud, const std::string& name, const CloudFrame& frame) {
+  const double step_m = cloud.step * (frame.unit_m > 0.0 ? frame.unit_m : 1.0);
+  if (step_m <= kCoarsestStepM) return;
+  throw InputError(
+      name, "",
+      fmt::format("expected coordinates to a centimetre: the file holds them in single "
+                  "precision, so places are rounded to {:.2f} m. Export the cloud as "
+                  "LAS or LAZ, or with a local origin",
+                  step_m));
+}
+
 StandCloud checked_stand(PointCloudFile cloud, const std::string& name, const CloudFrame& frame,
                          Log& log, const ProgressSink& progress) {
+  refuse_rounded(cloud, name, frame);
+  if (cloud.not_finite > 0) {
+    log.warn("inventory.not_numbers",
+             fmt::format("{}: {} of {} points are not numbers; left out", name, cloud.not_finite,
+                         cloud.not_finite + cloud.points.size()));
+  }
   StandCloud stand;
   stand.cloud = std::move(cloud);
   const std::string system = stand.cloud.coordinate_system;

@@ -41,11 +41,11 @@ const TopicReport* topic_of(const std::vector<TopicReport>& topics, const std::s
 void compare_ends(const EventOrderer::Report& report, const std::vector<TopicReport>& topics,
                   RunEvidence& evidence) {
   for (std::size_t s = 0; s < kSensorRoles.size(); ++s) {
-    if (report.streams[s].newest == 0) continue;
+    if (report.streams[s].released == 0) continue;
     SensorEvidence& sensor = evidence.*kSensorRoles[s].evidence;
     for (std::size_t other = 0; other < kSensorRoles.size(); ++other) {
       const TopicReport* topic = topic_of(topics, kSensorRoles[other].name);
-      if (topic != nullptr && topic->beside) continue;
+      if (report.streams[other].released == 0 || (topic != nullptr && topic->beside)) continue;
       const double longer_s = to_seconds(report.streams[other].newest - report.streams[s].newest);
       if (longer_s <= sensor.silent_at_end_s) continue;
       sensor.silent_at_end_s = longer_s;
@@ -147,7 +147,12 @@ void gather_reading(const ReadingFacts& facts, RunEvidence& evidence) {
   gather_findings(*facts.log, evidence);
 }
 
-void gather_motion_scale(const ImuTrust& trust, RunEvidence& evidence) {
+void gather_imu_trust(const ImuTrust& trust, RunEvidence& evidence) {
+  if (trust.without_samples_s > evidence.imu.unused_s) {
+    evidence.imu.unused_s = trust.without_samples_s;
+    evidence.imu.unused_why = "it was silent, or its samples lie too far apart to be integrated";
+  }
+  evidence.imu_on_probation = trust.on_probation;
   evidence.imu_motion_scale = trust.motion_scale;
   evidence.imu_motion_correlation = trust.motion_correlation;
   evidence.imu_motion_spread_m_s2 = trust.motion_spread_m_s2;

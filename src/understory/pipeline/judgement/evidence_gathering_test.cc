@@ -114,12 +114,27 @@ TEST(EvidenceGathering, WhatTheReadersCouldNotUse) {
   EXPECT_EQ(evidence.gnss.unreadable, 5U);
 }
 
+// A regression: the samples of an IMU at 10 Hz lie too far apart to go by, and nothing said so.
+TEST(EvidenceGathering, AnImuTooSlowToGoBy) {
+  RunEvidence evidence;
+  evidence.imu.unused_s = 0.2;
+  ImuTrust trust;
+  trust.without_samples_s = 11.9;
+  gather_imu_trust(trust, evidence);
+  EXPECT_DOUBLE_EQ(evidence.imu.unused_s, 11.9);
+  EXPECT_NE(evidence.imu.unused_why.find("too far apart"), std::string::npos);
+  EXPECT_FALSE(evidence.imu_on_probation);
+}
+
 TEST(EvidenceGathering, WhoWentOnAfterWhom) {
   const ReadRecording recording({topic("lidar", 100.0, 160.0)});
   EventOrderer::Report repair;
-  repair.streams[EventOrderer::kLidar].newest = from_seconds(157.0);
-  repair.streams[EventOrderer::kImu].newest = from_seconds(159.0);
-  repair.streams[EventOrderer::kGnss].newest = from_seconds(160.0);
+  // Before the epoch of the clock: a sensor that is not there does not outlast them.
+  const double ends_s[] = {-3.0, -1.0, 0.0};
+  for (const auto stream : {EventOrderer::kLidar, EventOrderer::kImu, EventOrderer::kGnss}) {
+    repair.streams[stream].released = 1;
+    repair.streams[stream].newest = from_seconds(ends_s[stream] - 10.0);
+  }
   const Log log;
   RunEvidence evidence;
   gather_reading(facts_of(recording, repair, log), evidence);

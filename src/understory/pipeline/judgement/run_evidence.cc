@@ -82,6 +82,7 @@ Figures figures_of(const RunEvidence& evidence) {
   figures["times_assumed"] = evidence.times_assumed;
   figures["point_times_missing"] = evidence.point_times_missing;
   figures["imu_used"] = evidence.imu_used;
+  figures["imu_on_probation"] = evidence.imu_on_probation;
   figures["imu_trusted"] = evidence.imu_distrust.empty();
   figures["imu_motion_scale"] = evidence.imu_motion_scale;
   figures["imu_motion_correlation"] = evidence.imu_motion_correlation;

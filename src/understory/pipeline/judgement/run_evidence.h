@@ -119,7 +119,8 @@ struct RunEvidence {
   bool times_assumed = false;        // nothing tells when the clouds of a folder were taken
   bool point_times_missing = false;  // of a lidar that spins
   std::string why_no_point_times;
-  bool imu_used = false;  // at the end
+  bool imu_used = false;          // at the end
+  bool imu_on_probation = false;  // at the end: left out until it is clear whether it is right
   // Acceleration by matching over that by the accelerometer, how well they go together, and how
   // much there was to compare; see MotionScale.
   double imu_motion_scale = 0.0;

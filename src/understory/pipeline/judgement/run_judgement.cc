@@ -348,7 +348,13 @@ class Judge {
   }
 
   void judge_imu() {
-    if (!evidence_.imu_distrust.empty()) hurt(evidence_.imu_distrust);
+    if (!evidence_.imu_distrust.empty()) {
+      hurt(evidence_.imu_distrust);
+    } else if (evidence_.imu_on_probation) {
+      missing(
+          "at the end the IMU was left out: the matches contradict it, and the recording ends "
+          "before it is clear which of them is right");
+    }
   }
 
   void judge_stems() {

@@ -130,6 +130,14 @@ TEST(RunJudgement, ALidarThatStopsBeforeTheOthers) {
   expect(RunStatus::kPartial, "stopped by the user", stopped);
 }
 
+TEST(RunJudgement, AnImuThatWasLeftOutAtTheEnd) {
+  RunEvidence evidence = good_run();
+  evidence.imu_on_probation = true;
+  expect(RunStatus::kPartial, "at the end the IMU was left out", evidence);
+  evidence.imu_distrust = "its axes look swapped";
+  expect(RunStatus::kUntrusted, "its axes look swapped", evidence);
+}
+
 TEST(RunJudgement, AMapThatIsNoGroundForAListOfTrees) {
   RunEvidence evidence = good_run();
   evidence.stand.trees = 20;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -70,6 +71,16 @@ std::vector<TreeFall> falls_in(const std::string& map) {
   return fs::exists(file) ? read_tree_falls(file) : std::vector<TreeFall>();
 }
 
+// A map merged with itself would count each of its observations twice.
+void refuse_same_map(const std::string& name, const std::vector<Tree>& a,
+                     const std::vector<Tree>& b) {
+  const auto same = [](const Tree& one, const Tree& other) {
+    return one.x == other.x && one.y == other.y && one.observations == other.observations;
+  };
+  if (a.empty() || !std::equal(a.begin(), a.end(), b.begin(), b.end(), same)) return;
+  throw InputError(name, "", "expected another map than the first: both hold the same trees");
+}
+
 // What two maps came to.
 struct Merge {
   std::vector<Tree> a;
@@ -87,6 +98,7 @@ Merge merge_maps(const MergeRequest& request, const ProgressSink& progress, Stag
   {
     const ScopedTimer timer(times, "reading");
     m.a = read_trees(file_in_folder(request.a, kTrees));
+    refuse_same_map(request.b, m.a, read_trees(file_in_folder(request.b, kTrees)));
     m.b = beside(request.b, m.a, request, progress);
     if (!request.reference.empty()) reference = beside(request.reference, m.a, request, progress);
   }

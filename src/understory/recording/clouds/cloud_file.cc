@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/clouds/cloud_table.h"
@@ -22,7 +23,10 @@ class Collector {
 
   // False if the point is NaN or infinite.
   bool add(const Eigen::Vector3d& position) {
-    if (!position.allFinite()) return false;
+    if (!position.allFinite()) {
+      ++cloud_.not_finite;
+      return false;
+    }
     if (cloud_.points.empty() && position.cwiseAbs().maxCoeff() > kFarFromOrigin)
       cloud_.origin = position.array().round();
     cloud_.points.push_back((position - cloud_.origin).cast<float>());
@@ -65,6 +69,10 @@ PointCloudFile from_table(const CloudTable& table, const std::string& name) {
     if (!collector.add(position)) continue;
     if (layout->intensity().size > 0)
       cloud.intensity.push_back(static_cast<float>(layout->intensity().read(raw)));
+  }
+  if (layout->x().type == FieldType::kFloat32) {
+    const auto far = static_cast<float>(cloud.origin.cwiseAbs().maxCoeff());
+    cloud.step = static_cast<double>(std::nextafter(far, std::numeric_limits<float>::max()) - far);
   }
   return cloud;
 }

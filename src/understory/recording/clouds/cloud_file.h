@@ -23,6 +23,10 @@ struct PointCloudFile {
   std::vector<double> gps_time;              // LAS: GPS time as stored (week or adjusted standard)
   std::string coordinate_system;             // LAS: "EPSG:25832" or WKT; empty if not given
   std::string format;                        // "LAZ 1.4, point format 6", "PCD binary"
+  // Distance of neighbouring numbers at the first point, in which a file of single precision holds
+  // its coordinates; 0: it holds them in double precision.
+  double step = 0.0;
+  std::uint64_t not_finite = 0;  // points that were left out
 };
 
 // Reads .las, .laz, .pcd, .ply or KITTI .bin (told by content, .bin by name). Points that are NaN

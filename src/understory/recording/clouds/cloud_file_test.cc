@@ -209,6 +209,21 @@ TEST(CloudFile, RefusesWithTheFileAndThePlace) {
   EXPECT_NE(message_of(huge).find("compressed points"), std::string::npos);
 }
 
+// A regression: stems of a cloud in a coordinate system, single precision, were rounded away.
+TEST(CloudFile, SaysHowCoarseSinglePrecisionIsThere) {
+  const auto step_at = [](const std::string& x, const std::string& size, const std::string& type) {
+    const std::string text = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE " + size + "\nTYPE " +
+                             type + "\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n" + x +
+                             " 2 3\n";
+    Log log;
+    return read(Bytes(text.begin(), text.end()), log).step;
+  };
+  EXPECT_EQ(step_at("6800000", "4 4 4", "F F F"), 0.5);
+  EXPECT_EQ(step_at("500000", "4 4 4", "F F F"), 0.03125);
+  EXPECT_EQ(step_at("6800000", "8 8 8", "F F F"), 0.0);
+  EXPECT_LT(step_at("500", "4 4 4", "F F F"), 1e-4);
+}
+
 TEST(CloudFile, LeavesOutNan) {
   Bytes bytes = join(pcd_header("binary"), binary_points());
   const std::size_t first = bytes.size() - 20 * kPoints;

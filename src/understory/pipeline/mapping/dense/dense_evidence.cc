@@ -26,7 +26,7 @@ void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const R
   } else if (!trust.trusted) {
     evidence.imu_distrust = trust.reason;
   }
-  gather_motion_scale(trust, evidence);
+  gather_imu_trust(trust, evidence);
   const ScanMotion scan_motion = front_end.odometry().scan_motion();
   evidence.match.scan_motion_ratio = scan_motion.ratio;
   evidence.match.scan_motion_probes = scan_motion.probes;

@@ -44,7 +44,7 @@ void gather_sparse(const SparseFrontEnd& front_end, const RunFacts& facts, const
   evidence.imu_distrust = refused.empty() ? trust.reason : imu_refusal(refused);
   evidence.imu_used = reading.imu_wanted && source.rig().body_from_imu.has_value() &&
                       evidence.imu.received > 0 && evidence.imu_distrust.empty();
-  gather_motion_scale(trust, evidence);
+  gather_imu_trust(trust, evidence);
   evidence.match.scans = front_end.path().size();
   evidence.match.repeated = front_end.repeated();
   evidence.match.smear_m = mean_smear_m(front_end.path());
