@@ -71,20 +71,19 @@ std::vector<TreeFall> falls_in(const std::string& map) {
   return fs::exists(file) ? read_tree_falls(file) : std::vector<TreeFall>();
 }
 
-// A map merged with itself would count each of its observations twice.
-void refuse_same_map(const std::string& name, const std::vector<Tree>& a,
-                     const std::vector<Tree>& b) {
+// Whether both lists are the same: a map merged with itself.
+bool are_same(const std::vector<Tree>& a, const std::vector<Tree>& b) {
   const auto same = [](const Tree& one, const Tree& other) {
     return one.x == other.x && one.y == other.y && one.observations == other.observations;
   };
-  if (a.empty() || !std::equal(a.begin(), a.end(), b.begin(), b.end(), same)) return;
-  throw InputError(name, "", "expected another map than the first: both hold the same trees");
+  return !a.empty() && std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
 }
 
 // What two maps came to.
 struct Merge {
   std::vector<Tree> a;
   std::vector<Tree> b;  // beside a
+  bool same = false;    // both are one map
   DeformationField field;
   MergedTrees merged;
   std::vector<TreeFall> falls;
@@ -98,7 +97,7 @@ Merge merge_maps(const MergeRequest& request, const ProgressSink& progress, Stag
   {
     const ScopedTimer timer(times, "reading");
     m.a = read_trees(file_in_folder(request.a, kTrees));
-    refuse_same_map(request.b, m.a, read_trees(file_in_folder(request.b, kTrees)));
+    m.same = are_same(m.a, read_trees(file_in_folder(request.b, kTrees)));
     m.b = beside(request.b, m.a, request, progress);
     if (!request.reference.empty()) reference = beside(request.reference, m.a, request, progress);
   }
@@ -158,6 +157,9 @@ void judge(const MergeRequest& request, const Merge& m, RunDocuments& documents)
   } else if (const std::string complaint = chance_complaint(m.chance); !complaint.empty()) {
     documents.lower(RunStatus::kUntrusted, complaint);
   }
+  if (m.same)
+    documents.lower(RunStatus::kUntrusted,
+                    "both maps hold the same trees: each of their observations counts twice");
   documents.inherit(trust_of_run(request.b));
   documents.inherit(trust_of_run(request.a));
 }
