@@ -107,7 +107,8 @@ def methods(folder):
     best = min(told[m]["expected_error_m"] for m in ("closed", "fit3", "split"))
     assert told["auto"]["expected_error_m"] == best and told["auto"]["method"] == "split", told["auto"]
     assert error_of(folder / "auto") < 1.1 * error_of(folder / "closed")
-    assert told["split"]["sd_turn_east_deg"] < 0.06 < told["closed"]["sd_turn_east_deg"]
+    # By the IMU: 0.05 where the carrier turned through all headings, 0.25 where it kept its heading.
+    assert 0.05 < told["split"]["sd_turn_east_deg"] < 0.26 < told["closed"]["sd_turn_east_deg"]
     text = georeference(RUN, "--method", "auto", "--gnss", FIXES, "-o", folder / "again").stdout
     assert "split has the smallest expected error" in text and "closed" in text, text
     rows = list(csv.DictReader((folder / "split" / "gnss.csv").open()))

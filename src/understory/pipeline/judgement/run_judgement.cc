@@ -379,6 +379,7 @@ class Judge {
       hurt("the map does not stand upright: " + stand.not_upright +
            ". Without an IMU its vertical is that of the scanner at the first scan: record the "
            "IMU, or bring the map upright with `understory inventory --up`");
+      return;  // that there are no stems follows from it
     }
     // Around a path lie areas that were seen from afar alone, so few points in the mean are no harm
     // by themselves.

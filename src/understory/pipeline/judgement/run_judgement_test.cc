@@ -146,7 +146,7 @@ TEST(RunJudgement, AMapThatIsNoGroundForAListOfTrees) {
   expect_complete(evidence);
   evidence.stand.trees = 0;
   expect(RunStatus::kPartial, "the list of trees is empty", evidence);
-  evidence.stand = {20, false, "z is not up"};
+  evidence.stand = {0, true, "z is not up"};
   expect(RunStatus::kUntrusted, "the map does not stand upright: z is not up", evidence);
 }
 
