@@ -66,7 +66,8 @@ class DenseMap : public MapMaker {
                        seen_from(view, poses_of(front_end_.map().keyframes())));
     made_.lidar_view = figures_of(view);
     if (front_end_.counts().imu_samples == 0)
-      made_.not_upright = up_complaint(shape_of(polled(blocks_of(*made_.tiles), recording_.progress)));
+      made_.not_upright =
+          up_complaint(shape_of(polled(blocks_of(*made_.tiles), recording_.progress)));
   }
 
   RunOutcome write() override { return write_dense_results(recording_, front_end_, made_); }
