@@ -156,12 +156,13 @@ class Copier {
   void tell_rig() {
     const Rig& rig = recording_.rig();
     const bool has_imu = rig.body_from_imu.has_value();
-    const bool has_gnss = rig.body_from_gnss.has_value();
-    if (begun_ && has_imu == has_imu_ && has_gnss == has_gnss_) return;
+    const int antennas = static_cast<int>(rig.body_from_gnss.has_value()) +
+                         static_cast<int>(rig.body_from_second_gnss.has_value());
+    if (begun_ && has_imu == has_imu_ && antennas == antennas_) return;
     target_.set_rig(rig);
     begun_ = true;
     has_imu_ = has_imu;
-    has_gnss_ = has_gnss;
+    antennas_ = antennas;
   }
 
   Recording& recording_;
@@ -170,7 +171,7 @@ class Copier {
   std::vector<Waiting> waiting_;
   bool begun_ = false;
   bool has_imu_ = false;
-  bool has_gnss_ = false;
+  int antennas_ = 0;  // whose place is known
   std::uint64_t events_ = 0;
   std::uint64_t scans_ = 0;
 };

@@ -57,9 +57,12 @@ nlohmann::json rig_json(const Rig& rig) {
                          {"body_from_lidar", pose_json(rig.body_from_lidar)},
                          {"lidar_source", rig.lidar_extrinsic_source},
                          {"imu_source", rig.imu_extrinsic_source},
-                         {"gnss_source", rig.gnss_extrinsic_source}};
+                         {"gnss_source", rig.gnss_extrinsic_source},
+                         {"second_gnss_source", rig.second_gnss_extrinsic_source}};
   json["body_from_imu"] = rig.body_from_imu ? pose_json(*rig.body_from_imu) : nlohmann::json();
   json["body_from_gnss"] = rig.body_from_gnss ? pose_json(*rig.body_from_gnss) : nlohmann::json();
+  json["body_from_second_gnss"] =
+      rig.body_from_second_gnss ? pose_json(*rig.body_from_second_gnss) : nlohmann::json();
   return json;
 }
 
@@ -111,6 +114,7 @@ void print_json(const RecordingInfo& info) {
                          {"warnings", info.warnings}};
   json["gnss"] = {{"fixes", info.gnss.fixes},
                   {"valid", info.gnss.valid},
+                  {"headings", info.gnss.headings},
                   {"rate_hz", info.gnss.rate_hz},
                   {"best_quality", info.gnss.best_quality}};
   json["topics"] = nlohmann::json::array();
@@ -188,12 +192,18 @@ void print_text(const RecordingInfo& info) {
     std::printf("\ngnss\n  %llu fixes at %.2f Hz, %llu valid, best quality %d\n",
                 static_cast<unsigned long long>(info.gnss.fixes), info.gnss.rate_hz,
                 static_cast<unsigned long long>(info.gnss.valid), info.gnss.best_quality);
+  if (info.gnss.headings > 0)
+    std::printf("  %llu headings of a second antenna\n",
+                static_cast<unsigned long long>(info.gnss.headings));
   std::printf("\nextrinsics (body is %s)\n", info.rig.body_frame.c_str());
   print_pose("body_from_lidar", info.rig.body_from_lidar, info.rig.lidar_extrinsic_source);
   if (info.imu.samples > 0)
     print_pose("body_from_imu", info.rig.body_from_imu, info.rig.imu_extrinsic_source);
   if (info.gnss.fixes > 0)
     print_pose("body_from_gnss", info.rig.body_from_gnss, info.rig.gnss_extrinsic_source);
+  if (info.gnss.headings > 0)
+    print_pose("body_from_second_gnss", info.rig.body_from_second_gnss,
+               info.rig.second_gnss_extrinsic_source);
   std::printf("\nwarnings  %s\n", info.warnings.empty() ? "none" : "");
   for (const std::string& warning : info.warnings)
     std::printf("  - %s\n", warning.c_str());

@@ -197,7 +197,7 @@ TEST_F(OutputTest, GnssQuotesItsReasons) {
   writer.commit();
   const std::string text = content(folder_ / "gnss.csv");
   EXPECT_NE(text.find("\n1.000000000,,,,61.250000000,0.000000000,0.0000,,,,,,,,,,0,,,,0,"
-                      "\"jump of 12 m, not \"\"used\"\"\"\n"),
+                      "\"jump of 12 m, not \"\"used\"\"\",,\n"),
             std::string::npos)
       << text;
 }

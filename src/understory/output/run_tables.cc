@@ -88,7 +88,8 @@ void StatesWriter::add(const StateRow& row) {
 GnssWriter::GnssWriter(const std::filesystem::path& path) : file_(path) {
   file_.write(
       "timestamp,x,y,z,latitude_deg,longitude_deg,height_m,c00,c01,c02,c11,c12,c22,hdop,vdop,"
-      "satellites,quality,residual_x,residual_y,residual_z,used,reason\n");
+      "satellites,quality,residual_x,residual_y,residual_z,used,reason,heading_deg,heading_sd_"
+      "deg\n");
 }
 
 void GnssWriter::add(const GnssRow& row) {
@@ -109,8 +110,10 @@ void GnssWriter::add(const GnssRow& row) {
   line += fmt::format(",{}", row.fix.quality);
   for (int i = 0; i < 3; ++i)
     put(row.residual[i], 4);
-  line += fmt::format(",{},{}\n", row.used ? 1 : 0, quoted(row.reason));
-  file_.write(line);
+  line += fmt::format(",{},{}", row.used ? 1 : 0, quoted(row.reason));
+  put(row.fix.heading_deg, 4);
+  put(row.fix.heading_sd_deg, 4);
+  file_.write(line + "\n");
 }
 
 Matrix6d g2o_information(const Matrix6d& information) {

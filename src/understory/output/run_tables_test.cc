@@ -127,6 +127,8 @@ TEST_F(RunTablesTest, FixesKeepTheirPlaceToTheTenthOfAMillimetre) {
   row.fix.longitude_deg = -24.987654321;
   row.fix.height_m = 151.2345;
   row.fix.satellites = 17;
+  row.fix.heading_deg = 359.9876;
+  row.fix.heading_sd_deg = 0.25;
   row.position_in_world = {1.25, -2.5, 3.75};
   row.used = true;
   row.reason = "two words, \"quoted\"";
@@ -142,6 +144,8 @@ TEST_F(RunTablesTest, FixesKeepTheirPlaceToTheTenthOfAMillimetre) {
   EXPECT_EQ(table.number("y"), -2.5);
   EXPECT_TRUE(std::isnan(table.number("residual_x"))) << "not known";
   EXPECT_EQ(table.number("used"), 1.0);
+  EXPECT_EQ(table.number("heading_deg"), 359.9876);
+  EXPECT_EQ(table.number("heading_sd_deg"), 0.25);
   EXPECT_EQ(table.text("reason"), "two words, \"quoted\"");
 }
 

@@ -29,6 +29,7 @@ class ExtrinsicsFile {
     std::optional<Pose> body_from_lidar;
     std::optional<Pose> body_from_imu;
     std::optional<Pose> body_from_gnss;
+    std::optional<Pose> body_from_second_gnss;
   };
 
   Given read(const YAML::Node& root) {
@@ -50,10 +51,12 @@ class ExtrinsicsFile {
         given.body_from_imu = read_pose(value, key);
       } else if (key == "body_from_gnss") {
         given.body_from_gnss = read_pose(value, key);
+      } else if (key == "body_from_second_gnss") {
+        given.body_from_second_gnss = read_pose(value, key);
       } else {
         problem(key,
-                "unknown key; expected body_frame, lidar_model, body_from_lidar, body_from_imu or "
-                "body_from_gnss");
+                "unknown key; expected body_frame, lidar_model, body_from_lidar, body_from_imu, "
+                "body_from_gnss or body_from_second_gnss");
       }
     }
     return given;
@@ -140,6 +143,11 @@ class ExtrinsicsFile {
   std::vector<std::string> problems_;
 };
 
+// Headings in the frame of the fixes say nothing of where the second antenna sits.
+bool has_second_antenna(const SensorFrames& frames) {
+  return !frames.second_gnss.empty() && frames.second_gnss != frames.gnss;
+}
+
 // The file's body from the recording's, by a sensor whose place is known on both.
 std::optional<Pose> new_from_old_body(const ExtrinsicsFile::Given& given, const Rig& rig) {
   if (given.body_from_lidar) return *given.body_from_lidar * rig.body_from_lidar.inverse();
@@ -179,6 +187,8 @@ void move_to_body(const std::string& path, const ExtrinsicsFile::Given& given, R
   if (new_from_old) rig.body_from_lidar = *new_from_old * rig.body_from_lidar;
   if (!given.body_from_imu) move("IMU", rig.body_from_imu, rig.imu_extrinsic_source);
   if (!given.body_from_gnss) move("GNSS antenna", rig.body_from_gnss, rig.gnss_extrinsic_source);
+  if (!given.body_from_second_gnss)
+    move("second GNSS antenna", rig.body_from_second_gnss, rig.second_gnss_extrinsic_source);
 }
 
 // A file that does not name its body may mean another one than the recording has.
@@ -193,7 +203,10 @@ void remark_on_body(const std::string& path, const ExtrinsicsFile::Given& given,
   if (!given.body_from_lidar) keep("the lidar", rig.lidar_extrinsic_source);
   if (!given.body_from_imu) keep("the IMU", rig.imu_extrinsic_source);
   if (!given.body_from_gnss) keep("the GNSS antenna", rig.gnss_extrinsic_source);
-  const bool places = given.body_from_lidar || given.body_from_imu || given.body_from_gnss;
+  if (!given.body_from_second_gnss)
+    keep("the second GNSS antenna", rig.second_gnss_extrinsic_source);
+  const bool places = given.body_from_lidar || given.body_from_imu || given.body_from_gnss ||
+                      given.body_from_second_gnss;
   if (kept.empty() || !places) return;
   log.warn("recording.extrinsics_body",
            path + ": names no body_frame: its places are taken to be on the recording's body (" +
@@ -278,6 +291,8 @@ Rig rig_from_transforms(const TransformTree& tree, const SensorFrames& frames) {
   if (rig.body_from_imu) rig.imu_extrinsic_source = source(frames.imu);
   if (!frames.gnss.empty()) rig.body_from_gnss = tree.find(body, frames.gnss);
   if (rig.body_from_gnss) rig.gnss_extrinsic_source = source(frames.gnss);
+  if (has_second_antenna(frames)) rig.body_from_second_gnss = tree.find(body, frames.second_gnss);
+  if (rig.body_from_second_gnss) rig.second_gnss_extrinsic_source = source(frames.second_gnss);
   return rig;
 }
 
@@ -294,7 +309,10 @@ bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& ri
   };
   const bool imu = place(frames.imu, rig.body_from_imu, rig.imu_extrinsic_source);
   const bool gnss = place(frames.gnss, rig.body_from_gnss, rig.gnss_extrinsic_source);
-  return imu || gnss;
+  const bool second =
+      has_second_antenna(frames) &&
+      place(frames.second_gnss, rig.body_from_second_gnss, rig.second_gnss_extrinsic_source);
+  return imu || gnss || second;
 }
 
 void apply_extrinsics_file(const std::string& path, const std::vector<std::string>& body_names,
@@ -322,6 +340,10 @@ void apply_extrinsics_file(const std::string& path, const std::vector<std::strin
   if (given.body_from_gnss) {
     rig.body_from_gnss = given.body_from_gnss;
     rig.gnss_extrinsic_source = source;
+  }
+  if (given.body_from_second_gnss) {
+    rig.body_from_second_gnss = given.body_from_second_gnss;
+    rig.second_gnss_extrinsic_source = source;
   }
 }
 

@@ -34,14 +34,15 @@ struct SensorFrames {
   std::string lidar;
   std::string imu;
   std::string gnss;
+  std::string second_gnss;  // the antenna that headings lead to; that of `gnss` tells nothing
 };
 
 // The rig by the frames: base_link is the body where it is connected to the lidar, else the IMU
 // where that is, else the lidar.
 [[nodiscard]] Rig rig_from_transforms(const TransformTree& tree, const SensorFrames& frames);
 
-// Puts the places of IMU and GNSS that have become known into a rig made by `rig_from_transforms`;
-// its body stays. True if there was any.
+// Puts the places of IMU and antennas that have become known into a rig made by
+// `rig_from_transforms`; its body stays. True if there was any.
 bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& rig);
 
 // Puts the extrinsics of a YAML file over those of the recording, which has its own body frame:
@@ -50,6 +51,7 @@ bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& ri
 //     body_from_lidar: {translation_m: [0, 0, 1.2], rotation_xyzw: [0, 0, 0, 1]}
 //     body_from_imu: {translation_m: [0, 0, 0], rpy_deg: [0, 0, 90]}
 //     body_from_gnss: {translation_m: [0, 0, 2]}
+//     body_from_second_gnss: {translation_m: [1, 0, 2]}
 // A rotation is given as rotation_xyzw, rpy_deg (fixed axes x, y, z) or matrix (nine numbers, row
 // by row); without one it is none.
 // Without `body_frame`, or where that is the recording's body (`body_names` are other names of it),

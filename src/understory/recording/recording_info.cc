@@ -102,6 +102,7 @@ class RecordingSurvey::Impl {
     fixes_.add(fix.stamp);
     ++info_.gnss.fixes;
     if (fix.quality > 0) ++info_.gnss.valid;
+    if (std::isfinite(fix.heading_deg)) ++info_.gnss.headings;
     info_.gnss.best_quality = std::max(info_.gnss.best_quality, fix.quality);
   }
 
@@ -272,6 +273,10 @@ class RecordingSurvey::Impl {
     warn_of_order(info, "gnss", fixes_.backward, fixes_.duplicates);
     if (info.gnss.fixes > 0 && info.gnss.valid == 0)
       info.warnings.push_back("gnss: no fix is valid");
+    if (info.gnss.headings > 0 && !(info.rig.body_from_gnss && info.rig.body_from_second_gnss))
+      info.warnings.push_back(
+          "gnss: the headings of a second antenna are not used: give the places of both antennas, "
+          "body_from_gnss and body_from_second_gnss, with --extrinsics FILE");
     for (const TopicReport& topic : info.topics) {
       if (topic.unreadable > 0)
         info.warnings.push_back(topic.name + ": " + std::to_string(topic.unreadable) +
@@ -324,6 +329,7 @@ std::vector<std::string> long_lever_arms(const Rig& rig) {
   look_at("lidar", rig.body_from_lidar, rig.lidar_extrinsic_source);
   look_at("IMU", rig.body_from_imu, rig.imu_extrinsic_source);
   look_at("GNSS antenna", rig.body_from_gnss, rig.gnss_extrinsic_source);
+  look_at("second GNSS antenna", rig.body_from_second_gnss, rig.second_gnss_extrinsic_source);
   return arms;
 }
 

@@ -50,7 +50,8 @@ struct RecordingInfo {
   };
   struct Gnss {
     std::uint64_t fixes = 0;
-    std::uint64_t valid = 0;  // quality above 0
+    std::uint64_t valid = 0;     // quality above 0
+    std::uint64_t headings = 0;  // of them with one of a second antenna
     double rate_hz = 0.0;
     int best_quality = 0;
     TimeNs first = 0;

@@ -214,17 +214,25 @@ TEST(Extrinsics, AreFoundAlongChainsEitherWay) {
   tree.add("base_link", "mast", base_from_mast);
   tree.add("mast", "os_sensor", mast_from_lidar);
   tree.add("imu_link", "base_link", imu_from_base);
-  const Rig rig = rig_from_transforms(tree, {"os_sensor", "imu_link", "gps"});
+  const Rig rig = rig_from_transforms(tree, {"os_sensor", "imu_link", "gps", ""});
   EXPECT_EQ(rig.body_frame, "base_link");
   EXPECT_LT(right_difference(rig.body_from_lidar, base_from_mast * mast_from_lidar).norm(), 1e-12);
   ASSERT_TRUE(rig.body_from_imu);
   EXPECT_LT(right_difference(*rig.body_from_imu, imu_from_base.inverse()).norm(), 1e-12);
   EXPECT_FALSE(rig.body_from_gnss);
+  // The second antenna has a frame of its own; headings in that of the fixes tell nothing of it.
+  tree.add("base_link", "gps", Pose());
+  tree.add("base_link", "gps_bow", base_from_mast);
+  const Rig two = rig_from_transforms(tree, {"os_sensor", "imu_link", "gps", "gps_bow"});
+  ASSERT_TRUE(two.body_from_second_gnss);
+  EXPECT_LT(right_difference(*two.body_from_second_gnss, base_from_mast).norm(), 1e-12);
+  EXPECT_FALSE(
+      rig_from_transforms(tree, {"os_sensor", "imu_link", "gps", "gps"}).body_from_second_gnss);
   // Without base_link the IMU is the body, without a chain to it the lidar.
   TransformTree without_base;
   without_base.add("imu_link", "os_sensor", mast_from_lidar);
-  EXPECT_EQ(rig_from_transforms(without_base, {"os_sensor", "imu_link", ""}).body_frame, "imu");
-  const Rig lidar_only = rig_from_transforms({}, {"os_sensor", "imu_link", ""});
+  EXPECT_EQ(rig_from_transforms(without_base, {"os_sensor", "imu_link", "", ""}).body_frame, "imu");
+  const Rig lidar_only = rig_from_transforms({}, {"os_sensor", "imu_link", "", ""});
   EXPECT_EQ(lidar_only.body_frame, "lidar");
   EXPECT_FALSE(lidar_only.body_from_imu);
 }
@@ -271,6 +279,7 @@ TEST(Extrinsics, OtherSensorsMoveToTheBodyOfTheFile) {
   recorded.body_from_lidar = Pose(so3_exp({0.1, 0.2, 0.3}), {0.01, 0.02, 0.03});
   recorded.body_from_imu = Pose();
   recorded.body_from_gnss = Pose(so3_exp({}), {0.0, 0.0, 1.0});
+  recorded.body_from_second_gnss = Pose(so3_exp({}), {1.0, 0.0, 1.0});
   recorded.imu_extrinsic_source = "sensor metadata";
   const Pose base_from_lidar(Eigen::Quaterniond::Identity(), {1.0, 2.0, 3.0});
   const std::string place = "{translation_m: [1, 2, 3]}\n";
@@ -283,6 +292,8 @@ TEST(Extrinsics, OtherSensorsMoveToTheBodyOfTheFile) {
     expect_near(rig.body_from_imu, base_from_lidar * recorded.body_from_lidar.inverse());
     expect_near(rig.body_from_gnss,
                 base_from_lidar * recorded.body_from_lidar.inverse() * *recorded.body_from_gnss);
+    expect_near(rig.body_from_second_gnss, base_from_lidar * recorded.body_from_lidar.inverse() *
+                                               *recorded.body_from_second_gnss);
     EXPECT_NE(rig.imu_extrinsic_source.find("moved to base_link"), std::string::npos);
     EXPECT_EQ(all_warnings(log), "");
   }
@@ -311,6 +322,20 @@ TEST(Extrinsics, OtherSensorsMoveToTheBodyOfTheFile) {
     expect_near(rig.body_from_imu, Pose());
     EXPECT_EQ(count_of(log, "recording.extrinsics_body"), 1U);
   }
+}
+
+TEST(Extrinsics, AFilePlacesTheSecondAntenna) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "rig.yaml";
+  const std::string text = "body_frame: imu\nbody_from_second_gnss: {translation_m: [1, 2, 3]}\n";
+  write_bytes(path, {text.begin(), text.end()});
+  Rig rig;
+  rig.body_frame = "imu";
+  rig.body_from_second_gnss = Pose(so3_exp({}), {1.0, 0.0, 1.0});
+  Log log;
+  apply_extrinsics_file(path, {}, rig, log);
+  expect_near(rig.body_from_second_gnss, Pose(so3_exp({}), {1.0, 2.0, 3.0}));
+  EXPECT_NE(rig.second_gnss_extrinsic_source.find("extrinsics file"), std::string::npos);
 }
 
 TEST(Extrinsics, APlaceThatNothingTellsIsDroppedOrRefused) {

@@ -21,6 +21,10 @@ struct GnssFix {
   double vdop = std::numeric_limits<double>::quiet_NaN();
   double track_deg = std::numeric_limits<double>::quiet_NaN();  // clockwise from true north
   double speed_m_s = std::numeric_limits<double>::quiet_NaN();
+  // Heading of the line from this antenna to a second one, clockwise from true north, 0 to 360, and
+  // its standard deviation. NaN: there is none; the receiver does not say how good it is.
+  double heading_deg = std::numeric_limits<double>::quiet_NaN();
+  double heading_sd_deg = std::numeric_limits<double>::quiet_NaN();
 };
 
 }  // namespace understory

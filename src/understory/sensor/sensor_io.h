@@ -31,9 +31,10 @@ inline void put_imu(BinaryWriter& writer, const ImuSample& sample) {
 // A fix in the bytes of checkpoints; get_fix reads it.
 inline void put_fix(BinaryWriter& writer, const GnssFix& fix) {
   writer.put(fix.stamp);
-  const double numbers[] = {fix.latitude_deg, fix.longitude_deg, fix.height_m, fix.hdop,
-                            fix.vdop,         fix.track_deg,     fix.speed_m_s};
-  writer.put_doubles(numbers, 7);
+  const double numbers[] = {fix.latitude_deg, fix.longitude_deg, fix.height_m,
+                            fix.hdop,         fix.vdop,          fix.track_deg,
+                            fix.speed_m_s,    fix.heading_deg,   fix.heading_sd_deg};
+  writer.put_doubles(numbers, 9);
   writer.put_doubles(fix.covariance.data(), 9);
   writer.put(fix.quality);
   writer.put(fix.satellites);
@@ -44,7 +45,7 @@ inline void put_fix(BinaryWriter& writer, const GnssFix& fix) {
   GnssFix fix;
   fix.stamp = reader.get<TimeNs>();
   for (double* number : {&fix.latitude_deg, &fix.longitude_deg, &fix.height_m, &fix.hdop, &fix.vdop,
-                         &fix.track_deg, &fix.speed_m_s}) {
+                         &fix.track_deg, &fix.speed_m_s, &fix.heading_deg, &fix.heading_sd_deg}) {
     *number = reader.get<double>();
   }
   reader.get_doubles(fix.covariance.data(), 9);

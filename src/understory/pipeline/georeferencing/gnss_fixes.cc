@@ -52,6 +52,8 @@ std::vector<GnssFix> read_table(const std::string& file) {
     fix.height_m = table.number("height_m");
     fix.hdop = table.number("hdop");
     fix.vdop = table.number("vdop");
+    fix.heading_deg = table.number("heading_deg");
+    fix.heading_sd_deg = table.number("heading_sd_deg");
     const double c[] = {table.number("c00"), table.number("c01"), table.number("c02"),
                         table.number("c11"), table.number("c12"), table.number("c22")};
     fix.covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];

@@ -15,6 +15,7 @@ constexpr auto kAskAfter = 20ms;  // whether to stop
 bool same(const Rig& a, const Rig& b) {
   return a.body_from_imu.has_value() == b.body_from_imu.has_value() &&
          a.body_from_gnss.has_value() == b.body_from_gnss.has_value() &&
+         a.body_from_second_gnss.has_value() == b.body_from_second_gnss.has_value() &&
          a.lidar_model == b.lidar_model && a.body_frame == b.body_frame;
 }
 

@@ -235,6 +235,45 @@ TEST(Mcap, KeepsTheLogTimesThatAreGiven) {
   }
 }
 
+TEST(Mcap, KeepsTheHeadingOfASecondAntenna) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "two_antennas.mcap";
+  Drive drive = make_drive(3);
+  drive.rig.body_from_second_gnss = Pose(so3_exp({}), {1.0, 0.25, 2.0});
+  int number = 0;
+  for (Event& event : drive.events) {
+    auto* fix = std::get_if<GnssFix>(&event);
+    if (fix == nullptr || ++number == 2) continue;  // one has none
+    fix->heading_deg = 359.5 - number;
+    if (number != 3) fix->heading_sd_deg = 0.25;
+  }
+  {
+    McapWriter writer(path);
+    writer.set_rig(drive.rig);
+    for (const Event& event : drive.events)
+      writer.write(event);
+  }
+  Log log;
+  const auto recording = open_recording(path, {}, log);
+  std::vector<GnssFix> fixes;
+  for (const Event& event : read_all(*recording)) {
+    if (const auto* fix = std::get_if<GnssFix>(&event)) fixes.push_back(*fix);
+  }
+  ASSERT_EQ(fixes.size(), 6U);
+  EXPECT_EQ(fixes[0].heading_deg, 358.5);
+  EXPECT_EQ(fixes[0].heading_sd_deg, 0.25);
+  EXPECT_EQ(fixes[0].hdop, 1.25);
+  EXPECT_TRUE(std::isnan(fixes[1].heading_deg));
+  EXPECT_EQ(fixes[2].heading_deg, 356.5);
+  EXPECT_TRUE(std::isnan(fixes[2].heading_sd_deg));
+  ASSERT_TRUE(recording->rig().body_from_second_gnss);
+  EXPECT_LT(
+      (recording->rig().body_from_second_gnss->translation() - Eigen::Vector3d(1, 0.25, 2)).norm(),
+      1e-12);
+  EXPECT_EQ(recording->rig().second_gnss_extrinsic_source, "/tf_static");
+  EXPECT_TRUE(log.warnings().empty()) << all_warnings(log);
+}
+
 TEST(Mcap, KeepsSecondReturnsAndMissingTimes) {
   const TemporaryFolder folder;
   const std::string path = folder / "dual.mcap";

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <utility>
@@ -35,7 +36,16 @@ struct Topic {
   const char* type;
 };
 
-enum TopicId : std::uint16_t { kLidar, kImu, kMag, kGnss, kGnssQuality, kTfStatic, kTopicCount };
+enum TopicId : std::uint16_t {
+  kLidar,
+  kImu,
+  kMag,
+  kGnss,
+  kGnssQuality,
+  kTfStatic,
+  kGnssNmea,
+  kTopicCount
+};
 
 constexpr std::array<Topic, kTopicCount> kTopics = {{
     {"/lidar", "sensor_msgs/msg/PointCloud2"},
@@ -44,6 +54,7 @@ constexpr std::array<Topic, kTopicCount> kTopics = {{
     {"/gnss", "sensor_msgs/msg/NavSatFix"},
     {"/gnss/quality", "gps_msgs/msg/GPSFix"},
     {"/tf_static", "tf2_msgs/msg/TFMessage"},
+    {"/gnss/nmea", "nmea_msgs/msg/Sentence"},
 }};
 
 // One record: content is added between construction and `close`.
@@ -132,6 +143,7 @@ std::vector<NamedTransform> transforms_of(const Rig& rig) {
   add("lidar", rig.body_from_lidar);
   if (rig.body_from_imu) add("imu", *rig.body_from_imu);
   if (rig.body_from_gnss) add("gnss", *rig.body_from_gnss);
+  if (rig.body_from_second_gnss) add(kSecondAntennaFrame, *rig.body_from_second_gnss);
   return transforms;
 }
 
@@ -419,8 +431,9 @@ void McapWriter::write(const Event& event, TimeNs log_time) {
   } else if (const auto* sample = std::get_if<ImuSample>(&event)) {
     impl_->add(kImu, log_time, encode_imu(*sample));
   } else if (const auto* fix = std::get_if<GnssFix>(&event)) {
-    // The quality first: a reader that has it can complete the fix as soon as that comes.
+    // Quality and heading first: a reader that has them completes the fix as soon as that comes.
     impl_->add(kGnssQuality, log_time, encode_gps_fix(*fix));
+    if (std::isfinite(fix->heading_deg)) impl_->add(kGnssNmea, log_time, encode_heading(*fix));
     impl_->add(kGnss, log_time, encode_nav_sat_fix(*fix));
   } else {
     impl_->add(kMag, log_time, encode_magnetic_field(std::get<MagSample>(event)));

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <vector>
 
 #include "understory/recording/messages/event_bytes.h"
@@ -146,6 +147,40 @@ void read_zda(const Fields& f, NmeaSentence& out) {
   out.day = day_number(digits(f[4], 0, 4), digits(f[3], 0, 2), digits(f[2], 0, 2));
 }
 
+// 0 to 360 degrees.
+std::optional<double> heading(std::string_view text) {
+  const auto degrees = number(text);
+  if (!degrees || *degrees < 0.0 || *degrees > 360.0) return std::nullopt;
+  return degrees;
+}
+
+void read_hdt(const Fields& f, NmeaSentence& out) {
+  if (f[2] == "T") out.heading_deg = heading(f[1]);
+}
+
+// Mode A: of the receiver itself, neither estimated, by hand, simulated nor invalid.
+void read_ths(const Fields& f, NmeaSentence& out) {
+  if (f[2] == "A") out.heading_deg = heading(f[1]);
+}
+
+// $PSAT,HPR,time,heading,pitch,roll,type: by GNSS (N), not by the gyroscope (G).
+void read_hpr(const Fields& f, NmeaSentence& out) {
+  out.time_of_day = time_of_day(f[2]);
+  if (f[6] == "N") out.heading_deg = heading(f[3]);
+}
+
+// $PASHR,time,heading,T,roll,pitch,heave, their standard deviations (roll, pitch, heading), quality
+// of GNSS (0: none), of the IMU. Other sentences of that name have no time there.
+void read_hr(const Fields& f, NmeaSentence& out) {
+  const auto time = time_of_day(f[1]);
+  if (!time || f[3] != "T") return;
+  out.time_of_day = time;
+  if (f[10] == "0") return;
+  out.heading_deg = heading(f[2]);
+  const auto sd = number(f[9]);
+  if (out.heading_deg && sd && *sd > 0.0) out.heading_sd_deg = sd;
+}
+
 template <typename T>
 void take(std::optional<T>& into, const std::optional<T>& from) {
   if (from) into = from;
@@ -157,9 +192,10 @@ void put_sentence(BinaryWriter& writer, const NmeaSentence& sentence) {
     put_optional(writer, *value);
   for (const auto* value : {&sentence.quality, &sentence.satellites})
     put_optional(writer, *value);
-  for (const auto* value : {&sentence.latitude_deg, &sentence.longitude_deg, &sentence.altitude_m,
-                            &sentence.geoid_separation_m, &sentence.hdop, &sentence.vdop,
-                            &sentence.track_deg, &sentence.speed_m_s})
+  for (const auto* value :
+       {&sentence.latitude_deg, &sentence.longitude_deg, &sentence.altitude_m,
+        &sentence.geoid_separation_m, &sentence.hdop, &sentence.vdop, &sentence.track_deg,
+        &sentence.speed_m_s, &sentence.heading_deg, &sentence.heading_sd_deg})
     put_optional(writer, *value);
 }
 
@@ -170,11 +206,20 @@ NmeaSentence get_sentence(BinaryReader& reader) {
     *value = get_optional<std::int64_t>(reader);
   for (auto* value : {&sentence.quality, &sentence.satellites})
     *value = get_optional<int>(reader);
-  for (auto* value : {&sentence.latitude_deg, &sentence.longitude_deg, &sentence.altitude_m,
-                      &sentence.geoid_separation_m, &sentence.hdop, &sentence.vdop,
-                      &sentence.track_deg, &sentence.speed_m_s})
+  for (auto* value :
+       {&sentence.latitude_deg, &sentence.longitude_deg, &sentence.altitude_m,
+        &sentence.geoid_separation_m, &sentence.hdop, &sentence.vdop, &sentence.track_deg,
+        &sentence.speed_m_s, &sentence.heading_deg, &sentence.heading_sd_deg})
     *value = get_optional<double>(reader);
   return sentence;
+}
+
+// A heading that was computed for an epoch before the one that is being read.
+bool is_late_heading(const NmeaSentence& sentence, const std::optional<NmeaSentence>& epoch) {
+  if (sentence.type != "HPR" && sentence.type != "SHR") return false;
+  if (!sentence.time_of_day || !epoch || !epoch->time_of_day) return false;
+  const TimeNs behind = *epoch->time_of_day - *sentence.time_of_day;
+  return behind > 0 ? behind < kNsPerDay / 2 : behind < -kNsPerDay / 2;
 }
 
 void merge(NmeaSentence& epoch, const NmeaSentence& more) {
@@ -184,6 +229,10 @@ void merge(NmeaSentence& epoch, const NmeaSentence& more) {
   take(epoch.vdop, more.vdop);
   take(epoch.track_deg, more.track_deg);
   take(epoch.speed_m_s, more.speed_m_s);
+  if (more.heading_deg) {  // with what is said of it
+    epoch.heading_deg = more.heading_deg;
+    epoch.heading_sd_deg = more.heading_sd_deg;
+  }
   take(epoch.altitude_m, more.altitude_m);
   take(epoch.geoid_separation_m, more.geoid_separation_m);
   // A position that comes with a height is preferred, because both are then of one solution.
@@ -214,14 +263,23 @@ std::optional<NmeaSentence> parse_nmea(std::string_view line) {
       return std::nullopt;
   }
   const Fields fields{split(body, ",", false)};
-  if (fields[0].size() < 5) return std::nullopt;
+  if (fields[0].size() < 4) return std::nullopt;
   NmeaSentence out;
+  if (fields[0] == "PSAT") {
+    out.type = fields[1];
+    if (out.type == "HPR") read_hpr(fields, out);
+    return out;
+  }
+  if (fields[0].size() < 5) return std::nullopt;
   out.type = fields[0].substr(fields[0].size() - 3);
   if (out.type == "RMC") read_rmc(fields, out);
   if (out.type == "GGA") read_gga(fields, out);
   if (out.type == "GNS") read_gns(fields, out);
   if (out.type == "GSA") read_gsa(fields, out);
   if (out.type == "ZDA") read_zda(fields, out);
+  if (out.type == "HDT") read_hdt(fields, out);
+  if (out.type == "THS") read_ths(fields, out);
+  if (fields[0] == "PASHR") read_hr(fields, out);
   return out;
 }
 
@@ -238,7 +296,30 @@ GnssFix nmea_fix(const NmeaSentence& sentence, TimeNs stamp) {
   fix.vdop = sentence.vdop.value_or(kUnknown);
   fix.track_deg = sentence.track_deg.value_or(kUnknown);
   fix.speed_m_s = sentence.speed_m_s.value_or(kUnknown);
+  fix.heading_deg = sentence.heading_deg.value_or(kUnknown);
+  fix.heading_sd_deg = sentence.heading_sd_deg.value_or(kUnknown);
   return fix;
+}
+
+std::string nmea_heading(const GnssFix& fix) {
+  const TimeNs of_day = ((fix.stamp % kNsPerDay) + kNsPerDay) % kNsPerDay;
+  const auto seconds = static_cast<int>(of_day / kNsPerSecond);
+  const auto microseconds = static_cast<int>(of_day % kNsPerSecond / 1000);
+  const int quality = fix.quality == 4 || fix.quality == 5 ? 2 : 1;
+  char text[160];
+  std::snprintf(text, sizeof text, "$PASHR,%02d%02d%02d.%06d,%.4f,T,,,,,,", seconds / 3600,
+                seconds / 60 % 60, seconds % 60, microseconds, fix.heading_deg);
+  std::string sentence = text;
+  if (std::isfinite(fix.heading_sd_deg)) {
+    std::snprintf(text, sizeof text, "%.4f", fix.heading_sd_deg);
+    sentence += text;
+  }
+  sentence += "," + std::to_string(quality) + ",0";
+  unsigned sum = 0;
+  for (const char c : sentence.substr(1))
+    sum ^= static_cast<unsigned char>(c);
+  std::snprintf(text, sizeof text, "*%02X", sum);
+  return sentence + text;
 }
 
 NmeaLogReader::NmeaLogReader(std::istream& stream, std::string source, std::int64_t first_day,
@@ -291,6 +372,7 @@ void NmeaLogReader::load(BinaryReader& reader) {
 
 std::optional<GnssFix> NmeaLogReader::add(const NmeaSentence& sentence) {
   std::optional<GnssFix> finished;
+  if (is_late_heading(sentence, epoch_)) return finished;
   const bool new_epoch = sentence.time_of_day && (!epoch_ || !epoch_->time_of_day ||
                                                   *sentence.time_of_day != *epoch_->time_of_day);
   if (new_epoch && epoch_ && epoch_->time_of_day) {

@@ -13,8 +13,8 @@
 
 namespace understory {
 
-// What one NMEA 0183 sentence says. RMC, GGA, GNS, GSA and ZDA of any talker are read, others give
-// `type` alone.
+// What one NMEA 0183 sentence says. RMC, GGA, GNS, GSA, ZDA, HDT and THS of any talker are read,
+// and PSAT,HPR and PASHR of receivers with two antennas. Others give `type` alone.
 struct NmeaSentence {
   std::string type;                    // "RMC"
   std::optional<TimeNs> time_of_day;   // UTC
@@ -29,6 +29,9 @@ struct NmeaSentence {
   std::optional<double> vdop;
   std::optional<double> track_deg;
   std::optional<double> speed_m_s;
+  // Clockwise from true north; set only where the receiver calls it valid and measured by GNSS.
+  std::optional<double> heading_deg;
+  std::optional<double> heading_sd_deg;
 };
 
 // Nothing if the line is no sentence or its checksum is wrong. The checksum may be missing.
@@ -38,7 +41,12 @@ struct NmeaSentence {
 // and the height above the geoid if no separation is given.
 [[nodiscard]] GnssFix nmea_fix(const NmeaSentence& sentence, TimeNs stamp);
 
-// Reads an NMEA log: one fix per epoch, all sentences of the epoch together. Stamps are UTC; before
+// The heading of a fix as a PASHR sentence, with its checksum, without an end of line. The date and
+// what is not known of the heading are lost.
+[[nodiscard]] std::string nmea_heading(const GnssFix& fix);
+
+// Reads an NMEA log: one fix per epoch, all sentences of the epoch together. HDT and THS have no
+// time: they are of the epoch of the sentence before them. Stamps are UTC; before
 // the first date (RMC, ZDA) the date is taken from `first_day` (-1: unknown, then such epochs are
 // left out with a warning). Lines with wrong checksums are passed over with a warning. Throws
 // ReadError where the system cannot read the log.

@@ -50,6 +50,67 @@ TEST(Nmea, JoinsTheSentencesOfAnEpoch) {
   EXPECT_TRUE(log.warnings().empty()) << test::all_warnings(log);
 }
 
+TEST(Nmea, ReadsTheHeadingOfTwoAntennas) {
+  Log log;
+  const std::string gga = ",3649.7478,N,00224.4542,E,4,11,0.9,120.5,M,47.0,M,,";
+  const std::string date = nmea_line("GPZDA,081802.00,21,01,2016,00,00");
+  const auto heading_of = [&](const std::string& sentence) {
+    const auto fixes =
+        read_log(date + nmea_line("GPGGA,081802.00" + gga) + nmea_line(sentence), log);
+    return fixes.size() == 1 ? fixes[0].heading_deg : -1.0;
+  };
+  EXPECT_EQ(heading_of("GPHDT,274.07,T"), 274.07);
+  EXPECT_EQ(heading_of("GNTHS,12.5,A"), 12.5);
+  EXPECT_EQ(heading_of("PSAT,HPR,081802.00,231.4,-1.2,,N"), 231.4);
+  EXPECT_EQ(heading_of("PASHR,081802.00,359.99,T,,,,,,0.150,2,0"), 359.99);
+  EXPECT_EQ(heading_of("GPHDT,0.0,T"), 0.0);
+  EXPECT_TRUE(std::isnan(heading_of("PSAT,HPR,081802.00,231.4,-1.2,,G")));  // by its gyroscope
+  EXPECT_TRUE(std::isnan(heading_of("PSAT,HPR,081802.00,,,,N")));
+  EXPECT_TRUE(std::isnan(heading_of("GNTHS,12.5,V")));
+  EXPECT_TRUE(std::isnan(heading_of("GPHDT,361.0,T")));
+  EXPECT_TRUE(std::isnan(heading_of("GPHDT,12.0,M")));
+  EXPECT_TRUE(std::isnan(heading_of("PASHR,081802.00,12.0,T,,,,,,0.150,0,1")));  // by an IMU alone
+  EXPECT_TRUE(std::isnan(heading_of("PASHR,081802.00,12.0,M,,,,,,0.150,2,0")));
+  EXPECT_TRUE(std::isnan(heading_of("PSAT,GBS,081802.00,231.4,-1.2,,N")));
+  EXPECT_TRUE(log.warnings().empty()) << test::all_warnings(log);
+}
+
+TEST(Nmea, AHeadingWithATimeIsOfItsEpoch) {
+  Log log;
+  const auto gga = [](const std::string& time) {
+    return nmea_line("GPGGA," + time + ",3649.7478,N,00224.4542,E,4,11,0.9,120.5,M,47.0,M,,");
+  };
+  const std::string date = nmea_line("GPZDA,081802.00,21,01,2016,00,00");
+  // The second comes late and is of no use; the third comes before its position.
+  const auto fixes =
+      read_log(date + gga("081802.00") + nmea_line("PASHR,081802.00,10.0,T,,,,,,0.150,2,0") +
+                   gga("081803.00") + nmea_line("PSAT,HPR,081802.00,11.0,,,N") +
+                   nmea_line("PASHR,081804.00,12.0,T,,,,,,,2,0") + gga("081804.00"),
+               log);
+  ASSERT_EQ(fixes.size(), 3U);
+  EXPECT_EQ(fixes[0].heading_deg, 10.0);
+  EXPECT_EQ(fixes[0].heading_sd_deg, 0.15);
+  EXPECT_TRUE(std::isnan(fixes[1].heading_deg));
+  EXPECT_EQ(fixes[2].heading_deg, 12.0);
+  EXPECT_TRUE(std::isnan(fixes[2].heading_sd_deg));
+}
+
+TEST(Nmea, WritesAHeadingThatItReadsBack) {
+  GnssFix fix;
+  fix.stamp = kJanuary21 + (8 * 3600 + 18 * 60 + 2) * kNsPerSecond + 250'000'000;
+  fix.quality = 4;
+  fix.heading_deg = 359.8765;
+  const auto without = parse_nmea(nmea_heading(fix));
+  ASSERT_TRUE(without);
+  EXPECT_EQ(without->heading_deg, 359.8765);
+  EXPECT_FALSE(without->heading_sd_deg);
+  fix.heading_sd_deg = 0.25;
+  const auto with = parse_nmea(nmea_heading(fix));
+  ASSERT_TRUE(with);
+  EXPECT_EQ(with->heading_sd_deg, 0.25);
+  EXPECT_EQ(with->time_of_day, fix.stamp - kJanuary21);
+}
+
 TEST(Nmea, DatesEpochsBeforeTheFirstDateAndAcrossMidnight) {
   Log log;
   const std::string gga = ",3649.7478,N,00224.4542,E,1,11,0.9,120.5,M,47.0,M,,";

@@ -109,8 +109,9 @@ TEST(CloudFolder, MergesImuAndGnssByTime) {
              "1700000000.15,0,0,nonsense,0,0,9.81\n1700000000150000000,1,0,0,0,0,9.81\n"
              "1700000000.25,2,0,0,0,0,9.81\n");
   write_text(folder / "gnss.csv",
-             "timestamp,latitude_deg,longitude_deg,height_m,hdop,sd_east_m,sd_north_m,sd_up_m\n"
-             "1700000000.12,47.5,8.5,500.25,1.5,1,2,3\n");
+             "timestamp,latitude_deg,longitude_deg,height_m,hdop,sd_east_m,sd_north_m,sd_up_m,"
+             "heading_deg,heading_sd_deg\n"
+             "1700000000.12,47.5,8.5,500.25,1.5,1,2,3,271.5,0.25\n");
   Log log;
   const auto recording = open_cloud_folder(folder / "", {}, log);
   const auto events = test::read_all(*recording);
@@ -125,6 +126,8 @@ TEST(CloudFolder, MergesImuAndGnssByTime) {
   const auto& fix = std::get<GnssFix>(events[2]);
   EXPECT_EQ(fix.height_m, 500.25);
   EXPECT_EQ(fix.covariance(1, 1), 4.0);
+  EXPECT_EQ(fix.heading_deg, 271.5);
+  EXPECT_EQ(fix.heading_sd_deg, 0.25);
   EXPECT_EQ(std::get<ImuSample>(events[3]).angular_rate.x(), 1.0);
   EXPECT_EQ(recording->rig().body_frame, "imu");
   EXPECT_EQ(test::count_of(log, "recording.damaged_line"), 1U);

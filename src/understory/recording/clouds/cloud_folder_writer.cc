@@ -100,6 +100,7 @@ std::string gnss_row(const GnssFix& fix) {
       "," + std::to_string(fix.quality) + "," + number(fix.track_deg) + "," + number(fix.speed_m_s);
   for (int i = 0; i < 3; ++i)
     row += "," + number(std::sqrt(fix.covariance(i, i)));
+  row += "," + number(fix.heading_deg) + "," + number(fix.heading_sd_deg);
   return row + "\n";
 }
 
@@ -117,6 +118,8 @@ std::string rig_yaml(const Rig& rig) {
   text += pose_yaml("body_from_lidar", rig.body_from_lidar);
   if (rig.body_from_imu) text += pose_yaml("body_from_imu", *rig.body_from_imu);
   if (rig.body_from_gnss) text += pose_yaml("body_from_gnss", *rig.body_from_gnss);
+  if (rig.body_from_second_gnss)
+    text += pose_yaml("body_from_second_gnss", *rig.body_from_second_gnss);
   return text;
 }
 
@@ -158,7 +161,7 @@ class CloudFolderWriter::Impl {
     if (!gnss_)
       gnss_ = make("gnss.csv",
                    "timestamp,latitude_deg,longitude_deg,height_m,hdop,vdop,satellites,quality,"
-                   "track_deg,speed_m_s,sd_east_m,sd_north_m,sd_up_m\n");
+                   "track_deg,speed_m_s,sd_east_m,sd_north_m,sd_up_m,heading_deg,heading_sd_deg\n");
     gnss_->write(bytes_of(gnss_row(fix)));
   }
   void operator()(const MagSample&) {}

@@ -85,6 +85,8 @@ CsvGnssReader::CsvGnssReader(const std::filesystem::path& path, Log& log) : rows
   quality_ = rows_.find({"quality"});
   track_ = rows_.find({"track_deg"});
   speed_ = rows_.find({"speed_m_s"});
+  heading_ = rows_.find({"heading_deg"});
+  heading_sd_ = rows_.find({"heading_sd_deg"});
   sd_[0] = rows_.find({"sd_east_m"});
   sd_[1] = rows_.find({"sd_north_m"});
   sd_[2] = rows_.find({"sd_up_m"});
@@ -110,6 +112,8 @@ std::optional<GnssFix> CsvGnssReader::next() {
     fix.vdop = optional_number(vdop_);
     fix.track_deg = optional_number(track_);
     fix.speed_m_s = optional_number(speed_);
+    fix.heading_deg = optional_number(heading_);
+    fix.heading_sd_deg = optional_number(heading_sd_);
     const double satellites = optional_number(satellites_);
     const double quality = optional_number(quality_);
     if (satellites >= 0.0 && satellites < 1000.0) fix.satellites = static_cast<int>(satellites);

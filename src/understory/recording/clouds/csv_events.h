@@ -72,7 +72,8 @@ class CsvImuReader {
 };
 
 // gnss.csv: timestamp, latitude_deg, longitude_deg, height_m (above the ellipsoid), and where known
-// hdop, vdop, satellites, quality, track_deg, speed_m_s, sd_east_m, sd_north_m, sd_up_m.
+// hdop, vdop, satellites, quality, track_deg, speed_m_s, sd_east_m, sd_north_m, sd_up_m,
+// heading_deg, heading_sd_deg.
 class CsvGnssReader {
  public:
   CsvGnssReader(const std::filesystem::path& path, Log& log);
@@ -86,7 +87,8 @@ class CsvGnssReader {
 
   EventRows rows_;
   std::size_t time_ = 0, latitude_ = 0, longitude_ = 0, height_ = 0;
-  std::optional<std::size_t> hdop_, vdop_, satellites_, quality_, track_, speed_;
+  std::optional<std::size_t> hdop_, vdop_, satellites_, quality_, track_, speed_, heading_,
+      heading_sd_;
   std::optional<std::size_t> sd_[3];
 };
 

@@ -84,22 +84,26 @@ ScanPtr get_scan(BinaryReader& reader) {
 
 void put_rig(BinaryWriter& writer, const Rig& rig) {
   put_pose(writer, rig.body_from_lidar);
-  for (const std::optional<Pose>* place : {&rig.body_from_imu, &rig.body_from_gnss}) {
+  for (const std::optional<Pose>* place :
+       {&rig.body_from_imu, &rig.body_from_gnss, &rig.body_from_second_gnss}) {
     writer.put(place->has_value());
     if (*place) put_pose(writer, **place);
   }
-  for (const std::string& text : {rig.body_frame, rig.lidar_model, rig.lidar_extrinsic_source,
-                                  rig.imu_extrinsic_source, rig.gnss_extrinsic_source})
+  for (const std::string& text :
+       {rig.body_frame, rig.lidar_model, rig.lidar_extrinsic_source, rig.imu_extrinsic_source,
+        rig.gnss_extrinsic_source, rig.second_gnss_extrinsic_source})
     writer.put(text);
 }
 
 Rig get_rig(BinaryReader& reader) {
   Rig rig;
   rig.body_from_lidar = get_pose(reader);
-  for (std::optional<Pose>* place : {&rig.body_from_imu, &rig.body_from_gnss})
+  for (std::optional<Pose>* place :
+       {&rig.body_from_imu, &rig.body_from_gnss, &rig.body_from_second_gnss})
     if (reader.get<bool>()) *place = get_pose(reader);
-  for (std::string* text : {&rig.body_frame, &rig.lidar_model, &rig.lidar_extrinsic_source,
-                            &rig.imu_extrinsic_source, &rig.gnss_extrinsic_source})
+  for (std::string* text :
+       {&rig.body_frame, &rig.lidar_model, &rig.lidar_extrinsic_source, &rig.imu_extrinsic_source,
+        &rig.gnss_extrinsic_source, &rig.second_gnss_extrinsic_source})
     *text = reader.get_string();
   return rig;
 }

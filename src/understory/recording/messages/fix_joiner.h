@@ -10,26 +10,36 @@
 
 namespace understory {
 
-// Joins positions (NavSatFix) with the quality that comes on another topic (GPSFix). A position
-// waits for it by the times of recording, at most `kWait`; they belong together where their stamps
-// differ by at most `kSame`. Not thread-safe.
+// Joins positions (NavSatFix) with the quality (GPSFix) and the heading of a second antenna that
+// come on other topics. A position waits for them by the times of recording, at most `kWait`.
+// Quality belongs to it where their stamps differ by at most `kSame`, a heading by at most
+// `kSameEpoch`: drivers stamp sentences when they come. Not thread-safe.
 class FixJoiner {
  public:
   static constexpr TimeNs kWait = kNsPerSecond / 5;
   static constexpr TimeNs kSame = kNsPerSecond / 1000;
+  static constexpr TimeNs kSameEpoch = kNsPerSecond / 40;
 
   void expect_quality() { has_quality_topic_ = true; }
+  void expect_heading() { has_heading_topic_ = true; }
 
   void add_position(GnssFix fix, TimeNs now, std::deque<Event>& events) {
     flush(events);
     if (!std::isfinite(fix.latitude_deg) || !std::isfinite(fix.longitude_deg)) fix.quality = 0;
     waiting_ = fix;
     waiting_since_ = now;
-    if (!has_quality_topic_ || join()) flush(events);
+    lacks_quality_ = has_quality_topic_;
+    lacks_heading_ = has_heading_topic_;
+    join(events);
   }
   void add_quality(const GnssFix& quality, std::deque<Event>& events) {
     quality_ = quality;
-    if (waiting_ && join()) flush(events);
+    join(events);
+  }
+  // Of `heading` its stamp, heading and standard deviation count.
+  void add_heading(const GnssFix& heading, std::deque<Event>& events) {
+    heading_ = heading;
+    join(events);
   }
   void pass_time(TimeNs now, std::deque<Event>& events) {
     if (waiting_ && (now < waiting_since_ || now - waiting_since_ > kWait)) flush(events);
@@ -40,25 +50,34 @@ class FixJoiner {
   }
 
   void save(BinaryWriter& writer) const {
-    writer.put(has_quality_topic_);
+    for (const bool flag : {has_quality_topic_, has_heading_topic_, lacks_quality_, lacks_heading_})
+      writer.put(flag);
     writer.put(waiting_since_);
-    for (const std::optional<GnssFix>* fix : {&waiting_, &quality_}) {
+    for (const std::optional<GnssFix>* fix : {&waiting_, &quality_, &heading_}) {
       writer.put(fix->has_value());
       if (*fix) put_fix(writer, **fix);
     }
   }
   void load(BinaryReader& reader) {
-    has_quality_topic_ = reader.get<bool>();
+    for (bool* flag : {&has_quality_topic_, &has_heading_topic_, &lacks_quality_, &lacks_heading_})
+      *flag = reader.get<bool>();
     waiting_since_ = reader.get<TimeNs>();
-    for (std::optional<GnssFix>* fix : {&waiting_, &quality_}) {
+    for (std::optional<GnssFix>* fix : {&waiting_, &quality_, &heading_}) {
       fix->reset();
       if (reader.get<bool>()) *fix = get_fix(reader);
     }
   }
 
  private:
-  bool join() {
-    if (!quality_ || std::abs(quality_->stamp - waiting_->stamp) > kSame) return false;
+  // The position goes on as soon as nothing is lacking.
+  void join(std::deque<Event>& events) {
+    if (!waiting_) return;
+    join_quality();
+    join_heading();
+    if (!lacks_quality_ && !lacks_heading_) flush(events);
+  }
+  void join_quality() {
+    if (!quality_ || std::abs(quality_->stamp - waiting_->stamp) > kSame) return;
     if (waiting_->quality > 0) waiting_->quality = quality_->quality;
     waiting_->satellites = quality_->satellites;
     waiting_->hdop = quality_->hdop;
@@ -66,13 +85,24 @@ class FixJoiner {
     waiting_->track_deg = quality_->track_deg;
     waiting_->speed_m_s = quality_->speed_m_s;
     if (!waiting_->covariance.allFinite()) waiting_->covariance = quality_->covariance;
-    return true;
+    lacks_quality_ = false;
+  }
+  void join_heading() {
+    if (!heading_ || std::abs(heading_->stamp - waiting_->stamp) > kSameEpoch) return;
+    waiting_->heading_deg = heading_->heading_deg;
+    waiting_->heading_sd_deg = heading_->heading_sd_deg;
+    lacks_heading_ = false;
+    heading_.reset();  // it is of one position
   }
 
   bool has_quality_topic_ = false;
+  bool has_heading_topic_ = false;
+  bool lacks_quality_ = false;  // of the position that waits
+  bool lacks_heading_ = false;
   std::optional<GnssFix> waiting_;
   TimeNs waiting_since_ = 0;
   std::optional<GnssFix> quality_;
+  std::optional<GnssFix> heading_;
 };
 
 }  // namespace understory

@@ -194,6 +194,14 @@ std::optional<GnssMessage> decode_gps_fix(MessageReader reader) {
   return message;
 }
 
+std::optional<NmeaMessage> decode_nmea_sentence(MessageReader reader) {
+  NmeaMessage message;
+  message.header = read_header(reader);
+  message.sentence = std::string(reader.text());
+  if (!reader.ok()) return std::nullopt;
+  return message;
+}
+
 std::optional<std::vector<TransformMessage>> decode_transforms(MessageReader reader) {
   const auto count = reader.length(60);
   std::vector<TransformMessage> transforms;

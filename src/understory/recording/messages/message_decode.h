@@ -60,6 +60,12 @@ struct GnssMessage {
   GnssFix fix;
 };
 
+// nmea_msgs/Sentence.
+struct NmeaMessage {
+  MessageHeader header;
+  std::string sentence;
+};
+
 // geometry_msgs/TransformStamped.
 struct TransformMessage {
   TimeNs stamp = 0;
@@ -86,6 +92,7 @@ struct PacketsMessage {
 [[nodiscard]] std::optional<MagMessage> decode_magnetic_field(MessageReader reader);
 [[nodiscard]] std::optional<GnssMessage> decode_nav_sat_fix(MessageReader reader);
 [[nodiscard]] std::optional<GnssMessage> decode_gps_fix(MessageReader reader);
+[[nodiscard]] std::optional<NmeaMessage> decode_nmea_sentence(MessageReader reader);
 [[nodiscard]] std::optional<std::vector<TransformMessage>> decode_transforms(MessageReader reader);
 [[nodiscard]] std::optional<PacketsMessage> decode_velodyne_scan(MessageReader reader);
 [[nodiscard]] std::optional<PacketsMessage> decode_nebula_packets(MessageReader reader);

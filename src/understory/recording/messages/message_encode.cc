@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "understory/recording/captures/nmea.h"
+
 namespace understory {
 namespace {
 
@@ -215,6 +217,13 @@ ByteBuffer encode_gps_fix(const GnssFix& fix) {
   for (int i = 0; i < 10; ++i)
     out.put(unknown);  // err ... err_dip
   put_position_covariance(out, fix);
+  return out.bytes();
+}
+
+ByteBuffer encode_heading(const GnssFix& fix) {
+  CdrWriter out;
+  out.put_header(fix.stamp, kSecondAntennaFrame);
+  out.put_text(nmea_heading(fix));
   return out.bytes();
 }
 

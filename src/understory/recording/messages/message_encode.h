@@ -34,6 +34,9 @@ class CdrWriter {
   ByteBuffer buffer_;
 };
 
+// The frame of the antenna at the end of a heading's line.
+inline constexpr const char* kSecondAntennaFrame = "gnss_second";
+
 // A fixed transform between two named frames.
 struct NamedTransform {
   std::string parent;
@@ -46,6 +49,8 @@ struct NamedTransform {
 [[nodiscard]] ByteBuffer encode_imu(const ImuSample& sample);
 [[nodiscard]] ByteBuffer encode_nav_sat_fix(const GnssFix& fix);
 [[nodiscard]] ByteBuffer encode_gps_fix(const GnssFix& fix);
+// nmea_msgs/Sentence with the heading of a fix, in the frame of the second antenna.
+[[nodiscard]] ByteBuffer encode_heading(const GnssFix& fix);
 [[nodiscard]] ByteBuffer encode_magnetic_field(const MagSample& sample);
 [[nodiscard]] ByteBuffer encode_transforms(const std::vector<NamedTransform>& transforms,
                                            TimeNs stamp);

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "understory/recording/captures/nmea.h"
 #include "understory/recording/extrinsics.h"
 #include "understory/recording/finding.h"
 #include "understory/recording/messages/arrival_times.h"
@@ -42,6 +43,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     survey_late_topics(*ahead, options, survey_);
     choice_ = choose_topics(survey_, options, file_, log_);
     if (!choice_.quality.empty()) fixes_.expect_quality();
+    if (topic_of_headings() != nullptr) fixes_.expect_heading();
     for (const TopicSurvey& topic : survey_.topics)
       frame_of_topic_[topic.topic] = topic.frame;
     source_ = open(log_);
@@ -78,8 +80,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
     source_->save(writer);
     survey_.transforms.save(writer);
     put_strings(writer, frame_of_topic_);
-    for (const std::string& text : {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality,
-                                    frames_.lidar, frames_.imu, frames_.gnss, imu_text_})
+    for (const std::string& text :
+         {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality, frames_.lidar, frames_.imu,
+          frames_.gnss, frames_.second_gnss, imu_text_})
       writer.put(text);
     put_rig(writer, rig_);
     writer.put(scan_given_);
@@ -102,8 +105,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
     source_->load(reader);
     survey_.transforms.load(reader);
     frame_of_topic_ = get_strings(reader);
-    for (std::string* text : {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality,
-                              &frames_.lidar, &frames_.imu, &frames_.gnss, &imu_text_})
+    for (std::string* text :
+         {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality, &frames_.lidar,
+          &frames_.imu, &frames_.gnss, &frames_.second_gnss, &imu_text_})
       *text = reader.get_string();
     rig_ = get_rig(reader);
     scan_given_ = reader.get<bool>();
@@ -140,7 +144,16 @@ class MessageRecording : public Recording, public ArrivalTimes {
       const TopicSurvey* found = survey_.find(topic);
       return found == nullptr ? std::string() : found->frame;
     };
-    frames_ = {frame_of(choice_.lidar), frame_of(choice_.imu), frame_of(choice_.gnss)};
+    const TopicSurvey* headings = topic_of_headings();
+    frames_ = {frame_of(choice_.lidar), frame_of(choice_.imu), frame_of(choice_.gnss),
+               headings == nullptr ? "" : headings->frame};
+  }
+
+  [[nodiscard]] const TopicSurvey* topic_of_headings() const {
+    for (const TopicSurvey& topic : survey_.topics) {
+      if (topic.headings > 0) return &topic;
+    }
+    return nullptr;
   }
 
   void make_rig(const std::map<std::string, std::string>& metadata) {
@@ -177,7 +190,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
 
   [[nodiscard]] bool lacks_place() const {
     return (!frames_.imu.empty() && !rig_.body_from_imu) ||
-           (!frames_.gnss.empty() && !rig_.body_from_gnss);
+           (!frames_.gnss.empty() && !rig_.body_from_gnss) ||
+           (!frames_.second_gnss.empty() && !rig_.body_from_second_gnss);
   }
 
   void warn_of_missing_place() {
@@ -273,6 +287,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
       case TopicRole::kGpsFix:
         decoded = take_gnss(topic, role, message, reader);
         break;
+      case TopicRole::kNmea:
+        decoded = take_sentence(topic, reader);
+        break;
       case TopicRole::kTransforms:
         decoded = take_transforms(topic, reader, message.log_time);
         break;
@@ -306,6 +323,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
         return choice_.gnss.empty() || choice_.gnss == topic ? adopt(choice_.gnss)
                                                              : adopt(choice_.quality);
       case TopicRole::kMag:
+      case TopicRole::kNmea:
       case TopicRole::kTransforms:
         return true;
       default:
@@ -458,6 +476,21 @@ class MessageRecording : public Recording, public ArrivalTimes {
       note_frame(frames_.gnss, gnss->header.frame);
       fixes_.add_position(gnss->fix, message.log_time, events_);
     }
+    return true;
+  }
+
+  // Positions come by other topics; of sentences, the headings of a second antenna are used.
+  bool take_sentence(TopicStatistics& topic, const MessageReader& reader) {
+    const auto message = decode_nmea_sentence(reader);
+    if (!message) return false;
+    topic.add_stamp(message->header.stamp);
+    topic.report().frame = message->header.frame;
+    const auto sentence = parse_nmea(message->sentence);
+    if (!sentence || !sentence->heading_deg) return true;
+    topic.report().conventions = "heading of a second antenna";
+    note_frame(frames_.second_gnss, message->header.frame);
+    fixes_.expect_heading();
+    fixes_.add_heading(nmea_fix(*sentence, message->header.stamp), events_);
     return true;
   }
 

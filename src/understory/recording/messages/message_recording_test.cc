@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "understory/recording/messages/message_encode.h"
@@ -127,6 +128,49 @@ TEST(MessageRecording, UsesATransformThatComesAfterTheFirstScans) {
   (void)read_all(*recording);
   EXPECT_TRUE(recording->rig().body_from_imu.has_value()) << all_warnings(log);
   EXPECT_EQ(count_of(log, "recording.late_extrinsics"), 1U) << all_warnings(log);
+}
+
+// nmea_msgs/Sentence as a driver writes it.
+std::vector<std::uint8_t> sentence_message(TimeNs stamp, const std::string& frame,
+                                           const std::string& sentence) {
+  CdrWriter out;
+  out.put_header(stamp, frame);
+  out.put_text(sentence);
+  return bytes_of(out.bytes());
+}
+
+TEST(MessageRecording, JoinsHeadingsToThePositionsOfTheirEpoch) {
+  const auto positions = channel("/fix", "sensor_msgs/msg/NavSatFix");
+  const auto sentences = channel("/nmea", "nmea_msgs/msg/Sentence");
+  std::vector<Stored> messages;
+  for (int i = 0; i < 40; ++i) {
+    GnssFix fix;
+    fix.stamp = kStart + i * 200'000'000LL;
+    fix.quality = 1;
+    messages.push_back({positions, fix.stamp, bytes_of(encode_nav_sat_fix(fix))});
+    // Stamped when they come, 15 ms later; the driver passes on other sentences, too. Number 7 has
+    // no heading, number 9 is far too late.
+    const TimeNs late = fix.stamp + (i == 9 ? 60'000'000LL : 15'000'000LL);
+    const std::string heading = i == 7 ? "" : std::to_string(i) + ".5";
+    messages.push_back({sentences, late, sentence_message(late, "gnss", "$GPGSA,A,3,,,,,,,,,")});
+    messages.push_back(
+        {sentences, late, sentence_message(late, "gnss", "$GPHDT," + heading + ",T\r\n")});
+  }
+  Log log;
+  const auto recording = open_messages(
+      "x.mcap", [&](Log&) { return std::make_unique<StoredSource>(messages); }, {}, log);
+  const std::vector<Event> events = read_all(*recording);
+  ASSERT_EQ(events.size(), 40U);
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const auto& fix = std::get<GnssFix>(events[i]);
+    EXPECT_EQ(fix.stamp, kStart + static_cast<TimeNs>(i) * 200'000'000LL);
+    if (i == 7 || i == 9) {
+      EXPECT_TRUE(std::isnan(fix.heading_deg)) << i;
+    } else {
+      EXPECT_EQ(fix.heading_deg, static_cast<double>(i) + 0.5);
+    }
+  }
+  EXPECT_FALSE(recording->rig().body_from_second_gnss);
 }
 
 // Bug: without an index a sensor that begins late was refused where the user named its topic.

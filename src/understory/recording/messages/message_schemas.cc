@@ -63,6 +63,7 @@ constexpr Definition kDefinitions[] = {
      "uint8 COVARIANCE_TYPE_DIAGONAL_KNOWN=2\nuint8 COVARIANCE_TYPE_KNOWN=3\n"
      "uint8 position_covariance_type\n",
      {"std_msgs/Header", "sensor_msgs/NavSatStatus"}},
+    {"nmea_msgs/Sentence", "std_msgs/Header header\nstring sentence\n", {"std_msgs/Header"}},
     {"gps_msgs/GPSStatus",
      "std_msgs/Header header\nuint16 satellites_used\nint32[] satellite_used_prn\n"
      "uint16 satellites_visible\nint32[] satellite_visible_prn\nint32[] satellite_visible_z\n"

@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "understory/recording/captures/nmea.h"
 #include "understory/recording/messages/message_decode.h"
 #include "understory/recording/messages/point_cloud.h"
 #include "understory/util/error.h"
@@ -43,6 +44,8 @@ class Surveyor {
         return add_frame(topic, decode_nav_sat_fix(reader));
       case TopicRole::kGpsFix:
         return add_frame(topic, decode_gps_fix(reader));
+      case TopicRole::kNmea:
+        return add_sentence(topic, decode_nmea_sentence(reader));
       case TopicRole::kTransforms:
         return add_transforms(reader);
       default:
@@ -121,6 +124,14 @@ class Surveyor {
       topic.specific_force_sum += imu->sample.specific_force.norm();
   }
 
+  static void add_sentence(TopicSurvey& topic, const std::optional<NmeaMessage>& message) {
+    if (!message) return;
+    const auto sentence = parse_nmea(message->sentence);
+    if (!sentence || !sentence->heading_deg) return;
+    ++topic.headings;
+    topic.frame = message->header.frame;
+  }
+
   template <typename Message>
   static void add_frame(TopicSurvey& topic, const std::optional<Message>& message) {
     if (message) topic.frame = message->header.frame;
@@ -178,6 +189,7 @@ TopicRole role_of(const MessageChannel& channel) {
       {"sensor_msgs/NavSatFix", TopicRole::kNavSatFix},
       {"gps_msgs/GPSFix", TopicRole::kGpsFix},
       {"gps_common/GPSFix", TopicRole::kGpsFix},
+      {"nmea_msgs/Sentence", TopicRole::kNmea},
       {"tf2_msgs/TFMessage", TopicRole::kTransforms},
       {"tf/tfMessage", TopicRole::kTransforms},
   };
@@ -202,6 +214,7 @@ const char* role_name(TopicRole role) {
       return "mag";
     case TopicRole::kNavSatFix:
     case TopicRole::kGpsFix:
+    case TopicRole::kNmea:
       return "gnss";
     case TopicRole::kTransforms:
       return "tf";

@@ -22,6 +22,7 @@ enum class TopicRole {
   kMag,
   kNavSatFix,
   kGpsFix,
+  kNmea,  // nmea_msgs/Sentence, for the heading of a second antenna
   kTransforms,
 };
 
@@ -38,6 +39,7 @@ struct TopicSurvey {
   std::string frame;  // of most of its data
   std::uint64_t messages = 0;
   std::uint64_t points = 0;
+  std::uint64_t headings = 0;  // sentences with one
   std::string time_field;
   std::string time_type;
   std::map<std::string, std::uint64_t> frames;            // points (IMU: messages) of each

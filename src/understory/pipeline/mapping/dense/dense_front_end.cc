@@ -112,6 +112,10 @@ void DenseFrontEnd::complete_rig(const Rig& rig) {
     rig_.body_from_gnss = rig.body_from_gnss;
     rig_.gnss_extrinsic_source = rig.gnss_extrinsic_source;
   }
+  if (!rig_.body_from_second_gnss && rig.body_from_second_gnss) {
+    rig_.body_from_second_gnss = rig.body_from_second_gnss;
+    rig_.second_gnss_extrinsic_source = rig.second_gnss_extrinsic_source;
+  }
   if (rig_.body_from_imu || !rig.body_from_imu || without_samples()) return;
   rig_.body_from_imu = rig.body_from_imu;
   rig_.imu_extrinsic_source = rig.imu_extrinsic_source;

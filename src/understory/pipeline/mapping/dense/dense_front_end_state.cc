@@ -53,6 +53,7 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   recovery_.save(writer);
   put_optional(writer, rig_.body_from_imu, put_pose);
   put_optional(writer, rig_.body_from_gnss, put_pose);
+  put_optional(writer, rig_.body_from_second_gnss, put_pose);
   writer.put(started());
   writer.put(static_cast<std::uint64_t>(received_.imu.size()));
   for (const ImuSample& sample : received_.imu)
@@ -87,6 +88,7 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   recovery_.load(reader);
   const auto body_from_imu = get_optional(reader, get_pose);
   const auto body_from_gnss = get_optional(reader, get_pose);
+  const auto body_from_second_gnss = get_optional(reader, get_pose);
   const bool was_started = reader.get<bool>();
   const auto waiting = reader.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < waiting; ++i)
@@ -100,6 +102,7 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   rig_ = rig;
   rig_.body_from_imu = body_from_imu;
   rig_.body_from_gnss = body_from_gnss;
+  rig_.body_from_second_gnss = body_from_second_gnss;
   map_->load(reader);
   make_odometry(Rig(rig_));
   odometry_->load(reader);
