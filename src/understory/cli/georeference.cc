@@ -22,6 +22,7 @@ struct GeoreferenceOptions {
   std::string points;
   std::string recording;
   std::vector<double> antenna_m;
+  std::vector<double> second_antenna_m;
   std::vector<double> start;
   double time_offset_s = 0.0;
   double time_offset_sd_s = 0.0;
@@ -74,6 +75,9 @@ void check(const GeoreferenceOptions& options) {
   if (!timed && (options.time_offset_s != 0.0 || options.time_offset_sd_s > 0.0))
     problems.emplace_back(
         "--time-offset-s and --time-offset-sd-s belong to auto, split, closed, fit3, fit6");
+  const bool by_headings = options.method == "auto" || options.method == "split";
+  if (!options.second_antenna_m.empty() && (!by_headings || options.antenna_m.empty()))
+    problems.emplace_back("--second-antenna-m belongs to auto, split, and needs --antenna-m");
   if (!timed && !points && options.tilt_sd_deg >= 0.0)
     problems.emplace_back("--tilt-sd-deg belongs to auto, split, closed, fit3, fit6, points");
   if (terrain && options.terrain_model.empty())
@@ -115,6 +119,8 @@ int run_georeference(const GeoreferenceOptions& options, CommandContext& context
     if (options.method == method.name) request.method = method.method;
   if (!options.antenna_m.empty())
     request.antenna_in_body = {options.antenna_m[0], options.antenna_m[1], options.antenna_m[2]};
+  if (const auto& at = options.second_antenna_m; !at.empty())
+    request.second_antenna_in_body = {at[0], at[1], at[2]};
   if (!options.start.empty())
     request.start = {options.start[0], options.start[1], options.start[2]};
   const GeoreferenceOutcome outcome =
@@ -140,6 +146,11 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
           "Position in the body frame of the GNSS antenna, or of what stood on the control "
           "points: x y z (if not given: where run.json has it, for the run's own fixes, else "
           "the origin)")
+      ->expected(3);
+  command
+      .add_option("--second-antenna-m", options.second_antenna_m,
+                  "Position in the body frame of the antenna that the headings of the fixes lead "
+                  "to: x y z (if not given: where run.json has it, for the run's own fixes)")
       ->expected(3);
   command
       .add_option("--time-offset-s", options.time_offset_s,

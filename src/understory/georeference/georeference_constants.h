@@ -18,6 +18,23 @@ namespace interpolation {  // georeference/satellites/: satellite_pairs, satelli
 inline constexpr double kGapS = 2.0;
 }  // namespace interpolation
 
+namespace satellite_pairs {  // georeference/satellites/satellite_pairs.cc
+// Share of the line between two antennas in the plane below which its heading does not count
+// [chosen: 60 degrees; a world that is 0.25 degrees off level turns it by 0.43 there]
+inline constexpr double kUpright = 0.5;
+}  // namespace satellite_pairs
+
+namespace second_antenna {  // georeference/satellites/second_antenna.cc
+// Pairs with a heading at least [bound: a median that leaves one out]
+inline constexpr std::size_t kFewestHeadings = 3;
+// Standard deviations of a heading from those before it beyond which it is left out [chosen]
+inline constexpr double kFarHeading = 5.0;
+// Headings in a row, that far off, after which they are right [chosen]
+inline constexpr std::uint64_t kMostFarHeadings = 30;
+// s between pairs, at least [bound: a correlation over no time]
+inline constexpr double kShortestStepS = 0.05;
+}  // namespace second_antenna
+
 namespace receiver_noise {  // georeference/satellites/receiver_noise.cc
 // Unknowns of the noise are in standard deviations of their prior. Rounds of the search for the
 // most probable one, at most [bound: time]
@@ -92,6 +109,8 @@ inline constexpr double kCautious = 1.35;
 inline constexpr int kCircleSteps = 5;
 // rad: a step at most [chosen]
 inline constexpr double kLongestTurn = 0.5;
+// Standard deviation of the radius, 1, that a heading tells of cosine and sine [chosen]
+inline constexpr double kRadiusSd = 0.1;
 // Fixes that wait for a pose, at most; older ones are dropped [bound: memory]
 inline constexpr std::size_t kMostWaiting = 2'000;
 // m: pairs that are farther off than that, many in a row, are of another place [chosen]

@@ -55,6 +55,32 @@ class PositionFactor : public gtsam::NoiseModelFactor2<gtsam::Pose3, Vector3d> {
   Eigen::Index axes_;  // east, north, and up where it is measured
 };
 
+// Where a direction of a keyframe points in the plane.
+class AzimuthFactor : public gtsam::NoiseModelFactor1<gtsam::Pose3> {
+ public:
+  AzimuthFactor(const GnssObservation& observation, const gtsam::SharedNoiseModel& noise)
+      : NoiseModelFactor1(noise, static_cast<gtsam::Key>(observation.keyframe)),
+        direction_(observation.direction_in_keyframe),
+        azimuth_(observation.azimuth_rad) {}
+
+  gtsam::Vector evaluateError(const gtsam::Pose3& pose, Jacobian by_pose) const override {
+    const Eigen::Matrix3d rotation = pose.rotation().matrix();
+    const Vector3d v = rotation * direction_;
+    if (by_pose) {
+      const Eigen::RowVector3d by_v =
+          Eigen::RowVector3d(-v.y(), v.x(), 0.0) / v.head<2>().squaredNorm();
+      *by_pose = gtsam::Matrix::Zero(1, 6);
+      by_pose->leftCols(3) = -by_v * rotation * skew(direction_);
+    }
+    return gtsam::Vector1(
+        std::remainder(std::atan2(v.y(), v.x()) - azimuth_, 2.0 * std::numbers::pi));
+  }
+
+ private:
+  Vector3d direction_;
+  double azimuth_;
+};
+
 // One step of a Gauss-Markov process.
 class DecayFactor : public gtsam::NoiseModelFactor2<Vector3d, Vector3d> {
  public:
@@ -113,6 +139,16 @@ class Fusion {
       graph.emplace_shared<PositionFactor>(
           observations_[i], key_of(nodes_[i]),
           gtsam::noiseModel::Robust::Create(kernel, noise_of(observations_[i])));
+    }
+  }
+
+  void add_headings(gtsam::NonlinearFactorGraph& graph) const {
+    const auto kernel = gtsam::noiseModel::mEstimator::Cauchy::Create(config_.kernel_sigmas);
+    for (const GnssObservation& observation : observations_) {
+      if (!std::isfinite(observation.azimuth_rad)) continue;
+      const auto noise = gtsam::noiseModel::Isotropic::Sigma(1, observation.azimuth_sd_rad);
+      graph.emplace_shared<AzimuthFactor>(observation,
+                                          gtsam::noiseModel::Robust::Create(kernel, noise));
     }
   }
 
@@ -204,7 +240,8 @@ void check(const PoseGraphProblem& problem, const std::vector<GnssObservation>& 
     UNDERSTORY_CHECK(keyframe >= 0 &&
                      keyframe < static_cast<int>(problem.world_from_keyframe.size()));
     UNDERSTORY_CHECK(observations[i].plane_scale > 0.0 && observations[i].height_scale > 0.0 &&
-                     observations[i].position_in_enu.allFinite());
+                     observations[i].position_in_enu.allFinite() &&
+                     observations[i].azimuth_sd_rad > 0.0);
     UNDERSTORY_CHECK(i == 0 || observations[i - 1].stamp <= observations[i].stamp);
   }
   UNDERSTORY_CHECK(errors.fast_plane_m > 0.0 && errors.fast_height_m > 0.0 &&
@@ -247,6 +284,7 @@ GnssFusionResult fuse_gnss(const PoseGraphProblem& problem, const std::vector<ch
                  config);
   fusion.add_biases(graph, first);
   fusion.add_positions(graph);
+  fusion.add_headings(graph);
   try {
     PoseGraphConfig solver;
     solver.max_iterations = config.max_iterations;

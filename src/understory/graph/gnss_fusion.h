@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,11 @@ struct GnssObservation {
   double height_scale = 1.0;
   double extra_plane_m = 0.0;  // independent errors of one that lies far off the others
   double extra_height_m = 0.0;
+  // By a second antenna: where a direction of the keyframe points, rad from east to north. NaN:
+  // there is no heading.
+  Eigen::Vector3d direction_in_keyframe = Eigen::Vector3d::UnitX();
+  double azimuth_rad = std::numeric_limits<double>::quiet_NaN();
+  double azimuth_sd_rad = 1.0;
 };
 
 // How positions by satellites err, standard deviations in metres: a slow part that is correlated
@@ -63,10 +69,11 @@ struct [[nodiscard]] GnssFusionResult {
 };
 
 // Solves the pose graph together with positions by satellites (P2-6, P4-5): odometry, the loops
-// that `loop_used` marks, tilts, positions with a lever arm, and the receivers' slow errors, which
-// are estimated along. Nothing is held: the positions tell where the path is. `problem` is in its
-// world frame, whose z axis is up; `enu_from_world` is a first guess, for instance from a rigid
-// fit. Deterministic; thread-safe. Where the system is undetermined the path is that of the guess.
+// that `loop_used` marks, tilts, positions with a lever arm, headings of a second antenna, and the
+// receivers' slow errors, which are estimated along. Nothing is held: the positions tell where the
+// path is. `problem` is in its world frame, whose z axis is up; `enu_from_world` is a first guess,
+// for instance from a rigid fit. Deterministic; thread-safe. Where the system is undetermined the
+// path is that of the guess.
 GnssFusionResult fuse_gnss(const PoseGraphProblem& problem, const std::vector<char>& loop_used,
                            const std::vector<GnssObservation>& observations,
                            const Pose& enu_from_world, const GnssErrors& errors,

@@ -91,6 +91,10 @@ Json to_json(const RunPlace& place) {
     const Eigen::Vector3d& at = *place.antenna_in_body;
     json["antenna_in_body_m"] = {at.x(), at.y(), at.z()};
   }
+  if (place.second_antenna_in_body) {
+    const Eigen::Vector3d& at = *place.second_antenna_in_body;
+    json["second_antenna_in_body_m"] = {at.x(), at.y(), at.z()};
+  }
   if (!place.on_globe) return json;
   const Eigen::Vector3d& t = place.enu_from_world.translation();
   const Eigen::Quaterniond& q = place.enu_from_world.rotation();

@@ -64,7 +64,8 @@ struct RunPlace {
   std::string method;     // that found it, as `georeference --method` names it
   // Of the receiver whose fixes the run holds, in the body frame, metres; nothing where unknown.
   std::optional<Eigen::Vector3d> antenna_in_body;
-  Pose enu_from_world;  // to east, north, up at the origin
+  std::optional<Eigen::Vector3d> second_antenna_in_body;  // that its headings lead to
+  Pose enu_from_world;                                    // to east, north, up at the origin
   GeodeticPlace origin;
   std::string coordinate_system;  // "EPSG:3067", or its name
   std::string heights;            // what heights of the layers are above, in words

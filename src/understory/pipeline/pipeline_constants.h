@@ -103,6 +103,9 @@ namespace georeferencing {  // pipeline/georeferencing/methods/place_by_*.cc
 // degrees: with a less certain heading a place 50 m from the path's middle is over 4 m off
 // [chosen]
 inline constexpr double kMostHeadingSdDeg = 5.0;
+// m: a carrier that stands and is placed by headings counts as a path of that extent, where fixes
+// are compared with it [chosen: receivers under trees err by less than 0.4 of it]
+inline constexpr double kStandingReachM = 25.0;
 // m from the body to an antenna [bound: carriers]
 inline constexpr double kLongestArmM = 10.0;
 // m around the path whose ground is fitted [chosen]

@@ -66,6 +66,15 @@ std::vector<GnssObservation> observations_of(const SolvedRun& run,
         pair.antenna_in_world;
     one.position_in_enu = pair.fix_in_enu;
     one.has_height = seen.height_known;
+    if (seen.headings && seen.headings->used && std::isfinite(pair.turn_rad)) {
+      const Pose& world_from_keyframe =
+          run.graph.world_from_keyframe[static_cast<std::size_t>(keyframe)];
+      one.direction_in_keyframe = world_from_keyframe.rotation().conjugate() * Vector3d::UnitX();
+      one.azimuth_rad = pair.turn_rad;
+      // All together know the turn as well as the fit says.
+      one.azimuth_sd_rad =
+          seen.headings->turn.sd_rad * std::sqrt(static_cast<double>(seen.headings->turn.pairs));
+    }
     const auto row = static_cast<Eigen::Index>(k);
     one.plane_scale = seen.plane_noise.relative_slow(seen.plane_times.scale(row));
     one.extra_plane_m = seen.plane_times.extra_sd_m(row);

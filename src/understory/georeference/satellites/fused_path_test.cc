@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/util/angles.h"
 #include "understory/util/random.h"
 
@@ -124,6 +125,29 @@ TEST(FusedPath, GoodPositionsTakeAScaleErrorOut) {
   EXPECT_LT(error_m(walk, fixes, fused), 0.03);
   EXPECT_GT(fused.odometry_scale, 0.25);  // the positions show that the map errs more
   EXPECT_GT(fused.bent_m, 0.1);
+}
+
+// A short way under a bad receiver: the headings tell how it lies, in the graph, too.
+TEST(FusedPath, HeadingsOfASecondAntennaTurnThePath) {
+  const Walk walk(60, 0.0, 1);
+  auto fixes = received(walk, {4.0, 0.3, 60.0, 3.0}, 2);
+  PairingConfig pairing = with_arm();
+  pairing.second_antenna_in_body = kArm + Vector3d(0.0, 1.0, 0.0);
+  const auto heading_error_deg = [&](const FusedPath& path) {
+    const Pose motion =
+        path.enu_from_keyframe[30] * walk.run.graph.world_from_keyframe[30].inverse();
+    return std::abs(std::remainder(yaw_of(motion) - yaw_of(kEnuFromWorld), 2.0 * M_PI)) / kDegree;
+  };
+  const FusedPath without = fuse_path(walk.run, fixes, first_guess(walk, fixes), pairing, {}, {});
+  for (std::size_t k = 0; k < fixes.size(); ++k) {
+    const Vector3d line = kEnuFromWorld.rotation() * (walk.truth[k].rotation() * Vector3d::UnitY());
+    fixes[k].heading_deg = std::fmod(std::atan2(line.x(), line.y()) / kDegree + 360.0, 360.0);
+    fixes[k].heading_sd_deg = 0.5;
+  }
+  const FusedPath with = fuse_path(walk.run, fixes, first_guess(walk, fixes), pairing, {}, {});
+  ASSERT_TRUE(without.found && with.found) << with.reason;
+  EXPECT_GT(heading_error_deg(without), 1.0);
+  EXPECT_LT(heading_error_deg(with), 0.5);
 }
 
 TEST(FusedPath, AReceiverUnderTreesLeavesTheShape) {

@@ -9,6 +9,7 @@
 #include "understory/geometry/pose_io.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/sensor/sensor_io.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
@@ -24,7 +25,6 @@ using Eigen::Vector3d;
 using Eigen::Vector4d;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kDegree = M_PI / 180.0;
 
 Vector4d plane_sd() {
   return {std::sqrt(0.5), std::sqrt(0.5), kFarM, kFarM};
@@ -94,16 +94,33 @@ OnCircle on_circle(const Vector4d& mean, const Matrix4d& covariance, double firs
   return found;
 }
 
+// A measurement of cosine, sine and shift: value = row * parameters + error.
+void measure(const Vector4d& row, double value, double sd, Vector4d& mean, Matrix4d& covariance,
+             double& log_weight) {
+  const Vector4d spread = covariance * row;
+  const double total = row.dot(spread) + sd * sd;
+  const double off = value - row.dot(mean);
+  log_weight -= 0.5 * (off * off / total + std::log(total));
+  mean += spread * (off / total);
+  covariance -= spread * spread.transpose() / total;
+}
+
 }  // namespace
 
 OnlineGeoreference::OnlineGeoreference(const OnlineGeoreferenceConfig& config)
-    : config_(config), plane_(config.plane, plane_sd()), height_(config.height, height_sd(config)) {
+    : config_(config),
+      plane_(config.plane, plane_sd()),
+      height_(config.height, height_sd(config)),
+      turn_(config.second_antenna) {
   sum_up_height();
 }
 
-void OnlineGeoreference::add_fix(const GnssFix& fix, const Vector3d& antenna_in_body) {
+void OnlineGeoreference::add_fix(const GnssFix& fix, const Vector3d& antenna_in_body,
+                                 const std::optional<Vector3d>& second_in_body) {
   if (!has_position(fix)) return;
-  waiting_.push_back({fix, antenna_in_body});
+  Vector3d baseline = Vector3d::Zero();
+  if (second_in_body) baseline = *second_in_body - antenna_in_body;
+  waiting_.push_back({fix, antenna_in_body, baseline});
   if (waiting_.size() > kMostWaiting) waiting_.pop_front();
 }
 
@@ -126,13 +143,19 @@ void OnlineGeoreference::take(const WaitingFix& waiting, const Pose& odometry_fr
   const Vector3d antenna = odometry_from_body * waiting.antenna_in_body;
   SatellitePair one;
   one.antenna_in_world = antenna;
+  Eigen::Quaterniond rotation = odometry_from_body.rotation();
   if (at < stamp) {
     if (!last_ || at < last_->stamp || to_seconds(stamp - last_->stamp) > kGapS) return;
     const double u = to_seconds(at - last_->stamp) / to_seconds(stamp - last_->stamp);
     one.antenna_in_world =
         (1.0 - u) * (last_->world_from_body * waiting.antenna_in_body) + u * antenna;
+    rotation = last_->world_from_body.rotation().slerp(u, rotation);
   }
   const GnssFix& fix = waiting.fix;
+  if (std::isfinite(fix.heading_deg)) {
+    one.turn_rad = turn_by_heading(fix, rotation * waiting.baseline_in_body);
+    one.turn_sd_rad = turn_sd_rad(fix, config_.heading_sd_deg);
+  }
   one.has_height = std::isfinite(fix.height_m);
   const GeodeticPlace place{fix.latitude_deg, fix.longitude_deg,
                             one.has_height ? fix.height_m : 0.0};
@@ -187,6 +210,7 @@ void OnlineGeoreference::take_in_plane(const SatellitePair& pair, const Vector2d
   filter_pair.value = pair.fix_in_enu.head<2>();
   plane_.update(filter_pair);
   plane_at_s_ = pair.time_s;
+  turn_.add(pair, config_.drift_deg_per_sqrt_m * kDegree * std::sqrt(way_m));
   sum_up_plane(antenna);
 }
 
@@ -211,19 +235,37 @@ void OnlineGeoreference::take_height(const SatellitePair& pair, const Vector3d& 
   sum_up_height();
 }
 
+// The headings join what the positions tell if these do not contradict them.
 void OnlineGeoreference::sum_up_plane(const Vector2d& antenna) {
+  sum_up_kinds(antenna, false);
+  contradicts_headings_ = false;
+  if (!turn_.known()) return;
+  contradicts_headings_ = contradicts(turn_.turn_rad() - place_.turn_rad, turn_.sd_rad(),
+                                      std::sqrt(place_.covariance(0, 0)), config_.second_antenna);
+  if (!contradicts_headings_) sum_up_kinds(antenna, true);
+}
+
+void OnlineGeoreference::sum_up_kinds(const Vector2d& antenna, bool with_headings) {
   const auto& kinds = plane_.kinds();
   place_.known = true;
   const auto [linear, linear_covariance] = plane_.parameters();
   place_.linear = linear;
   place_.linear_covariance = kCautious * kCautious * linear_covariance;
-  const double first_turn = std::atan2(linear(1), linear(0));
+  const double first_turn = with_headings ? turn_.turn_rad() : std::atan2(linear(1), linear(0));
   std::vector<OnCircle> all;
   double best = -std::numeric_limits<double>::infinity();
   for (const auto& kind : kinds) {
-    all.push_back(
-        on_circle(kind.mean.head<4>(), kind.covariance.topLeftCorner<4, 4>(), first_turn));
-    all.back().log_share += kind.log_weight;
+    Vector4d parameters = kind.mean.template head<4>();
+    Matrix4d covariance = kind.covariance.template topLeftCorner<4, 4>();
+    double log_weight = kind.log_weight;
+    if (with_headings) {
+      const double c = std::cos(first_turn);
+      const double s = std::sin(first_turn);
+      measure({-s, c, 0.0, 0.0}, 0.0, turn_.sd_rad(), parameters, covariance, log_weight);
+      measure({c, s, 0.0, 0.0}, 1.0, kRadiusSd, parameters, covariance, log_weight);
+    }
+    all.push_back(on_circle(parameters, covariance, first_turn));
+    all.back().log_share += log_weight;
     best = std::max(best, all.back().log_share);
   }
   double total = 0.0;
@@ -333,6 +375,8 @@ void OnlineGeoreference::move_world(const Pose& new_world_from_old_world) {
 void OnlineGeoreference::begin_piece() {
   plane_.forget_parameters(plane_sd());
   height_.forget_parameters(height_sd(config_));
+  turn_.forget();
+  contradicts_headings_ = false;
   place_ = {};
   sum_up_height();
   gathered_ = {};
@@ -343,6 +387,8 @@ void OnlineGeoreference::begin_piece() {
 void OnlineGeoreference::begin_anew() {
   plane_ = PlaneFilters(config_.plane, plane_sd());
   height_ = HeightFilters(config_.height, height_sd(config_));
+  turn_.forget();
+  contradicts_headings_ = false;
   origin_.reset();
   plane_at_s_.reset();
   height_at_s_.reset();
@@ -364,6 +410,7 @@ void OnlineGeoreference::save(BinaryWriter& writer) const {
   for (const WaitingFix& waiting : waiting_) {
     put_fix(writer, waiting.fix);
     writer.put_doubles(waiting.antenna_in_body.data(), 3);
+    writer.put_doubles(waiting.baseline_in_body.data(), 3);
   }
   gathered_.save(writer);
   put_pose(writer, odometry_from_world_);
@@ -376,6 +423,7 @@ void OnlineGeoreference::save(BinaryWriter& writer) const {
   writer.put(first_fix_);
   writer.put(pairs_);
   writer.put(outliers_in_a_row_);
+  turn_.save(writer);
   writer.put(place_.known);
   writer.put(place_.height_known);
 }
@@ -392,6 +440,7 @@ void OnlineGeoreference::load(BinaryReader& reader) {
     WaitingFix& waiting = waiting_.emplace_back();
     waiting.fix = get_fix(reader);
     reader.get_doubles(waiting.antenna_in_body.data(), 3);
+    reader.get_doubles(waiting.baseline_in_body.data(), 3);
   }
   gathered_.load(reader);
   odometry_from_world_ = get_pose(reader);
@@ -407,6 +456,7 @@ void OnlineGeoreference::load(BinaryReader& reader) {
   first_fix_ = reader.get<TimeNs>();
   pairs_ = reader.get<std::uint64_t>();
   outliers_in_a_row_ = reader.get<std::uint64_t>();
+  turn_.load(reader);
   // The rest follows from the filters.
   if (reader.get<bool>()) sum_up_plane(at_antenna_);
   place_.height_known = reader.get<bool>();

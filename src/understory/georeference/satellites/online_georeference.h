@@ -9,6 +9,7 @@
 #include "understory/georeference/satellites/fix_covariance.h"
 #include "understory/georeference/satellites/receiver_filters.h"
 #include "understory/georeference/satellites/satellite_pairs.h"
+#include "understory/georeference/satellites/second_antenna.h"
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/util/files/binary_io.h"
@@ -27,6 +28,8 @@ struct OnlineGeoreferenceConfig {
   double drift_m_per_sqrt_m = 0.002;
   ReceiverFilterConfig plane;
   ReceiverFilterConfig height;
+  SecondAntennaConfig second_antenna;
+  double heading_sd_deg = 0.5;  // of a heading whose receiver does not say how good it is
 };
 
 // The body on the globe at one scan, by all that was received until then. What is not known is NaN,
@@ -44,15 +47,18 @@ struct GlobalPose {
 };
 
 // Lays the odometry on the globe while it runs (P4's future work): heading and place in the plane,
-// height and tilt, with the receiver's slow, steady and fast errors (ReceiverFilters). Takes the
-// poses in order of time, and the fixes up to each before it. Memory and work on a scan do not grow
-// with the run. Deterministic; not thread-safe.
+// height and tilt, with the receiver's slow, steady and fast errors (ReceiverFilters). The headings
+// of a second antenna count while the positions do not contradict them. Takes the poses in order of
+// time, and the fixes up to each before it. Memory and work on a scan do not grow with the run.
+// Deterministic; not thread-safe.
 class OnlineGeoreference {
  public:
   explicit OnlineGeoreference(const OnlineGeoreferenceConfig& config);
 
-  // Fixes without a position are passed over. `antenna_in_body`: metres.
-  void add_fix(const GnssFix& fix, const Eigen::Vector3d& antenna_in_body);
+  // Fixes without a position are passed over. `antenna_in_body`: metres. `second_in_body`: the
+  // antenna that headings lead to; without it they do not count.
+  void add_fix(const GnssFix& fix, const Eigen::Vector3d& antenna_in_body,
+               const std::optional<Eigen::Vector3d>& second_in_body = {});
   // The next pose of the odometry, in the frame that it calls its world. Fixes up to its stamp
   // count.
   [[nodiscard]] GlobalPose add_pose(const StampedPose& pose);
@@ -63,6 +69,9 @@ class OnlineGeoreference {
   void begin_piece();
 
   [[nodiscard]] std::uint64_t pairs() const { return pairs_; }
+  // What became of the headings of a second antenna at the last pair.
+  [[nodiscard]] bool has_headings() const { return turn_.known(); }
+  [[nodiscard]] bool contradicts_headings() const { return contradicts_headings_; }
 
   // The whole state, bit for bit. `load` into one with the same configuration.
   void save(BinaryWriter& writer) const;
@@ -72,6 +81,7 @@ class OnlineGeoreference {
   struct WaitingFix {
     GnssFix fix;
     Eigen::Vector3d antenna_in_body;
+    Eigen::Vector3d baseline_in_body;  // to the second one; zero: its place is not known
   };
   // What the filters say together, at the antenna of the last pair.
   struct Place {
@@ -93,6 +103,7 @@ class OnlineGeoreference {
   void take_height(const SatellitePair& pair, const Eigen::Vector3d& antenna, double way_m);
   void begin_anew();
   void sum_up_plane(const Eigen::Vector2d& antenna);
+  void sum_up_kinds(const Eigen::Vector2d& antenna, bool with_headings);
   void sum_up_height();
   [[nodiscard]] Eigen::Vector3d tilt() const;
   [[nodiscard]] Eigen::Vector3d levelled(const Eigen::Vector3d& point) const;
@@ -119,6 +130,8 @@ class OnlineGeoreference {
   TimeNs first_fix_ = 0;
   std::uint64_t pairs_ = 0;
   std::uint64_t outliers_in_a_row_ = 0;
+  TurnFilter turn_;  // by the second antenna
+  bool contradicts_headings_ = false;
   Place place_;
 };
 

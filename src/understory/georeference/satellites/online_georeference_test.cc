@@ -17,6 +17,7 @@ using Eigen::Vector3d;
 constexpr double kDegree = M_PI / 180.0;
 const GeodeticPlace kPlace{62.9, 27.4, 140.0};
 const Vector3d kArm(0.3, -0.2, 1.1);
+const Vector3d kLine(0.4, 0.9, 0.05);  // to the second antenna
 const Pose kEnuFromWorld(Eigen::Quaterniond(Eigen::AngleAxisd(-2.4, Vector3d::UnitZ())),
                          Vector3d(20.0, 5.0, -3.0));
 
@@ -35,6 +36,8 @@ struct Receiver {
   double correlation_s = 60.0;
   double stated_m = 0.05;
   bool heights = true;
+  bool headings = false;   // of a second antenna
+  double wrong_deg = 0.0;  // that they all are off
 };
 
 // A walk with fixes each half second, step by step.
@@ -47,7 +50,7 @@ class Walk {
 
   GlobalPose step() {
     const double time_s = 0.1 * steps_;
-    if (steps_ % 5 == 0) online_.add_fix(fix_at(time_s), kArm);
+    if (steps_ % 5 == 0) online_.add_fix(fix_at(time_s), kArm, Vector3d(kArm + kLine));
     ++steps_;
     return online_.add_pose({stamp(time_s), world_from_first_ * body_at(time_s)});
   }
@@ -102,6 +105,12 @@ class Walk {
     fix.height_m = receiver_.heights ? place.height_m : std::nan("");
     fix.covariance = std::pow(receiver_.stated_m, 2.0) * Eigen::Matrix3d::Identity();
     fix.quality = 1;
+    if (receiver_.headings) {
+      const Vector3d line = kEnuFromWorld.rotation() * (body_at(time_s).rotation() * kLine);
+      fix.heading_deg =
+          std::fmod(std::atan2(line.x(), line.y()) / kDegree + receiver_.wrong_deg + 720.0, 360.0);
+      fix.heading_sd_deg = 0.4;
+    }
     return fix;
   }
 
@@ -239,6 +248,53 @@ TEST(OnlineGeoreference, TheStateIsKeptToTheBit) {
     ASSERT_EQ(one.place.height_m, two.place.height_m) << step;
     ASSERT_EQ(one.place_sd_m, two.place_sd_m) << step;
   }
+}
+
+// The carrier stands for ten seconds: only a second antenna can tell where it looks.
+TEST(OnlineGeoreference, ASecondAntennaTellsTheHeadingOfACarrierThatStands) {
+  Receiver receiver{1.0, 0.3, 30.0, 0.5, true};
+  EXPECT_FALSE(Walk(receiver, 8).until(9.0).heading_known);
+  receiver.headings = true;
+  Walk walk(receiver, 8);
+  const GlobalPose pose = walk.until(9.0);
+  ASSERT_TRUE(pose.heading_known);
+  EXPECT_TRUE(walk.online().has_headings());
+  EXPECT_FALSE(walk.online().contradicts_headings());
+  EXPECT_LT(pose.turn_sd_deg.z(), 1.0);
+  EXPECT_LT(std::abs(walk.error(pose)(5)), 3.0 * pose.turn_sd_deg.z());
+  // And it stays right on the way.
+  EXPECT_LT(std::abs(walk.error(walk.until(60.0))(5)), 1.0);
+}
+
+// Swapped antennas turn the carrier about until the way tells better.
+TEST(OnlineGeoreference, HeadingsThatContradictTheWayAreLeftOut) {
+  Receiver receiver{0.3, 0.1, 30.0, 0.5, true};
+  const GlobalPose without = Walk(receiver, 8).until(80.0);
+  receiver.headings = true;
+  receiver.wrong_deg = 180.0;
+  Walk walk(receiver, 8);
+  const GlobalPose pose = walk.until(80.0);
+  EXPECT_TRUE(walk.online().contradicts_headings());
+  ASSERT_TRUE(pose.heading_known);
+  EXPECT_LT(std::abs(walk.error(pose)(5)), 5.0);
+  EXPECT_EQ(pose.place.latitude_deg, without.place.latitude_deg);
+}
+
+TEST(OnlineGeoreference, GoesOnWithHeadingsWhereItStopped) {
+  Receiver receiver{1.0, 0.3, 30.0, 0.5, true};
+  receiver.headings = true;
+  Walk walk(receiver, 8);
+  (void)walk.until(23.3);
+  BinaryWriter saved;
+  walk.online().save(saved);
+  OnlineGeoreference again{OnlineGeoreferenceConfig()};
+  BinaryReader reader(saved.bytes(), "state");
+  again.load(reader);
+  EXPECT_TRUE(reader.at_end());
+  Walk other = walk;
+  other.go_on_with(again);
+  for (int step = 0; step < 100; ++step)
+    ASSERT_EQ(walk.step().turn_sd_deg.z(), other.step().turn_sd_deg.z()) << step;
 }
 
 }  // namespace

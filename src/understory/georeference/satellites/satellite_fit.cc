@@ -250,8 +250,11 @@ std::string fit_by(SatelliteMethod method, const std::vector<StampedPose>& traje
   if (method == SatelliteMethod::kSplit) {
     fit.enu_from_world = seen.enu_from_world;
     fit.covariance = right_from_spread(seen.spread, seen.enu_from_world, seen.middle);
+    fit.headings = seen.headings;
     return "";
   }
+  if (seen.headings && std::isnan(seen.headings->off_rad))
+    return "this method needs a longer path, whose positions tell the heading: use split";
   if (!seen.height_known) return "this method needs fixes with heights: use split";
   if (method == SatelliteMethod::kFit6) {
     const SixFit six = fit_six(trajectory, smoothed, seen, config);

@@ -66,7 +66,8 @@ struct SatelliteFit {
   std::size_t fixes_in_time = 0;
   // Latitude and longitude of the fixes fit the path better when they are swapped.
   bool swapped = false;
-  std::vector<FittedFix> fixes;  // all of them
+  std::vector<FittedFix> fixes;          // all of them
+  std::optional<UsedHeadings> headings;  // of a second antenna; kSplit alone uses them
 };
 
 // Lays a path on fixes by several methods, a fit each. `smoothed` is for kFit6 only. Not found

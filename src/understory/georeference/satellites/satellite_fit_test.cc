@@ -288,5 +288,106 @@ TEST(SatelliteFit, SpreadsAndCovariancesAreTheSameErrors) {
             1e-6 * (xi * xi.transpose()).norm());
 }
 
+const Vector3d kLine(0.3, 0.8, 0.1);  // to the second antenna, not along x
+
+// Headings with an error that goes on for twenty seconds; `wrong_deg` is added to all.
+void add_headings(const std::vector<StampedPose>& poses, double sd_deg, double wrong_deg,
+                  std::uint64_t seed, std::vector<GnssFix>& fixes) {
+  Random random(seed);
+  double slow = random.normal();
+  const double kept = std::exp(-1.0 / 20.0);
+  for (std::size_t k = 0; k < fixes.size(); ++k) {
+    const Vector3d line =
+        enu_from_world().rotation() * (poses[2 * k].world_from_body.rotation() * kLine);
+    slow = kept * slow + std::sqrt(1.0 - kept * kept) * random.normal();
+    const double heading_deg = std::atan2(line.x(), line.y()) * 180.0 / M_PI;
+    fixes[k].heading_deg = std::fmod(heading_deg + wrong_deg + sd_deg * slow + 720.0, 360.0);
+    fixes[k].heading_sd_deg = sd_deg;
+  }
+}
+
+SatelliteFitConfig with_second_antenna() {
+  SatelliteFitConfig config = usual();
+  config.pairing.second_antenna_in_body = kArm + kLine;
+  return config;
+}
+
+double heading_error_deg(const SatelliteFit& fit) {
+  return std::remainder(yaw_of(fit.enu_from_world) - yaw_of(enu_from_world()), 2.0 * M_PI) * 180.0 /
+         M_PI;
+}
+
+double heading_sd_deg(const SatelliteFit& fit) {
+  return std::sqrt(fit.spread(2, 2)) * 180.0 / M_PI;
+}
+
+std::vector<StampedPose> standing() {
+  std::vector<StampedPose> poses = walk();
+  for (StampedPose& pose : poses)
+    pose.world_from_body = Pose(pose.world_from_body.rotation(), {0.01, 0.02, 0.0});
+  return poses;
+}
+
+// A machine that stands still: positions tell no heading, the second antenna does.
+TEST(SatelliteFit, ACarrierThatStandsIsPlacedByItsSecondAntenna) {
+  const auto poses = standing();
+  double squares = 0.0;
+  constexpr int kDraws = 20;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const auto seed = static_cast<std::uint64_t>(draw + 1);
+    auto fixes = received(poses, {0.8, 60.0, 0.2}, seed);
+    EXPECT_FALSE(
+        fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, with_second_antenna()).found);
+    add_headings(poses, 0.8, 0.0, seed, fixes);
+    const auto fits = fits_to_satellites(
+        poses, fixes, {SatelliteMethod::kSplit, SatelliteMethod::kFit3}, with_second_antenna());
+    ASSERT_TRUE(fits[0].found) << fits[0].reason;
+    EXPECT_FALSE(fits[1].found);  // by positions alone
+    ASSERT_TRUE(fits[0].headings);
+    EXPECT_TRUE(fits[0].headings->used);
+    EXPECT_TRUE(std::isnan(fits[0].headings->off_rad));
+    EXPECT_LT(rms_error_m(fits[0], poses), 3.0);
+    squares += std::pow(heading_error_deg(fits[0]) / heading_sd_deg(fits[0]), 2.0) / kDraws;
+  }
+  EXPECT_LT(squares, 1.5);  // the line itself is right here
+}
+
+TEST(SatelliteFit, ASecondAntennaMakesTheHeadingBetter) {
+  const auto poses = walk();
+  double with = 0.0;
+  double without = 0.0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    auto fixes = received(poses, {6.0, 200.0, 0.5, 2.0, 0.0, 3.0}, seed);
+    without += std::pow(heading_error_deg(fit_to_satellites(poses, fixes, SatelliteMethod::kSplit,
+                                                            with_second_antenna())),
+                        2.0);
+    add_headings(poses, 0.5, 0.0, seed, fixes);
+    const SatelliteFit fit =
+        fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, with_second_antenna());
+    ASSERT_TRUE(fit.headings && fit.headings->used);
+    EXPECT_LT(std::abs(heading_error_deg(fit)), 3.0 * heading_sd_deg(fit));
+    with += std::pow(heading_error_deg(fit), 2.0);
+  }
+  EXPECT_LT(with, 0.1 * without);
+}
+
+// Antennas that are swapped, or a place of one that is wrong by a quarter turn.
+TEST(SatelliteFit, HeadingsThatContradictThePositionsAreLeftOut) {
+  const auto poses = walk();
+  for (const double wrong_deg : {180.0, 90.0, -30.0}) {
+    auto fixes = received(poses, {1.0, 60.0, 0.3}, 3);
+    const SatelliteFit without =
+        fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, with_second_antenna());
+    add_headings(poses, 0.5, wrong_deg, 4, fixes);
+    const SatelliteFit fit =
+        fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, with_second_antenna());
+    ASSERT_TRUE(fit.found && fit.headings);
+    EXPECT_FALSE(fit.headings->used);
+    EXPECT_NEAR(std::abs(fit.headings->off_rad) * 180.0 / M_PI, std::abs(wrong_deg), 3.0);
+    EXPECT_EQ(yaw_of(fit.enu_from_world), yaw_of(without.enu_from_world));
+    EXPECT_EQ(fit.expected_error_m, without.expected_error_m);
+  }
+}
+
 }  // namespace
 }  // namespace understory

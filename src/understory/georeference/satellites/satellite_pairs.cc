@@ -6,13 +6,16 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 #include "understory/georeference/georeference_constants.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
 using namespace georeference_constants::interpolation;
+using namespace georeference_constants::satellite_pairs;
 
 using Eigen::Vector3d;
 
@@ -71,6 +74,11 @@ void GatheredPair::add(const SatellitePair& one) {
   sum_.velocity_in_world += one.velocity_in_world;
   sum_.fix_in_enu += one.fix_in_enu;
   sum_.has_height = (sum_.fixes == 0 || sum_.has_height) && one.has_height;
+  if (std::isfinite(one.turn_rad)) {
+    turns_ += Eigen::Vector2d(std::cos(one.turn_rad), std::sin(one.turn_rad));
+    turn_sds_ += one.turn_sd_rad;
+    ++headings_;
+  }
   sum_.covariance = sum_.fixes == 0 ? one.covariance : sum_.covariance + one.covariance;
   ++sum_.fixes;
 }
@@ -83,6 +91,10 @@ SatellitePair GatheredPair::mean() const {
   pair.velocity_in_world /= n;
   pair.fix_in_enu /= n;
   pair.covariance /= n;
+  if (headings_ > 0) {
+    pair.turn_rad = std::atan2(turns_.y(), turns_.x());
+    pair.turn_sd_rad = turn_sds_ / static_cast<double>(headings_);
+  }
   return pair;
 }
 
@@ -94,6 +106,9 @@ void GatheredPair::save(BinaryWriter& writer) const {
   writer.put(sum_.has_height);
   writer.put_doubles(sum_.covariance.data(), 9);
   writer.put(static_cast<std::uint64_t>(sum_.fixes));
+  writer.put_doubles(turns_.data(), 2);
+  writer.put(turn_sds_);
+  writer.put(headings_);
 }
 
 void GatheredPair::load(BinaryReader& reader) {
@@ -104,6 +119,22 @@ void GatheredPair::load(BinaryReader& reader) {
   sum_.has_height = reader.get<bool>();
   reader.get_doubles(sum_.covariance.data(), 9);
   sum_.fixes = reader.get<std::uint64_t>();
+  reader.get_doubles(turns_.data(), 2);
+  turn_sds_ = reader.get<double>();
+  headings_ = reader.get<std::uint64_t>();
+}
+
+double turn_by_heading(const GnssFix& fix, const Vector3d& baseline_in_world) {
+  const double in_plane = baseline_in_world.head<2>().norm();
+  if (!(in_plane > kUpright * baseline_in_world.norm()))
+    return std::numeric_limits<double>::quiet_NaN();
+  const double heading_from_east = 0.5 * M_PI - fix.heading_deg * kDegree;
+  const double as_it_lies = std::atan2(baseline_in_world.y(), baseline_in_world.x());
+  return std::remainder(heading_from_east - as_it_lies, 2.0 * M_PI);
+}
+
+double turn_sd_rad(const GnssFix& fix, double heading_sd_deg) {
+  return kDegree * (fix.heading_sd_deg > 0.0 ? fix.heading_sd_deg : heading_sd_deg);
 }
 
 std::optional<Vector3d> antenna_place(const std::vector<StampedPose>& trajectory,
@@ -153,6 +184,11 @@ SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
     const auto before = antenna_place(trajectory, arm, stamp - kNsPerSecond / 2);
     const auto after = antenna_place(trajectory, arm, stamp + kNsPerSecond / 2);
     if (before && after) one.velocity_in_world = *after - *before;
+    if (config.second_antenna_in_body && std::isfinite(fix.heading_deg)) {
+      const Vector3d second = *antenna_place(trajectory, *config.second_antenna_in_body, stamp);
+      one.turn_rad = turn_by_heading(fix, second - *place);
+      one.turn_sd_rad = turn_sd_rad(fix, config.heading_sd_deg);
+    }
     one.fix_in_enu = frame.from_place({fix.latitude_deg, fix.longitude_deg, height(fix)});
     one.has_height = std::isfinite(fix.height_m);
     one.covariance = fix_covariance(fix, config.covariance);

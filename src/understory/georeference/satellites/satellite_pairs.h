@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +20,10 @@ namespace understory {
 struct PairingConfig {
   // Where the antenna is in the body frame, metres.
   Eigen::Vector3d antenna_in_body = Eigen::Vector3d::Zero();
+  // And the second one, to which the headings of the fixes lead. Not known: they do not count.
+  std::optional<Eigen::Vector3d> second_antenna_in_body = {};
+  // degrees: of a heading whose receiver does not say how good it is [chosen: a metre apart].
+  double heading_sd_deg = 0.5;
   // Added to the stamps of the fixes: negative where the receiver's are late.
   double time_offset_s = 0.0;
   // Fixes of one interval become one pair. The interval is this long at least, and longer where
@@ -35,6 +41,10 @@ struct SatellitePair {
   Eigen::Vector3d velocity_in_world = Eigen::Vector3d::Zero();  // of the antenna, m/s
   Eigen::Vector3d fix_in_enu = Eigen::Vector3d::Zero();
   bool has_height = false;  // all its fixes have one; else z of the fix is no measurement
+  // By the second antenna: the turn about up from the world to east, north, up, and its standard
+  // deviation, rad. NaN: no fix of the interval has a heading.
+  double turn_rad = std::numeric_limits<double>::quiet_NaN();
+  double turn_sd_rad = std::numeric_limits<double>::quiet_NaN();
   // Mean covariance that the fixes state: errors within an interval are nearly the same.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   std::size_t fixes = 0;
@@ -56,7 +66,17 @@ class GatheredPair {
  private:
   SatellitePair sum_;
   double begin_s_ = 0.0;
+  Eigen::Vector2d turns_ = Eigen::Vector2d::Zero();  // sum of cosines and sines
+  double turn_sds_ = 0.0;                            // sum
+  std::uint64_t headings_ = 0;
 };
+
+// The turn about up that brings the line to the second antenna, as it lies in the world
+// (`baseline_in_world`, any length), to the heading of a fix, rad, -pi to pi. NaN where the fix has
+// none or the line is upright.
+[[nodiscard]] double turn_by_heading(const GnssFix& fix, const Eigen::Vector3d& baseline_in_world);
+// How good a heading is, rad: as the receiver states, else `heading_sd_deg`.
+[[nodiscard]] double turn_sd_rad(const GnssFix& fix, double heading_sd_deg);
 
 // All pairs of a run, in order of time. Frame east, north, up at the first fix.
 struct SatellitePairs {

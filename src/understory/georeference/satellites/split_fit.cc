@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "understory/georeference/georeference_constants.h"
+#include "understory/georeference/satellites/gnss_fit.h"
 #include "understory/util/median.h"
 
 namespace understory {
@@ -102,11 +103,14 @@ VectorXd far_off_m(const VectorXd& off_m, const VectorXd& scale, double median) 
 
 class Splitter {
  public:
-  Splitter(const std::vector<SatellitePair>& pairs, const SplitFitConfig& config)
-      : pairs_(pairs), config_(config) {
+  Splitter(const std::vector<SatellitePair>& pairs, const SplitFitConfig& config,
+           std::optional<TurnByHeadings> headings)
+      : pairs_(pairs), config_(config), headings_(headings) {
     fit_.height_known =
         std::all_of(pairs.begin(), pairs.end(), [](const auto& p) { return p.has_height; });
     level_ = first_motion(pairs, config.robust, fit_.height_known);
+    if (headings_)  // positions of one place may turn it any way
+      level_ = about(middle(), Vector3d(0.0, 0.0, turn_to_headings()), Vector3d::Zero()) * level_;
   }
 
   SplitFit solve() {
@@ -130,6 +134,11 @@ class Splitter {
   }
 
  private:
+  // From the turn of `level_` to that of the headings, rad.
+  [[nodiscard]] double turn_to_headings() const {
+    return std::remainder(headings_->turn_rad - yaw_of(level_), 2.0 * M_PI);
+  }
+
   [[nodiscard]] Vector3d middle() const {
     Vector3d sum = Vector3d::Zero();
     for (const SatellitePair& pair : pairs_)
@@ -190,8 +199,16 @@ class Splitter {
     }
     MatrixXd information = MatrixXd::Zero(clock ? 4 : 3, clock ? 4 : 3);
     if (clock) information(3, 3) = std::pow(config_.time_offset_sd_s, -2.0);
-    const NoisyEstimate found =
+    // What the headings know of the turn: it is about so much, and the rest is about zero.
+    const double known_turn = headings_ ? turn_to_headings() : 0.0;
+    if (headings_) {
+      information(0, 0) = std::pow(headings_->sd_rad, -2.0);
+      for (NoisySeries& axis : series)
+        axis.residual -= known_turn * axis.jacobian.col(0);
+    }
+    NoisyEstimate found =
         estimate_under_noise(fit_.plane_times, series, information, config_.plane, plane_search_);
+    found.mean(0) += known_turn;
     level_ = about(centre, Vector3d(0.0, 0.0, found.mean(0)),
                    Vector3d(found.mean(1), found.mean(2), 0.0)) *
              level_;
@@ -238,6 +255,7 @@ class Splitter {
 
   const std::vector<SatellitePair>& pairs_;
   const SplitFitConfig& config_;
+  std::optional<TurnByHeadings> headings_;
   Pose level_;  // without the tilt and the height that were found
   Vector3d tilt_ = Vector3d::Zero();
   double up_ = 0.0;
@@ -245,6 +263,25 @@ class Splitter {
   NoiseSearch height_search_;
   SplitFit fit_;
 };
+
+// With the headings of a second antenna where the positions do not contradict them.
+SplitFit fit_with_headings(const std::vector<SatellitePair>& pairs, const SplitFitConfig& config,
+                           const TurnByHeadings& turn, bool positions_tell) {
+  UsedHeadings headings;
+  headings.turn = turn;
+  headings.used = true;
+  SplitFit fit;
+  if (positions_tell) {
+    fit = Splitter(pairs, config, std::nullopt).solve();
+    const double sd_rad = std::sqrt(fit.spread(2, 2));
+    headings.off_rad = std::remainder(turn.turn_rad - yaw_of(fit.enu_from_world), 2.0 * M_PI);
+    headings.off_sd_rad = std::hypot(turn.sd_rad, sd_rad);
+    headings.used = !contradicts(headings.off_rad, turn.sd_rad, sd_rad, config.second_antenna);
+  }
+  if (headings.used) fit = Splitter(pairs, config, turn).solve();
+  fit.headings = headings;
+  return fit;
+}
 
 Pose at(const Vector3d& middle) {
   return {Eigen::Quaterniond::Identity(), middle};
@@ -281,6 +318,8 @@ SplitFit fit_split(const std::vector<SatellitePair>& pairs, const SplitFitConfig
     return fit;
   }
   const double extent_m = plane_extent_m(pairs);
+  if (const auto turn = turn_by_headings(pairs, config.second_antenna))
+    return fit_with_headings(pairs, config, *turn, extent_m >= kLeastExtentM);
   if (extent_m < kLeastExtentM) {
     fit.reason = fmt::format(
         "the path spans {:.1f} m while there are fixes: expected {:.0f} m at least, to tell the "
@@ -288,7 +327,7 @@ SplitFit fit_split(const std::vector<SatellitePair>& pairs, const SplitFitConfig
         extent_m, kLeastExtentM);
     return fit;
   }
-  return Splitter(pairs, config).solve();
+  return Splitter(pairs, config, std::nullopt).solve();
 }
 
 Matrix6d right_from_spread(const Matrix6d& spread, const Pose& target_from_source,

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "understory/geometry/pose.h"
 #include "understory/georeference/satellites/receiver_noise.h"
 #include "understory/georeference/satellites/satellite_pairs.h"
+#include "understory/georeference/satellites/second_antenna.h"
 
 namespace understory {
 
@@ -33,12 +36,23 @@ struct SplitFitConfig {
   double most_scale = 10.0;
   // How far the receiver's clock may be off beyond what is known; 0 holds it.
   double time_offset_sd_s = 0.0;
+  SecondAntennaConfig second_antenna;
   // Pairs that lie far off the others get a larger error.
   bool robust = true;
   // Errors in the plane and in height before the fixes are looked at [tuned: the four GNSS presets
   // of docs/method/georeference.md, seeds up to 19].
   ReceiverPriorConfig plane;
   ReceiverPriorConfig height;
+};
+
+// The headings of a second antenna, and what became of them.
+struct UsedHeadings {
+  TurnByHeadings turn;
+  bool used = false;  // false: they contradict the positions
+  // By them minus by the positions alone, rad, and its standard deviation; NaN where the path spans
+  // too little for positions to tell a heading.
+  double off_rad = std::numeric_limits<double>::quiet_NaN();
+  double off_sd_rad = std::numeric_limits<double>::quiet_NaN();
 };
 
 // The motion that lays a run on its fixes and what is known of the receiver's errors.
@@ -57,14 +71,16 @@ struct SplitFit {
   NoisyTimes height_times;
   NoiseBelief plane_noise;
   NoiseBelief height_noise;
-  std::vector<char> far_off;  // of each pair: 1 if it hardly counts
+  std::vector<char> far_off;             // of each pair: 1 if it hardly counts
+  std::optional<UsedHeadings> headings;  // nothing: fewer than three pairs have one
 };
 
-// Heading and place from the positions in the plane alone, height and tilt from the heights and
-// from how level the run's world is. The errors of the fixes are correlated in time, and their size
-// is estimated along (`estimate_under_noise`). `pairs` all have heights or none counts. Not found
-// for fewer than three pairs, or where the path spans less than five metres. Deterministic;
-// thread-safe.
+// Heading and place from the positions in the plane and the headings of a second antenna, height
+// and tilt from the heights and from how level the run's world is. The errors of the fixes are
+// correlated in time, and their size is estimated along (`estimate_under_noise`). Headings that
+// contradict the positions are left out. `pairs` all have heights or none counts. Not found for
+// fewer than three pairs, or where the path spans less than five metres and there are no headings.
+// Deterministic; thread-safe.
 [[nodiscard]] SplitFit fit_split(const std::vector<SatellitePair>& pairs,
                                  const SplitFitConfig& config);
 

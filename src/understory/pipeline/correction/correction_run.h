@@ -29,8 +29,9 @@ struct CorrectionInput {
   std::vector<LoggedCut> head_cuts;
   std::vector<GnssFix> fixes;                      // of the recording; compared with, not used
   std::optional<Eigen::Vector3d> antenna_in_body;  // metres; nothing where unknown
-  std::optional<Trajectory> truth;                 // of a simulated recording
-  RunEvidence evidence;                            // of the reading
+  std::optional<Eigen::Vector3d> second_antenna_in_body;
+  std::optional<Trajectory> truth;  // of a simulated recording
+  RunEvidence evidence;             // of the reading
 };
 
 // What a correction has found beside.

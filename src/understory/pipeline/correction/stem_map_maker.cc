@@ -74,9 +74,9 @@ void StemMapMaker::list_trees() {
 
 PlacedMap StemMapMaker::place_on_globe(const Trajectory& trajectory) {
   const ScopedTimer timer(place_.times, "gnss_fit");
-  PlacedMap map =
-      place_map({place_.results, trajectory, run_.fixes, run_.antenna_in_body, LevelledBy::kStems},
-                place_.georeference, place_.log);
+  PlacedMap map = place_map({place_.results, trajectory, run_.fixes, run_.antenna_in_body,
+                             run_.second_antenna_in_body, LevelledBy::kStems},
+                            place_.georeference, place_.log);
   documents_.summary().quality.merge(map.figures);
   documents_.report().fixes = std::move(map.fixes);
   documents_.report().has_fixes = !run_.fixes.empty();

@@ -35,6 +35,9 @@ std::string yaml_of(GeoreferenceRequest request) {
   std::string dem = request.terrain_model.string();
   std::vector<double> antenna_m;
   if (const auto& at = request.antenna_in_body) antenna_m.assign(at->data(), at->data() + 3);
+  std::vector<double> second_antenna_m;
+  if (const auto& at = request.second_antenna_in_body)
+    second_antenna_m.assign(at->data(), at->data() + 3);
   std::vector<double> start;
   if (request.start) start.assign(request.start->begin(), request.start->end());
   ConfigTable table;
@@ -44,6 +47,7 @@ std::string yaml_of(GeoreferenceRequest request) {
   table.add_enum("method", request.method, methods, "");
   table.add("gnss", request.gnss, "");
   table.add("antenna_m", antenna_m, "m", "");
+  if (request.second_antenna_in_body) table.add("second_antenna_m", second_antenna_m, "m", "");
   std::string points = request.points.string();
   table.add("points", points, "");
   table.add("recording", request.recording, "");
@@ -121,7 +125,10 @@ Placement find_placement(const GeoreferenceRequest& request, const MovableRun& r
 RunPlace place_of(const GeoreferenceRequest& request, const MovableRun& run,
                   const Placement& placement) {
   RunPlace place;
-  if (request.gnss.empty()) place.antenna_in_body = run.antenna_in_body;
+  if (request.gnss.empty()) {
+    place.antenna_in_body = run.antenna_in_body;
+    place.second_antenna_in_body = run.second_antenna_in_body;
+  }
   place.method = placement.method;
   place.on_globe = placement.origin.has_value();
   if (place.on_globe) {

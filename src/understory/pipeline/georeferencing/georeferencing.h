@@ -40,6 +40,7 @@ struct GeoreferenceRequest {
   std::string gnss;  // file with fixes; empty: gnss.csv of the run
   // Of the receiver or of what stood on the points; not given: that of the run's own receiver.
   std::optional<Eigen::Vector3d> antenna_in_body;
+  std::optional<Eigen::Vector3d> second_antenna_in_body;  // needs the first one's
   std::string recording;          // whose IMU smooths the fixes; empty: as run.json names it
   std::filesystem::path points;   // table of control points
   double time_offset_s = 0.0;     // added to the stamps of the fixes

@@ -92,6 +92,7 @@ RunWithPositions use_positions(const MappedPath& run, const SolvedRun& solved,
   }
   PairingConfig pairing;
   pairing.antenna_in_body = run.antenna_in_body.value_or(Eigen::Vector3d::Zero());
+  pairing.second_antenna_in_body = run.second_antenna_in_body;
   SplitFitConfig split;
   split.tilt_sd_deg = tilt_sd_deg(run.levelled_by, straightness(run.trajectory));
   const FusedPath path = fuse_path(solved, fixes_with_position(run.fixes),

@@ -91,6 +91,7 @@ FoundPlacement try_to_place(const MappedPath& run, const std::vector<GnssFix>& f
   movable.trajectory = run.trajectory;
   movable.fixes = fixes;
   movable.antenna_in_body = run.antenna_in_body;
+  movable.second_antenna_in_body = run.second_antenna_in_body;
   try {
     FoundPlacement found{method.place(request, movable, log), ""};
     if (found.placement->method.empty()) found.placement->method = method.name;
@@ -141,6 +142,7 @@ PlacedMap place_map(const MappedPath& run, const FoundPlacement& found,
   map.place.reason = found.reason;
   if (run.fixes.empty()) return map;
   map.place.antenna_in_body = run.antenna_in_body;
+  map.place.second_antenna_in_body = run.second_antenna_in_body;
   if (found.placement) {
     const Placement& placement = *found.placement;
     std::copy_if(placement.figures.begin(), placement.figures.end(),

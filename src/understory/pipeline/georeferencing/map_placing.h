@@ -24,6 +24,7 @@ struct MappedPath {
   const Trajectory& trajectory;   // world frame
   const std::vector<GnssFix>& fixes;
   std::optional<Eigen::Vector3d> antenna_in_body = {};  // metres; nothing where unknown
+  std::optional<Eigen::Vector3d> second_antenna_in_body = {};
   LevelledBy levelled_by = LevelledBy::kNothing;
 };
 

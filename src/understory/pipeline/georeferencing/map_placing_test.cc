@@ -76,7 +76,7 @@ TEST(MapPlacing, TheStatedTiltIsThatOfWhatHoldsItUp) {
   const auto tilt_deg = [&](LevelledBy what) {
     const test::TemporaryFolder folder;
     Log log;
-    const PlacedMap map = place_map({folder.path(), walk.path, walk.fixes, {}, what}, {}, log);
+    const PlacedMap map = place_map({folder.path(), walk.path, walk.fixes, {}, {}, what}, {}, log);
     return std::get<double>(map.figures.at("sd_turn_east_deg"));
   };
   // The walk is straight: the bias of the accelerometer makes a tilt.

@@ -50,6 +50,7 @@ MovableRun read_movable_run(const fs::path& folder) {
     run.enu_from_world = place->enu_from_world;
   }
   run.antenna_in_body = read_antenna(folder);
+  run.second_antenna_in_body = read_second_antenna(folder);
   run.layers = std::make_shared<LayerFrame>(read_layer_frame(folder));
   run.of_cloud = fs::exists(folder / "map.laz") || fs::exists(folder / "dtm.tif");
   const double area_m2 = RunJson(folder).find_number("/quality/area_m2");

@@ -34,6 +34,7 @@ struct MovableRun {
   Pose enu_from_world;
   std::vector<GnssFix> fixes;  // of a run that is being mapped; else in its gnss.csv
   std::optional<Eigen::Vector3d> antenna_in_body;  // of these fixes, metres; not where unknown
+  std::optional<Eigen::Vector3d> second_antenna_in_body;
   // The frame that its layers are in: map.laz, dtm.tif and chm.tif.
   std::shared_ptr<const LayerFrame> layers = std::make_shared<LayerFrame>();
   bool of_cloud = false;  // it has a cloud, so that heights of trees are measured

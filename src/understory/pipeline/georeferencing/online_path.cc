@@ -11,6 +11,7 @@
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/georeference/systems/default_system.h"
 #include "understory/output/global_table.h"
+#include "understory/sensor/second_antenna_place.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -111,7 +112,8 @@ void OnlinePath::take(const GnssFix& fix, const Rig& rig) {
     file_ = std::make_unique<RecordFile>(work_ / kFile);
   }
   georeference_->add_fix(
-      fix, rig.body_from_gnss ? rig.body_from_gnss->translation() : Eigen::Vector3d::Zero());
+      fix, rig.body_from_gnss ? rig.body_from_gnss->translation() : Eigen::Vector3d::Zero(),
+      second_antenna_of(rig));
 }
 
 void OnlinePath::take(const PositionedScan& scan) {
@@ -152,7 +154,10 @@ std::map<std::string, Figure> OnlinePath::write(const std::filesystem::path& res
   });
   writer.commit();
   if (shares.scans == 0) return {};
-  return shares.figures(system ? system->code() : "");
+  std::map<std::string, Figure> figures = shares.figures(system ? system->code() : "");
+  if (georeference_->has_headings())
+    figures["global_second_antenna_used"] = georeference_->contradicts_headings() ? 0.0 : 1.0;
+  return figures;
 }
 
 void OnlinePath::sync() {

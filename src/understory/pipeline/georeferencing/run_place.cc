@@ -37,6 +37,14 @@ std::optional<RunPlace> place_of(const RunJson& json) {
   return place;
 }
 
+std::optional<Eigen::Vector3d> place_on_body(const fs::path& run, const char* key) {
+  const RunJson json(run);
+  if (!json.has(key)) return std::nullopt;
+  const std::vector<double> at = json.get_numbers(key, 3);
+  if (std::isnan(at[0] + at[1] + at[2])) return std::nullopt;
+  return Eigen::Vector3d(at[0], at[1], at[2]);
+}
+
 }  // namespace
 
 void describe(ConfigTable& table, GeoreferenceConfig& config) {
@@ -86,11 +94,11 @@ std::optional<RunPlace> read_run_place(const fs::path& run) {
 }
 
 std::optional<Eigen::Vector3d> read_antenna(const fs::path& run) {
-  const RunJson json(run);
-  if (!json.has("/georeference/antenna_in_body_m")) return std::nullopt;
-  const std::vector<double> at = json.get_numbers("/georeference/antenna_in_body_m", 3);
-  if (std::isnan(at[0] + at[1] + at[2])) return std::nullopt;
-  return Eigen::Vector3d(at[0], at[1], at[2]);
+  return place_on_body(run, "/georeference/antenna_in_body_m");
+}
+
+std::optional<Eigen::Vector3d> read_second_antenna(const fs::path& run) {
+  return place_on_body(run, "/georeference/second_antenna_in_body_m");
 }
 
 LayerFrame read_layer_frame(const fs::path& run) {

@@ -43,6 +43,8 @@ struct ResultFrames {
 [[nodiscard]] std::optional<RunPlace> read_run_place(const std::filesystem::path& run);
 // Where run.json of a folder says that the antenna is in the body frame, metres.
 [[nodiscard]] std::optional<Eigen::Vector3d> read_antenna(const std::filesystem::path& run);
+// The same of the second antenna.
+[[nodiscard]] std::optional<Eigen::Vector3d> read_second_antenna(const std::filesystem::path& run);
 // The frame that the layers of a run folder are in.
 [[nodiscard]] LayerFrame read_layer_frame(const std::filesystem::path& run);
 

@@ -72,6 +72,8 @@ Placement place_by_best(const GeoreferenceRequest& request, const MovableRun& ru
   if (best == nullptr)
     return placement_of(request, run, input, tried.front().fit, tried.front().name, log);
   Placement placement = placement_of(request, run, input, best->fit, best->name, log);
+  const auto& headings = tried.front().fit.headings;
+  if (best != &tried.front() && headings) warn_of_headings(*headings, log);
   for (const TriedMethod& one : tried) {
     if (one.fit.found)
       placement.figures[fmt::format("expected_error_{}_m", one.name)] = one.fit.expected_error_m;

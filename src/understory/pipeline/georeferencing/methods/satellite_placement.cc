@@ -10,6 +10,7 @@
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/pipeline/run_folder/run_json.h"
 #include "understory/pipeline/source.h"
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -55,11 +56,21 @@ void doubt(const GeoreferenceRequest& request, const MovableRun& run, const Sate
         tilt_sd_deg, kMostHeadingSdDeg));
   if (!fit.height_known && request.terrain_model.empty())
     placement.doubt("the fixes have no heights: the height of the run is not that of the earth");
-  if (fit.plane_rms_m > SatelliteFitConfig().most_misfit * extent)
+  // A carrier that stands is placed by headings: its fixes may scatter over more than its path.
+  const bool by_headings = fit.headings && std::isnan(fit.headings->off_rad);
+  const double reach_m = by_headings ? std::max(extent, kStandingReachM) : extent;
+  if (fit.plane_rms_m > SatelliteFitConfig().most_misfit * reach_m)
     placement.doubt(fmt::format(
         "the fixes lie {:.1f} m off the path (root mean square), which spans {:.0f} m: are they "
         "fixes of this run?",
         fit.plane_rms_m, extent));
+}
+
+void tell_headings(const UsedHeadings& headings, Placement& placement) {
+  placement.figures["gnss_second_antenna_used"] = headings.used ? 1.0 : 0.0;
+  placement.figures["gnss_second_antenna_sd_deg"] = headings.turn.sd_rad / kDegree;
+  if (std::isfinite(headings.off_rad))
+    placement.figures["gnss_second_antenna_off_deg"] = headings.off_rad / kDegree;
 }
 
 void tell_figures(const SatelliteFit& fit, Placement& placement) {
@@ -74,6 +85,7 @@ void tell_figures(const SatelliteFit& fit, Placement& placement) {
   placement.figures["gnss_correlation_s"] = fit.correlation_s;
   placement.figures["gnss_independent_fixes"] = fit.independent_fixes;
   placement.figures["gnss_yaw_deg"] = yaw_of(fit.enu_from_world) * 180.0 / M_PI;
+  if (fit.headings) tell_headings(*fit.headings, placement);
   if (fit.height_known) {
     placement.figures["gnss_height_rms_m"] = fit.height_rms_m;
     placement.figures["gnss_height_error_m"] = fit.height_noise_m;
@@ -82,6 +94,24 @@ void tell_figures(const SatelliteFit& fit, Placement& placement) {
     placement.figures["gnss_time_offset_s"] = fit.time_offset_s;
     placement.figures["gnss_time_offset_sd_s"] = fit.time_offset_sd_s;
   }
+}
+
+// Where headings count by it. Warns of headings that do not.
+std::optional<Eigen::Vector3d> second_antenna(const GeoreferenceRequest& request,
+                                              const MovableRun& run,
+                                              const std::vector<GnssFix>& fixes, Log& log) {
+  const bool own = request.gnss.empty() && !request.antenna_in_body;
+  std::optional<Eigen::Vector3d> second = request.second_antenna_in_body;
+  if (!second && own) second = run.second_antenna_in_body;
+  const bool headings = std::any_of(fixes.begin(), fixes.end(), [](const GnssFix& fix) {
+    return std::isfinite(fix.heading_deg);
+  });
+  if (headings && !second)
+    log.warn("gnss.second_antenna",
+             "the headings of the fixes are not used: the places of both antennas are not known. "
+             "Give body_from_gnss and body_from_second_gnss (--extrinsics FILE of map), or "
+             "--antenna-m and --second-antenna-m (georeference)");
+  return second;
 }
 
 }  // namespace
@@ -110,11 +140,21 @@ SatelliteInput read_satellite_input(const GeoreferenceRequest& request, const Mo
   input.file = named.file;
   input.fixes = named.fixes;
   input.config.pairing.antenna_in_body = antenna_of(request, run, log);
+  input.config.pairing.second_antenna_in_body = second_antenna(request, run, input.fixes, log);
   input.config.pairing.time_offset_s = request.time_offset_s;
   input.config.split.time_offset_sd_s = request.time_offset_sd_s;
   input.config.split.robust = input.config.rigid.robust = request.path.robust;
   input.config.split.tilt_sd_deg = tilt_sd_deg(request, run);
   return input;
+}
+
+void warn_of_headings(const UsedHeadings& headings, Log& log) {
+  if (headings.used) return;
+  log.warn("gnss.second_antenna_contradicts",
+           fmt::format("the headings of the second antenna are left out: they differ by {:.1f} "
+                       "degrees from those of the positions, which expect {:.1f} (one standard "
+                       "deviation). Check the places of the antennas, and whether they are swapped",
+                       headings.off_rad / kDegree, headings.off_sd_rad / kDegree));
 }
 
 Placement placement_of(const GeoreferenceRequest& request, const MovableRun& run,
@@ -135,6 +175,7 @@ Placement placement_of(const GeoreferenceRequest& request, const MovableRun& run
   tell_figures(fit, placement);
   tell_placement(run.trajectory, placement);
   doubt(request, run, fit, placement);
+  if (fit.headings) warn_of_headings(*fit.headings, log);
   placement.gnss = rows_of(fit.fixes, "far off the others, or of another time");
   placement.summary = fmt::format(
       "{}: {} fixes at times of the path, {:.2f} m off it in the plane (root mean square); they "

@@ -29,9 +29,14 @@ struct SatelliteInput {
                                          Log& log);
 
 // Reads the fixes and settles the settings of the fits: a run that was mapped with an IMU is level.
-// Warns of a lever arm that is no lever arm. Throws InputError.
+// Warns of a lever arm that is no lever arm, and of headings without the antennas' places. Throws
+// InputError.
 [[nodiscard]] SatelliteInput read_satellite_input(const GeoreferenceRequest& request,
                                                   const MovableRun& run, Log& log);
+
+// Warns of headings of a second antenna that contradict the positions: a wrong place of an antenna,
+// or antennas that are swapped, must not turn the map in silence.
+void warn_of_headings(const UsedHeadings& headings, Log& log);
 
 // A fit as the placement of a run, with figures, doubts and the fixes as used. Throws InputError
 // where the fit was not found or the angles of the fixes are swapped.

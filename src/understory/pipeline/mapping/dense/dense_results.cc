@@ -18,6 +18,7 @@
 #include "understory/pipeline/mapping/finished_trajectory.h"
 #include "understory/pipeline/mapping/map_documents.h"
 #include "understory/pipeline/run_folder/run_truth.h"
+#include "understory/sensor/second_antenna_place.h"
 #include "understory/util/median.h"
 
 namespace understory {
@@ -360,6 +361,7 @@ MappedPath mapped_path(const ReadRecording& recording, const DenseFrontEnd& fron
   if (front_end.counts().imu_samples > 0) path.levelled_by = LevelledBy::kGravity;
   if (const auto& antenna = front_end.rig().body_from_gnss)
     path.antenna_in_body = antenna->translation();
+  path.second_antenna_in_body = second_antenna_of(front_end.rig());
   return path;
 }
 

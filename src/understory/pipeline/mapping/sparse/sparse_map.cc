@@ -10,6 +10,7 @@
 #include "understory/pipeline/mapping/sparse/sparse_evidence.h"
 #include "understory/pipeline/mapping/sparse/sparse_front_end.h"
 #include "understory/pipeline/run_folder/run_truth.h"
+#include "understory/sensor/second_antenna_place.h"
 
 namespace understory {
 namespace {
@@ -59,6 +60,7 @@ CorrectionInput correction_input(SparseFrontEnd& front_end, const ReadRecording&
   input.truth = write_truth(recording.request.run_folder, source);
   if (const auto& antenna = source.rig().body_from_gnss)
     input.antenna_in_body = antenna->translation();
+  input.second_antenna_in_body = second_antenna_of(source.rig());
   input.head_cuts = read_head_log(front_end.config().correction.harvester.head_log);
   front_end.hand_over(input.views, input.steps, input.path, input.fixes);
   write_stems(recording.results / "stems.csv.gz", input.views);
