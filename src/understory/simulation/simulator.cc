@@ -197,6 +197,13 @@ class Simulator::Impl : public SimulatedWorld {
     rig.body_from_gnss =
         Pose(Eigen::Quaterniond::Identity(),
              Eigen::Vector3d(site.gnss.mount_m[0], site.gnss.mount_m[1], site.gnss.mount_m[2]));
+    const Eigen::Vector3d line(site.gnss.second_antenna_m[0], site.gnss.second_antenna_m[1],
+                               site.gnss.second_antenna_m[2]);
+    if (!line.isZero()) {
+      rig.body_from_second_gnss =
+          Pose(Eigen::Quaterniond::Identity(), rig.body_from_gnss->translation() + line);
+      rig.second_gnss_extrinsic_source = "simulation";
+    }
     rig.lidar_model = site.lidar.model;
     if (rig.lidar_model.rfind("OS", 0) == 0) rig.lidar_model.insert(2, "-");
     rig.lidar_extrinsic_source = "simulation";

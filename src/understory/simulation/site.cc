@@ -234,6 +234,10 @@ void describe_gnss(ConfigTable& table, GnssConfig& c) {
     table.add("enabled", c.enabled, "whether there is a receiver");
     table.add("rate_hz", c.rate_hz, {0.1, 500.0}, "Hz", "fixes");
     table.add("mount_m", c.mount_m, "m", "antenna in the body frame");
+    table.add("second_antenna_m", c.second_antenna_m, "m",
+              "second antenna from the first one, body frame; 0 0 0 = none");
+    table.add("heading_sd_deg", c.heading_sd_deg, {0.0, 90.0}, "deg",
+              "heading of the line to it, open sky, a metre apart; 5 times under closed canopy");
     table.add("open_sd_m", c.open_sd_m, {0.0, 100.0}, "m", "slow plane error under open sky");
     table.add("canopy_sd_m", c.canopy_sd_m, {0.0, 100.0}, "m", "added under closed canopy");
     table.add("correlation_s", c.correlation_s, {0.1, 1e5}, "s", "of the slow error");
@@ -301,6 +305,7 @@ void check_site(const SiteConfig& site) {
   check_triple("imu.mount_m", site.imu.mount_m, problems);
   check_triple("imu.mount_rpy_deg", site.imu.mount_rpy_deg, problems);
   check_triple("gnss.mount_m", site.gnss.mount_m, problems);
+  check_triple("gnss.second_antenna_m", site.gnss.second_antenna_m, problems);
   check_triple("total_station.prism_m", site.total_station.prism_m, problems);
   if (site.stand.pine_share + site.stand.spruce_share > 1.0 + 1e-9) {
     problems.push_back("stand: pine_share and spruce_share add up to more than 1");

@@ -184,11 +184,15 @@ struct GnssConfig {
   double latency_s = 0.0;        // from the moment of a fix to its place in the stream
   bool enabled = true;
   double rate_hz = 5.0;
-  std::vector<double> mount_m = {0.0, 0.0, 0.15};  // antenna in the body frame
-  double open_sd_m = 0.35;                         // slow error in the plane under open sky
-  double canopy_sd_m = 2.2;                        // added under closed canopy
-  double correlation_s = 45.0;                     // of the slow error
-  double multipath_share = 0.35;                   // fast error (2 s) relative to the slow one
+  std::vector<double> mount_m = {0.0, 0.0, 0.15};          // antenna in the body frame
+  std::vector<double> second_antenna_m = {0.0, 0.0, 0.0};  // from the first one; zero: none
+  // Of the heading of their line, a metre apart, under open sky; five times that under closed
+  // canopy.
+  double heading_sd_deg = 0.2;
+  double open_sd_m = 0.35;        // slow error in the plane under open sky
+  double canopy_sd_m = 2.2;       // added under closed canopy
+  double correlation_s = 45.0;    // of the slow error
+  double multipath_share = 0.35;  // fast error (2 s) relative to the slow one
   double white_sd_m = 0.04;
   double height_factor = 1.9;       // height error over plane error
   double reported_factor = 0.5;     // reported over true standard deviation: overconfident

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <map>
 
+#include "understory/recording/captures/nmea.h"
 #include "understory/util/angles.h"
 #include "understory/util/error.h"
 
@@ -154,6 +155,7 @@ void FieldLogWriter::write_extrinsics(const std::string& path, const Rig& rig) c
   file << "body_frame: " << rig.body_frame << "\nlidar_model: VLP-16\n"
        << line("body_from_lidar", rig.body_from_lidar * turned);
   if (rig.body_from_gnss) file << line("body_from_gnss", *rig.body_from_gnss);
+  if (rig.body_from_second_gnss) file << line("body_from_second_gnss", *rig.body_from_second_gnss);
   file.close();
   if (!file) throw unwritten(path);
 }
@@ -208,6 +210,11 @@ void FieldLogWriter::write_scan(const Scan& scan) {
 
 void FieldLogWriter::write_fix(const GnssFix& fix) {
   nmea_ << gga(fix) << gsa(fix) << rmc(fix);
+  if (std::isfinite(fix.heading_deg)) {
+    GnssFix printed = fix;  // with the time as the other sentences print it
+    printed.stamp -= printed.stamp % 10'000'000;
+    nmea_ << nmea_heading(printed) << "\r\n";
+  }
   std::string payload(198, '\0');
   put(payload, us_of_hour(fix.stamp));
   payload.resize(206, '\0');

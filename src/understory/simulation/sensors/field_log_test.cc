@@ -7,6 +7,7 @@
 
 #include "understory/recording/captures/nmea.h"
 #include "understory/recording/extrinsics.h"
+#include "understory/sensor/second_antenna_place.h"
 #include "understory/simulation/simulator.h"
 #include "understory/util/error.h"
 #include "understory/util/files/folder_test_support.h"
@@ -115,6 +116,42 @@ TEST(FieldLog, OtherScannersAreRefused) {
   const Simulator simulator(load_site("demo", {"duration_s=1"}));
   const test::TemporaryFolder folder;
   EXPECT_THROW(FieldLogWriter(folder / "x.pcap", simulator.site(), simulator.rig()), ConfigError);
+}
+
+TEST(FieldLog, KeepsTheHeadingOfASecondAntenna) {
+  const test::TemporaryFolder folder;
+  const std::string pcap = folder / "two.pcap";
+  std::vector<GnssFix> fixes;
+  {
+    Simulator simulator(
+        load_site("lieksa1", {"duration_s=2", "gnss.second_antenna_m=[0.5,0.5,0]"}));
+    FieldLogWriter writer(pcap, simulator.site(), simulator.rig());
+    while (const std::optional<Event> event = simulator.next()) {
+      if (const auto* fix = std::get_if<GnssFix>(&*event)) {
+        writer.write(*event);
+        fixes.push_back(*fix);
+      }
+    }
+    writer.finish();
+  }
+  std::ifstream ahead(folder / "two.nmea", std::ios::binary);
+  std::ifstream stream(folder / "two.nmea", std::ios::binary);
+  Log log;
+  NmeaLogReader reader(stream, "two.nmea", first_nmea_day(ahead, "two.nmea"), log);
+  ASSERT_GT(fixes.size(), 1U);
+  for (const GnssFix& fix : fixes) {
+    const auto read = reader.next();
+    ASSERT_TRUE(read);
+    EXPECT_NEAR(read->heading_deg, fix.heading_deg, 1e-4);
+    EXPECT_NEAR(read->heading_sd_deg, fix.heading_sd_deg, 1e-4);
+  }
+  Rig rig;
+  apply_extrinsics_file(folder / "two.extrinsics.yaml", {}, rig, log);
+  ASSERT_TRUE(second_antenna_of(rig));
+  EXPECT_LT(
+      (*second_antenna_of(rig) - rig.body_from_gnss->translation() - Eigen::Vector3d(0.5, 0.5, 0.0))
+          .norm(),
+      1e-5);
 }
 
 }  // namespace

@@ -13,7 +13,9 @@ namespace {
 constexpr double kSemiMajor = 6378137.0;
 constexpr double kFlattening = 1.0 / 298.257223563;
 constexpr double kEccentricity2 = kFlattening * (2.0 - kFlattening);
-constexpr double kFastSeconds = 2.0;  // correlation of the fast error
+constexpr double kFastSeconds = 2.0;      // correlation of the fast error
+constexpr double kHeadingSeconds = 20.0;  // of the slow error of a heading
+constexpr double kLeastShare = 0.5;       // of a line in the plane: a steeper one has no heading
 
 Eigen::Vector3d ecef(double latitude, double longitude, double height) {
   const double s = std::sin(latitude);
@@ -142,6 +144,7 @@ std::optional<GnssFix> SatelliteReceiver::next() {
   walk(dt);
   const bool lost = in_outage(dt, noise);
   jump(dt);
+  walk_heading(dt);
   const Eigen::Vector3d runaway = burst(dt) + jump_;
   ++count_;
 
@@ -172,7 +175,31 @@ std::optional<GnssFix> SatelliteReceiver::next() {
   fix.track_deg = std::atan2(velocity.x(), velocity.y()) / kDegree;
   if (fix.track_deg < 0.0) fix.track_deg += 360.0;
   fix.speed_m_s = velocity.head<2>().norm();
+  tell_heading(state.world_from_body, fix);
   return fix;
+}
+
+// Half of the variance is slow, half of it changes from fix to fix. The errors go on in an outage.
+void SatelliteReceiver::walk_heading(double dt_s) {
+  CounterNoise noise(seed_ + 5, static_cast<std::uint64_t>(count_), 0);
+  const double kept = std::exp(-dt_s / kHeadingSeconds);
+  heading_slow_ = count_ == 0
+                      ? noise.normal()
+                      : kept * heading_slow_ + std::sqrt(1.0 - kept * kept) * noise.normal();
+  heading_error_ = std::sqrt(0.5) * (heading_slow_ + noise.normal());
+}
+
+// Nothing where there is no second antenna, or where it stands above the first one.
+void SatelliteReceiver::tell_heading(const Pose& world_from_body, GnssFix& fix) const {
+  const Eigen::Vector3d baseline(config_.second_antenna_m[0], config_.second_antenna_m[1],
+                                 config_.second_antenna_m[2]);
+  const Eigen::Vector3d along = world_from_body.rotation() * baseline;
+  const double length_m = along.head<2>().norm();
+  if (length_m < kLeastShare * baseline.norm() || length_m == 0.0) return;
+  fix.heading_sd_deg = config_.heading_sd_deg * (1.0 + 4.0 * cover_ * cover_) / length_m;
+  const double heading_deg = std::atan2(along.x(), along.y()) / kDegree;
+  fix.heading_deg =
+      std::fmod(std::fmod(heading_deg + fix.heading_sd_deg * heading_error_, 360.0) + 360.0, 360.0);
 }
 
 }  // namespace understory

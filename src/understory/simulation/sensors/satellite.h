@@ -18,8 +18,8 @@ namespace understory {
 
 // The GNSS receiver under trees: slow and fast errors correlated in time, both growing with the
 // share of the sky that the stand hides, height worse than plane, outages, bursts, jumps, and a
-// covariance that promises too much; where asked, it holds its position while it stands. Fixes come
-// one after another.
+// covariance that promises too much; where asked, it holds its position while it stands, and tells
+// the heading of a second antenna. Fixes come one after another.
 class SatelliteReceiver {
  public:
   // `path` and `scene` must outlive the receiver.
@@ -40,6 +40,8 @@ class SatelliteReceiver {
   [[nodiscard]] Eigen::Vector3d burst(double dt_s);
   void jump(double dt_s);
 
+  void walk_heading(double dt_s);
+  void tell_heading(const Pose& world_from_body, GnssFix& fix) const;
   [[nodiscard]] Eigen::Vector3d hold(const Eigen::Vector3d& solution, double speed_m_s);
 
   GnssConfig config_;
@@ -59,6 +61,8 @@ class SatelliteReceiver {
   double burst_s_ = 1.0;
   double burst_left_s_ = 0.0;
   Eigen::Vector3d burst_peak_ = Eigen::Vector3d::Zero();
+  double heading_slow_ = 0.0;            // unit variance
+  double heading_error_ = 0.0;           // unit variance
   std::optional<Eigen::Vector3d> held_;  // east-north-up, while the carrier stands
   std::int64_t count_ = 0;
 };

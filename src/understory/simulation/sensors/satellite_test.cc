@@ -96,5 +96,73 @@ TEST(GnssRealism, CovarianceIsHonestOrOverconfidentAsAsked) {
   }
 }
 
+// The receiver's headings against the line between the antennas as the carrier really holds it.
+std::vector<double> heading_errors_deg(const SiteConfig& site, double trees_per_ha,
+                                       std::vector<GnssFix>* fixes = nullptr) {
+  SiteConfig config = site;
+  config.stand.trees_per_ha = trees_per_ha;
+  const Route route(config.carrier, 1);
+  const Terrain terrain(config.terrain, 42.0, 42.0, 1, &route);
+  const Stand stand = grow_stand(config.stand, config.carrier, terrain, route, 1);
+  const ForestScene scene(config.stand, terrain, stand, 1);
+  const CarrierPlan plan = plan_carrier(config, route, terrain, {});
+  SatelliteReceiver receiver(config, plan.path, scene, 0);
+  const auto& along = config.gnss.second_antenna_m;
+  std::vector<double> errors;
+  for (int i = 0; i < static_cast<int>(600.0 * config.gnss.rate_hz); ++i) {
+    const auto fix = receiver.next();
+    if (!fix) continue;
+    if (fixes != nullptr) fixes->push_back(*fix);
+    if (std::isnan(fix->heading_deg)) continue;
+    EXPECT_GE(fix->heading_deg, 0.0);
+    EXPECT_LT(fix->heading_deg, 360.0);
+    const Eigen::Vector3d line =
+        plan.path.state(to_seconds(fix->stamp)).world_from_body.rotation() *
+        Eigen::Vector3d(along[0], along[1], along[2]);
+    const double truth = std::atan2(line.x(), line.y()) * 180.0 / M_PI;
+    errors.push_back(std::remainder(fix->heading_deg - truth, 360.0) / fix->heading_sd_deg);
+  }
+  return errors;
+}
+
+double mean_square(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values)
+    sum += value * value / static_cast<double>(values.size());
+  return sum;
+}
+
+TEST(GnssRealism, ASecondAntennaErrsAsItSaysAndMoreUnderTrees) {
+  SiteConfig site = quiet_receiver();
+  site.gnss.second_antenna_m = {0.3, -0.4, 0.05};
+  std::vector<GnssFix> open;
+  std::vector<GnssFix> under;
+  const auto free_sky = heading_errors_deg(site, 0.0, &open);
+  ASSERT_GT(free_sky.size(), 500U);
+  EXPECT_NEAR(mean_square(free_sky), 1.0, 0.5);
+  EXPECT_NEAR(mean_square(heading_errors_deg(site, 1500.0, &under)), 1.0, 0.5);
+  EXPECT_NEAR(open.back().heading_sd_deg, 0.4, 0.02);  // half a metre apart
+  const auto worst = std::max_element(
+      under.begin(), under.end(),
+      [](const GnssFix& a, const GnssFix& b) { return a.heading_sd_deg < b.heading_sd_deg; });
+  EXPECT_GT(worst->heading_sd_deg, 2.0 * open.back().heading_sd_deg);
+}
+
+TEST(GnssRealism, ASecondAntennaChangesNothingElseAndAnUprightOneTellsNothing) {
+  SiteConfig site = quiet_receiver();
+  std::vector<GnssFix> without;
+  std::vector<GnssFix> with;
+  EXPECT_TRUE(heading_errors_deg(site, 1500.0, &without).empty());
+  site.gnss.second_antenna_m = {0.0, 0.0, 1.0};
+  EXPECT_TRUE(heading_errors_deg(site, 1500.0).empty());
+  site.gnss.second_antenna_m = {1.0, 0.0, 0.0};
+  (void)heading_errors_deg(site, 1500.0, &with);
+  ASSERT_EQ(with.size(), without.size());
+  for (std::size_t k = 0; k < with.size(); ++k) {
+    ASSERT_EQ(with[k].latitude_deg, without[k].latitude_deg);
+    ASSERT_EQ(with[k].track_deg, without[k].track_deg);
+  }
+}
+
 }  // namespace
 }  // namespace understory
