@@ -15,9 +15,13 @@
 namespace understory {
 namespace {
 
-constexpr char kMark[] = "UNDERSTORY CHECKPOINT 6\n";
-constexpr std::size_t kMarkBytes = sizeof(kMark) - 1;
-constexpr std::uintmax_t kMostBytes = std::uintmax_t{1} << 32U;
+const std::string& mark() {
+  static const std::string text =
+      "UNDERSTORY CHECKPOINT " + std::to_string(kCheckpointFormat) + "\n";
+  return text;
+}
+
+constexpr std::uintmax_t kMostCheckpointBytes = std::uintmax_t{1} << 32U;
 
 // Before the content.
 struct Head {
@@ -42,18 +46,18 @@ void write_checkpoint(const std::filesystem::path& work, std::uint64_t number,
   // The files that it counts on are found again only with the folder that holds them.
   sync_folder(work);
   AtomicFile file(path);
-  file.write({kMark, kMarkBytes});
+  file.write(mark());
   file.write({reinterpret_cast<const char*>(&head), sizeof(head)});
   file.write(bytes);
   file.commit();
 }
 
 Checkpoint parse_checkpoint(const std::filesystem::path& file, std::string bytes) {
-  if (bytes.size() < kMarkBytes + sizeof(Head) || bytes.compare(0, kMarkBytes, kMark) != 0)
+  if (bytes.size() < mark().size() + sizeof(Head) || !bytes.starts_with(mark()))
     throw InputError(file.string(), "", "expected a checkpoint of this program version");
   Head head;
-  std::memcpy(&head, bytes.data() + kMarkBytes, sizeof(head));
-  bytes.erase(0, kMarkBytes + sizeof(Head));
+  std::memcpy(&head, bytes.data() + mark().size(), sizeof(head));
+  bytes.erase(0, mark().size() + sizeof(Head));
   if (head.checksum != checksum(head.number, bytes_of(bytes)))
     throw InputError(file.string(), "", "the checkpoint is damaged (checksum)");
   return {file, head.number, std::move(bytes)};
@@ -70,7 +74,8 @@ std::vector<Checkpoint> read_checkpoints(const std::filesystem::path& work,
     if (error) continue;
     any = true;
     try {
-      if (size > kMostBytes) throw InputError(path.string(), "", "is too large for a checkpoint");
+      if (size > kMostCheckpointBytes)
+        throw InputError(path.string(), "", "is too large for a checkpoint");
       std::string bytes(size, '\0');
       std::ifstream file(path, std::ios::binary);
       if (!file.read(bytes.data(), static_cast<std::streamsize>(size)))

@@ -1,0 +1,48 @@
+#include <gtest/gtest.h>
+
+#include <cstddef>
+
+#include "understory/georeference/satellites/online_georeference.h"
+#include "understory/odometry/imu/imu_watch.h"
+#include "understory/pipeline/judgement/imu_usage.h"
+#include "understory/pipeline/mapping/sensor_traits.h"
+#include "understory/pipeline/run_folder/checkpoint.h"
+#include "understory/preprocess/event_orderer.h"
+#include "understory/recording/messages/event_bytes.h"
+#include "understory/recording/messages/fix_joiner.h"
+#include "understory/recording/messages/topic_statistics.h"
+#include "understory/sensor/sensor_io.h"
+
+namespace understory {
+namespace {
+
+template <typename Put>
+std::size_t size_of(const Put& put) {
+  BinaryWriter writer;
+  put(writer);
+  return writer.bytes().size();
+}
+
+// A regression: what the parts of a checkpoint keep had grown, and its number had not. A run that
+// was begun before would have been read as another one. Where this fails, kCheckpointFormat grows
+// by one, and the sizes here become the new ones.
+TEST(CheckpointFormat, GrowsWithWhatIsKept) {
+  EXPECT_EQ(kCheckpointFormat, 7);
+  Log log;
+  const auto saved = [](const auto& part) {
+    return size_of([&](BinaryWriter& writer) { part.save(writer); });
+  };
+  EXPECT_EQ(saved(EventOrderer(EventOrderer::Config(), log)), 1142U);
+  EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 597U);
+  EXPECT_EQ(saved(ImuUsage()), 25U);
+  EXPECT_EQ(saved(OnlineGeoreference(OnlineGeoreferenceConfig())), 221632U);
+  EXPECT_EQ(saved(TopicStatistics()), 136U);
+  EXPECT_EQ(saved(FixJoiner()), 15U);
+  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_traits(writer, {}); }), 54U);
+  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_rig(writer, {}); }), 140U);
+  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_fix(writer, {}); }), 160U);
+  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_imu(writer, {}); }), 57U);
+}
+
+}  // namespace
+}  // namespace understory
