@@ -11,6 +11,7 @@
 #include "understory/recording/messages/arrival_times.h"
 #include "understory/recording/messages/event_bytes.h"
 #include "understory/recording/messages/fix_joiner.h"
+#include "understory/recording/messages/imu_unit.h"
 #include "understory/recording/messages/message_decode.h"
 #include "understory/recording/messages/message_survey.h"
 #include "understory/recording/messages/packet_topic.h"
@@ -21,7 +22,7 @@
 namespace understory {
 namespace {
 
-constexpr double kGravity = 9.80665;
+constexpr std::size_t kSamplesToJudge = 20;  // of an IMU, by which its unit is told
 constexpr double kSamePlaceM = 0.001;
 constexpr double kSameAngle = 0.001;
 
@@ -80,16 +81,15 @@ class MessageRecording : public Recording, public ArrivalTimes {
     source_->save(writer);
     survey_.transforms.save(writer);
     put_strings(writer, frame_of_topic_);
-    for (const std::string& text :
-         {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality, frames_.lidar, frames_.imu,
-          frames_.gnss, frames_.second_gnss, imu_text_})
+    for (const std::string& text : {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality,
+                                    frames_.lidar, frames_.imu, frames_.gnss, frames_.second_gnss})
       writer.put(text);
     put_rig(writer, rig_);
     writer.put(scan_given_);
     writer.put(convention_.has_value());
     if (convention_) put_convention(writer, *convention_);
     writer.put(ring_count_);
-    writer.put(imu_scale_);
+    imu_unit_.save(writer);
     writer.put(static_cast<std::uint64_t>(topics_.size()));
     for (const auto& [name, statistics] : topics_)
       statistics.save(writer);
@@ -105,16 +105,15 @@ class MessageRecording : public Recording, public ArrivalTimes {
     source_->load(reader);
     survey_.transforms.load(reader);
     frame_of_topic_ = get_strings(reader);
-    for (std::string* text :
-         {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality, &frames_.lidar,
-          &frames_.imu, &frames_.gnss, &frames_.second_gnss, &imu_text_})
+    for (std::string* text : {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality,
+                              &frames_.lidar, &frames_.imu, &frames_.gnss, &frames_.second_gnss})
       *text = reader.get_string();
     rig_ = get_rig(reader);
     scan_given_ = reader.get<bool>();
     convention_.reset();
     if (reader.get<bool>()) convention_ = get_convention(reader);
     ring_count_ = reader.get<int>();
-    imu_scale_ = reader.get<double>();
+    imu_unit_.load(reader);
     topics_.clear();
     for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
       TopicStatistics statistics;
@@ -229,31 +228,17 @@ class MessageRecording : public Recording, public ArrivalTimes {
               file_ + ": " + choice_.lidar + ": " + convention_->warning);
   }
 
-  // Sensors that give multiples of gravity instead of m/s^2 are told by the mean over two seconds,
-  // which no carrier keeps at a tenth of gravity.
   void judge_imu() {
     const TopicSurvey* imu = survey_.find(choice_.imu);
     if (imu == nullptr || imu->late) {
-      imu_text_.clear();
-      return;
+      imu_unit_.forget();
+    } else if (imu->delays.size() >= kSamplesToJudge) {
+      judge_imu_by(imu->specific_force_sum / static_cast<double>(imu->delays.size()));
     }
-    if (imu->delays.size() < 20) return;
-    const double mean = imu->specific_force_sum / static_cast<double>(imu->delays.size());
-    imu_text_ = "m/s^2, rad/s";
-    if (mean < 0.5 || mean > 2.0) return;
-    take_imu_in_g();
   }
 
-  // One that begins later is judged by its first sample.
-  void judge_late_imu(const ImuSample& first) {
-    const double force = first.specific_force.norm();
-    imu_text_ = "m/s^2, rad/s";
-    if (force > 0.5 && force < 2.0) take_imu_in_g();
-  }
-
-  void take_imu_in_g() {
-    imu_scale_ = kGravity;
-    imu_text_ = "accelerations in g, converted to m/s^2; rad/s";
+  void judge_imu_by(double mean_specific_force) {
+    if (!imu_unit_.judge(mean_specific_force)) return;
     log_.warn("imu.in_g", file_ + ": " + choice_.imu +
                               ": the accelerations are in g; converted to m/s^2 (x 9.80665)");
   }
@@ -416,9 +401,10 @@ class MessageRecording : public Recording, public ArrivalTimes {
     if (is_of_another(topic, imu->header.frame, "samples")) return true;
     topic.add_stamp(imu->sample.stamp);
     topic.report().frame = imu->header.frame;
-    if (imu_text_.empty()) judge_late_imu(imu->sample);
+    if (!imu_unit_.known()) judge_imu_by(imu->sample.specific_force.norm());
     note_frame(frames_.imu, imu->header.frame);
-    topic.report().conventions = imu_text_ + (imu->sample.orientation ? "; with orientation" : "");
+    topic.report().conventions =
+        imu_unit_.text() + (imu->sample.orientation ? "; with orientation" : "");
     if (!imu->sample.specific_force.allFinite() || !imu->sample.angular_rate.allFinite()) {
       ++topic.report().not_numbers;
       log_.warn("imu.not_finite", file_ + ": " + topic.report().name + ": a sample at " +
@@ -426,7 +412,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
                                       " is not finite; dropped");
       return true;
     }
-    imu->sample.specific_force *= imu_scale_;
+    imu_unit_.convert(imu->sample);
     events_.emplace_back(imu->sample);
     return true;
   }
@@ -507,8 +493,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
   bool extrinsics_told_ = false;  // what the file leaves open has been warned of
   std::optional<TimeConvention> convention_;
   int ring_count_ = 0;
-  double imu_scale_ = 1.0;
-  std::string imu_text_ = "m/s^2, rad/s (assumed)";
+  ImuUnit imu_unit_;
   std::map<std::string, TopicStatistics> topics_;
   std::deque<Event> events_;
   std::optional<TimeNs> last_log_time_;  // of the message that the waiting events came with

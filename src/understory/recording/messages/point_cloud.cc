@@ -11,7 +11,7 @@
 namespace understory {
 namespace {
 
-constexpr TimeNs kLongestScan = 2 * kNsPerSecond;
+constexpr TimeNs kLongestCloud = 2 * kNsPerSecond;
 constexpr std::uint32_t kMostRings = 1024;
 
 constexpr std::string_view kIntensityNames[] = {"intensity", "i",           "reflectivity",
@@ -271,7 +271,7 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
     }
     if (scan.has_point_times) {
       const TimeNs time = relative_time(raw);
-      if (time < -kLongestScan || time > kLongestScan) {
+      if (time < -kLongestCloud || time > kLongestCloud) {
         ++result.bad_times;
         return;
       }
