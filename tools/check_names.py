@@ -7,6 +7,9 @@ the templates over them are one symbol, of which the linker keeps either.
 A number of a table (x_constants.h) and a constant of another file of the layer: where eight files are
 compiled together, the constant hides the number, if it comes first. Files that are APART are exempt.
 
+Two types or constants of one name in unnamed namespaces of a layer: whether their files are compiled
+together, and do not compile then, depends on how many files the layer has. APART files are exempt.
+
     check_names.py [SOURCE_TREE]     exit 0: in order; 1: prints each pair; 2: no such tree
 """
 
@@ -25,17 +28,46 @@ APART = re.compile(r"^ +APART\s+((?:[\w/.]+\.cc\s+)+)", re.MULTILINE)
 CONSTANT = re.compile(r"^(?:static )?constexpr [^=;{(]*?\b(k\w+)\s*(?:\[[^\]]*\])?\s*[={]", re.MULTILINE)
 
 
-def hidden_numbers(layer):
-    """One line for each number of a table that a constant of another file of the layer may hide."""
+def united(layer):
+    """The text of each file of the layer that may be compiled together with others."""
     lists = layer / "CMakeLists.txt"
     apart = APART.search(lists.read_text(encoding="utf-8")) if lists.is_file() else None
     alone = {layer / name for name in apart.group(1).split()} if apart else set()
+    return {path: path.read_text(encoding="utf-8") for path in sorted(layer.rglob("*.cc"))
+            if not path.name.endswith("_test.cc") and path not in alone}
+
+
+def unnamed(text):
+    """Types and constants of unnamed namespaces."""
+    spaces = []
+    for line in text.splitlines():
+        opened = OPENED.match(line)
+        if opened:
+            spaces.append(opened.group(1))
+        elif CLOSED.match(line) and spaces:
+            spaces.pop()
+        elif None in spaces:
+            found = CONSTANT.match(line) or (not line.rstrip().endswith(";") and TYPE.match(line))
+            if found:
+                yield found.group(1)
+
+
+def clashes(sources):
+    """One line for each name that two files give to something of their own."""
+    first = {}
+    for path, text in sources.items():
+        for name in dict.fromkeys(unnamed(text)):
+            if name in first:
+                yield f"{path.name}: {name} is also a name of {first[name]}: compiled together they clash"
+            first.setdefault(name, path.name)
+
+
+def hidden_numbers(layer, sources):
+    """One line for each number of a table that a constant of another file of the layer may hide."""
     tables = {}
     for path in layer.glob("*_constants.h"):
         for name, body in TABLE.findall(path.read_text(encoding="utf-8")):
             tables[(path.stem, name)] = NUMBER.findall(body)
-    sources = {path: path.read_text(encoding="utf-8") for path in sorted(layer.rglob("*.cc"))
-               if not path.name.endswith("_test.cc") and path not in alone}
     own = {}
     for path, text in sources.items():
         for name in CONSTANT.findall(text):
@@ -73,7 +105,9 @@ def check(tree):
                 yield f"{place}: {name} is also a type of {first[name]}"
             first.setdefault(name, place)
     for layer in sorted(path for path in root.iterdir() if path.is_dir()):
-        yield from hidden_numbers(layer)
+        sources = united(layer)
+        yield from hidden_numbers(layer, sources)
+        yield from clashes(sources)
 
 
 def main():

@@ -71,6 +71,21 @@ class CheckNames(unittest.TestCase):
         self.assertEqual(len(findings({**files, **lists})), 1)
         self.assertEqual(findings({**files, "a/x/two.cc": "", "b/two.cc": other}), [])
 
+    def test_one_name_in_unnamed_namespaces_of_a_layer_is_an_error(self):
+        def own(text):
+            return f"namespace u {{\nnamespace {{\n{text}\n}}  // namespace\n}}  // namespace u\n"
+        for text in ("constexpr double kNear = 1.0;", "class Reader {\n};", "struct Work : Job {\n};"):
+            found = findings({"a/one.cc": own(text), "a/x/two.cc": own(text)})
+            self.assertEqual(len(found), 1, text)
+            self.assertIn("is also a name of one.cc", found[0])
+            self.assertEqual(findings({"a/one.cc": own(text), "b/two.cc": own(text)}), [])
+            self.assertEqual(findings({"a/one.cc": own(text), "a/one_test.cc": own(text)}), [])
+            lists = "understory_layer(a\n  SOURCES\n    one.cc\n  APART\n    x/two.cc\n  DEPENDS util)\n"
+            self.assertEqual(findings({"a/one.cc": own(text), "a/x/two.cc": own(text),
+                                       "a/CMakeLists.txt": lists}), [])
+        local = "int f() {\n  constexpr double kNear = 1.0;\n}"
+        self.assertEqual(findings({"a/one.cc": own(local), "a/two.cc": own(local)}), [])
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -20,7 +20,7 @@
 namespace understory {
 namespace {
 
-struct MapOptions {
+struct EvaluateMapOptions {
   std::string stems;
   std::string trajectory;
   double tolerance_s = 0.01;
@@ -113,7 +113,7 @@ std::string to_text(const Placed& placed, const MapSharpness& map, const MapShar
   return text;
 }
 
-int evaluate_map(const MapOptions& options, CommandContext& context) {
+int evaluate_map(const EvaluateMapOptions& options, CommandContext& context) {
   const Placed placed = place(
       read_stem_views(file_in_folder(options.stems, "stems.csv.gz"), context.log),
       read_trajectory(file_in_folder(options.trajectory, "trajectory.tum")), options.tolerance_s);
@@ -141,7 +141,7 @@ int evaluate_map(const MapOptions& options, CommandContext& context) {
 void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
   auto* command = evaluate.add_subcommand(
       "map", "Sharpness of a map without truth: of a cloud, or of stems placed by any trajectory");
-  const auto options = std::make_shared<MapOptions>();
+  const auto options = std::make_shared<EvaluateMapOptions>();
   command
       ->add_option("RUN", options->stems,
                    "Run folder or cloud (.laz, .las); with TRAJECTORY the stems of the views "

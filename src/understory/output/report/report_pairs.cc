@@ -12,7 +12,7 @@ namespace understory {
 namespace {
 
 constexpr std::uint8_t kRed = 255;
-constexpr int kGreys = 250;
+constexpr int kPairGreys = 250;
 
 // Colour 1 white to colour 250 black, and red.
 PalettePicture grey_picture(int width, int height) {
@@ -20,7 +20,7 @@ PalettePicture grey_picture(int width, int height) {
   picture.width = width;
   picture.height = height;
   picture.palette.resize(256);
-  for (int k = 0; k < kGreys; ++k) {
+  for (int k = 0; k < kPairGreys; ++k) {
     const auto grey = static_cast<std::uint8_t>(252 - k);
     picture.palette[static_cast<std::size_t>(k) + 1] = {grey, grey, grey};
   }
@@ -30,7 +30,8 @@ PalettePicture grey_picture(int width, int height) {
 }
 
 std::uint8_t grey(double share) {
-  return static_cast<std::uint8_t>(1 + std::clamp(static_cast<int>(share * kGreys), 0, kGreys - 1));
+  return static_cast<std::uint8_t>(
+      1 + std::clamp(static_cast<int>(share * kPairGreys), 0, kPairGreys - 1));
 }
 
 std::string image(const PalettePicture& picture, double x, double y, double width, double height) {

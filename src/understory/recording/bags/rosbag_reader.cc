@@ -24,7 +24,7 @@ constexpr std::uint8_t kChunkInfo = 0x06;
 constexpr std::uint8_t kConnection = 0x07;
 
 constexpr std::uint32_t kLongestHeader = 1U << 20;
-constexpr std::size_t kSearchWindow = 1U << 20;
+constexpr std::size_t kBagSearchWindow = 1U << 20;
 constexpr std::string_view kChunkMark = "compression=";
 constexpr std::size_t kMarkReach = 96;  // a chunk's header begins at most that far before its mark
 // Chunks loaded at a time: neighbours may overlap in time by a little.
@@ -355,8 +355,8 @@ class RosbagSource : public MessageSource {
   // The next chunk from `from` on, found by its compression field.
   std::optional<std::uint64_t> find_chunk(std::uint64_t from) {
     std::vector<std::uint8_t> window;
-    for (std::uint64_t at = from; at < file_->size(); at += kSearchWindow) {
-      file_->read(at, kSearchWindow + kChunkMark.size() - 1, window);
+    for (std::uint64_t at = from; at < file_->size(); at += kBagSearchWindow) {
+      file_->read(at, kBagSearchWindow + kChunkMark.size() - 1, window);
       const std::string_view view(reinterpret_cast<const char*>(window.data()), window.size());
       for (std::size_t mark = view.find(kChunkMark); mark != std::string_view::npos;
            mark = view.find(kChunkMark, mark + 1)) {

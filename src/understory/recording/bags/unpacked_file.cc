@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kStep = 1U << 20;
+constexpr std::size_t kUnpackStep = 1U << 20;
 // Recordings shrink to a tenth; what grows by more than this is no recording.
 constexpr std::uint64_t kMostGrowth = 1000;
 constexpr std::uint64_t kAlwaysAllowed = 64ULL << 20;
@@ -87,11 +87,11 @@ void UnpackedFile::unpack(const std::string& packed) {
                                                                           &ZSTD_freeDStream);
   const std::uint64_t most = kAlwaysAllowed + kMostGrowth * file->size();
   std::vector<std::uint8_t> bytes;
-  std::vector<std::uint8_t> piece(kStep);
+  std::vector<std::uint8_t> piece(kUnpackStep);
   std::uint64_t written = 0;
   std::size_t state = 0;
   for (std::uint64_t at = 0; at < file->size(); at += bytes.size()) {
-    file->ByteSource::read(at, kStep, bytes);
+    file->ByteSource::read(at, kUnpackStep, bytes);
     if (bytes.empty()) break;
     ZSTD_inBuffer in{bytes.data(), bytes.size(), 0};
     bool full = false;  // the piece was, so that more may come without more input

@@ -12,9 +12,9 @@
 namespace understory {
 namespace {
 
-constexpr std::uint64_t kMostHeaderLines = 1024;
+constexpr std::uint64_t kMostPlyHeaderLines = 1024;
 constexpr std::size_t kMostProperties = 1024;
-constexpr std::uint64_t kMostPoints = 0xFFFF'FFFF;
+constexpr std::uint64_t kMostPlyPoints = 0xFFFF'FFFF;
 
 struct Property {
   std::string name;
@@ -74,14 +74,14 @@ std::string plain_name(std::string_view name) {
   return std::string(name);
 }
 
-class HeaderReader {
+class PlyHeaderReader {
  public:
-  explicit HeaderReader(ByteSource& file) : file_(file), lines_(file) {}
+  explicit PlyHeaderReader(ByteSource& file) : file_(file), lines_(file) {}
 
   PlyHeader read() {
     std::string_view line;
     while (true) {
-      if (!lines_.next(line) || lines_.number() > kMostHeaderLines)
+      if (!lines_.next(line) || lines_.number() > kMostPlyHeaderLines)
         fail("expected a PLY header that ends with end_header");
       const std::vector<std::string_view> words = split_words(line);
       if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
@@ -106,7 +106,7 @@ class HeaderReader {
         fail("expected the format ascii, binary_little_endian or binary_big_endian");
     } else if (words[0] == "element" && words.size() >= 3) {
       const auto count = to_count(words[2]);
-      if (!count || *count > kMostPoints) fail("expected a number of elements below 2^32");
+      if (!count || *count > kMostPlyPoints) fail("expected a number of elements below 2^32");
       header_.elements.push_back({std::string(words[1]), *count, {}, false});
     } else if (words[0] == "property" && words.size() >= 3) {
       property(words);
@@ -174,7 +174,7 @@ void read_ascii(ByteSource& file, const PlyHeader& header, std::uint64_t skip,
 }  // namespace
 
 CloudTable read_ply(ByteSource& file, Log& log) {
-  const PlyHeader header = HeaderReader(file).read();
+  const PlyHeader header = PlyHeaderReader(file).read();
   const auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
                                    [](const Element& e) { return e.name == "vertex"; });
   if (vertex == header.elements.end() || vertex->has_list || vertex->properties.empty())

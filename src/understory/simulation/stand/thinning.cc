@@ -47,7 +47,7 @@ void move_boom(Shift& shift, double time_s, double reach_m, double lift_m) {
 }
 
 // Where a thinning harvester stands and what it may cut.
-struct Work {
+struct ThinningWork {
   const CarrierConfig& carrier;
   const Route& route;
   const Terrain& terrain;
@@ -64,7 +64,7 @@ struct Reach {
 
 constexpr double kGripHeight = kStumpHeight + 0.6;
 
-std::optional<Reach> reach_to(const Work& work, double at_m, const GrownTree& tree) {
+std::optional<Reach> reach_to(const ThinningWork& work, double at_m, const GrownTree& tree) {
   const Eigen::Vector2d place = work.route.place(at_m);
   const Eigen::Vector3d grip = tree.centre(kGripHeight);
   const double distance = (grip.head<2>() - place).norm();
@@ -86,7 +86,7 @@ std::optional<Reach> reach_to(const Work& work, double at_m, const GrownTree& tr
 }
 
 // A grown tree in reach, drawn among those whose neighbours were left standing.
-const GrownTree* choose_tree(const Work& work, double at_m, Random& random) {
+const GrownTree* choose_tree(const ThinningWork& work, double at_m, Random& random) {
   constexpr double kApart = 2.2;  // a thinning leaves trees between those that it takes
   std::vector<const GrownTree*> candidates;
   for (const GrownTree& tree : work.stand.trees) {
@@ -113,7 +113,7 @@ void work_up(const CarrierConfig& c, Shift& shift, Random& random, double side, 
 
 // One tree: out to it, cut, let it fall, feed it through the head with the cabin turning to and
 // fro, drop it. Where none is in reach the operator looks about and goes on.
-void fell_tree(Work& work, Shift& shift, Random& random, double end_s) {
+void fell_tree(ThinningWork& work, Shift& shift, Random& random, double end_s) {
   const CarrierConfig& c = work.carrier;
   const GrownTree* tree = choose_tree(work, shift.at_m, random);
   if (tree == nullptr) {
@@ -146,7 +146,7 @@ void fell_tree(Work& work, Shift& shift, Random& random, double end_s) {
 }
 
 // Works at one place for about the given time, backing up between trees as it comes.
-void work_here(Work& work, Shift& shift, Random& random, double budget_s) {
+void work_here(ThinningWork& work, Shift& shift, Random& random, double budget_s) {
   const CarrierConfig& c = work.carrier;
   constexpr double kTree = 32.0;
   const double end = shift.time_s + budget_s;
@@ -163,7 +163,7 @@ void work_here(Work& work, Shift& shift, Random& random, double budget_s) {
   swing_to(c, shift, 0.0);
 }
 
-Shift plan_shift(Work& work, Random& random) {
+Shift plan_shift(ThinningWork& work, Random& random) {
   const CarrierConfig& c = work.carrier;
   const double road_m = work.route.length_m();
   const double hop = std::max(2.0, c.turn_interval_s * c.speed_m_s);
@@ -196,7 +196,7 @@ CarrierPlan plan_thinning(const SiteConfig& config, const Route& route, const Te
   const auto road = static_cast<std::uint64_t>(c.strip_road - 1);
   Random random(static_cast<std::uint64_t>(config.seed),
                 stream_of(NoiseStream::kCarrier) + 1000 * road);
-  Work work{c, route, terrain, stand, {}};
+  ThinningWork work{c, route, terrain, stand, {}};
   Shift shift = plan_shift(work, random);
   std::sort(shift.jolts_s.begin(), shift.jolts_s.end());
   const double rock_roll = c.gait_deg * random.uniform(0.6, 1.0);
