@@ -1,23 +1,15 @@
 """A disk that becomes full at any point, in the commands that write a folder from other results: the exit code is 3 and
 the message names the place, nothing is left behind, former results stay as they are, and with room it is done."""
 
-import os
 import resource
 import shutil
 import subprocess
 
-from program import Cases, good_recording, program
+from program import Cases, good_recording, program, snapshot, two_runs
 
 cases = Cases()
 good, messages, truth = good_recording(cases.folder, seconds=10, more=("stand.size_x_m=40", "stand.size_y_m=40"))
-RUN, STEMS = cases.folder / "run", cases.folder / "stems"
-assert program("map", good, "-o", RUN).returncode == 0
-done = program("map", good, "-o", STEMS, "--front-end", "sparse")
-assert done.returncode in (0, 4), done.stderr
-FIXES = cases.folder / "fixes.csv"
-FIXES.write_text("timestamp,latitude_deg,longitude_deg,height_m\n" + "".join(
-    f"{line.split()[0]},{62 + float(line.split()[2]) / 111e3:.9f},{29 + float(line.split()[1]) / 52e3:.9f},100\n"
-    for line in (RUN / "trajectory.tum").read_text().splitlines()[::10]))
+RUN, STEMS, FIXES = two_runs(cases.folder, good)
 COMMANDS = {
     "inventory": ["inventory", RUN / "map.laz"],
     "inventory of a run": ["inventory", RUN],
@@ -26,12 +18,6 @@ COMMANDS = {
     "correct": ["correct", STEMS / "stems.csv.gz"],
 }
 STEPS = 5
-
-
-def snapshot(folder):
-    """All that lies below it; of folders that they are there, since working in one changes its time."""
-    return {path: path.is_dir() or (os.lstat(path).st_ino, os.lstat(path).st_size, os.lstat(path).st_mtime_ns)
-            for path in sorted(folder.rglob("*"))}
 
 
 def refused(words, out, **options):

@@ -44,6 +44,25 @@ def map_recording(recording, folder, *options, **more):
     return Outcome(done.returncode, done.stdout, done.stderr, folder)
 
 
+def snapshot(folder):
+    """All that lies below it; of folders that they are there, since working in one changes its time."""
+    return {path: path.is_dir() or (os.lstat(path).st_ino, os.lstat(path).st_size, os.lstat(path).st_mtime_ns)
+            for path in sorted(folder.rglob("*"))}
+
+
+def two_runs(folder, recording):
+    """The recording mapped by both front ends, and fixes along its path: (run, run by stems, fixes)."""
+    run, stems, fixes = folder / "run", folder / "stems", folder / "fixes.csv"
+    done = program("map", recording, "-o", run)
+    assert done.returncode == 0, done.stderr
+    done = program("map", recording, "-o", stems, "--front-end", "sparse")
+    assert done.returncode in (0, 4), done.stderr
+    fixes.write_text("timestamp,latitude_deg,longitude_deg,height_m\n" + "".join(
+        f"{line.split()[0]},{62 + float(line.split()[2]) / 111e3:.9f},{29 + float(line.split()[1]) / 52e3:.9f},100\n"
+        for line in (run / "trajectory.tum").read_text().splitlines()[::10]))
+    return run, stems, fixes
+
+
 def unfinished_run(folder, checkpoint=b"half"):
     """A run folder as a killed run leaves it, though with a checkpoint of nothing; the checkpoint."""
     work = folder / ".understory"

@@ -1,13 +1,12 @@
 """Ctrl-C and SIGTERM at many moments, in every command that takes long: it ends soon, with exit code 4, leaves
 nothing half written, and former results stay. What `map` had positioned is gone on with."""
 
-import os
 import shutil
 import signal
 import subprocess
 import time
 
-from program import PROGRAM, Cases, good_recording, program
+from program import PROGRAM, Cases, good_recording, program, snapshot, two_runs
 
 cases = Cases()
 FILES = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "map.laz", "trees.csv"]
@@ -15,20 +14,7 @@ STEM_FILES = ["trajectory.tum", "odometry.tum", "stems.csv.gz", "trees.csv"]
 PATIENCE_S = 30  # far more than a stop takes on a busy machine, far less than the work that is left
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 good, messages, truth = good_recording(cases.folder, seconds=20, more=("stand.size_x_m=80", "stand.size_y_m=80"))
-RUN, STEMS = cases.folder / "whole", cases.folder / "stems"
-assert program("map", good, "-o", RUN).returncode == 0
-done = program("map", good, "-o", STEMS, "--front-end", "sparse")
-assert done.returncode in (0, 4), done.stderr
-FIXES = cases.folder / "fixes.csv"
-FIXES.write_text("timestamp,latitude_deg,longitude_deg,height_m\n" + "".join(
-    f"{line.split()[0]},{62 + float(line.split()[2]) / 111e3:.9f},{29 + float(line.split()[1]) / 52e3:.9f},100\n"
-    for line in (RUN / "trajectory.tum").read_text().splitlines()[::10]))
-
-
-def snapshot(folder):
-    """All that lies below it; of folders that they are there, since working in one changes its time."""
-    return {path: path.is_dir() or (os.lstat(path).st_ino, os.lstat(path).st_size, os.lstat(path).st_mtime_ns)
-            for path in sorted(folder.rglob("*"))}
+RUN, STEMS, FIXES = two_runs(cases.folder, good)
 
 
 def stop_at(stage, sent, *words):
