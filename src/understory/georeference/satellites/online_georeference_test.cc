@@ -230,9 +230,8 @@ TEST(OnlineGeoreference, AFirstFixOfAnotherPlaceIsForgotten) {
   EXPECT_LT(walk.error(pose).head<2>().norm(), 0.15);
 }
 
-TEST(OnlineGeoreference, TheStateIsKeptToTheBit) {
-  Walk walk({1.0, 0.3, 30.0, 0.5, true}, 8);
-  (void)walk.until(33.3);
+// The same walk with an estimate that was saved and read again.
+Walk gone_on(Walk& walk) {
   BinaryWriter saved;
   walk.online().save(saved);
   OnlineGeoreference again{OnlineGeoreferenceConfig()};
@@ -241,6 +240,13 @@ TEST(OnlineGeoreference, TheStateIsKeptToTheBit) {
   EXPECT_TRUE(reader.at_end());
   Walk other = walk;
   other.go_on_with(again);
+  return other;
+}
+
+TEST(OnlineGeoreference, TheStateIsKeptToTheBit) {
+  Walk walk({1.0, 0.3, 30.0, 0.5, true}, 8);
+  (void)walk.until(33.3);
+  Walk other = gone_on(walk);
   for (int step = 0; step < 400; ++step) {
     const GlobalPose one = walk.step();
     const GlobalPose two = other.step();
@@ -285,14 +291,7 @@ TEST(OnlineGeoreference, GoesOnWithHeadingsWhereItStopped) {
   receiver.headings = true;
   Walk walk(receiver, 8);
   (void)walk.until(23.3);
-  BinaryWriter saved;
-  walk.online().save(saved);
-  OnlineGeoreference again{OnlineGeoreferenceConfig()};
-  BinaryReader reader(saved.bytes(), "state");
-  again.load(reader);
-  EXPECT_TRUE(reader.at_end());
-  Walk other = walk;
-  other.go_on_with(again);
+  Walk other = gone_on(walk);
   for (int step = 0; step < 100; ++step)
     ASSERT_EQ(walk.step().turn_sd_deg.z(), other.step().turn_sd_deg.z()) << step;
 }

@@ -71,9 +71,9 @@ class GatheredPair {
   std::uint64_t headings_ = 0;
 };
 
-// The turn about up that brings the line to the second antenna, as it lies in the world
-// (`baseline_in_world`, any length), to the heading of a fix, rad, -pi to pi. NaN where the fix has
-// none or the line is upright.
+// The turn about up from the world to east, north, up by the heading of a fix, rad, -pi to pi.
+// `baseline_in_world` leads from the antenna to the second one, any length. NaN where the fix has
+// no heading or the baseline is upright.
 [[nodiscard]] double turn_by_heading(const GnssFix& fix, const Eigen::Vector3d& baseline_in_world);
 // How good a heading is, rad: as the receiver states, else `heading_sd_deg`.
 [[nodiscard]] double turn_sd_rad(const GnssFix& fix, double heading_sd_deg);
