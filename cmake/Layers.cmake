@@ -2,10 +2,12 @@ if(UNDERSTORY_TESTS)
   add_custom_target(layer_tests COMMENT "the test programs of the layers")
 endif()
 
-# understory_layer(<name> SOURCES ... [APART ...] [TESTS ...] [DEPENDS ...] [LIBRARIES ...]
+# understory_layer(<name> [TOGETHER <number>] SOURCES ... [APART ...] [TESTS ...] [DEPENDS ...] [LIBRARIES ...]
 #                  [PRIVATE_LIBRARIES ...] [TEST_LIBRARIES ...])
 # One folder under src/understory is one static library understory_<name> (alias understory::<name>).
 #   SOURCES            explicit .cc files; without any the layer is headers only
+#   TOGETHER           how many files are compiled as one with UNDERSTORY_UNITY: 8. More save what their
+#                      headers cost, but for Eigen's types the compiler's time grows faster than their number
 #   APART              further ones that are compiled by themselves, also with UNDERSTORY_UNITY: names in
 #                      them clash with others', or their loops are to be optimised for themselves
 #   TESTS              x_test.cc beside x.cc; together the GoogleTest program test_<name>
@@ -13,17 +15,20 @@ endif()
 #   LIBRARIES          third-party targets that its headers need (PUBLIC)
 #   PRIVATE_LIBRARIES  third-party targets that only its .cc files need
 function(understory_layer name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" ""
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TOGETHER"
                         "SOURCES;APART;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES;TEST_LIBRARIES")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "understory_layer(${name}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
   endif()
   list(TRANSFORM arg_DEPENDS PREPEND understory::)
+  if(NOT arg_TOGETHER)
+    set(arg_TOGETHER 8)
+  endif()
 
   set(target understory_${name})
   if(arg_SOURCES)
     add_library(${target} STATIC ${arg_APART})
-    understory_unite(${target} ${arg_SOURCES})
+    understory_unite(${target} ${arg_TOGETHER} ${arg_SOURCES})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE understory_own_code ${arg_PRIVATE_LIBRARIES})
     understory_precompile(${target})
@@ -42,12 +47,11 @@ function(understory_layer name)
   endif()
 endfunction()
 
-# understory_unite(<target> <source>...): makes the files parts of the target. With UNDERSTORY_UNITY eight of
-# them are compiled as one, so that the headers which they share are parsed once, and their templates
+# understory_unite(<target> <together> <source>...): makes the files parts of the target. With UNDERSTORY_UNITY
+# so many of them are compiled as one, so that the headers which they share are parsed once, and their templates
 # compiled once: a build from nothing takes half the time. Names in unnamed namespaces must differ within a
 # layer then. CMake's own unity builds write absolute paths, which ccache cannot know again in another clone.
-function(understory_unite target)
-  set(kTogether 8)
+function(understory_unite target together)
   set(batch "")
   set(number 0)
   if(UNDERSTORY_UNITY)
@@ -64,7 +68,7 @@ function(understory_unite target)
     set_source_files_properties("${source}" PROPERTIES HEADER_FILE_ONLY ON)
     target_sources(${target} PRIVATE "${source}")
     list(LENGTH batch length)
-    if(length EQUAL kTogether)
+    if(length EQUAL together)
       understory_write_batch(${target} ${number} "${batch}")
       math(EXPR number "${number} + 1")
       set(batch "")
@@ -138,7 +142,8 @@ function(understory_program target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LAYERS;LIBRARIES")
   list(TRANSFORM arg_LAYERS PREPEND understory::)
   add_executable(${target})
-  understory_unite(${target} ${arg_SOURCES})
+  # All of it at once: the parser of options is compiled anew in each part, which takes longer than the rest.
+  understory_unite(${target} 1000 ${arg_SOURCES})
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}/src")
   target_link_libraries(${target} PRIVATE understory_own_code understory_flags ${arg_LAYERS}
                                           ${arg_LIBRARIES})

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
+#include "understory/geometry/best_rotation.h"
 #include "understory/util/angles.h"
 #include "understory/util/error.h"
 
@@ -47,16 +47,10 @@ Points without(const Points& points, std::size_t from, std::size_t to) {
 
 AlignmentResult fit_se3(const Points& source, const Points& target) {
   const Moments m = moments(source, target);
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m.covariance,
-                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign = Eigen::Vector3d::Ones();  // eq. 43
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) sign.z() = -1.0;
-  const Eigen::Matrix3d rotation =
-      svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();  // eq. 40
+  const auto [rotation, extents] = best_rotation(m.covariance);
   AlignmentResult result;
   result.target_from_source = Pose(rotation, m.target_mean - rotation * m.source_mean);  // eq. 41
-  const Eigen::Vector3d& extent = svd.singularValues();
-  result.determined = extent(0) > 0.0 && extent(1) > kRankTolerance * extent(0);
+  result.determined = extents(0) > 0.0 && extents(1) > kRankTolerance * extents(0);
   return result;
 }
 

@@ -1,6 +1,5 @@
 #include "understory/evaluation/map_entropy.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "understory/geometry/symmetric_eigen.h"
 #include "understory/geometry/voxel_index.h"
 #include "understory/util/parallel.h"
 
@@ -99,9 +99,7 @@ void add_entropy(const Cubes& cubes, std::size_t k, const MapEntropyConfig& conf
   if (!cubes.counts(k)) return;
   Matrix3d covariance;
   if (cubes.covariance_around(k, config.radius_m, covariance) < config.fewest_neighbours) return;
-  Eigen::SelfAdjointEigenSolver<Matrix3d> axes;
-  axes.computeDirect(covariance, Eigen::EigenvaluesOnly);
-  const Vector3d variances = axes.eigenvalues().cwiseMax(0.0);
+  const Vector3d variances = fast_symmetric_eigen(covariance).values.cwiseMax(0.0);
   ++sums.used;
   sums.thickness += variances(0);
   for (int axis = 0; axis < 3; ++axis)

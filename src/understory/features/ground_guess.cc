@@ -1,11 +1,11 @@
 #include "understory/features/ground_guess.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "understory/features/features_constants.h"
+#include "understory/geometry/symmetric_solver.h"
 
 namespace understory {
 namespace {
@@ -123,11 +123,10 @@ GroundGuess::Plane GroundGuess::fit(const Eigen::Vector2d& middle) const {
     constexpr double kSlopeKnown = 1.0 / (kSlopeSd * kSlopeSd);
     Eigen::Matrix3d information;
     information << n, sx, sy, sx, xx + kSlopeKnown, xy, sy, xy, yy + kSlopeKnown;
-    const Eigen::LDLT<Eigen::Matrix3d> solved = information.ldlt();
+    const SymmetricSolver<3> solved(information);
     plane.height_and_slope = solved.solve(Eigen::Vector3d(sz, xz, yz));
     if (round < 3) continue;
-    plane.covariance = std::max(1.0, squares / std::max(weights, 1e-9)) *
-                       solved.solve(Eigen::Matrix3d::Identity());
+    plane.covariance = std::max(1.0, squares / std::max(weights, 1e-9)) * solved.inverse();
   }
   return plane;
 }

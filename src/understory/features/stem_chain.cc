@@ -1,12 +1,12 @@
 #include "understory/features/stem_chain.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "understory/features/features_constants.h"
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/util/median.h"
 
 namespace understory {
@@ -324,7 +324,7 @@ void fit_chain(const SectionView& view, const StemChainConfig& config, StemChain
       information += weight * h.transpose() * inverse * h;
       right += weight * h.transpose() * inverse * centres[k].place;
     }
-    line.state = information.ldlt().solve(right);
+    line.state = SymmetricSolver<4>(information).solve(right);
   }
   chain.misfit = std::sqrt(squares / (2.0 * static_cast<double>(centres.size())));
   line.covariance = information.inverse();

@@ -1,11 +1,12 @@
 #include "understory/features/tree_tops.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <unordered_map>
+
+#include "understory/geometry/symmetric_eigen.h"
 
 namespace understory {
 namespace {
@@ -170,9 +171,7 @@ std::vector<TreeTop> find_tree_tops(std::span<const Eigen::Vector3f> points,
     std::vector<Eigen::Vector3f> near;
     for (const std::size_t k : top.neighbours)
       near.push_back(points[k]);
-    top.smallest_eigenvalue_m2 =
-        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter_matrix(near), Eigen::EigenvaluesOnly)
-            .eigenvalues()[0];
+    top.smallest_eigenvalue_m2 = symmetric_eigenvalues(scatter_matrix(near))[0];
     if (top.smallest_eigenvalue_m2 > config.least_eigenvalue_m2) tops.push_back(std::move(top));
   }
   return tops;

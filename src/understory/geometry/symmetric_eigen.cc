@@ -9,4 +9,15 @@ SymmetricEigen2 symmetric_eigen(const Eigen::Matrix2d& matrix) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
+SymmetricEigen3 fast_symmetric_eigen(const Eigen::Matrix3d& matrix) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(matrix);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& matrix) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly)
+      .eigenvalues();
+}
+
 }  // namespace understory

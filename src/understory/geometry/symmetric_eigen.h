@@ -14,4 +14,16 @@ struct SymmetricEigen2 {
 // triangle is read.
 [[nodiscard]] SymmetricEigen2 symmetric_eigen(const Eigen::Matrix2d& matrix);
 
+struct SymmetricEigen3 {
+  Eigen::Vector3d values;
+  Eigen::Matrix3d vectors;
+};
+
+// Of a symmetric, finite matrix, by its characteristic polynomial: several times as fast as QR
+// steps, with values that are off by some 1e-8 of the largest. For the scatter of points in space.
+[[nodiscard]] SymmetricEigen3 fast_symmetric_eigen(const Eigen::Matrix3d& matrix);
+
+// The eigenvalues alone, ascending, by QR steps: to the last digits.
+[[nodiscard]] Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& matrix);
+
 }  // namespace understory

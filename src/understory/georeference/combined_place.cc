@@ -1,7 +1,6 @@
 #include "understory/georeference/combined_place.h"
 
-#include <Eigen/Cholesky>
-
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/error.h"
 
@@ -59,8 +58,8 @@ CombinedPlace combine_places(const std::vector<PlaceEvidence>& sources) {
       right -= jacobian.transpose() * source.information * away;
       place.disagreement += away.dot(source.information * away);
     }
-    const Eigen::LDLT<Matrix6d> factor(information);
-    place.spread = factor.solve(Matrix6d::Identity());
+    const SymmetricSolver<6> factor(information);
+    place.spread = factor.inverse();
     const Vector6d step = factor.solve(right);
     place.target_from_world = moved(place.target_from_world, place.middle, step);
     if (step.norm() < 1e-10) break;

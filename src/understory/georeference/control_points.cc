@@ -1,11 +1,11 @@
 #include "understory/georeference/control_points.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/georeference/satellites/split_fit.h"
 #include "understory/util/median.h"
@@ -127,7 +127,7 @@ void refine(const std::vector<ControlPoint>& points, const ControlFitConfig& con
     prior(0, 0) = prior(1, 1) = std::pow(fit.sd_m / tilt_sd, 2.0);
     Vector6d pull = Vector6d::Zero();
     pull.head<2>() = -prior(0, 0) * tilt.head<2>();
-    const Eigen::LDLT<Matrix6d> solver(normal.hessian + prior);
+    const SymmetricSolver<6> solver(normal.hessian + prior);
     const Vector6d xi = solver.solve(normal.gradient + pull);
     const Pose to(Eigen::Quaterniond::Identity(), middle);
     fit.target_from_world =
@@ -139,8 +139,7 @@ void refine(const std::vector<ControlPoint>& points, const ControlFitConfig& con
     fit.sd_m = std::sqrt((kPriorCoordinates * config.sd_m * config.sd_m + after.squares) /
                          (kPriorCoordinates + std::max(0, fit.redundant)));
     fit.covariance =
-        right_from_spread(fit.sd_m * fit.sd_m * Matrix6d(solver.solve(Matrix6d::Identity())),
-                          fit.target_from_world, middle);
+        right_from_spread(fit.sd_m * fit.sd_m * solver.inverse(), fit.target_from_world, middle);
   }
 }
 

@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <utility>
 
 #include "understory/geometry/symmetric_eigen.h"
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"
 
@@ -110,8 +110,8 @@ Solution solve(const std::vector<Sample>& samples, double centre, double spread,
     information += weight * gradient * gradient.transpose();
     right -= weight * sample.above_m * gradient;
   }
-  const Eigen::LDLT<Matrix6d> factor(information);
-  return {factor.solve(right), factor.solve(Matrix6d::Identity())};
+  const SymmetricSolver<6> factor(information);
+  return {factor.solve(right), factor.inverse()};
 }
 
 // How many points share a patch of the ground in the mean.

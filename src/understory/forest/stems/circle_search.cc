@@ -1,6 +1,6 @@
 #include "understory/forest/stems/circle_search.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +10,7 @@
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/cell_index.h"
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
@@ -138,7 +139,7 @@ bool refine_among(const PointList& points, const Surroundings& around, double ba
       ++used;
     }
     if (used < 4) break;
-    const Eigen::Vector3d step = -normal.ldlt().solve(gradient);
+    const Eigen::Vector3d step = -SymmetricSolver<3>(normal).solve(gradient);
     if (!step.allFinite() || step.norm() > 0.5) break;
     circle.centre += step.head<2>();
     circle.radius_m += step.z();

@@ -1,6 +1,6 @@
 #include "understory/forest/stems/noisy_cylinder.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -8,6 +8,7 @@
 
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/stem_axis.h"
+#include "understory/geometry/symmetric_solver.h"
 
 namespace understory {
 namespace {
@@ -226,7 +227,7 @@ class Estimator {
     prior(3, 0.0, config_.slope_sd);
     prior(5, config_.usual_taper, config_.taper_sd);
     const Matrix6 normal = sums.normal.selfadjointView<Eigen::Upper>();
-    const Eigen::LDLT<Matrix6> solver(normal);
+    const SymmetricSolver<6> solver(normal);
     const Vector6 found = solver.solve(sums.right);
     if (!found.allFinite() || found[4] < kLeastRadius || found.head<2>().norm() > kFarthest)
       return false;
@@ -234,7 +235,7 @@ class Estimator {
     slope_ = found.segment<2>(2);
     radius_ = found[4];
     taper_ = found[5];
-    result.covariance = s2 * solver.solve(Matrix6::Identity());
+    result.covariance = s2 * solver.inverse();
     scatter_ = std::clamp(std::sqrt(0.5 * sums.square / sums.weight), kLeastScatter, kMostScatter);
     strays_ = std::clamp(1.0 - sums.weight / total_, kLeastStrays, kMostStrays);
     learn_views(seen);

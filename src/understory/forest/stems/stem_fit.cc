@@ -1,6 +1,6 @@
 #include "understory/forest/stems/stem_fit.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -9,6 +9,7 @@
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/util/median.h"
 
 namespace understory {
@@ -264,7 +265,7 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
   for (int iteration = 0; iteration < kMostSteps; ++iteration) {
     system = build_system(some, stem, start, scatter);
     if (system.used < 6) return result;
-    const Vector6 step = -system.normal.ldlt().solve(system.gradient);
+    const Vector6 step = -SymmetricSolver<6>(system.normal).solve(system.gradient);
     if (!step.allFinite() || step.head<2>().norm() > kLongestStep) return result;
     stem.centre += step.head<2>();
     stem.slope += step.segment<2>(2);

@@ -1,8 +1,9 @@
 #include "understory/georeference/satellites/fix_covariance.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "understory/geometry/symmetric_eigen.h"
 
 namespace understory {
 namespace {
@@ -12,8 +13,7 @@ using Eigen::Vector3d;
 
 bool is_covariance(const Matrix3d& c) {
   if (!c.allFinite() || c.diagonal().minCoeff() <= 0.0) return false;
-  return Eigen::SelfAdjointEigenSolver<Matrix3d>(c).eigenvalues().minCoeff() >=
-         -1e-9 * c.diagonal().maxCoeff();
+  return symmetric_eigenvalues(c).minCoeff() >= -1e-9 * c.diagonal().maxCoeff();
 }
 
 }  // namespace

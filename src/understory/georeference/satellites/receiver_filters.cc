@@ -1,6 +1,7 @@
 #include "understory/georeference/satellites/receiver_filters.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -106,9 +107,7 @@ double extra_variance(const ReceiverKind<Parameters, Axes>& kind,
   spread = rows.transpose() * kind.covariance * rows;
   spread.diagonal().array() += seen.white_m * seen.white_m;
   const auto log_density = [&](const Eigen::Matrix<double, Axes, Axes>& covariance) {
-    const Eigen::LLT<Eigen::Matrix<double, Axes, Axes>> root(covariance);
-    return -0.5 * root.matrixL().solve(off).squaredNorm() -
-           root.matrixLLT().diagonal().array().log().sum();
+    return -0.5 * (off.dot(covariance.inverse() * off) + std::log(covariance.determinant()));
   };
   const double extra = off.squaredNorm() / Axes;
   const double regular = log_density(spread) + std::log1p(-outlier_share);

@@ -1,10 +1,10 @@
 #include "understory/georeference/satellites/rigid_fits.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
+#include "understory/geometry/best_rotation.h"
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"
 
@@ -52,14 +52,14 @@ RigidFit iterate(const Problem& problem, std::size_t pairs, const Pose& start,
   for (; fit.steps < config.most_steps; ++fit.steps) {
     if (config.robust) weigh(problem.squared(fit.target_from_source), Problem::kMedian, fit.weight);
     const auto step = problem.step(fit.target_from_source, fit.weight);
-    const Eigen::LDLT<Matrix6d> solver(step.hessian);
-    if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0.0) {
+    const SymmetricSolver<6> solver(step.hessian);
+    if (!solver.is_positive()) {
       fit.reason = "the pairs leave a direction open: expected a path that is not straight";
       return fit;
     }
     const Vector6d xi = -solver.solve(step.gradient);
     fit.target_from_source = fit.target_from_source * Pose::exp(xi);
-    fit.covariance = solver.solve(Matrix6d::Identity());
+    fit.covariance = solver.inverse();
     if (xi.norm() < config.least_step) break;
   }
   fit.found = true;
@@ -145,10 +145,7 @@ RigidFit fit_closed(const std::vector<PlacePair>& pairs) {
     fit.reason = "all positions lie at one place";
     return fit;
   }
-  const Eigen::JacobiSVD<Matrix3d> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Vector3d signs = Vector3d::Ones();
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) signs.z() = -1.0;
-  const Matrix3d rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  const Matrix3d rotation = best_rotation(products).rotation;
   fit.target_from_source = Pose(rotation, target - rotation * source);
   fit.found = true;
   return fit;

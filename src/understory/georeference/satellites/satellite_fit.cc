@@ -1,11 +1,11 @@
 #include "understory/georeference/satellites/satellite_fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
 
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/georeference/georeference_constants.h"
 
 namespace understory {
@@ -30,12 +30,12 @@ struct Linearised {
     Matrix6d hessian = Matrix6d::Zero();
     for (std::size_t k = 0; k < jacobian.size(); ++k)
       hessian += jacobian[k].transpose() * information[k] * jacobian[k];
-    const Eigen::LDLT<Matrix6d> solver(hessian);
+    const Matrix6d covariance = SymmetricSolver<6>(hessian).inverse();
     Gains<D> result;
     result.fill(MatrixXd::Zero(6, static_cast<Eigen::Index>(jacobian.size())));
     for (std::size_t k = 0; k < jacobian.size(); ++k) {
       const Eigen::Matrix<double, 6, D> gain =
-          solver.solve(jacobian[k].transpose() * information[k]);
+          covariance * (jacobian[k].transpose() * information[k]);
       for (int row = 0; row < D; ++row)
         result[static_cast<std::size_t>(row)].col(static_cast<Eigen::Index>(k)) = gain.col(row);
     }

@@ -1,12 +1,12 @@
 #include "understory/georeference/satellites/satellite_smoothing.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <optional>
 
 #include "understory/georeference/georeference_constants.h"
+#include "understory/odometry/imu/chain_equations.h"
 #include "understory/odometry/imu/imu_state.h"
 #include "understory/odometry/imu/preintegration.h"
 #include "understory/util/median.h"
@@ -25,18 +25,13 @@ Vector3d gravity_at(double latitude_deg) {
   return {0.0, 0.0, -9.780327 * (1.0 + 5.3024e-3 * s - 5.8e-6 * 4.0 * s * (1.0 - s))};
 }
 
+const Eigen::Matrix<double, 3, 2> kKnownGravity = Eigen::Matrix<double, 3, 2>::Zero();
+
 // A position of the antenna at one state; weights are inverse variances of east, north, up.
 struct AntennaFactor {
   Vector3d place_in_enu = Vector3d::Zero();
   Vector3d sd_m = Vector3d::Ones();  // of one position by itself
   Vector3d weight = Vector3d::Zero();
-};
-
-// The normal equations: block tridiagonal in the states.
-struct ChainSystem {
-  std::vector<Matrix15d> diagonal;
-  std::vector<Matrix15d> next;  // of state k by state k + 1
-  std::vector<Vector15d> right;
 };
 
 class SatelliteChain {
@@ -69,11 +64,8 @@ class SatelliteChain {
           preintegrate(samples_[k], states_[k].gyro_bias, states_[k].accel_bias, config_.imu));
   }
 
-  [[nodiscard]] ChainSystem linearise() const {
-    ChainSystem system;
-    system.diagonal.assign(states_.size(), Matrix15d::Zero());
-    system.next.assign(states_.size(), Matrix15d::Zero());
-    system.right.assign(states_.size(), Vector15d::Zero());
+  [[nodiscard]] ChainEquations linearise() const {
+    ChainEquations system(states_.size());
     // The prior of velocity and biases, and next to nothing of the attitude.
     Vector15d weight = Vector15d::Zero();
     weight.head<3>().setConstant(kAttitudeWeight);
@@ -86,12 +78,14 @@ class SatelliteChain {
     system.right[0].tail<3>() -= weight.tail<3>().cwiseProduct(states_[0].accel_bias);
     for (std::size_t k = 0; k < states_.size(); ++k) {
       add_antenna(k, system);
-      if (k + 1 < states_.size()) add_motion(k, system);
+      if (k + 1 < states_.size())
+        system.add_motion(k, states_[k], states_[k + 1], motions_[k], gravity_, kKnownGravity,
+                          config_.imu);
     }
     return system;
   }
 
-  void add_antenna(std::size_t k, ChainSystem& system) const {
+  void add_antenna(std::size_t k, ChainEquations& system) const {
     const Matrix3d r = states_[k].world_from_imu.rotation_matrix();
     const Vector3d error = states_[k].world_from_imu * arm_in_imu_ - antennas_[k].place_in_enu;
     Eigen::Matrix<double, 3, 6> j;
@@ -104,50 +98,19 @@ class SatelliteChain {
     system.right[k].head<6>() -= j.transpose() * weight.cwiseProduct(error);
   }
 
-  void add_motion(std::size_t k, ChainSystem& system) const {
-    const MotionResidual r = motion_residual(states_[k], states_[k + 1], motions_[k], gravity_);
-    const Eigen::LLT<Matrix9d> root(motions_[k].covariance);
-    const Eigen::Matrix<double, 9, 15> by_from = root.matrixL().solve(r.by_from);
-    const Eigen::Matrix<double, 9, 15> by_to = root.matrixL().solve(r.by_to);
-    const Vector9d error = root.matrixL().solve(r.error);
-    system.diagonal[k] += by_from.transpose() * by_from;
-    system.next[k] += by_from.transpose() * by_to;
-    system.diagonal[k + 1] += by_to.transpose() * by_to;
-    system.right[k] -= by_from.transpose() * error;
-    system.right[k + 1] -= by_to.transpose() * error;
-    Vector6d weight;
-    const double seconds = motions_[k].duration;
-    weight << Vector3d::Constant(
-        1.0 / (std::pow(config_.imu.gyro_bias_walk_rad_s2_sqrt_hz, 2.0) * seconds)),
-        Vector3d::Constant(1.0 /
-                           (std::pow(config_.imu.accel_bias_walk_m_s3_sqrt_hz, 2.0) * seconds));
-    Vector6d walk;
-    walk << states_[k + 1].gyro_bias - states_[k].gyro_bias,
-        states_[k + 1].accel_bias - states_[k].accel_bias;
-    system.diagonal[k].diagonal().tail<6>() += weight;
-    system.diagonal[k + 1].diagonal().tail<6>() += weight;
-    system.next[k].diagonal().tail<6>() -= weight;
-    system.right[k].tail<6>() += weight.cwiseProduct(walk);
-    system.right[k + 1].tail<6>() -= weight.cwiseProduct(walk);
-  }
-
   // One Gauss-Newton step by elimination from the first state on; marginals on the way back.
   // Returns the largest change.
   double solve() {
-    ChainSystem system = linearise();
+    ChainEquations system = linearise();
     const std::size_t last = states_.size() - 1;
-    for (std::size_t k = 0; k < last; ++k) {
-      const Eigen::LDLT<Matrix15d> pivot(system.diagonal[k]);
-      const Matrix15d carried = pivot.solve(system.next[k]);
-      system.diagonal[k + 1] -= system.next[k].transpose() * carried;
-      system.right[k + 1] -= carried.transpose() * system.right[k];
-    }
+    for (std::size_t k = 0; k < last; ++k)
+      system.eliminate(k);
     marginals_.assign(states_.size(), Matrix15d::Zero());
     Vector15d step = Vector15d::Zero();
     double largest = 0.0;
     for (std::size_t k = states_.size(); k-- > 0;) {
-      const Eigen::LDLT<Matrix15d> pivot(system.diagonal[k]);
-      const Matrix15d own = pivot.solve(Matrix15d::Identity());
+      const StateSolver pivot(system.diagonal[k]);
+      const Matrix15d own = pivot.inverse();
       const Matrix15d gain = own * system.next[k];
       const Vector15d right =
           k < last ? Vector15d(system.right[k] - system.next[k] * step) : system.right[k];

@@ -1,6 +1,5 @@
 #include "understory/graph/loops/loop_closure.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +9,7 @@
 
 #include "understory/geometry/pose.h"
 #include "understory/geometry/rotation_between.h"
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/graph/graph_constants.h"
 #include "understory/graph/self_correction/structure.h"
 #include "understory/util/angles.h"
@@ -218,7 +218,7 @@ std::string judge(const LoopVerification& report, const RegistrationResult& resu
 Matrix6d loop_covariance(const RegistrationResult& result, const LoopClosureConfig& config) {
   Matrix6d information = result.information;
   information.diagonal().array() += 1e-6;
-  const Matrix6d inverse = information.ldlt().solve(Matrix6d::Identity());
+  const Matrix6d inverse = SymmetricSolver<6>(information).inverse();
   Matrix6d covariance = 0.5 * (inverse + inverse.transpose());
   const double rotation = config.sigma_rotation_deg * kDegree;
   covariance.diagonal().head<3>().array() += rotation * rotation;

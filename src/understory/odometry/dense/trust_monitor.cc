@@ -1,11 +1,11 @@
 #include "understory/odometry/dense/trust_monitor.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
 
+#include "understory/geometry/best_rotation.h"
 #include "understory/odometry/odometry_constants.h"
 #include "understory/util/angles.h"
 
@@ -63,13 +63,10 @@ AxesGuess best_axes(const TurnSums& sums) {
 }
 
 // The best rotation (Kabsch), with the common part in the data or taken out as a bias.
-Eigen::Matrix3d best_rotation(const TurnSums& sums, bool centred) {
+Eigen::Matrix3d best_turn(const TurnSums& sums, bool centred) {
   Eigen::Matrix3d product = sums.product;
   if (centred) product -= sums.gyro * sums.lidar.transpose() / sums.count;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) signs.z() = -1.0;
-  return svd.matrixV() * signs.asDiagonal() * svd.matrixU().transpose();
+  return best_rotation(product).rotation.transpose();
 }
 
 std::string degrees(double radians) {
@@ -173,8 +170,8 @@ void TrustMonitor::judge_turns() {
   const double left = unexplained(sums, Eigen::Matrix3d::Identity());
   const double good = on_probation() ? kGoodOnProbation : kGood;
   const double limit = good * good * all;
-  Eigen::Matrix3d rotation = best_rotation(sums, false);
-  const Eigen::Matrix3d centred = best_rotation(sums, true);
+  Eigen::Matrix3d rotation = best_turn(sums, false);
+  const Eigen::Matrix3d centred = best_turn(sums, true);
   if (unexplained(sums, centred) < unexplained(sums, rotation)) rotation = centred;
   // Where most turns are about the vertical, an IMU turned about it explains most of them. Once it
   // is suspected, a turn that explains them much better is enough.

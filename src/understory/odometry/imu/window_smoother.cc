@@ -4,6 +4,7 @@
 
 #include "understory/geometry/pose_io.h"
 #include "understory/geometry/rotation_between.h"
+#include "understory/odometry/imu/chain_equations.h"
 #include "understory/odometry/odometry_constants.h"
 #include "understory/util/error.h"
 
@@ -12,8 +13,6 @@ namespace {
 
 using namespace odometry_constants::window_smoother;
 
-using Matrix2x15 = Eigen::Matrix<double, 2, 15>;
-using Matrix15x2 = Eigen::Matrix<double, 15, 2>;
 using Matrix17d = Eigen::Matrix<double, 17, 17>;
 using Vector17d = Eigen::Matrix<double, 17, 1>;
 
@@ -30,44 +29,41 @@ Eigen::Vector2d tilt_difference(const Eigen::Quaterniond& from, const Eigen::Qua
   return so3_log(from.conjugate() * to).head<2>();
 }
 
+// Turns the velocity of a matrix over the tangent: T M T^T, where T is the identity but there.
+template <int N>
+void turn_velocity(const Eigen::Matrix3d& turn, Eigen::Matrix<double, N, N>& matrix) {
+  matrix.template middleRows<3>(6) = (turn * matrix.template middleRows<3>(6)).eval();
+  matrix.template middleCols<3>(6) = (matrix.template middleCols<3>(6) * turn.transpose()).eval();
+}
+
 }  // namespace
 
 struct WindowSmoother::System {
-  explicit System(std::size_t states)
-      : diagonal(states, Matrix15d::Zero()),
-        next(states, Matrix15d::Zero()),
-        tilt(states, Matrix15x2::Zero()),
-        right(states, Vector15d::Zero()) {}
+  explicit System(std::size_t states) : chain(states), tilt(states, Matrix15x2::Zero()) {}
 
-  std::vector<Matrix15d> diagonal;
-  std::vector<Matrix15d> next;  // block (k, k + 1)
+  ChainEquations chain;
   std::vector<Matrix15x2> tilt;
-  std::vector<Vector15d> right;
   Eigen::Matrix2d tilt_diagonal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d tilt_right = Eigen::Vector2d::Zero();
 
   // Takes state k out of the equations, on to k + 1 and the tilt.
   void eliminate(std::size_t k) {
-    const Eigen::LDLT<Matrix15d> factor(diagonal[k]);
-    const Matrix15d by_next = factor.solve(next[k]);
-    const Matrix15x2 by_tilt = factor.solve(tilt[k]);
-    const Vector15d by_right = factor.solve(right[k]);
-    diagonal[k + 1] -= next[k].transpose() * by_next;
-    tilt[k + 1] -= next[k].transpose() * by_tilt;
-    right[k + 1] -= next[k].transpose() * by_right;
+    const StateSolver solver = chain.eliminate(k);
+    const Matrix15x2 by_tilt = solver.solve(tilt[k]);
+    tilt[k + 1] -= chain.next[k].transpose() * by_tilt;
     tilt_diagonal -= tilt[k].transpose() * by_tilt;
-    tilt_right -= tilt[k].transpose() * by_right;
+    tilt_right -= tilt[k].transpose() * solver.solve(chain.right[k]);
   }
 
   // Equations of one state and the tilt.
   [[nodiscard]] Matrix17d joint(std::size_t k) const {
     Matrix17d matrix;
-    matrix << diagonal[k], tilt[k], tilt[k].transpose(), tilt_diagonal;
+    matrix << chain.diagonal[k], tilt[k], tilt[k].transpose(), tilt_diagonal;
     return 0.5 * (matrix + matrix.transpose());
   }
   [[nodiscard]] Vector17d joint_right(std::size_t k) const {
     Vector17d vector;
-    vector << right[k], tilt_right;
+    vector << chain.right[k], tilt_right;
     return vector;
   }
 };
@@ -118,52 +114,27 @@ void WindowSmoother::add_prior(System& system) const {
   Vector17d d;
   d << local(prior_.point, states_.front()),
       tilt_difference(prior_.gravity_rotation, gravity_rotation_);
-  Matrix17d jacobian = Matrix17d::Identity();
-  jacobian.topLeftCorner<15, 15>() = local_jacobian(prior_.point, states_.front());
-  const Matrix17d information = jacobian.transpose() * prior_.information * jacobian;
-  const Vector17d right = jacobian.transpose() * (prior_.vector - prior_.information * d);
-  system.diagonal[0] += information.topLeftCorner<15, 15>();
-  system.tilt[0] += information.topRightCorner<15, 2>();
-  system.tilt_diagonal += information.bottomRightCorner<2, 2>();
-  system.right[0] += right.head<15>();
+  // The tilt's derivative is the identity.
+  const Matrix15d jacobian = local_jacobian(prior_.point, states_.front());
+  const Matrix15d own = prior_.information.topLeftCorner<15, 15>();
+  const Matrix15x2 with_tilt = prior_.information.topRightCorner<15, 2>();
+  const Vector17d right = prior_.vector - prior_.information * d;
+  const Matrix15d carried = own * jacobian;
+  system.chain.diagonal[0] += jacobian.transpose() * carried;
+  system.tilt[0] += jacobian.transpose() * with_tilt;
+  system.tilt_diagonal += prior_.information.bottomRightCorner<2, 2>();
+  system.chain.right[0] += jacobian.transpose() * right.head<15>();
   system.tilt_right += right.tail<2>();
 }
 
 void WindowSmoother::add_interval(System& system, std::size_t k) const {
-  const Preintegration& motion = intervals_[k].motion;
-  const ImuState& from = states_[k];
-  const ImuState& to = states_[k + 1];
-  const MotionResidual r = motion_residual(from, to, motion, gravity());
-  const Eigen::LLT<Matrix9d> root(motion.covariance);
-  // Whitened: L^-1 of everything, so that the products below are symmetric to the last bit.
-  const Eigen::Matrix<double, 9, 15> by_from = root.matrixL().solve(r.by_from);
-  const Eigen::Matrix<double, 9, 15> by_to = root.matrixL().solve(r.by_to);
-  const Eigen::Matrix<double, 9, 2> by_tilt = root.matrixL().solve(
-      r.by_gravity * gravity_by_tilt(gravity_rotation_, config_.imu.gravity_m_s2));
-  const Vector9d error = root.matrixL().solve(r.error);
-  system.diagonal[k] += by_from.transpose() * by_from;
-  system.next[k] += by_from.transpose() * by_to;
-  system.diagonal[k + 1] += by_to.transpose() * by_to;
-  system.tilt[k] += by_from.transpose() * by_tilt;
-  system.tilt[k + 1] += by_to.transpose() * by_tilt;
-  system.tilt_diagonal += by_tilt.transpose() * by_tilt;
-  system.right[k] -= by_from.transpose() * error;
-  system.right[k + 1] -= by_to.transpose() * error;
-  system.tilt_right -= by_tilt.transpose() * error;
-
-  // Random walk of the biases.
-  const double gyro = config_.imu.gyro_bias_walk_rad_s2_sqrt_hz;
-  const double accel = config_.imu.accel_bias_walk_m_s3_sqrt_hz;
-  Vector6d weight;
-  weight << Eigen::Vector3d::Constant(1.0 / (gyro * gyro * motion.duration)),
-      Eigen::Vector3d::Constant(1.0 / (accel * accel * motion.duration));
-  Vector6d walk;
-  walk << to.gyro_bias - from.gyro_bias, to.accel_bias - from.accel_bias;
-  system.diagonal[k].diagonal().tail<6>() += weight;
-  system.diagonal[k + 1].diagonal().tail<6>() += weight;
-  system.next[k].diagonal().tail<6>() -= weight;
-  system.right[k].tail<6>() += weight.cwiseProduct(walk);
-  system.right[k + 1].tail<6>() -= weight.cwiseProduct(walk);
+  const WhiteMotion white = system.chain.add_motion(
+      k, states_[k], states_[k + 1], intervals_[k].motion, gravity(),
+      gravity_by_tilt(gravity_rotation_, config_.imu.gravity_m_s2), config_.imu);
+  system.tilt[k] += white.by_from.transpose() * white.by_tilt;
+  system.tilt[k + 1] += white.by_to.transpose() * white.by_tilt;
+  system.tilt_diagonal += white.by_tilt.transpose() * white.by_tilt;
+  system.tilt_right -= white.by_tilt.transpose() * white.error;
 }
 
 void WindowSmoother::add_lidar(System& system, std::size_t k) const {
@@ -179,8 +150,8 @@ void WindowSmoother::add_lidar(System& system, std::size_t k) const {
   jacobian.bottomRightCorner<3, 3>() = relative.toRotationMatrix();
   const Eigen::LLT<Matrix6d> root(factor.covariance);
   const Matrix6d white = root.matrixL().solve(jacobian);
-  system.diagonal[k].topLeftCorner<6, 6>() += white.transpose() * white;
-  system.right[k].head<6>() -= white.transpose() * Vector6d(root.matrixL().solve(error));
+  system.chain.diagonal[k].topLeftCorner<6, 6>() += white.transpose() * white;
+  system.chain.right[k].head<6>() -= white.transpose() * Vector6d(root.matrixL().solve(error));
 }
 
 WindowSmoother::System WindowSmoother::linearise() const {
@@ -211,8 +182,9 @@ void WindowSmoother::optimise(int iterations) {
     double largest = step.cwiseAbs().maxCoeff();
     states_[last] = retract(states_[last], step);
     for (std::size_t k = last; k-- > 0;) {
-      const Vector15d right = system.right[k] - system.next[k] * step - system.tilt[k] * tilt;
-      step = Eigen::LDLT<Matrix15d>(system.diagonal[k]).solve(right);
+      const Vector15d right =
+          system.chain.right[k] - system.chain.next[k] * step - system.tilt[k] * tilt;
+      step = StateSolver(system.chain.diagonal[k]).solve(right);
       largest = std::max(largest, step.cwiseAbs().maxCoeff());
       states_[k] = retract(states_[k], step);
     }
@@ -264,13 +236,10 @@ void WindowSmoother::move_world(const Pose& new_from_old) {
   gravity_rotation_ = (new_from_old.rotation() * gravity_rotation_).normalized();
   prior_.gravity_rotation = (new_from_old.rotation() * prior_.gravity_rotation).normalized();
   // Velocity is the one part of the tangent that is expressed in the world.
-  Matrix17d turn = Matrix17d::Identity();
-  turn.block<3, 3>(6, 6) = new_from_old.rotation_matrix();
-  prior_.information = (turn * prior_.information * turn.transpose()).eval();
-  prior_.vector = (turn * prior_.vector).eval();
-  covariance_ =
-      (turn.topLeftCorner<15, 15>() * covariance_ * turn.topLeftCorner<15, 15>().transpose())
-          .eval();
+  const Eigen::Matrix3d turn = new_from_old.rotation_matrix();
+  turn_velocity(turn, prior_.information);
+  turn_velocity(turn, covariance_);
+  prior_.vector.segment<3>(6) = (turn * prior_.vector.segment<3>(6)).eval();
 }
 
 namespace {

@@ -1,8 +1,9 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <numbers>
 
 #include "understory/odometry/motion/motion_model.h"
+
+#include "understory/geometry/symmetric_solver.h"
 
 namespace understory {
 namespace {
@@ -101,7 +102,7 @@ Matrix6d lidar_covariance(const LidarFactor& factor, const LidarNoiseConfig& con
   Matrix6d information = factor.information / config.information_divisor;
   information.diagonal().head<3>().array() += 1.0;
   information.diagonal().tail<3>().array() += 1e-6;
-  const Matrix6d matched = information.ldlt().solve(Matrix6d::Identity());
+  const Matrix6d matched = SymmetricSolver<6>(information).inverse();
   const Matrix6d symmetric = 0.5 * (matched + matched.transpose());
   if (config.source == LidarNoise::kBoth) return covariance + symmetric;
   covariance.setZero();

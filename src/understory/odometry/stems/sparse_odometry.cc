@@ -1,11 +1,11 @@
 #include "understory/odometry/stems/sparse_odometry.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "understory/geometry/pose_io.h"
 #include "understory/geometry/rotation_between.h"
+#include "understory/geometry/symmetric_solver.h"
 
 namespace understory {
 namespace {
@@ -33,7 +33,8 @@ Pose hold_tilt(const Pose& world_from_level, const Matrix6d& information, double
   // What heading and place do where the tilt is held: the conditional mean.
   Eigen::Matrix3d rest = information.block<3, 3>(2, 2);
   rest.diagonal().array() += 1e-6 + 1e-9 * rest.diagonal().maxCoeff();
-  step.segment<3>(2) = -rest.ldlt().solve(information.block<3, 2>(2, 0) * turn.head<2>());
+  step.segment<3>(2) =
+      -SymmetricSolver<3>(rest).solve(information.block<3, 2>(2, 0) * turn.head<2>());
   return world_from_level * Pose::exp(step);
 }
 

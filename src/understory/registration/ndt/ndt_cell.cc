@@ -1,9 +1,9 @@
 #include "understory/registration/ndt/ndt_cell.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "understory/geometry/symmetric_eigen.h"
 #include "understory/registration/registration_constants.h"
 
 namespace understory::internal {
@@ -17,9 +17,8 @@ struct Shape {
 };
 
 Shape shape_of(const Eigen::Matrix3d& covariance) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.computeDirect(covariance);
-  return {solver.eigenvalues().cwiseMax(0.0), solver.eigenvectors()};
+  const SymmetricEigen3 eigen = fast_symmetric_eigen(covariance);
+  return {eigen.values.cwiseMax(0.0), eigen.vectors};
 }
 
 bool is_line(const Shape& shape, double floor) {

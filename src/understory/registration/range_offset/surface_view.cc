@@ -1,10 +1,11 @@
 #include "understory/registration/range_offset/surface_view.h"
 
-#include <Eigen/Eigenvalues>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
+
+#include "understory/geometry/symmetric_eigen.h"
 
 namespace understory {
 
@@ -86,16 +87,15 @@ std::optional<FlatPatch> patch_of(const Sums& sums, const SurfaceViewConfig& con
   const double share = 1.0 / sums.count;
   const Eigen::Vector3d mean = share * sums.point.cast<double>();
   const Eigen::Matrix3d covariance = share * sums.products.cast<double>() - mean * mean.transpose();
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.computeDirect(covariance);
+  const SymmetricEigen3 eigen = fast_symmetric_eigen(covariance);
   const double width = config.min_width * config.cell_m;
-  if (solver.eigenvalues()[0] > config.max_thickness_m * config.max_thickness_m ||
-      solver.eigenvalues()[1] < width * width) {
+  if (eigen.values[0] > config.max_thickness_m * config.max_thickness_m ||
+      eigen.values[1] < width * width) {
     return std::nullopt;
   }
   FlatPatch patch;
   patch.mean = mean + config.cell_m * Eigen::Vector3d(sums.at[0], sums.at[1], sums.at[2]);
-  patch.normal = solver.eigenvectors().col(0);
+  patch.normal = eigen.vectors.col(0);
   patch.ray = share * sums.ray.cast<double>();
   if (patch.normal.dot(patch.ray) > 0.0) patch.normal = -patch.normal;
   return patch;

@@ -1,12 +1,12 @@
 #include "understory/registration/stems/sparse_icp.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "understory/geometry/best_rotation.h"
 #include "understory/geometry/delaunay.h"
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/registration/icp/nearest_pairs.h"
 #include "understory/registration/registration_constants.h"
 #include "understory/util/error.h"
@@ -99,10 +99,7 @@ Pose fit(const SparsePoints& target, const SparsePoints& source, const std::vect
     shift = mean_q - turn * mean_p;
     shift.z() = 0.0;
   } else {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-    signs.z() = (svd.matrixV() * svd.matrixU().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-    turn = svd.matrixV() * signs.asDiagonal() * svd.matrixU().transpose();
+    turn = best_rotation(moment).rotation.transpose();
     shift = mean_q - turn * mean_p;
   }
   return Pose(turn, shift) * now;
@@ -171,7 +168,7 @@ Vector6d newton_step(const SparsePoints& target, const SparsePoints& source, con
     system += 1e6 * information.diagonal().maxCoeff() * held.transpose() * held;
   }
   system.diagonal().array() += 1e-9 * system.diagonal().maxCoeff() + 1e-12;
-  return -system.ldlt().solve(gradient);
+  return -SymmetricSolver<6>(system).solve(gradient);
 }
 
 bool small(const Vector6d& step, const SparseIcpConfig& config) {
