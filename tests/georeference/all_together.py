@@ -110,11 +110,11 @@ def write_map(path, trees, draw):
     return path
 
 
-def write_terrain(path, draw, sd_m=0.3):
+def write_terrain(path, draw, sd_m=0.3, geoid=GEOID):
     lines = ["ncols 200\nnrows 200\nxllcorner -200\nyllcorner -200\ncellsize 2\nNODATA_value -9999"]
     for row in range(200):
         y = 200 - 2 * row - 1
-        lines.append(" ".join(f"{HEIGHT + GEOID + hills(-200 + 2 * c + 1, y) + draw.gauss(0, sd_m):.3f}"
+        lines.append(" ".join(f"{HEIGHT + geoid + hills(-200 + 2 * c + 1, y) + draw.gauss(0, sd_m):.3f}"
                               for c in range(200)))
     path.write_text("\n".join(lines) + "\n")
     path.with_suffix(".prj").write_text(LOCAL_WKT)
@@ -200,12 +200,13 @@ def one_by_one(folder):
     alone = errors(folder / "fixes", told, 0.0)
     with_trees, _ = placed(RUN, folder / "trees", "--gnss", FIXES, *TREE_OPTIONS)
     trees = errors(folder / "trees", with_trees, 0.0)
-    with_terrain, _ = placed(RUN, folder / "terrain", "--gnss", FIXES, "--dem", DEM)
+    with_terrain, said = placed(RUN, folder / "terrain", "--gnss", FIXES, "--dem", DEM)
     terrain = errors(folder / "terrain", with_terrain, GEOID)
     assert trees[0] < 0.25 < alone[0], (trees, alone)
     assert terrain[1] < 0.3 * alone[1], (terrain, alone)
     assert with_trees["expected_error_m"] < told["expected_error_m"]
     assert with_terrain["expected_error_m"] < told["expected_error_m"]
+    assert "its heights are" in said and abs(with_terrain["terrain_above_fixes_m"] - GEOID) < 6, said
     return f"plane {alone[0]:.2f} m, with trees {trees[0]:.2f} m; height {alone[1]:.2f} m, with terrain {terrain[1]:.2f} m"
 
 
@@ -221,10 +222,31 @@ def without_fixes(folder):
 @cases.case("fixes without heights, terrain model")
 def flat_fixes(folder):
     flat = write_fixes(folder / "flat.csv", random.Random(9), heights=False)
-    told, _ = placed(RUN, folder / "placed", "--gnss", flat, "--dem", DEM)
+    told, said = placed(RUN, folder / "placed", "--gnss", flat, "--dem", DEM)
     _, height, _ = errors(folder / "placed", told, GEOID)
     assert height < 0.3, height
+    assert "its heights are" not in said, said
     return f"{height:.2f} m in height"
+
+
+@cases.case("a terrain model whose heights are no heights in metres")
+def in_feet(folder):
+    feet = folder / "feet.asc"
+    head, rows = DEM.read_text().splitlines()[:6], DEM.read_text().splitlines()[6:]
+    lines = [" ".join(f"{float(value) / 0.3048:.3f}" for value in row.split()) for row in rows]
+    feet.write_text("\n".join(head + lines) + "\n")
+    feet.with_suffix(".prj").write_text(LOCAL_WKT)
+    told, _ = placed(RUN, folder / "placed", "--gnss", FIXES, "--dem", feet, expected=4)
+    assert any("No height system" in reason for reason in told["reasons"]), told["reasons"]
+    return told["reasons"][0][-90:]
+
+
+@cases.case("a terrain model that agrees with the fixes' heights")
+def same_heights(folder):
+    level = write_terrain(folder / "level.asc", random.Random(6), geoid=0.0)
+    _, said = placed(RUN, folder / "placed", "--gnss", FIXES, "--dem", level)
+    assert "its heights are" not in said, said
+    return "no warning"
 
 
 @cases.case("a tree map of another forest")

@@ -117,6 +117,11 @@ inline constexpr double kSearchedAtLeastM = 20.0;
 // Of fixes and trees together: chi squared beyond which they contradict each other [tuned: the GNSS
 // presets of docs/method/georeference.md, seeds 1 to 19, are off by up to 9.5 standard deviations]
 inline constexpr double kMostDisagreement = 100.0;
+// m between the heights of a terrain model and of fixes: said from here on [chosen: fixes under
+// trees err by less in the mean of a path]
+inline constexpr double kHeightsDifferM = 8.0;
+// m: no geoid lies farther from the ellipsoid [bound: EGM2008 spans -106 to 86, and fixes err]
+inline constexpr double kMostGeoidM = 125.0;
 }  // namespace georeferencing
 
 namespace correction_figures {  // pipeline/correction/correction_figures.cc

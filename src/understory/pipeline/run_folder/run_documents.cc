@@ -28,6 +28,8 @@ std::map<std::string, std::string> frames_of(const std::filesystem::path& folder
   for (const char* name : {"map.laz", "dtm.tif", "dsm.tif", "chm.tif", "trees.gpkg", "map.qgs"}) {
     if (std::filesystem::exists(folder / name)) frames[name] = layers;
   }
+  // Latitude, longitude and height on WGS 84, whether or not the layers are on the globe.
+  if (std::filesystem::exists(folder / "global.csv.gz")) frames["global.csv.gz"] = "EPSG:4979";
   return frames;
 }
 

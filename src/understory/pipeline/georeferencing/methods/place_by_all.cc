@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <optional>
 
 #include "understory/georeference/combined_place.h"
 #include "understory/georeference/satellites/split_fit.h"
@@ -26,6 +27,7 @@ struct GatheredPlace {
   Placement placement;
   std::vector<std::string> methods;
   std::vector<PlaceEvidence> evidence;
+  std::optional<Pose> by_fixes;  // where the fixes alone lay the run, if they tell its height
 };
 
 // Fixes that are named count even where they cannot be read: that is said then.
@@ -58,11 +60,18 @@ PlaceEvidence evidence_of_fixes(const Placement& placed, const Vector3d& middle,
   return evidence;
 }
 
+// Of the height at the middle of the path; NaN where the method does not tell it.
+double height_sd_m(const Placement& placed, const Vector3d& middle) {
+  return std::sqrt(spread_from_right(placed.covariance, placed.target_from_world, middle)(5, 5));
+}
+
 void gather_fixes(const GeoreferenceRequest& request, const MovableRun& run, Log& log,
                   GatheredPlace& gathered) {
   gathered.placement = place_by_best(request, run, log);
   gathered.methods.push_back(gathered.placement.method);
   const Vector3d middle = middle_of_path(run, gathered.placement.target_from_world);
+  if (height_sd_m(gathered.placement, middle) < kHeightsDifferM)
+    gathered.by_fixes = gathered.placement.target_from_world;
   gathered.evidence.push_back(
       evidence_of_fixes(gathered.placement, middle, request.terrain_model.empty()));
   if (gathered.evidence.back().information.isZero())
@@ -146,8 +155,30 @@ CombinedPlace combine(GatheredPlace& gathered) {
   return combined;
 }
 
+// The heights are those of the terrain model. Whoever knows the fixes' heights should know by how
+// much they differ.
+void compare_heights(const GeoreferenceRequest& request, const Vector3d& middle,
+                     const Pose& by_fixes, Log& log, Placement& placement) {
+  const Vector3d in_world = placement.target_from_world.inverse() * middle;
+  const double above_m = middle.z() - (by_fixes * in_world).z();
+  placement.figures["terrain_above_fixes_m"] = above_m;
+  if (std::abs(above_m) < kHeightsDifferM) return;
+  const std::string differ = fmt::format("{}: its heights are {:.1f} m {} those of the fixes",
+                                         request.terrain_model.string(), std::abs(above_m),
+                                         above_m < 0.0 ? "below" : "above");
+  if (std::abs(above_m) > kMostGeoidM) {
+    placement.doubt(differ +
+                    ". No height system explains that: is it of this place, and in metres?");
+    return;
+  }
+  log.warn("georeference.heights_differ",
+           differ +
+               ". The map has the heights of the model. They often count from the geoid, and "
+               "those of fixes from the ellipsoid");
+}
+
 void lay_on_terrain(const GeoreferenceRequest& request, const MovableRun& run,
-                    const CombinedPlace& combined, GatheredPlace& gathered) {
+                    const CombinedPlace& combined, Log& log, GatheredPlace& gathered) {
   Placement& placement = gathered.placement;
   TerrainFitConfig config = request.terrain;
   Matrix6d information = combined.spread.inverse();
@@ -160,6 +191,8 @@ void lay_on_terrain(const GeoreferenceRequest& request, const MovableRun& run,
   placement.summary += "\n";
   gathered.methods.emplace_back("terrain");
   tell_levelled(request, levelled, placement);
+  if (gathered.by_fixes)
+    compare_heights(request, levelled.fit.middle, *gathered.by_fixes, log, placement);
 }
 
 }  // namespace
@@ -173,7 +206,7 @@ Placement place_by_all(const GeoreferenceRequest& request, const MovableRun& run
                      "expected fixes or --tree-map beside --dem: where the run lies on the terrain "
                      "model is not known");
   const CombinedPlace combined = combine(gathered);
-  if (!request.terrain_model.empty()) lay_on_terrain(request, run, combined, gathered);
+  if (!request.terrain_model.empty()) lay_on_terrain(request, run, combined, log, gathered);
   gathered.placement.method = fmt::format("{}", fmt::join(gathered.methods, "+"));
   return gathered.placement;
 }
