@@ -14,6 +14,7 @@ struct SymmetricEigen2 {
 // triangle is read.
 [[nodiscard]] SymmetricEigen2 symmetric_eigen(const Eigen::Matrix2d& matrix);
 
+// The same of a 3 x 3 matrix.
 struct SymmetricEigen3 {
   Eigen::Vector3d values;
   Eigen::Matrix3d vectors;
