@@ -1,7 +1,7 @@
 # Every third-party library as an imported target, so that its headers count as system headers.
 #   Eigen3::Eigen TBB::tbb fmt::fmt understory::nanoflann understory::gdal understory::embree
 #   understory::deflate understory::lz4 understory::zstd understory::bz2 ZLIB::ZLIB OpenSSL::Crypto SQLite::SQLite3 yaml-cpp
-#   CLI11::CLI11 nlohmann_json::nlohmann_json GTest::gtest_main understory::gtsam understory::laszip
+#   CLI11::CLI11 nlohmann_json::nlohmann_json pugixml::pugixml GTest::gtest_main understory::gtsam understory::laszip
 include(Gtsam)
 include(Laszip)
 
@@ -41,6 +41,7 @@ find_package(SQLite3 REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
+find_package(pugixml REQUIRED)
 understory_dependency(bz2 BZip2::BZip2)
 # yaml-cpp 0.8 renamed its target.
 if(NOT TARGET yaml-cpp)

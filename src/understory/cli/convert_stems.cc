@@ -12,6 +12,7 @@
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/inventory/stand_cloud.h"
 #include "understory/pipeline/source.h"
+#include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
 #include "understory/util/files/staged_output.h"
 
@@ -21,10 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_cloud(const std::string& input) {
-  constexpr std::array<const char*, 4> kEndings = {".las", ".laz", ".ply", ".pcd"};
-  const std::string ending = fs::path(input).extension().string();
-  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end() &&
-         fs::is_regular_file(input);
+  return has_map_name(input) && fs::is_regular_file(input);
 }
 
 void write(const StemSegments& found, const Pose& body_from_points, int frame, TimeNs stamp,

@@ -55,8 +55,9 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   auto options = std::make_shared<InventoryOptions>();
   CLI::App* command = app.add_subcommand(
       "inventory", "Ground, trees and stem diameters from any point cloud or from a run");
-  command->add_option("CLOUD", options->request.cloud,
-                      "Point cloud (.las, .laz, .ply, .pcd) in metres, z up; or a run folder");
+  command->add_option(
+      "CLOUD", options->request.cloud,
+      "Point cloud (.las, .laz, .e57, .ply, .pcd) in metres, z up; or a run folder");
   command->add_option("-o,--output", options->request.run_folder, "Folder for the results");
   command->add_option("--config", options->request.config_file, "YAML file with settings");
   command->add_option("--set", options->settings, "key=value, may be repeated");

@@ -190,7 +190,7 @@ int run_register(const RegisterOptions& options, CommandContext& context) {
 void add_register_command(CLI::App& app, Command& chosen) {
   auto options = std::make_shared<RegisterOptions>();
   CLI::App* command = app.add_subcommand("register", "Match one point cloud to another");
-  command->add_option("A", options->target, "Target cloud (.pcd, .ply, .las, .laz, .bin)");
+  command->add_option("A", options->target, "Target cloud (.las, .laz, .e57, .pcd, .ply, .bin)");
   command->add_option("B", options->source, "Source cloud");
   std::vector<std::string> methods = matcher_names();
   methods.insert(methods.end(), {"stem-icp", "go-icp"});

@@ -3,19 +3,20 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include "understory/pipeline/run_folder/run_json.h"
 #include "understory/pipeline/run_folder/work_folder.h"
 #include "understory/recording/bags/ros2_bag.h"
+#include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
-
-const std::vector<std::string> kCloudEndings = {".las", ".laz", ".ply", ".pcd"};
 
 // Optimal string alignment distance.
 std::size_t letters_apart(const std::string& a, const std::string& b) {
@@ -53,7 +54,7 @@ std::string single_cloud(const std::string& folder) {
     std::error_code ignored;
     const std::string path = entry->path().string();
     if (!entry->is_regular_file(ignored)) continue;
-    const bool cloud = ends_with_one_of(path, kCloudEndings);
+    const bool cloud = has_map_name(path);
     if (ends_with_one_of(path, {".bin"}) || (cloud && !found.empty())) return {};
     if (cloud) found = path;
   }
@@ -101,8 +102,7 @@ void refuse_cloud(const std::string& recording) {
                      "holds one point cloud, and a map is made of many: `understory inventory " +
                          cloud + " -o DIR` measures its trees");
   }
-  if (!fs::is_regular_file(recording, ignored) || !ends_with_one_of(recording, kCloudEndings))
-    return;
+  if (!fs::is_regular_file(recording, ignored) || !has_map_name(recording)) return;
   throw InputError(
       recording, "",
       "is one point cloud, and a map is made of many: `understory inventory " + recording +

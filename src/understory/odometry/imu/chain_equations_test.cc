@@ -20,8 +20,8 @@ std::vector<Preintegration> two_motions() {
       sample.accel[0] = 0.3;
       sample.accel[2] = 9.81;
     }
-    motions.push_back(preintegrate(samples, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
-                                   ImuNoiseConfig()));
+    motions.push_back(
+        preintegrate(samples, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), ImuNoiseConfig()));
   }
   return motions;
 }

@@ -1,11 +1,14 @@
 #include "understory/recording/clouds/cloud_file.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
 
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/clouds/cloud_table.h"
+#include "understory/recording/clouds/e57.h"
 #include "understory/recording/clouds/las.h"
 #include "understory/recording/messages/point_cloud.h"
 #include "understory/util/error.h"
@@ -55,6 +58,21 @@ PointCloudFile read_las_cloud(ByteSource& file, Log& log, const ProgressSink& pr
   return cloud;
 }
 
+PointCloudFile read_e57_cloud(ByteSource& file, Log& log, const ProgressSink& progress) {
+  const E57Header header = read_e57_header(file);
+  PointCloudFile cloud;
+  cloud.coordinate_system = header.coordinate_system;
+  cloud.format = "E57, " + std::to_string(header.scans.size()) +
+                 (header.scans.size() == 1 ? " scan" : " scans");
+  const bool intensity = header.has_intensity();
+  Collector collector(cloud);
+  read_e57_points(file, header, log, [&](const E57Point& point) {
+    progress.poll();
+    if (collector.add(point.position) && intensity) cloud.intensity.push_back(point.intensity);
+  });
+  return cloud;
+}
+
 PointCloudFile from_table(const CloudTable& table, const std::string& name) {
   const PointCloud2Message message = table.message(0);
   const auto layout = CloudLayout::find(message);
@@ -85,6 +103,9 @@ PointCloudFile read_cloud(ByteSource& file, Log& log, const ProgressSink& progre
     case CloudFormat::kLas:
       cloud = read_las_cloud(file, log, progress);
       break;
+    case CloudFormat::kE57:
+      cloud = read_e57_cloud(file, log, progress);
+      break;
     case CloudFormat::kPcd:
       cloud = from_table(read_pcd(file, log), file.name());
       break;
@@ -95,10 +116,19 @@ PointCloudFile read_cloud(ByteSource& file, Log& log, const ProgressSink& progre
       cloud = from_table(read_kitti(file, log), file.name());
       break;
     case CloudFormat::kUnknown:
-      throw InputError(file.name(), "byte 0", "expected a cloud (.las, .laz, .pcd, .ply, .bin)");
+      throw InputError(file.name(), "byte 0",
+                       "expected a cloud (.las, .laz, .e57, .pcd, .ply, .bin)");
   }
   if (cloud.points.empty()) throw InputError(file.name(), "", "holds no finite point");
   return cloud;
+}
+
+bool has_map_name(const std::filesystem::path& path) {
+  constexpr std::array<const char*, 5> kEndings = {".las", ".laz", ".e57", ".ply", ".pcd"};
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
 
 PointCloudFile read_cloud(const std::string& path, Log& log, const ProgressSink& progress) {

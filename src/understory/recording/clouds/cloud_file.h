@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -21,7 +22,7 @@ struct PointCloudFile {
   std::vector<float> intensity;              // as the file has it
   std::vector<std::uint8_t> classification;  // ASPRS classes, LAS only
   std::vector<double> gps_time;              // LAS: GPS time as stored (week or adjusted standard)
-  std::string coordinate_system;             // LAS: "EPSG:25832" or WKT; empty if not given
+  std::string coordinate_system;             // LAS, E57: "EPSG:25832" or WKT; empty if not given
   std::string format;                        // "LAZ 1.4, point format 6", "PCD binary"
   // Distance of neighbouring numbers at the first point, in which a file of single precision holds
   // its coordinates; 0: it holds them in double precision.
@@ -29,10 +30,14 @@ struct PointCloudFile {
   std::uint64_t not_finite = 0;  // points that were left out
 };
 
-// Reads .las, .laz, .pcd, .ply or KITTI .bin (told by content, .bin by name). Points that are NaN
-// or infinite are left out. A file that breaks off gives the points up to there and a warning
-// ("recording.damaged"); throws InputError if no point can be had from it. Of LAS and LAZ each
-// point polls `progress`.
+// Whether the name ends like that of a file that can hold a map: .las, .laz, .e57, .ply, .pcd, in
+// capital letters, too. (.bin is one scan.)
+[[nodiscard]] bool has_map_name(const std::filesystem::path& path);
+
+// Reads .las, .laz, .e57, .pcd, .ply or KITTI .bin (told by content, .bin by name). Points that are
+// NaN or infinite are left out. A file that breaks off gives the points up to there and a warning
+// ("recording.damaged"); throws InputError if no point can be had from it. Of LAS, LAZ and E57
+// each point polls `progress`.
 [[nodiscard]] PointCloudFile read_cloud(const std::string& path, Log& log,
                                         const ProgressSink& progress = {});
 [[nodiscard]] PointCloudFile read_cloud(ByteSource& file, Log& log,

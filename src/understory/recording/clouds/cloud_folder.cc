@@ -103,6 +103,10 @@ CloudTable read_table(const std::string& path, Log& log) {
       return read_ply(*file, log);
     case CloudFormat::kKitti:
       return read_kitti(*file, log);
+    case CloudFormat::kE57:
+      throw InputError(
+          path, "",
+          "an E57 file holds a finished map and no times. For trees in it: understory inventory");
     case CloudFormat::kUnknown:
       break;
   }

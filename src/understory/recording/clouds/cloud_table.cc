@@ -86,6 +86,7 @@ CloudFormat cloud_format(ByteSource& file) {
       file.read(0, reinterpret_cast<std::uint8_t*>(head.data()), head.size() - 1);
   const std::string_view text(head.data(), got);
   if (text.rfind("LASF", 0) == 0) return CloudFormat::kLas;
+  if (text.rfind("ASTM-E57", 0) == 0) return CloudFormat::kE57;
   if (text.rfind("ply\n", 0) == 0 || text.rfind("ply\r", 0) == 0) return CloudFormat::kPly;
   if (text.rfind("# .PCD", 0) == 0 || text.rfind("VERSION", 0) == 0 ||
       text.find("\nVERSION") != std::string_view::npos)

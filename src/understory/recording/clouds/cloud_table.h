@@ -43,7 +43,7 @@ void store_number(double value, FieldType type, std::uint8_t* into);
 [[nodiscard]] CloudTable read_kitti(ByteSource& file, Log& log);
 
 // Formats of files that hold one cloud.
-enum class CloudFormat { kUnknown, kPcd, kPly, kLas, kKitti };
+enum class CloudFormat { kUnknown, kPcd, kPly, kLas, kE57, kKitti };
 // By the first bytes; KITTI, which has no header, by the name's end (.bin).
 [[nodiscard]] CloudFormat cloud_format(ByteSource& file);
 

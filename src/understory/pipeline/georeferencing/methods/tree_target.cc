@@ -12,6 +12,7 @@
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/georeference/trees/tree_map_file.h"
 #include "understory/pipeline/inventory/stand_cloud.h"
+#include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
 #include "understory/util/median.h"
 
@@ -20,13 +21,6 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-bool is_cloud(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
-  return ending == ".las" || ending == ".laz" || ending == ".pcd" || ending == ".ply";
-}
 
 // The highest return above the ground in each cell.
 Raster canopy_of(const PointBlocks& blocks, const GroundModel& ground, const Vector2d& origin,
@@ -130,7 +124,7 @@ TreeTarget read_tree_target(const std::filesystem::path& path, const std::string
                             const TreeTargetConfig& config, Log& log,
                             const ProgressSink& progress) {
   TreeTarget target;
-  target.from_cloud = is_cloud(path);
+  target.from_cloud = has_map_name(path);
   if (!std::filesystem::exists(path))
     throw InputError(path.string(), "", "expected a map of trees: no such file");
   const TreeMapFile map = target.from_cloud ? tops_of(path, system, config, log, progress)
