@@ -9,7 +9,7 @@ import subprocess
 
 from disk import Disk, MAKE, WRITE, read_log
 
-DENSE = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "map.laz", "trees.csv", "dtm.tif", "chm.tif"]
+DENSE = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "map.laz", "trees.csv", "dtm.tif", "chm.tif", "dsm.tif"]
 STEMS = ["stems.csv.gz", "trajectory.tum", "odometry.tum", "steps.csv", "corrections.csv", "loops.csv", "trees.csv"]
 # The file that tells how far a run has come, the length of the record of a scan in it, and where its stamp stands.
 PROGRESS = {"dense": ("journal.bin", None, 0), "sparse": ("views.bin", 66, 2)}

@@ -163,12 +163,16 @@ def rasters(folder):
     if not shutil.which("gdalinfo"):
         return "GDAL's tools are not installed"
     _, points = package(RUN)
-    for name in ("dtm.tif", "chm.tif"):
+    for name in ("dtm.tif", "chm.tif", "dsm.tif"):
         info = json.loads(tool("gdalinfo", "-json", RUN / name))
         assert 'ID["EPSG",3067]' in info["coordinateSystem"]["wkt"], name
         step = info["geoTransform"]
         assert step[2] == step[4] == 0 and step[1] == -step[5] == 0.5, step
         assert "coordinateSystem" not in json.loads(tool("gdalinfo", "-json", LOCAL / name))
+    at = [f"{value:.3f}" for value in points[0][:2]]
+    ground, above, surface = (float(tool("gdallocationinfo", "-geoloc", "-valonly", RUN / name, *at))
+                              for name in ("dtm.tif", "chm.tif", "dsm.tif"))
+    assert above > 2 and abs(ground + above - surface) < 0.3, (ground, above, surface)
     heights = []
     for east, north, up in points[:10]:
         said = tool("gdallocationinfo", "-geoloc", "-valonly", RUN / "dtm.tif", f"{east:.3f}", f"{north:.3f}").strip()
@@ -185,8 +189,8 @@ def project(folder):
     for run, code in ((RUN, "EPSG:3067"), (LOCAL, None)):
         root = xml.parse(run / "map.qgs").getroot()
         sources = [layer.findtext("datasource") for layer in root.find("projectlayers")]
-        assert sources == ["./trees.gpkg|layername=trees", "./trees.gpkg|layername=path", "./chm.tif", "./dtm.tif",
-                           "./map.laz"], sources
+        assert sources == ["./trees.gpkg|layername=trees", "./trees.gpkg|layername=path", "./chm.tif", "./dsm.tif",
+                           "./dtm.tif", "./map.laz"], sources
         assert all((run / source.split("|")[0]).exists() for source in sources)
         assert root.findtext("projectCrs/spatialrefsys/authid") == (code or ""), code
         assert root.findtext("properties/Paths/Absolute") == "false"

@@ -32,4 +32,19 @@ double Raster::interpolate(double x, double y) const {
   return weights >= 0.25 ? z0 + sum / weights : kUnknown;
 }
 
+Raster raised_by(const Raster& ground, const Raster& above) {
+  Raster surface = above;
+  surface.z0 = ground.z0;
+  for (int row = 0; row < above.rows; ++row) {
+    for (int column = 0; column < above.columns; ++column) {
+      const double x = above.x0 + (column + 0.5) * above.cell_m;
+      const double y = above.y0 + (row + 0.5) * above.cell_m;
+      const std::size_t at = above.index(column, row);
+      const double height = above.z0 + static_cast<double>(above.values[at]);
+      surface.values[at] = static_cast<float>(ground.interpolate(x, y) - ground.z0 + height);
+    }
+  }
+  return surface;
+}
+
 }  // namespace understory

@@ -44,4 +44,8 @@ struct Raster {
   [[nodiscard]] double interpolate(double x, double y) const;
 };
 
+// Heights over the cells of `above`, whose own are heights above the ground: those of the ground
+// are added. NaN where either is. Both in one frame.
+[[nodiscard]] Raster raised_by(const Raster& ground, const Raster& above);
+
 }  // namespace understory

@@ -13,7 +13,9 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
   if (!inventory.ground.terrain.empty()) {
     write_geotiff(folder / "dtm.tif", inventory.ground.terrain, crs);
   }
-  if (!inventory.canopy.empty()) write_geotiff(folder / "chm.tif", inventory.canopy, crs);
+  if (inventory.canopy.empty()) return;
+  write_geotiff(folder / "chm.tif", inventory.canopy, crs);
+  write_geotiff(folder / "dsm.tif", raised_by(inventory.ground.terrain, inventory.canopy), crs);
 }
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,

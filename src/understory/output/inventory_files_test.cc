@@ -30,9 +30,10 @@ class InventoryFilesTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(InventoryFilesTest, APlotHasTreesTwiceAndBothRasters) {
+TEST_F(InventoryFilesTest, APlotHasTreesTwiceAndAllRasters) {
   write_inventory_files(folder_.path(), plot(), "EPSG:3067");
-  EXPECT_EQ(names(), (std::set<std::string>{"trees.csv", "trees.gpkg", "dtm.tif", "chm.tif"}));
+  EXPECT_EQ(names(),
+            (std::set<std::string>{"trees.csv", "trees.gpkg", "dtm.tif", "chm.tif", "dsm.tif"}));
   CsvReader trees(folder_ / "trees.csv");
   EXPECT_TRUE(trees.next() && trees.next());
   EXPECT_FALSE(trees.next());
@@ -50,7 +51,8 @@ TEST_F(InventoryFilesTest, OfARunOnTheGlobeTheLayersAreInItsSystem) {
   CsvReader trees(folder_ / "trees.csv");
   ASSERT_TRUE(trees.next());
   EXPECT_EQ(trees.number("x"), 0.0);
-  EXPECT_EQ(names(), (std::set<std::string>{"trees.csv", "trees.gpkg", "dtm.tif", "chm.tif"}));
+  EXPECT_EQ(names(),
+            (std::set<std::string>{"trees.csv", "trees.gpkg", "dtm.tif", "chm.tif", "dsm.tif"}));
 }
 
 TEST_F(InventoryFilesTest, ThePictureTellsGroundFromVegetationByTheTerrain) {

@@ -89,15 +89,15 @@ void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tr
 void write_raster_layers(const std::filesystem::path& folder, const Raster& terrain,
                          const Raster& canopy, const FrameChange& change,
                          const LayerFrame& layers) {
-  const auto write = [&](const char* name, const Raster& own, CellHeights heights,
-                         const std::string& meaning) {
-    write_geotiff(folder / name, moved_raster(own, terrain, change, heights), layers.wkt(),
-                  meaning);
-  };
   if (terrain.empty()) return;
-  write("dtm.tif", terrain, CellHeights::kOfGround, band_meaning("height of the ground", layers));
-  if (!canopy.empty())
-    write("chm.tif", canopy, CellHeights::kAboveGround, "height of the canopy above the ground");
+  const Raster ground = moved_raster(terrain, terrain, change, CellHeights::kOfGround);
+  write_geotiff(folder / "dtm.tif", ground, layers.wkt(),
+                band_meaning("height of the ground", layers));
+  if (canopy.empty()) return;
+  const Raster above = moved_raster(canopy, terrain, change, CellHeights::kAboveGround);
+  write_geotiff(folder / "chm.tif", above, layers.wkt(), "height of the canopy above the ground");
+  write_geotiff(folder / "dsm.tif", raised_by(ground, above), layers.wkt(),
+                band_meaning("height of the surface, treetops included", layers));
 }
 
 void write_layer_project(const std::filesystem::path& folder, const std::string& title,

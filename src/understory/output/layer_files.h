@@ -30,8 +30,8 @@ namespace understory {
 void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
                        const std::vector<StampedPose>& path, const LayerFrame& layers);
 
-// Writes dtm.tif and chm.tif (where it is not empty) over cells of the layers' grid. `change` leads
-// there from the frame of the rasters. Throws OutputError.
+// Writes dtm.tif, and chm.tif and dsm.tif where the canopy is not empty, over cells of the layers'
+// grid. `change` leads there from the frame of the rasters. Throws OutputError.
 void write_raster_layers(const std::filesystem::path& folder, const Raster& terrain,
                          const Raster& canopy, const FrameChange& change, const LayerFrame& layers);
 

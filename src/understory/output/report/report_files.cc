@@ -16,7 +16,7 @@ struct ResultFile {
 };
 
 // In the order in which a user wants them; docs/reference/outputs.md has their columns.
-constexpr std::array<ResultFile, 22> kResultFiles = {
+constexpr std::array<ResultFile, 23> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
      {"trees.gpkg", "the same trees as points on a map, and the path",
@@ -26,6 +26,7 @@ constexpr std::array<ResultFile, 22> kResultFiles = {
       "CloudCompare, QGIS"},
      {"dtm.tif", "height of the ground", "QGIS"},
      {"chm.tif", "height of the canopy above the ground", "QGIS"},
+     {"dsm.tif", "height of the surface, treetops included", "QGIS"},
      {"trajectory.tum", "the path of the scanner: time, place, attitude", "a text editor, evo"},
      {"gnss.csv", "the fixes of the GNSS receiver", "a spreadsheet"},
      {"global.csv.gz", "place on the globe at each scan, while the run went on",

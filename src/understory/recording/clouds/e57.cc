@@ -107,7 +107,8 @@ E57Scan scan_of(const pugi::xml_node& node, const std::string& file) {
   add_fields(points.child("prototype"), 0, scan.fields);
   for (const pugi::xml_node& codec : points.child("codecs").children()) {
     if (codec.type() == pugi::node_element && !codec.child("bitPackCodec"))
-      throw InputError(file, "scan " + scan.name, "expected points in bit packs, not another codec");
+      throw InputError(file, "scan " + scan.name,
+                       "expected points in bit packs, not another codec");
   }
   return scan;
 }
@@ -116,13 +117,14 @@ std::string xml_of(E57Pages& pages, const FileHead& head, const std::string& fil
   if (head.xml_length == 0 || head.xml_length > kMostXmlBytes)
     throw InputError(file, "header", "expected an XML part of at most 256 MB");
   std::string text(head.xml_length, '\0');
-  const std::size_t got = pages.read(
-      head.xml_position, reinterpret_cast<std::uint8_t*>(text.data()), text.size());
+  const std::size_t got =
+      pages.read(head.xml_position, reinterpret_cast<std::uint8_t*>(text.data()), text.size());
   if (got < text.size())
-    throw InputError(file, "XML part",
-                     pages.damaged_at() >= 0
-                         ? "is damaged (checksum)"
-                         : "the file ends before it: it is not whole, and says nowhere else what it holds");
+    throw InputError(
+        file, "XML part",
+        pages.damaged_at() >= 0
+            ? "is damaged (checksum)"
+            : "the file ends before it: it is not whole, and says nowhere else what it holds");
   return text;
 }
 
@@ -289,9 +291,9 @@ class ScanReader {
       if (spherical_) {
         const Eigen::Vector3d at = three_of(*spherical_);  // range, azimuth, elevation
         if (!cartesian_)
-          point.position = at[0] * Eigen::Vector3d(std::cos(at[2]) * std::cos(at[1]),
-                                                   std::cos(at[2]) * std::sin(at[1]),
-                                                   std::sin(at[2]));
+          point.position =
+              at[0] * Eigen::Vector3d(std::cos(at[2]) * std::cos(at[1]),
+                                      std::cos(at[2]) * std::sin(at[1]), std::sin(at[2]));
       }
       const bool valid = !invalid_ || streams_[*invalid_].next() == 0.0;
       if (intensity_) point.intensity = static_cast<float>(streams_[*intensity_].next());
@@ -365,8 +367,9 @@ void read_e57_points(ByteSource& file, const E57Header& header, Log& log,
     E57Pages pages(file);
     ScanReader reader(pages, scan);
     if (!reader.has_points())
-      throw InputError(file.name(), "scan " + scan.name,
-                       "expected the fields cartesianX, Y, Z or sphericalRange, Azimuth, Elevation");
+      throw InputError(
+          file.name(), "scan " + scan.name,
+          "expected the fields cartesianX, Y, Z or sphericalRange, Azimuth, Elevation");
     const std::uint64_t given = reader.read(visit);
     all += given;
     if (given == scan.points) continue;

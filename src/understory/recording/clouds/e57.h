@@ -34,7 +34,7 @@ struct E57Scan {
 // What the XML part of an E57 file tells.
 struct E57Header {
   std::vector<E57Scan> scans;
-  std::string coordinate_system;  // WKT, or empty
+  std::string coordinate_system;             // WKT, or empty
   [[nodiscard]] bool has_intensity() const;  // all scans have it
 };
 

@@ -28,7 +28,8 @@ Bytes packed(const std::vector<std::uint64_t>& values, int bits) {
   std::size_t at = 0;
   for (const std::uint64_t value : values) {
     for (int bit = 0; bit < bits; ++bit, ++at)
-      bytes[at / 8] |= static_cast<std::uint8_t>(((value >> static_cast<unsigned>(bit)) & 1U) << (at % 8));
+      bytes[at / 8] |=
+          static_cast<std::uint8_t>(((value >> static_cast<unsigned>(bit)) & 1U) << (at % 8));
   }
   return bytes;
 }
@@ -56,7 +57,9 @@ Bytes packet(const std::vector<Bytes>& streams) {
   return whole;
 }
 
-std::uint64_t physical(std::uint64_t logical) { return E57Pages::behind(0, logical); }
+std::uint64_t physical(std::uint64_t logical) {
+  return E57Pages::behind(0, logical);
+}
 
 // An E57 file made by hand: sections of packets, and an XML part that names them.
 class E57Maker {
@@ -176,8 +179,8 @@ TEST(E57, NumbersOfAnyBitsRunOnFromPacketToPacket) {
     invalid.push_back(i % 10 == 3 ? 2 : 0);
     intensity.push_back(i % 256);
   }
-  const std::vector<Bytes> whole = {packed(x, 17), packed(y, 17), {}, packed(invalid, 2),
-                                    packed(intensity, 8)};
+  const std::vector<Bytes> whole = {
+      packed(x, 17), packed(y, 17), {}, packed(invalid, 2), packed(intensity, 8)};
   std::vector<Bytes> packets;
   std::vector<std::size_t> at(whole.size(), 0);
   for (int part = 0; part < 4; ++part) {
@@ -212,9 +215,9 @@ TEST(E57, RangesAndAnglesBecomePoints) {
   const std::uint64_t place =
       maker.add_section({packet({floats({10, 4}), floats({0, half}), floats({0, half / 3})})});
   std::string prototype = kFloats;
-  for (const auto& [from, to] : {std::pair{"cartesianX", "sphericalRange"},
-                                 std::pair{"cartesianY", "sphericalAzimuth"},
-                                 std::pair{"cartesianZ", "sphericalElevation"}})
+  for (const auto& [from, to] :
+       {std::pair{"cartesianX", "sphericalRange"}, std::pair{"cartesianY", "sphericalAzimuth"},
+        std::pair{"cartesianZ", "sphericalElevation"}})
     prototype.replace(prototype.find(from), std::strlen(from), to);
   const ReadCloud got = read(maker.file(scan_xml(place, 2, prototype)));
   ASSERT_EQ(got.cloud.points.size(), 2U);
@@ -227,8 +230,7 @@ TEST(E57, ScansFollowEachOtherAndOneThatIsDamagedCostsNoOther) {
   std::vector<float> many(2000, 3.0F);
   const std::uint64_t first =
       maker.add_section({packet({floats(many), floats(many), floats(many)})});
-  const std::uint64_t second =
-      maker.add_section({packet({floats({1}), floats({2}), floats({3})})});
+  const std::uint64_t second = maker.add_section({packet({floats({1}), floats({2}), floats({3})})});
   const std::string scans = scan_xml(first, 2000, kFloats) + scan_xml(second, 1, kFloats);
   Bytes bytes = maker.file(scans);
   EXPECT_EQ(read(bytes).cloud.points.size(), 2001U);
@@ -241,8 +243,7 @@ TEST(E57, ScansFollowEachOtherAndOneThatIsDamagedCostsNoOther) {
 
 TEST(E57, WhatCannotBeReadIsNamed) {
   E57Maker maker;
-  const std::uint64_t place =
-      maker.add_section({packet({floats({1}), floats({2}), floats({3})})});
+  const std::uint64_t place = maker.add_section({packet({floats({1}), floats({2}), floats({3})})});
   const Bytes good = maker.file(scan_xml(place, 1, kFloats));
   Bytes cut(good.begin(), good.begin() + 100);
   EXPECT_NE(refusal(cut).find("within its header"), std::string::npos) << refusal(cut);
@@ -250,18 +251,21 @@ TEST(E57, WhatCannotBeReadIsNamed) {
   damaged[60] ^= 4U;
   EXPECT_NE(refusal(damaged).find("checksum"), std::string::npos) << refusal(damaged);
   EXPECT_NE(refusal(maker.file("")).find("no scan"), std::string::npos);
-  EXPECT_NE(refusal(maker.file(scan_xml(place, 1, "<rowIndex type=\"Integer\"/>"))).find("cartesianX"),
+  EXPECT_NE(
+      refusal(maker.file(scan_xml(place, 1, "<rowIndex type=\"Integer\"/>"))).find("cartesianX"),
+      std::string::npos);
+  EXPECT_NE(refusal(maker.file(scan_xml(1U << 30U, 1, kFloats))).find("not one"),
             std::string::npos);
-  EXPECT_NE(refusal(maker.file(scan_xml(1U << 30U, 1, kFloats))).find("not one"), std::string::npos);
   EXPECT_NE(refusal(maker.file("<vectorChild>")).find("XML"), std::string::npos);
 }
 
 TEST(E57, ACountThatNoFileHoldsTakesNoTime) {
   E57Maker maker;
   const std::uint64_t place = maker.add_section({});
-  const std::string same = "<cartesianX type=\"Integer\" minimum=\"1\" maximum=\"1\"/>"
-                           "<cartesianY type=\"Integer\" minimum=\"2\" maximum=\"2\"/>"
-                           "<cartesianZ type=\"Integer\" minimum=\"3\" maximum=\"3\"/>";
+  const std::string same =
+      "<cartesianX type=\"Integer\" minimum=\"1\" maximum=\"1\"/>"
+      "<cartesianY type=\"Integer\" minimum=\"2\" maximum=\"2\"/>"
+      "<cartesianZ type=\"Integer\" minimum=\"3\" maximum=\"3\"/>";
   const ReadCloud got = read(maker.file(scan_xml(place, std::size_t{1} << 60U, same)));
   EXPECT_EQ(got.cloud.points.size(), 1'000'000U);
   EXPECT_EQ(got.damage, 1U);
