@@ -278,8 +278,8 @@ TEST(Extrinsics, OtherSensorsMoveToTheBodyOfTheFile) {
   recorded.body_frame = "imu";
   recorded.body_from_lidar = Pose(so3_exp({0.1, 0.2, 0.3}), {0.01, 0.02, 0.03});
   recorded.body_from_imu = Pose();
-  recorded.body_from_gnss = Pose(so3_exp({}), {0.0, 0.0, 1.0});
-  recorded.body_from_second_gnss = Pose(so3_exp({}), {1.0, 0.0, 1.0});
+  recorded.body_from_gnss = Pose(Eigen::Quaterniond::Identity(), {0.0, 0.0, 1.0});
+  recorded.body_from_second_gnss = Pose(Eigen::Quaterniond::Identity(), {1.0, 0.0, 1.0});
   recorded.imu_extrinsic_source = "sensor metadata";
   const Pose base_from_lidar(Eigen::Quaterniond::Identity(), {1.0, 2.0, 3.0});
   const std::string place = "{translation_m: [1, 2, 3]}\n";
@@ -331,10 +331,10 @@ TEST(Extrinsics, AFilePlacesTheSecondAntenna) {
   write_bytes(path, {text.begin(), text.end()});
   Rig rig;
   rig.body_frame = "imu";
-  rig.body_from_second_gnss = Pose(so3_exp({}), {1.0, 0.0, 1.0});
+  rig.body_from_second_gnss = Pose(Eigen::Quaterniond::Identity(), {1.0, 0.0, 1.0});
   Log log;
   apply_extrinsics_file(path, {}, rig, log);
-  expect_near(rig.body_from_second_gnss, Pose(so3_exp({}), {1.0, 2.0, 3.0}));
+  expect_near(rig.body_from_second_gnss, Pose(Eigen::Quaterniond::Identity(), {1.0, 2.0, 3.0}));
   EXPECT_NE(rig.second_gnss_extrinsic_source.find("extrinsics file"), std::string::npos);
 }
 

@@ -239,7 +239,7 @@ TEST(Mcap, KeepsTheHeadingOfASecondAntenna) {
   const TemporaryFolder folder;
   const std::string path = folder / "two_antennas.mcap";
   Drive drive = make_drive(3);
-  drive.rig.body_from_second_gnss = Pose(so3_exp({}), {1.0, 0.25, 2.0});
+  drive.rig.body_from_second_gnss = Pose(Eigen::Quaterniond::Identity(), {1.0, 0.25, 2.0});
   int number = 0;
   for (Event& event : drive.events) {
     auto* fix = std::get_if<GnssFix>(&event);
