@@ -16,6 +16,7 @@
 #include "understory/recording/messages/message_survey.h"
 #include "understory/recording/messages/packet_topic.h"
 #include "understory/recording/messages/point_cloud.h"
+#include "understory/recording/messages/sensor_places.h"
 #include "understory/recording/messages/topic_statistics.h"
 #include "understory/util/error.h"
 
@@ -37,7 +38,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
  public:
   MessageRecording(std::string file, const MessageSourceFactory& open, const OpenOptions& options,
                    Log& log)
-      : file_(std::move(file)), log_(log), extrinsics_file_(options.extrinsics_file) {
+      : file_(std::move(file)),
+        log_(log),
+        places_(survey_.transforms, options.extrinsics_file, log) {
     Log quiet;  // the same damage will be met again when reading
     const auto ahead = open(quiet);
     survey_ = survey_messages(*ahead);
@@ -50,7 +53,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     source_ = open(log_);
     note_frames();
     make_rig(ahead->sensor_metadata());
-    if (lacks_place() && survey_late_transforms(*ahead, survey_)) place_sensors();
+    if (places_.lacks_any() && survey_late_transforms(*ahead, survey_)) place_sensors();
     warn_of_missing_place();
     judge_lidar();
     judge_imu();
@@ -81,10 +84,11 @@ class MessageRecording : public Recording, public ArrivalTimes {
     source_->save(writer);
     survey_.transforms.save(writer);
     put_strings(writer, frame_of_topic_);
-    for (const std::string& text : {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality,
-                                    frames_.lidar, frames_.imu, frames_.gnss, frames_.second_gnss})
+    for (const std::string& text :
+         {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality, places_.frames().lidar,
+          places_.frames().imu, places_.frames().gnss, places_.frames().second_gnss})
       writer.put(text);
-    put_rig(writer, rig_);
+    put_rig(writer, places_.rig());
     writer.put(scan_given_);
     writer.put(convention_.has_value());
     if (convention_) put_convention(writer, *convention_);
@@ -105,10 +109,11 @@ class MessageRecording : public Recording, public ArrivalTimes {
     source_->load(reader);
     survey_.transforms.load(reader);
     frame_of_topic_ = get_strings(reader);
-    for (std::string* text : {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality,
-                              &frames_.lidar, &frames_.imu, &frames_.gnss, &frames_.second_gnss})
+    for (std::string* text :
+         {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality, &places_.frames().lidar,
+          &places_.frames().imu, &places_.frames().gnss, &places_.frames().second_gnss})
       *text = reader.get_string();
-    rig_ = get_rig(reader);
+    places_.rig() = get_rig(reader);
     scan_given_ = reader.get<bool>();
     convention_.reset();
     if (reader.get<bool>()) convention_ = get_convention(reader);
@@ -126,7 +131,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     ended_ = reader.get<bool>();
   }
 
-  [[nodiscard]] const Rig& rig() const override { return rig_; }
+  [[nodiscard]] const Rig& rig() const override { return places_.rig(); }
   [[nodiscard]] std::vector<TopicReport> topics() const override {
     std::vector<TopicReport> reports;
     for (const auto& [name, statistics] : topics_)
@@ -144,8 +149,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
       return found == nullptr ? std::string() : found->frame;
     };
     const TopicSurvey* headings = topic_of_headings();
-    frames_ = {frame_of(choice_.lidar), frame_of(choice_.imu), frame_of(choice_.gnss),
-               headings == nullptr ? "" : headings->frame};
+    places_.frames() = {frame_of(choice_.lidar), frame_of(choice_.imu), frame_of(choice_.gnss),
+                        headings == nullptr ? "" : headings->frame};
   }
 
   [[nodiscard]] const TopicSurvey* topic_of_headings() const {
@@ -157,47 +162,20 @@ class MessageRecording : public Recording, public ArrivalTimes {
 
   void make_rig(const std::map<std::string, std::string>& metadata) {
     const auto model = metadata.find("lidar_model");
-    if (model != metadata.end()) rig_.lidar_model = model->second;
+    if (model != metadata.end()) places_.rig().lidar_model = model->second;
     const auto rings = metadata.find("ring_count");
     if (rings != metadata.end()) ring_count_ = std::atoi(rings->second.substr(0, 6).c_str());
     place_sensors();
   }
 
-  // The rig by what is known of frames and transforms. Once a scan has been given the body stays
-  // what it is, and only the places of other sensors are added. True if there was anything new.
-  bool place_sensors() {
-    if (scan_given_)
-      return extrinsics_file_.empty() && complete_rig(survey_.transforms, frames_, rig_);
-    const bool had_imu = rig_.body_from_imu.has_value();
-    const std::string model = rig_.lidar_model;
-    rig_ = rig_from_transforms(survey_.transforms, frames_);
-    rig_.lidar_model = model;
-    apply_extrinsics();
-    return !had_imu && rig_.body_from_imu;
-  }
-
-  // The file speaks of the recording's body by its frame or by the sensor's kind.
-  void apply_extrinsics() {
-    if (extrinsics_file_.empty()) return;
-    const std::string own = rig_.body_frame == "imu"     ? frames_.imu
-                            : rig_.body_frame == "lidar" ? frames_.lidar
-                                                         : rig_.body_frame;
-    Log quiet;
-    apply_extrinsics_file(extrinsics_file_, {own}, rig_, extrinsics_told_ ? quiet : log_);
-    extrinsics_told_ = true;
-  }
-
-  [[nodiscard]] bool lacks_place() const {
-    return (!frames_.imu.empty() && !rig_.body_from_imu) ||
-           (!frames_.gnss.empty() && !rig_.body_from_gnss) ||
-           (!frames_.second_gnss.empty() && !rig_.body_from_second_gnss);
-  }
+  // Once a scan has been given the body stays what it is.
+  bool place_sensors() { return places_.place(scan_given_); }
 
   void warn_of_missing_place() {
-    if (choice_.imu.empty() || choice_.lidar.empty() || rig_.body_from_imu) return;
+    if (choice_.imu.empty() || choice_.lidar.empty() || places_.rig().body_from_imu) return;
     log_.warn("recording.no_imu_extrinsics",
-              file_ + ": the place of the IMU (" + frames_.imu + ") relative to the lidar (" +
-                  frames_.lidar +
+              file_ + ": the place of the IMU (" + places_.frames().imu +
+                  ") relative to the lidar (" + places_.frames().lidar +
                   ") is not known: it is not used until a transform tells it. Give --extrinsics "
                   "FILE");
   }
@@ -207,7 +185,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     if (!known.empty() || frame.empty()) return;
     known = frame;
     place_sensors();
-    if (&known == &frames_.imu) warn_of_missing_place();
+    if (&known == &places_.frames().imu) warn_of_missing_place();
   }
 
   void judge_lidar() {
@@ -364,7 +342,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
                     " have impossible times; dropped");
     topic.add_stamp(cloud->header.stamp);
     topic.report().frame = cloud->header.frame;
-    note_frame(frames_.lidar, cloud->header.frame);
+    note_frame(places_.frames().lidar, cloud->header.frame);
     topic.report().conventions = convention_->text;
     topic.report().points += converted.scan->points.size();
     topic.report().empty_points += converted.without_return;
@@ -388,10 +366,10 @@ class MessageRecording : public Recording, public ArrivalTimes {
     if (is_of_another(topic, message->header.frame, "packets")) return true;
     topic.add_stamp(message->header.stamp);
     topic.report().frame = message->header.frame;
-    note_frame(frames_.lidar, message->header.frame);
+    note_frame(places_.frames().lidar, message->header.frame);
     topic.report().points += packets().add(*message, events_);
     topic.report().conventions = packets_->conventions();
-    if (rig_.lidar_model.empty()) rig_.lidar_model = packets_->model();
+    if (places_.rig().lidar_model.empty()) places_.rig().lidar_model = packets_->model();
     return true;
   }
 
@@ -402,7 +380,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     topic.add_stamp(imu->sample.stamp);
     topic.report().frame = imu->header.frame;
     if (!imu_unit_.known()) judge_imu_by(imu->sample.specific_force.norm());
-    note_frame(frames_.imu, imu->header.frame);
+    note_frame(places_.frames().imu, imu->header.frame);
     topic.report().conventions =
         imu_unit_.text() + (imu->sample.orientation ? "; with orientation" : "");
     if (!imu->sample.specific_force.allFinite() || !imu->sample.angular_rate.allFinite()) {
@@ -459,7 +437,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
       fixes_.expect_quality();
       fixes_.add_quality(gnss->fix, events_);
     } else {
-      note_frame(frames_.gnss, gnss->header.frame);
+      note_frame(places_.frames().gnss, gnss->header.frame);
       fixes_.add_position(gnss->fix, message.log_time, events_);
     }
     return true;
@@ -474,7 +452,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     const auto sentence = parse_nmea(message->sentence);
     if (!sentence || !sentence->heading_deg) return true;
     topic.report().conventions = "heading of a second antenna";
-    note_frame(frames_.second_gnss, message->header.frame);
+    note_frame(places_.frames().second_gnss, message->header.frame);
     fixes_.expect_heading();
     fixes_.add_heading(nmea_fix(*sentence, message->header.stamp), events_);
     return true;
@@ -486,11 +464,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
   TopicChoice choice_;
   std::map<std::string, std::string> frame_of_topic_;  // of the sensor that is used
   std::unique_ptr<MessageSource> source_;
-  SensorFrames frames_;
-  std::string extrinsics_file_;
-  Rig rig_;
+  SensorPlaces places_;
   bool scan_given_ = false;
-  bool extrinsics_told_ = false;  // what the file leaves open has been warned of
   std::optional<TimeConvention> convention_;
   int ring_count_ = 0;
   ImuUnit imu_unit_;

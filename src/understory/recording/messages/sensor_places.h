@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+
+#include "understory/recording/extrinsics.h"
+#include "understory/sensor/rig.h"
+#include "understory/util/log.h"
+
+namespace understory {
+
+// Where the sensors of a recording are on its body: by the frames of their messages, the transforms
+// between frames, and an extrinsics file. More of each may become known while the recording is
+// read. Not thread-safe.
+class SensorPlaces {
+ public:
+  // `transforms` may grow; both it and `log` must outlive this. No file: an empty name.
+  SensorPlaces(const TransformTree& transforms, std::string extrinsics_file, Log& log)
+      : transforms_(transforms), extrinsics_file_(std::move(extrinsics_file)), log_(log) {}
+
+  // The rig by what is known now. With `body_stays` the body is what it was, and only the places of
+  // other sensors are added. True if one was added that matters to a run that goes on.
+  bool place(bool body_stays);
+  // Whether there is a sensor whose place is not known.
+  [[nodiscard]] bool lacks_any() const;
+
+  [[nodiscard]] SensorFrames& frames() { return frames_; }
+  [[nodiscard]] const SensorFrames& frames() const { return frames_; }
+  [[nodiscard]] Rig& rig() { return rig_; }
+  [[nodiscard]] const Rig& rig() const { return rig_; }
+
+ private:
+  void apply_extrinsics();
+
+  const TransformTree& transforms_;
+  std::string extrinsics_file_;
+  Log& log_;
+  SensorFrames frames_;
+  Rig rig_;
+  bool extrinsics_told_ = false;  // what the file leaves open has been warned of
+};
+
+}  // namespace understory
