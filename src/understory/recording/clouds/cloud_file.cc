@@ -70,6 +70,8 @@ PointCloudFile read_e57_cloud(ByteSource& file, Log& log, const ProgressSink& pr
     progress.poll();
     if (collector.add(point.position) && intensity) cloud.intensity.push_back(point.intensity);
   });
+  if (!cloud.points.empty())
+    cloud.step = header.scans.front().step_at(cloud.origin + cloud.points.front().cast<double>());
   return cloud;
 }
 

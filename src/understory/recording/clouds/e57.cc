@@ -74,6 +74,7 @@ E57Field field_of(const pugi::xml_node& node) {
     field.kind = E57Field::Kind::kInteger;
     field.least = integer_of(node, "minimum", std::numeric_limits<std::int64_t>::min());
     const std::int64_t most = integer_of(node, "maximum", std::numeric_limits<std::int64_t>::max());
+    if (most < field.least) field.kind = E57Field::Kind::kOther;  // no number lies between
     const std::uint64_t span =
         static_cast<std::uint64_t>(most) - static_cast<std::uint64_t>(field.least);
     field.bits = std::bit_width(span);
@@ -101,7 +102,7 @@ E57Scan scan_of(const pugi::xml_node& node, const std::string& file) {
   scan.name = node.child("name").child_value();
   const pugi::xml_node points = node.child("points");
   scan.points = points.attribute("recordCount").as_ullong();
-  scan.position = points.attribute("fileOffset").as_ullong();
+  scan.section = points.attribute("fileOffset").as_ullong();
   if (scan.points == 0) return scan;
   scan.file_from_scan = pose_of(node, file);
   add_fields(points.child("prototype"), 0, scan.fields);
@@ -218,10 +219,9 @@ class ScanReader {
   // The number of points that were there, invalid ones too.
   std::uint64_t read(const std::function<void(const E57Point&)>& visit) {
     std::array<std::uint64_t, 4> head{};  // of the section
-    if (pages_.read(scan_.position, reinterpret_cast<std::uint8_t*>(head.data()), 32) < 32)
-      return 0;
+    if (pages_.read(scan_.section, reinterpret_cast<std::uint8_t*>(head.data()), 32) < 32) return 0;
     std::uint64_t at = head[2];
-    const std::uint64_t end = E57Pages::behind(scan_.position, head[1]);
+    const std::uint64_t end = E57Pages::behind(scan_.section, head[1]);
     if (all_constant()) return give(std::min(scan_.points, kMostAlike), visit);
     std::uint64_t given = 0;
     while (given < scan_.points && at < end) {
@@ -330,6 +330,15 @@ bool E57Header::has_intensity() const {
     return std::any_of(scan.fields.begin(), scan.fields.end(),
                        [](const E57Field& field) { return field.name == "intensity"; });
   });
+}
+
+double E57Scan::step_at(const Eigen::Vector3d& position) const {
+  const bool coarse = std::any_of(fields.begin(), fields.end(), [](const E57Field& field) {
+    return field.name == "cartesianX" && field.kind == E57Field::Kind::kFloat;
+  });
+  if (!coarse) return 0.0;
+  const auto far = static_cast<float>((file_from_scan.inverse() * position).cwiseAbs().maxCoeff());
+  return static_cast<double>(std::nextafter(far, std::numeric_limits<float>::max()) - far);
 }
 
 E57Header read_e57_header(ByteSource& file) {

@@ -27,8 +27,12 @@ struct E57Scan {
   std::string name;
   Pose file_from_scan;
   std::uint64_t points = 0;
-  std::uint64_t position = 0;  // physical, of the section that holds the points
+  std::uint64_t section = 0;  // that holds the points: its physical place
   std::vector<E57Field> fields;
+
+  // Distance of neighbouring numbers, in which its points of single precision are held at a place
+  // in the frame of the file, m; 0: they are in double precision or scaled.
+  [[nodiscard]] double step_at(const Eigen::Vector3d& position) const;
 };
 
 // What the XML part of an E57 file tells.

@@ -163,8 +163,15 @@ TEST(E57, FloatsComeWithThePoseOfTheirScan) {
   EXPECT_LT((point(got, 1) - Vector3d(399999.25, 6800002.0, 4.0)).norm(), 1e-4);
   EXPECT_EQ(got.cloud.coordinate_system, "EPSG:3067");
   EXPECT_EQ(got.cloud.format, "E57, 1 scan");
-  EXPECT_EQ(got.cloud.step, 0.0) << "the pose is in double precision";
+  EXPECT_LT(got.cloud.step, 1e-6) << "the large part of the coordinates is in the pose";
   EXPECT_EQ(got.damage, 0U);
+}
+
+TEST(E57, FloatsFarFromTheOriginSayHowCoarseTheyAre) {
+  E57Maker maker;
+  const std::uint64_t place =
+      maker.add_section({packet({floats({400000}), floats({6.8e6F}), floats({5})})});
+  EXPECT_EQ(read(maker.file(scan_xml(place, 1, kFloats))).cloud.step, 0.5);
 }
 
 TEST(E57, NumbersOfAnyBitsRunOnFromPacketToPacket) {
@@ -254,6 +261,9 @@ TEST(E57, WhatCannotBeReadIsNamed) {
   EXPECT_NE(
       refusal(maker.file(scan_xml(place, 1, "<rowIndex type=\"Integer\"/>"))).find("cartesianX"),
       std::string::npos);
+  std::string swapped = kScaled;
+  swapped.replace(swapped.find("-50000"), 6, "90000");
+  EXPECT_NE(refusal(maker.file(scan_xml(place, 1, swapped))).find("cartesianX"), std::string::npos);
   EXPECT_NE(refusal(maker.file(scan_xml(1U << 30U, 1, kFloats))).find("not one"),
             std::string::npos);
   EXPECT_NE(refusal(maker.file("<vectorChild>")).find("XML"), std::string::npos);
