@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -12,7 +13,6 @@
 #include <vector>
 
 #include "understory/forest/forest_constants.h"
-#include "understory/geometry/symmetric_solver.h"
 
 namespace understory {
 namespace {
@@ -162,7 +162,8 @@ Eigen::Vector2d slope_of(const Columns& columns) {
       normal += row * row.transpose();
       right += low.z() * row;
     }
-    plane = SymmetricSolver<3>(normal).solve(right);
+    // Lows in one row leave a slope open, which this solver leaves at zero.
+    plane = normal.colPivHouseholderQr().solve(right);
     for (std::size_t i = 0; i < lows.size(); ++i)
       off[i] = std::abs(lows[i].z() - Vector3d(lows[i].x(), lows[i].y(), 1.0).dot(plane));
     width = kPlaneMedians * quantile(off, 0.5);

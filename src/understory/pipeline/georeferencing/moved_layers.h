@@ -19,9 +19,9 @@ struct RunLayers {
 
 // Writes what a run folder holds of map.laz, dtm.tif, chm.tif and dsm.tif to another, moved: the
 // cloud point by point, the rasters over cells of their own size, north up in the new frame. A
-// point of a layer goes back to the world frame of its run, by `target_from_world` to the world
-// frame of the result, and from there into the layers of the result. The cloud is drawn into
-// `picture`, in the frame `drawing` of the result. Throws InputError or OutputError.
+// point of a layer goes back to the world frame of its run. `target_from_world` leads from there to
+// the world frame of the result, and to its layers. The cloud is drawn into `picture`, in the frame
+// `drawing` of the result. Throws InputError or OutputError.
 void write_moved_layers(const RunLayers& from, const Pose& target_from_world, const RunLayers& to,
                         const LayerFrame& drawing, MapPicture& picture, Log& log);
 
