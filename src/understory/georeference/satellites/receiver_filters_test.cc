@@ -148,6 +148,19 @@ TEST(ReceiverFilters, SingleWildPairsHardlyCount) {
   EXPECT_LT((row * (clean.parameters().mean - wild.parameters().mean)).norm(), 0.6);
 }
 
+TEST(ReceiverFilters, ErrorsOfTheUsualSizeAreNoOutliersAndWildOnesAre) {
+  PlaneFilters filters({}, kSd);
+  SlowReceiver receiver(13, 2.0, 5.0);
+  int outliers = 0;
+  for (int k = 0; k < 4000; ++k) {
+    filters.update(pair_at(k, 2.0, receiver.next()));
+    if (k >= 100) outliers += filters.last_was_outlier() ? 1 : 0;
+  }
+  EXPECT_LE(outliers, 4) << "of 3,900 pairs without any";
+  filters.update(pair_at(4000, 2.0, receiver.next() + Vector2d(40.0, 0.0)));
+  EXPECT_TRUE(filters.last_was_outlier());
+}
+
 TEST(ReceiverFilters, TheStateIsKeptToTheBit) {
   PlaneFilters filters({}, kSd);
   SlowReceiver receiver(11, 3.0, 60.0);
