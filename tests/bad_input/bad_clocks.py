@@ -258,9 +258,11 @@ def imu_of_nan(folder):
     nothing = [math.nan] * 3
     outcome = mapped(folder, [edit_imu(m, lambda rate, force: (nothing, nothing)) if m.topic == "/imu" else m
                               for m in messages])
-    assert outcome.error < 1.5 * WITHOUT_IMU + 0.005, (outcome.error, WITHOUT_IMU)
     if FRONT_END == "dense":
+        # With a place that no sample fills, the error was 1.4 times as large.
+        assert outcome.error < 1.1 * WITHOUT_IMU, (outcome.error, WITHOUT_IMU)
         assert "no sample of the IMU can be used" in outcome.said, outcome.said
+    assert outcome.error < 1.5 * WITHOUT_IMU + 0.005, (outcome.error, WITHOUT_IMU)
     reasons = "; ".join(outcome.run["reasons"])
     assert "messages of the IMU (100.0 %) were not used" in reasons, reasons
     return reasons
