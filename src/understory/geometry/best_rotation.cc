@@ -1,5 +1,6 @@
 #include "understory/geometry/best_rotation.h"
 
+#include <Eigen/LU>
 #include <Eigen/SVD>
 
 namespace understory {
