@@ -34,7 +34,7 @@ int convert_cloud_to_stems(const std::string& input, const std::string& output, 
   const StandCloud stand = read_stand(input, {}, context.log, context.until_stopped());
   if (!stand.doubt.empty()) throw InputError(input, "", "expected metres and z up: " + stand.doubt);
   if (!stand.suspicion.empty()) context.log.info(stand.suspicion);
-  InventoryConfig config;
+  InventoryConfig config = basic_inventory();
   config.segments = 0;
   const InventoryResult found =
       take_inventory(blocks_of(stand.cloud), config, context.until_stopped());

@@ -24,6 +24,7 @@ struct MapOptions {
   std::string config_file;
   std::vector<std::string> settings;
   std::string coordinate_system;
+  std::string inventory;
   std::string front_end = kDenseFrontEnd;
   bool realtime = false;
   bool overwrite = false;
@@ -94,6 +95,7 @@ int run_map(const MapOptions& options, CommandContext& context) {
   std::vector<std::string> settings = options.settings;
   if (!options.coordinate_system.empty())
     settings.push_back("georeference.crs=" + options.coordinate_system);
+  if (!options.inventory.empty()) settings.push_back("inventory.extent=" + options.inventory);
   ReadConfig<FrontEndConfig> read = read_front_end_config(
       options.front_end, options.profile, options.config_file, settings, context.log);
   if (options.print_config) return print_config(options, read, context);
@@ -138,6 +140,11 @@ void add_map_command(CLI::App& app, Command& chosen) {
                       "Coordinate system of map.laz, rasters and trees.gpkg where the recording "
                       "has GNSS: EPSG:3067 or WKT (if not given ETRS-TM35FIN in Finland, else the "
                       "UTM zone)");
+  command
+      ->add_option("--inventory", options->inventory,
+                   "What is measured of the trees: diameters and heights (basic, if not given), or "
+                   "stem curves and volumes as well (full)")
+      ->check(CLI::IsMember({"basic", "full"}));
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "
                     "(time_repair.window_s is 0, of stems also stems.pace.longest_gap_s)");

@@ -5,13 +5,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "understory/forest/cell_grid.h"
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/ground/canopy.h"
 #include "understory/forest/stems/slice_thinner.h"
+#include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/stems/stem_fit.h"
+#include "understory/forest/stems/stem_surroundings.h"
 #include "understory/forest/trees/tree_heights.h"
+#include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
@@ -51,7 +56,7 @@ void gather(const PointBlocks& cloud, const InventoryConfig& config, const Inven
 
 // The fourth: canopy and tops of trees.
 void look_up(const PointBlocks& cloud, const InventoryResult& result, const CanopyCeiling& ceiling,
-             CanopyGrid& canopy, TreeColumns& trees) {
+             CanopyGrid& canopy, TreeColumns& trees, StemSurroundings* surroundings) {
   std::vector<double> heights;
   cloud([&](std::span<const Eigen::Vector3d> points) {
     result.ground.heights_above(points, heights);
@@ -60,6 +65,7 @@ void look_up(const PointBlocks& cloud, const InventoryResult& result, const Cano
       const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
       if (ceiling.holds(place, heights[i])) canopy.add(place, heights[i]);
       trees.add(place, heights[i]);
+      if (surroundings != nullptr) surroundings->add(points[i] - result.origin);
     }
   });
 }
@@ -119,6 +125,33 @@ std::vector<double> heights_in_view(const InventoryResult& result, const TreeCol
   return heights;
 }
 
+// Height of the ground at each stem over the origin.
+std::vector<double> ground_at_stems(const InventoryResult& result) {
+  std::vector<double> ground;
+  for (const StemFit& stem : result.stems) {
+    const Eigen::Vector2d foot = stem.centre - kBreastHeight * stem.slope;
+    ground.push_back(result.ground.terrain.interpolate(result.origin.x() + foot.x(),
+                                                       result.origin.y() + foot.y()) -
+                     result.origin.z());
+  }
+  return ground;
+}
+
+void measure_curves(StemSurroundings& surroundings, const StemCurveConfig& config,
+                    const ProgressSink& progress, InventoryResult& result) {
+  std::vector<std::vector<SlicePoint>> points = surroundings.take();
+  result.curves.resize(points.size());
+  parallel_for(points.size(), 4, [&](std::size_t i) {
+    progress.poll();
+    result.curves[i] =
+        measure_stem_curve(std::move(points[i]), result.stems[i], result.trees[i].height_m, config);
+  });
+  for (std::size_t i = 0; i < result.curves.size(); ++i) {
+    result.trees[i].stem_volume_m3 = result.curves[i].volume_m3;
+    result.trees[i].stem_volume_sd_m3 = result.curves[i].volume_sd_m3;
+  }
+}
+
 void remark(const Gathered& gathered, const InventoryConfig& config, InventoryResult& result) {
   const double per_m2 = static_cast<double>(gathered.points) / std::max(1.0, result.area_m2);
   std::uint64_t returns = 0;
@@ -162,6 +195,17 @@ void remark(const Gathered& gathered, const InventoryConfig& config, InventoryRe
 }  // namespace
 
 void describe(ConfigTable& table, InventoryConfig& config) {
+  table.add_enum("extent", config.extent,
+                 {{"basic", InventoryExtent::kBasic}, {"full", InventoryExtent::kFull}},
+                 "basic: ground, stems, diameters, heights; full: stem curves and volumes as well");
+  table.section("curves", [&] {
+    std::vector<std::pair<std::string, TaperSpecies>> names;
+    for (const TaperSpecies species :
+         {TaperSpecies::kUnknown, TaperSpecies::kPine, TaperSpecies::kSpruce, TaperSpecies::kBirch})
+      names.emplace_back(taper_species_name(species), species);
+    table.add_enum("species", config.curves.species, names,
+                   "species of the stand: its taper curve stands where a stem was not seen");
+  });
   table.section("ground", [&] { describe(table, config.ground); });
   table.section("stems", [&] { describe(table, config.stems); });
   table.add("canopy_cell_m", config.canopy_cell_m, {0.1, 10.0}, "m", "cell of the canopy model");
@@ -173,7 +217,7 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
                                const ProgressSink& progress, const SeenTest& in_view) {
   const PointBlocks cloud = polled(unasked, progress);
   const auto tell = [&](const char* stage, double done) {
-    progress({stage, done, 6.0, "passes", ""});
+    progress({stage, done, 7.0, "passes", ""});
   };
   InventoryResult result;
   tell("ground", 0.0);
@@ -194,16 +238,23 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
   tell("tops", 4.0);
   CanopyGrid canopy(config.canopy_cell_m);
   TreeColumns columns(result.stems);
-  look_up(cloud, result, gathered.ceiling, canopy, columns);
+  const bool full = config.extent == InventoryExtent::kFull;
+  std::optional<StemSurroundings> surroundings;
+  if (full) surroundings.emplace(result.stems, ground_at_stems(result));
+  look_up(cloud, result, gathered.ceiling, canopy, columns, full ? &*surroundings : nullptr);
   result.canopy = canopy.raster(result.origin.x(), result.origin.y());
   result.area_m2 = area_of(result.canopy);
   result.trees =
       trees_of(result, heights_in_view(result, columns, config.stems.highest_m, in_view));
+  if (full) {
+    tell("stem curves", 5.0);
+    measure_curves(*surroundings, config.curves, progress, result);
+  }
   remark(gathered, config, result);
-  tell("segments", 5.0);
+  tell("segments", 6.0);
   result.segments =
       collect_segments(cloud, result.ground, result.trees, config.segments, kSegmentReach);
-  tell("segments", 6.0);
+  tell("segments", 7.0);
   return result;
 }
 

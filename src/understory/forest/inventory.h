@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/forest/ground/ground.h"
+#include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/trees/tree_segments.h"
 #include "understory/sensor/stem_view.h"
@@ -15,14 +16,26 @@
 
 namespace understory {
 
+// How much an inventory measures: ground, stems, diameters and heights; or stem curves and volumes
+// as well.
+enum class InventoryExtent { kBasic, kFull };
+
 // Settings of `understory inventory` and of the trees of a map.
 struct InventoryConfig {
+  InventoryExtent extent = InventoryExtent::kFull;
   GroundConfig ground;
   StemDetectorConfig stems;
+  StemCurveConfig curves;
   double canopy_cell_m = 0.5;
   int segments = 6;  // trees whose points are kept for a look at them
 };
 void describe(ConfigTable& table, InventoryConfig& config);
+// The settings of an inventory at the end of `map`: no slower than it has to be.
+[[nodiscard]] inline InventoryConfig basic_inventory() {
+  InventoryConfig config;
+  config.extent = InventoryExtent::kBasic;
+  return config;
+}
 
 // What the cloud can tell about the stand. Expected outcomes (nothing found, too sparse) are told
 // in `remarks`, in words for a forester.
@@ -32,6 +45,7 @@ struct InventoryResult {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // of slices and stems, world frame
   std::vector<Tree> trees;                           // by id; ids from 1 in order of position
   std::vector<StemFit> stems;                        // of the same index as trees
+  std::vector<StemCurve> curves;                     // of the same index; of a full inventory only
   std::vector<SlicePoint> slices;  // the thinned points between 0.5 m and 3.5 m that were searched
   std::vector<TreeSegment> segments;  // of a few trees, for the report
   std::uint64_t points = 0;

@@ -5,10 +5,20 @@
 #include "understory/output/run_tables.h"
 
 namespace understory {
+namespace {
+
+void write_tree_tables(const std::filesystem::path& folder, const InventoryResult& inventory) {
+  write_trees_csv(folder / "trees.csv", inventory.trees);
+  if (inventory.curves.empty()) return;
+  write_stem_curves(folder / "stem_curves.csv", inventory.trees, inventory.curves,
+                    inventory.origin.head<2>());
+}
+
+}  // namespace
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const std::string& crs) {
-  write_trees_csv(folder / "trees.csv", inventory.trees);
+  write_tree_tables(folder, inventory);
   write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs);
   if (!inventory.ground.terrain.empty()) {
     write_geotiff(folder / "dtm.tif", inventory.ground.terrain, crs);
@@ -20,7 +30,7 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const LayerFrame& layers) {
-  write_trees_csv(folder / "trees.csv", inventory.trees);
+  write_tree_tables(folder, inventory);
   write_tree_layers(folder, inventory.trees, {}, layers);
   write_raster_layers(folder, inventory.ground.terrain, inventory.canopy, change_into(layers),
                       layers);

@@ -10,9 +10,9 @@
 
 namespace understory {
 
-// Writes trees.csv, trees.gpkg, dtm.tif, chm.tif and dsm.tif into `folder` (the rasters only where
-// there is one). The inventory is in the world frame of `layers`; trees.csv stays in it. Throws
-// OutputError.
+// Writes trees.csv, stem_curves.csv (of a full inventory), trees.gpkg, dtm.tif, chm.tif and dsm.tif
+// into `folder` (the rasters only where there is one). The inventory is in the world frame of
+// `layers`; trees.csv stays in it. Throws OutputError.
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const LayerFrame& layers);
 // The same of a cloud that is in the coordinate system `crs` ("EPSG:25832" or WKT) already; empty

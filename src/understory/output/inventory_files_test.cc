@@ -39,6 +39,25 @@ TEST_F(InventoryFilesTest, APlotHasTreesTwiceAndAllRasters) {
   EXPECT_FALSE(trees.next());
 }
 
+TEST_F(InventoryFilesTest, AFullInventoryHasTheCurvesOfItsStems) {
+  InventoryResult inventory = plot();
+  inventory.origin = {100.0, 200.0, 0.0};
+  inventory.trees[0].id = 7;
+  inventory.curves.resize(2);
+  inventory.curves[0].sections.push_back({0.1, {1.0, 2.0}, 0.25, 0.01, true});
+  write_inventory_files(folder_.path(), inventory, "");
+  CsvReader curves(folder_ / "stem_curves.csv");
+  ASSERT_TRUE(curves.next());
+  EXPECT_EQ(curves.number("tree_id"), 7.0);
+  EXPECT_EQ(curves.number("height_m"), 0.1);
+  EXPECT_EQ(curves.number("x"), 101.0);
+  EXPECT_EQ(curves.number("y"), 202.0);
+  EXPECT_EQ(curves.number("diameter_m"), 0.25);
+  EXPECT_EQ(curves.number("diameter_sd_m"), 0.01);
+  EXPECT_EQ(curves.number("measured"), 1.0);
+  EXPECT_FALSE(curves.next());
+}
+
 TEST_F(InventoryFilesTest, WhereNothingWasSeenThereIsAnEmptyListAndNoRaster) {
   write_inventory_files(folder_.path(), {}, "");
   EXPECT_EQ(names(), (std::set<std::string>{"trees.csv", "trees.gpkg"}));

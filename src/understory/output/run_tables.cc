@@ -149,6 +149,20 @@ void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>&
   file.commit();
 }
 
+void write_stem_curves(const std::filesystem::path& path, const std::vector<Tree>& trees,
+                       const std::vector<StemCurve>& curves, const Eigen::Vector2d& origin) {
+  AtomicTextFile file(path);
+  file.write("tree_id,height_m,x,y,diameter_m,diameter_sd_m,measured\n");
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    for (const CurveSection& section : curves[i].sections)
+      file.write(fmt::format("{},{:.1f},{:.3f},{:.3f},{:.4f},{:.4f},{}\n", trees[i].id,
+                             section.height_m, origin.x() + section.centre.x(),
+                             origin.y() + section.centre.y(), section.diameter_m,
+                             section.diameter_sd_m, section.measured ? 1 : 0));
+  }
+  file.commit();
+}
+
 void write_tree_falls(const std::filesystem::path& path, const std::vector<TreeFall>& falls) {
   AtomicTextFile file(path);
   file.write("id,x,y,seen_until,gone_since,missed\n");

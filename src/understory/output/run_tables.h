@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/trees/tree_fall.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/sensor/gnss_fix.h"
@@ -96,6 +97,11 @@ void write_g2o(const std::filesystem::path& path, const std::vector<GraphVertex>
 
 // trees.csv with the columns of docs/reference/outputs.md; empty where unknown.
 void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>& trees);
+
+// stem_curves.csv: `tree_id,height_m,x,y,diameter_m,diameter_sd_m,measured`, upwards. `curves` have
+// the order of `trees`; their centres are relative to `origin`.
+void write_stem_curves(const std::filesystem::path& path, const std::vector<Tree>& trees,
+                       const std::vector<StemCurve>& curves, const Eigen::Vector2d& origin);
 
 // felled.csv: `id,x,y,seen_until,gone_since,missed`.
 void write_tree_falls(const std::filesystem::path& path, const std::vector<TreeFall>& falls);

@@ -23,6 +23,8 @@ struct Tree {
   int observations = 0;        // returns (or views, in a sparse map) that support the stem
   double x_sd_m = kUnknown;    // standard deviation of x
   double y_sd_m = kUnknown;
+  double stem_volume_m3 = kUnknown;     // over bark, from the ground to the top
+  double stem_volume_sd_m3 = kUnknown;  // its standard deviation
   bool felled = false;  // of a truth: cut down while it was scanned, so it may be listed or not
 };
 
@@ -46,6 +48,8 @@ inline constexpr std::array kTreeColumns = {
     TreeColumn{"observations", &Tree::observations, 0, false},
     TreeColumn{"x_sd_m", &Tree::x_sd_m, 4, false},
     TreeColumn{"y_sd_m", &Tree::y_sd_m, 4, false},
+    TreeColumn{"stem_volume_m3", &Tree::stem_volume_m3, 4, false},
+    TreeColumn{"stem_volume_sd_m3", &Tree::stem_volume_sd_m3, 4, false},
 };
 
 // The names of the columns, and the cells of one tree, separated by commas, without the end of the

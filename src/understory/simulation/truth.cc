@@ -102,7 +102,25 @@ void write_returns(const std::string& path, const TruthLog& log) {
   file.close();
 }
 
-// Trees that were felled while the recording ran say when, by its clock.
+// Where the stem ends: at the top, or where it is broken off.
+double stem_end_m(const GrownTree& grown) {
+  return grown.broken_m > 0.0 ? grown.broken_m : grown.height_m;
+}
+
+// A scanned tree shows its own stem, of which only the diameter at breast height is known.
+bool has_known_stem(const GrownTree& grown) {
+  return grown.cloud.empty();
+}
+
+// Over bark, from the ground to the end of the stem, in slices of a centimetre.
+double stem_volume_m3(const GrownTree& grown) {
+  constexpr double kSlice = 0.01;
+  double volume = 0.0;
+  for (double height = 0.5 * kSlice; height < stem_end_m(grown); height += kSlice)
+    volume += 0.25 * M_PI * std::pow(grown.diameter(height), 2) * kSlice;
+  return volume;
+}
+
 // As it grew: nothing of it is uncertain.
 Tree truth_of(const GrownTree& grown) {
   Tree tree;
@@ -114,8 +132,29 @@ Tree truth_of(const GrownTree& grown) {
   tree.height_m = grown.height_m;
   tree.lean_deg = grown.lean_deg();
   tree.dbh_sd_m = tree.x_sd_m = tree.y_sd_m = 0.0;
+  if (has_known_stem(grown)) {
+    tree.stem_volume_m3 = stem_volume_m3(grown);
+    tree.stem_volume_sd_m3 = 0.0;
+  }
   return tree;
 }
+
+// By decimetres, as the program writes its own.
+std::string stem_curves_text(const Stand& stand) {
+  constexpr double kStep = 0.1;
+  std::string text = "tree_id,height_m,x,y,diameter_m\n";
+  for (const GrownTree& grown : stand.trees) {
+    if (!has_known_stem(grown)) continue;
+    for (int i = 0; i * kStep <= stem_end_m(grown); ++i) {
+      const Eigen::Vector3d centre = grown.centre(i * kStep);
+      text += fmt::format("{},{:.1f},{:.4f},{:.4f},{:.5f}\n", grown.id, i * kStep, centre.x(),
+                          centre.y(), grown.diameter(i * kStep));
+    }
+  }
+  return text;
+}
+
+// Trees that were felled while the recording ran say when, by its clock.
 
 std::string trees_text(const SimulatedWorld& world, TimeNs start, const TruthLog& log) {
   const std::vector<ScanTruth>& scans = log.scans();
@@ -218,9 +257,9 @@ std::vector<StemReturns> TruthLog::stems(std::size_t i) const {
 }
 
 bool is_truth_file(const std::string& name) {
-  constexpr std::array<const char*, 9> kNames = {
-      "trajectory.tum", "velocity.csv",      "imu_bias.csv", "returns.csv.gz", "trees.csv",
-      "dtm.tif",        "total_station.csv", "head.csv",     "site.yaml"};
+  constexpr std::array<const char*, 10> kNames = {
+      "trajectory.tum",  "velocity.csv", "imu_bias.csv",      "returns.csv.gz", "trees.csv",
+      "stem_curves.csv", "dtm.tif",      "total_station.csv", "head.csv",       "site.yaml"};
   return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
 }
 
@@ -235,6 +274,7 @@ void write_truth_folder(const std::string& folder, const SimulatedWorld& world, 
   write_text(folder + "/imu_bias.csv", bias_text(log.scans()));
   write_returns(folder + "/returns.csv.gz", log);
   write_text(folder + "/trees.csv", trees_text(world, start, log));
+  write_text(folder + "/stem_curves.csv", stem_curves_text(world.stand));
   if (!prism.empty()) write_text(folder + "/total_station.csv", prism_text(prism));
   if (!cuts.empty()) write_text(folder + "/head.csv", head_text(cuts));
   write_terrain(folder + "/dtm.tif", world.terrain);

@@ -16,8 +16,9 @@ struct ResultFile {
 };
 
 // In the order in which a user wants them; docs/reference/outputs.md has their columns.
-constexpr std::array<ResultFile, 23> kResultFiles = {
+constexpr std::array<ResultFile, 24> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
+     {"stem_curves.csv", "diameters along each stem", "a spreadsheet"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
      {"trees.gpkg", "the same trees as points on a map, and the path",
       "QGIS: drag the file into the window"},

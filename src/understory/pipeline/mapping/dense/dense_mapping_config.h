@@ -28,7 +28,7 @@ struct DenseMappingConfig {
   double keyframe_thin_m = 0.02;  // thins a scan's cloud before it is stored for the map
   double map_range_max_m = 60.0;  // farther returns do not enter the finished map
   bool map_enabled = true;        // write map.laz and what is made from it
-  InventoryConfig inventory;
+  InventoryConfig inventory = basic_inventory();
   GeoreferenceConfig georeference;
   GnssUseConfig gnss;
   JudgementConfig judgement;

@@ -1,0 +1,318 @@
+#include "understory/forest/stems/stem_curve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "understory/forest/forest_constants.h"
+#include "understory/forest/stems/arc_bins.h"
+#include "understory/forest/stems/noisy_cylinder.h"
+#include "understory/forest/stems/stem_axis.h"
+#include "understory/util/median.h"
+
+namespace understory {
+namespace {
+
+using namespace forest_constants::stem_curve;
+
+// A section as it was fitted: radius and its standard deviation.
+struct FittedSection {
+  double height_m = 0.0;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  double radius_m = 0.0;
+  double sd_m = 0.0;
+};
+
+// What speaks for a fitted section: points of the window about its surface.
+struct SectionEvidence {
+  int on = 0;
+  int inside = 0;
+  double arc_deg = 0.0;
+};
+
+SectionEvidence section_evidence(const std::vector<SlicePoint>& points, const StemFit& fit,
+                                 double scatter_m) {
+  const double band = std::max(kBandScatters * scatter_m, kLeastBand);
+  const double within = -std::max(kInsideBands * band, kInsideShare * fit.radius_m);
+  SectionEvidence evidence;
+  ArcBins arc;
+  const StemAxis axis(fit);
+  for (const SlicePoint& point : points) {
+    const AxisPlace place = axis.place(point);
+    const double e = axis.surface_error(place);
+    if (e < within) ++evidence.inside;
+    if (std::abs(e) > band) continue;
+    ++evidence.on;
+    arc.add(place.outward.x(), place.outward.y());
+  }
+  evidence.arc_deg = arc.covered_deg();
+  return evidence;
+}
+
+// Follows the stem from one section to the next.
+class Tracker {
+ public:
+  Tracker(const std::vector<SlicePoint>& points, const StemFit& stem)
+      : points_(points), stem_(stem) {}
+
+  // Sections away from breast height, in steps of `step_m` (negative: downwards) until `end_m`.
+  void follow(double step_m, double end_m, std::vector<FittedSection>& rings) {
+    FittedSection last{kBreastHeight, stem_.centre, stem_.radius_m, 0.0};
+    Eigen::Vector2d slope = stem_.slope;
+    double unseen_m = 0.0;
+    for (double height = kBreastHeight + step_m;
+         step_m > 0.0 ? height < end_m : height > end_m - 1e-9; height += step_m) {
+      FittedSection guess = last;
+      guess.height_m = height;
+      guess.centre += step_m * slope;
+      guess.radius_m += step_m * kUsualTaper;
+      if (guess.radius_m < kThinnest) return;
+      const auto found = fit(guess, slope);
+      if (!found) {
+        unseen_m += std::abs(step_m);
+        if (unseen_m > kLongestGap) return;
+        last = guess;
+        continue;
+      }
+      unseen_m = 0.0;
+      rings.push_back(*found);
+      const double weight = kPredictionSd * kPredictionSd /
+                            (kPredictionSd * kPredictionSd + found->sd_m * found->sd_m);
+      last.height_m = height;
+      last.radius_m = guess.radius_m + weight * (found->radius_m - guess.radius_m);
+      slope += kSlopeGain / step_m * (found->centre - guess.centre);
+      last.centre = found->centre;
+    }
+  }
+
+ private:
+  // The points between two heights around a place, with the middle height as breast height.
+  std::vector<SlicePoint> window(const FittedSection& guess, const Eigen::Vector2d& slope) const {
+    const auto low = static_cast<float>(guess.height_m - kHalfWindow);
+    const auto high = static_cast<float>(guess.height_m + kHalfWindow);
+    const double reach = guess.radius_m + kFitReach;
+    std::vector<SlicePoint> near;
+    auto at = std::lower_bound(points_.begin(), points_.end(), low,
+                               [](const SlicePoint& p, float h) { return p.height_m < h; });
+    for (; at != points_.end() && at->height_m < high; ++at) {
+      const double rise = static_cast<double>(at->height_m) - guess.height_m;
+      const Eigen::Vector2d off =
+          Eigen::Vector2f(at->x, at->y).cast<double>() - guess.centre - rise * slope;
+      if (off.squaredNorm() > reach * reach) continue;
+      SlicePoint point = *at;
+      point.height_m = static_cast<float>(rise + kBreastHeight);
+      near.push_back(point);
+    }
+    return near;
+  }
+
+  std::optional<FittedSection> fit(const FittedSection& guess, const Eigen::Vector2d& slope) const {
+    const std::vector<SlicePoint> near = window(guess, slope);
+    StemFit start;
+    start.centre = guess.centre;
+    start.slope = slope;
+    start.radius_m = guess.radius_m;
+    start.taper = kUsualTaper;
+    start.rms_m = stem_.rms_m;
+    const NoisyCylinder found = fit_noisy_cylinder(near, start, kForm);
+    if (!found.converged || found.strays > kMostStrays) return std::nullopt;
+    const double spread = std::sqrt(std::max(1e-12, found.covariance(4, 4)));
+    const double sd = std::sqrt(std::pow(kLinear * spread, 2) +
+                                std::pow(kSquare * spread * spread, 2) + kMapError * kMapError);
+    StemFit ring = start;
+    ring.centre = found.centre;
+    ring.slope = found.slope;
+    ring.radius_m = found.radius_m;
+    ring.taper = found.taper;
+    if (sd > kMostSdShare * found.radius_m + kMostSd ||
+        found.scatter_m > kMostScatterShare * found.radius_m + kMostScatter ||
+        (found.centre - guess.centre).norm() > kMostShift + kMostShiftShare * guess.radius_m)
+      return std::nullopt;
+    // A branch or the foliage around a stem makes it thicker from one section to the next.
+    const double change = found.radius_m - guess.radius_m;
+    const bool flare = guess.height_m < kBreastHeight;
+    if (change > (flare ? kFlare : kMostChangeShare) * guess.radius_m + kMostChange ||
+        -change > kMostChangeShare * guess.radius_m + kMostChange)
+      return std::nullopt;
+    const SectionEvidence seen = section_evidence(near, ring, found.scatter_m);
+    if (seen.on < kFewestPoints || seen.arc_deg < kLeastArcDeg ||
+        seen.inside > kMostInside * seen.on)
+      return std::nullopt;
+    return FittedSection{guess.height_m, found.centre, found.radius_m, sd};
+  }
+
+  static constexpr NoisyCylinderConfig kForm{};
+  const std::vector<SlicePoint>& points_;
+  const StemFit& stem_;
+};
+
+double weight_of(const FittedSection& ring) {
+  return 1.0 / (ring.sd_m * ring.sd_m);
+}
+
+// The form of the whole stem: its scale, and the power where the species is unknown.
+struct Form {
+  TaperForm taper;
+  double scale = 1.0;
+
+  [[nodiscard]] double radius(double height_m) const { return scale * taper.at(height_m); }
+};
+
+// The scale that fits the sections best, and the sum of their weighted squares.
+std::pair<double, double> scale_of(const TaperForm& taper,
+                                   const std::vector<FittedSection>& rings) {
+  double above = 0.0;
+  double below = 0.0;
+  double squares = 0.0;
+  for (const FittedSection& ring : rings) {
+    if (ring.height_m < kFlareEnd) continue;
+    const double form = taper.at(ring.height_m);
+    above += weight_of(ring) * form * ring.radius_m;
+    below += weight_of(ring) * form * form;
+    squares += weight_of(ring) * ring.radius_m * ring.radius_m;
+  }
+  const double scale = below > 0.0 ? above / below : 0.0;
+  return {scale, squares - scale * above};
+}
+
+Form form_of(const std::vector<FittedSection>& rings, double top_m, TaperSpecies species) {
+  Form best{TaperForm(species, top_m, kUsualPower)};
+  double least = std::numeric_limits<double>::infinity();
+  for (double power = kLeastPower; power < kMostPower; power += kPowerStep) {
+    const TaperForm taper(species, top_m, power);
+    const auto [scale, squares] = scale_of(taper, rings);
+    const double off = (power - kUsualPower) / kPowerSd;
+    const double cost = squares / kCorrelatedRings + off * off;
+    if (cost >= least) continue;
+    least = cost;
+    best = {taper, scale};
+    if (species != TaperSpecies::kUnknown) break;
+  }
+  return best;
+}
+
+// Without the sections that neither their neighbours nor the form of the stem support.
+std::vector<FittedSection> without_outliers(const std::vector<FittedSection>& rings,
+                                            const Form& form) {
+  std::vector<double> off;
+  for (const FittedSection& ring : rings) {
+    if (ring.height_m >= kFlareEnd) off.push_back(ring.radius_m - form.radius(ring.height_m));
+  }
+  const double middle = upper_median(off);
+  for (double& value : off)
+    value = std::abs(value - middle);
+  const double spread = std::max(kLeastSpread, kSdOverMad * upper_median(off));
+  std::vector<FittedSection> kept;
+  for (const FittedSection& ring : rings) {
+    const double error = ring.radius_m - form.radius(ring.height_m) - middle;
+    if (ring.height_m < kFlareEnd || std::abs(error) < kOutlierSpreads * spread + 2.0 * ring.sd_m)
+      kept.push_back(ring);
+  }
+  return kept;
+}
+
+// The smooth curve through the sections: their ratio to the form, a weighted line through the
+// sections around each height. Beyond the last section the ratio goes on unchanged.
+class SmoothCurve {
+ public:
+  SmoothCurve(const std::vector<FittedSection>& rings, const Form& form, const StemFit& stem)
+      : rings_(rings), form_(form), stem_(stem) {}
+
+  [[nodiscard]] CurveSection at(double height_m) const {
+    CurveSection section;
+    section.height_m = height_m;
+    double weights = 0.0;
+    double sum = 0.0;
+    double squares = 0.0;
+    Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+    double nearest = std::numeric_limits<double>::infinity();
+    const double inside = std::clamp(height_m, rings_.front().height_m, rings_.back().height_m);
+    for (const FittedSection& ring : rings_) {
+      const double away = std::abs(ring.height_m - inside);
+      nearest = std::min(nearest, std::abs(ring.height_m - height_m));
+      const double weight =
+          std::exp(-0.5 * std::pow(away / kSmoothing, 2)) * weight_of(ring) + 1e-12;
+      weights += weight;
+      sum += weight * ring.radius_m / std::max(1e-6, form_.radius(ring.height_m));
+      squares += weight * weight * ring.sd_m * ring.sd_m;
+      centre += weight * (ring.centre - line_at(ring.height_m));
+    }
+    section.centre = line_at(height_m) + centre / weights;
+    section.diameter_m = 2.0 * sum / weights * form_.radius(height_m);
+    section.measured = nearest < kStep;
+    const double away = std::max(0.0, nearest - kStep);
+    // Neighbouring sections share points and errors of the map.
+    const double own = 2.0 * std::sqrt(kCorrelatedRings * squares) / weights;
+    section.diameter_sd_m =
+        std::hypot(own, std::min(kMostModelSd, kModelSdPerMetre * away) * section.diameter_m);
+    return section;
+  }
+
+ private:
+  [[nodiscard]] Eigen::Vector2d line_at(double height_m) const {
+    return stem_.centre + (height_m - kBreastHeight) * stem_.slope;
+  }
+
+  const std::vector<FittedSection>& rings_;
+  const Form& form_;
+  const StemFit& stem_;
+};
+
+void add_volume(StemCurve& curve) {
+  double volume = 0.0;
+  double sd = 0.0;
+  for (std::size_t i = 1; i < curve.sections.size(); ++i) {
+    const CurveSection& a = curve.sections[i - 1];
+    const CurveSection& b = curve.sections[i];
+    const double length = b.height_m - a.height_m;
+    // A cone between two sections.
+    volume +=
+        M_PI / 12.0 * length *
+        (a.diameter_m * a.diameter_m + a.diameter_m * b.diameter_m + b.diameter_m * b.diameter_m);
+    sd += M_PI / 4.0 * length * (a.diameter_m * a.diameter_sd_m + b.diameter_m * b.diameter_sd_m);
+  }
+  curve.volume_m3 = volume;
+  curve.volume_sd_m3 = sd;
+}
+
+}  // namespace
+
+StemCurve measure_stem_curve(std::vector<SlicePoint> points, const StemFit& stem, double height_m,
+                             const StemCurveConfig& config) {
+  std::sort(points.begin(), points.end(), [](const SlicePoint& a, const SlicePoint& b) {
+    return std::tie(a.height_m, a.x, a.y) < std::tie(b.height_m, b.x, b.y);
+  });
+  const double highest = points.empty() ? 0.0 : static_cast<double>(points.back().height_m);
+  const double top = std::isfinite(height_m) ? height_m : highest;
+  std::vector<FittedSection> rings;
+  Tracker tracker(points, stem);
+  tracker.follow(-kStep, kLowest, rings);
+  std::reverse(rings.begin(), rings.end());
+  rings.push_back({kBreastHeight, stem.centre, stem.radius_m,
+                   std::sqrt(std::max(0.0, stem.covariance(2, 2))) + kMapError});
+  tracker.follow(kStep, top - kStep, rings);
+
+  StemCurve curve;
+  // Without a height the form serves as an outline only: it ends well above what was seen.
+  const double outline = std::isfinite(height_m) ? height_m : kUnknownTop * rings.back().height_m;
+  if (outline < kLeastTop) return curve;
+  Form form = form_of(rings, outline, config.species);
+  rings = without_outliers(rings, form);
+  form = form_of(rings, outline, config.species);
+  curve.measured_to_m = rings.back().height_m;
+  const SmoothCurve smooth(rings, form, stem);
+  const double end = std::isfinite(height_m) ? height_m : curve.measured_to_m;
+  const auto count = static_cast<int>(std::floor(end / kSectionStep));
+  for (int i = 0; i <= count; ++i)
+    curve.sections.push_back(smooth.at(i * kSectionStep));
+  if (!std::isfinite(height_m)) return curve;
+  if (end > count * kSectionStep) curve.sections.push_back(smooth.at(end));
+  add_volume(curve);
+  return curve;
+}
+
+}  // namespace understory

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+#include "understory/forest/stems/stem_detector.h"
+#include "understory/forest/stems/taper_form.h"
+
+namespace understory {
+
+// A stem at one height above the ground.
+struct CurveSection {
+  double height_m = 0.0;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  // metres, frame of the stem
+  double diameter_m = 0.0;                           // across the axis
+  double diameter_sd_m = 0.0;
+  bool measured = false;  // by points within a step; otherwise by the form of the taper
+};
+
+// The diameters of a stem from the ground to the top, every decimetre.
+struct StemCurve {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  std::vector<CurveSection> sections;  // upwards; without a height of the tree they end where the
+                                      // measured ones end
+  double measured_to_m = kUnknown;    // height of the last measured section
+  double volume_m3 = kUnknown;        // over bark, ground to top; unknown without a height
+  double volume_sd_m3 = kUnknown;
+};
+
+struct StemCurveConfig {
+  TaperSpecies species = TaperSpecies::kUnknown;  // whose form stands where nothing was measured
+};
+
+// Follows a stem upwards and downwards from breast height: a noisy cylinder every quarter of a
+// metre, each begun from those before it. Sections that do not fit into the curve are left out.
+// What was not seen has the form of the taper, scaled to what was seen next to it. `points`: around
+// the stem, height above the ground at the stem, in any order. `height_m`: of the tree, NaN if
+// unknown. The diameter at breast height is that of `stem`. Deterministic.
+[[nodiscard]] StemCurve measure_stem_curve(std::vector<SlicePoint> points, const StemFit& stem,
+                                           double height_m, const StemCurveConfig& config);
+
+}  // namespace understory

@@ -1,0 +1,158 @@
+#include "understory/forest/stems/stem_curve.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "understory/forest/stems/stem_surroundings.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+constexpr double kTop = 18.0;
+
+// A bowed pine of 30 cm, seen all around up to `seen_to_m`.
+struct TestStem {
+  double dbh_m = 0.3;
+  double seen_to_m = 8.0;
+  double noise_m = 0.006;
+
+  [[nodiscard]] double diameter(double height) const {
+    const auto form = [](double h) { return std::pow((kTop - h) / kTop, 0.75); };
+    return dbh_m * form(height) / form(1.3);
+  }
+  [[nodiscard]] Eigen::Vector2d centre(double height) const {
+    return {5.0 + 0.01 * height, 7.0 + 0.15 * (1.0 - std::cos(height / 3.0))};
+  }
+  [[nodiscard]] std::vector<SlicePoint> points(Random& random) const {
+    std::vector<SlicePoint> all;
+    for (int i = 0; i < 400 * static_cast<int>(seen_to_m); ++i) {
+      const double h = random.uniform(0.05, seen_to_m);
+      const double turn = random.uniform(0.0, 2.0 * M_PI);
+      const double r = 0.5 * diameter(h) + random.normal(0.0, noise_m);
+      const Eigen::Vector2d c = centre(h);
+      all.push_back({static_cast<float>(c.x() + r * std::cos(turn)),
+                     static_cast<float>(c.y() + r * std::sin(turn)), static_cast<float>(h), 1});
+    }
+    return all;
+  }
+  [[nodiscard]] StemFit fit() const {
+    StemFit fit;
+    fit.centre = centre(1.3);
+    fit.slope = (centre(1.8) - centre(0.8));
+    fit.radius_m = 0.5 * diameter(1.3);
+    fit.taper = -0.008;
+    fit.rms_m = noise_m;
+    fit.covariance(2, 2) = 4e-6;
+    return fit;
+  }
+};
+
+double error_at(const StemCurve& curve, const TestStem& stem, double height) {
+  const CurveSection& section =
+      curve.sections.at(static_cast<std::size_t>(std::lround(height / 0.1)));
+  return section.diameter_m - stem.diameter(height);
+}
+
+TEST(StemCurve, FollowsABowedStemAsFarAsItIsSeen) {
+  Random random(1);
+  const TestStem stem;
+  const StemCurve curve = measure_stem_curve(stem.points(random), stem.fit(), kTop, {});
+  EXPECT_NEAR(curve.measured_to_m, 8.0, 0.6);
+  for (double height = 0.5; height < 7.8; height += 0.5) {
+    EXPECT_LT(std::abs(error_at(curve, stem, height)), 0.006) << height;
+    const CurveSection& section =
+        curve.sections.at(static_cast<std::size_t>(std::lround(height / 0.1)));
+    EXPECT_TRUE(section.measured) << height;
+    EXPECT_LT((section.centre - stem.centre(height)).norm(), 0.02) << height;
+  }
+}
+
+TEST(StemCurve, AboveItHasTheFormAndSaysSo) {
+  Random random(2);
+  const TestStem stem;
+  const StemCurve curve = measure_stem_curve(stem.points(random), stem.fit(), kTop, {});
+  EXPECT_EQ(curve.sections.back().height_m, kTop);
+  EXPECT_EQ(curve.sections.back().diameter_m, 0.0);
+  for (double height = 9.0; height < kTop; height += 1.0) {
+    const CurveSection& section =
+        curve.sections.at(static_cast<std::size_t>(std::lround(height / 0.1)));
+    EXPECT_FALSE(section.measured) << height;
+    EXPECT_LT(std::abs(error_at(curve, stem, height)), 2.0 * section.diameter_sd_m) << height;
+    EXPECT_GT(section.diameter_sd_m, 0.02 * section.diameter_m) << height;
+  }
+}
+
+TEST(StemCurve, TheVolumeIsThatOfTheStem) {
+  Random random(3);
+  const TestStem stem;
+  const StemCurve curve = measure_stem_curve(stem.points(random), stem.fit(), kTop, {});
+  double volume = 0.0;
+  for (double height = 0.005; height < kTop; height += 0.01)
+    volume += 0.25 * M_PI * std::pow(stem.diameter(height), 2) * 0.01;
+  EXPECT_NEAR(curve.volume_m3, volume, 0.03 * volume);
+  EXPECT_LT(std::abs(curve.volume_m3 - volume), 2.0 * curve.volume_sd_m3);
+}
+
+// Whorls make no thicker stem: their points lie around it in some heights only.
+TEST(StemCurve, BranchesDoNotMakeItThicker) {
+  Random random(4);
+  const TestStem stem;
+  std::vector<SlicePoint> points = stem.points(random);
+  for (double whorl = 2.5; whorl < 8.0; whorl += 0.7) {
+    for (int i = 0; i < 250; ++i) {
+      const double h = whorl + random.uniform(-0.12, 0.12);
+      const double turn = random.uniform(0.0, 2.0 * M_PI);
+      const double r = 0.5 * stem.diameter(h) + random.uniform(0.0, 0.3);
+      const Eigen::Vector2d c = stem.centre(h);
+      points.push_back({static_cast<float>(c.x() + r * std::cos(turn)),
+                        static_cast<float>(c.y() + r * std::sin(turn)), static_cast<float>(h), 1});
+    }
+  }
+  const StemCurve curve = measure_stem_curve(points, stem.fit(), kTop, {});
+  EXPECT_GT(curve.measured_to_m, 7.0);
+  for (double height = 0.5; height < 7.0; height += 0.5)
+    EXPECT_LT(std::abs(error_at(curve, stem, height)), 0.012) << height;
+}
+
+TEST(StemCurve, WithoutAHeightItEndsWhereTheStemWasSeenAndHasNoVolume) {
+  Random random(5);
+  const TestStem stem;
+  const StemCurve curve =
+      measure_stem_curve(stem.points(random), stem.fit(), StemCurve::kUnknown, {});
+  EXPECT_NEAR(curve.sections.back().height_m, curve.measured_to_m, 0.11);
+  EXPECT_LT(std::abs(error_at(curve, stem, 6.0)), 0.008);
+  EXPECT_TRUE(std::isnan(curve.volume_m3));
+}
+
+// Of a stem that shows at breast height only, the rest has the form, and the volume is uncertain.
+TEST(StemCurve, WhereNothingElseIsSeenTheFormStands) {
+  const TestStem stem;
+  const StemCurve curve = measure_stem_curve({}, stem.fit(), kTop, {});
+  EXPECT_NEAR(error_at(curve, stem, 1.3), 0.0, 1e-3);
+  EXPECT_EQ(curve.measured_to_m, 1.3);
+  EXPECT_GT(curve.volume_sd_m3, 0.1 * curve.volume_m3);
+}
+
+TEST(StemSurroundings, KeepWhatIsNearAStemByHeightAboveItsGround) {
+  std::vector<StemFit> stems(2);
+  stems[0].radius_m = stems[1].radius_m = 0.1;
+  stems[1].centre = {0.5, 0.0};
+  StemSurroundings surroundings(stems, {10.0, 12.0});
+  surroundings.add({0.1, 0.0, 13.0});
+  surroundings.add({0.101, 0.001, 13.001});  // in the cube of the first
+  surroundings.add({0.25, 0.0, 14.0});       // near both
+  surroundings.add({0.1, 0.0, 9.0});         // under the ground
+  surroundings.add({5.0, 0.0, 13.0});        // far from both
+  const auto points = surroundings.take();
+  ASSERT_EQ(points.size(), 2U);
+  ASSERT_EQ(points[0].size(), 2U);
+  EXPECT_EQ(points[0][0].returns, 2U);
+  EXPECT_NEAR(points[0][0].height_m, 3.0005, 1e-4);
+  ASSERT_EQ(points[1].size(), 1U);
+  EXPECT_NEAR(points[1][0].height_m, 2.0, 1e-5);
+}
+
+}  // namespace
+}  // namespace understory
