@@ -68,7 +68,8 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
   command->add_flag("--overwrite", options->request.overwrite, kOverwriteMeaning);
   command->footer(
-      "Writes trees.csv, stem_curves.csv, trees.gpkg, dtm.tif, chm.tif, dsm.tif, map.qgs, report.html and "
+      "Writes trees.csv, stem_curves.csv, trees.gpkg, map.laz, dtm.tif, chm.tif, dsm.tif, map.qgs, "
+      "report.html and "
       "run.json.\n"
       "Example:\n  understory inventory plot.laz -o plot-inventory");
   command->callback([options, &chosen] {

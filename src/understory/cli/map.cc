@@ -143,7 +143,7 @@ void add_map_command(CLI::App& app, Command& chosen) {
   command
       ->add_option("--inventory", options->inventory,
                    "What is measured of the trees: diameters and heights (basic, if not given), or "
-                   "stem curves and volumes as well (full)")
+                   "stem curves, volumes, crowns and the tree of each point as well (full)")
       ->check(CLI::IsMember({"basic", "full"}));
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "

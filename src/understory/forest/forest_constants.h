@@ -405,6 +405,8 @@ inline constexpr double kStep = 0.25;
 inline constexpr double kHalfWindow = 0.3;
 // m between the sections of a curve [bound: by decimetres]
 inline constexpr double kSectionStep = 0.1;
+// m: a top so near over a section needs none of its own [bound: the decimals of stem_curves.csv]
+inline constexpr double kSameHeight = 0.01;
 // m above the ground: the lowest section that is fitted [chosen]
 inline constexpr double kLowest = 0.3;
 // m: up to here roots make a stem thicker than its form [chosen]
@@ -528,6 +530,55 @@ inline constexpr double kLeastAbove = 1.5;
 // [not recorded]
 inline constexpr double kStraight = 6.0;
 }  // namespace tree_heights
+
+namespace tree_owners {  // forest/trees/tree_owners.cc
+// m: edge of the cubes that a tree is made of [chosen]
+inline constexpr double kVoxel = 0.2;
+// Times the length of a way sideways: crowns are higher than wide [chosen]
+inline constexpr double kSideways = 1.5;
+// Times the length of a way downwards: trees grow upwards [chosen]
+inline constexpr double kDownwards = 2.0;
+// m beyond the surface of a stem: cubes that are its own [chosen]
+inline constexpr double kSeedReach = 0.15;
+// m: what stands lower beside a stem is undergrowth [chosen]
+inline constexpr double kUndergrowth = 1.5;
+// m beyond the surface of a stem that are its own there [chosen]
+inline constexpr double kStemReach = 0.3;
+// m: height of a tree whose top was not seen [chosen]
+inline constexpr double kUsualHeight = 20.0;
+// m over the top of a tree: higher points are those of another one, or none [chosen]
+inline constexpr double kOverTop = 0.5;
+// How far from the stem a tree reaches: share of the height ... [chosen]
+inline constexpr double kCrownShare = 0.25;
+// ... and m, added [chosen]
+inline constexpr double kCrownOffset = 1.0;
+// m: the same at least and at most [chosen]
+inline constexpr double kLeastReach = 1.5;
+inline constexpr double kMostReach = 6.0;
+// Cubes along an edge of the larger cubes that lead over gaps [chosen]
+inline constexpr std::array<std::int64_t, 2> kBridges = {3, 6};
+}  // namespace tree_owners
+
+namespace tree_crowns {  // forest/trees/tree_crowns.cc
+// m: height of the layers of a crown [chosen]
+inline constexpr double kLayer = 0.5;
+// Directions in which the width of a layer is measured [chosen]
+inline constexpr int kSectors = 16;
+// Directions from one with points to the next: wider gaps are no part of the crown [chosen]
+inline constexpr std::size_t kWidestGap = 5;
+// m beyond the surface of the stem: what reaches farther is a branch [chosen]
+inline constexpr double kBranch = 0.35;
+// Quantile of the widths of the layers that is the width of a tree [chosen]
+inline constexpr double kWideQuantile = 0.9;
+// Of that width: narrower layers are no crown yet [chosen]
+inline constexpr double kBaseShare = 0.35;
+// Layers at the base of a crown ... [chosen]
+inline constexpr int kBaseLayers = 5;
+// ... and how many of them are wide [chosen]
+inline constexpr int kLeastWideLayers = 3;
+// Share of the cubes in a direction that lie within the edge of the crown [chosen]
+inline constexpr double kEdgeQuantile = 0.97;
+}  // namespace tree_crowns
 
 namespace tree_segments {  // forest/trees/tree_segments.cc
 // m: one point per cube near breast height, where the cross section is drawn [chosen]

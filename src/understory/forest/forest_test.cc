@@ -182,6 +182,51 @@ TEST(Inventory, DiametersPositionsAndHeightsOfAStand) {
   }
 }
 
+TEST(Inventory, AFullOneHasCurvesVolumesCrownsAndTheTreeOfEachPoint) {
+  Plot plot(4);
+  plot.slope_x = 0.25;
+  plot.add_ground(18.0, 40);
+  plot.add_stem({5.0, 9.0, 0.3});
+  plot.add_stem({12.0, 9.0, 0.2});
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  ASSERT_EQ(result.trees.size(), 2U);
+  ASSERT_EQ(result.curves.size(), 2U);
+  ASSERT_TRUE(result.owners);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Tree& tree = result.trees[i];
+    const CurveSection& section = result.curves[i].sections.at(30);  // 3 m
+    EXPECT_TRUE(section.measured);
+    EXPECT_NEAR(section.diameter_m, tree.dbh_m - 2.0 * 0.008 * 1.7, 0.012);
+    EXPECT_NEAR(result.curves[i].measured_to_m, 4.0, 0.6);
+    EXPECT_EQ(tree.stem_volume_m3, result.curves[i].volume_m3);
+    // Between a cone and a cylinder of the tree.
+    const double cylinder = 0.25 * M_PI * tree.dbh_m * tree.dbh_m * tree.height_m;
+    EXPECT_GT(tree.stem_volume_m3, 0.3 * cylinder);
+    EXPECT_LT(tree.stem_volume_m3, 0.8 * cylinder);
+    EXPECT_NEAR(tree.crown_base_m, 4.0, 1.1);
+    EXPECT_GT(tree.crown_area_m2, 1.0);
+    EXPECT_LT(tree.crown_area_m2, 8.0);
+    const double ground = plot.ground(tree.x, tree.y);
+    EXPECT_EQ(tree_at(result, {tree.x + 0.5 * tree.dbh_m, tree.y, ground + 2.0}, 2.0),
+              static_cast<std::uint32_t>(tree.id));
+    EXPECT_EQ(tree_at(result, {tree.x, tree.y, ground + 0.05}, 0.05), 0U) << "ground";
+  }
+  EXPECT_EQ(tree_at(result, {8.5, 3.0, plot.ground(8.5, 3.0) + 2.0}, 2.0), 0U);
+}
+
+TEST(Inventory, ABasicOneHasNoneOfThat) {
+  Plot plot(4);
+  plot.add_ground(12.0, 40);
+  plot.add_stem({6.0, 6.0, 0.3});
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), basic_inventory());
+  ASSERT_EQ(result.trees.size(), 1U);
+  EXPECT_TRUE(result.curves.empty());
+  EXPECT_FALSE(result.owners);
+  EXPECT_TRUE(std::isnan(result.trees[0].stem_volume_m3));
+  EXPECT_TRUE(std::isnan(result.trees[0].crown_area_m2));
+  EXPECT_EQ(tree_at(result, {6.1, 6.0, 102.0}, 2.0), 0U);
+}
+
 TEST(Inventory, StemsOfAnInventoryAreItsTreesAsOneView) {
   Plot plot(4);
   plot.slope_x = 0.25;

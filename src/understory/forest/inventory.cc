@@ -15,6 +15,7 @@
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/stems/stem_fit.h"
 #include "understory/forest/stems/stem_surroundings.h"
+#include "understory/forest/trees/tree_crowns.h"
 #include "understory/forest/trees/tree_heights.h"
 #include "understory/util/parallel.h"
 
@@ -54,9 +55,15 @@ void gather(const PointBlocks& cloud, const InventoryConfig& config, const Inven
   gathered.ceiling.settle();
 }
 
+// What a full inventory gathers beside it.
+struct Details {
+  StemSurroundings surroundings;
+  TreeOwners owners;
+};
+
 // The fourth: canopy and tops of trees.
 void look_up(const PointBlocks& cloud, const InventoryResult& result, const CanopyCeiling& ceiling,
-             CanopyGrid& canopy, TreeColumns& trees, StemSurroundings* surroundings) {
+             CanopyGrid& canopy, TreeColumns& trees, Details* details) {
   std::vector<double> heights;
   cloud([&](std::span<const Eigen::Vector3d> points) {
     result.ground.heights_above(points, heights);
@@ -65,7 +72,9 @@ void look_up(const PointBlocks& cloud, const InventoryResult& result, const Cano
       const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
       if (ceiling.holds(place, heights[i])) canopy.add(place, heights[i]);
       trees.add(place, heights[i]);
-      if (surroundings != nullptr) surroundings->add(points[i] - result.origin);
+      if (details == nullptr) continue;
+      details->surroundings.add(points[i] - result.origin);
+      if (heights[i] > result.ground.config.class_m) details->owners.add(place, heights[i]);
     }
   });
 }
@@ -152,6 +161,38 @@ void measure_curves(StemSurroundings& surroundings, const StemCurveConfig& confi
   }
 }
 
+std::vector<OwnerTree> owner_trees(const InventoryResult& result, double slices_end_m) {
+  std::vector<OwnerTree> trees;
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    const StemFit& stem = result.stems[i];
+    OwnerTree tree;
+    tree.radius_m = stem.radius_m;
+    tree.height_m = result.trees[i].height_m;
+    tree.seen_to_m = slices_end_m;
+    if (std::isfinite(result.curves[i].measured_to_m))
+      tree.seen_to_m = std::max(slices_end_m, result.curves[i].measured_to_m);
+    for (const CurveSection& section : result.curves[i].sections)
+      tree.centres.push_back(section.centre);
+    if (tree.centres.empty()) {
+      for (int decimetre = 0; decimetre < 100; ++decimetre)
+        tree.centres.push_back(stem_place_at(stem, 0.1 * decimetre));
+    }
+    trees.push_back(std::move(tree));
+  }
+  return trees;
+}
+
+void find_crowns(const ProgressSink& progress, double slices_end_m, InventoryResult& result) {
+  const std::vector<OwnerTree> trees = owner_trees(result, slices_end_m);
+  result.owners->find(trees, progress);
+  const std::vector<TreeCrown> crowns = measure_crowns(*result.owners, trees);
+  for (std::size_t i = 0; i < crowns.size(); ++i) {
+    result.trees[i].crown_base_m = crowns[i].base_m;
+    result.trees[i].crown_area_m2 = crowns[i].area_m2;
+    result.trees[i].crown_volume_m3 = crowns[i].volume_m3;
+  }
+}
+
 void remark(const Gathered& gathered, const InventoryConfig& config, InventoryResult& result) {
   const double per_m2 = static_cast<double>(gathered.points) / std::max(1.0, result.area_m2);
   std::uint64_t returns = 0;
@@ -195,9 +236,11 @@ void remark(const Gathered& gathered, const InventoryConfig& config, InventoryRe
 }  // namespace
 
 void describe(ConfigTable& table, InventoryConfig& config) {
-  table.add_enum("extent", config.extent,
-                 {{"basic", InventoryExtent::kBasic}, {"full", InventoryExtent::kFull}},
-                 "basic: ground, stems, diameters, heights; full: stem curves and volumes as well");
+  table.add_enum(
+      "extent", config.extent,
+      {{"basic", InventoryExtent::kBasic}, {"full", InventoryExtent::kFull}},
+      "basic: ground, stems, diameters, heights; full: stem curves, volumes, crowns and the "
+      "tree of each point as well");
   table.section("curves", [&] {
     std::vector<std::pair<std::string, TaperSpecies>> names;
     for (const TaperSpecies species :
@@ -217,7 +260,7 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
                                const ProgressSink& progress, const SeenTest& in_view) {
   const PointBlocks cloud = polled(unasked, progress);
   const auto tell = [&](const char* stage, double done) {
-    progress({stage, done, 7.0, "passes", ""});
+    progress({stage, done, 8.0, "passes", ""});
   };
   InventoryResult result;
   tell("ground", 0.0);
@@ -239,23 +282,35 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
   CanopyGrid canopy(config.canopy_cell_m);
   TreeColumns columns(result.stems);
   const bool full = config.extent == InventoryExtent::kFull;
-  std::optional<StemSurroundings> surroundings;
-  if (full) surroundings.emplace(result.stems, ground_at_stems(result));
-  look_up(cloud, result, gathered.ceiling, canopy, columns, full ? &*surroundings : nullptr);
+  std::optional<Details> details;
+  if (full) details.emplace(Details{{result.stems, ground_at_stems(result)}, {}});
+  look_up(cloud, result, gathered.ceiling, canopy, columns, full ? &*details : nullptr);
   result.canopy = canopy.raster(result.origin.x(), result.origin.y());
   result.area_m2 = area_of(result.canopy);
   result.trees =
       trees_of(result, heights_in_view(result, columns, config.stems.highest_m, in_view));
   if (full) {
     tell("stem curves", 5.0);
-    measure_curves(*surroundings, config.curves, progress, result);
+    measure_curves(details->surroundings, config.curves, progress, result);
+    tell("crowns", 6.0);
+    result.owners = std::move(details->owners);
+    find_crowns(progress, config.stems.highest_m, result);
   }
   remark(gathered, config, result);
-  tell("segments", 6.0);
+  tell("segments", 7.0);
   result.segments =
       collect_segments(cloud, result.ground, result.trees, config.segments, kSegmentReach);
-  tell("segments", 7.0);
+  tell("segments", 8.0);
   return result;
+}
+
+std::uint32_t tree_at(const InventoryResult& inventory, const Eigen::Vector3d& point,
+                      double height_m) {
+  if (!inventory.owners || !(height_m > inventory.ground.config.class_m)) return 0;
+  const Eigen::Vector2d place = (point - inventory.origin).head<2>();
+  const std::int32_t owner = inventory.owners->owner(place, height_m);
+  if (owner == TreeOwners::kNobody) return 0;
+  return static_cast<std::uint32_t>(inventory.trees[static_cast<std::size_t>(owner)].id);
 }
 
 std::vector<Stem> stems_of(const InventoryResult& inventory, const Eigen::Vector3d& origin) {

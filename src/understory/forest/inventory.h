@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "understory/forest/ground/ground.h"
 #include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
+#include "understory/forest/trees/tree_owners.h"
 #include "understory/forest/trees/tree_segments.h"
 #include "understory/sensor/stem_view.h"
 #include "understory/sensor/tree.h"
@@ -16,8 +18,8 @@
 
 namespace understory {
 
-// How much an inventory measures: ground, stems, diameters and heights; or stem curves and volumes
-// as well.
+// How much an inventory measures: ground, stems, diameters and heights; or stem curves, volumes,
+// crowns and the tree of each point as well.
 enum class InventoryExtent { kBasic, kFull };
 
 // Settings of `understory inventory` and of the trees of a map.
@@ -46,6 +48,7 @@ struct InventoryResult {
   std::vector<Tree> trees;                           // by id; ids from 1 in order of position
   std::vector<StemFit> stems;                        // of the same index as trees
   std::vector<StemCurve> curves;                     // of the same index; of a full inventory only
+  std::optional<TreeOwners> owners;                  // of a full inventory: the trees' points
   std::vector<SlicePoint> slices;  // the thinned points between 0.5 m and 3.5 m that were searched
   std::vector<TreeSegment> segments;  // of a few trees, for the report
   std::uint64_t points = 0;
@@ -64,6 +67,11 @@ using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
                                              const InventoryConfig& config,
                                              const ProgressSink& progress = {},
                                              const SeenTest& in_view = {});
+
+// The id of the tree that a point of the cloud belongs to, 0 if none; of a full inventory.
+// `height_m` is its height above the ground.
+[[nodiscard]] std::uint32_t tree_at(const InventoryResult& inventory, const Eigen::Vector3d& point,
+                          double height_m);
 
 // The stems of an inventory as one view of them: foot and centre line, world frame without its
 // `origin` (metres, world frame), so that single precision is enough. In the order of the trees.

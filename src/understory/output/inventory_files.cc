@@ -5,7 +5,6 @@
 #include "understory/output/run_tables.h"
 
 namespace understory {
-namespace {
 
 void write_tree_tables(const std::filesystem::path& folder, const InventoryResult& inventory) {
   write_trees_csv(folder / "trees.csv", inventory.trees);
@@ -13,8 +12,6 @@ void write_tree_tables(const std::filesystem::path& folder, const InventoryResul
   write_stem_curves(folder / "stem_curves.csv", inventory.trees, inventory.curves,
                     inventory.origin.head<2>());
 }
-
-}  // namespace
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const std::string& crs) {

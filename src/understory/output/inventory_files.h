@@ -10,6 +10,9 @@
 
 namespace understory {
 
+// trees.csv, and of a full inventory stem_curves.csv. Throws OutputError.
+void write_tree_tables(const std::filesystem::path& folder, const InventoryResult& inventory);
+
 // Writes trees.csv, stem_curves.csv (of a full inventory), trees.gpkg, dtm.tif, chm.tif and dsm.tif
 // into `folder` (the rasters only where there is one). The inventory is in the world frame of
 // `layers`; trees.csv stays in it. Throws OutputError.

@@ -22,6 +22,8 @@ namespace {
 
 constexpr TimeNs kUnixAtGpsEpoch = 315'964'800 * kNsPerSecond;
 constexpr TimeNs kAdjustedGps = 1'000'000'000 * kNsPerSecond;
+// Of tree_id and HeightAboveGround.
+constexpr laszip_U16 kColumnBytes = sizeof(std::uint32_t) + sizeof(float);
 constexpr TimeNs kYear2000 = 946'684'800 * kNsPerSecond;
 
 // Seconds by which GPS time is ahead of UTC; the leap seconds since 1999.
@@ -100,10 +102,20 @@ struct LasWriter::Impl {
     header->global_encoding = kStandardGpsTime | kWkt;
     std::strncpy(header->generating_software, options.generating_software.c_str(), 31);
     std::strncpy(header->system_identifier, "SLAM", 31);
+    if (options.trees) add_columns();
     if (options.crs_wkt.empty()) return;
     check(laszip_add_vlr(
         las, "LASF_Projection", 2112, static_cast<laszip_U16>(options.crs_wkt.size() + 1),
         "OGC coordinate system WKT", reinterpret_cast<const laszip_U8*>(options.crs_wkt.c_str())));
+  }
+
+  // LASzip's numbers of the types.
+  void add_columns() {
+    constexpr laszip_U32 kUnsigned32 = 4;
+    constexpr laszip_U32 kFloat32 = 8;
+    header->point_data_record_length += kColumnBytes;
+    check(laszip_add_attribute(las, kUnsigned32, "tree_id", "0: of no tree", 1.0, 0.0));
+    check(laszip_add_attribute(las, kFloat32, "HeightAboveGround", "metres", 1.0, 0.0));
   }
 
   [[nodiscard]] laszip_I32 scaled(double value, int axis) const {
@@ -150,7 +162,7 @@ void LasWriter::add(const LasRecord& point) {
   out.X = self.scaled(point.x, 0);
   out.Y = self.scaled(point.y, 1);
   out.Z = self.scaled(point.z, 2);
-  out.gps_time = las_time(point.stamp);
+  out.gps_time = point.gps_time.value_or(las_time(point.stamp));
   out.intensity = point.intensity;
   out.return_number = 1;
   out.number_of_returns = 1;
@@ -158,6 +170,12 @@ void LasWriter::add(const LasRecord& point) {
   out.extended_number_of_returns = 1;
   out.extended_classification = point.classification;
   out.classification = point.classification < 32 ? point.classification : 0;
+  if (self.options.trees) {
+    UNDERSTORY_CHECK(out.num_extra_bytes == kColumnBytes);
+    std::memcpy(out.extra_bytes, &point.tree_id, sizeof point.tree_id);
+    std::memcpy(out.extra_bytes + sizeof point.tree_id, &point.height_above_ground,
+                sizeof point.height_above_ground);
+  }
   errno = 0;
   self.check(laszip_write_point(self.las));
   self.check(laszip_update_inventory(self.las));

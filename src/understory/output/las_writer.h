@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "understory/util/time.h"
@@ -18,6 +19,11 @@ struct LasRecord {
   TimeNs stamp = 0;
   std::uint16_t intensity = 0;
   std::uint8_t classification = 1;  // LAS: 1 unclassified, 2 ground, 3-5 vegetation
+  // Instead of the stamp: the time as another LAS file stores it.
+  std::optional<double> gps_time = std::nullopt;
+  // With LasOptions::trees only.
+  std::uint32_t tree_id = 0;      // 0: of no tree
+  float height_above_ground = 0;  // metres; NaN where the ground is not known
 };
 
 // How points are written to LAS and LAZ.
@@ -27,6 +33,7 @@ struct LasOptions {
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
   // Step of the stored coordinates, in the units of the coordinate system.
   Eigen::Vector3d scale = Eigen::Vector3d::Constant(0.001);
+  bool trees = false;   // two more columns: tree_id and HeightAboveGround (as PDAL names it)
   std::string crs_wkt;  // OGC WKT of the coordinate system; empty = local frame, none written
   // Stamps are written as adjusted standard GPS time if they are of this century (Unix time), else
   // as seconds as they are.

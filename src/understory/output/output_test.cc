@@ -7,6 +7,7 @@
 #include <zlib.h>
 
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -200,6 +201,45 @@ TEST_F(OutputTest, GnssQuotesItsReasons) {
                       "\"jump of 12 m, not \"\"used\"\"\",,\n"),
             std::string::npos)
       << text;
+}
+
+TEST_F(OutputTest, LazKeepsTheTreeAndTheHeightOfAPoint) {
+  const fs::path path = folder_ / "map.laz";
+  LasOptions options;
+  options.trees = true;
+  LasWriter writer(path, options);
+  for (std::uint32_t i = 0; i < 60'000; ++i) {  // more than one chunk
+    LasRecord record;
+    record.x = 0.001 * i;
+    record.gps_time = 0.5 * i;
+    record.tree_id = i % 1000;
+    record.height_above_ground = 0.25F * static_cast<float>(i % 100);
+    writer.add(record);
+  }
+  writer.commit();
+
+  laszip_POINTER reader = nullptr;
+  ASSERT_EQ(laszip_create(&reader), 0);
+  laszip_BOOL compressed = 0;
+  ASSERT_EQ(laszip_open_reader(reader, path.c_str(), &compressed), 0);
+  laszip_header* header = nullptr;
+  laszip_get_header_pointer(reader, &header);
+  EXPECT_EQ(header->point_data_record_length, 38);
+  laszip_point* point = nullptr;
+  laszip_get_point_pointer(reader, &point);
+  for (std::uint32_t i = 0; i < 60'000; ++i) {
+    ASSERT_EQ(laszip_read_point(reader), 0);
+    ASSERT_EQ(point->num_extra_bytes, 8);
+    std::uint32_t tree = 0;
+    float height = 0.0F;
+    std::memcpy(&tree, point->extra_bytes, 4);
+    std::memcpy(&height, point->extra_bytes + 4, 4);
+    ASSERT_EQ(tree, i % 1000);
+    ASSERT_EQ(height, 0.25F * static_cast<float>(i % 100));
+    ASSERT_EQ(point->gps_time, 0.5 * i);
+  }
+  laszip_close_reader(reader);
+  laszip_destroy(reader);
 }
 
 TEST_F(OutputTest, LazComesBackToTheMillimetre) {

@@ -155,7 +155,7 @@ void write_stem_curves(const std::filesystem::path& path, const std::vector<Tree
   file.write("tree_id,height_m,x,y,diameter_m,diameter_sd_m,measured\n");
   for (std::size_t i = 0; i < curves.size(); ++i) {
     for (const CurveSection& section : curves[i].sections)
-      file.write(fmt::format("{},{:.1f},{:.3f},{:.3f},{:.4f},{:.4f},{}\n", trees[i].id,
+      file.write(fmt::format("{},{:.2f},{:.3f},{:.3f},{:.4f},{:.4f},{}\n", trees[i].id,
                              section.height_m, origin.x() + section.centre.x(),
                              origin.y() + section.centre.y(), section.diameter_m,
                              section.diameter_sd_m, section.measured ? 1 : 0));

@@ -25,6 +25,9 @@ struct Tree {
   double y_sd_m = kUnknown;
   double stem_volume_m3 = kUnknown;     // over bark, from the ground to the top
   double stem_volume_sd_m3 = kUnknown;  // its standard deviation
+  double crown_base_m = kUnknown;       // above the ground: where the crown begins
+  double crown_area_m2 = kUnknown;      // of its outline seen from above
+  double crown_volume_m3 = kUnknown;
   bool felled = false;  // of a truth: cut down while it was scanned, so it may be listed or not
 };
 
@@ -50,6 +53,9 @@ inline constexpr std::array kTreeColumns = {
     TreeColumn{"y_sd_m", &Tree::y_sd_m, 4, false},
     TreeColumn{"stem_volume_m3", &Tree::stem_volume_m3, 4, false},
     TreeColumn{"stem_volume_sd_m3", &Tree::stem_volume_sd_m3, 4, false},
+    TreeColumn{"crown_base_m", &Tree::crown_base_m, 2, false},
+    TreeColumn{"crown_area_m2", &Tree::crown_area_m2, 2, false},
+    TreeColumn{"crown_volume_m3", &Tree::crown_volume_m3, 2, false},
 };
 
 // The names of the columns, and the cells of one tree, separated by commas, without the end of the

@@ -310,7 +310,7 @@ StemCurve measure_stem_curve(std::vector<SlicePoint> points, const StemFit& stem
   for (int i = 0; i <= count; ++i)
     curve.sections.push_back(smooth.at(i * kSectionStep));
   if (!std::isfinite(height_m)) return curve;
-  if (end > count * kSectionStep) curve.sections.push_back(smooth.at(end));
+  if (end > count * kSectionStep + kSameHeight) curve.sections.push_back(smooth.at(end));
   add_volume(curve);
   return curve;
 }

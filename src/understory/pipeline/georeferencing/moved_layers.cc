@@ -18,16 +18,6 @@ using Eigen::Vector3d;
 
 constexpr double kAnywhere = 1e8;
 
-// The writer turns Unix time into adjusted standard GPS time, and leaves seconds as they are; here
-// is the way back.
-TimeNs stamp_of(double gps_time) {
-  constexpr double kAdjusted = 1e9;
-  constexpr double kUnixAtGpsEpoch = 315'964'800.0;
-  constexpr double kLeapSeconds = 18.0;
-  const bool seconds = gps_time >= 0.0 && gps_time < 1e7;
-  return from_seconds(seconds ? gps_time : gps_time + kAdjusted + kUnixAtGpsEpoch - kLeapSeconds);
-}
-
 // All of a raster of the run; empty where there is none.
 Raster read_layer(const fs::path& file) {
   if (!fs::exists(file)) return {};
@@ -68,7 +58,7 @@ void move_cloud(const fs::path& from, const fs::path& to, const Move& move, cons
     record.x = at.x();
     record.y = at.y();
     record.z = at.z();
-    record.stamp = stamp_of(point.gps_time);
+    record.gps_time = point.gps_time;
     record.intensity =
         static_cast<std::uint16_t>(std::clamp(std::lround(point.intensity), 0L, 65535L));
     record.classification = point.classification;

@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <span>
 
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/inventory_files.h"
+#include "understory/output/las_writer.h"
+#include "understory/output/layer_files.h"
 #include "understory/output/qgis_project.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/inventory/lidar_view.h"
@@ -94,6 +97,42 @@ Stock stock_of(const InventoryRequest& request) {
   return stock;
 }
 
+// How the cloud is written again: in its own system, or that of the layers of its run.
+LasOptions las_options_of(const Stock& stock) {
+  if (stock.of_run) return las_options(stock.frames.layers);
+  LasOptions options;
+  options.offset = stock.stand.cloud.origin.array().round();
+  if (const auto system = CoordinateSystem::find(stock.stand.cloud.coordinate_system))
+    options.crs_wkt = system->wkt();
+  return options;
+}
+
+// map.laz: the cloud with classes, the tree of each point and heights above the ground.
+void write_labelled_cloud(const Stock& stock, const fs::path& file, const ProgressSink& progress) {
+  const PointCloudFile& cloud = stock.stand.cloud;
+  LasOptions options = las_options_of(stock);
+  options.trees = true;
+  LasWriter writer(file, options);
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    progress.poll();
+    const Eigen::Vector3d in_world = cloud.origin + cloud.points[i].cast<double>();
+    const double height = stock.inventory.ground.height_above(in_world);
+    const Eigen::Vector3d at = stock.of_run ? stock.frames.layers.from_world(in_world) : in_world;
+    LasRecord record;
+    record.x = at.x();
+    record.y = at.y();
+    record.z = at.z();
+    if (!cloud.gps_time.empty()) record.gps_time = cloud.gps_time[i];
+    if (!cloud.intensity.empty())
+      record.intensity = static_cast<std::uint16_t>(std::clamp(cloud.intensity[i], 0.0F, 65535.0F));
+    record.classification = stock.inventory.ground.las_class(height);
+    record.tree_id = tree_at(stock.inventory, in_world, height);
+    record.height_above_ground = static_cast<float>(height);
+    writer.add(record);
+  }
+  writer.commit();
+}
+
 void take_stock(const InventoryRequest& request, const fs::path& results, Log& log,
                 const ProgressSink& progress, StageTimes& times, Stock& stock) {
   {
@@ -121,6 +160,7 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
   } else {
     write_inventory_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
   }
+  if (stock.inventory.owners) write_labelled_cloud(stock, results / "map.laz", progress);
   write_project(stock, results);
 }
 

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "understory/forest/inventory.h"
+#include "understory/output/inventory_files.h"
 #include "understory/output/las_writer.h"
 #include "understory/output/layer_files.h"
 #include "understory/output/report/map_picture.h"
@@ -167,17 +168,28 @@ std::string title_of(const ReadRecording& recording) {
 }
 
 std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
-                          const GroundModel& ground, const ResultFrames& frames,
+                          const InventoryResult& inventory, const ResultFrames& frames,
                           MapPicture& picture, const ProgressSink& progress) {
-  LasWriter writer(file, las_options(frames.layers));
+  LasOptions options = las_options(frames.layers);
+  options.trees = inventory.owners.has_value();
+  LasWriter writer(file, options);
   double done = 0.0;
   tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
     for (const MapPoint& p : points) {
       const Eigen::Vector3d in_world(p.x, p.y, p.z);
-      const double height = ground.height_above(in_world);
-      const std::uint8_t las_class = ground.las_class(height);
+      const double height = inventory.ground.height_above(in_world);
+      const std::uint8_t las_class = inventory.ground.las_class(height);
       const Eigen::Vector3d at = frames.layers.from_world(in_world);
-      writer.add({at.x(), at.y(), at.z(), p.stamp, p.intensity, las_class});
+      LasRecord record;
+      record.x = at.x();
+      record.y = at.y();
+      record.z = at.z();
+      record.stamp = p.stamp;
+      record.intensity = p.intensity;
+      record.classification = las_class;
+      record.tree_id = tree_at(inventory, in_world, height);
+      record.height_above_ground = static_cast<float>(height);
+      writer.add(record);
       const Eigen::Vector3d drawn = frames.local ? frames.local->from_world(in_world) : at;
       picture.add(drawn.x(), drawn.y(), drawn.z(), height);
     }
@@ -194,9 +206,9 @@ std::uint64_t write_map(const ReadRecording& recording, DenseProducts& made,
                         MapPicture& picture) {
   const std::filesystem::path& folder = recording.results;
   const InventoryResult& inventory = made.inventory;
-  const std::uint64_t points = write_cloud(folder / "map.laz", *made.tiles, inventory.ground,
-                                           frames, picture, recording.progress);
-  write_trees_csv(folder / "trees.csv", inventory.trees);
+  const std::uint64_t points =
+      write_cloud(folder / "map.laz", *made.tiles, inventory, frames, picture, recording.progress);
+  write_tree_tables(folder, inventory);
   write_tree_layers(folder, inventory.trees, trajectory, frames.layers);
   write_raster_layers(folder, inventory.ground.terrain, inventory.canopy,
                       change_into(frames.layers), frames.layers);

@@ -1,0 +1,141 @@
+#include "understory/forest/trees/tree_crowns.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "understory/forest/forest_constants.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+using namespace forest_constants::tree_crowns;
+
+using Places = std::vector<Eigen::Vector2d>;
+
+// How far nearly all places in one direction reach; negative where there are none.
+using Reaches = std::array<double, kSectors>;
+
+Reaches reaches_of(const Places& places, const Eigen::Vector2d& middle) {
+  std::array<std::vector<double>, kSectors> distances;
+  for (const Eigen::Vector2d& place : places) {
+    const Eigen::Vector2d off = place - middle;
+    const double turn = std::atan2(off.y(), off.x()) / (2.0 * M_PI) + 0.5;
+    const auto sector =
+        std::min<std::size_t>(kSectors - 1, static_cast<std::size_t>(turn * kSectors));
+    distances[sector].push_back(off.norm());
+  }
+  Reaches reaches;
+  reaches.fill(-1.0);
+  for (std::size_t s = 0; s < kSectors; ++s) {
+    std::vector<double>& all = distances[s];
+    if (all.empty()) continue;
+    const auto at = static_cast<std::size_t>(kEdgeQuantile * static_cast<double>(all.size() - 1));
+    std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(at), all.end());
+    reaches[s] = all[at];
+  }
+  return reaches;
+}
+
+// Few points leave directions empty: narrow gaps are filled in from both sides.
+Reaches without_gaps(const Reaches& reaches) {
+  Reaches filled = reaches;
+  for (std::size_t s = 0; s < kSectors; ++s) {
+    if (reaches[s] >= 0.0) continue;
+    std::size_t before = 1;
+    std::size_t after = 1;
+    while (before < kSectors && reaches[(s + kSectors - before) % kSectors] < 0.0)
+      ++before;
+    while (after < kSectors && reaches[(s + after) % kSectors] < 0.0)
+      ++after;
+    if (before + after > kWidestGap) continue;
+    const double left = reaches[(s + kSectors - before) % kSectors];
+    const double right = reaches[(s + after) % kSectors];
+    const auto share = static_cast<double>(before) / static_cast<double>(before + after);
+    filled[s] = left + share * (right - left);
+  }
+  return filled;
+}
+
+// Area around `middle` that the places fill: a sum of wedges.
+double outline_area(const Places& places, const Eigen::Vector2d& middle) {
+  double area = 0.0;
+  for (const double reach : without_gaps(reaches_of(places, middle)))
+    area += M_PI / kSectors * std::pow(std::max(0.0, reach), 2);
+  return area;
+}
+
+// The layers of one tree: its cubes by height.
+std::vector<Places> layers_of(const std::vector<TreeOwners::Voxel>& voxels) {
+  std::vector<Places> layers;
+  for (const TreeOwners::Voxel& voxel : voxels) {
+    const auto layer = static_cast<std::size_t>(std::max(0.0, voxel.height_m) / kLayer);
+    if (layer >= layers.size()) layers.resize(layer + 1);
+    layers[layer].push_back(voxel.place);
+  }
+  return layers;
+}
+
+// How far a layer reaches from the stem, as a mean over all directions.
+double width_of(const Places& places, const Eigen::Vector2d& stem) {
+  return std::sqrt(outline_area(places, stem) / M_PI);
+}
+
+// The lowest layer from which on most layers are wide; the number of layers if there is none.
+std::size_t base_of(const std::vector<double>& widths, double radius_m) {
+  std::vector<double> sorted = widths;
+  std::sort(sorted.begin(), sorted.end());
+  const double wide =
+      sorted[static_cast<std::size_t>(kWideQuantile * static_cast<double>(sorted.size() - 1))];
+  const double least = std::max(radius_m + kBranch, kBaseShare * wide);
+  for (std::size_t base = 0; base < widths.size(); ++base) {
+    if (widths[base] < least) continue;
+    const auto first = widths.begin() + static_cast<std::ptrdiff_t>(base);
+    const auto end = first + std::min<std::ptrdiff_t>(kBaseLayers, widths.end() - first);
+    const auto many = std::count_if(first, end, [&](double width) { return width >= least; });
+    if (many >= kLeastWideLayers) return base;
+  }
+  return widths.size();
+}
+
+TreeCrown crown_of(const std::vector<TreeOwners::Voxel>& voxels, const OwnerTree& tree) {
+  const std::vector<Places> layers = layers_of(voxels);
+  std::vector<double> widths;
+  for (std::size_t i = 0; i < layers.size(); ++i)
+    widths.push_back(width_of(layers[i], centre_at(tree, (static_cast<double>(i) + 0.5) * kLayer)));
+  TreeCrown crown;
+  if (widths.empty()) return crown;
+  const std::size_t base = base_of(widths, tree.radius_m);
+  if (base == widths.size()) return crown;
+  crown.base_m = static_cast<double>(base) * kLayer;
+  Places all;
+  crown.volume_m3 = 0.0;
+  for (std::size_t i = base; i < layers.size(); ++i) {
+    all.insert(all.end(), layers[i].begin(), layers[i].end());
+    crown.volume_m3 += kLayer * M_PI * widths[i] * widths[i];
+  }
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& place : all)
+    middle += place / static_cast<double>(all.size());
+  crown.area_m2 = outline_area(all, middle);
+  return crown;
+}
+
+}  // namespace
+
+std::vector<TreeCrown> measure_crowns(const TreeOwners& owners,
+                                      const std::vector<OwnerTree>& trees) {
+  std::vector<std::vector<TreeOwners::Voxel>> voxels(trees.size());
+  for (std::size_t i = 0; i < owners.size(); ++i) {
+    const TreeOwners::Voxel voxel = owners.voxel(i);
+    if (voxel.owner != TreeOwners::kNobody)
+      voxels[static_cast<std::size_t>(voxel.owner)].push_back(voxel);
+  }
+  std::vector<TreeCrown> crowns(trees.size());
+  parallel_for(trees.size(), 4, [&](std::size_t i) { crowns[i] = crown_of(voxels[i], trees[i]); });
+  return crowns;
+}
+
+}  // namespace understory

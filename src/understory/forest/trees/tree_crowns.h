@@ -1,0 +1,24 @@
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "understory/forest/trees/tree_owners.h"
+
+namespace understory {
+
+// The crown of a tree, from the cubes that belong to it. NaN where none was seen.
+struct TreeCrown {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  double base_m = kUnknown;     // above the ground: where the layers become wide and stay so
+  double area_m2 = kUnknown;    // of its outline seen from above
+  double volume_m3 = kUnknown;  // sum of the outlines of its layers
+};
+
+// Base, area and volume of each crown. Outlines are made of sixteen wedges: each reaches as far from
+// the middle as nearly all cubes in its direction.
+[[nodiscard]] std::vector<TreeCrown> measure_crowns(const TreeOwners& owners,
+                                                    const std::vector<OwnerTree>& trees);
+
+}  // namespace understory

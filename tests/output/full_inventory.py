@@ -1,0 +1,165 @@
+"""A full inventory through the program: stem curves, volumes, crowns, and the tree of each point.
+
+A simulated walk is mapped with `--inventory full`; the map is then taken stock of once more, as a
+run and as a cloud of its own. What is written is compared with the truth of the simulation, and
+read by laspy and GDAL's SQLite.
+"""
+
+import csv
+import json
+import os
+import sqlite3
+import subprocess
+import tempfile
+from pathlib import Path
+
+import laspy
+import numpy as np
+
+PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
+SECTION_RMSE_M = 0.014  # of sections that were measured, to 6 m of height, to 8 m from the path
+VOLUME_BIAS = 0.06  # of the sum over the trees to 8 m from the path
+
+
+def run(*words):
+    done = subprocess.run([PROGRAM, "--quiet", *map(str, words)], capture_output=True, text=True)
+    assert done.returncode == 0, (words, done.returncode, done.stderr)
+    return done.stdout
+
+
+def rows(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def number(text):
+    return float(text) if text else float("nan")
+
+
+def curves(path):
+    found = {}
+    for row in rows(path):
+        found.setdefault(int(row["tree_id"]), []).append(
+            [number(row[name]) for name in ("height_m", "diameter_m", "x", "y")] + [number(row.get("measured", "1"))])
+    return {tree: np.array(sections) for tree, sections in found.items()}
+
+
+def into_truth(folder, truth):
+    """The turn about the vertical and the shift that lay the list on the truth."""
+    found = json.loads(run("evaluate", "trees", folder, truth, "--align", "yaw", "--json"))["alignment_found"]
+    turn = np.radians(found["yaw_deg"])
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    return lambda place: rotation @ place + np.array(found["translation_m"][:2])
+
+
+def pairs(folder, truth):
+    """Trees of the list near the path with those of the truth at the same place."""
+    laid = into_truth(folder, truth)
+    path = np.loadtxt(truth / "trajectory.tum")[:, 1:3]
+    listed, true = rows(folder / "trees.csv"), rows(truth / "trees.csv")
+    places = np.array([[float(row["x"]), float(row["y"])] for row in true])
+    for row in listed:
+        place = laid(np.array([float(row["x"]), float(row["y"])]))
+        gaps = np.linalg.norm(places - place, axis=1)
+        j = int(gaps.argmin())
+        if gaps[j] < 0.4 and np.linalg.norm(path - places[j], axis=1).min() < 8.0:
+            yield row, true[j]
+
+
+def check_curves(folder, truth):
+    own, right = curves(folder / "stem_curves.csv"), curves(truth / "stem_curves.csv")
+    errors, volumes, true_volumes = [], [], []
+    for tree, grown in pairs(folder, truth):
+        sections, there = own[int(tree["id"])], right[int(grown["id"])]
+        heights = sections[:, 0]
+        assert heights[0] == 0.0 and np.all(np.diff(heights) > 0.0), heights
+        assert np.all(sections[:, 1] >= 0.0)
+        low = (sections[:, 4] == 1) & (heights > 0.3) & (heights < 6.0)
+        errors.extend(sections[low, 1] - np.interp(heights[low], there[:, 0], there[:, 1]))
+        if tree["stem_volume_m3"]:
+            assert abs(heights[-1] - float(tree["height_m"])) < 0.06, (heights[-1], tree)
+            volumes.append(float(tree["stem_volume_m3"]))
+            true_volumes.append(float(grown["stem_volume_m3"]))
+    assert len(volumes) >= 15, len(volumes)
+    rmse = float(np.sqrt(np.mean(np.square(errors))))
+    bias = sum(volumes) / sum(true_volumes) - 1.0
+    assert len(errors) > 300 and rmse < SECTION_RMSE_M, (len(errors), rmse)
+    assert abs(bias) < VOLUME_BIAS, bias
+    return rmse, bias
+
+
+def check_cloud(folder, truth, points):
+    """map.laz: each point's tree and height. A measured stem's points are its own."""
+    las = laspy.read(folder / "map.laz")
+    assert len(las.points) == points, (len(las.points), points)
+    owner = np.asarray(las["tree_id"])
+    height = np.asarray(las["HeightAboveGround"])
+    ids = {int(row["id"]) for row in rows(folder / "trees.csv")}
+    assert set(np.unique(owner).tolist()) <= ids | {0}
+    assert np.all(owner[np.asarray(las.classification) == 2] == 0), "ground belongs to no tree"
+    xyz = las.xyz
+    own = curves(folder / "stem_curves.csv")
+    right = wrong = 0
+    for tree, grown in pairs(folder, truth):
+        for height_m, diameter, x, y, measured in own[int(tree["id"])][10:60:5]:
+            if measured != 1:
+                continue
+            near = (np.abs(height - height_m) < 0.05) & (np.hypot(xyz[:, 0] - x, xyz[:, 1] - y) < 0.55 * diameter + 0.02)
+            right += int(np.sum(owner[near] == int(tree["id"])))
+            wrong += int(np.sum(owner[near] != int(tree["id"])))
+    assert right > 2000 and wrong < 0.02 * right, (right, wrong)
+    return right, wrong
+
+
+def check_crowns(folder, truth):
+    known = 0
+    for tree, grown in pairs(folder, truth):
+        if not tree["crown_base_m"] or not tree["height_m"]:
+            continue
+        known += 1
+        base, area, volume, top = (float(tree[name]) for name in ("crown_base_m", "crown_area_m2", "crown_volume_m3", "height_m"))
+        assert 0.0 <= base < top and 0.1 < area < 60.0, tree
+        assert 0.0 < volume < area * (top - base) + 1.0, tree
+    assert known >= 15, known
+    return known
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        truth = folder / "walk.truth"
+        run("simulate", "handheld", "-o", folder / "walk.mcap", "--seed", 3, "--duration-s", 16, "--set", "gnss.enabled=false")
+        run("map", folder / "walk.mcap", "-o", folder / "run", "--inventory", "full")
+        points = json.loads((folder / "run/run.json").read_text())["counts"]["map_points"]
+        print("map: RMSE of sections %.4f m, bias of the volume %+.3f" % check_curves(folder / "run", truth))
+        print("map: points of stems right and wrong", *check_cloud(folder / "run", truth, points))
+        print("map: crowns", check_crowns(folder / "run", truth))
+        with sqlite3.connect(folder / "run/trees.gpkg") as layer:
+            assert layer.execute("select count(*) from trees where stem_volume_m3 > 0").fetchone()[0] > 15
+
+        run("inventory", folder / "run", "-o", folder / "again")
+        check_curves(folder / "again", truth)
+        check_cloud(folder / "again", truth, points)
+        run("inventory", folder / "run/map.laz", "-o", folder / "cloud")
+        check_curves(folder / "cloud", truth)
+        check_cloud(folder / "cloud", truth, points)
+        # As a cloud it keeps its times and intensities.
+        first, second = (laspy.read(folder / place / "map.laz") for place in ("run", "cloud"))
+        assert np.array_equal(first.gps_time, second.gps_time)
+        assert np.array_equal(first.intensity, second.intensity)
+        assert np.allclose(first.xyz, second.xyz, atol=1e-9)
+
+        # A basic one has none of that, and the empty columns say so.
+        run("inventory", folder / "run", "-o", folder / "basic", "--set", "extent=basic")
+        assert not (folder / "basic/stem_curves.csv").exists() and not (folder / "basic/map.laz").exists()
+        assert all(row["stem_volume_m3"] == "" for row in rows(folder / "basic/trees.csv"))
+
+        # The same for any number of threads.
+        for threads in (1, 2):
+            run("--threads", threads, "inventory", folder / "run", "-o", folder / f"by{threads}")
+        for file in ("trees.csv", "stem_curves.csv", "map.laz"):
+            assert (folder / "by1" / file).read_bytes() == (folder / "by2" / file).read_bytes(), file
+
+
+if __name__ == "__main__":
+    main()
