@@ -262,6 +262,39 @@ TEST(Mcap, KeepsTheLogTimesThatAreGiven) {
   }
 }
 
+// The positions of a second antenna come back as headings of the first one's.
+TEST(Mcap, KeepsThePositionsOfASecondAntenna) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "two_receivers.mcap";
+  Drive drive = make_drive(6);
+  drive.rig.body_from_second_gnss = Pose(Eigen::Quaterniond::Identity(), {1.5, 0.0, 2.0});
+  {
+    McapWriter writer(path);
+    writer.set_rig(drive.rig);
+    for (const Event& event : drive.events) {
+      writer.write(event);
+      if (const auto* fix = std::get_if<GnssFix>(&event)) {
+        GnssFix second = *fix;
+        second.longitude_deg += 1.5 / 75'900.0;  // east
+        writer.write_second_position(second, fix->stamp);
+      }
+    }
+  }
+  Log log;
+  const auto recording = open_recording(path, {}, log);
+  std::size_t headings = 0;
+  for (const Event& event : read_all(*recording)) {
+    const auto* fix = std::get_if<GnssFix>(&event);
+    if (fix == nullptr) continue;
+    EXPECT_EQ(fix->hdop, 1.25);
+    if (std::isnan(fix->heading_deg)) continue;
+    EXPECT_NEAR(fix->heading_deg, 90.0, 1e-3);
+    ++headings;
+  }
+  EXPECT_EQ(headings, 8U);  // four pairs before the first
+  EXPECT_EQ(all_warnings(log), "");
+}
+
 TEST(Mcap, KeepsTheHeadingOfASecondAntenna) {
   const TemporaryFolder folder;
   const std::string path = folder / "two_antennas.mcap";

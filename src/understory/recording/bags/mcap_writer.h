@@ -45,6 +45,10 @@ class McapWriter {
   // tells how the clocks of the sensors run (preprocess/stream_offset.h).
   void write(const Event& event, TimeNs log_time);
 
+  // A position of the second antenna, on /gnss/second in the frame gnss_second. The fix of the
+  // first one, without a heading, is to be written before it.
+  void write_second_position(const GnssFix& fix, TimeNs log_time);
+
   // Closes the last chunk, writes index and summary, and syncs the file to the disk.
   void finish();
 
