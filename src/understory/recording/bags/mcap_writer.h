@@ -21,8 +21,8 @@ struct McapWriterOptions {
 
 // Writes the project's native recording: MCAP with ROS 2 messages (CDR), chunks with CRC, message
 // and chunk indexes, statistics and a summary, on the topics /lidar, /imu, /mag, /gnss,
-// /gnss/quality and /tf_static. A message's log time is its event_time (a scan's is its end) unless
-// another is given. Readers sort by it.
+// /gnss/quality, /gnss/nmea, /gnss/second and /tf_static. A message's log time is its event_time (a
+// scan's is its end) unless another is given. Readers sort by it.
 //
 // Events are to be written in the order of their log times; other orders are kept as they come.
 // Every method throws OutputError if the file cannot be written (disk full, no permission). What
