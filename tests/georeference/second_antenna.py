@@ -115,9 +115,9 @@ def fused(folder):
     assert abs(error) < 3 * max(0.5, facts["georeference"]["heading_sd_deg"]), (error, facts["georeference"])
 
 
-# Two receivers that give positions: they err alike by metres, and each by centimetres. They promise half of that.
-POSITIONS = ("gnss.second_antenna_positions=true", "gnss.second_antenna_common=0.9999", "gnss.white_sd_m=0.005",
-             "gnss.reported_factor=0.01")
+# Two receivers that give positions: they err alike by a metre, and each by centimetres. They promise one.
+POSITIONS = ("gnss.second_antenna_positions=true", "gnss.second_antenna_common=0.9992", "gnss.open_sd_m=1",
+             "gnss.canopy_sd_m=0", "gnss.white_sd_m=0.005", "gnss.reported_factor=0.01")
 PAIR = simulated("pair", "demo", 25, *POSITIONS)
 LINE_DEG = math.degrees(math.atan2(0.8, 0.1))  # of the second antenna in the body's plane, from x to y
 
