@@ -1,6 +1,7 @@
-"""Headings of a second antenna: they lay the map within what is stated, place a machine that stands, and are noticed
-where they contradict the positions."""
+"""Headings of a second antenna, by its sentences and by its positions: they lay the map within what is stated, place a
+machine that stands, and are noticed where they contradict the positions or are those of another line."""
 
+import csv
 import json
 import math
 import sys
@@ -112,6 +113,87 @@ def fused(folder):
     assert facts["georeference"]["method"] == "fuse", facts["georeference"]
     error = heading_error_deg(WALK, folder / "run", facts)
     assert abs(error) < 3 * max(0.5, facts["georeference"]["heading_sd_deg"]), (error, facts["georeference"])
+
+
+# Two receivers that give positions: they err alike by a metre, and each by centimetres. They promise one.
+POSITIONS = ("gnss.second_antenna_positions=true", "gnss.second_antenna_common=0.9992", "gnss.open_sd_m=1",
+             "gnss.canopy_sd_m=0", "gnss.white_sd_m=0.005", "gnss.reported_factor=0.01")
+PAIR = simulated("pair", "demo", 25, *POSITIONS)
+LINE_DEG = math.degrees(math.atan2(0.8, 0.1))  # of the second antenna in the body's plane, from x to y
+
+
+def normalised_errors(run, recording, turn_deg):
+    """Of the headings in gnss.csv against the truth, in standard deviations. The body is nearly level."""
+    truth = yaws(recording.with_suffix(".truth") / "trajectory.tum")
+    off = []
+    with (run / "gnss.csv").open() as file:
+        for row in csv.DictReader(file):
+            time = min(truth, key=lambda stamp: abs(stamp - float(row["timestamp"])))
+            if not row["heading_deg"] or row["heading_deg"] == "nan" or abs(time - float(row["timestamp"])) > 0.06:
+                continue
+            should = 90 - truth[time] - LINE_DEG + turn_deg
+            off.append(math.remainder(float(row["heading_deg"]) - should, 360) / float(row["heading_sd_deg"]))
+    return off
+
+
+@cases.case("positions of two antennas tell the heading, as well as is stated")
+def positions(folder):
+    told = json.loads(program("info", PAIR, "--json").stdout)
+    assert told["gnss"]["headings"] > 80, told["gnss"]
+    facts = mapped(PAIR, folder / "run")
+    quality, place = facts["quality"], facts["georeference"]
+    assert quality["gnss_second_antenna_used"] == 1, quality
+    assert not warned(facts, "recording.second_antenna") and not warned(facts, "recording.antenna_distance"), facts
+    error = heading_error_deg(PAIR, folder / "run", facts)
+    assert abs(error) < 3 * place["heading_sd_deg"] and place["heading_sd_deg"] < 2.5, (error, place)
+    off = normalised_errors(folder / "run", PAIR, 0.0)
+    square = sum(one * one for one in off) / len(off)
+    print(f"by positions: off by {error:.2f} degrees, stated {place['heading_sd_deg']:.2f}; {len(off)} headings, "
+          f"normalised square {square:.2f}, off from those of the path by {quality['gnss_second_antenna_off_deg']:.2f}")
+    assert len(off) > 80 and 0.2 < square < 2.5, (len(off), square)
+    assert abs(quality["gnss_second_antenna_off_deg"]) < 20, quality  # the positions err by metres over 27 m
+
+
+@cases.case("a machine that stands is placed by the positions of two antennas, and says so while it runs")
+def standing_positions(folder):
+    recording = simulated("still_pair", "harvester", 12, "carrier.still_s=60", *POSITIONS)
+    facts = mapped(recording, folder / "run")
+    place = facts["georeference"]
+    assert place["on_globe"] and place["heading_sd_deg"] < 5, place
+    error = heading_error_deg(recording, folder / "run", facts)
+    print(f"standing, by positions: off by {error:.2f} degrees, stated {place['heading_sd_deg']:.2f}")
+    assert abs(error) < 3 * place["heading_sd_deg"], (error, place)
+    assert facts["quality"]["global_heading_known_percent"] > 50, facts["quality"]
+
+
+@cases.case("the graph takes the headings by positions, too")
+def fused_positions(folder):
+    facts = mapped(PAIR, folder / "run", "--set", "gnss.use=fuse")
+    assert facts["georeference"]["method"] == "fuse", facts["georeference"]
+    assert facts["quality"]["gnss_second_antenna_used"] == 1, facts["quality"]
+    error = heading_error_deg(PAIR, folder / "run", facts)
+    assert abs(error) < 3 * max(0.5, facts["georeference"]["heading_sd_deg"]), (error, facts["georeference"])
+
+
+def rig_file(path, first, second):
+    path.write_text(f"body_frame: {json.loads(program('info', PAIR, '--json').stdout)['rig']['body_frame']}\n"
+                    f"body_from_gnss: {{translation_m: {first}}}\nbody_from_second_gnss: {{translation_m: {second}}}\n")
+    return path
+
+
+@cases.case("positions of antennas that are swapped, or not as far apart as the rig says, do not turn the map")
+def wrong_positions(folder):
+    swap = rig_file(folder / "swapped.yaml", [0.3, 0.5, 0.45], [0.2, -0.3, 0.4])
+    facts = mapped(PAIR, folder / "swapped", "--extrinsics", swap, "--gnss-topic", "/gnss")
+    assert facts["quality"]["gnss_second_antenna_used"] == 0, facts["quality"]
+    assert warned(facts, "gnss.second_antenna_contradicts"), facts["warnings"]
+    far = rig_file(folder / "far.yaml", [0.2, -0.3, 0.4], [0.3, 1.5, 0.45])
+    facts = mapped(PAIR, folder / "far", "--extrinsics", far, "--gnss-topic", "/gnss")
+    assert "gnss_second_antenna_used" not in facts["quality"], facts["quality"]
+    assert "pairs of positions" in warned(facts, "recording.antenna_distance")[0]["message"], facts["warnings"]
+    # A file that places the antennas, and nothing says which topic is whose.
+    facts = mapped(PAIR, folder / "unnamed", "--extrinsics", far)
+    assert "--gnss-topic" in warned(facts, "recording.second_antenna")[0]["message"], facts["warnings"]
 
 
 cases.run()

@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -74,6 +75,20 @@ class Outputs {
   std::vector<std::unique_ptr<StagedFile>> files_;
 };
 
+void write_event(const Event& event, const Simulator& /*simulator*/, FieldLogWriter& writer) {
+  writer.write(event);
+}
+
+// Where the second antenna gives positions, they are recorded and not the headings by them.
+void write_event(const Event& event, const Simulator& simulator, McapWriter& writer) {
+  const auto* fix = std::get_if<GnssFix>(&event);
+  if (fix == nullptr || !simulator.second_fix()) return writer.write(event);
+  GnssFix bare = *fix;
+  bare.heading_deg = bare.heading_sd_deg = std::numeric_limits<double>::quiet_NaN();
+  writer.write(bare);
+  writer.write_second_position(*simulator.second_fix(), bare.stamp);
+}
+
 // Writes all events to a recording of either kind; false if it was stopped.
 template <typename Writer>
 bool write_events(Simulator& simulator, Writer& writer, CommandContext& context) {
@@ -81,7 +96,7 @@ bool write_events(Simulator& simulator, Writer& writer, CommandContext& context)
   std::size_t scans = 0;
   bool stopped = false;
   while (std::optional<Event> event = simulator.next()) {
-    writer.write(*event);
+    write_event(*event, simulator, writer);
     if (!std::holds_alternative<ScanPtr>(*event)) continue;
     ++scans;
     context.progress({"simulating", simulator.progress() * duration, duration, "s of recording",

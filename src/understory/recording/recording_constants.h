@@ -13,6 +13,39 @@
 // or real clouds and measurements by their page.
 namespace understory::recording_constants {
 
+// Pairs of positions by which it is told that most are not as far apart as the antennas, before the
+// end of the recording; recording/messages/two_receivers.cc [chosen: four seconds at five a second]
+inline constexpr std::uint64_t kEnoughPairs = 20;
+
+namespace baseline_headings {  // recording/messages/baseline_headings.cc
+// m: antennas that are nearer tell no heading [bound: a centimetre is six degrees there]
+inline constexpr double kShortestM = 0.1;
+// Last distances by which their scatter is told [chosen: ten seconds at five a second]
+inline constexpr std::size_t kLastDistances = 50;
+// Distances before the first heading [chosen: a median of fewer is chance]
+inline constexpr std::size_t kFewestDistances = 5;
+// Share of the antennas' distance by which a pair's may be off, and by which all may scatter: a
+// heading by chance is 20 degrees off there [chosen]
+inline constexpr double kMostShare = 0.3;
+// Standard deviations beyond which a distance is wrong [chosen]
+inline constexpr double kFarDistance = 4.0;
+// m: standard deviation of a distance at least: phase centres and the rig's own survey [chosen]
+inline constexpr double kLeastSdM = 0.005;
+// Part of a line that lies in the plane, for a heading: 60 degrees steep at most [chosen]
+inline constexpr double kLeastInPlane = 0.5;
+// degrees: of a heading that tells nothing [bound: a quarter of a turn]
+inline constexpr double kMostSdDeg = 90.0;
+// Positions that are kept for the times between them [bound: two on each side]
+inline constexpr std::size_t kLastPositions = 4;
+// ns: stamps of one moment [bound: clocks that are printed to a millisecond]
+inline constexpr std::int64_t kSameMoment = 1'000'000;
+// ns: stamps of one epoch whose messages are stamped as they come [chosen: as for sentences]
+inline constexpr std::int64_t kSameEpoch = 25'000'000;
+// ns: from one position to the next, for the straight line between them; a carrier that sways by
+// 1 m/s^2 is off it by a centimetre [chosen]
+inline constexpr std::int64_t kLongestPositionStep = 250'000'000;
+}  // namespace baseline_headings
+
 namespace imu_axes {  // recording/imu_axes.cc
 // ns over which forces and turns are summed [not recorded]
 inline constexpr std::int64_t kTiltWindow = 500'000'000;

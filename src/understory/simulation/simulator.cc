@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include "understory/recording/messages/baseline_headings.h"
 #include "understory/simulation/scene/scan_cache.h"
 #include "understory/simulation/sensors/inertial.h"
 #include "understory/simulation/sensors/magnetometer.h"
@@ -49,6 +50,10 @@ class Simulator::Impl : public SimulatedWorld {
     end = start + from_seconds(duration_s);
     describe_rig();
     describe_topics();
+    if (rig.body_from_second_gnss) {
+      antennas.set_length_m(
+          (rig.body_from_second_gnss->translation() - rig.body_from_gnss->translation()).norm());
+    }
     next_fix = find_fix();
   }
 
@@ -74,6 +79,7 @@ class Simulator::Impl : public SimulatedWorld {
     } else if (fix_time == first) {
       note(reports[2], next_fix->stamp);
       if (wanted) event = *next_fix;
+      second_fix = next_second_fix;
       next_fix = find_fix();
     } else {
       take_scan(wanted, event);
@@ -111,6 +117,9 @@ class Simulator::Impl : public SimulatedWorld {
   SatelliteReceiver gnss;
   Magnetometer mag;
   std::optional<GnssFix> next_fix;
+  std::optional<GnssFix> next_second_fix;
+  std::optional<GnssFix> second_fix;  // of the last event that is a fix
+  BaselineHeadings antennas;
   std::int64_t scan_number = 0;
   TimeNs now = 0;
   Rig rig;
@@ -184,7 +193,15 @@ class Simulator::Impl : public SimulatedWorld {
 
   std::optional<GnssFix> find_fix() {
     while (site.gnss.enabled && gnss.next_stamp() < end) {
-      if (std::optional<GnssFix> fix = gnss.next()) return fix;
+      std::optional<GnssFix> fix = gnss.next();
+      if (!fix) continue;
+      next_second_fix = gnss.second_fix();
+      if (!next_second_fix) return fix;
+      if (const auto line = antennas.add(*fix, *next_second_fix)) {
+        fix->heading_deg = line->heading_deg;
+        fix->heading_sd_deg = line->sd_deg;
+      }
+      return fix;
     }
     return std::nullopt;
   }
@@ -278,6 +295,10 @@ std::string Simulator::format() const {
 double Simulator::progress() const {
   if (impl_->now == 0) return 0.0;
   return std::clamp(to_seconds(impl_->now - impl_->start) / impl_->duration_s, 0.0, 1.0);
+}
+
+const std::optional<GnssFix>& Simulator::second_fix() const {
+  return impl_->second_fix;
 }
 
 const SiteConfig& Simulator::site() const {

@@ -31,6 +31,10 @@ class Simulator : public Recording {
   [[nodiscard]] std::string format() const override;
   [[nodiscard]] double progress() const override;
 
+  // Where the second antenna gives positions (gnss.second_antenna_positions): that of the moment of
+  // the fix that `next` gave last. That fix has the heading by both then, as recording/ finds it.
+  [[nodiscard]] const std::optional<GnssFix>& second_fix() const;
+
   [[nodiscard]] const SiteConfig& site() const;
   [[nodiscard]] double duration_s() const;
 

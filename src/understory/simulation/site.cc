@@ -238,6 +238,10 @@ void describe_gnss(ConfigTable& table, GnssConfig& c) {
               "second antenna from the first one, body frame; 0 0 0 = none");
     table.add("heading_sd_deg", c.heading_sd_deg, {0.0, 90.0}, "deg",
               "heading of the line to it, open sky, a metre apart; 5 times under closed canopy");
+    table.add("second_antenna_positions", c.second_antenna_positions,
+              "it gives positions and no headings");
+    table.add("second_antenna_common", c.second_antenna_common, {0.0, 1.0}, "",
+              "share of the variance of their errors that both positions have in common");
     table.add("open_sd_m", c.open_sd_m, {0.0, 100.0}, "m", "slow plane error under open sky");
     table.add("canopy_sd_m", c.canopy_sd_m, {0.0, 100.0}, "m", "added under closed canopy");
     table.add("correlation_s", c.correlation_s, {0.1, 1e5}, "s", "of the slow error");

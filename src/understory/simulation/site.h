@@ -189,6 +189,10 @@ struct GnssConfig {
   // Of the heading of their line, a metre apart, under open sky; five times that under closed
   // canopy.
   double heading_sd_deg = 0.2;
+  // The second antenna gives positions and no headings. Its errors are as large as those of the
+  // first one, and so much of their variance is common to both.
+  bool second_antenna_positions = false;
+  double second_antenna_common = 0.5;
   double open_sd_m = 0.35;        // slow error in the plane under open sky
   double canopy_sd_m = 2.2;       // added under closed canopy
   double correlation_s = 45.0;    // of the slow error

@@ -67,6 +67,33 @@ TEST_P(McapCompressions, SensorsThatBeginLaterHaveTheirPlaceFromTheIndex) {
   EXPECT_EQ(all_warnings(log), "");
 }
 
+// The same of the second antenna, whose place alone is lacking at the start.
+TEST_P(McapCompressions, TheSecondAntennaHasItsLatePlaceFromTheIndex) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "drive.mcap";
+  Drive drive = make_drive(8);
+  const TimeNs begin = event_time(drive.events.front());
+  const Pose second(Eigen::Quaterniond::Identity(), {1.0, 0.25, 2.0});
+  {
+    McapWriter writer(path, small_chunks(GetParam()));
+    writer.set_rig(drive.rig);
+    for (Event& event : drive.events) {
+      if (!drive.rig.body_from_second_gnss && event_time(event) > begin + 5 * kNsPerSecond) {
+        drive.rig.body_from_second_gnss = second;
+        writer.set_rig(drive.rig);
+      }
+      if (auto* fix = std::get_if<GnssFix>(&event)) fix->heading_deg = 77.0;
+      writer.write(event);
+    }
+  }
+  Log log;
+  const auto recording = open_recording(path, {}, log);
+  ASSERT_TRUE(recording->rig().body_from_second_gnss);
+  EXPECT_LT(right_difference(*recording->rig().body_from_second_gnss, second).norm(), 1e-14);
+  EXPECT_EQ(recording->rig().second_gnss_extrinsic_source, "/tf_static");
+  EXPECT_EQ(all_warnings(log), "");
+}
+
 // Cuts the file at many places: nothing but a prefix of the events may come out, and all of the
 // chunks that are whole.
 TEST_P(McapCompressions, ReadsTruncatedFilesUpToTheCut) {
@@ -233,6 +260,39 @@ TEST(Mcap, KeepsTheLogTimesThatAreGiven) {
     EXPECT_EQ(event_time(*event), 2 * kStart - arrival);
     EXPECT_EQ(dynamic_cast<const ArrivalTimes&>(*recording).arrival(), arrival);
   }
+}
+
+// The positions of a second antenna come back as headings of the first one's.
+TEST(Mcap, KeepsThePositionsOfASecondAntenna) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "two_receivers.mcap";
+  Drive drive = make_drive(6);
+  drive.rig.body_from_second_gnss = Pose(Eigen::Quaterniond::Identity(), {1.5, 0.0, 2.0});
+  {
+    McapWriter writer(path);
+    writer.set_rig(drive.rig);
+    for (const Event& event : drive.events) {
+      writer.write(event);
+      if (const auto* fix = std::get_if<GnssFix>(&event)) {
+        GnssFix second = *fix;
+        second.longitude_deg += 1.5 / 75'900.0;  // east
+        writer.write_second_position(second, fix->stamp);
+      }
+    }
+  }
+  Log log;
+  const auto recording = open_recording(path, {}, log);
+  std::size_t headings = 0;
+  for (const Event& event : read_all(*recording)) {
+    const auto* fix = std::get_if<GnssFix>(&event);
+    if (fix == nullptr) continue;
+    EXPECT_EQ(fix->hdop, 1.25);
+    if (std::isnan(fix->heading_deg)) continue;
+    EXPECT_NEAR(fix->heading_deg, 90.0, 1e-3);
+    ++headings;
+  }
+  EXPECT_EQ(headings, 8U);  // four pairs before the first
+  EXPECT_EQ(all_warnings(log), "");
 }
 
 TEST(Mcap, KeepsTheHeadingOfASecondAntenna) {

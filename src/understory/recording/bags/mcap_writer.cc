@@ -44,6 +44,7 @@ enum TopicId : std::uint16_t {
   kGnssQuality,
   kTfStatic,
   kGnssNmea,
+  kGnssSecond,
   kTopicCount
 };
 
@@ -55,6 +56,7 @@ constexpr std::array<Topic, kTopicCount> kTopics = {{
     {"/gnss/quality", "gps_msgs/msg/GPSFix"},
     {"/tf_static", "tf2_msgs/msg/TFMessage"},
     {"/gnss/nmea", "nmea_msgs/msg/Sentence"},
+    {"/gnss/second", "sensor_msgs/msg/NavSatFix"},
 }};
 
 // One record: content is added between construction and `close`.
@@ -438,6 +440,10 @@ void McapWriter::write(const Event& event, TimeNs log_time) {
   } else {
     impl_->add(kMag, log_time, encode_magnetic_field(std::get<MagSample>(event)));
   }
+}
+
+void McapWriter::write_second_position(const GnssFix& fix, TimeNs log_time) {
+  impl_->add(kGnssSecond, log_time, encode_nav_sat_fix(fix, kSecondAntennaFrame));
 }
 
 void McapWriter::finish() {

@@ -21,8 +21,8 @@ struct McapWriterOptions {
 
 // Writes the project's native recording: MCAP with ROS 2 messages (CDR), chunks with CRC, message
 // and chunk indexes, statistics and a summary, on the topics /lidar, /imu, /mag, /gnss,
-// /gnss/quality and /tf_static. A message's log time is its event_time (a scan's is its end) unless
-// another is given. Readers sort by it.
+// /gnss/quality, /gnss/nmea, /gnss/second and /tf_static. A message's log time is its event_time (a
+// scan's is its end) unless another is given. Readers sort by it.
 //
 // Events are to be written in the order of their log times; other orders are kept as they come.
 // Every method throws OutputError if the file cannot be written (disk full, no permission). What
@@ -44,6 +44,10 @@ class McapWriter {
   // `log_time`: when the event was recorded, where a recording is copied. The order of arrival
   // tells how the clocks of the sensors run (preprocess/stream_offset.h).
   void write(const Event& event, TimeNs log_time);
+
+  // A position of the second antenna, on /gnss/second in the frame gnss_second. The fix of the
+  // first one, without a heading, is to be written before it.
+  void write_second_position(const GnssFix& fix, TimeNs log_time);
 
   // Closes the last chunk, writes index and summary, and syncs the file to the disk.
   void finish();

@@ -5,15 +5,17 @@
 #include <deque>
 #include <optional>
 
+#include "understory/recording/messages/baseline_headings.h"
 #include "understory/recording/recording.h"
 #include "understory/sensor/sensor_io.h"
 
 namespace understory {
 
-// Joins positions (NavSatFix) with the quality (GPSFix) and the heading of a second antenna that
-// come on other topics. A position waits for them by the times of recording, at most `kWait`.
-// Quality belongs to it where their stamps differ by at most `kSame`, a heading by at most
-// `kSameEpoch`: drivers stamp sentences when they come. Not thread-safe.
+// Joins positions (NavSatFix) with the quality (GPSFix) and with the heading or the position of a
+// second antenna that come on other topics. A position waits for them by the times of recording, at
+// most `kWait`. Quality belongs to it where their stamps differ by at most `kSame`, a heading by at
+// most `kSameEpoch`: drivers stamp sentences when they come. Positions of a second antenna are
+// taken at its time (SecondPositions) and become its heading (BaselineHeadings). Not thread-safe.
 class FixJoiner {
  public:
   static constexpr TimeNs kWait = kNsPerSecond / 5;
@@ -22,6 +24,12 @@ class FixJoiner {
 
   void expect_quality() { has_quality_topic_ = true; }
   void expect_heading() { has_heading_topic_ = true; }
+  [[nodiscard]] bool expects_heading() const { return has_heading_topic_; }
+  // Positions of a second antenna come, that far from the first one on the carrier, metres.
+  // Nothing: not known yet; they tell no heading until then.
+  void expect_second_position(std::optional<double> distance_m) {
+    baseline_.set_length_m(distance_m);
+  }
 
   void add_position(GnssFix fix, TimeNs now, std::deque<Event>& events) {
     flush(events);
@@ -29,7 +37,7 @@ class FixJoiner {
     waiting_ = fix;
     waiting_since_ = now;
     lacks_quality_ = has_quality_topic_;
-    lacks_heading_ = has_heading_topic_;
+    lacks_heading_ = has_heading_topic_ || baseline_.known();
     join(events);
   }
   void add_quality(const GnssFix& quality, std::deque<Event>& events) {
@@ -41,13 +49,21 @@ class FixJoiner {
     heading_ = heading;
     join(events);
   }
+  void add_second_position(const GnssFix& second, std::deque<Event>& events) {
+    seconds_.add(second);
+    join(events);
+  }
   void pass_time(TimeNs now, std::deque<Event>& events) {
     if (waiting_ && (now < waiting_since_ || now - waiting_since_ > kWait)) flush(events);
   }
   void flush(std::deque<Event>& events) {
+    if (waiting_ && lacks_heading_ && baseline_.known())
+      take_line_to(seconds_.near(waiting_->stamp));
     if (waiting_) events.emplace_back(*waiting_);
     waiting_.reset();
   }
+  // What the positions of the second antenna told so far.
+  [[nodiscard]] const BaselineHeadings& baseline() const { return baseline_; }
 
   void save(BinaryWriter& writer) const {
     for (const bool flag : {has_quality_topic_, has_heading_topic_, lacks_quality_, lacks_heading_})
@@ -57,6 +73,8 @@ class FixJoiner {
       writer.put(fix->has_value());
       if (*fix) put_fix(writer, **fix);
     }
+    seconds_.save(writer);
+    baseline_.save(writer);
   }
   void load(BinaryReader& reader) {
     for (bool* flag : {&has_quality_topic_, &has_heading_topic_, &lacks_quality_, &lacks_heading_})
@@ -66,6 +84,8 @@ class FixJoiner {
       fix->reset();
       if (reader.get<bool>()) *fix = get_fix(reader);
     }
+    seconds_.load(reader);
+    baseline_.load(reader);
   }
 
  private:
@@ -87,7 +107,16 @@ class FixJoiner {
     if (!waiting_->covariance.allFinite()) waiting_->covariance = quality_->covariance;
     lacks_quality_ = false;
   }
+  void take_line_to(const std::optional<GnssFix>& second) {
+    if (!second) return;
+    lacks_heading_ = false;
+    const auto line = baseline_.add(*waiting_, *second);
+    if (!line) return;
+    waiting_->heading_deg = line->heading_deg;
+    waiting_->heading_sd_deg = line->sd_deg;
+  }
   void join_heading() {
+    if (lacks_heading_ && baseline_.known()) return take_line_to(seconds_.at(waiting_->stamp));
     if (!heading_ || std::abs(heading_->stamp - waiting_->stamp) > kSameEpoch) return;
     waiting_->heading_deg = heading_->heading_deg;
     waiting_->heading_sd_deg = heading_->heading_sd_deg;
@@ -103,6 +132,8 @@ class FixJoiner {
   TimeNs waiting_since_ = 0;
   std::optional<GnssFix> quality_;
   std::optional<GnssFix> heading_;
+  SecondPositions seconds_;
+  BaselineHeadings baseline_;
 };
 
 }  // namespace understory

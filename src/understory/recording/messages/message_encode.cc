@@ -190,9 +190,9 @@ ByteBuffer encode_imu(const ImuSample& sample) {
   return out.bytes();
 }
 
-ByteBuffer encode_nav_sat_fix(const GnssFix& fix) {
+ByteBuffer encode_nav_sat_fix(const GnssFix& fix, const std::string& frame) {
   CdrWriter out;
-  out.put_header(fix.stamp, "gnss");
+  out.put_header(fix.stamp, frame);
   out.put(nav_sat_status(fix.quality));
   out.put(std::uint16_t{1});  // service: GPS
   out.put(fix.latitude_deg);

@@ -47,7 +47,7 @@ struct NamedTransform {
 // The project's messages (design: formats), frames as named there. Pure functions.
 [[nodiscard]] ByteBuffer encode_point_cloud2(const Scan& scan);
 [[nodiscard]] ByteBuffer encode_imu(const ImuSample& sample);
-[[nodiscard]] ByteBuffer encode_nav_sat_fix(const GnssFix& fix);
+[[nodiscard]] ByteBuffer encode_nav_sat_fix(const GnssFix& fix, const std::string& frame = "gnss");
 [[nodiscard]] ByteBuffer encode_gps_fix(const GnssFix& fix);
 // nmea_msgs/Sentence with the heading of a fix, in the frame of the second antenna.
 [[nodiscard]] ByteBuffer encode_heading(const GnssFix& fix);

@@ -18,6 +18,7 @@
 #include "understory/recording/messages/point_cloud.h"
 #include "understory/recording/messages/sensor_places.h"
 #include "understory/recording/messages/topic_statistics.h"
+#include "understory/recording/messages/two_receivers.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -40,14 +41,15 @@ class MessageRecording : public Recording, public ArrivalTimes {
                    Log& log)
       : file_(std::move(file)),
         log_(log),
-        places_(survey_.transforms, options.extrinsics_file, log) {
+        places_(survey_.transforms, options.extrinsics_file, log),
+        receivers_(file_, !options.gnss_topic.empty(), log) {
     Log quiet;  // the same damage will be met again when reading
     const auto ahead = open(quiet);
     survey_ = survey_messages(*ahead);
     survey_late_topics(*ahead, options, survey_);
     choice_ = choose_topics(survey_, options, file_, log_);
     if (!choice_.quality.empty()) fixes_.expect_quality();
-    if (topic_of_headings() != nullptr) fixes_.expect_heading();
+    if (topic_of_headings(survey_) != nullptr) fixes_.expect_heading();
     for (const TopicSurvey& topic : survey_.topics)
       frame_of_topic_[topic.topic] = topic.frame;
     source_ = open(log_);
@@ -55,6 +57,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     make_rig(ahead->sensor_metadata());
     if (places_.lacks_any() && survey_late_transforms(*ahead, survey_)) place_sensors();
     warn_of_missing_place();
+    receivers_.judge(choice_, places_);
     judge_lidar();
     judge_imu();
     survey_.topics.clear();
@@ -66,6 +69,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
       if (!source_->next(message)) {
         ended_ = true;
         fixes_.flush(events_);
+        receivers_.judge(choice_, fixes_.baseline(), true);
         if (packets_) packets_->finish(events_);
         break;
       }
@@ -85,8 +89,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
     survey_.transforms.save(writer);
     put_strings(writer, frame_of_topic_);
     for (const std::string& text :
-         {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality, places_.frames().lidar,
-          places_.frames().imu, places_.frames().gnss, places_.frames().second_gnss})
+         {choice_.lidar, choice_.imu, choice_.gnss, choice_.quality, choice_.second_gnss,
+          places_.frames().lidar, places_.frames().imu, places_.frames().gnss,
+          places_.frames().second_gnss})
       writer.put(text);
     put_rig(writer, places_.rig());
     writer.put(scan_given_);
@@ -99,6 +104,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
       statistics.save(writer);
     put_events(writer, events_);
     fixes_.save(writer);
+    receivers_.save(writer);
     writer.put(packets_ != nullptr);
     if (packets_) packets_->save(writer);
     writer.put(ended_);
@@ -109,9 +115,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
     source_->load(reader);
     survey_.transforms.load(reader);
     frame_of_topic_ = get_strings(reader);
-    for (std::string* text :
-         {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality, &places_.frames().lidar,
-          &places_.frames().imu, &places_.frames().gnss, &places_.frames().second_gnss})
+    for (std::string* text : {&choice_.lidar, &choice_.imu, &choice_.gnss, &choice_.quality,
+                              &choice_.second_gnss, &places_.frames().lidar, &places_.frames().imu,
+                              &places_.frames().gnss, &places_.frames().second_gnss})
       *text = reader.get_string();
     places_.rig() = get_rig(reader);
     scan_given_ = reader.get<bool>();
@@ -127,6 +133,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     }
     get_events(reader, events_);
     fixes_.load(reader);
+    receivers_.load(reader);
     if (reader.get<bool>()) packets().load(reader);
     ended_ = reader.get<bool>();
   }
@@ -148,16 +155,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
       const TopicSurvey* found = survey_.find(topic);
       return found == nullptr ? std::string() : found->frame;
     };
-    const TopicSurvey* headings = topic_of_headings();
+    const TopicSurvey* headings = topic_of_headings(survey_);
     places_.frames() = {frame_of(choice_.lidar), frame_of(choice_.imu), frame_of(choice_.gnss),
-                        headings == nullptr ? "" : headings->frame};
-  }
-
-  [[nodiscard]] const TopicSurvey* topic_of_headings() const {
-    for (const TopicSurvey& topic : survey_.topics) {
-      if (topic.headings > 0) return &topic;
-    }
-    return nullptr;
+                        headings == nullptr ? frame_of(choice_.second_gnss) : headings->frame};
   }
 
   void make_rig(const std::map<std::string, std::string>& metadata) {
@@ -169,7 +169,11 @@ class MessageRecording : public Recording, public ArrivalTimes {
   }
 
   // Once a scan has been given the body stays what it is.
-  bool place_sensors() { return places_.place(scan_given_); }
+  bool place_sensors() {
+    const bool placed = places_.place(scan_given_);
+    if (!choice_.second_gnss.empty()) fixes_.expect_second_position(receivers_.distance_m(places_));
+    return placed;
+  }
 
   void warn_of_missing_place() {
     if (choice_.imu.empty() || choice_.lidar.empty() || places_.rig().body_from_imu) return;
@@ -186,6 +190,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     known = frame;
     place_sensors();
     if (&known == &places_.frames().imu) warn_of_missing_place();
+    if (&known == &places_.frames().second_gnss) receivers_.judge(choice_, places_);
   }
 
   void judge_lidar() {
@@ -281,8 +286,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
       case TopicRole::kImu:
         return adopt(choice_.imu);
       case TopicRole::kNavSatFix:
-        return adopt(choice_.gnss);
+        return adopt(choice_.gnss) || is_of_second_antenna(topic);
       case TopicRole::kGpsFix:
+        if (topic == choice_.second_gnss) return true;
         return choice_.gnss.empty() || choice_.gnss == topic ? adopt(choice_.gnss)
                                                              : adopt(choice_.quality);
       case TopicRole::kMag:
@@ -292,6 +298,16 @@ class MessageRecording : public Recording, public ArrivalTimes {
       default:
         return false;
     }
+  }
+
+  // Another topic of positions that begins late is one where sentences tell no heading.
+  bool is_of_second_antenna(const std::string& topic) {
+    const auto first = topics_.find(choice_.gnss);
+    const bool alike = first != topics_.end() &&
+                       first->second.report().type.find("NavSatFix") != std::string::npos;
+    if (alike && choice_.second_gnss.empty() && !fixes_.expects_heading())
+      choice_.second_gnss = topic;
+    return topic == choice_.second_gnss;
   }
 
   TopicStatistics& statistics_of(const MessageChannel& channel, TopicRole role) {
@@ -432,6 +448,13 @@ class MessageRecording : public Recording, public ArrivalTimes {
     topic.add_stamp(gnss->fix.stamp);
     topic.report().frame = gnss->header.frame;
     topic.report().conventions = "WGS 84, height above the ellipsoid";
+    if (message.channel->topic == choice_.second_gnss) {
+      topic.report().conventions += "; of a second antenna";
+      note_frame(places_.frames().second_gnss, gnss->header.frame);
+      fixes_.add_second_position(gnss->fix, events_);
+      receivers_.judge(choice_, fixes_.baseline(), false);
+      return true;
+    }
     if (role == TopicRole::kGpsFix && message.channel->topic != choice_.gnss) {
       topic.report().conventions = "quality of the fixes";
       fixes_.expect_quality();
@@ -450,7 +473,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     topic.add_stamp(message->header.stamp);
     topic.report().frame = message->header.frame;
     const auto sentence = parse_nmea(message->sentence);
-    if (!sentence || !sentence->heading_deg) return true;
+    if (!sentence || !sentence->heading_deg || fixes_.baseline().known()) return true;
     topic.report().conventions = "heading of a second antenna";
     note_frame(places_.frames().second_gnss, message->header.frame);
     fixes_.expect_heading();
@@ -465,6 +488,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
   std::map<std::string, std::string> frame_of_topic_;  // of the sensor that is used
   std::unique_ptr<MessageSource> source_;
   SensorPlaces places_;
+  TwoReceivers receivers_;
   bool scan_given_ = false;
   std::optional<TimeConvention> convention_;
   int ring_count_ = 0;

@@ -322,6 +322,32 @@ bool survey_late_transforms(MessageSource& source, MessageSurvey& survey) {
   return !found.empty();
 }
 
+const TopicSurvey* topic_of_headings(const MessageSurvey& survey) {
+  for (const TopicSurvey& topic : survey.topics) {
+    if (topic.headings > 0) return &topic;
+  }
+  return nullptr;
+}
+
+namespace {
+
+std::string second_antenna_topic(const MessageSurvey& survey, const std::string& first) {
+  const TopicSurvey* own = survey.find(first);
+  if (own == nullptr || topic_of_headings(survey) != nullptr) return "";
+  MessageSurvey others;
+  for (const TopicSurvey& topic : survey.topics) {
+    if (topic.role == own->role && topic.topic != first) others.topics.push_back(topic);
+  }
+  Log quiet;
+  return choose(
+      others, "", "second_gnss", "", quiet, [](TopicRole) { return true; },
+      [&](const TopicSurvey& topic) {
+        return std::tuple(topic.frame != own->frame, !topic.late, topic.messages);
+      });
+}
+
+}  // namespace
+
 TopicChoice choose_topics(const MessageSurvey& survey, const OpenOptions& options,
                           const std::string& file, Log& log) {
   TopicChoice choice;
@@ -351,9 +377,16 @@ TopicChoice choose_topics(const MessageSurvey& survey, const OpenOptions& option
       !has(TopicRole::kNavSatFix) || (early(TopicRole::kGpsFix) && !early(TopicRole::kNavSatFix));
   const bool by_gps_fix = named != nullptr ? named->role == TopicRole::kGpsFix : only_gps_fix;
   const TopicRole gnss_role = by_gps_fix ? TopicRole::kGpsFix : TopicRole::kNavSatFix;
+  const auto positions =
+      std::count_if(survey.topics.begin(), survey.topics.end(),
+                    [&](const TopicSurvey& topic) { return topic.role == gnss_role; });
+  Log quiet;  // of two topics, what becomes of the second is told when the antennas' places are
+              // known
+  const bool maybe_antennas = positions == 2 && topic_of_headings(survey) == nullptr;
   choice.gnss = choose(
-      survey, options.gnss_topic, "gnss", file, log,
+      survey, options.gnss_topic, "gnss", file, maybe_antennas ? quiet : log,
       [&](TopicRole role) { return role == gnss_role; }, max_messages);
+  choice.second_gnss = second_antenna_topic(survey, choice.gnss);
   if (!by_gps_fix && has(TopicRole::kGpsFix))
     choice.quality = choose(
         survey, "", "gnss_quality", file, log,

@@ -67,12 +67,18 @@ void survey_late_topics(MessageSource& source, const OpenOptions& options, Messa
 // Adds the transforms that the file's index leads to. True if there were any.
 bool survey_late_transforms(MessageSource& source, MessageSurvey& survey);
 
+// The first topic with sentences that tell a heading; nothing where there is none.
+[[nodiscard]] const TopicSurvey* topic_of_headings(const MessageSurvey& survey);
+
 // The topics to be used.
 struct TopicChoice {
   std::string lidar;
   std::string imu;
   std::string gnss;     // NavSatFix, or GPSFix if there is nothing else
   std::string quality;  // GPSFix beside a NavSatFix
+  // Positions of a second antenna, if they are: another topic of the kind of `gnss`, rather one
+  // with a frame of its own. Empty where sentences tell headings.
+  std::string second_gnss;
 };
 
 // Those that the options name, else the ones with most data. Warns where others are left out;

@@ -1,6 +1,13 @@
 #include "understory/recording/messages/sensor_places.h"
 
+#include "understory/sensor/second_antenna_place.h"
+
 namespace understory {
+namespace {
+
+constexpr const char* kIsBody = "is the body frame";  // as rig_from_transforms says it
+
+}  // namespace
 
 bool SensorPlaces::place(bool body_stays) {
   if (body_stays) return extrinsics_file_.empty() && complete_rig(transforms_, frames_, rig_);
@@ -21,6 +28,34 @@ void SensorPlaces::apply_extrinsics() {
   Log quiet;
   apply_extrinsics_file(extrinsics_file_, {own}, rig_, extrinsics_told_ ? quiet : log_);
   extrinsics_told_ = true;
+}
+
+bool SensorPlaces::by_file() const {
+  return !extrinsics_file_.empty() &&
+         (rig_.gnss_extrinsic_source.rfind("extrinsics file", 0) == 0 ||
+          rig_.second_gnss_extrinsic_source.rfind("extrinsics file", 0) == 0);
+}
+
+std::optional<double> SensorPlaces::antenna_distance_m(bool first_is_named) const {
+  const auto second = second_antenna_of(rig_);
+  if (!second || (by_file() && !first_is_named) ||
+      rig_.second_gnss_extrinsic_source.rfind(kIsBody, 0) == 0)
+    return std::nullopt;
+  return (*second - rig_.body_from_gnss->translation()).norm();
+}
+
+std::string SensorPlaces::why_no_second_antenna(bool first_is_named) const {
+  if (!rig_.body_from_second_gnss && frames_.second_gnss == frames_.gnss)
+    return "both are in the frame " + frames_.gnss;
+  if (rig_.second_gnss_extrinsic_source.rfind(kIsBody, 0) == 0)
+    return "their frame is that of the body, " + frames_.second_gnss;
+  const bool first = !rig_.body_from_gnss;
+  if (first || !rig_.body_from_second_gnss)
+    return "the place of " + (first ? frames_.gnss : frames_.second_gnss) +
+           " on the body is not known";
+  if (by_file() && !first_is_named)
+    return "nothing says which of them body_from_gnss means: name its topic by --gnss-topic";
+  return "the antennas sit less than a decimetre apart";
 }
 
 bool SensorPlaces::lacks_any() const {

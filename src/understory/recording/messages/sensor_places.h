@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "understory/recording/extrinsics.h"
@@ -22,6 +23,13 @@ class SensorPlaces {
   bool place(bool body_stays);
   // Whether there is a sensor whose place is not known.
   [[nodiscard]] bool lacks_any() const;
+  // From one antenna to the other, metres; nothing where the place of one is not known. The origin
+  // of the body is no antenna by its frame alone: filters state their positions there.
+  // And a file that places the antennas means topics that are named: otherwise the busier one is
+  // the first, and a line that is taken the wrong way round turns the map by 180 degrees.
+  [[nodiscard]] std::optional<double> antenna_distance_m(bool first_is_named) const;
+  // Why there is none, for a warning.
+  [[nodiscard]] std::string why_no_second_antenna(bool first_is_named) const;
 
   [[nodiscard]] SensorFrames& frames() { return frames_; }
   [[nodiscard]] const SensorFrames& frames() const { return frames_; }
@@ -30,6 +38,7 @@ class SensorPlaces {
 
  private:
   void apply_extrinsics();
+  [[nodiscard]] bool by_file() const;
 
   const TransformTree& transforms_;
   std::string extrinsics_file_;

@@ -62,6 +62,9 @@ SatelliteReceiver::SatelliteReceiver(const SiteConfig& config, const CarrierPath
   CounterNoise noise(seed_, 0, 1);
   slow_ = normal3(noise);
   fast_ = normal3(noise);
+  CounterNoise second(seed_ + 6, 0, 1);
+  second_slow_ = normal3(second);
+  second_fast_ = normal3(second);
 }
 
 TimeNs SatelliteReceiver::next_stamp() const {
@@ -75,6 +78,10 @@ void SatelliteReceiver::walk(double dt_s) {
   const double fast = std::exp(-dt_s / kFastSeconds);
   slow_ = slow * slow_ + std::sqrt(1.0 - slow * slow) * normal3(noise);
   fast_ = fast * fast_ + std::sqrt(1.0 - fast * fast) * normal3(noise);
+  if (!has_second_positions()) return;
+  CounterNoise second(seed_ + 6, static_cast<std::uint64_t>(count_), 0);
+  second_slow_ = slow * second_slow_ + std::sqrt(1.0 - slow * slow) * normal3(second);
+  second_fast_ = fast * second_fast_ + std::sqrt(1.0 - fast * fast) * normal3(second);
 }
 
 bool SatelliteReceiver::in_outage(double dt_s, CounterNoise& noise) {
@@ -175,7 +182,38 @@ std::optional<GnssFix> SatelliteReceiver::next() {
   fix.track_deg = std::atan2(velocity.x(), velocity.y()) / kDegree;
   if (fix.track_deg < 0.0) fix.track_deg += 360.0;
   fix.speed_m_s = velocity.head<2>().norm();
-  tell_heading(state.world_from_body, fix);
+  if (has_second_positions()) {
+    second_fix_ = second_position(state.world_from_body, fix, sd);
+  } else {
+    tell_heading(state.world_from_body, fix);
+  }
+  return fix;
+}
+
+bool SatelliteReceiver::has_second_positions() const {
+  const auto& line = config_.second_antenna_m;
+  return config_.second_antenna_positions && (line[0] != 0.0 || line[1] != 0.0 || line[2] != 0.0);
+}
+
+// The same sky and the same promises; bursts and jumps are those of the first antenna alone.
+GnssFix SatelliteReceiver::second_position(const Pose& world_from_body, const GnssFix& first,
+                                           double sd_m) const {
+  const double common = config_.second_antenna_common;  // is the correlation of both errors
+  const double own = std::sqrt(1.0 - common * common);
+  const Eigen::Vector3d slow = common * slow_ + own * second_slow_;
+  const Eigen::Vector3d fast = common * fast_ + own * second_fast_;
+  CounterNoise noise(seed_ + 7, static_cast<std::uint64_t>(count_), 0);
+  Eigen::Vector3d error =
+      sd_m * (slow + config_.multipath_share * fast) + config_.white_sd_m * normal3(noise);
+  error.z() *= config_.height_factor;
+  const Eigen::Vector3d antenna(config_.mount_m[0] + config_.second_antenna_m[0],
+                                config_.mount_m[1] + config_.second_antenna_m[1],
+                                config_.mount_m[2] + config_.second_antenna_m[2]);
+  const Eigen::Vector3d geodetic = geodetic_from_enu(origin_, world_from_body * antenna + error);
+  GnssFix fix = first;
+  fix.latitude_deg = geodetic.x();
+  fix.longitude_deg = geodetic.y();
+  fix.height_m = geodetic.z();
   return fix;
 }
 

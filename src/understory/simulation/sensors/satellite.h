@@ -19,7 +19,7 @@ namespace understory {
 // The GNSS receiver under trees: slow and fast errors correlated in time, both growing with the
 // share of the sky that the stand hides, height worse than plane, outages, bursts, jumps, and a
 // covariance that promises too much; where asked, it holds its position while it stands, and tells
-// the heading of a second antenna. Fixes come one after another.
+// the heading or the position of a second antenna. Fixes come one after another.
 class SatelliteReceiver {
  public:
   // `path` and `scene` must outlive the receiver.
@@ -31,6 +31,8 @@ class SatelliteReceiver {
   std::optional<GnssFix> next();
 
   // What stands behind the last fix, for tests and reports.
+  // Where the site's second antenna gives positions: that of the moment of the last fix.
+  [[nodiscard]] const std::optional<GnssFix>& second_fix() const { return second_fix_; }
   [[nodiscard]] double last_cover() const { return cover_; }
   [[nodiscard]] const Eigen::Vector3d& last_error_enu() const { return error_; }
 
@@ -40,6 +42,9 @@ class SatelliteReceiver {
   [[nodiscard]] Eigen::Vector3d burst(double dt_s);
   void jump(double dt_s);
 
+  [[nodiscard]] bool has_second_positions() const;
+  [[nodiscard]] GnssFix second_position(const Pose& world_from_body, const GnssFix& first,
+                                        double sd_m) const;
   void walk_heading(double dt_s);
   void tell_heading(const Pose& world_from_body, GnssFix& fix) const;
   [[nodiscard]] Eigen::Vector3d hold(const Eigen::Vector3d& solution, double speed_m_s);
@@ -53,6 +58,9 @@ class SatelliteReceiver {
   std::uint64_t seed_;
   Eigen::Vector3d slow_;  // unit variance
   Eigen::Vector3d fast_;
+  Eigen::Vector3d second_slow_;  // what the second antenna does not have in common with the first
+  Eigen::Vector3d second_fast_;
+  std::optional<GnssFix> second_fix_;
   Eigen::Vector3d error_ = Eigen::Vector3d::Zero();
   double cover_now_ = 0.0;
   double cover_ = 0.0;

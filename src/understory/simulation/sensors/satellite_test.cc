@@ -164,5 +164,43 @@ TEST(GnssRealism, ASecondAntennaChangesNothingElseAndAnUprightOneTellsNothing) {
   }
 }
 
+// The difference of both positions errs as the parts of the errors that are not common.
+TEST(GnssRealism, PositionsOfASecondAntennaShareTheirErrors) {
+  const auto difference_sd = [](double common) {
+    SiteConfig site = quiet_receiver();
+    site.gnss.second_antenna_m = {0.3, -0.4, 0.05};
+    site.gnss.second_antenna_positions = true;
+    site.gnss.second_antenna_common = common;
+    site.gnss.open_sd_m = 1.0;
+    site.gnss.correlation_s = 5.0;
+    site.gnss.multipath_share = 0.0;
+    site.stand.trees_per_ha = 0.0;
+    const Route route(site.carrier, 1);
+    const Terrain terrain(site.terrain, 42.0, 42.0, 1, &route);
+    const Stand stand = grow_stand(site.stand, site.carrier, terrain, route, 1);
+    const ForestScene scene(site.stand, terrain, stand, 1);
+    const CarrierPlan plan = plan_carrier(site, route, terrain, {});
+    SatelliteReceiver receiver(site, plan.path, scene, 0);
+    const Eigen::Vector3d first_arm(site.gnss.mount_m[0], site.gnss.mount_m[1],
+                                    site.gnss.mount_m[2]);
+    const Eigen::Vector3d second_arm = first_arm + Eigen::Vector3d(0.3, -0.4, 0.05);
+    double squares = 0.0;
+    for (int i = 0; i < 1500; ++i) {
+      const auto fix = receiver.next();
+      EXPECT_TRUE(fix && receiver.second_fix() && std::isnan(fix->heading_deg));
+      const GnssFix& second = *receiver.second_fix();
+      const Pose pose = plan.path.state(to_seconds(fix->stamp)).world_from_body;
+      const Eigen::Vector3d truth = geodetic_from_enu(site.origin, pose * second_arm) -
+                                    geodetic_from_enu(site.origin, pose * first_arm);
+      const double off_deg = second.latitude_deg - fix->latitude_deg - truth.x();
+      squares += std::pow(off_deg * 111'400.0, 2.0) / 1500.0;
+    }
+    return std::sqrt(squares);
+  };
+  EXPECT_LT(difference_sd(1.0), 0.01);
+  EXPECT_NEAR(difference_sd(0.5), 1.0, 0.15);
+  EXPECT_NEAR(difference_sd(0.0), std::sqrt(2.0), 0.2);
+}
+
 }  // namespace
 }  // namespace understory
