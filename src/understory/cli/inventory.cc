@@ -68,9 +68,9 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
   command->add_flag("--overwrite", options->request.overwrite, kOverwriteMeaning);
   command->footer(
-      "Writes trees.csv, stem_curves.csv, trees.gpkg, map.laz, dtm.tif, chm.tif, dsm.tif, map.qgs, "
-      "report.html and "
-      "run.json.\n"
+      "Writes trees.csv, stem_curves.csv, trees.gpkg, map.laz, dtm.tif, chm.tif, dsm.tif, "
+      "map.qgs,\n"
+      "report.html and run.json.\n"
       "Example:\n  understory inventory plot.laz -o plot-inventory");
   command->callback([options, &chosen] {
     chosen = [options](CommandContext& context) { return run(*options, context); };

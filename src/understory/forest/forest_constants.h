@@ -425,9 +425,11 @@ inline constexpr double kSlopeGain = 0.15;
 inline constexpr double kFitReach = 0.1;
 // Share of the points that belong to something else at most [chosen]
 inline constexpr double kMostStrays = 0.45;
-// As in stem_fit: what makes a fit's own error true
+// Times the fit's own error: returns are not independent [as in stem_fit]
 inline constexpr double kLinear = 1.5;
+// 1/m: what the error of a radius grows by with its own square [as in stem_fit]
 inline constexpr double kSquare = 1400.0;
+// m of the radius: keyframes do not quite lie on each other [as in stem_fit]
 inline constexpr double kMapError = 0.002;
 // Radii: error of a section at most ... [chosen]
 inline constexpr double kMostSdShare = 0.12;
@@ -466,9 +468,11 @@ inline constexpr double kLeastArcDeg = 60.0;
 inline constexpr double kUsualPower = 0.7;
 // How far stems differ from it [chosen]
 inline constexpr double kPowerSd = 0.12;
-// The range and the steps in which it is looked for [chosen]
+// The least power that is tried [chosen]
 inline constexpr double kLeastPower = 0.4;
+// The greatest one [chosen]
 inline constexpr double kMostPower = 1.2;
+// The step between those that are tried [chosen]
 inline constexpr double kPowerStep = 0.02;
 // Sections that share errors, such as those of the map [chosen]
 inline constexpr double kCorrelatedRings = 4.0;
@@ -552,8 +556,9 @@ inline constexpr double kOverTop = 0.5;
 inline constexpr double kCrownShare = 0.25;
 // ... and m, added [chosen]
 inline constexpr double kCrownOffset = 1.0;
-// m: the same at least and at most [chosen]
+// m: the same at least [chosen]
 inline constexpr double kLeastReach = 1.5;
+// m: the same at most [chosen]
 inline constexpr double kMostReach = 6.0;
 // Cubes along an edge of the larger cubes that lead over gaps [chosen]
 inline constexpr std::array<std::int64_t, 2> kBridges = {3, 6};

@@ -71,7 +71,7 @@ using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
 // The id of the tree that a point of the cloud belongs to, 0 if none; of a full inventory.
 // `height_m` is its height above the ground.
 [[nodiscard]] std::uint32_t tree_at(const InventoryResult& inventory, const Eigen::Vector3d& point,
-                          double height_m);
+                                    double height_m);
 
 // The stems of an inventory as one view of them: foot and centre line, world frame without its
 // `origin` (metres, world frame), so that single precision is enough. In the order of the trees.

@@ -23,12 +23,13 @@ struct StemCurve {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
   std::vector<CurveSection> sections;  // upwards; without a height of the tree they end where the
-                                      // measured ones end
-  double measured_to_m = kUnknown;    // height of the last measured section
-  double volume_m3 = kUnknown;        // over bark, ground to top; unknown without a height
+                                       // measured ones end
+  double measured_to_m = kUnknown;     // height of the last measured section
+  double volume_m3 = kUnknown;         // over bark, ground to top; unknown without a height
   double volume_sd_m3 = kUnknown;
 };
 
+// How a stem curve is completed.
 struct StemCurveConfig {
   TaperSpecies species = TaperSpecies::kUnknown;  // whose form stands where nothing was measured
 };
