@@ -268,8 +268,11 @@ std::optional<UpAxis> other_up_axis(const CloudShape& shape) {
       best = k;
   }
   const double as_given = shape.roughness[0];
-  const bool clear = best != 0 && shape.roughness[best] < kSmooth &&
-                     (as_given > std::max(kRough, kClearly * shape.roughness[best]));
+  const double smoothest = shape.roughness[best];
+  const bool smooth = smoothest < kSmooth && as_given > std::max(kRough, kClearly * smoothest);
+  // A steep or bushy ground, which the crowns beside it leave no doubt about.
+  const bool smooth_beside = smoothest < kSmoothBeside && as_given > kFarClearer * smoothest;
+  const bool clear = best != 0 && (smooth || smooth_beside);
   return clear ? std::optional(kUpAxes[best]) : std::nullopt;
 }
 
