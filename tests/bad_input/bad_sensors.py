@@ -197,6 +197,44 @@ def backwards(folder):
     return outcome.run["reasons"][0]
 
 
+def times_of(cloud):
+    return [struct.unpack_from("<I", cloud.points, i * cloud.step + cloud.fields["t"][0])[0] for i in range(len(cloud))]
+
+
+# Short runs of them were complete: the motion within scans is probed too seldom.
+@cases.case("times of points in no order")
+def mixed_times(folder):
+    def spoil(cloud):
+        times = times_of(cloud)
+        random.Random(1).shuffle(times)
+        for i, time in enumerate(times):
+            cloud.put(i, "t", "I", time)
+
+    _, outcome = mapped(folder, with_clouds(spoil))
+    assert "scan.mixed_times" in outcome.warnings and outcome.run["evidence"]["scans_mixed_times"] > 0.9 * ALL
+    return expect(outcome, 4, 0.1, "the times of points are in no order")
+
+
+@cases.case("points of a scan in no order, with their times")
+def mixed_rows(folder):
+    def spoil(cloud):
+        rows = [bytes(cloud.points[i * cloud.step : (i + 1) * cloud.step]) for i in range(len(cloud))]
+        random.Random(1).shuffle(rows)
+        cloud.points = bytearray(b"".join(rows))
+
+    _, outcome = mapped(folder, with_clouds(spoil))
+    assert outcome.run["evidence"]["scans_mixed_times"] == 0
+    return expect(outcome, 0, 0.03)
+
+
+# The path was right by itself, but the whole map leant by 6 degrees, and was complete.
+@cases.case("an accelerometer that is off by 1 m/s^2")
+def accelerometer_off(folder):
+    _, outcome = mapped(folder, with_imu(lambda rates, forces: (rates, (forces[0] + 1, *forces[1:]))))
+    assert 4 < outcome.run["evidence"]["tilt_at_end_deg"] < 8, outcome.run["evidence"]
+    return expect(outcome, 4, 0.05, "the map leans by", "the accelerometer is off by")
+
+
 @cases.case("clouds far apart that are taken to be a tenth of a second apart")
 def assumed_times(folder):
     """A folder of every fifteenth cloud whose names tell no times: the walk becomes a flight."""

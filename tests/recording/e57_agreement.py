@@ -114,8 +114,8 @@ with tempfile.TemporaryDirectory() as scratch:
     file.close()
 
     write_ply(room / "plot.ply", np.concatenate([points[:half], kept]))
-    run("inventory", room / "plot.ply", "-o", room / "from_ply")
-    run("inventory", path, "-o", room / "from_e57")
+    run("inventory", "--set", "extent=basic", room / "plot.ply", "-o", room / "from_ply")
+    run("inventory", "--set", "extent=basic", path, "-o", room / "from_e57")
     want, got = trees(room / "from_ply"), trees(room / "from_e57")
     assert len(want) == len(got) > 10 and np.abs(want - got).max() < 1e-3, (len(want), len(got))
     print(f"{len(points)} points, {len(got)} trees: the same")
@@ -123,17 +123,17 @@ with tempfile.TemporaryDirectory() as scratch:
     plain = pye57.E57(str(room / "plain.e57"), mode="w")
     add_plain_scan(plain, np.concatenate([points[:half], kept]))
     plain.close()
-    run("inventory", room / "plain.e57", "-o", room / "from_plain")
+    run("inventory", "--set", "extent=basic", room / "plain.e57", "-o", room / "from_plain")
     assert abs(len(trees(room / "from_plain")) - len(want)) < 0.05 * len(want)
 
     whole = path.read_bytes()
     (room / "cut.e57").write_bytes(whole[: len(whole) // 2])
-    said = run("inventory", room / "cut.e57", "-o", room / "none", expected=3)
+    said = run("inventory", "--set", "extent=basic", room / "cut.e57", "-o", room / "none", expected=3)
     assert "the file ends before it" in said and not (room / "none").exists(), said
     flipped = bytearray(whole)
     flipped[len(whole) // 4] ^= 1
     (room / "flipped.e57").write_bytes(flipped)
-    said = run("inventory", room / "flipped.e57", "-o", room / "rest", expected=4)
+    said = run("inventory", "--set", "extent=basic", room / "flipped.e57", "-o", room / "rest", expected=4)
     assert "a checksum is wrong" in said, said
     said = run("map", path, "-o", room / "none", expected=3)
     assert "understory inventory" in said and not (room / "none").exists(), said

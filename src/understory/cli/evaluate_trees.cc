@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "understory/evaluation/tree_errors.h"
+#include "understory/evaluation/tree_list_check.h"
 #include "understory/evaluation/tree_rates.h"
 #include "understory/util/error.h"
 #include "understory/util/files/file_in_folder.h"
@@ -181,9 +182,16 @@ std::optional<VisibleTreeErrors> compare_visible(const TreeOptions& options,
   return compare_visible_trees(a, b, options.radius_m, visibility);
 }
 
+void warn_of_list(const std::string& name, const std::vector<Tree>& trees, Log& log) {
+  for (const std::string& complaint : {diameter_complaint(trees), doubles_complaint(trees)})
+    if (!complaint.empty()) log.warn("evaluate.trees", name + ": " + complaint);
+}
+
 int evaluate_trees(const TreeOptions& options, CommandContext& context) {
   std::vector<Tree> a = read_trees(file_in_folder(options.a, "trees.csv"));
   const std::vector<Tree> b = read_trees(file_in_folder(options.b, "trees.csv"));
+  warn_of_list(options.a, a, context.log);
+  warn_of_list(options.b, b, context.log);
   const Alignment alignment = alignment_from_name(options.alignment);
   bool aligned = true;
   Comparison result;

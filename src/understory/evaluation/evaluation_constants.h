@@ -36,6 +36,30 @@ inline constexpr double kMostShift = 5.0;
 inline constexpr double kLeastSpreadM = 0.005;
 }  // namespace tree_match_chance
 
+namespace tree_list_check {  // evaluation/tree_list_check.cc
+// m: no stand has a larger median of diameters; groves of giant sequoias come near it [bound:
+// forests]
+inline constexpr double kThickestMedianM = 3.0;
+// m: nor a smaller one: thinner stems have no diameter at breast height that counts [bound:
+// forests]
+inline constexpr double kThinnestMedianM = 0.01;
+// Medians above it are millimetres: as centimetres they were above kThickestMedianM or near it
+// [chosen]
+inline constexpr double kThickestCentimetres = 120.0;
+// Diameters, or pairs of them, that tell anything at least [chosen]
+inline constexpr std::size_t kLeastKnown = 5;
+// Median ratio of the diameters of two lists of one stand at most; two methods differ by 1.4 where
+// one sees stems from afar, radii by 2, feet by 3.3 [docs/reference/stems.md]
+inline constexpr double kMostRatio = 1.8;
+// m: two stems do not stand so near each other [bound: the thinnest stems; four lists of real plots
+// have 3 such rows in 5,268]
+inline constexpr double kOneStemM = 0.05;
+// Doubled rows at least [chosen: forks]
+inline constexpr std::size_t kLeastDoubles = 3;
+// Share of doubled rows at most [chosen: forks]
+inline constexpr double kMostDoubles = 0.02;
+}  // namespace tree_list_check
+
 namespace tree_alignment {  // evaluation/tree_alignment.cc
 // m between two trees of one list that are tried as a pair at least. Long pairs fix the heading
 // better and are rarer, short ones are more often both within the other list [chosen: suits plots

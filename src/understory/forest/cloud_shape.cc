@@ -192,6 +192,12 @@ double lean_deg(const Vector3d& axis) {
   return std::acos(std::clamp(axis.z(), -1.0, 1.0)) * 180.0 / M_PI;
 }
 
+// Whether stems stand clearly along another direction than z.
+bool leans(const StandingDirection& found) {
+  return found.gain > kLeastGain && found.gain > kLeastGainOverZ * found.gain_of_z &&
+         lean_deg(found.axis) > kLeastLeanDeg;
+}
+
 bool is_slice(const CloudShape& shape) {
   return shape.extent.minCoeff() < std::max(kThinnest, kThinnestShare * shape.extent.maxCoeff()) &&
          shape.extent.z() <= shape.extent.minCoeff();
@@ -268,17 +274,20 @@ std::optional<UpAxis> other_up_axis(const CloudShape& shape) {
       best = k;
   }
   const double as_given = shape.roughness[0];
-  const bool clear = best != 0 && shape.roughness[best] < kSmooth &&
-                     (as_given > std::max(kRough, kClearly * shape.roughness[best]));
+  const double smoothest = shape.roughness[best];
+  const bool smooth = smoothest < kSmooth && as_given > std::max(kRough, kClearly * smoothest);
+  // A steep or bushy ground, which the crowns beside it leave no doubt about. Stems tell the
+  // direction of a tilted cloud better.
+  const bool tilted = shape.standing && leans(*shape.standing);
+  const bool smooth_beside =
+      !tilted && smoothest < kSmoothBeside && as_given > kFarClearer * smoothest;
+  const bool clear = best != 0 && (smooth || smooth_beside);
   return clear ? std::optional(kUpAxes[best]) : std::nullopt;
 }
 
 std::optional<Eigen::Vector3d> leaning_axis(const CloudShape& shape) {
   if (!shape.standing || is_slice(shape) || other_up_axis(shape)) return std::nullopt;
-  const StandingDirection& found = *shape.standing;
-  const bool clear = found.gain > kLeastGain && found.gain > kLeastGainOverZ * found.gain_of_z &&
-                     lean_deg(found.axis) > kLeastLeanDeg;
-  return clear ? std::optional(found.axis) : std::nullopt;
+  return leans(*shape.standing) ? std::optional(shape.standing->axis) : std::nullopt;
 }
 
 std::string up_complaint(const CloudShape& shape) {

@@ -32,6 +32,12 @@ inline constexpr double kSmooth = 0.2;
 inline constexpr double kRough = 0.3;
 // Times smoother another axis has to be than z [real clouds, docs/method/forest.md]
 inline constexpr double kClearly = 1.8;
+// Roughness, in cells: an axis that is smoother may be up where z is far rougher [real clouds: one
+// has 0.22 where the grid falls badly]
+inline constexpr double kSmoothBeside = 0.28;
+// Times smoother such an axis has to be than z [real clouds: 4.3 upside down; as they are, no axis
+// is 1.8 times smoother than z]
+inline constexpr double kFarClearer = 3.0;
 // m: a thinner cloud is a slice and has no ground [chosen]
 inline constexpr double kThinnest = 3.0;
 // Of the longest side: the same [chosen]

@@ -323,6 +323,8 @@ inline constexpr double kLeastMatched = 8.0;
 inline constexpr double kLargestRadiusM = 3000.0;
 // m: a column of diameters with a greater median is in centimetres [bound: trees]
 inline constexpr double kThickestM = 2.0;
+// m: no map has a smaller median of diameters [bound: forests]
+inline constexpr double kThinnestM = 0.01;
 // Parts of the source that are tried [bound: time]
 inline constexpr std::size_t kParts = 3;
 }  // namespace tree_match

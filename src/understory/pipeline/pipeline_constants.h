@@ -54,6 +54,12 @@ namespace run_judgement {  // pipeline/judgement/run_judgement.cc
 inline constexpr double kSureErrors = 5.0;
 // m at which a turn counts as a shift [chosen]
 inline constexpr double kRangeM = 10.0;
+// Share of the scans whose points have times in no order [chosen: no lidar gives one]
+inline constexpr double kMostMixedTimes = 0.05;
+// degrees that a map leans at most, with kLargeBiasM_s2: 1.7 m over 50 m [chosen]
+inline constexpr double kMostTiltDeg = 2.0;
+// m/s^2: an accelerometer that is off by more is not calibrated; good ones have 0.1 [data sheets]
+inline constexpr double kLargeBiasM_s2 = 0.3;
 }  // namespace run_judgement
 
 namespace evidence_gathering {  // pipeline/judgement/evidence_gathering.cc
@@ -88,7 +94,25 @@ inline constexpr double kSparseInlierRatio = 0.05;
 namespace stand_cloud {  // pipeline/inventory/stand_cloud.cc
 // m by which places may be rounded: a tenth of a thin stem [chosen]
 inline constexpr double kCoarsestStepM = 0.01;
+// Share by which a unit of heights is another one than that of the plane: international and US
+// feet differ by 2e-6 [chosen]
+inline constexpr double kSameUnit = 1e-4;
 }  // namespace stand_cloud
+
+namespace cloud_inventory {  // pipeline/inventory/cloud_inventory.cc
+// m above the ground that a tenth of the canopy model reaches: trees, whose stems must be listed
+// [chosen]
+inline constexpr double kTallWithoutStemsM = 6.0;
+// Share of the cells of the canopy model that are lower [chosen]
+inline constexpr double kCanopyQuantile = 0.9;
+// m: lower stands may be slender, and are not tall for feet [as kTallForMetres of cloud_shape]
+inline constexpr double kTallM = 42.0;
+// Height over diameter: no tall stand is more slender; real ones have 40 to 100, in feet of height
+// and metres of diameter 3.3 times as much [bound: forests]
+inline constexpr double kMostSlender = 150.0;
+// Trees with both figures at least [chosen]
+inline constexpr std::size_t kLeastTrees = 3;
+}  // namespace cloud_inventory
 
 namespace lidar_view {  // pipeline/inventory/lidar_view.cc
 // Clouds that a view is learnt from [chosen]

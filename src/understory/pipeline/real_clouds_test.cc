@@ -66,6 +66,9 @@ TEST(RealClouds, TurnedOrScaledEachStandIsNoticed) {
           other_up_axis(shape_of(blocks_of(cloud, upright_from_cloud(axis).transpose())));
       EXPECT_EQ(found.value_or(UpAxis::kZ), axis) << name << " with " << to_string(axis) << " up";
     }
+    // The lower side up, mirrored: the cells of the grid fall otherwise.
+    const Eigen::Matrix3d mirror = Eigen::Vector3d(1.0, 1.0, -1.0).asDiagonal();
+    EXPECT_EQ(other_up_axis(shape_of(blocks_of(cloud, mirror))), UpAxis::kMinusZ) << name;
     for (const double scale : {1000.0, 100.0})
       EXPECT_NE(unit_complaint(shape_of(blocks_of(cloud, scale * Eigen::Matrix3d::Identity()))), "")
           << name << " times " << scale;

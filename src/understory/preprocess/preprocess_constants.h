@@ -31,4 +31,18 @@ namespace isolated_points {  // preprocess/isolated_points.cc
 inline constexpr double kMostAlone = 0.5;
 }  // namespace isolated_points
 
+namespace point_order {  // preprocess/point_order.cc
+// Points of a scan that are looked at [bound: time]
+inline constexpr std::size_t kMostPoints = 2'000;
+// Points of a scan at least, or nothing is told [chosen]
+inline constexpr std::size_t kLeastPoints = 300;
+// Different times among them at least [chosen: sensors that give one time to many points]
+inline constexpr std::size_t kLeastTimes = 50;
+// Points after one in time that are compared with it [chosen: beams of one moment]
+inline constexpr std::size_t kFollowing = 4;
+// Median angle over that of a mixed order, below which there is an order; lidars have 0.1 and less,
+// mixed times 0.9 to 1.1 [simulated]
+inline constexpr double kOrderedShare = 0.5;
+}  // namespace point_order
+
 }  // namespace understory::preprocess_constants

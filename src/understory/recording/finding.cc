@@ -20,6 +20,8 @@ const char* key_of(Finding finding) {
       return "recording.assumed_rate";
     case Finding::kNoPointTimes:
       return "recording.no_point_times";
+    case Finding::kMixedTimes:
+      return "scan.mixed_times";
   }
   UNDERSTORY_CHECK(false);
   return "";

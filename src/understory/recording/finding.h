@@ -17,6 +17,7 @@ enum class Finding {
   kLateSensor,     // met too late in a capture to be used
   kAssumedTimes,   // nothing tells when the clouds of a folder were taken
   kNoPointTimes,   // of a lidar that spins
+  kMixedTimes,     // a scan whose points have times in no order
 };
 
 // The key of its warning, for docs/reference/troubleshooting.md and run.json.

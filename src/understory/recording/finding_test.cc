@@ -8,9 +8,9 @@
 namespace understory {
 namespace {
 
-constexpr Finding kAll[] = {Finding::kDamage,      Finding::kDamagedPacket, Finding::kCutOff,
-                            Finding::kOtherSensor, Finding::kLateSensor,    Finding::kAssumedTimes,
-                            Finding::kNoPointTimes};
+constexpr Finding kAll[] = {Finding::kDamage,       Finding::kDamagedPacket, Finding::kCutOff,
+                            Finding::kOtherSensor,  Finding::kLateSensor,    Finding::kAssumedTimes,
+                            Finding::kNoPointTimes, Finding::kMixedTimes};
 
 TEST(Finding, IsCountedByKindAndKeepsItsFirstMessage) {
   std::set<std::string> keys;

@@ -55,9 +55,17 @@ void settle_unit(const std::string& column, TreeMapFile& map) {
   if (column == "dbh_cm") {
     scale = 0.01;
   } else if (column != "dbh_m" && upper_median(known) > kThickestM) {
-    scale = 0.01;
-    map.remarks.push_back("the column '" + column + "' is taken for centimetres");
+    const bool millimetres = upper_median(known) > 100.0 * kThickestM;
+    scale = millimetres ? 0.001 : 0.01;
+    map.remarks.push_back("the column '" + column + "' is taken for " +
+                          (millimetres ? "millimetres" : "centimetres"));
   }
+  const double median_m = scale * upper_median(known, 1.0);
+  if (median_m > kThickestM || median_m < kThinnestM)
+    map.remarks.push_back(fmt::format(
+        "the median diameter in the column '{}' is {:.4g} m: its unit is another one. The place "
+        "does not depend on it, as only their order counts",
+        column, median_m));
   for (Tree& tree : map.trees)
     tree.dbh_m *= scale;
 }

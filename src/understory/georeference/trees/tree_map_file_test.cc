@@ -72,5 +72,25 @@ TEST(TreeMapFile, NamesWhatIsWrong) {
   EXPECT_THROW((void)read_tree_map(write(folder, "d.gpkg", "no database"), ""), InputError);
 }
 
+TEST(TreeMapFile, DiametersInMillimetresAndThoseOfNoUnitAreTold) {
+  const test::TemporaryFolder folder;
+  const auto file = folder.path() / "trees.csv";
+  const auto read = [&](const std::string& text) {
+    std::ofstream(file) << text;
+    return read_tree_map(file, "");
+  };
+  const TreeMapFile millimetres = read("x,y,dbh\n1,2,310\n3,4,290\n5,6,330\n");
+  EXPECT_NEAR(millimetres.trees[0].dbh_m, 0.31, 1e-12);
+  ASSERT_EQ(millimetres.remarks.size(), 1U);
+  EXPECT_NE(millimetres.remarks[0].find("millimetres"), std::string::npos);
+  for (const char* text : {"x,y,dbh_m\n1,2,31\n", "x,y,dbh_cm\n1,2,0.31\n"}) {
+    const TreeMapFile wrong = read(text);
+    ASSERT_EQ(wrong.remarks.size(), 1U) << text;
+    EXPECT_NE(wrong.remarks[0].find("its unit is another one"), std::string::npos);
+  }
+  EXPECT_TRUE(read("x,y,dbh_cm\n1,2,31\n").remarks.empty());
+  EXPECT_TRUE(read("x,y,dbh_m\n1,2,\n").remarks.empty());
+}
+
 }  // namespace
 }  // namespace understory

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/inventory_files.h"
@@ -16,17 +18,21 @@
 #include "understory/pipeline/inventory/lidar_view.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/pipeline/run_folder/run_folder.h"
 #include "understory/recording/finding.h"
 #include "understory/util/error.h"
 #include "understory/util/files/output_guard.h"
+#include "understory/util/median.h"
 #include "understory/util/timing.h"
 
 namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
+
+using namespace pipeline_constants::cloud_inventory;
 
 // The cloud itself, or the map of a run.
 fs::path cloud_of(const std::string& given) {
@@ -35,10 +41,52 @@ fs::path cloud_of(const std::string& given) {
   return fs::is_directory(path) ? path / "map.laz" : path;
 }
 
+// Height that a tenth of the canopy reaches, m above the ground; 0 where nothing is known.
+double canopy_height_of(const Raster& canopy) {
+  std::vector<double> heights;
+  for (const float height : canopy.values)
+    if (std::isfinite(height)) heights.push_back(height);
+  if (heights.empty()) return 0.0;
+  const auto at =
+      static_cast<std::ptrdiff_t>(kCanopyQuantile * static_cast<double>(heights.size() - 1));
+  std::nth_element(heights.begin(), heights.begin() + at, heights.end());
+  return heights[static_cast<std::size_t>(at)];
+}
+
+// Why the list of a cloud in which stems could be seen is wrong; empty: nothing says so.
+std::string list_complaint(const InventoryResult& inventory, bool unit_given) {
+  const double canopy_m = canopy_height_of(inventory.canopy);
+  if (inventory.trees.empty() && !inventory.too_sparse && canopy_m > kTallWithoutStemsM)
+    return fmt::format(
+        "no stem was found, though points stand {:.0f} m above the ground: z may not be up (--up), "
+        "or the unit not the metre (--unit-m)",
+        canopy_m);
+  std::vector<double> heights;
+  std::vector<double> ratios;
+  for (const Tree& tree : inventory.trees) {
+    if (!std::isfinite(tree.height_m) || !(tree.dbh_m > 0.0)) continue;
+    heights.push_back(tree.height_m);
+    ratios.push_back(tree.height_m / tree.dbh_m);
+  }
+  if (unit_given || ratios.size() < kLeastTrees) return {};
+  const double height_m = upper_median(heights);
+  const double ratio = upper_median(ratios);
+  if (height_m < kTallM || ratio < kMostSlender) return {};
+  return fmt::format(
+      "the trees are {:.0f} m high and {:.0f} times as high as thick: heights may be in feet, and "
+      "the plane in metres. Bring both to metres first (--unit-m 1 if it is right as it is)",
+      height_m, ratio);
+}
+
 // What the user has to know before using the numbers. The map of a run is judged as `map` does.
-void judge(const InventoryResult& inventory, bool of_run, const Log& log, RunDocuments& documents) {
+void judge(const InventoryResult& inventory, const InventoryRequest& request, bool of_run,
+           const Log& log, RunDocuments& documents) {
   if (const Found damage = found(log, Finding::kDamage); damage.count > 0)
     documents.lower(RunStatus::kPartial, "the cloud is not whole: " + damage.first);
+  if (!of_run) {
+    const std::string complaint = list_complaint(inventory, request.frame.unit_m > 0.0);
+    if (!complaint.empty()) documents.lower(RunStatus::kUntrusted, complaint);
+  }
   if (!inventory.too_sparse) return;
   const bool any = !inventory.trees.empty();
   if (any && of_run) return;
@@ -65,7 +113,19 @@ void name_system(const InventoryRequest& request, Stock& stock) {
     throw ConfigError({"--crs is for a cloud that names no coordinate system; " +
                        stock.path.string() + " is in " +
                        (own.empty() ? "the frame of its run" : own.substr(0, 60))});
+  // The user's own words, so the coordinates are to be those of the system.
+  if ((request.frame.unit_m != 0.0 && request.frame.unit_m != 1.0) ||
+      (!request.frame.up.empty() && request.frame.up != "z"))
+    throw ConfigError(
+        {"--crs does not hold for coordinates that --unit-m or --up changes: leave "
+         "it out, or convert the cloud first"});
   own = request.coordinate_system;
+}
+
+CloudFrame with_system(const InventoryRequest& request) {
+  CloudFrame frame = request.frame;
+  frame.coordinate_system = request.coordinate_system;
+  return frame;
 }
 
 // map.qgs over the results.
@@ -139,7 +199,7 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
     const ScopedTimer timer(times, "reading");
     stock.stand = stock.of_run
                       ? read_run_map(stock.path, stock.frames.layers, request.frame, log, progress)
-                      : read_stand(stock.path, request.frame, log, progress);
+                      : read_stand(stock.path, with_system(request), log, progress);
     name_system(request, stock);
   }
   // The map of a run is in metres, and what is wrong with it is a matter of trust.
@@ -174,7 +234,7 @@ void describe(const InventoryRequest& request, const Stock& stock, const Log& lo
   documents.count("trees", inventory.trees.size());
   documents.summary().quality["area_m2"] = inventory.area_m2;
   documents.summary().quality["ground_measured_share"] = inventory.ground.measured_share;
-  judge(inventory, stock.of_run, log, documents);
+  judge(inventory, request, stock.of_run, log, documents);
   if (!stock.stand.doubt.empty()) documents.inherit({RunStatus::kUntrusted, {stock.stand.doubt}});
   if (!stock.stand.suspicion.empty() && !stock.of_run)
     documents.inherit({RunStatus::kUntrusted, {stock.stand.suspicion}});

@@ -69,6 +69,13 @@ std::string system_complaint(const std::string& system) {
   const double unit = metres_per_unit(system);
   if (unit == 0.0)
     return "its coordinate system is in degrees: project it first, for instance to UTM";
+  const auto known = CoordinateSystem::find(system);
+  if (known && !known->vertical_name().empty() &&
+      std::abs(known->height_unit_m() - unit) > kSameUnit * unit)
+    return fmt::format(
+        "its coordinate system counts in units of {:.7g} m in the plane and of {:.7g} m in height: "
+        "bring both to metres first",
+        unit, known->height_unit_m());
   if (std::abs(unit - 1.0) < 1e-9 || !std::isfinite(unit)) return {};
   return fmt::format("its coordinate system counts in units of {:.7g} m ({}): give --unit-m {:.7g}",
                      unit, std::abs(unit - 0.3048) < 1e-5 ? "feet" : "not metres", unit);
@@ -148,7 +155,8 @@ StandCloud checked_stand(PointCloudFile cloud, const std::string& name, const Cl
   }
   StandCloud stand;
   stand.cloud = std::move(cloud);
-  const std::string system = stand.cloud.coordinate_system;
+  const std::string& own = stand.cloud.coordinate_system;
+  const std::string system = own.empty() ? frame.coordinate_system : own;
   bring_upright(frame, name, stand.cloud, log);
   if (frame.unit_m > 0.0 && !frame.up.empty()) return stand;
   const PointBlocks blocks = blocks_of(stand.cloud);

@@ -17,6 +17,8 @@ struct CloudFrame {
   // The direction that is up: x, y, z, -x, -y, -z or three numbers "X,Y,Z"; empty: z, if nothing
   // speaks against it.
   std::string up;
+  // Of a cloud that states none, as the user names it: its unit is checked too. Empty: not known.
+  std::string coordinate_system;
 };
 // Whether a text names a direction for CloudFrame::up.
 [[nodiscard]] bool is_direction(const std::string& up);

@@ -117,6 +117,7 @@ void gather_findings(const Log& log, RunEvidence& evidence) {
   evidence.cut_off = found(log, Finding::kCutOff).count > 0;
   evidence.times_assumed = found(log, Finding::kAssumedTimes).count > 0;
   evidence.why_no_point_times = found(log, Finding::kNoPointTimes).first;
+  evidence.mixed_times = found(log, Finding::kMixedTimes).count;
   evidence.point_times_missing = found(log, Finding::kNoPointTimes).count > 0;
 }
 

@@ -81,6 +81,9 @@ Figures figures_of(const RunEvidence& evidence) {
   figures["cut_off"] = evidence.cut_off;
   figures["times_assumed"] = evidence.times_assumed;
   figures["point_times_missing"] = evidence.point_times_missing;
+  put(figures, "scans_mixed_times", evidence.mixed_times);
+  figures["tilt_at_end_deg"] = evidence.tilt_at_end_deg;
+  figures["accelerometer_bias_m_s2"] = evidence.accelerometer_bias_m_s2;
   figures["imu_used"] = evidence.imu_used;
   figures["imu_on_probation"] = evidence.imu_on_probation;
   figures["imu_trusted"] = evidence.imu_distrust.empty();

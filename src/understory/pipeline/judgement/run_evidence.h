@@ -119,6 +119,7 @@ struct RunEvidence {
   bool times_assumed = false;        // nothing tells when the clouds of a folder were taken
   bool point_times_missing = false;  // of a lidar that spins
   std::string why_no_point_times;
+  std::uint64_t mixed_times = 0;  // scans whose points have times in no order
   bool imu_used = false;          // at the end
   bool imu_on_probation = false;  // at the end: left out until it is clear whether it is right
   // Acceleration by matching over that by the accelerometer, how well they go together, and how
@@ -127,6 +128,11 @@ struct RunEvidence {
   double imu_motion_correlation = 0.0;
   double imu_motion_spread_m_s2 = 0.0;
   int imu_motion_windows = 0;
+  // How far z of the world is from up, by gravity at the end, and by how much the accelerometer is
+  // off then. A world is levelled once, at the beginning; what is learnt of the accelerometer later
+  // turns gravity in it.
+  double tilt_at_end_deg = 0.0;
+  double accelerometer_bias_m_s2 = 0.0;
   std::string imu_distrust;  // why the IMU is not trusted; empty: it is, or is none
   MotionEvidence motion;
   MatchEvidence match;

@@ -163,6 +163,15 @@ class Judge {
       hurt(fmt::format("{}. The sensor moved so much that points 10 m away are smeared by {:.2f} m",
                        evidence_.why_no_point_times, match.smear_m));
     }
+    if (share(evidence_.mixed_times, match.scans) > kMostMixedTimes) {
+      std::string mixed = fmt::format(
+          "in {} of {} scans the times of points are in no order: a driver or a converter has "
+          "mixed "
+          "them up, and the motion within a scan (points 10 m away move by {:.2f} m) cannot be "
+          "taken out",
+          evidence_.mixed_times, match.scans, match.smear_m);
+      match.smear_m > config_.max_smear_m ? hurt(std::move(mixed)) : missing(std::move(mixed));
+    }
     if (share(match.repeated, match.scans) > config_.max_repeated) {
       hurt(
           fmt::format("{} of {} scans hold the same points as the scan before: the driver or the "
@@ -348,6 +357,13 @@ class Judge {
   }
 
   void judge_imu() {
+    if (evidence_.imu_used && evidence_.tilt_at_end_deg > kMostTiltDeg &&
+        evidence_.accelerometer_bias_m_s2 > kLargeBiasM_s2) {
+      hurt(fmt::format(
+          "the map leans by {:.1f} degrees: the accelerometer is off by {:.2f} m/s^2, which showed "
+          "only after the map was levelled by it. Calibrate the IMU",
+          evidence_.tilt_at_end_deg, evidence_.accelerometer_bias_m_s2));
+    }
     if (!evidence_.imu_distrust.empty()) {
       hurt(evidence_.imu_distrust);
     } else if (evidence_.imu_on_probation) {

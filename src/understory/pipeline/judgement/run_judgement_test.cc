@@ -281,6 +281,28 @@ TEST(RunJudgement, TimesOfPoints) {
   expect_complete(evidence);
 }
 
+TEST(RunJudgement, TimesOfPointsInNoOrder) {
+  RunEvidence evidence = good_run();
+  evidence.mixed_times = 50;
+  evidence.match.smear_m = 0.5;
+  expect_complete(evidence);
+  evidence.mixed_times = 60;
+  expect(RunStatus::kUntrusted, "60 of 1000 scans the times of points are in no order", evidence);
+  evidence.match.smear_m = 0.01;  // a machine that hardly moves
+  expect(RunStatus::kPartial, "in no order", evidence);
+}
+
+TEST(RunJudgement, AMapThatLeansByABadAccelerometer) {
+  RunEvidence evidence = good_run();
+  evidence.tilt_at_end_deg = 5.8;
+  evidence.accelerometer_bias_m_s2 = 0.1;  // a path that bends, no accelerometer
+  expect_complete(evidence);
+  evidence.accelerometer_bias_m_s2 = 1.0;
+  expect(RunStatus::kUntrusted, "the map leans by 5.8 degrees", evidence);
+  evidence.tilt_at_end_deg = 0.3;  // it lies along the vertical, or was known at the beginning
+  expect_complete(evidence);
+}
+
 TEST(RunJudgement, AccelerationsOfTheImu) {
   const JudgementConfig limits;
   RunEvidence evidence = good_run();

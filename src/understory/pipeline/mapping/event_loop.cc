@@ -4,7 +4,10 @@
 
 #include <utility>
 
+#include "understory/preprocess/point_order.h"
+#include "understory/recording/finding.h"
 #include "understory/util/files/read_error.h"
+#include "understory/util/time.h"
 #include "understory/util/timing.h"
 
 namespace understory {
@@ -113,6 +116,7 @@ void EventLoop::handle_ready() {
   while (const auto ready = orderer_->pop()) {
     const TimeNs before = front_end_->last_scan_end();
     take_fix_or_sample(*ready);
+    if (const auto* scan = std::get_if<ScanPtr>(&*ready)) look_at_times(**scan);
     note_positioned(front_end_->handle(*ready, source_->rig()));
     if (front_end_->last_scan_end() == before) continue;
     const FrontEndProgress so_far = front_end_->progress();
@@ -120,6 +124,13 @@ void EventLoop::handle_ready() {
     const auto done = static_cast<double>(so_far.scans);
     progress_({so_far.stage, done, share > 0.0 ? done / share : 0.0, "scans", remark(so_far)});
   }
+}
+
+void EventLoop::look_at_times(const Scan& scan) {
+  if (!times_in_no_order(scan)) return;
+  report_finding(log_, Finding::kMixedTimes,
+                 fmt::format("scan at {}: the times of its points are in no order",
+                             format_seconds(scan.stamp)));
 }
 
 // For the online georeference. The world of a path by stems is level by these.

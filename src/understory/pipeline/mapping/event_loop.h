@@ -62,6 +62,7 @@ class EventLoop {
   [[nodiscard]] bool stopped();
   void handle_ready();
   void take_fix_or_sample(const Event& event);
+  void look_at_times(const Scan& scan);
   void note_positioned(const std::vector<PositionedScan>& scans);
   void save_state();
   void save_state_if_due();

@@ -10,6 +10,7 @@
 
 #include "understory/evaluation/tree_errors.h"
 #include "understory/evaluation/tree_falls.h"
+#include "understory/evaluation/tree_list_check.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/run_folder/run_documents.h"
@@ -71,19 +72,11 @@ std::vector<TreeFall> falls_in(const std::string& map) {
   return fs::exists(file) ? read_tree_falls(file) : std::vector<TreeFall>();
 }
 
-// Whether both lists are the same: a map merged with itself.
-bool are_same(const std::vector<Tree>& a, const std::vector<Tree>& b) {
-  const auto same = [](const Tree& one, const Tree& other) {
-    return one.x == other.x && one.y == other.y && one.observations == other.observations;
-  };
-  return !a.empty() && std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
-}
-
 // What two maps came to.
 struct Merge {
   std::vector<Tree> a;
   std::vector<Tree> b;  // beside a
-  bool same = false;    // both are one map
+  bool same = false;    // a copy of a
   DeformationField field;
   MergedTrees merged;
   std::vector<TreeFall> falls;
@@ -97,7 +90,7 @@ Merge merge_maps(const MergeRequest& request, const ProgressSink& progress, Stag
   {
     const ScopedTimer timer(times, "reading");
     m.a = read_trees(file_in_folder(request.a, kTrees));
-    m.same = are_same(m.a, read_trees(file_in_folder(request.b, kTrees)));
+    m.same = are_copies(m.a, read_trees(file_in_folder(request.b, kTrees)));
     m.b = beside(request.b, m.a, request, progress);
     if (!request.reference.empty()) reference = beside(request.reference, m.a, request, progress);
   }
@@ -149,6 +142,23 @@ void add_inputs(const MergeRequest& request, RunDocuments& documents) {
   }
 }
 
+// What is wrong with the lists themselves.
+void judge_lists(const MergeRequest& request, const Merge& m, RunDocuments& documents) {
+  const auto lower = [&](const std::string& complaint) {
+    if (!complaint.empty()) documents.lower(RunStatus::kUntrusted, complaint);
+  };
+  for (const auto& [trees, name] : {std::pair(&m.a, request.a), std::pair(&m.b, request.b)}) {
+    for (const std::string& complaint : {diameter_complaint(*trees), doubles_complaint(*trees)})
+      lower(complaint.empty() ? "" : name + ": " + complaint);
+  }
+  std::vector<TreePair> pairs;
+  for (std::size_t i = 0; i < m.merged.trees.size(); ++i) {
+    if (m.merged.index_in_s[i] >= 0 && m.merged.index_in_l[i] >= 0)
+      pairs.emplace_back(m.merged.index_in_s[i], m.merged.index_in_l[i]);
+  }
+  lower(diameter_complaint(m.a, m.b, pairs));
+}
+
 void judge(const MergeRequest& request, const Merge& m, RunDocuments& documents) {
   if (m.merged.joined == 0) {
     documents.lower(RunStatus::kUntrusted,
@@ -160,6 +170,7 @@ void judge(const MergeRequest& request, const Merge& m, RunDocuments& documents)
   if (m.same)
     documents.lower(RunStatus::kUntrusted,
                     "both maps hold the same trees: each of their observations counts twice");
+  judge_lists(request, m, documents);
   documents.inherit(trust_of_run(request.b));
   documents.inherit(trust_of_run(request.a));
 }

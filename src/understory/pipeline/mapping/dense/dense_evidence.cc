@@ -1,5 +1,8 @@
 #include "understory/pipeline/mapping/dense/dense_evidence.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "understory/pipeline/judgement/evidence_gathering.h"
 #include "understory/pipeline/judgement/run_judgement.h"
 
@@ -27,6 +30,11 @@ void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const R
     evidence.imu_distrust = trust.reason;
   }
   gather_imu_trust(trust, evidence);
+  const Eigen::Quaterniond level = front_end.odometry().motion().level_from_world();
+  const double up = (level * Eigen::Vector3d::UnitZ()).z();
+  evidence.tilt_at_end_deg = std::acos(std::clamp(up, -1.0, 1.0)) * 180.0 / M_PI;
+  const NavState last = front_end.odometry().motion().predict(front_end.last_scan_end());
+  evidence.accelerometer_bias_m_s2 = last.accel_bias.norm();
   const ScanMotion scan_motion = front_end.odometry().scan_motion();
   evidence.match.scan_motion_ratio = scan_motion.ratio;
   evidence.match.scan_motion_probes = scan_motion.probes;

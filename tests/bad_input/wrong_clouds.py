@@ -1,0 +1,161 @@
+"""Clouds and tree lists in a frame or unit that is not theirs, through `understory inventory`, `merge` and
+`evaluate trees`: a list that is wrong is never called complete."""
+
+import csv
+import math
+import random
+
+from program import Cases, program
+
+cases = Cases()
+SIDE = 20.0
+
+
+def places(seed, count=24):
+    draw = random.Random(seed)
+    trees = []
+    while len(trees) < count:
+        tree = (draw.uniform(1, SIDE - 1), draw.uniform(1, SIDE - 1))
+        if all(math.dist(tree, other) > 2.2 for other in trees):
+            trees.append(tree)
+    return trees
+
+
+def tree_points(x, y, height, draw, returns=2500):
+    """A trunk and, above its half, a crown."""
+    for _ in range(returns):
+        h, a = draw.uniform(0, height), draw.uniform(0, 2 * math.pi)
+        r = 0.11 + draw.gauss(0, 0.004) if h < height / 2 else draw.uniform(0, 0.3 * (height + 0.5 - h))
+        yield x + r * math.cos(a), y + r * math.sin(a), h
+
+
+def plot(height=14.0, seed=3):
+    """Even ground and trees of that height."""
+    draw = random.Random(seed)
+    points = [(draw.uniform(0, SIDE), draw.uniform(0, SIDE), draw.gauss(0, 0.01)) for _ in range(20000)]
+    for x, y in places(seed):
+        points += tree_points(x, y, height, draw)
+    return points
+
+
+def write_ply(path, points):
+    head = ("ply\nformat ascii 1.0\n" f"element vertex {len(points)}\n"
+            "property float x\nproperty float y\nproperty float z\nend_header\n")
+    path.write_text(head + "".join(f"{x:.6g} {y:.6g} {z:.6g}\n" for x, y, z in points))
+    return path
+
+
+def inventory(cloud, folder, *options):
+    return program("inventory", cloud, "-o", folder / "inventory", "--overwrite", *options)
+
+
+def listed(folder):
+    return list(csv.DictReader((folder / "inventory" / "trees.csv").open()))
+
+
+@cases.case("a plot as it is")
+def good_plot(folder):
+    cloud = write_ply(folder / "plot.ply", plot())
+    for options in ((), ("--crs", "EPSG:3067"), ("--crs", "EPSG:3067+3900")):
+        done = inventory(cloud, folder, *options)
+        assert done.returncode == 0 and len(listed(folder)) > 20, (options, done)
+    # A meadow has no stem, and its list is complete.
+    meadow = write_ply(folder / "meadow.ply", [p for p in plot() if p[2] < 0.2])
+    assert inventory(meadow, folder).returncode in (0, 4)
+    return f"{len(listed(folder))} trees in the meadow"
+
+
+# Its list of no tree was complete: what the user says of the frame is not checked, but what comes of it is.
+@cases.case("a plot that the user turns upside down")
+def upside_down(folder):
+    cloud = write_ply(folder / "plot.ply", plot())
+    done = inventory(cloud, folder, "--up=-z")
+    assert done.returncode == 4 and not listed(folder), done
+    assert "no stem was found, though points stand" in done.stderr, done
+    return done.stderr.strip()
+
+
+# With a system in metres nothing was said: trees of 46 m are told from heights in feet by their diameters.
+@cases.case("heights in feet and a system in metres")
+def heights_in_feet(folder):
+    cloud = write_ply(folder / "plot.ply", [(x, y, z / 0.3048) for x, y, z in plot(16.0)])
+    done = inventory(cloud, folder, "--crs", "EPSG:3067")
+    assert done.returncode == 4 and "times as high as thick" in done.stderr, done
+    said = done.stderr.strip()
+    done = inventory(cloud, folder, "--unit-m", 1)
+    assert "times as high as thick" not in done.stderr, done
+    return said
+
+
+@cases.case("a system in feet or degrees that the user names")
+def named_system(folder):
+    cloud = write_ply(folder / "plot.ply", plot())
+    for crs, words in (("EPSG:2276", "counts in units of 0.3048006 m"), ("EPSG:4326", "is in degrees"),
+                       ("EPSG:3067+6360", "in the plane and of 0.3048006 m in height")):
+        done = inventory(cloud, folder, "--crs", crs)
+        assert done.returncode == 3 and words in done.stderr, (crs, done)
+    # The layers of scaled coordinates were said to be in feet.
+    done = inventory(cloud, folder, "--crs", "EPSG:2276", "--unit-m", 0.3048)
+    assert done.returncode == 2 and "--crs does not hold" in done.stderr, done
+    return done.stderr.strip()
+
+
+def write_list(path, trees, unit=1.0):
+    rows = ["id,x,y,z,dbh_m,height_m,observations"]
+    rows += [f"{k + 1},{x:.3f},{y:.3f},0,{d * unit:.6g},{h:.1f},{n}" for k, (x, y, d, h, n) in enumerate(trees)]
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def two_lists(seed=7):
+    """One stand as two surveys saw it."""
+    draw = random.Random(seed)
+    first = [(x, y, draw.uniform(0.12, 0.4), 15.0, draw.randrange(20, 90)) for x, y in places(seed, 40)]
+    second = [(x + draw.gauss(0, 0.03), y + draw.gauss(0, 0.03), d * draw.gauss(1, 0.03), h, draw.randrange(20, 90))
+              for x, y, d, h, _ in first]
+    return first, second
+
+
+def merged(folder, a, b):
+    return program("merge", a, b, "-o", folder / "merged", "--overwrite")
+
+
+@cases.case("diameters in another unit")
+def units(folder):
+    first, second = two_lists()
+    a = write_list(folder / "a.csv", first)
+    done = merged(folder, a, write_list(folder / "b.csv", second))
+    assert done.returncode == 0, done
+    for name, unit, words in (("centimetres", 100, "they look like centimetres"), ("inches", 1 / 0.0254, "or inches"),
+                              ("millimetres", 1000, "they look like millimetres"), ("kilometres", 0.001, "no metres"),
+                              ("feet", 1 / 0.3048, "times those of the first"), ("radii", 0.5, "or holds radii")):
+        b = write_list(folder / f"{name}.csv", second, unit)
+        for one, other in ((a, b), (b, a)):
+            done = merged(folder, one, other)
+            assert done.returncode == 4 and (words in done.stderr or "times those of the first" in done.stderr), (
+                name, done)
+        assert words in merged(folder, a, b).stderr, name
+        said = program("evaluate", "trees", b, a).stderr
+        assert ("no metres" in said) == (name not in ("feet", "radii")), (name, said)
+    return done.stderr.strip().replace(str(folder), "").splitlines()[0]
+
+
+@cases.case("trees that stand twice in a list")
+def doubled(folder):
+    first, second = two_lists()
+    draw = random.Random(2)
+    twice = second + [(x + draw.uniform(-0.02, 0.02), y + draw.uniform(-0.02, 0.02), d, h, n)
+                      for x, y, d, h, n in second[:12]]
+    a, b = write_list(folder / "a.csv", first), write_list(folder / "b.csv", twice)
+    for one, other in ((a, b), (b, a)):
+        done = merged(folder, one, other)
+        assert done.returncode == 4 and f"{b}: 12 of 52 rows lie within 5 cm" in done.stderr, done
+    assert "stand twice" in program("evaluate", "trees", b, a).stderr
+    # A copy with doubled rows, or in another order, was taken for a second survey.
+    for name, rows in (("doubled", first + twice[-12:]), ("reversed", first[::-1]), ("part", first[:25])):
+        done = merged(folder, a, write_list(folder / f"{name}.csv", rows))
+        assert done.returncode == 4 and "both maps hold the same trees" in done.stderr, (name, done)
+    return done.stderr.strip().replace(str(folder), "")
+
+
+cases.run()
