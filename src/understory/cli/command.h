@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
@@ -18,6 +20,15 @@ inline constexpr int kExitUntrusted = 4;
 // The meaning of --overwrite for commands that write a folder of results.
 inline constexpr const char* kOverwriteMeaning =
     "Replace the results that an earlier run left in the folder";
+
+// --set key=value, which may be given several times. Each takes one value, so that a recording or a
+// cloud may follow it.
+inline void add_settings_option(CLI::App& command, std::vector<std::string>& settings) {
+  command.add_option("--set", settings, "One setting, key=value (may be repeated)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false)
+      ->take_all();
+}
 
 // What every subcommand is given: messages and progress go to stderr, results to stdout.
 struct CommandContext {

@@ -51,10 +51,7 @@ void add_correct_command(CLI::App& app, Command& chosen) {
                       "trajectory is then where the correction begins");
   command->add_option("-o,--output", options->run_folder, "Run folder to write");
   command->add_option("--config", options->config_file, "YAML file of settings");
-  command->add_option("--set", options->settings, "One setting, key=value (may be repeated)")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false)
-      ->take_all();
+  add_settings_option(*command, options->settings);
   command->add_flag("--overwrite", options->overwrite, kOverwriteMeaning);
   command->add_flag("--print-config", options->print_config,
                     "Print every setting with default, unit, range and meaning");

@@ -60,7 +60,7 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
       "Point cloud (.las, .laz, .e57, .ply, .pcd) in metres, z up; or a run folder");
   command->add_option("-o,--output", options->request.run_folder, "Folder for the results");
   command->add_option("--config", options->request.config_file, "YAML file with settings");
-  command->add_option("--set", options->settings, "key=value, may be repeated");
+  add_settings_option(*command, options->settings);
   add_cloud_frame_options(*command, options->request.frame);
   command->add_option("--crs", options->request.coordinate_system,
                       "Coordinate system of a cloud that names none, for instance EPSG:3067 (a "

@@ -128,10 +128,7 @@ void add_map_command(CLI::App& app, Command& chosen) {
   command->add_option("--resume", options->resume, "Go on where a killed run stopped");
   command->add_option("--profile", options->profile, "Shipped settings: handheld, harvester, ...");
   command->add_option("--config", options->config_file, "YAML file of settings");
-  command->add_option("--set", options->settings, "One setting, key=value (may be repeated)")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false)
-      ->take_all();
+  add_settings_option(*command, options->settings);
   command
       ->add_option("--front-end", options->front_end,
                    "How scans are positioned: all points (dense) or stems alone (sparse)")

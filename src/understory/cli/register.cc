@@ -205,7 +205,7 @@ void add_register_command(CLI::App& app, Command& chosen) {
                    "a_from_b to start from: x,y,z or x,y,z,qx,qy,qz,qw or 16 numbers row by row")
       ->delimiter(',');
   command->add_option("--config", options->config_file, "YAML file with settings");
-  command->add_option("--set", options->settings, "Change a setting: key=value");
+  add_settings_option(*command, options->settings);
   command->add_flag("--json", options->json, "Print one JSON object");
   command->add_flag("--print-config", options->print_config, "Print every key with its meaning");
   command->footer(

@@ -174,7 +174,7 @@ void add_simulate_command(CLI::App& app, Command& chosen) {
                     "Replace the recording and the truth that are there already");
   command->add_option("--seed", options->seed, "Seed of everything random");
   command->add_option("--duration-s", options->duration_s, "Length of the recording in seconds");
-  command->add_option("--set", options->settings, "Change a key of the site: key=value");
+  add_settings_option(*command, options->settings);
   command->add_flag("--list", options->list, "Name the shipped sites");
   command->add_flag("--print-site", options->keys, "Print every key of the site with its meaning");
   command->footer(
