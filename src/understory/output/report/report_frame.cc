@@ -108,8 +108,14 @@ void add_stand(Tiles& tiles, const std::vector<Tree>& trees, double area_m2) {
   const double hectares = area_m2 / 1e4;
   double dbh = 0.0;
   double basal = 0.0;
+  double volume = 0.0;
+  std::size_t with_volume = 0;
   for (const Tree& tree : trees) {
     dbh += tree.dbh_m;
+    if (std::isfinite(tree.stem_volume_m3)) {
+      volume += tree.stem_volume_m3;
+      ++with_volume;
+    }
     basal += 0.25 * M_PI * tree.dbh_m * tree.dbh_m;
   }
   const auto n = static_cast<double>(trees.size());
@@ -133,6 +139,13 @@ void add_stand(Tiles& tiles, const std::vector<Tree>& trees, double area_m2) {
           "Cross sections of all measured stems at 1.3 m, per hectare of that area. Too small "
           "where stems are missed.");
     }
+  }
+  if (with_volume > 0 && hectares > 0.0) {
+    tiles.add(fmt::format("≈ {:.0f} m³/ha", volume / hectares), "stem volume over bark",
+              fmt::format("Volume of the {} stems whose height is known, from the ground to the "
+                          "top, per hectare of that area. Too small where stems or heights are "
+                          "missing.",
+                          with_volume));
   }
 }
 

@@ -250,6 +250,12 @@ std::string diameters(const std::vector<Tree>& trees) {
   return "<figure><h3>Diameters</h3>" + svg_histogram(histogram) + "</figure>";
 }
 
+// Whether the trees are those of a full inventory.
+bool has_volumes(const std::vector<Tree>& trees) {
+  return std::any_of(trees.begin(), trees.end(),
+                     [](const Tree& tree) { return std::isfinite(tree.stem_volume_m3); });
+}
+
 // `stems`: their fits in the same order, or null. `of_cloud`: else trees come from sights of single
 // views, which have no heights.
 std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems,
@@ -268,6 +274,11 @@ std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit
   html += of_cloud ? "<th class=\"n\">height, m</th><th class=\"n\">returns</th>"
                    : "<th class=\"n\">views</th>";
   if (stems != nullptr) html += "<th class=\"n\">seen around, °</th>";
+  const bool full = has_volumes(trees);
+  if (full)
+    html +=
+        "<th class=\"n\">stem, m³</th><th class=\"n\">crown from, m</th><th class=\"n\">crown, "
+        "m²</th>";
   html += "</tr></thead><tbody>";
   const auto out = std::back_inserter(html);
   for (std::size_t i = 0; i < std::min(trees.size(), kLongestTable); ++i) {
@@ -278,6 +289,11 @@ std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit
     if (of_cloud) cells.push_back(metres(t.height_m, 1));
     cells.push_back(std::to_string(t.observations));
     if (stems != nullptr) cells.push_back(metres((*stems)[i].arc_deg, 0));
+    if (full) {
+      cells.push_back(metres(t.stem_volume_m3, 3));
+      cells.push_back(metres(t.crown_base_m, 1));
+      cells.push_back(metres(t.crown_area_m2, 1));
+    }
     fmt::format_to(out, "<tr>");
     for (const std::string& cell : cells)
       fmt::format_to(out, "<td class=\"n\">{}</td>", cell);

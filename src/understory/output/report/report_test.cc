@@ -58,6 +58,27 @@ TEST(Report, ListsTheFilesThatLieBesideIt) {
   EXPECT_EQ(report_html(ReportInput()).find("The files of this folder"), std::string::npos);
 }
 
+// Of a full inventory: the volume of the stems whose height is known, on the area of the stand.
+TEST(Report, AFullInventoryHasTheStemVolumePerHectare) {
+  InventoryResult inventory;
+  inventory.area_m2 = 2'000.0;
+  inventory.trees.resize(3);
+  inventory.stems.resize(3);
+  for (Tree& tree : inventory.trees)
+    tree.dbh_m = 0.2;
+  ReportInput input;
+  input.inventory = &inventory;
+  EXPECT_EQ(report_html(input).find("m³"), std::string::npos);
+  inventory.trees[0].stem_volume_m3 = 5.5;
+  inventory.trees[1].stem_volume_m3 = 4.25;
+  inventory.trees[1].crown_area_m2 = 12.3;
+  const std::string html = report_html(input);
+  EXPECT_NE(html.find("≈ 49 m³/ha"), std::string::npos);
+  EXPECT_NE(html.find("Volume of the 2 stems"), std::string::npos);
+  EXPECT_NE(html.find("<td class=\"n\">4.250</td>"), std::string::npos);
+  EXPECT_NE(html.find("<td class=\"n\">12.3</td>"), std::string::npos);
+}
+
 // "distance 20 cm; less is better" was taken for the error of the map.
 TEST(Report, TellsWhatTheDistanceOfMatchedPointsIs) {
   ReportInput input;
