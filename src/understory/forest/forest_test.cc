@@ -36,6 +36,14 @@ class Plot {
       cloud.emplace_back(x, y, ground(x, y) + random_.normal(0.0, 0.02));
     }
   }
+  // More of it in a square around a place.
+  void add_ground_at(double x, double y, double half_m, int count) {
+    for (int i = 0; i < count; ++i) {
+      const double px = x + random_.uniform(-half_m, half_m);
+      const double py = y + random_.uniform(-half_m, half_m);
+      cloud.emplace_back(px, py, ground(px, py) + random_.normal(0.0, 0.02));
+    }
+  }
   struct Stem {
     double x, y, dbh;
     double lean_x = 0.0;     // metres per metre
@@ -212,6 +220,28 @@ TEST(Inventory, AFullOneHasCurvesVolumesCrownsAndTheTreeOfEachPoint) {
     EXPECT_EQ(tree_at(result, {tree.x, tree.y, ground + 0.05}, 0.05), 0U) << "ground";
   }
   EXPECT_EQ(tree_at(result, {8.5, 3.0, plot.ground(8.5, 3.0) + 2.0}, 2.0), 0U);
+}
+
+// Beside a path the ground has a hundred times the points of a crown; the canopy model had holes
+// over such trees.
+TEST(Inventory, ACrownOverAGroundSeenMuchMoreIsPartOfTheCanopy) {
+  Plot plot(4);
+  plot.add_ground(12.0, 40);
+  plot.add_stem({6.0, 6.0, 0.3});
+  plot.add_ground_at(6.0, 6.0, 2.0, 60'000);
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), basic_inventory());
+  ASSERT_EQ(result.trees.size(), 1U);
+  const Raster& canopy = result.canopy;
+  float highest = 0.0F;
+  for (int row = 0; row < canopy.rows; ++row) {
+    for (int column = 0; column < canopy.columns; ++column) {
+      const double x = canopy.x0 + (column + 0.5) * canopy.cell_m;
+      const double y = canopy.y0 + (row + 0.5) * canopy.cell_m;
+      if (std::hypot(x - 6.0, y - 6.0) < 1.0)
+        highest = std::max(highest, canopy.values[canopy.index(column, row)]);
+    }
+  }
+  EXPECT_NEAR(highest, result.trees[0].height_m, 0.1);
 }
 
 TEST(Inventory, ABasicOneHasNoneOfThat) {

@@ -55,6 +55,13 @@ void gather(const PointBlocks& cloud, const InventoryConfig& config, const Inven
   gathered.ceiling.settle();
 }
 
+// A point over the canopy's ceiling, near a stem: part of that tree, or a ghost.
+struct HeldBack {
+  Eigen::Vector2f place;
+  float height_m = 0.0F;
+  std::uint32_t tree = 0;
+};
+
 // What a full inventory gathers beside it.
 struct Details {
   StemSurroundings surroundings;
@@ -63,20 +70,36 @@ struct Details {
 
 // The fourth: canopy and tops of trees.
 void look_up(const PointBlocks& cloud, const InventoryResult& result, const CanopyCeiling& ceiling,
-             CanopyGrid& canopy, TreeColumns& trees, Details* details) {
+             CanopyGrid& canopy, TreeColumns& trees, std::vector<HeldBack>& held_back,
+             Details* details) {
   std::vector<double> heights;
   cloud([&](std::span<const Eigen::Vector3d> points) {
     result.ground.heights_above(points, heights);
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!(heights[i] >= 0.0 && heights[i] <= kHighest)) continue;
       const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
-      if (ceiling.holds(place, heights[i])) canopy.add(place, heights[i]);
-      trees.add(place, heights[i]);
+      const std::size_t tree = trees.add(place, heights[i]);
+      if (ceiling.holds(place, heights[i])) {
+        canopy.add(place, heights[i]);
+      } else if (tree != TreeColumns::kNone) {
+        held_back.push_back({place.cast<float>(), static_cast<float>(heights[i]),
+                             static_cast<std::uint32_t>(tree)});
+      }
       if (details == nullptr) continue;
       details->surroundings.add(points[i] - result.origin);
       if (heights[i] > result.ground.config.class_m) details->owners.add(place, heights[i]);
     }
   });
+}
+
+// Near a scanner the ground has a hundred times the points of a crown, and the ceiling may lie
+// under it: what is no higher than the top of its tree is real.
+void add_trees(const std::vector<double>& tops, const std::vector<HeldBack>& held_back,
+               CanopyGrid& canopy) {
+  for (const HeldBack& point : held_back) {
+    const auto height = static_cast<double>(point.height_m);
+    if (height <= tops[point.tree]) canopy.add(point.place.cast<double>(), height);
+  }
 }
 
 // Area in which stems could be seen: squares of 2 m with points near breast height or on the
@@ -118,20 +141,18 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
 }
 
 // NaN where the tree may go on above the scanner's view.
-std::vector<double> heights_in_view(const InventoryResult& result, const TreeColumns& columns,
-                                    double slices_end_m, const SeenTest& in_view) {
-  std::vector<double> heights;
-  for (std::size_t i = 0; i < result.stems.size(); ++i) {
-    double height = columns.top(i, slices_end_m);
+std::vector<double> heights_in_view(const InventoryResult& result, std::vector<double> tops,
+                                    const SeenTest& in_view) {
+  for (std::size_t i = 0; i < tops.size(); ++i) {
+    double& height = tops[i];
     if (in_view && std::isfinite(height)) {
       const Eigen::Vector2d place = stem_place_at(result.stems[i], height);
       Eigen::Vector3d above(result.origin.x() + place.x(), result.origin.y() + place.y(), 0.0);
       above.z() = result.ground.terrain.interpolate(above.x(), above.y()) + height + kMargin;
       if (!in_view(above)) height = std::numeric_limits<double>::quiet_NaN();
     }
-    heights.push_back(height);
   }
-  return heights;
+  return tops;
 }
 
 // Height of the ground at each stem over the origin.
@@ -284,11 +305,15 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
   const bool full = config.extent == InventoryExtent::kFull;
   std::optional<Details> details;
   if (full) details.emplace(Details{{result.stems, ground_at_stems(result)}, {}});
-  look_up(cloud, result, gathered.ceiling, canopy, columns, full ? &*details : nullptr);
+  std::vector<HeldBack> held_back;
+  look_up(cloud, result, gathered.ceiling, canopy, columns, held_back, full ? &*details : nullptr);
+  std::vector<double> tops;
+  for (std::size_t i = 0; i < result.stems.size(); ++i)
+    tops.push_back(columns.top(i, config.stems.highest_m));
+  add_trees(tops, held_back, canopy);
   result.canopy = canopy.raster(result.origin.x(), result.origin.y());
   result.area_m2 = area_of(result.canopy);
-  result.trees =
-      trees_of(result, heights_in_view(result, columns, config.stems.highest_m, in_view));
+  result.trees = trees_of(result, heights_in_view(result, tops, in_view));
   if (full) {
     tell("stem curves", 5.0);
     measure_curves(details->surroundings, config.curves, progress, result);

@@ -42,21 +42,23 @@ TreeColumns::TreeColumns(const std::vector<StemFit>& stems)
   }
 }
 
-void TreeColumns::add(const Eigen::Vector2d& place, double height_m) {
+std::size_t TreeColumns::add(const Eigen::Vector2d& place, double height_m) {
   const auto near = near_.find(key(cell_of(place)));
-  if (near == near_.end()) return;
-  Column* nearest = nullptr;
+  if (near == near_.end()) return kNone;
+  std::size_t nearest = kNone;
   double least = kCrownReach * kCrownReach;
   for (const std::uint32_t i : near->second) {
     const double distance = (stem_place_at(stems_[i], height_m) - place).squaredNorm();
     if (distance >= least) continue;
     least = distance;
-    nearest = &columns_[i];
+    nearest = i;
   }
-  if (nearest == nullptr) return;
+  if (nearest == kNone) return kNone;
+  Column& column = columns_[nearest];
   const std::size_t metre = HeightColumn::metre_of(height_m);
-  ++nearest->points[metre];
-  nearest->highest_m[metre] = std::max(nearest->highest_m[metre], static_cast<float>(height_m));
+  ++column.points[metre];
+  column.highest_m[metre] = std::max(column.highest_m[metre], static_cast<float>(height_m));
+  return nearest;
 }
 
 double TreeColumns::top(std::size_t stem, double slices_end_m) const {

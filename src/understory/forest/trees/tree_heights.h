@@ -16,9 +16,13 @@ namespace understory {
 // What a cloud holds around each stem, nearer to it than to any other, by metres above the ground.
 class TreeColumns {
  public:
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
   // `stems` outlive this; their frame is that of `add`.
   explicit TreeColumns(const std::vector<StemFit>& stems);
-  void add(const Eigen::Vector2d& place, double height_m);  // height >= 0
+  // Height >= 0. Returns the number of the stem that the point counts for, kNone if it is near
+  // none.
+  std::size_t add(const Eigen::Vector2d& place, double height_m);
 
   // Height of a tree's top above the ground: the highest point that hangs together with its stem
   // (gaps of at most 3 m) and is nearer to it than to any other stem, ghosts of other pulses aside
