@@ -5,11 +5,11 @@
 #include <cmath>
 #include <utility>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/stem_constants.h"
 
 namespace understory {
 
-using forest_constants::circle_search::kStretch;
+using stem_constants::circle_search::kStretch;
 
 LivePoints::LivePoints(std::size_t count) : alive_(count, 1), sums_(count + 1, 0), size_(count) {
   for (std::size_t i = 1; i <= count; ++i)

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/cell_index.h"
 #include "understory/geometry/symmetric_solver.h"
@@ -17,7 +17,7 @@
 namespace understory {
 namespace {
 
-using namespace forest_constants::circle_search;
+using namespace stem_constants::circle_search;
 
 using PointList = std::vector<Eigen::Vector2f>;
 

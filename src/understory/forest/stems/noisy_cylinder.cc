@@ -6,14 +6,14 @@
 #include <cmath>
 #include <cstdint>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/geometry/symmetric_solver.h"
 
 namespace understory {
 namespace {
 
-using namespace forest_constants::noisy_cylinder;
+using namespace stem_constants::noisy_cylinder;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;

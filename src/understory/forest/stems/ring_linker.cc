@@ -4,13 +4,13 @@
 #include <cmath>
 #include <numeric>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/stem_axis.h"
 
 namespace understory {
 namespace {
 
-using namespace forest_constants::ring_linker;
+using namespace stem_constants::ring_linker;
 
 // A straight line through two rings, or a vertical one through one.
 struct Line {

@@ -9,13 +9,13 @@
 #include <tuple>
 #include <unordered_map>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/stem_constants.h"
 #include "understory/geometry/rotation_between.h"
 
 namespace understory {
 namespace {
 
-using namespace forest_constants::standing_direction;
+using namespace stem_constants::standing_direction;
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;

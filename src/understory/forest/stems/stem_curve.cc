@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
 #include "understory/forest/stems/stem_axis.h"
@@ -17,7 +17,7 @@
 namespace understory {
 namespace {
 
-using namespace forest_constants::stem_curve;
+using namespace stem_constants::stem_curve;
 
 // A section as it was fitted: radius and its standard deviation.
 struct FittedSection {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/circle_search.h"
 #include "understory/forest/stems/ring_linker.h"
 #include "understory/forest/stems/stem_fit.h"
@@ -13,7 +13,7 @@
 namespace understory {
 namespace {
 
-using namespace forest_constants::stem_detector;
+using namespace stem_constants::stem_detector;
 
 // Points by square of the ground, to gather those around a stem: sorts them, so that those of a
 // square, and of squares side by side, follow each other.

@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
 #include "understory/geometry/symmetric_solver.h"
@@ -15,7 +15,7 @@
 namespace understory {
 namespace {
 
-using namespace forest_constants::stem_fit;
+using namespace stem_constants::stem_fit;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;

@@ -6,14 +6,14 @@
 #include <tuple>
 #include <utility>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/trees/tree_heights.h"
 
 namespace understory {
 namespace {
 
-using namespace forest_constants::stem_surroundings;
+using namespace stem_constants::stem_surroundings;
 
 Eigen::Vector2i square_of(const Eigen::Vector2d& place) {
   return (place / kSquare).array().floor().cast<int>();

@@ -23,6 +23,11 @@ struct Cube {
 
 constexpr std::int64_t kMiddle = 1 << 20;  // 21 bits each
 
+// Whether the number of a cube there has room.
+bool holds(const Eigen::Vector2d& place) {
+  return place.cwiseAbs().maxCoeff() < kVoxel * static_cast<double>(kMiddle - 1);
+}
+
 std::uint64_t packed(const Cube& cube) {
   const auto part = [](std::int64_t value) {
     return static_cast<std::uint64_t>(value + kMiddle) & 0x1fffff;
@@ -202,6 +207,7 @@ Eigen::Vector2d centre_at(const OwnerTree& tree, double height_m) {
 }
 
 void TreeOwners::add(const Eigen::Vector2d& place, double height_m) {
+  if (!holds(place)) return;
   cubes_.push_back(packed(cube_at(place, height_m)));
   if (cubes_.size() < limit_) return;
   compact();
@@ -227,6 +233,7 @@ void TreeOwners::find(const std::vector<OwnerTree>& trees, const ProgressSink& p
 }
 
 std::int32_t TreeOwners::owner(const Eigen::Vector2d& place, double height_m) const {
+  if (!holds(place)) return kNobody;
   const std::uint64_t cube = packed(cube_at(place, height_m));
   const auto at = std::lower_bound(cubes_.begin(), cubes_.end(), cube);
   if (at == cubes_.end() || *at != cube) return kNobody;

@@ -33,7 +33,8 @@ class TreeOwners {
     std::int32_t owner = kNobody;
   };
 
-  // Points in the frame of the trees; the height is that above the ground below the point.
+  // Points in the frame of the trees; the height is that above the ground below the point. Those
+  // more than 200 km from its origin are left out.
   void add(const Eigen::Vector2d& place, double height_m);
 
   // Gives each cube to the tree whose stem is nearest along a way through cubes that hold points

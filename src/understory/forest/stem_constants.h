@@ -1,0 +1,424 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+// The fitted and chosen numbers of `forest/stems` that are no settings, which stand in the
+// Config structs. One namespace for each file that uses them. A comment gives the unit (none: a
+// plain number), the meaning, and in brackets where the number comes from:
+//   chosen   by judgement, fitted to nothing
+//   bound    by physics, geometry, statistics, memory or time
+//   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   not recorded   in use for long, and nothing tells why it is this number
+// or real clouds and measurements by their page.
+namespace understory::stem_constants {
+
+namespace stem_detector {  // forest/stems/stem_detector.cc
+// Share of a stem's directions that show a surface; stems' pieces were filled to 0.67 and more
+// [tuned on simulated maps]
+inline constexpr double kLeastFill = 0.65;
+// Returns a slice: seen well enough for a cut-off piece to be none [tuned on simulated maps]
+inline constexpr double kWellSeen = 50.0;
+// degrees: steeper leans are rare, and a line through scattered points has them; they have to be
+// better supported [tuned on simulated maps]
+inline constexpr double kSteepLeanDeg = 8.0;
+// Sum of the ratios of points inside and outside of the surface, of a steep stem at most [tuned
+// on simulated maps]
+inline constexpr double kSteepClutter = 0.25;
+// The same of a stem of two rings ... [tuned on simulated maps]
+inline constexpr double kClutterOfTwo = 0.34;
+// ... and what each further ring adds: in a thicket it takes many slices that agree [tuned on
+// simulated maps]
+inline constexpr double kClutterPerRing = 0.085;
+// The same at most [tuned on simulated maps]
+inline constexpr double kMostClutter = 0.65;
+// m: scatter from which few rings have to be clean [tuned on simulated maps]
+inline constexpr double kNoisyScatter = 0.029;
+// rings that are few then [tuned on simulated maps]
+inline constexpr double kFewRings = 6.0;
+// Sum of the ratios at most then [tuned on simulated maps]
+inline constexpr double kNoisyClutter = 0.4;
+// m: radius of a slim column that may stand alone [tuned on simulated maps]
+inline constexpr double kSlimRadius = 0.1;
+// Ratio of points outside of it at most [tuned on simulated maps]
+inline constexpr double kAloneOutside = 0.12;
+// degrees that it leans at most [tuned on simulated maps]
+inline constexpr double kAloneLeanDeg = 10.0;
+// m that it extends at least [tuned on simulated maps]
+inline constexpr double kAloneExtent = 1.5;
+// Share of its slices that show it [tuned on simulated maps]
+inline constexpr double kAloneSlices = 0.85;
+// degrees of its circle that are seen evenly [tuned on simulated maps]
+inline constexpr double kAloneArcDeg = 90.0;
+// Share of the slices between its ends that show a stem [tuned on simulated maps]
+inline constexpr double kLeastSliceShare = 0.6;
+// m that a stem extends at least [tuned on simulated maps]
+inline constexpr double kLeastExtent = 0.7;
+// m over breast height: what begins higher is a branch or a crown [tuned on simulated maps]
+inline constexpr double kBeginsAbove = 0.3;
+// Share of the seen arc that has to be seen evenly [tuned on simulated maps]
+inline constexpr double kEvenArcShare = 0.35;
+// m: error of a diameter at most ... [tuned on simulated maps]
+inline constexpr double kDbhSd = 0.01;
+// ... and of the diameter, added [tuned on simulated maps]
+inline constexpr double kDbhSdShare = 0.08;
+// Sum of the ratios of what only thick slices show, where points are many [tuned on simulated
+// maps]
+inline constexpr double kThickOnlyClutter = 0.25;
+// m: scatter of it [tuned on simulated maps]
+inline constexpr double kThickOnlyScatter = 0.025;
+// Ratio of points inside a stem at most [tuned on simulated maps]
+inline constexpr double kMostInside = 0.35;
+// Sum of the ratios of a stem that shows in few slices [tuned on simulated maps]
+inline constexpr double kFewSlicesClutter = 0.25;
+// radii: error of its radius at most [tuned on simulated maps]
+inline constexpr double kFewSlicesSd = 0.35;
+// Slices that a thick one of the second search holds [not recorded]
+inline constexpr double kThickSlices = 3.0;
+// Thick slices that show a stem at least [not recorded]
+inline constexpr int kLeastThickSlices = 2;
+// m: distance of connected points in a thin slice [not recorded]
+inline constexpr double kThinReach = 0.08;
+// m: the same in a thick slice [not recorded]
+inline constexpr double kThickReach = 0.12;
+// m: half of the width of a circle's band in a thin slice [not recorded]
+inline constexpr double kThinBand = 0.02;
+// m: the same in a thick slice [not recorded]
+inline constexpr double kThickBand = 0.025;
+// Of the least diameter: radius of a circle at least, as the edge of a stem is blurred [not
+// recorded]
+inline constexpr double kLeastRadiusShare = 0.4;
+// Radii: scatter of a column that stands alone at most ... [not recorded]
+inline constexpr double kAloneScatterShare = 0.4;
+// ... and m, added [not recorded]
+inline constexpr double kAloneScatter = 0.006;
+// Share of the least arc that has to be seen evenly [not recorded]
+inline constexpr double kEvenArcOfLeast = 0.8;
+// Points a slice: more are many [not recorded]
+inline constexpr int kDensePointsPerSlice = 12;
+// m: scatter of a stem at most, or ... [not recorded]
+inline constexpr double kMostScatter = 0.012;
+// ... radii, whichever is more ... [not recorded]
+inline constexpr double kMostScatterShare = 0.2;
+// ... and m, added to either [not recorded]
+inline constexpr double kScatterSlack = 0.008;
+// Share of all slices that show a stem without a doubt [not recorded]
+inline constexpr double kShownByMost = 0.8;
+// Share of all slices below which a piece that was seen well is cut off [not recorded]
+inline constexpr double kShownByFew = 0.4;
+// Stems whose centres are nearer than this share of both radii are one [not recorded]
+inline constexpr double kSameOfBoth = 0.85;
+// So are stems whose centres are nearer than the larger radius and this share of the smaller one
+// [not recorded]
+inline constexpr double kSameOfSmaller = 0.3;
+// Scatters: points so near to the surface are those of the stem [not recorded]
+inline constexpr double kClaimScatters = 2.5;
+// m: the same at least [not recorded]
+inline constexpr double kClaimBand = 0.015;
+// m around the radius in which points of a leaning stem are looked for [not recorded]
+inline constexpr double kLeanReach = 1.2;
+// m beyond the radius whose points belong to a stem [not recorded]
+inline constexpr double kExplainedMargin = 0.06;
+// m beyond the radius of a start in which its points are looked for [not recorded]
+inline constexpr double kStartReach = 0.4;
+// m beyond the radius whose points enter the fit [not recorded]
+inline constexpr double kFitReach = 0.35;
+}  // namespace stem_detector
+
+namespace ring_linker {  // forest/stems/ring_linker.cc
+// m: edge of the cells in which rings of other slices are looked for [chosen]
+inline constexpr double kRingCell = 1.0;
+// m by which the radii of two rings of one stem differ at most ... [not recorded]
+inline constexpr double kSameRadius = 0.03;
+// ... and of the larger radius, added [not recorded]
+inline constexpr double kSameRadiusShare = 0.3;
+// m to the side of a ring where the next one of a vertical stem may lie [not recorded]
+inline constexpr double kBesideReach = 0.05;
+// m that a ring may lie off the line at most ... [not recorded]
+inline constexpr double kOffLine = 0.04;
+// ... and radii, added [not recorded]
+inline constexpr double kOffLineShare = 0.2;
+}  // namespace ring_linker
+
+namespace stem_fit {  // forest/stems/stem_fit.cc
+// m/m: radius lost per metre of height in a stem's lower part [chosen]
+inline constexpr double kUsualTaper = -0.008;
+// m/m: how far stems differ from it [chosen]
+inline constexpr double kTaperSd = 0.006;
+// m/m: how far the slope may leave that of the rings [chosen]
+inline constexpr double kSlopeSd = 0.05;
+// m: scatter of points about a stem, at least [bound: noise of lidars]
+inline constexpr double kLeastScatter = 0.004;
+// m: scatter of points about a stem, at most [chosen]
+inline constexpr double kMostScatter = 0.03;
+// 1/m: what the error of a radius grows by with its own square [tuned on handheld seeds 1 and 2,
+// harvester seed 1, true poses: 95 % within two standard deviations]
+inline constexpr double kSquare = 1400.0;
+// Times the fit's own error: returns are not independent [tuned like kSquare]
+inline constexpr double kLinear = 1.5;
+// m of the radius: keyframes do not quite lie on each other, stems are not round [tuned like
+// kSquare]
+inline constexpr double kMapError = 0.002;
+// points that a fit takes [bound: time]
+inline constexpr std::size_t kEnoughPoints = 400;
+// Scatters beyond which a point has no weight (Tukey) [not recorded]
+inline constexpr double kReachScatters = 4.0;
+// m from the surface of the start: points that a fit takes [not recorded]
+inline constexpr double kSampleReach = 0.15;
+// Scatters: points so near to the surface are on it [not recorded]
+inline constexpr double kBandScatters = 2.5;
+// m: the same at least [not recorded]
+inline constexpr double kLeastBand = 0.015;
+// Bands under the surface from which on a point is inside ... [not recorded]
+inline constexpr double kInsideBands = 2.0;
+// ... or radii under it, whichever is more [not recorded]
+inline constexpr double kInsideShare = 0.3;
+// m: radius of a thin start at least [not recorded]
+inline constexpr double kThinRadius = 0.02;
+// Spreads of the points in the plane that make its radius [not recorded]
+inline constexpr double kThinSpreads = 0.7;
+// m: scatter that a fit begins with at least [not recorded]
+inline constexpr double kFirstScatter = 0.015;
+// m from the surface: points that tell the scatter [not recorded]
+inline constexpr double kScatterReach = 0.05;
+// Steps of a fit at most [bound: convergence]
+inline constexpr int kMostSteps = 12;
+// m: a fit that steps farther has failed [not recorded]
+inline constexpr double kLongestStep = 0.3;
+// Of the least diameter: a fit with a smaller radius has failed [not recorded]
+inline constexpr double kLeastRadiusShare = 0.3;
+// Steps before the scatter is taken from the points [not recorded]
+inline constexpr int kFixedScatterSteps = 3;
+// m: a fit whose step is shorter has ended [not recorded]
+inline constexpr double kSettled = 2e-4;
+// m outside of the surface: points that the noisy cylinder is fitted to [not recorded]
+inline constexpr double kRefineReach = 0.1;
+// Radii: with more scatter a thin stem is tried as well [not recorded]
+inline constexpr double kThinTryScatter = 0.12;
+// Share of the directions that show a surface: with less a thin stem is tried [not recorded]
+inline constexpr double kThinTryFill = 0.7;
+// Share of the arc that is seen evenly: with less a thin stem is tried [not recorded]
+inline constexpr double kThinTryArc = 0.5;
+// Share of points off the surface that a thin stem may have more [not recorded]
+inline constexpr double kThinStrays = 0.05;
+}  // namespace stem_fit
+
+namespace noisy_cylinder {  // forest/stems/noisy_cylinder.cc
+// m: scatter of ranges at least [bound: noise of lidars]
+inline constexpr double kLeastScatter = 0.004;
+// m: scatter of ranges at most [chosen]
+inline constexpr double kMostScatter = 0.06;
+// Directions from which a stem may have been seen [chosen]
+inline constexpr int kViews = 24;
+// Share of a direction that gave nothing: keeps logarithms finite [bound: rounding]
+inline constexpr double kLeastView = 1e-4;
+// m: scatter that a fit begins with at least [not recorded]
+inline constexpr double kFirstScatterLeast = 0.01;
+// m: the same at most [not recorded]
+inline constexpr double kFirstScatterMost = 0.03;
+// m beyond the radius over which points of no stem are spread [not recorded]
+inline constexpr double kStrayReach = 0.1;
+// Points of a fit at least [bound: six parameters]
+inline constexpr std::size_t kFewestPoints = 8;
+// m: a fit whose step is shorter has ended [not recorded]
+inline constexpr double kSettled = 4e-5;
+// Times that an extrapolation goes beyond a step at most [not recorded]
+inline constexpr double kMostStretch = 6.0;
+// Scatters between places on the circumference: the scatter blurs the gaps [not recorded]
+inline constexpr double kBinScatters = 0.8;
+// Places on the circumference at least [not recorded]
+inline constexpr double kFewestBins = 24.0;
+// Places on the circumference at most [bound: time]
+inline constexpr double kMostBins = 160.0;
+// Standard deviations of the angle from which a point may have come [bound: the rest is below 0.1
+// %]
+inline constexpr double kBlurReach = 3.5;
+// Share of the points that must lie on the surface [not recorded]
+inline constexpr double kLeastWeight = 0.2;
+// m: a fit with a smaller radius has failed [not recorded]
+inline constexpr double kLeastRadius = 0.008;
+// m: a fit that goes farther from its start has failed [not recorded]
+inline constexpr double kFarthest = 0.5;
+// Share of points off the surface that a fit begins with [not recorded]
+inline constexpr double kFirstStrays = 0.05;
+// The same at least [not recorded]
+inline constexpr double kLeastStrays = 0.005;
+// The same at most [not recorded]
+inline constexpr double kMostStrays = 0.5;
+// Rounds in which the seen directions are found [bound: convergence]
+inline constexpr int kViewRounds = 4;
+}  // namespace noisy_cylinder
+
+namespace stem_surroundings {  // forest/stems/stem_surroundings.cc
+// m: edge of the squares that know the stems nearby [chosen]
+inline constexpr double kSquare = 1.0;
+// m: one point per cube [chosen]
+inline constexpr double kCube = 0.02;
+// m around the surface whose points are kept at breast height ... [chosen]
+inline constexpr double kReach = 0.2;
+// ... and m per metre above it, added: stems bend [chosen]
+inline constexpr double kReachPerMetre = 0.03;
+// m above the ground: higher points are no tree [bound: the tallest trees have 116 m]
+inline constexpr double kHighest = 120.0;
+// Points that are gathered before they are thinned [bound: memory]
+inline constexpr std::size_t kFirstLimit = 2'000'000;
+}  // namespace stem_surroundings
+
+namespace stem_curve {  // forest/stems/stem_curve.cc
+// m between the sections that are fitted [chosen]
+inline constexpr double kStep = 0.25;
+// m: half of the height of a section [chosen]
+inline constexpr double kHalfWindow = 0.3;
+// m between the sections of a curve [bound: by decimetres]
+inline constexpr double kSectionStep = 0.1;
+// m: a top so near over a section needs none of its own [bound: the decimals of stem_curves.csv]
+inline constexpr double kSameHeight = 0.01;
+// m above the ground: the lowest section that is fitted [chosen]
+inline constexpr double kLowest = 0.3;
+// m: up to here roots make a stem thicker than its form [chosen]
+inline constexpr double kFlareEnd = 1.0;
+// m/m: radius lost per metre of height [as in stem_fit]
+inline constexpr double kUsualTaper = -0.008;
+// m of the radius: thinner stems are not followed [chosen]
+inline constexpr double kThinnest = 0.015;
+// m without a section after which a stem is not followed any more [chosen]
+inline constexpr double kLongestGap = 2.0;
+// m of the radius by which a prediction is wrong [chosen]
+inline constexpr double kPredictionSd = 0.006;
+// Share of a section's shift that turns the axis [chosen]
+inline constexpr double kSlopeGain = 0.15;
+// m around the predicted surface whose points enter a fit [chosen]
+inline constexpr double kFitReach = 0.1;
+// Share of the points that belong to something else at most [chosen]
+inline constexpr double kMostStrays = 0.45;
+// Times the fit's own error: returns are not independent [as in stem_fit]
+inline constexpr double kLinear = 1.5;
+// 1/m: what the error of a radius grows by with its own square [as in stem_fit]
+inline constexpr double kSquare = 1400.0;
+// m of the radius: keyframes do not quite lie on each other [as in stem_fit]
+inline constexpr double kMapError = 0.002;
+// Radii: error of a section at most ... [chosen]
+inline constexpr double kMostSdShare = 0.12;
+// ... and m, added [chosen]
+inline constexpr double kMostSd = 0.003;
+// Radii: scatter of a section's points at most ... [as in stem_detector]
+inline constexpr double kMostScatterShare = 0.2;
+// ... and m, added [as in stem_detector]
+inline constexpr double kMostScatter = 0.012;
+// m: shift of a section from where it was expected at most ... [chosen]
+inline constexpr double kMostShift = 0.03;
+// ... and radii, added [chosen]
+inline constexpr double kMostShiftShare = 0.2;
+// Radii: change from the expected radius at most ... [chosen]
+inline constexpr double kMostChangeShare = 0.1;
+// ... and m, added [chosen]
+inline constexpr double kMostChange = 0.01;
+// Radii: the same growth towards the roots [chosen]
+inline constexpr double kFlare = 0.5;
+// Scatters: points so near to the surface are on it [as in stem_fit]
+inline constexpr double kBandScatters = 2.5;
+// m: the same at least [as in stem_fit]
+inline constexpr double kLeastBand = 0.015;
+// Bands under the surface from which on a point is inside ... [as in stem_fit]
+inline constexpr double kInsideBands = 2.0;
+// ... or radii under it, whichever is more [as in stem_fit]
+inline constexpr double kInsideShare = 0.3;
+// Points inside a section over those on it at most [chosen]
+inline constexpr double kMostInside = 0.3;
+// Points on a section at least [chosen]
+inline constexpr int kFewestPoints = 10;
+// degrees of a section that are seen at least [chosen]
+inline constexpr double kLeastArcDeg = 60.0;
+// Power of the distance to the top that a stem's diameter follows: most stems lie between a
+// paraboloid (0.5) and a cone (1) [bound: Laasasenaho 1982 has 0.6 to 0.7 for pine and spruce]
+inline constexpr double kUsualPower = 0.7;
+// How far stems differ from it [chosen]
+inline constexpr double kPowerSd = 0.12;
+// The least power that is tried [chosen]
+inline constexpr double kLeastPower = 0.4;
+// The greatest one [chosen]
+inline constexpr double kMostPower = 1.2;
+// The step between those that are tried [chosen]
+inline constexpr double kPowerStep = 0.02;
+// Sections that share errors, such as those of the map [chosen]
+inline constexpr double kCorrelatedRings = 4.0;
+// m of the radius: sections scatter about the form by that at least [chosen]
+inline constexpr double kLeastSpread = 0.004;
+// Spreads beyond which a section does not belong to the stem [chosen]
+inline constexpr double kOutlierSpreads = 3.0;
+// m of height over which sections are averaged: one standard deviation [chosen]
+inline constexpr double kSmoothing = 0.35;
+// Diameters per metre beyond what was seen: error of the form ... [chosen]
+inline constexpr double kModelSdPerMetre = 0.03;
+// ... and at most [chosen]
+inline constexpr double kMostModelSd = 0.25;
+// Heights of the last section: where the outline of a tree of unknown height ends [chosen]
+inline constexpr double kUnknownTop = 2.0;
+// m: lower trees have no stem curve [bound: breast height]
+inline constexpr double kLeastTop = 2.0;
+}  // namespace stem_curve
+
+namespace standing_direction {  // forest/stems/standing_direction.cc
+// m: one point each, or what is near would count most [chosen]
+inline constexpr double kVoxel = 0.2;
+// m: edge of the cells whose lowest point is the ground [chosen]
+inline constexpr double kGroundCell = 2.0;
+// m: points above that are looked at [chosen]
+inline constexpr double kAboveGround = 1.5;
+// Voxels that are looked at [bound: time]
+inline constexpr std::size_t kMostVoxels = 60'000;
+// Voxels at least, or nothing is told [chosen]
+inline constexpr std::size_t kLeastVoxels = 2'000;
+// degrees from z: directions farther away are not tried [chosen]
+inline constexpr double kFarthestDeg = 72.0;
+// degrees from z: nearer directions count as z [chosen]
+inline constexpr double kNearZDeg = 6.0;
+// m: edge of a column in the first search [chosen]
+inline constexpr double kCoarseCell = 1.0;
+// degrees between the directions of the first search [chosen]
+inline constexpr double kCoarseDeg = 6.0;
+// m: edge of a column in the last search [chosen]
+inline constexpr double kCell = 0.5;
+// Directions of the first search that are looked at closely [chosen]
+inline constexpr std::size_t kFinalists = 4;
+// Columns to those that are compared with [chosen]
+inline constexpr int kApart = 3;
+// Columns at most [bound: memory]
+inline constexpr double kMostCells = 4e6;
+}  // namespace standing_direction
+
+namespace circle_search {  // forest/stems/circle_search.cc
+// Pairs of points that are tried with a drawn one [bound: time]
+inline constexpr int kTriesPerDraw = 9;
+// m: edge of the cells that count points on a circle [bound: time]
+inline constexpr float kFineCell = 0.08F;
+// m: edge of the cells that points are drawn from [bound: time]
+inline constexpr float kCoarseCell = 0.3F;
+// Cells of a row between which points are moved up where others are taken away [bound: time]
+inline constexpr int kStretch = 64;
+// m: around a sampled circle that points are gathered to fit it to, at first [bound: time]
+inline constexpr double kRefineMargin = 0.1;
+// Points of a group that are sorted anew when the lowest of them goes, at most [bound: time]
+inline constexpr std::size_t kMostSortedAnew = 500'000;
+// Share of the seen arc that has to be seen evenly [not recorded]
+inline constexpr double kEvenArcShare = 0.3;
+// Bands: scatter of a circle at most, or ... [not recorded]
+inline constexpr double kMostScatterBands = 0.6;
+// ... radii, whichever is more [not recorded]
+inline constexpr double kMostScatterShare = 0.12;
+// m: distances of the three points that a circle is drawn through, in turn [not recorded]
+inline constexpr std::array<float, 4> kScales = {0.08F, 0.2F, 0.45F, 0.9F};
+// Draws of a group at least [bound: time]
+inline constexpr std::size_t kFewestDraws = 24;
+// Points of a group for each further draw [bound: time]
+inline constexpr std::size_t kPointsPerDraw = 8;
+// Draws of a group at most [bound: time]
+inline constexpr std::size_t kMostDraws = 150;
+// m: a circle counts by the power 0.7 of its radius and this [not recorded]
+inline constexpr double kLengthOffset = 0.15;
+// Points on a circle that one inside it outweighs [not recorded]
+inline constexpr double kInsideWeight = 1.5;
+}  // namespace circle_search
+
+}  // namespace understory::stem_constants
