@@ -53,7 +53,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     for (const TopicSurvey& topic : survey_.topics)
       frame_of_topic_[topic.topic] = topic.frame;
     source_ = open(log_);
-    note_frames();
+    places_.frames() = frames_of(choice_, survey_);
     make_rig(ahead->sensor_metadata());
     if (places_.lacks_any() && survey_late_transforms(*ahead, survey_)) place_sensors();
     warn_of_missing_place();
@@ -150,16 +150,6 @@ class MessageRecording : public Recording, public ArrivalTimes {
   [[nodiscard]] std::optional<TimeNs> arrival() const override { return last_log_time_; }
 
  private:
-  void note_frames() {
-    const auto frame_of = [&](const std::string& topic) {
-      const TopicSurvey* found = survey_.find(topic);
-      return found == nullptr ? std::string() : found->frame;
-    };
-    const TopicSurvey* headings = topic_of_headings(survey_);
-    places_.frames() = {frame_of(choice_.lidar), frame_of(choice_.imu), frame_of(choice_.gnss),
-                        headings == nullptr ? frame_of(choice_.second_gnss) : headings->frame};
-  }
-
   void make_rig(const std::map<std::string, std::string>& metadata) {
     const auto model = metadata.find("lidar_model");
     if (model != metadata.end()) places_.rig().lidar_model = model->second;
@@ -176,12 +166,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
   }
 
   void warn_of_missing_place() {
-    if (choice_.imu.empty() || choice_.lidar.empty() || places_.rig().body_from_imu) return;
-    log_.warn("recording.no_imu_extrinsics",
-              file_ + ": the place of the IMU (" + places_.frames().imu +
-                  ") relative to the lidar (" + places_.frames().lidar +
-                  ") is not known: it is not used until a transform tells it. Give --extrinsics "
-                  "FILE");
+    if (choice_.imu.empty() || choice_.lidar.empty()) return;
+    const std::string why = places_.why_no_imu();
+    if (!why.empty()) log_.warn("recording.no_imu_extrinsics", file_ + ": " + why);
   }
 
   // A sensor that begins later than the start of the recording was looked at.

@@ -394,4 +394,14 @@ TopicChoice choose_topics(const MessageSurvey& survey, const OpenOptions& option
   return choice;
 }
 
+SensorFrames frames_of(const TopicChoice& choice, const MessageSurvey& survey) {
+  const auto frame_of = [&](const std::string& topic) {
+    const TopicSurvey* found = survey.find(topic);
+    return found == nullptr ? std::string() : found->frame;
+  };
+  const TopicSurvey* headings = topic_of_headings(survey);
+  return {frame_of(choice.lidar), frame_of(choice.imu), frame_of(choice.gnss),
+          headings == nullptr ? frame_of(choice.second_gnss) : headings->frame};
+}
+
 }  // namespace understory

@@ -86,4 +86,7 @@ struct TopicChoice {
 [[nodiscard]] TopicChoice choose_topics(const MessageSurvey& survey, const OpenOptions& options,
                                         const std::string& file, Log& log);
 
+// The frames of the sensors on those topics; empty where it is not known.
+[[nodiscard]] SensorFrames frames_of(const TopicChoice& choice, const MessageSurvey& survey);
+
 }  // namespace understory

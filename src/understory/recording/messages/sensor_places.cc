@@ -58,6 +58,12 @@ std::string SensorPlaces::why_no_second_antenna(bool first_is_named) const {
   return "the antennas sit less than a decimetre apart";
 }
 
+std::string SensorPlaces::why_no_imu() const {
+  if (rig_.body_from_imu) return {};
+  return "the place of the IMU (" + frames_.imu + ") relative to the lidar (" + frames_.lidar +
+         ") is not known: it is not used until a transform tells it. Give --extrinsics FILE";
+}
+
 bool SensorPlaces::lacks_any() const {
   return (!frames_.imu.empty() && !rig_.body_from_imu) ||
          (!frames_.gnss.empty() && !rig_.body_from_gnss) ||

@@ -23,6 +23,8 @@ class SensorPlaces {
   bool place(bool body_stays);
   // Whether there is a sensor whose place is not known.
   [[nodiscard]] bool lacks_any() const;
+  // Why the IMU cannot be used, for a warning: its place is not known. Empty: it is.
+  [[nodiscard]] std::string why_no_imu() const;
   // From one antenna to the other, metres; nothing where the place of one is not known. The origin
   // of the body is no antenna by its frame alone: filters state their positions there.
   // And a file that places the antennas means topics that are named: otherwise the busier one is
