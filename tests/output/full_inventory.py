@@ -124,6 +124,34 @@ def check_crowns(folder, truth):
     return known
 
 
+def check_foreign_clouds(run_map, folder):
+    """A clip of the map as others write it: times of the GPS week, intensities up to 1, a point astray."""
+    clip = run_map.xyz[np.abs(run_map.xyz[:, :2] - np.median(run_map.xyz[:, :2], axis=0)).max(axis=1) < 8.0]
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales, header.offsets = [0.001] * 3, clip.min(axis=0)
+    las = laspy.LasData(header)
+    las.xyz = clip
+    las.gps_time = 1000.0 + 0.25 * np.arange(len(clip))
+    assert las.header.global_encoding.gps_time_type == laspy.header.GpsTimeType.WEEK_TIME
+    las.write(folder / "week.las")
+    run("inventory", folder / "week.las", "-o", folder / "week")
+    again = laspy.read(folder / "week/map.laz")
+    assert again.header.global_encoding.gps_time_type == laspy.header.GpsTimeType.WEEK_TIME
+    assert np.array_equal(again.gps_time, las.gps_time)
+
+    stray = np.vstack([clip, [[1e9, 5.0, 5.0]]])
+    with open(folder / "stray.ply", "w") as file:
+        file.write(f"ply\nformat ascii 1.0\nelement vertex {len(stray)}\n")
+        file.write("".join(f"property double {name}\n" for name in ("x", "y", "z", "intensity")) + "end_header\n")
+        for k, point in enumerate(stray):
+            file.write("%.4f %.4f %.4f %.3f\n" % (*point, 0.001 * (k % 1001)))
+    run("inventory", folder / "stray.ply", "-o", folder / "stray")
+    again = laspy.read(folder / "stray/map.laz")
+    assert len(again.points) == len(clip)
+    assert again.intensity.max() == 65535 and abs(int(again.intensity[500]) - 32768) <= 1
+    assert "1 points lie over" in (folder / "stray/report.html").read_text()
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -149,10 +177,16 @@ def main():
         assert np.array_equal(first.intensity, second.intensity)
         assert np.allclose(first.xyz, second.xyz, atol=1e-9)
 
+        check_foreign_clouds(first, folder)
+
         # A basic one has none of that, and the empty columns say so.
         run("inventory", folder / "run", "-o", folder / "basic", "--set", "extent=basic")
         assert not (folder / "basic/stem_curves.csv").exists() and not (folder / "basic/map.laz").exists()
         assert all(row["stem_volume_m3"] == "" for row in rows(folder / "basic/trees.csv"))
+
+        said = subprocess.run([PROGRAM, "map", "sim:lieksa2", "-o", str(folder / "stems"), "--front-end", "sparse",
+                               "--inventory", "full"], capture_output=True, text=True)
+        assert said.returncode == 2 and "--front-end dense" in said.stderr, said.stderr
 
         # The same for any number of threads.
         for threads in (1, 2):

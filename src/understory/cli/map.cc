@@ -95,7 +95,13 @@ int run_map(const MapOptions& options, CommandContext& context) {
   std::vector<std::string> settings = options.settings;
   if (!options.coordinate_system.empty())
     settings.push_back("georeference.crs=" + options.coordinate_system);
-  if (!options.inventory.empty()) settings.push_back("inventory.extent=" + options.inventory);
+  if (!options.inventory.empty()) {
+    if (options.front_end != kDenseFrontEnd)
+      throw ConfigError(
+          {"--inventory measures the cloud of a map, which a run by stems does not "
+           "make: leave it out, or map with --front-end dense"});
+    settings.push_back("inventory.extent=" + options.inventory);
+  }
   ReadConfig<FrontEndConfig> read = read_front_end_config(
       options.front_end, options.profile, options.config_file, settings, context.log);
   if (options.print_config) return print_config(options, read, context);

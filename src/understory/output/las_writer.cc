@@ -24,6 +24,8 @@ constexpr TimeNs kUnixAtGpsEpoch = 315'964'800 * kNsPerSecond;
 constexpr TimeNs kAdjustedGps = 1'000'000'000 * kNsPerSecond;
 // Of tree_id and HeightAboveGround.
 constexpr laszip_U16 kColumnBytes = sizeof(std::uint32_t) + sizeof(float);
+// Of the offset, in steps of the scale.
+constexpr double kMostSteps = 2147483647.0;
 constexpr TimeNs kYear2000 = 946'684'800 * kNsPerSecond;
 
 // Seconds by which GPS time is ahead of UTC; the leap seconds since 1999.
@@ -49,6 +51,10 @@ double las_time(TimeNs stamp) {
 }
 
 }  // namespace
+
+bool has_room(const LasOptions& options, const Eigen::Vector3d& point) {
+  return ((point - options.offset).cwiseQuotient(options.scale).array().abs() < kMostSteps).all();
+}
 
 struct LasWriter::Impl {
   std::filesystem::path path;
@@ -99,7 +105,7 @@ struct LasWriter::Impl {
     header->z_offset = options.offset.z();
     constexpr laszip_U16 kStandardGpsTime = 1;
     constexpr laszip_U16 kWkt = 16;
-    header->global_encoding = kStandardGpsTime | kWkt;
+    header->global_encoding = (options.gps_week_time ? 0 : kStandardGpsTime) | kWkt;
     std::strncpy(header->generating_software, options.generating_software.c_str(), 31);
     std::strncpy(header->system_identifier, "SLAM", 31);
     if (options.trees) add_columns();
@@ -122,7 +128,7 @@ struct LasWriter::Impl {
     const double offset = options.offset[axis];
     const double scale = options.scale[axis];
     const double steps = std::round((value - offset) / scale);
-    if (!(std::abs(steps) < 2147483647.0)) {
+    if (!(std::abs(steps) < kMostSteps)) {
       throw OutputError(path.string(),
                         fmt::format("coordinate {} m does not fit: expected one within {:.0f} km "
                                     "of the offset {} m",

@@ -33,12 +33,16 @@ struct LasOptions {
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
   // Step of the stored coordinates, in the units of the coordinate system.
   Eigen::Vector3d scale = Eigen::Vector3d::Constant(0.001);
-  bool trees = false;   // two more columns: tree_id and HeightAboveGround (as PDAL names it)
+  bool gps_week_time = false;  // LasRecord::gps_time counts from the beginning of a week
+  bool trees = false;          // two more columns: tree_id and HeightAboveGround (as PDAL names it)
   std::string crs_wkt;  // OGC WKT of the coordinate system; empty = local frame, none written
   // Stamps are written as adjusted standard GPS time if they are of this century (Unix time), else
   // as seconds as they are.
   std::string generating_software = "understory";
 };
+
+// Whether a point has room in a file: it is near enough to the offset.
+[[nodiscard]] bool has_room(const LasOptions& options, const Eigen::Vector3d& point);
 
 // LAS 1.4, point format 6, compressed where the path ends in .laz. Points are handed over one after
 // another and not held. The file appears with `commit`. Not thread-safe.

@@ -242,6 +242,16 @@ TEST_F(OutputTest, LazKeepsTheTreeAndTheHeightOfAPoint) {
   laszip_destroy(reader);
 }
 
+TEST_F(OutputTest, LasHasRoomForPointsNearItsOffset) {
+  LasOptions options;
+  options.offset = {3e6, 6e6, 0.0};
+  EXPECT_TRUE(has_room(options, {3e6 + 2'147'000.0, 6e6, 100.0}));
+  EXPECT_FALSE(has_room(options, {3e6 + 2'148'000.0, 6e6, 100.0}));
+  EXPECT_FALSE(has_room(options, {3e6, 6e6, -2'148'000.0}));
+  LasWriter writer(folder_ / "map.las", options);
+  EXPECT_THROW(writer.add({3e6, 6e6 - 2'148'000.0, 0.0}), OutputError);
+}
+
 TEST_F(OutputTest, LazComesBackToTheMillimetre) {
   const fs::path path = folder_ / "map.laz";
   LasOptions options;

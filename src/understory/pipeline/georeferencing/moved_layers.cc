@@ -49,7 +49,9 @@ void move_cloud(const fs::path& from, const fs::path& to, const Move& move, cons
                 const LayerFrame& drawing, MapPicture& picture, Log& log) {
   const auto file = open_file(from.string());
   const LasHeader header = read_las_header(*file);
-  LasWriter writer(to, las_options(move.to));
+  LasOptions options = las_options(move.to);
+  options.gps_week_time = header.gps_week_time;
+  LasWriter writer(to, options);
   read_las_points(*file, header, log, [&](const LasPoint& point) {
     move.progress.poll();
     LasRecord record;

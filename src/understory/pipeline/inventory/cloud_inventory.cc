@@ -161,36 +161,59 @@ Stock stock_of(const InventoryRequest& request) {
 LasOptions las_options_of(const Stock& stock) {
   if (stock.of_run) return las_options(stock.frames.layers);
   LasOptions options;
-  options.offset = stock.stand.cloud.origin.array().round();
+  options.offset = stock.inventory.origin.array().round();  // near most of the points
   if (const auto system = CoordinateSystem::find(stock.stand.cloud.coordinate_system))
     options.crs_wkt = system->wkt();
   return options;
 }
 
-// map.laz: the cloud with classes, the tree of each point and heights above the ground.
-void write_labelled_cloud(const Stock& stock, const fs::path& file, const ProgressSink& progress) {
+// What the intensities of a cloud are multiplied by: some formats have them from 0 to 1.
+float intensity_scale(const PointCloudFile& cloud) {
+  float most = 0.0F;
+  for (const float intensity : cloud.intensity)
+    if (intensity > most) most = intensity;
+  const bool las = cloud.format.rfind("LA", 0) == 0;
+  return !las && most <= 1.0F ? 65535.0F : 1.0F;
+}
+
+std::uint16_t las_intensity(float intensity) {
+  return intensity > 0.0F ? static_cast<std::uint16_t>(std::lround(std::min(intensity, 65535.0F)))
+                          : std::uint16_t{0};
+}
+
+// map.laz: the cloud with classes, the tree of each point and heights above the ground. Returns how
+// many points lie too far from the others for it.
+std::uint64_t write_labelled_cloud(const Stock& stock, const fs::path& file,
+                                   const ProgressSink& progress) {
   const PointCloudFile& cloud = stock.stand.cloud;
   LasOptions options = las_options_of(stock);
   options.trees = true;
+  options.gps_week_time = cloud.gps_week_time;
   LasWriter writer(file, options);
+  const float scale = intensity_scale(cloud);
+  std::uint64_t too_far = 0;
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     progress.poll();
     const Eigen::Vector3d in_world = cloud.origin + cloud.points[i].cast<double>();
     const double height = stock.inventory.ground.height_above(in_world);
     const Eigen::Vector3d at = stock.of_run ? stock.frames.layers.from_world(in_world) : in_world;
+    if (!has_room(options, at)) {
+      ++too_far;
+      continue;
+    }
     LasRecord record;
     record.x = at.x();
     record.y = at.y();
     record.z = at.z();
     if (!cloud.gps_time.empty()) record.gps_time = cloud.gps_time[i];
-    if (!cloud.intensity.empty())
-      record.intensity = static_cast<std::uint16_t>(std::clamp(cloud.intensity[i], 0.0F, 65535.0F));
+    if (!cloud.intensity.empty()) record.intensity = las_intensity(scale * cloud.intensity[i]);
     record.classification = stock.inventory.ground.las_class(height);
     record.tree_id = tree_at(stock.inventory, in_world, height);
     record.height_above_ground = static_cast<float>(height);
     writer.add(record);
   }
   writer.commit();
+  return too_far;
 }
 
 void take_stock(const InventoryRequest& request, const fs::path& results, Log& log,
@@ -220,7 +243,12 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
   } else {
     write_inventory_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
   }
-  if (stock.inventory.owners) write_labelled_cloud(stock, results / "map.laz", progress);
+  if (stock.inventory.owners) {
+    const std::uint64_t too_far = write_labelled_cloud(stock, results / "map.laz", progress);
+    if (too_far > 0)
+      stock.inventory.remarks.push_back(fmt::format(
+          "{} points lie over 2,147 km from the others and are not in map.laz.", too_far));
+  }
   write_project(stock, results);
 }
 

@@ -44,6 +44,7 @@ PointCloudFile read_las_cloud(ByteSource& file, Log& log, const ProgressSink& pr
   const LasHeader header = read_las_header(file);
   PointCloudFile cloud;
   cloud.coordinate_system = header.coordinate_system;
+  cloud.gps_week_time = header.gps_week_time;
   cloud.format = std::string(header.compressed ? "LAZ" : "LAS") + " 1." +
                  std::to_string(header.version_minor) + ", point format " +
                  std::to_string(header.point_format);

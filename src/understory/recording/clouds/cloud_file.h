@@ -22,6 +22,7 @@ struct PointCloudFile {
   std::vector<float> intensity;              // as the file has it
   std::vector<std::uint8_t> classification;  // ASPRS classes, LAS only
   std::vector<double> gps_time;              // LAS: GPS time as stored (week or adjusted standard)
+  bool gps_week_time = false;                // LAS: gps_time counts from the beginning of a week
   std::string coordinate_system;             // LAS, E57: "EPSG:25832" or WKT; empty if not given
   std::string format;                        // "LAZ 1.4, point format 6", "PCD binary"
   // Distance of neighbouring numbers at the first point, in which a file of single precision holds

@@ -434,6 +434,7 @@ void read_fields(const std::vector<std::uint8_t>& raw, LasHeader& header) {
   header.compressed = (format & 0xC0) != 0;
   header.point_format = format & 0x3F;
   header.has_gps_time = has_time(header.point_format);
+  header.gps_week_time = (get<std::uint16_t>(raw, 6) & 1U) == 0;
   header.record_length = get<std::uint16_t>(raw, 105);
   header.point_position = get<std::uint32_t>(raw, 96);
   header.points = get<std::uint32_t>(raw, 107);

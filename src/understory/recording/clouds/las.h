@@ -16,6 +16,7 @@ struct LasHeader {
   int point_format = 0;
   bool compressed = false;
   bool has_gps_time = false;
+  bool gps_week_time = false;  // times count from the beginning of a week
   std::uint64_t points = 0;
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
