@@ -62,33 +62,6 @@ bool is_highest(std::span<const Eigen::Vector3f> points, std::size_t top,
   return highest;
 }
 
-// The bell-weighted mean of the cells with a height; NaN where the cell itself has none.
-std::vector<float> smoothed(const Raster& raster, double sd_m) {
-  const double sd = sd_m / raster.cell_m;
-  const int reach = static_cast<int>(std::ceil(2.5 * sd));
-  std::vector<float> result(raster.values.size(), std::numeric_limits<float>::quiet_NaN());
-  for (int row = 0; row < raster.rows; ++row) {
-    for (int column = 0; column < raster.columns; ++column) {
-      const std::size_t at = raster.index(column, row);
-      if (!std::isfinite(raster.values[at])) continue;
-      double sum = 0.0;
-      double weights = 0.0;
-      for (int r = -reach; r <= reach; ++r) {
-        for (int c = -reach; c <= reach; ++c) {
-          if (!raster.contains(column + c, row + r)) continue;
-          const auto value = static_cast<double>(raster.values[raster.index(column + c, row + r)]);
-          if (!std::isfinite(value)) continue;
-          const double weight = sd > 0.0 ? std::exp(-0.5 * (r * r + c * c) / (sd * sd)) : 1.0;
-          sum += weight * value;
-          weights += weight;
-        }
-      }
-      result[at] = static_cast<float>(sum / weights);
-    }
-  }
-  return result;
-}
-
 bool is_top(const Raster& raster, const std::vector<float>& heights, int column, int row,
             double window_m) {
   const std::size_t at = raster.index(column, row);
@@ -190,8 +163,35 @@ std::vector<Eigen::Vector3f> top_points(std::span<const Eigen::Vector3f> points,
   return result;
 }
 
+Raster smoothed_canopy(const Raster& raster, double sd_m) {
+  const double sd = sd_m / raster.cell_m;
+  const int reach = static_cast<int>(std::ceil(2.5 * sd));
+  Raster result = raster;
+  std::fill(result.values.begin(), result.values.end(), std::numeric_limits<float>::quiet_NaN());
+  for (int row = 0; row < raster.rows; ++row) {
+    for (int column = 0; column < raster.columns; ++column) {
+      const std::size_t at = raster.index(column, row);
+      if (!std::isfinite(raster.values[at])) continue;
+      double sum = 0.0;
+      double weights = 0.0;
+      for (int r = -reach; r <= reach; ++r) {
+        for (int c = -reach; c <= reach; ++c) {
+          if (!raster.contains(column + c, row + r)) continue;
+          const auto value = static_cast<double>(raster.values[raster.index(column + c, row + r)]);
+          if (!std::isfinite(value)) continue;
+          const double weight = sd > 0.0 ? std::exp(-0.5 * (r * r + c * c) / (sd * sd)) : 1.0;
+          sum += weight * value;
+          weights += weight;
+        }
+      }
+      result.values[at] = static_cast<float>(sum / weights);
+    }
+  }
+  return result;
+}
+
 std::vector<CanopyTop> find_canopy_tops(const Raster& canopy, const CanopyTopConfig& config) {
-  const std::vector<float> heights = smoothed(canopy, config.smoothing_m);
+  const std::vector<float> heights = smoothed_canopy(canopy, config.smoothing_m).values;
   std::vector<CanopyTop> tops;
   for (int row = 0; row < canopy.rows; ++row) {
     for (int column = 0; column < canopy.columns; ++column) {

@@ -51,6 +51,10 @@ struct CanopyTopConfig {
   double window_per_m = 0.04;
 };
 
+// The bell-weighted mean (`sd_m`, metres) of the cells with a height; NaN where the cell itself has
+// none. Frame and unit of the raster.
+[[nodiscard]] Raster smoothed_canopy(const Raster& canopy, double sd_m);
+
 // A top in a raster of canopy heights. Frame of the raster, metres.
 struct CanopyTop {
   Eigen::Vector2d at = Eigen::Vector2d::Zero();  // between cells, by a parabola

@@ -104,6 +104,9 @@ inline constexpr double kSegmentReach = 1.5;
 // Returns per square metre near breast height: with fewer, trees are missing [real clouds,
 // docs/method/forest.md]
 inline constexpr double kSparse = 20.0;
+// Of all points, those near breast height: a sparse cloud with a smaller share was taken from above
+// [real clouds: 0.025 and 0.06 from aeroplanes]
+inline constexpr double kFromAboveShare = 0.12;
 // Share of the cells of the terrain that were seen: with less it is said [not recorded]
 inline constexpr double kLeastMeasured = 0.2;
 }  // namespace inventory
@@ -217,6 +220,15 @@ inline constexpr int kLeastWideLayers = 3;
 // Share of the cubes in a direction that lie within the edge of the crown [chosen]
 inline constexpr double kEdgeQuantile = 0.97;
 }  // namespace tree_crowns
+
+namespace canopy_crowns {  // forest/trees/canopy_crowns.cc
+// Times that the gaps of a canopy model shrink by a cell [chosen]
+inline constexpr int kFillPasses = 2;
+// Known cells around one that give it their median [chosen]
+inline constexpr std::size_t kLeastAround = 5;
+// m below that median: the pulses went through the crown [chosen]
+inline constexpr float kPit = 2.0F;
+}  // namespace canopy_crowns
 
 namespace tree_segments {  // forest/trees/tree_segments.cc
 // m: one point per cube near breast height, where the cross section is drawn [chosen]

@@ -214,13 +214,67 @@ void find_crowns(const ProgressSink& progress, double slices_end_m, InventoryRes
   }
 }
 
-void remark(const Gathered& gathered, const InventoryConfig& config, InventoryResult& result) {
-  const double per_m2 = static_cast<double>(gathered.points) / std::max(1.0, result.area_m2);
+std::uint64_t returns_near_breast(const InventoryResult& result) {
   std::uint64_t returns = 0;
   for (const SlicePoint& point : result.slices)
     returns += point.returns;
-  const double near_breast = static_cast<double>(returns) / std::max(1.0, result.area_m2);
-  result.too_sparse = near_breast < kSparse;
+  return returns;
+}
+
+void judge_density(InventoryResult& result) {
+  const auto returns = static_cast<double>(returns_near_breast(result));
+  result.too_sparse = returns < kSparse * std::max(1.0, result.area_m2);
+  result.from_above =
+      result.too_sparse && returns < kFromAboveShare * static_cast<double>(result.points);
+}
+
+// Whether the stem of a listed tree stands below a crown's cells, or near its top.
+std::vector<char> crowns_with_stems(const InventoryResult& result) {
+  std::vector<char> taken(result.crowns->crowns.size(), 0);
+  for (const Tree& tree : result.trees) {
+    const std::int32_t crown = result.crowns->at({tree.x, tree.y});
+    if (crown != CanopyCrowns::kNone) taken[static_cast<std::size_t>(crown)] = 1;
+  }
+  return taken;
+}
+
+// Trees whose stem was not seen, by their crowns.
+void add_crowns(const InventoryConfig& config, InventoryResult& result) {
+  if (config.crowns.search == CrownSearch::kNever ||
+      (config.crowns.search == CrownSearch::kFromAbove && !result.from_above))
+    return;
+  result.crowns = find_canopy_crowns(result.canopy, config.crowns);
+  const std::vector<char> with_stem = crowns_with_stems(result);
+  for (std::size_t i = 0; i < with_stem.size(); ++i) {
+    result.crown_ids.push_back(0);
+    const CanopyCrown& crown = result.crowns->crowns[i];
+    if (with_stem[i] != 0 || crown.cut) continue;
+    Tree tree;
+    tree.id = static_cast<int>(result.trees.size()) + 1;
+    tree.x = crown.top.x();
+    tree.y = crown.top.y();
+    tree.z = result.ground.terrain.interpolate(tree.x, tree.y);
+    tree.height_m = crown.height_m;
+    tree.crown_area_m2 = crown.area_m2;
+    result.crown_ids.back() = tree.id;
+    result.trees.push_back(tree);
+  }
+}
+
+void remark_on_stems(const Gathered& gathered, const InventoryConfig& config,
+                     InventoryResult& result) {
+  const double area_m2 = std::max(1.0, result.area_m2);
+  const double per_m2 = static_cast<double>(gathered.points) / area_m2;
+  const std::uint64_t returns = returns_near_breast(result);
+  const double near_breast = static_cast<double>(returns) / area_m2;
+  const std::size_t by_crown = result.trees.size() - result.stems.size();
+  if (by_crown > 0)
+    result.remarks.push_back(fmt::format(
+        "{} trees were found by their crowns alone ({:.1f} returns per square metre lie between {} "
+        "and {} m above the ground, {:.0f} at all heights). They have no diameter. Trees below "
+        "other crowns are not in the list.",
+        by_crown, near_breast, config.stems.lowest_m, config.stems.highest_m, per_m2));
+  if (by_crown > 0 && result.from_above) return;
   if (returns == 0) {
     result.remarks.push_back(fmt::format(
         "No point lies between {} and {} m above the lowest points: the ground below the trees is "
@@ -233,11 +287,16 @@ void remark(const Gathered& gathered, const InventoryConfig& config, InventoryRe
         "and canopy models are not affected.",
         near_breast, config.stems.lowest_m, config.stems.highest_m, per_m2));
   }
+}
+
+void remark(const Gathered& gathered, const InventoryConfig& config, InventoryResult& result) {
+  remark_on_stems(gathered, config, result);
   if (result.ground.measured_share < kLeastMeasured) {
     result.remarks.push_back(fmt::format(
         "Ground was seen in only {:.0f} % of the terrain model's cells; between them it is "
-        "interpolated, and with it the height at which diameters are taken.",
-        100.0 * result.ground.measured_share));
+        "interpolated{}.",
+        100.0 * result.ground.measured_share,
+        result.stems.empty() ? "" : ", and with it the height at which diameters are taken"));
   }
   if (gathered.without_ground * 50 > gathered.points) {
     result.remarks.push_back(fmt::format(
@@ -270,6 +329,7 @@ void describe(ConfigTable& table, InventoryConfig& config) {
     table.add_enum("species", config.curves.species, names,
                    "species of the stand: its taper curve stands where a stem was not seen");
   });
+  table.section("crowns", [&] { describe(table, config.crowns); });
   table.section("ground", [&] { describe(table, config.ground); });
   table.section("stems", [&] { describe(table, config.stems); });
   table.add("canopy_cell_m", config.canopy_cell_m, {0.1, 10.0}, "m", "cell of the canopy model");
@@ -313,6 +373,7 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
   add_trees(tops, held_back, canopy);
   result.canopy = canopy.raster(result.origin.x(), result.origin.y());
   result.area_m2 = area_of(result.canopy);
+  judge_density(result);
   result.trees = trees_of(result, heights_in_view(result, tops, in_view));
   if (full) {
     tell("stem curves", 5.0);
@@ -320,6 +381,7 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
     tell("crowns", 6.0);
     result.owners = std::move(details->owners);
     find_crowns(progress, config.stems.highest_m, result);
+    add_crowns(config, result);
   }
   remark(gathered, config, result);
   tell("segments", 7.0);
@@ -334,8 +396,12 @@ std::uint32_t tree_at(const InventoryResult& inventory, const Eigen::Vector3d& p
   if (!inventory.owners || !(height_m > inventory.ground.config.class_m)) return 0;
   const Eigen::Vector2d place = (point - inventory.origin).head<2>();
   const std::int32_t owner = inventory.owners->owner(place, height_m);
-  if (owner == TreeOwners::kNobody) return 0;
-  return static_cast<std::uint32_t>(inventory.trees[static_cast<std::size_t>(owner)].id);
+  if (owner != TreeOwners::kNobody)
+    return static_cast<std::uint32_t>(inventory.trees[static_cast<std::size_t>(owner)].id);
+  if (!inventory.crowns || height_m < forest_constants::tree_owners::kUndergrowth) return 0;
+  const std::int32_t crown = inventory.crowns->at(point.head<2>());
+  if (crown == CanopyCrowns::kNone) return 0;
+  return static_cast<std::uint32_t>(inventory.crown_ids[static_cast<std::size_t>(crown)]);
 }
 
 std::vector<Stem> stems_of(const InventoryResult& inventory, const Eigen::Vector3d& origin) {

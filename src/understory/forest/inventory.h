@@ -9,6 +9,7 @@
 #include "understory/forest/ground/ground.h"
 #include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
+#include "understory/forest/trees/canopy_crowns.h"
 #include "understory/forest/trees/tree_owners.h"
 #include "understory/forest/trees/tree_segments.h"
 #include "understory/sensor/stem_view.h"
@@ -28,6 +29,7 @@ struct InventoryConfig {
   GroundConfig ground;
   StemDetectorConfig stems;
   StemCurveConfig curves;
+  CanopyCrownConfig crowns;  // of a full inventory
   double canopy_cell_m = 0.5;
   int segments = 6;  // trees whose points are kept for a look at them
 };
@@ -45,15 +47,19 @@ struct InventoryResult {
   GroundModel ground;
   Raster canopy;  // highest point above ground per cell, NaN where none
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // of slices and stems, world frame
-  std::vector<Tree> trees;                           // by id; ids from 1 in order of position
-  std::vector<StemFit> stems;                        // of the same index as trees
-  std::vector<StemCurve> curves;                     // of the same index; of a full inventory only
-  std::optional<TreeOwners> owners;                  // of a full inventory: the trees' points
+  // By id, from 1: first those with a stem, in order of position, then those by their crowns alone.
+  std::vector<Tree> trees;
+  std::vector<StemFit> stems;          // of the same index as the first trees
+  std::vector<StemCurve> curves;       // of the same index; of a full inventory only
+  std::optional<TreeOwners> owners;    // of a full inventory: the trees' points
+  std::optional<CanopyCrowns> crowns;  // where trees were found by them
+  std::vector<int> crown_ids;      // id of the tree of each crown, 0 where it is none of the list
   std::vector<SlicePoint> slices;  // the thinned points between 0.5 m and 3.5 m that were searched
   std::vector<TreeSegment> segments;  // of a few trees, for the report
   std::uint64_t points = 0;
   double area_m2 = 0.0;     // cells in which the slices hold points, holes filled
   bool too_sparse = false;  // for stems: some are missing from the list
+  bool from_above = false;  // too sparse, as hardly any of its points lie near breast height
   std::vector<std::string> remarks;
 };
 

@@ -22,6 +22,7 @@ std::uint64_t cube_of(const Eigen::Vector3d& p) {
 }
 
 std::vector<Tree> spread_over_diameters(std::vector<Tree> trees, int most) {
+  std::erase_if(trees, [](const Tree& tree) { return std::isnan(tree.dbh_m); });
   std::stable_sort(trees.begin(), trees.end(),
                    [](const Tree& a, const Tree& b) { return a.dbh_m > b.dbh_m; });
   std::vector<Tree> chosen;

@@ -17,8 +17,8 @@ struct TreeSegment {
   std::vector<Eigen::Vector3f> points;
 };
 
-// One more run through the cloud. Takes at most `most` of the trees, spread evenly over their
-// diameters; `reach_m` is half the width of the square around a foot.
+// One more run through the cloud. Takes at most `most` of the trees with a diameter, spread evenly
+// over it; `reach_m` is half the width of the square around a foot.
 [[nodiscard]] std::vector<TreeSegment> collect_segments(const PointBlocks& cloud,
                                                         const GroundModel& ground,
                                                         const std::vector<Tree>& trees, int most,

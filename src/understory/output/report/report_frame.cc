@@ -101,10 +101,17 @@ class Tiles {
   std::string meanings_;
 };
 
-void add_stand(Tiles& tiles, const std::vector<Tree>& trees, double area_m2) {
-  tiles.add(count_text(trees.size()), "trees with a measured stem",
-            "Trees whose stem shows its surface at several heights around 1.3 m. A tree without a "
-            "visible stem is not counted.");
+void add_stand(Tiles& tiles, const std::vector<Tree>& all_trees, double area_m2) {
+  std::vector<Tree> trees = all_trees;
+  std::erase_if(trees, [](const Tree& tree) { return std::isnan(tree.dbh_m); });
+  if (const std::size_t by_crown = all_trees.size() - trees.size(); by_crown > 0)
+    tiles.add(count_text(by_crown), "trees found by their crowns",
+              "Trees whose top stands out of the canopy, and whose stem was not seen. They have no "
+              "diameter. Trees below other crowns are not counted.");
+  if (!trees.empty() || all_trees.empty())
+    tiles.add(count_text(trees.size()), "trees with a measured stem",
+              "Trees whose stem shows its surface at several heights around 1.3 m. A tree without "
+              "a visible stem is not counted here.");
   const double hectares = area_m2 / 1e4;
   double dbh = 0.0;
   double basal = 0.0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <map>
 
@@ -250,10 +251,83 @@ std::string diameters(const std::vector<Tree>& trees) {
   return "<figure><h3>Diameters</h3>" + svg_histogram(histogram) + "</figure>";
 }
 
-// Whether the trees are those of a full inventory.
-bool has_volumes(const std::vector<Tree>& trees) {
-  return std::any_of(trees.begin(), trees.end(),
-                     [](const Tree& tree) { return std::isfinite(tree.stem_volume_m3); });
+std::string heights(const std::vector<Tree>& trees) {
+  Histogram histogram;
+  histogram.x_label = "height above the ground, m";
+  histogram.y_label = "trees";
+  histogram.step = 2.0;
+  for (const Tree& tree : trees) {
+    if (!std::isfinite(tree.height_m)) continue;
+    const auto bin = static_cast<std::size_t>(tree.height_m / histogram.step);
+    if (histogram.counts.size() <= bin) histogram.counts.resize(bin + 1, 0);
+    ++histogram.counts[bin];
+  }
+  if (histogram.counts.empty()) return "";
+  histogram.counts.push_back(0);
+  return "<figure><h3>Heights</h3>" + svg_histogram(histogram) + "</figure>";
+}
+
+// How trees are found and what their figures mean, in a forester's words.
+std::string about_trees(const InventoryResult& inventory) {
+  std::string html;
+  if (!inventory.stems.empty())
+    html +=
+        "<p>A stem is listed where points show its surface at several heights around 1.3 m. "
+        "± is one standard deviation of the diameter, without the widening by the laser's beam. A "
+        "height is given only where points were seen above the stem and the lidar looked higher "
+        "still. Where foliage hid the top, the tree is higher.</p>";
+  if (inventory.trees.size() > inventory.stems.size())
+    html +=
+        "<p>Trees without a diameter were found by their crowns: x and y are those of the top, and "
+        "the area is that of the crown seen from above. Trees below other crowns are not "
+        "listed.</p>";
+  return html;
+}
+
+// A column of the table of trees: its title, and the cell of the i-th tree.
+struct TableColumn {
+  const char* title;
+  std::function<std::string(std::size_t)> cell;
+};
+
+// The columns that hold anything: trees by their crowns alone have no figures of a stem.
+std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
+                                    const std::vector<StemFit>* stems, bool of_cloud) {
+  const auto number = [&](double Tree::*member, int decimals) {
+    return [&trees, member, decimals](std::size_t i) { return metres(trees[i].*member, decimals); };
+  };
+  const auto in_cm = [&](double Tree::*member) {
+    return [&trees, member](std::size_t i) { return centimetres(trees[i].*member); };
+  };
+  const auto any = [&](double Tree::*member) {
+    return std::any_of(trees.begin(), trees.end(),
+                       [&](const Tree& tree) { return std::isfinite(tree.*member); });
+  };
+  const auto observations = [&trees](std::size_t i) {
+    return std::to_string(trees[i].observations);
+  };
+  std::vector<TableColumn> columns = {
+      {"no.", [&trees](std::size_t i) { return std::to_string(trees[i].id); }},
+      {"x, m", number(&Tree::x, 2)},
+      {"y, m", number(&Tree::y, 2)},
+      {"ground, m", number(&Tree::z, 2)}};
+  const bool measured = any(&Tree::dbh_m) || trees.empty();
+  if (measured) {
+    columns.push_back({"diameter, cm", in_cm(&Tree::dbh_m)});
+    columns.push_back({"± cm", in_cm(&Tree::dbh_sd_m)});
+    columns.push_back({"lean, °", number(&Tree::lean_deg, 1)});
+  }
+  if (of_cloud) columns.push_back({"height, m", number(&Tree::height_m, 1)});
+  if (measured) columns.push_back({of_cloud ? "returns" : "views", observations});
+  if (measured && stems != nullptr)
+    columns.push_back({"seen around, °", [stems](std::size_t i) {
+                         return i < stems->size() ? metres((*stems)[i].arc_deg, 0) : std::string();
+                       }});
+  if (any(&Tree::stem_volume_m3)) columns.push_back({"stem, m³", number(&Tree::stem_volume_m3, 3)});
+  if (any(&Tree::crown_base_m))
+    columns.push_back({"crown from, m", number(&Tree::crown_base_m, 1)});
+  if (any(&Tree::crown_area_m2)) columns.push_back({"crown, m²", number(&Tree::crown_area_m2, 1)});
+  return columns;
 }
 
 // `stems`: their fits in the same order, or null. `of_cloud`: else trees come from sights of single
@@ -261,42 +335,22 @@ bool has_volumes(const std::vector<Tree>& trees) {
 std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems,
                        bool of_cloud) {
   std::string html =
-      "<h3>All trees</h3><p class=\"so\">x, y and the height of the ground are those "
-      "of the stem's foot, as in trees.csv. ";
+      "<h3>All trees</h3><p class=\"so\">x, y and the height of the ground are as in trees.csv. ";
+  const bool with_stems = stems == nullptr || !stems->empty();
+  if (with_stems) html += "They are those of the stem's foot. ";
   if (!of_cloud) html += "Views are the scans that show the stem.";
-  if (of_cloud) html += "Returns are laser points on the stem. ";
-  if (stems != nullptr) html += "Seen around is the part of its circumference that the laser saw.";
-  html +=
-      "</p><div class=\"scroll\"><table class=\"sort\"><thead><tr>"
-      "<th class=\"n\">no.</th><th class=\"n\">x, m</th><th class=\"n\">y, m</th><th "
-      "class=\"n\">ground, m</th><th class=\"n\">diameter, cm</th><th class=\"n\">± cm</th><th "
-      "class=\"n\">lean, °</th>";
-  html += of_cloud ? "<th class=\"n\">height, m</th><th class=\"n\">returns</th>"
-                   : "<th class=\"n\">views</th>";
-  if (stems != nullptr) html += "<th class=\"n\">seen around, °</th>";
-  const bool full = has_volumes(trees);
-  if (full)
-    html +=
-        "<th class=\"n\">stem, m³</th><th class=\"n\">crown from, m</th><th class=\"n\">crown, "
-        "m²</th>";
+  if (of_cloud && with_stems) html += "Returns are laser points on the stem. ";
+  if (stems != nullptr && with_stems)
+    html += "Seen around is the part of its circumference that the laser saw.";
+  html += "</p><div class=\"scroll\"><table class=\"sort\"><thead><tr>";
+  const std::vector<TableColumn> columns = columns_of(trees, stems, of_cloud);
+  for (const TableColumn& column : columns)
+    html += fmt::format("<th class=\"n\">{}</th>", column.title);
   html += "</tr></thead><tbody>";
-  const auto out = std::back_inserter(html);
   for (std::size_t i = 0; i < std::min(trees.size(), kLongestTable); ++i) {
-    const Tree& t = trees[i];
-    std::vector<std::string> cells = {
-        std::to_string(t.id), metres(t.x, 2),          metres(t.y, 2),       metres(t.z, 2),
-        centimetres(t.dbh_m), centimetres(t.dbh_sd_m), metres(t.lean_deg, 1)};
-    if (of_cloud) cells.push_back(metres(t.height_m, 1));
-    cells.push_back(std::to_string(t.observations));
-    if (stems != nullptr) cells.push_back(metres((*stems)[i].arc_deg, 0));
-    if (full) {
-      cells.push_back(metres(t.stem_volume_m3, 3));
-      cells.push_back(metres(t.crown_base_m, 1));
-      cells.push_back(metres(t.crown_area_m2, 1));
-    }
-    fmt::format_to(out, "<tr>");
-    for (const std::string& cell : cells)
-      fmt::format_to(out, "<td class=\"n\">{}</td>", cell);
+    html += "<tr>";
+    for (const TableColumn& column : columns)
+      html += fmt::format("<td class=\"n\">{}</td>", column.cell(i));
     html += "</tr>";
   }
   html += "</tbody></table></div>";
@@ -361,12 +415,9 @@ std::string stand_section(const ReportInput& input) {
   if (inventory.trees.empty()) {
     html += "<p>No stem could be measured in this cloud.</p>";
   } else {
-    html +=
-        "<p>A stem is listed where points show its surface at several heights around 1.3 m. "
-        "± is one standard deviation of the diameter, without the widening by the laser's beam. A "
-        "height is given only where points were seen above the stem and the lidar looked higher "
-        "still. Where foliage hid the top, the tree is higher.</p><div class=\"two\">" +
-        diameters(inventory.trees) + "</div>";
+    html += about_trees(inventory) + "<div class=\"two\">";
+    if (!inventory.stems.empty()) html += diameters(inventory.trees);
+    html += heights(inventory.trees) + "</div>";
   }
   html += cross_sections(inventory);
   if (!inventory.trees.empty())

@@ -87,7 +87,8 @@ void judge(const InventoryResult& inventory, const InventoryRequest& request, bo
     const std::string complaint = list_complaint(inventory, request.frame.unit_m > 0.0);
     if (!complaint.empty()) documents.lower(RunStatus::kUntrusted, complaint);
   }
-  if (!inventory.too_sparse) return;
+  const bool by_crowns = inventory.trees.size() > inventory.stems.size();
+  if (!inventory.too_sparse || (inventory.from_above && by_crowns)) return;
   const bool any = !inventory.trees.empty();
   if (any && of_run) return;
   documents.lower(any || of_run ? RunStatus::kPartial : RunStatus::kUntrusted,
