@@ -62,6 +62,9 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_option("--config", options->request.config_file, "YAML file with settings");
   add_settings_option(*command, options->settings);
   add_cloud_frame_options(*command, options->request.frame);
+  command->add_flag("--slice", options->request.slice,
+                    "The cloud is one thin cut near breast height: only diameters and places are "
+                    "measured, at whatever z it lies");
   command->add_option("--crs", options->request.coordinate_system,
                       "Coordinate system of a cloud that names none, for instance EPSG:3067 (a "
                       "cloud that names its own keeps it)");
@@ -71,7 +74,8 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
       "Writes trees.csv, stem_curves.csv, trees.gpkg, map.laz, dtm.tif, chm.tif, dsm.tif, "
       "map.qgs,\n"
       "report.html and run.json.\n"
-      "Example:\n  understory inventory plot.laz -o plot-inventory");
+      "Examples:\n  understory inventory plot.laz -o plot-inventory\n"
+      "  understory inventory cut.laz --slice -o cut-inventory");
   command->callback([options, &chosen] {
     chosen = [options](CommandContext& context) { return run(*options, context); };
   });

@@ -230,6 +230,15 @@ inline constexpr std::size_t kLeastAround = 5;
 inline constexpr float kPit = 2.0F;
 }  // namespace canopy_crowns
 
+namespace slice_inventory {  // forest/slice_inventory.cc
+// m: one point per cube; a cut has few enough for thin cubes [chosen]
+inline constexpr double kThin = 0.005;
+// m: edge of the cells that its area is counted in [chosen]
+inline constexpr float kAreaCell = 1.0F;
+// Cells along the longer side of the plane that it is drawn over [bound: memory]
+inline constexpr double kMostCells = 1000.0;
+}  // namespace slice_inventory
+
 namespace tree_segments {  // forest/trees/tree_segments.cc
 // m: one point per cube near breast height, where the cross section is drawn [chosen]
 inline constexpr double kLowThin = 0.015;

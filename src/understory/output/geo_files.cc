@@ -73,15 +73,13 @@ void set_field(OGRFeature& feature, const TreeColumn& column, const Tree& tree) 
 
 }  // namespace
 
-void write_geotiff(const std::filesystem::path& path, const Raster& raster,
-                   const std::string& crs_wkt, const std::string& meaning) {
-  UNDERSTORY_CHECK(!raster.empty());
-  const QuietGdal quiet;
-  char** options = CSLSetNameValue(nullptr, "COMPRESS", "DEFLATE");
-  options = CSLSetNameValue(options, "PREDICTOR", "3");
-  GDALDatasetUniquePtr dataset(driver("GTiff")->Create(part_path(path).c_str(), raster.columns,
-                                                       raster.rows, 1, GDT_Float32, options));
-  CSLDestroy(options);
+namespace {
+
+// The raster in memory, as GDAL sees it: a TIFF starts in the north.
+GDALDatasetUniquePtr in_memory(const Raster& raster, const std::string& crs_wkt,
+                               const std::string& meaning, const std::filesystem::path& path) {
+  GDALDatasetUniquePtr dataset(
+      driver("MEM")->Create("", raster.columns, raster.rows, 1, GDT_Float32, nullptr));
   if (dataset == nullptr) fail(path);
   const double top = raster.y0 + raster.rows * raster.cell_m;
   std::array<double, 6> transform = {raster.x0, raster.cell_m, 0.0, top, 0.0, -raster.cell_m};
@@ -97,7 +95,7 @@ void write_geotiff(const std::filesystem::path& path, const Raster& raster,
   if (!meaning.empty()) band->SetDescription(meaning.c_str());
   std::vector<float> line(static_cast<std::size_t>(raster.columns));
   for (int row = 0; row < raster.rows; ++row) {
-    const int from = raster.rows - 1 - row;  // a TIFF starts in the north
+    const int from = raster.rows - 1 - row;
     for (int column = 0; column < raster.columns; ++column) {
       const float value = raster.values[raster.index(column, from)];
       line[static_cast<std::size_t>(column)] =
@@ -109,6 +107,23 @@ void write_geotiff(const std::filesystem::path& path, const Raster& raster,
       fail(path);
     }
   }
+  return dataset;
+}
+
+}  // namespace
+
+void write_geotiff(const std::filesystem::path& path, const Raster& raster,
+                   const std::string& crs_wkt, const std::string& meaning) {
+  UNDERSTORY_CHECK(!raster.empty());
+  const QuietGdal quiet;
+  const GDALDatasetUniquePtr source = in_memory(raster, crs_wkt, meaning, path);
+  char** options = CSLSetNameValue(nullptr, "COMPRESS", "DEFLATE");
+  options = CSLSetNameValue(options, "PREDICTOR", "YES");
+  options = CSLSetNameValue(options, "OVERVIEW_RESAMPLING", "AVERAGE");
+  GDALDatasetUniquePtr dataset(driver("COG")->CreateCopy(part_path(path).c_str(), source.get(),
+                                                         FALSE, options, nullptr, nullptr));
+  CSLDestroy(options);
+  if (dataset == nullptr) fail(path);
   close(std::move(dataset), path);
 }
 

@@ -10,7 +10,8 @@
 
 namespace understory {
 
-// GeoTIFF, float32, deflate, NaN as no-data. `crs_wkt` is WKT or
+// Cloud optimized GeoTIFF (tiles, overviews by the mean of the cells from 512 cells on), float32,
+// deflate, NaN as no-data. `crs_wkt` is WKT or
 // "EPSG:25832"; empty: local coordinates, no system. `meaning` is the description of its band.
 void write_geotiff(const std::filesystem::path& path, const Raster& raster,
                    const std::string& crs_wkt, const std::string& meaning = "");

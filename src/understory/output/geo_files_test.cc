@@ -79,6 +79,21 @@ TEST_F(GeoFilesTest, ARasterHasTheCoordinateSystemThatWasNamed) {
   EXPECT_EQ(open("local.tif", GDAL_OF_RASTER)->GetSpatialRef(), nullptr);
 }
 
+TEST_F(GeoFilesTest, ALargeRasterHasOverviews) {
+  Raster large = two_by_three();
+  large.columns = 1'300;
+  large.rows = 700;
+  large.values.assign(1'300 * 700, 2.0F);
+  write_geotiff(folder_ / "dtm.tif", large, "EPSG:3067");
+  const auto dataset = open("dtm.tif", GDAL_OF_RASTER);
+  ASSERT_NE(dataset, nullptr);
+  ASSERT_GE(dataset->GetRasterBand(1)->GetOverviewCount(), 1);
+  EXPECT_EQ(dataset->GetRasterBand(1)->GetOverview(0)->GetXSize(), 650);
+  EXPECT_STREQ(dataset->GetMetadataItem("LAYOUT", "IMAGE_STRUCTURE"), "COG");
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+    EXPECT_EQ(entry.path().filename(), "dtm.tif") << "something was left beside the file";
+}
+
 TEST_F(GeoFilesTest, ARasterWithoutCellsIsNotWritten) {
   EXPECT_THROW(write_geotiff(folder_ / "dtm.tif", {}, ""), std::exception);
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));

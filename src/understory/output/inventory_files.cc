@@ -33,6 +33,12 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
                       layers);
 }
 
+void write_slice_files(const std::filesystem::path& folder, const InventoryResult& inventory,
+                       const std::string& crs) {
+  write_tree_tables(folder, inventory);
+  write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs);
+}
+
 void add_to_picture(MapPicture& picture, std::span<const Eigen::Vector3d> points,
                     const GroundModel& ground, const LayerFrame& drawing) {
   for (const Eigen::Vector3d& point : points) {

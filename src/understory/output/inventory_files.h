@@ -23,6 +23,10 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const std::string& crs);
 
+// trees.csv and trees.gpkg of a cut: it has no ground and no canopy. Throws OutputError.
+void write_slice_files(const std::filesystem::path& folder, const InventoryResult& inventory,
+                       const std::string& crs);
+
 // Adds a block of a cloud (world frame) to the picture of the map, in the frame that it is drawn
 // in.
 void add_to_picture(MapPicture& picture, std::span<const Eigen::Vector3d> points,

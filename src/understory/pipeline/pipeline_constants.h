@@ -110,6 +110,8 @@ inline constexpr double kTallM = 42.0;
 // Height over diameter: no tall stand is more slender; real ones have 40 to 100, in feet of height
 // and metres of diameter 3.3 times as much [bound: forests]
 inline constexpr double kMostSlender = 150.0;
+// m: a thinner cloud without a stem may be a cut [chosen: stems need 1.5 m at least]
+inline constexpr double kThinCutM = 1.0;
 // Trees with both figures at least [chosen]
 inline constexpr std::size_t kLeastTrees = 3;
 }  // namespace cloud_inventory

@@ -126,12 +126,13 @@ class Watershed {
 }  // namespace
 
 void describe(ConfigTable& table, CanopyCrownConfig& config) {
-  table.add_enum("search", config.search,
-                 {{"never", CrownSearch::kNever},
-                  {"from_above", CrownSearch::kFromAbove},
-                  {"always", CrownSearch::kAlways}},
-                 "trees found by their crowns alone, without diameter: never; from_above: in clouds "
-                 "that show hardly any stem; always: wherever no stem stands below");
+  table.add_enum(
+      "search", config.search,
+      {{"never", CrownSearch::kNever},
+       {"from_above", CrownSearch::kFromAbove},
+       {"always", CrownSearch::kAlways}},
+      "trees found by their crowns alone, without diameter: never; from_above: in clouds "
+      "that show hardly any stem; always: wherever no stem stands below");
   table.add("smoothing_m", config.tops.smoothing_m, {0.0, 5.0}, "m",
             "standard deviation of the bell that smooths the canopy, so that a crown has one top");
   table.add("least_height_m", config.tops.least_height_m, {0.5, 50.0}, "m",

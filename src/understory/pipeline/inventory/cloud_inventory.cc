@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "understory/forest/slice_inventory.h"
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/inventory_files.h"
 #include "understory/output/las_writer.h"
@@ -78,22 +79,8 @@ std::string list_complaint(const InventoryResult& inventory, bool unit_given) {
       height_m, ratio);
 }
 
-// What the user has to know before using the numbers. The map of a run is judged as `map` does.
-void judge(const InventoryResult& inventory, const InventoryRequest& request, bool of_run,
-           const Log& log, RunDocuments& documents) {
-  if (const Found damage = found(log, Finding::kDamage); damage.count > 0)
-    documents.lower(RunStatus::kPartial, "the cloud is not whole: " + damage.first);
-  if (!of_run) {
-    const std::string complaint = list_complaint(inventory, request.frame.unit_m > 0.0);
-    if (!complaint.empty()) documents.lower(RunStatus::kUntrusted, complaint);
-  }
-  const bool by_crowns = inventory.trees.size() > inventory.stems.size();
-  if (!inventory.too_sparse || (inventory.from_above && by_crowns)) return;
-  const bool any = !inventory.trees.empty();
-  if (any && of_run) return;
-  documents.lower(any || of_run ? RunStatus::kPartial : RunStatus::kUntrusted,
-                  few_points_reason(any));
-}
+constexpr const char* kNoStemInCut =
+    "no stem was found in the cut: no ring of points of the size of a stem has an empty inside";
 
 // A finished inventory and what it was made from.
 struct Stock {
@@ -105,6 +92,43 @@ struct Stock {
   InventoryResult inventory;
   MapPicture picture;
 };
+
+// Metres from the lowest to the highest point.
+double thickness_of(const PointCloudFile& cloud) {
+  if (cloud.points.empty()) return 0.0;
+  const auto lower = [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+    return a.z() < b.z();
+  };
+  const auto [low, high] = std::minmax_element(cloud.points.begin(), cloud.points.end(), lower);
+  return static_cast<double>(high->z() - low->z());
+}
+
+// What the user has to know before using the numbers. The map of a run is judged as `map` does.
+void judge(const Stock& stock, const InventoryRequest& request, const Log& log,
+           RunDocuments& documents) {
+  const InventoryResult& inventory = stock.inventory;
+  const bool of_run = stock.of_run;
+  if (const Found damage = found(log, Finding::kDamage); damage.count > 0)
+    documents.lower(RunStatus::kPartial, "the cloud is not whole: " + damage.first);
+  if (request.slice) {
+    if (inventory.trees.empty()) documents.lower(RunStatus::kUntrusted, kNoStemInCut);
+    return;
+  }
+  if (!of_run) {
+    const std::string complaint = list_complaint(inventory, request.frame.unit_m > 0.0);
+    if (!complaint.empty()) documents.lower(RunStatus::kUntrusted, complaint);
+  }
+  const bool by_crowns = inventory.trees.size() > inventory.stems.size();
+  if (!inventory.too_sparse || (inventory.from_above && by_crowns)) return;
+  const bool any = !inventory.trees.empty();
+  if (any && of_run) return;
+  std::string reason = few_points_reason(any);
+  if (const double thick_m = thickness_of(stock.stand.cloud); !any && thick_m < kThinCutM)
+    reason += fmt::format(
+        ". It is {:.2f} m thick: give --slice if it is a cut through a stand near breast height",
+        thick_m);
+  documents.lower(any || of_run ? RunStatus::kPartial : RunStatus::kUntrusted, reason);
+}
 
 // What the user says of the system of a cloud that names none.
 void name_system(const InventoryRequest& request, Stock& stock) {
@@ -150,6 +174,8 @@ Stock stock_of(const InventoryRequest& request) {
   stock.path = cloud_of(request.cloud);
   stock.of_run = stock.path != fs::path(request.cloud);
   if (!stock.of_run) return stock;
+  if (request.slice)
+    throw ConfigError({"--slice is for a cloud that is one thin cut, not for the map of a run"});
   stock.place = read_run_place(request.cloud);
   stock.frames.layers = read_layer_frame(request.cloud);
   const CoordinateSystem* system = stock.frames.layers.system();
@@ -227,19 +253,23 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
     name_system(request, stock);
   }
   // The map of a run is in metres, and what is wrong with it is a matter of trust.
-  if (!stock.stand.doubt.empty() && !stock.of_run)
+  if (!stock.stand.doubt.empty() && !stock.of_run && !request.slice)
     throw InputError(stock.path.string(), "", "expected metres and z up: " + stock.stand.doubt);
   const PointBlocks blocks = blocks_of(stock.stand.cloud);
   {
     const ScopedTimer timer(times, "inventory");
-    stock.inventory = take_inventory(blocks, request.config, progress,
-                                     stock.of_run ? seen_in_run(request.cloud) : SeenTest());
+    stock.inventory = request.slice
+                          ? take_slice(blocks, request.config, progress)
+                          : take_inventory(blocks, request.config, progress,
+                                           stock.of_run ? seen_in_run(request.cloud) : SeenTest());
   }
   const ScopedTimer timer(times, "writing");
   polled(blocks, progress)([&](std::span<const Eigen::Vector3d> points) {
     add_to_picture(stock.picture, points, stock.inventory.ground, stock.frames.drawing());
   });
-  if (stock.of_run) {
+  if (request.slice) {
+    write_slice_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
+  } else if (stock.of_run) {
     write_inventory_files(results, stock.inventory, stock.frames.layers);
   } else {
     write_inventory_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
@@ -263,9 +293,10 @@ void describe(const InventoryRequest& request, const Stock& stock, const Log& lo
   documents.count("trees", inventory.trees.size());
   documents.summary().quality["area_m2"] = inventory.area_m2;
   documents.summary().quality["ground_measured_share"] = inventory.ground.measured_share;
-  judge(inventory, request, stock.of_run, log, documents);
-  if (!stock.stand.doubt.empty()) documents.inherit({RunStatus::kUntrusted, {stock.stand.doubt}});
-  if (!stock.stand.suspicion.empty() && !stock.of_run)
+  judge(stock, request, log, documents);
+  if (!stock.stand.doubt.empty() && !request.slice)
+    documents.inherit({RunStatus::kUntrusted, {stock.stand.doubt}});
+  if (!stock.stand.suspicion.empty() && !stock.of_run && !request.slice)
     documents.inherit({RunStatus::kUntrusted, {stock.stand.suspicion}});
   documents.inherit(trust_of_run(request.cloud, true));
   for (const std::string& remark : inventory.remarks)

@@ -18,6 +18,7 @@ struct InventoryRequest {
   std::filesystem::path run_folder;
   bool overwrite = false;  // what an earlier run left in the folder
   CloudFrame frame;
+  bool slice = false;  // the cloud is one thin cut near breast height: only diameters and places
   std::string coordinate_system;  // of a cloud that names none: "EPSG:3067" or WKT; empty: unknown
   InventoryConfig config;
   ConfigRecord config_record;  // for run.json
