@@ -78,18 +78,6 @@ inline std::uint32_t VoxelFilter::find_or_add(std::uint64_t key, std::uint32_t i
   return voxel;
 }
 
-inline VoxelFilter::Voxel& VoxelFilter::add_point(const Eigen::Vector3f& point, std::uint64_t key,
-                                                  std::uint32_t index) {
-  const std::uint32_t found = find_or_add(key, index, point);
-  voxel_of_point_[index] = found;
-  Voxel& voxel = voxels_[found];
-  voxel.sum[0] += point.x() - voxel.origin[0];
-  voxel.sum[1] += point.y() - voxel.origin[1];
-  voxel.sum[2] += point.z() - voxel.origin[2];
-  ++voxel.count;
-  return voxel;
-}
-
 // `note(voxel, index)` is told of each point that fell into a voxel.
 template <typename InRange, typename Note>
 void VoxelFilter::sort_into_voxels(const Points& points, double voxel_size_m,
@@ -107,9 +95,21 @@ void VoxelFilter::sort_into_voxels(const Points& points, double voxel_size_m,
                                   voxel_floor(p.z() * scale));
       __builtin_prefetch(slots_.data() + (voxel_hash(keys[i - begin]) & mask_));
     }
+    // Found first and added to then: the memory of the voxels is asked for in between.
     for (std::size_t i = begin; i < end; ++i) {
       const auto index = static_cast<std::uint32_t>(i);
-      if (in_range(index)) note(add_point(points[i], keys[i - begin], index), index);
+      if (!in_range(index)) continue;
+      voxel_of_point_[i] = find_or_add(keys[i - begin], index, points[i]);
+      __builtin_prefetch(voxels_.data() + voxel_of_point_[i]);
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      if (voxel_of_point_[i] == kNone) continue;
+      Voxel& voxel = voxels_[voxel_of_point_[i]];
+      voxel.sum[0] += points[i].x() - voxel.origin[0];
+      voxel.sum[1] += points[i].y() - voxel.origin[1];
+      voxel.sum[2] += points[i].z() - voxel.origin[2];
+      ++voxel.count;
+      note(voxel, static_cast<std::uint32_t>(i));
     }
   }
 }

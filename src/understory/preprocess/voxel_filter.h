@@ -62,7 +62,6 @@ class VoxelFilter {
   template <typename InRange, typename Note>
   void sort_into_voxels(const Points& points, double voxel_size_m, const InRange& in_range,
                         const Note& note);
-  Voxel& add_point(const Eigen::Vector3f& point, std::uint64_t key, std::uint32_t index);
   void choose_nearest_to_mean(const Points& points);
 
   std::vector<Slot> slots_;
