@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numbers>
 
+#include "understory/geometry/matrix_inverse.h"
+
 namespace understory {
 namespace {
 
@@ -44,7 +46,7 @@ std::vector<Pose> refine_first_keyframes(
   for (std::size_t i = count; i-- > 0;) {
     const auto cloud = points(i);
     const Pose guess = moved * segment[i].world_from_body;
-    const PosePrior prior{guess, segment[i + 1].covariance.inverse()};
+    const PosePrior prior{guess, inverse_matrix(segment[i + 1].covariance)};
     const RegistrationResult match =
         map.snapshot()->match(*cloud, guess, {prior}, MatchStart::kNear);
     result[i] = is_acceptable(match, guess, config) ? match.target_from_source : guess;

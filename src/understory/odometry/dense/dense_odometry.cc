@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/odometry/imu/imu_smoother.h"
 #include "understory/odometry/odometry_constants.h"
 
@@ -139,7 +140,8 @@ void DenseOdometry::match(const MatchTarget& local_map, const NavState& predicte
   PoseTerms terms;
   if (config.prior_weight > 0.0) {
     const Matrix6d loose = predicted.pose_covariance + 1e-9 * Matrix6d::Identity();
-    terms.push_back(PosePrior{predicted.world_from_body, config.prior_weight * loose.inverse()});
+    terms.push_back(
+        PosePrior{predicted.world_from_body, config.prior_weight * inverse_matrix(loose)});
   }
   estimate.match = local_map.match(estimate.thinned.points, predicted.world_from_body, terms,
                                    far ? MatchStart::kFar : MatchStart::kNear);
