@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <string_view>
 #include <type_traits>
 
@@ -155,15 +156,29 @@ struct RelativeTimes {
   }
 };
 
+// First and last of the points' times, relative to the header stamp.
+struct TimeRange {
+  TimeNs first = std::numeric_limits<TimeNs>::max();
+  TimeNs last = std::numeric_limits<TimeNs>::min();
+
+  void add(TimeNs time) {
+    first = std::min(first, time);
+    last = std::max(last, time);
+  }
+};
+
 // Makes the scan begin at its first point. Where that lies just behind the header stamp, the stamp
 // itself is kept: it is the start of the revolution, in which the first beams may have missed.
-void count_from_first(const std::vector<TimeNs>& relative, TimeNs header, Scan& scan) {
-  const auto [first, last] = std::minmax_element(relative.begin(), relative.end());
-  const bool keep = *first >= 0 && *first <= (*last - *first) / 4;
-  const TimeNs start = keep ? 0 : *first;
-  scan.stamp = header + start;
-  for (std::size_t i = 0; i < relative.size(); ++i)
-    scan.points[i].t_ns = static_cast<std::uint32_t>(relative[i] - start);
+// Until now the points hold the last 32 bits of their times relative to the header stamp.
+void count_from_first(const TimeRange& times, TimeNs header, Scan& scan) {
+  const bool keep = times.first >= 0 && times.first <= (times.last - times.first) / 4;
+  if (keep) {
+    scan.stamp = header;
+    return;
+  }
+  scan.stamp = header + times.first;
+  for (ScanPoint& point : scan.points)
+    point.t_ns -= static_cast<std::uint32_t>(times.first);
 }
 
 }  // namespace
@@ -255,10 +270,9 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
     relative_time.foreign_start =
         raw_time_to_ns(measure_times(cloud, layout, 0).low, convention.unit_s);
 
-  std::vector<TimeNs> relative;
+  TimeRange times;
   const std::size_t most = cloud.point_step > 0 ? cloud.data.size() / cloud.point_step : 0;
   scan.points.reserve(most);
-  relative.reserve(scan.has_point_times ? most : 0);
   std::uint16_t highest_ring = 0;
   const PositionReader read_position(layout);
   const SlotReader<float, FieldType::kFloat32> read_intensity(layout.intensity());
@@ -275,7 +289,8 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
         ++result.bad_times;
         return;
       }
-      relative.push_back(time);
+      times.add(time);
+      point.t_ns = static_cast<std::uint32_t>(time);
     }
     if (layout.intensity().size > 0) {
       const float intensity = read_intensity(raw);
@@ -288,7 +303,8 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
     highest_ring = std::max(highest_ring, point.ring);
     scan.points.push_back(point);
   });
-  if (!relative.empty()) count_from_first(relative, cloud.header.stamp, scan);
+  if (scan.has_point_times && !scan.points.empty())
+    count_from_first(times, cloud.header.stamp, scan);
   if (layout.has_ring()) scan.ring_count = highest_ring + 1;
   if (rows_are_rings) scan.ring_count = static_cast<int>(cloud.height);
   return result;
