@@ -9,7 +9,7 @@ import sys
 import numpy as np
 
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("t", "<u4"),
-                  ("ring", "<u2"), ("return_index", "u1"), ("reserved", "u1")])
+                  ("ring", "<u2"), ("return_index", "u1"), ("tag", "u1")])
 DATA = pathlib.Path(os.environ["UNDERSTORY_DATA"]) / "drivers"
 
 

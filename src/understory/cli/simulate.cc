@@ -135,7 +135,9 @@ int simulate(const SimulateOptions& options, CommandContext& context) {
     FieldLogWriter writer(outputs.part(), simulator.site(), simulator.rig());
     whole = write_events(simulator, writer, context);
   } else {
-    McapWriter writer(outputs.part());
+    McapWriterOptions as_driver;
+    as_driver.livox = simulator.site().lidar.model == "Mid-360";
+    McapWriter writer(outputs.part(), as_driver);
     writer.set_rig(simulator.rig());
     whole = write_events(simulator, writer, context);
   }

@@ -34,6 +34,8 @@ class Surveyor {
     switch (topic.role) {
       case TopicRole::kCloud:
         return add_cloud(topic, reader, message.log_time);
+      case TopicRole::kLivox:
+        return add_livox(topic, decode_livox(reader), message.log_time);
       case TopicRole::kVelodynePackets:
         return add_packets(topic, decode_velodyne_scan(reader));
       case TopicRole::kNebulaPackets:
@@ -80,6 +82,7 @@ class Surveyor {
     if (is_new) {
       survey_.topics.emplace_back();
       survey_.topics.back().topic = channel.topic;
+      survey_.topics.back().type = channel.type;
       survey_.topics.back().role = role_of(channel);
     }
     return survey_.topics[at->second];
@@ -87,7 +90,22 @@ class Surveyor {
 
   static void add_cloud(TopicSurvey& topic, const MessageReader& reader, TimeNs log_time) {
     const auto cloud = decode_point_cloud2(reader);
-    if (!cloud) return;
+    if (cloud) add_cloud(topic, *cloud, log_time);
+  }
+
+  static void add_livox(TopicSurvey& topic, const std::optional<LivoxMessage>& message,
+                        TimeNs log_time) {
+    constexpr std::size_t kMostIds = 16;
+    if (!message) return;
+    add_cloud(topic, message->cloud, log_time);
+    if (topic.livox_ids.size() < kMostIds || topic.livox_ids.count(message->lidar_id) > 0)
+      topic.livox_ids[message->lidar_id] += message->cloud.width + 1;
+    const auto layout = CloudLayout::find(message->cloud);
+    if (layout) topic.lines = std::max(topic.lines, highest_ring(message->cloud, *layout) + 1);
+  }
+
+  static void add_cloud(TopicSurvey& topic, const PointCloud2Message& message, TimeNs log_time) {
+    const PointCloud2Message* cloud = &message;
     const auto layout = CloudLayout::find(*cloud);
     if (!layout) return;
     topic.time_field = layout->time_field();
@@ -150,8 +168,8 @@ std::string short_type(const std::string& type) {
 }
 
 bool is_lidar(TopicRole role) {
-  return role == TopicRole::kCloud || role == TopicRole::kVelodynePackets ||
-         role == TopicRole::kNebulaPackets;
+  return role == TopicRole::kCloud || role == TopicRole::kLivox ||
+         role == TopicRole::kVelodynePackets || role == TopicRole::kNebulaPackets;
 }
 
 // Chooses among the topics that `wanted` accepts: the one named, else that of the highest `score`.
@@ -182,6 +200,9 @@ std::string choose(const MessageSurvey& survey, const std::string& named, const 
 TopicRole role_of(const MessageChannel& channel) {
   static const std::map<std::string, TopicRole> kRoles = {
       {"sensor_msgs/PointCloud2", TopicRole::kCloud},
+      {"livox_ros_driver/CustomMsg", TopicRole::kLivox},
+      {"livox_ros_driver2/CustomMsg", TopicRole::kLivox},
+      {"livox_interfaces/CustomMsg", TopicRole::kLivox},
       {"velodyne_msgs/VelodyneScan", TopicRole::kVelodynePackets},
       {"nebula_msgs/NebulaPackets", TopicRole::kNebulaPackets},
       {"sensor_msgs/Imu", TopicRole::kImu},
@@ -205,6 +226,7 @@ TopicRole role_of(const MessageChannel& channel) {
 const char* role_name(TopicRole role) {
   switch (role) {
     case TopicRole::kCloud:
+    case TopicRole::kLivox:
     case TopicRole::kVelodynePackets:
     case TopicRole::kNebulaPackets:
       return "lidar";

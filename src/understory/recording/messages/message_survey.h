@@ -17,6 +17,7 @@ enum class TopicRole {
   kIgnored,
   kCloud,            // sensor_msgs/PointCloud2
   kVelodynePackets,  // velodyne_msgs/VelodyneScan
+  kLivox,            // CustomMsg of livox_ros_driver, livox_ros_driver2
   kNebulaPackets,    // nebula_msgs/NebulaPackets of a Velodyne
   kImu,
   kMag,
@@ -35,6 +36,7 @@ enum class TopicRole {
 // What the first seconds of a recording say of one topic.
 struct TopicSurvey {
   std::string topic;
+  std::string type;
   TopicRole role = TopicRole::kIgnored;
   std::string frame;  // of most of its data
   std::uint64_t messages = 0;
@@ -44,6 +46,8 @@ struct TopicSurvey {
   std::string time_type;
   std::map<std::string, std::uint64_t> frames;            // points (IMU: messages) of each
   std::map<std::string, std::vector<CloudTimes>> clouds;  // of PointCloud2, by frame
+  int lines = 0;                                          // of a Livox
+  std::map<int, std::uint64_t> livox_ids;                 // points of each lidar_id
   std::vector<TimeNs> delays;                             // log time - stamp
   double specific_force_sum = 0.0;                        // of norms, as they come
   bool late = false;                                      // first seen behind the start

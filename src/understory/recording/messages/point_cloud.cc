@@ -24,6 +24,7 @@ constexpr std::string_view kTimeNames[] = {
     "timestamps", "rel_time",    "relative_time",   "stamp",       "t_offset",
     "ts",         "gps_time",    "timestamp_offset"};
 constexpr std::string_view kReturnNames[] = {"return_index"};
+constexpr std::string_view kTagNames[] = {"tag"};
 
 template <typename Result, typename T>
 Result load(const std::uint8_t* raw, bool swap) {
@@ -196,6 +197,7 @@ std::optional<CloudLayout> CloudLayout::find(const PointCloud2Message& cloud) {
   take(kIntensityNames, layout.intensity_);
   take(kRingNames, layout.ring_);
   take(kReturnNames, layout.return_index_);
+  take(kTagNames, layout.tag_);
   layout.time_name_ = take(kTimeNames, layout.time_);
   if (layout.x_.size == 0 || layout.y_.size == 0 || layout.z_.size == 0) return std::nullopt;
   return layout;
@@ -242,6 +244,15 @@ CloudTimes measure_times(const PointCloud2Message& cloud, const CloudLayout& lay
   return times;
 }
 
+int highest_ring(const PointCloud2Message& cloud, const CloudLayout& layout) {
+  int highest = -1;
+  if (!layout.has_ring()) return highest;
+  for_each_point(cloud, [&](const std::uint8_t* raw, std::size_t) {
+    highest = std::max(highest, static_cast<int>(to_ring(layout.ring().read(raw))));
+  });
+  return highest;
+}
+
 ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout& layout,
                              const TimeConvention& convention) {
   ConvertedCloud result;
@@ -275,6 +286,7 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
         ++result.bad_times;
         return;
       }
+      if (!relative.empty() && time < relative.back()) ++result.backward_times;
       relative.push_back(time);
     }
     if (layout.intensity().size > 0) {
@@ -285,6 +297,8 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
     if (rows_are_rings) point.ring = static_cast<std::uint16_t>(row);
     if (layout.return_index().size > 0)
       point.return_index = static_cast<std::uint8_t>(to_ring(layout.return_index().read(raw)));
+    if (layout.tag().size > 0)
+      point.tag = static_cast<std::uint8_t>(to_ring(layout.tag().read(raw)));
     highest_ring = std::max(highest_ring, point.ring);
     scan.points.push_back(point);
   });

@@ -76,7 +76,35 @@ LidarModel vlp_16(const LidarConfig& config) {
   return model;
 }
 
+// Four lines from -7 to 52 degrees and 200 000 points a second (Mid-360 User Manual v1.2,
+// "Specifications"). Livox publishes no equation of the pattern. This one stands in for it: one
+// turn a frame, and a golden share of a swing left over from turn to turn, so that swings of later
+// turns fall between those of earlier ones.
+LidarModel mid_360(const LidarConfig& config) {
+  constexpr int kLines = 4;
+  constexpr double kSwingsPerTurn = 17.0 + 0.6180339887498949;
+  LidarModel model;
+  model.revolution_ns = 1e9 / config.rate_hz;
+  model.firing_ns = 20000.0;
+  model.swing_hz = config.rate_hz * kSwingsPerTurn;
+  model.swing_low_rad = -7.0 * kDegree;
+  model.swing_high_rad = 52.0 * kDegree;
+  // Up and down strokes are half a swing's turn apart, and the lines share that angle.
+  const double apart = kTau / (2.0 * kSwingsPerTurn * kLines);
+  for (int i = 0; i < kLines; ++i)
+    model.beams.push_back({0.0, apart * (i - 1.5), 0.0, static_cast<std::uint16_t>(i)});
+  model.beams_at_once = true;
+  return model;
+}
+
 }  // namespace
+
+double LidarModel::elevation(std::size_t beam, double time_ns) const {
+  if (!swings()) return beams[beam].elevation_rad;
+  const double swung = time_ns * 1e-9 * swing_hz;
+  const double share = std::abs(2.0 * (swung - std::floor(swung)) - 1.0);
+  return swing_low_rad + share * (swing_high_rad - swing_low_rad);
+}
 
 double LidarModel::azimuth(double time_ns) const {
   const double turns = time_ns / revolution_ns;
@@ -101,6 +129,7 @@ LidarModel make_lidar_model(const LidarConfig& config) {
   if (config.model == "VLP-16") model = vlp_16(config);
   if (config.model == "RS-16") model = rs_16(config);
   if (config.model == "HDL-64") model = hdl_64(config);
+  if (config.model == "Mid-360") model = mid_360(config);
   if (config.model == "OS0-128") {
     model = ouster(config, {128, 45.0, {11.1, 3.7, -3.7, -11.1}, 0.02767});
   }

@@ -8,6 +8,7 @@
 #include "understory/simulation/carrier/carrier.h"
 #include "understory/simulation/carrier/machine.h"
 #include "understory/simulation/scene/scene.h"
+#include "understory/simulation/sensors/beam_directions.h"
 #include "understory/simulation/sensors/beam_echo.h"
 #include "understory/simulation/sensors/counter_noise.h"
 #include "understory/simulation/sensors/lidar_model.h"
@@ -65,6 +66,7 @@ class Scanner {
   void make_rays(double moment_s, Block& block) const;
   void look_out(const Look& look, std::int64_t firing, std::pair<std::size_t, std::size_t> range,
                 const std::uint32_t* slots, std::vector<Ray>& rays) const;
+  [[nodiscard]] const BeamDirections& directions(std::int64_t firing, BeamDirections& swung) const;
   [[nodiscard]] std::vector<std::uint32_t> trace_order() const;
   void find_slots(std::size_t firings, Block& block) const;
   void meet_machine(Block& block) const;
@@ -80,15 +82,7 @@ class Scanner {
   std::uint64_t seed_;
   LidarModel model_;
   Pose body_from_lidar_;
-  // Directions of the beams at azimuth 0 of the head, and level ones to the left of each.
-  struct Directions {
-    [[nodiscard]] Eigen::Vector3d direction(std::size_t beam) const {
-      return {x[beam], y[beam], z[beam]};
-    }
-    std::vector<double> x, y, z;
-    std::vector<float> near_x, near_y, near_z, near_side_x, near_side_y;  // for casting
-  };
-  Directions beams_;
+  BeamDirections beams_;  // of a lidar whose beams keep their elevations
   // The beams of a full block (firing by firing, beam by beam), those together that look in nearly
   // the same direction.
   std::vector<std::uint32_t> order_;
