@@ -20,10 +20,10 @@ def skip_without(path):
     return path
 
 
-def read_scans(recording):
+def read_scans(recording, *metadata):
     """[(stamp in ns, points)]"""
     program = pathlib.Path(os.environ["UNDERSTORY_BUILD"]) / "tests" / "dump_scans"
-    raw = subprocess.run([program, recording], check=True, stdout=subprocess.PIPE).stdout
+    raw = subprocess.run([program, recording, *metadata], check=True, stdout=subprocess.PIPE).stdout
     scans, at = [], 0
     while at < len(raw):
         stamp, count = struct.unpack_from("<qQ", raw, at)

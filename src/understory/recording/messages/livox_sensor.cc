@@ -44,7 +44,7 @@ std::optional<LivoxSensor> livox_sensor(const TopicSurvey& lidar) {
   if (lidar.role != TopicRole::kLivox || lidar.type.rfind(kSecondDriver, 0) != 0 ||
       lidar.lines > kMid360Lines)
     return std::nullopt;
-  return LivoxSensor{"Mid-360", Pose(Eigen::Quaterniond::Identity(), {0.011, 0.02329, -0.04412})};
+  return LivoxSensor{"Mid-360", mid360_lidar_from_imu()};
 }
 
 std::optional<int> busiest_livox(const TopicSurvey& lidar) {
@@ -60,6 +60,11 @@ std::optional<int> busiest_livox(const TopicSurvey& lidar) {
 
 void warn_of_unread_lidars(const MessageSurvey& survey, const std::string& file, Log& log) {
   for (const TopicSurvey& topic : survey.topics) {
+    if (!topic.unread.empty())
+      log.warn("recording.unread_lidar", file + ": " + topic.topic + ": packets of " +
+                                             topic.unread +
+                                             " are not read: replay them through "
+                                             "the sensor's driver and record its PointCloud2");
     if (topic.role != TopicRole::kIgnored) continue;
     const std::string_view way = way_around(topic.type);
     if (way.empty()) continue;

@@ -12,6 +12,12 @@ namespace understory {
 // Types of messages of livox_ros_driver2 begin so.
 inline constexpr const char* kSecondDriver = "livox_ros_driver2/";
 
+// The IMU of a Mid-360 in the frame of its points: (11.0, 23.29, -44.12) mm, axes parallel (Mid-360
+// User Manual v1.2, "Coordinates").
+[[nodiscard]] inline Pose mid360_lidar_from_imu() {
+  return {Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.011, 0.02329, -0.04412)};
+}
+
 // What is known of the Livox that sends a topic of CustomMsg.
 struct LivoxSensor {
   std::string model;    // "Mid-360"

@@ -6,6 +6,7 @@ namespace understory {
 namespace {
 
 constexpr std::size_t kVelodynePacketBytes = 1206;
+constexpr std::size_t kPandarPacketBytes = 1500;
 constexpr std::size_t kLivoxPointBytes = 19;
 constexpr std::size_t kLivoxCdrStep = 20;  // a point begins at a multiple of four bytes
 
@@ -277,6 +278,39 @@ std::optional<PacketsMessage> decode_nebula_packets(MessageReader reader) {
     SensorPacket packet;
     packet.stamp = read_time(reader);
     packet.data = reader.byte_sequence();
+    message.packets.push_back(packet);
+  }
+  if (!reader.ok()) return std::nullopt;
+  return message;
+}
+
+std::optional<PacketsMessage> decode_pandar_scan(MessageReader reader) {
+  PacketsMessage message;
+  message.header = read_header(reader);
+  const auto count = reader.length(8 + kPandarPacketBytes + 4);
+  message.packets.reserve(count);
+  for (std::uint32_t i = 0; i < count && reader.ok(); ++i) {
+    SensorPacket packet;
+    packet.stamp = read_time(reader);
+    packet.data = reader.take(kPandarPacketBytes);
+    const auto size = reader.get<std::uint32_t>();
+    if (size < packet.data.size()) packet.data = packet.data.first(size);
+    message.packets.push_back(packet);
+  }
+  if (!reader.ok()) return std::nullopt;
+  return message;
+}
+
+std::optional<PacketsMessage> decode_hesai_frame(MessageReader reader) {
+  PacketsMessage message;
+  message.header = read_header(reader);
+  const auto count = reader.length(16);
+  for (std::uint32_t i = 0; i < count && reader.ok(); ++i) {
+    SensorPacket packet;
+    packet.stamp = read_time(reader);
+    packet.data = reader.byte_sequence();
+    const auto size = reader.get<std::uint32_t>();
+    if (size < packet.data.size()) packet.data = packet.data.first(size);
     message.packets.push_back(packet);
   }
   if (!reader.ok()) return std::nullopt;

@@ -83,7 +83,7 @@ struct LivoxMessage {
   std::uint8_t lidar_id = 0;
 };
 
-// velodyne_msgs/VelodyneScan and nebula_msgs/NebulaPackets: packets as the sensor sent them.
+// VelodyneScan, NebulaPackets, PandarScan and UdpFrame: packets as the sensor sent them.
 struct SensorPacket {
   TimeNs stamp = 0;
   ByteSpan data;
@@ -106,5 +106,9 @@ struct PacketsMessage {
 [[nodiscard]] std::optional<std::vector<TransformMessage>> decode_transforms(MessageReader reader);
 [[nodiscard]] std::optional<PacketsMessage> decode_velodyne_scan(MessageReader reader);
 [[nodiscard]] std::optional<PacketsMessage> decode_nebula_packets(MessageReader reader);
+// pandar_msgs/PandarScan and hesai_lidar/PandarScan: packets of 1500 bytes and their true length.
+[[nodiscard]] std::optional<PacketsMessage> decode_pandar_scan(MessageReader reader);
+// hesai_ros_driver/UdpFrame.
+[[nodiscard]] std::optional<PacketsMessage> decode_hesai_frame(MessageReader reader);
 
 }  // namespace understory

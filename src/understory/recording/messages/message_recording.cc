@@ -55,6 +55,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     for (const TopicSurvey& topic : survey_.topics)
       frame_of_topic_[topic.topic] = topic.frame;
     source_ = open(log_);
+    calibration_file_ = options.metadata_file;
     places_.frames() = frames_of(choice_, survey_);
     clouds_.know_livox(survey_.find(choice_.lidar), places_, survey_.transforms);
     warn_of_unread_lidars(survey_, file_, log_);
@@ -107,7 +108,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     put_events(writer, events_);
     fixes_.save(writer);
     receivers_.save(writer);
-    writer.put(packets_ != nullptr);
+    writer.put(packet_maker_);
     if (packets_) packets_->save(writer);
     writer.put(ended_);
     return true;
@@ -134,7 +135,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
     get_events(reader, events_);
     fixes_.load(reader);
     receivers_.load(reader);
-    if (reader.get<bool>()) packets().load(reader);
+    const auto maker = reader.get_enum(PacketMaker::kHesai);
+    if (maker != PacketMaker::kNone) packets(maker).load(reader);
     ended_ = reader.get<bool>();
   }
 
@@ -219,10 +221,10 @@ class MessageRecording : public Recording, public ArrivalTimes {
         decoded = take_livox(topic, reader, message.log_time);
         break;
       case TopicRole::kVelodynePackets:
-        decoded = take_packets(topic, decode_velodyne_scan(reader));
-        break;
       case TopicRole::kNebulaPackets:
-        decoded = take_packets(topic, decode_nebula_packets(reader));
+      case TopicRole::kPandarPackets:
+      case TopicRole::kHesaiFrames:
+        decoded = take_packets(topic, decode_packets(role, reader));
         break;
       case TopicRole::kImu:
         decoded = take_imu(topic, reader);
@@ -262,6 +264,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
       case TopicRole::kLivox:
       case TopicRole::kVelodynePackets:
       case TopicRole::kNebulaPackets:
+      case TopicRole::kPandarPackets:
+      case TopicRole::kHesaiFrames:
         return adopt(choice_.lidar);
       case TopicRole::kImu:
         return adopt(choice_.imu);
@@ -344,13 +348,11 @@ class MessageRecording : public Recording, public ArrivalTimes {
     return true;
   }
 
-  // The clouds that go with packets: the ROS 1 driver's calibration has the beams' vertical
-  // offsets, that of nebula for ROS 2 has not.
-  PacketTopic& packets() {
+  PacketTopic& packets(PacketMaker maker) {
     if (!packets_) {
-      VelodyneConfig config;
-      config.vertical_offsets = source_->format().rfind("ROS 1", 0) == 0;
-      packets_ = std::make_unique<PacketTopic>(config, file_ + " " + choice_.lidar, log_);
+      packet_maker_ = maker;
+      const bool ros1 = source_->format().rfind("ROS 1", 0) == 0;
+      packets_ = make_packet_topic(maker, {file_, choice_.lidar, ros1, calibration_file_}, log_);
     }
     return *packets_;
   }
@@ -361,7 +363,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
     topic.add_stamp(message->header.stamp);
     topic.report().frame = message->header.frame;
     note_frame(places_.frames().lidar, message->header.frame);
-    topic.report().points += packets().add(*message, events_);
+    if (!packets_ && message->packets.empty()) return true;
+    topic.report().points += packets(packet_maker(*message)).add(*message, events_);
     topic.report().conventions = packets_->conventions();
     if (places_.rig().lidar_model.empty()) places_.rig().lidar_model = packets_->model();
     return true;
@@ -474,6 +477,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
   std::deque<Event> events_;
   std::optional<TimeNs> last_log_time_;  // of the message that the waiting events came with
   FixJoiner fixes_;
+  std::string calibration_file_;  // that the options name
+  PacketMaker packet_maker_ = PacketMaker::kNone;
   std::unique_ptr<PacketTopic> packets_;
   bool ended_ = false;
 };

@@ -6,8 +6,10 @@
 #include <tuple>
 #include <utility>
 
+#include "understory/recording/captures/hesai_tables.h"
 #include "understory/recording/captures/nmea.h"
 #include "understory/recording/messages/message_decode.h"
+#include "understory/recording/messages/packet_topic.h"
 #include "understory/recording/messages/point_cloud.h"
 #include "understory/util/error.h"
 #include "understory/util/files/read_error.h"
@@ -37,9 +39,10 @@ class Surveyor {
       case TopicRole::kLivox:
         return add_livox(topic, decode_livox(reader), message.log_time);
       case TopicRole::kVelodynePackets:
-        return add_packets(topic, decode_velodyne_scan(reader));
       case TopicRole::kNebulaPackets:
-        return add_packets(topic, decode_nebula_packets(reader));
+      case TopicRole::kPandarPackets:
+      case TopicRole::kHesaiFrames:
+        return add_packets(topic, decode_packets(topic.role, reader));
       case TopicRole::kImu:
         return add_imu(topic, reader, message.log_time);
       case TopicRole::kNavSatFix:
@@ -73,10 +76,6 @@ class Surveyor {
   }
 
  private:
-  static bool is_packets(TopicRole role) {
-    return role == TopicRole::kVelodynePackets || role == TopicRole::kNebulaPackets;
-  }
-
   TopicSurvey& topic_of(const MessageChannel& channel) {
     const auto [at, is_new] = index_.try_emplace(channel.topic, survey_.topics.size());
     if (is_new) {
@@ -130,7 +129,9 @@ class Surveyor {
   static void add_packets(TopicSurvey& topic, const std::optional<PacketsMessage>& message) {
     if (!message) return;
     note_frame(topic, message->header.frame, message->packets.size());
-    topic.points += 384 * message->packets.size();  // a Velodyne packet holds as many
+    const bool hesai = packet_maker(*message) == PacketMaker::kHesai;
+    topic.points += (hesai ? 256 : 384) * message->packets.size();  // as many in a packet
+    if (hesai) topic.unread = hesai_kind(message->packets.front().data).other;
   }
 
   static void add_imu(TopicSurvey& topic, const MessageReader& reader, TimeNs log_time) {
@@ -168,8 +169,7 @@ std::string short_type(const std::string& type) {
 }
 
 bool is_lidar(TopicRole role) {
-  return role == TopicRole::kCloud || role == TopicRole::kLivox ||
-         role == TopicRole::kVelodynePackets || role == TopicRole::kNebulaPackets;
+  return role == TopicRole::kCloud || role == TopicRole::kLivox || is_packets(role);
 }
 
 // Chooses among the topics that `wanted` accepts: the one named, else that of the highest `score`.
@@ -205,6 +205,9 @@ TopicRole role_of(const MessageChannel& channel) {
       {"livox_interfaces/CustomMsg", TopicRole::kLivox},
       {"velodyne_msgs/VelodyneScan", TopicRole::kVelodynePackets},
       {"nebula_msgs/NebulaPackets", TopicRole::kNebulaPackets},
+      {"pandar_msgs/PandarScan", TopicRole::kPandarPackets},
+      {"hesai_lidar/PandarScan", TopicRole::kPandarPackets},
+      {"hesai_ros_driver/UdpFrame", TopicRole::kHesaiFrames},
       {"sensor_msgs/Imu", TopicRole::kImu},
       {"sensor_msgs/MagneticField", TopicRole::kMag},
       {"sensor_msgs/NavSatFix", TopicRole::kNavSatFix},
@@ -229,6 +232,8 @@ const char* role_name(TopicRole role) {
     case TopicRole::kLivox:
     case TopicRole::kVelodynePackets:
     case TopicRole::kNebulaPackets:
+    case TopicRole::kPandarPackets:
+    case TopicRole::kHesaiFrames:
       return "lidar";
     case TopicRole::kImu:
       return "imu";

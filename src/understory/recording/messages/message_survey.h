@@ -18,7 +18,9 @@ enum class TopicRole {
   kCloud,            // sensor_msgs/PointCloud2
   kVelodynePackets,  // velodyne_msgs/VelodyneScan
   kLivox,            // CustomMsg of livox_ros_driver, livox_ros_driver2
-  kNebulaPackets,    // nebula_msgs/NebulaPackets of a Velodyne
+  kNebulaPackets,    // nebula_msgs/NebulaPackets
+  kPandarPackets,    // PandarScan of pandar_msgs and hesai_lidar
+  kHesaiFrames,      // hesai_ros_driver/UdpFrame
   kImu,
   kMag,
   kNavSatFix,
@@ -42,6 +44,7 @@ struct TopicSurvey {
   std::uint64_t messages = 0;
   std::uint64_t points = 0;
   std::uint64_t headings = 0;  // sentences with one
+  std::string unread;          // what its packets are of, if of a sensor that is not read
   std::string time_field;
   std::string time_type;
   std::map<std::string, std::uint64_t> frames;            // points (IMU: messages) of each
