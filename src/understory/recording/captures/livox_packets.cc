@@ -322,9 +322,10 @@ void LivoxDecoder::load(BinaryReader& reader) {
   last_imu_ = get_time();
   waiting_.reset();
   if (reader.get<bool>()) {
-    waiting_.emplace();
-    waiting_->bytes = reader.get_vector<std::uint8_t>();
-    waiting_->time = reader.get<TimeNs>();
+    Waiting packet;
+    packet.bytes = reader.get_vector<std::uint8_t>();
+    packet.time = reader.get<TimeNs>();
+    waiting_ = std::move(packet);
   }
   interval_ns_ = reader.get<double>();
   data_type_ = reader.get<std::uint8_t>();
