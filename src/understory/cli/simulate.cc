@@ -93,12 +93,15 @@ void write_event(const Event& event, const Simulator& simulator, McapWriter& wri
 template <typename Writer>
 bool write_events(Simulator& simulator, Writer& writer, CommandContext& context) {
   const double duration = simulator.duration_s();
+  constexpr std::size_t kEventsATime = 1000;  // of a recording without scans
   std::size_t scans = 0;
+  std::size_t others = 0;
   bool stopped = false;
   while (std::optional<Event> event = simulator.next()) {
     write_event(*event, simulator, writer);
-    if (!std::holds_alternative<ScanPtr>(*event)) continue;
-    ++scans;
+    const bool scan = std::holds_alternative<ScanPtr>(*event);
+    if (!scan && (simulator.site().scans || ++others % kEventsATime != 0)) continue;
+    if (scan) ++scans;
     context.progress({"simulating", simulator.progress() * duration, duration, "s of recording",
                       std::to_string(scans) + " scans"});
     stopped = context.stop_requested();

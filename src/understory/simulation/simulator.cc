@@ -67,7 +67,7 @@ class Simulator::Impl : public SimulatedWorld {
     const TimeNs imu_time = site.imu.enabled ? imu.next_stamp() : kNever;
     const TimeNs mag_time = site.mag.enabled ? mag.next_stamp() : kNever;
     const TimeNs fix_time = next_fix ? next_fix->stamp + from_seconds(site.gnss.latency_s) : kNever;
-    const TimeNs scan_time = scanner.end(number_of(scan_number));
+    const TimeNs scan_time = site.scans ? scanner.end(number_of(scan_number)) : kNever;
     const TimeNs first = std::min({imu_time, mag_time, fix_time, scan_time});
     if (first >= end) return false;
     if (imu_time == first) {
@@ -142,6 +142,7 @@ class Simulator::Impl : public SimulatedWorld {
 
   // Keeps the biases of the scans that began before a sample.
   void note_biases(TimeNs stamp) {
+    if (!site.scans) return;
     while (scanner.stamp(number_of(static_cast<std::int64_t>(biases.size()))) <= stamp)
       biases.emplace_back(imu.gyro_bias(), imu.accel_bias());
   }
@@ -221,7 +222,7 @@ class Simulator::Impl : public SimulatedWorld {
           Pose(Eigen::Quaterniond::Identity(), rig.body_from_gnss->translation() + line);
       rig.second_gnss_extrinsic_source = "simulation";
     }
-    rig.lidar_model = site.lidar.model;
+    if (site.scans) rig.lidar_model = site.lidar.model;
     if (rig.lidar_model.rfind("OS", 0) == 0) rig.lidar_model.insert(2, "-");
     rig.lidar_extrinsic_source = "simulation";
     if (site.imu.enabled) rig.imu_extrinsic_source = "simulation";
@@ -279,7 +280,7 @@ const Rig& Simulator::rig() const {
 
 std::vector<TopicReport> Simulator::topics() const {
   const SiteConfig& site = impl_->site;
-  const bool present[] = {true, site.imu.enabled, site.gnss.enabled, site.mag.enabled};
+  const bool present[] = {site.scans, site.imu.enabled, site.gnss.enabled, site.mag.enabled};
   std::vector<TopicReport> reports;
   for (std::size_t i = 0; i < impl_->reports.size(); ++i) {
     if (present[i]) reports.push_back(impl_->reports[i]);
@@ -288,8 +289,8 @@ std::vector<TopicReport> Simulator::topics() const {
 }
 
 std::string Simulator::format() const {
-  return "simulation (" + impl_->site.lidar.model + ", seed " + std::to_string(impl_->site.seed) +
-         ")";
+  const std::string lidar = impl_->site.scans ? impl_->site.lidar.model : "no lidar";
+  return "simulation (" + lidar + ", seed " + std::to_string(impl_->site.seed) + ")";
 }
 
 double Simulator::progress() const {

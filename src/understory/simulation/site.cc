@@ -110,7 +110,7 @@ void describe_stand(ConfigTable& table, StandConfig& c) {
 
 void describe_carrier(ConfigTable& table, CarrierConfig& c) {
   table.section("carrier", [&] {
-    table.add_choice("kind", c.kind, {"walk", "harvester", "uav", "sleigh"},
+    table.add_choice("kind", c.kind, {"walk", "harvester", "uav", "sleigh", "still"},
                      "how the sensors are carried");
     table.add_choice("body", c.body, {"imu", "base_link"}, "frame whose path is planned");
     table.add("length_m", c.length_m, {1.0, 5000.0}, "m", "of the route");
@@ -326,6 +326,9 @@ void check_site(const SiteConfig& site) {
   if (site.carrier.narrow_from > site.carrier.narrow_to) {
     problems.push_back("carrier: narrow_from is larger than narrow_to");
   }
+  if (site.carrier.kind == "still" && site.duration_s <= 0.0) {
+    problems.push_back("carrier: kind still needs duration_s");
+  }
   if (site.carrier.work == "thinning" && site.carrier.route_time_s <= 0.0) {
     problems.push_back("carrier: work thinning needs route_time_s");
   }
@@ -336,6 +339,7 @@ void check_site(const SiteConfig& site) {
 
 void describe(ConfigTable& table, SiteConfig& config) {
   describe_scanned(table, config);
+  table.add("scans", config.scans, "whether there is a lidar");
   table.section("receiver_hold", [&] {
     table.add("below_m_s", config.receiver_hold.below_m_s, {0.0, 100.0}, "m/s",
               "speed below which the GNSS receiver holds its position, 0 = never");

@@ -248,6 +248,7 @@ struct HeadLogConfig {  // what a harvester's computer notes at each felling cut
 struct SiteConfig {
   int seed = 1;
   double duration_s = 0.0;  // 0: as long as the route takes
+  bool scans = true;        // false: no lidar, the other sensors alone
   OriginConfig origin;
   TerrainConfig terrain;
   StandConfig stand;
