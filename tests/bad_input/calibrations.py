@@ -1,6 +1,7 @@
 """`understory calibrate` on good recordings and on such as tell nothing: exit codes, files, and what is said."""
 
 import csv
+import json
 
 from program import Cases, program, snapshot
 
@@ -48,6 +49,37 @@ def refusals(folder):
     assert program("calibrate").returncode == 2
     assert snapshot(folder) == before
     return "nothing"
+
+
+@cases.case("an IMU is found on the lidar of a walk")
+def lidar_imu(folder):
+    walk, rig = folder / "walk.mcap", folder / "rig"
+    words = [word for setting in ("lidar.model=VLP-16", "carrier.still_s=1", "carrier.turn_interval_s=3",
+                                  "stand.size_x_m=60", "stand.size_y_m=60", "imu.time_offset_s=0.02",
+                                  "gnss.enabled=false") for word in ("--set", setting)]
+    assert program("simulate", "demo", "-o", walk, "--duration-s", "20", *words).returncode == 0
+    before = snapshot(folder)
+    done = program("calibrate", "lidar-imu", walk, "-o", rig, "--path", walk)
+    assert done.returncode == 3, done  # no trajectory
+    assert snapshot(folder) == before
+    done = program("calibrate", "lidar-imu", walk, "-o", rig)
+    assert done.returncode in (0, 4), done
+    assert sorted(path.name for path in rig.iterdir()) == ["calibration.json", "extrinsics.yaml", "path.tum"]
+    found = json.loads((rig / "calibration.json").read_text())
+    assert abs(found["imu_late_s"] - 0.02) < 0.005, found
+    assert len(found["covariance"]) == 7
+    assert program("info", walk, "--extrinsics", rig / "extrinsics.yaml").returncode == 0
+    return done.stdout
+
+
+@cases.case("what tells nothing of lidar and IMU is refused")
+def no_lidar_imu(folder):
+    for recording, said in ((f"{STILL}&duration_s=20", "lidar"),
+                            ("sim:demo?lidar.model=VLP-16&duration_s=4&gnss.enabled=false&stand.size_x_m=30"
+                             "&stand.size_y_m=30", "at least 10 s of a path")):
+        done = program("calibrate", "lidar-imu", recording, "-o", folder / "rig")
+        assert done.returncode == 3 and said in done.stderr and not done.stdout, done
+    assert not list(folder.iterdir())
 
 
 cases.run()

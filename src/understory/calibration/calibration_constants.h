@@ -65,4 +65,74 @@ inline constexpr std::size_t kRateIntervals = 1000;
 inline constexpr double kMostLost = 0.02;
 }  // namespace imu_noise_calibration
 
+namespace path_and_imu {  // calibration/lidar_imu/path_and_imu.cc
+// Poses of a run at least [bound: statistics of its frequencies]
+inline constexpr std::size_t kFewestPoses = 30;
+// Poses of a run at most [bound: time, which grows with the square]
+inline constexpr std::size_t kMostPoses = 1000;
+// s between two scans of a run at most [chosen]
+inline constexpr double kLongestStepS = 0.5;
+// Step of a numerical derivative: rad, m, rad/s, m/s^2 [bound: rounding and curvature]
+inline constexpr double kDerivativeStep = 1e-5;
+// s: the same of the lateness [bound: half a sample's interval at 1 kHz]
+inline constexpr double kLatenessStepS = 5e-4;
+}  // namespace path_and_imu
+
+namespace coloured_fit {  // calibration/lidar_imu/coloured_fit.cc
+// Frequencies to each side over which the power of the errors is averaged [chosen: 60 numbers of
+// three axes make a mean good to 13 %]
+inline constexpr std::int64_t kReach = 10;
+// Rounds of the fit of the law of the errors [bound: shares change by less than 1 % after these]
+inline constexpr int kLawRounds = 3000;
+// Power of errors at least: a signal without errors has no information beyond [bound: rounding]
+inline constexpr double kLeastPower = 1e-24;
+}  // namespace coloured_fit
+
+namespace lidar_imu_calibration {  // calibration/lidar_imu/lidar_imu_calibration.cc
+// s of path with samples at least [chosen]
+inline constexpr double kShortestPathS = 10.0;
+// Rounds of the fit at most [bound: time]
+inline constexpr int kMostFitRounds = 30;
+// Standard deviations of the last step of a fit [chosen: far below the errors]
+inline constexpr double kConvergedSigmas = 0.01;
+// s of lateness beside the given one at most [chosen]
+inline constexpr double kMostLatenessS = 0.3;
+// s to each side of the given lateness that are searched first [chosen]
+inline constexpr double kSearchS = 0.25;
+// s from one searched lateness to the next [bound: the fit converges from tens of milliseconds]
+inline constexpr double kSearchStepS = 0.025;
+// rad^2 about the second axis, sum over all steps: less turning is not searched [bound: noise of
+// scan matching, 0.1 degrees over 1000 steps, is 0.003]
+inline constexpr double kEnoughTurning = 0.01;
+// rad: standard deviation of the given rotation in the fit [chosen: weak]
+inline constexpr double kGivenRotation = 0.5;
+// m: the same of the place [chosen: weak]
+inline constexpr double kGivenPlaceM = 2.0;
+// s: the same of the lateness [chosen: weak]
+inline constexpr double kGivenLatenessS = 0.1;
+// rad/s: the same of the gyroscope's bias, about 0 [bound: data sheets of MEMS gyroscopes]
+inline constexpr double kGivenGyroBias = 0.06;
+// m/s^2: the same of the accelerometer's bias [bound: data sheets of MEMS accelerometers]
+inline constexpr double kGivenAccelBias = 0.3;
+// m/s^2: the same of gravity, each axis [chosen: weak, its direction is that of the path's frame]
+inline constexpr double kGivenGravity = 1.0;
+// Standard deviation of scale and axes of gyroscope and accelerometer, each entry [bound: data
+// sheets of calibrated MEMS IMUs tell 0.03 to 0.05 degrees and 0.05 to 0.1 %]
+inline constexpr double kGivenAxes = 5e-4;
+// Standard deviation of the bends of a path [tuned: handheld, seeds 0, 1, 19: -0.09]
+inline constexpr double kGivenBend = 0.2;
+// rad: standard deviation beyond which a rotation is not told by the recording [chosen: 1 degree]
+inline constexpr double kMostRotation = 0.01745;
+// m: the same of the place [chosen]
+inline constexpr double kMostPlaceM = 0.1;
+// s: the same of the lateness [chosen]
+inline constexpr double kMostLatenessSdS = 0.005;
+// Times the covariance: errors of real matching are not the same at all times, as the fit takes
+// them to be [tuned: handheld by VLP-16, 60 s, seeds 0, 1, 2, 4, 5, 19: squared errors over the
+// variance were 1.9]
+inline constexpr double kPathsAreWorse = 1.7;
+// Information about what is kept: far above all that a recording tells [bound: rounding]
+inline constexpr double kKept = 1e14;
+}  // namespace lidar_imu_calibration
+
 }  // namespace understory::calibration_constants
