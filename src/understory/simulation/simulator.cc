@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "understory/recording/messages/baseline_headings.h"
 #include "understory/simulation/scene/scan_cache.h"
@@ -16,6 +17,7 @@
 #include "understory/simulation/stand/stand.h"
 #include "understory/simulation/truth.h"
 #include "understory/simulation/world.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -126,6 +128,7 @@ class Simulator::Impl : public SimulatedWorld {
   std::vector<TopicReport> reports;
   TruthLog truths;
   std::unique_ptr<ScanCache> cache;
+  std::function<void(const std::vector<TruePoint>&)> point_sink;
   // Biases at the stamps of scans that are not finished yet.
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> biases;
 
@@ -176,6 +179,7 @@ class Simulator::Impl : public SimulatedWorld {
       ScanReadings readings = measure(number);
       ScanPtr scan = scanner.assemble(number, readings);
       reports[0].points += scan->points.size();
+      if (point_sink) point_sink(scanner.true_points(*scan, readings));
       stems = std::move(readings.stems);
       event = std::move(scan);
     }
@@ -301,6 +305,12 @@ const std::optional<GnssFix>& Simulator::second_fix() const {
   return impl_->second_fix;
 }
 
+void Simulator::tell_points(std::function<void(const std::vector<TruePoint>&)> sink) {
+  UNDERSTORY_CHECK(!impl_->cache);
+  impl_->scanner.keep_sources();
+  impl_->point_sink = std::move(sink);
+}
+
 const SiteConfig& Simulator::site() const {
   return impl_->site;
 }
@@ -331,6 +341,11 @@ std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {
     }
   }
   const SiteConfig site = load_site(parts.site, settings);
+  if (site.truth.points) {
+    throw ConfigError(
+        {"truth.points: only `understory simulate` writes points.laz; simulate a "
+         "recording and map that"});
+  }
   log.debug("simulating " + parts.site);
   if (folder.empty()) return std::make_unique<Simulator>(site);
   return std::make_unique<Simulator>(site, folder, log);

@@ -109,6 +109,8 @@ struct Scanner::Block {
   std::vector<Eigen::Vector3f> origin_in_lidar;     // by firing; only beside a machine
   std::vector<BeamReading> readings;                // by beam
   std::vector<BeamReading> seconds;                 // by beam, if two returns are asked for
+  std::vector<EchoSource> sources;                  // by beam, if asked for
+  std::vector<EchoSource> second_sources;           // by beam, if two returns are asked for too
   std::vector<std::uint64_t> stems;                 // tree << 16 | ring of each return from a stem
 };
 
@@ -231,6 +233,9 @@ ScanReadings Scanner::measure(std::int64_t number) {
   for (const Block& block : blocks) {
     readings.beams.insert(readings.beams.end(), block.readings.begin(), block.readings.end());
     readings.seconds.insert(readings.seconds.end(), block.seconds.begin(), block.seconds.end());
+    readings.sources.insert(readings.sources.end(), block.sources.begin(), block.sources.end());
+    readings.second_sources.insert(readings.second_sources.end(), block.second_sources.begin(),
+                                   block.second_sources.end());
     stems.insert(stems.end(), block.stems.begin(), block.stems.end());
   }
   readings.stems = count_stems(std::move(stems));
@@ -287,6 +292,8 @@ void Scanner::cast_block(double moment_s, Block& block) const {
   block.readings.resize(block.slots.size());
   const bool two = config_.returns == 2;
   if (two) block.seconds.resize(block.readings.size());
+  if (keeps_sources_) block.sources.resize(block.readings.size());
+  if (keeps_sources_ && two) block.second_sources.resize(block.readings.size());
   NoiseRow row(seed_, 0);
   for (std::size_t i = 0; i < block.readings.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;
@@ -301,12 +308,16 @@ void Scanner::cast_block(double moment_s, Block& block) const {
       meet_snow(CounterNoise(seed_ + 6, firing, i % beams), snow_per_m(time), echo);
       if (two && echo.surface == Surface::kSnow) second = behind;
     }
+    if (keeps_sources_) {
+      block.sources[i] = {echo.tree, echo.surface};
+      if (two) block.second_sources[i] = {second.tree, second.surface};
+    }
     if (second.surface != Surface::kNone) {
       block.seconds[i] = read_echo(second, config_, CounterNoise(seed_ + 5, firing, i % beams));
     }
     if (echo.surface == Surface::kNone) continue;
     block.readings[i] = read_echo(echo, config_, row.at(i % beams));
-    if (echo.tree > 0 && block.readings[i].range_m > 0.0F) {
+    if (echo.surface == Surface::kStem && echo.tree > 0 && block.readings[i].range_m > 0.0F) {
       block.stems.push_back(static_cast<std::uint64_t>(echo.tree) << 16 |
                             model_.beams[i % beams].ring);
     }
@@ -357,6 +368,7 @@ void Scanner::add_ghosts(Block& block) const {
       const double range = config_.min_range_m + noise.uniform() * 0.6 * config_.max_range_m;
       block.readings[i] = {std::round(static_cast<float>(range) / step) * step,
                            std::round(1.0F + 12.0F * noise.uniform())};
+      if (keeps_sources_) block.sources[i] = {};
       continue;
     }
     const bool blooms = noise.uniform() < config_.blooming;
@@ -365,8 +377,9 @@ void Scanner::add_ghosts(Block& block) const {
       if (other >= real.size() || other / group != i / group) continue;
       if (real[other].intensity < kGlaring) continue;
       const bool behind = real[i].range_m <= 0.0F || real[i].range_m > real[other].range_m + 0.3F;
-      if (behind)
-        block.readings[i] = {real[other].range_m, std::round(0.3F * real[other].intensity)};
+      if (!behind) continue;
+      block.readings[i] = {real[other].range_m, std::round(0.3F * real[other].intensity)};
+      if (keeps_sources_) block.sources[i] = {};
     }
   }
 }

@@ -22,12 +22,29 @@ struct StemReturns {
   int returns = 0;
 };
 
+// What gave an echo. Nothing: a ghost.
+struct EchoSource {
+  std::int32_t tree = 0;  // id of the tree, by its stem or its crown; 0 for anything else
+  Surface surface = Surface::kNone;
+};
+
+// A point of a scan where it really lies, but for the errors of the lidar itself.
+struct TruePoint {
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // world frame
+  TimeNs stamp = 0;                                 // as recorded
+  float intensity = 0.0F;
+  EchoSource source;
+};
+
 // What the beams of one scan measured, firing by firing and beam by beam in the order of the model.
 struct ScanReadings {
   std::vector<BeamReading> beams;
   std::vector<BeamReading>
       seconds;                     // the weaker of two echoes, beam by beam; empty if not asked for
   std::vector<StemReturns> stems;  // by increasing id
+  // Of the beams and of the weaker echoes; empty if not asked for (keep_sources).
+  std::vector<EchoSource> sources;
+  std::vector<EchoSource> second_sources;
 };
 
 // A scan and which stems its returns came from.
@@ -53,6 +70,12 @@ class Scanner {
   [[nodiscard]] SimulatedScan cast(std::int64_t scan);
   // The two halves of `cast`: what the beams measure, and the points that follow from it.
   [[nodiscard]] ScanReadings measure(std::int64_t scan);
+  // From now on `measure` tells what gave each echo.
+  void keep_sources() { keeps_sources_ = true; }
+  // The points of a scan, in its order, by the true pose of each. `readings` must have their
+  // sources.
+  [[nodiscard]] std::vector<TruePoint> true_points(const Scan& scan,
+                                                   const ScanReadings& readings) const;
   [[nodiscard]] ScanPtr assemble(std::int64_t scan, const ScanReadings& readings) const;
 
   [[nodiscard]] const Pose& body_from_lidar() const { return body_from_lidar_; }
@@ -77,6 +100,7 @@ class Scanner {
   const CarrierPath& path_;
   const Machine& machine_;
   TimeNs start_;
+  bool keeps_sources_ = false;
   std::uint64_t seed_;
   LidarModel model_;
   Pose body_from_lidar_;
