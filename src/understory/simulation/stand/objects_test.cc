@@ -48,8 +48,8 @@ TEST(Objects, AllKindsStandClearOfTheRouteAndOfTrees) {
   for (const StandObject& object : world.stand.objects) {
     ++counts[object.kind];
     EXPECT_GT(world.route.distance_to(object.foot.head<2>()), world.site.objects.clearance_m);
-    EXPECT_NEAR(object.foot.z(),
-                world.terrain.smooth_height(object.foot.x(), object.foot.y(), 0.3), 0.8);
+    EXPECT_NEAR(object.foot.z(), world.terrain.smooth_height(object.foot.x(), object.foot.y(), 0.3),
+                0.8);
     for (const GrownTree& tree : world.stand.trees)
       EXPECT_GT(outside_of(object, tree.foot, 0.0), 0.0) << object_name(object.kind);
   }
