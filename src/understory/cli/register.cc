@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "understory/cli/command.h"
+#include "understory/cli/register_features.h"
 #include "understory/cli/register_output.h"
 #include "understory/cli/register_stems.h"
 #include "understory/preprocess/voxel_filter.h"
@@ -84,12 +85,14 @@ Pose parse_guess(const std::vector<double>& numbers) {
 // A cloud in a frame of its own: `shift` takes its points back to the frame of the file.
 struct Loaded {
   Points points;
+  std::vector<std::uint16_t> ring;
   Eigen::Vector3d shift;
 };
 
 Loaded load(const std::string& path, const Eigen::Vector3d* frame, Log& log) {
   PointCloudFile file = read_cloud(path, log);
-  Loaded loaded{std::move(file.points), frame != nullptr ? *frame : file.origin};
+  Loaded loaded{std::move(file.points), std::move(file.ring),
+                frame != nullptr ? *frame : file.origin};
   const Eigen::Vector3f offset = (file.origin - loaded.shift).cast<float>();
   for (Eigen::Vector3f& point : loaded.points)
     point += offset;
@@ -97,10 +100,20 @@ Loaded load(const std::string& path, const Eigen::Vector3d* frame, Log& log) {
 }
 
 RegistrationResult match(const RegisterOptions& options, const RegisterConfig& config,
-                         const Points& target, const Points& source, const Pose& guess) {
+                         const Loaded& target_cloud, const Loaded& source_cloud,
+                         const Pose& guess) {
+  const Points& target = target_cloud.points;
+  const Points& source = source_cloud.points;
   VoxelFilter filter;
-  const Points thinned = filter.filter(source, config.source_voxel_m);
   const auto matcher = make_matcher(config.matcher, options.method);
+  if (const auto finder = matcher->feature_finder()) {
+    const FeaturePoints a =
+        features_of_cloud(*finder, target, target_cloud.ring, config.target_voxel_m);
+    const FeaturePoints b =
+        features_of_cloud(*finder, source, source_cloud.ring, config.source_voxel_m);
+    return match_clouds_by_features(*matcher, a, b, guess);
+  }
+  const Points thinned = filter.filter(source, config.source_voxel_m);
   const double voxel_m = matcher->sums_up_points() ? config.target_voxel_m : config.source_voxel_m;
   return matcher->make_target(filter.filter(target, voxel_m))
       ->match(thinned, guess, {}, MatchStart::kFar);
@@ -166,7 +179,7 @@ int run_register(const RegisterOptions& options, CommandContext& context) {
     return options.method == "go-icp" ? register_by_go_icp(clouds, config.go_icp, context)
                                       : register_by_stem_icp(clouds, config.stem_icp, context);
   }
-  const RegistrationResult result = match(options, config, target.points, source.points, guess);
+  const RegistrationResult result = match(options, config, target, source, guess);
   const Pose a_from_b = shift * result.target_from_source * shift.inverse();
   if (options.json)
     print_json(result, a_from_b);

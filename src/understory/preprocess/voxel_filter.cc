@@ -14,6 +14,15 @@ namespace {
 
 constexpr std::size_t kKeysAhead = 64;
 
+// Without its feature.
+void append_point(const BodyCloud& from, std::size_t i, BodyCloud& to) {
+  to.points.push_back(from.points[i]);
+  to.intensity.push_back(from.intensity[i]);
+  to.range.push_back(from.range[i]);
+  to.ring.push_back(from.ring[i]);
+  to.t_ns.push_back(from.t_ns[i]);
+}
+
 }  // namespace
 
 void describe(ConfigTable& table, VoxelFilterConfig& config) {
@@ -160,6 +169,27 @@ BodyCloud VoxelFilter::filter(const BodyCloud& cloud, const VoxelFilterConfig& c
   }
   thinned.resize(n);
   return thinned;
+}
+
+BodyCloud VoxelFilter::filter_features(const BodyCloud& cloud, const VoxelFilterConfig& config,
+                                       bool keep_none) {
+  UNDERSTORY_CHECK(cloud.feature.size() == cloud.size());
+  BodyCloud filtered;
+  filtered.stamp = cloud.stamp;
+  for (const PointFeature kind :
+       {PointFeature::kEdge, PointFeature::kPlane, PointFeature::kGround, PointFeature::kNone}) {
+    if (kind == PointFeature::kNone && !keep_none) break;
+    BodyCloud part;
+    part.stamp = cloud.stamp;
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      if (cloud.feature[i] == kind) append_point(cloud, i, part);
+    }
+    const BodyCloud thinned = filter(part, config);
+    for (std::size_t i = 0; i < thinned.size(); ++i)
+      append_point(thinned, i, filtered);
+    filtered.feature.resize(filtered.size(), kind);
+  }
+  return filtered;
 }
 
 Points VoxelFilter::filter(const Points& points, double voxel_size_m) {

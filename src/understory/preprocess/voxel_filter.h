@@ -33,6 +33,9 @@ class VoxelFilter {
  public:
   // Ranges are measured from the lidar where the cloud has them.
   [[nodiscard]] BodyCloud filter(const BodyCloud& cloud, const VoxelFilterConfig& config);
+  // Each kind of feature by itself, edges first; those of kNone last, or left out.
+  [[nodiscard]] BodyCloud filter_features(const BodyCloud& cloud, const VoxelFilterConfig& config,
+                                          bool keep_none);
   // Without range limits; points only. `keep` returns indices instead: the point of each voxel that
   // VoxelPoint names (kMean counts as kNearestToMean).
   [[nodiscard]] Points filter(const Points& points, double voxel_size_m);
