@@ -47,7 +47,24 @@ def read(files):
     return np.array(rows), np.array(right), np.array(best)
 
 
-def fit(x, y, ridge=0.1):
+# What each trait must weigh at least, with its sign: traits that go together can turn a weight around,
+# and then a strong rival would speak for a pose.
+LEAST = np.array([0.0, 1.0, -0.3, 1.0, 0.3, 2.0])
+
+
+def fit(x, y):
+    """Logistic regression; weights that fall short of LEAST are held there."""
+    held = np.zeros(x.shape[1], bool)
+    while True:
+        w = np.where(held, LEAST, 0.0)
+        w[~held] = newton(x[:, ~held], y, x[:, held] @ LEAST[held])
+        short = ~held & (np.sign(LEAST) * w < np.abs(LEAST))
+        if not short.any():
+            return w
+        held |= short
+
+
+def newton(x, y, offset, ridge=0.1):
     """Logistic regression by Newton steps, the columns brought to one scale."""
     middle, scale = x.mean(0), x.std(0)
     middle[0], scale[0] = 0.0, 1.0
@@ -56,7 +73,7 @@ def fit(x, y, ridge=0.1):
     keep = np.full(len(w), ridge)
     keep[0] = 0.0
     for _ in range(60):
-        p = 1.0 / (1.0 + np.exp(-np.clip(z @ w, -30, 30)))
+        p = 1.0 / (1.0 + np.exp(-np.clip(z @ w + offset, -30, 30)))
         step = np.linalg.solve((z * (p * (1 - p))[:, None]).T @ z + np.diag(keep),
                                z.T @ (p - y) + keep * w)
         w -= step

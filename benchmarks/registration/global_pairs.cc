@@ -8,11 +8,13 @@
 #include <cstdlib>
 #include <fstream>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/registration/global/global_match.h"
+#include "understory/registration/global/match_verdict.h"
 #include "understory/registration/global/pose_evidence.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
@@ -59,28 +61,29 @@ void match(const Sample& a, const Sample& b, bool same_place, std::size_t i, std
   double start = process_cpu_seconds();
   std::vector<GlobalCandidate> found = search_poses(a.cloud, b.cloud);
   if (!found.empty()) {
-    const RegistrationResult last =
-        refine_pose(a.cloud, b.cloud, found.front().target_from_source,
-                    upright_terms(found.front()));
+    const RegistrationResult last = last_steps(a.cloud, b.cloud, found.front());
     if (last.usable()) found.front().target_from_source = last.target_from_source;
   }
   const double ms = 1e3 * (process_cpu_seconds() - start);
-  std::printf("{\"i\": %zu, \"j\": %zu, \"overlap\": %.3f, \"distance_m\": %.2f, \"uprights\": [%zu, %zu], "
-              "\"prepare_ms\": %.1f, \"search_ms\": %.1f, \"poses\": [",
-              i, j, same_place ? overlap(a.cloud, b.cloud, truth) : 0.0,
-              same_place ? truth.translation().norm() : -1.0, a.cloud.uprights.size(),
-              b.cloud.uprights.size(), a.prepare_ms + b.prepare_ms, ms);
+  std::printf(
+      "{\"i\": %zu, \"j\": %zu, \"overlap\": %.3f, \"distance_m\": %.2f, \"uprights\": [%zu, %zu], "
+      "\"prepare_ms\": %.1f, \"search_ms\": %.1f, \"poses\": [",
+      i, j, same_place ? overlap(a.cloud, b.cloud, truth) : 0.0,
+      same_place ? truth.translation().norm() : -1.0, a.cloud.uprights.size(),
+      b.cloud.uprights.size(), a.prepare_ms + b.prepare_ms, ms);
   start = process_cpu_seconds();
   const auto print = [&](const Pose& pose, const char* how, double score, double rival) {
     const Pose off = truth.inverse() * pose;
     const PoseEvidence e = weigh_pose(a.cloud, b.cloud, pose);
-    std::printf("{\"how\": \"%s\", \"off_m\": %.3f, \"off_deg\": %.3f, \"score\": %.4f, "
-                "\"rival\": %.4f, \"near\": %.4f, \"through\": %.4f, \"looked\": %.1f, "
-                "\"fine\": %.4f, \"aside\": %.4f, \"peak\": %.3f, \"matched\": %.0f, "
-                "\"chance\": %.2f}",
-                how, same_place ? off.translation().norm() : 99.0,
-                off.angle() * 180.0 / std::numbers::pi, score, rival, e.near, e.seen_through,
-                e.looked_at, e.fine, e.fine_aside, e.peak_off_m, e.matched, e.by_chance);
+    std::printf(
+        "{\"how\": \"%s\", \"off_m\": %.3f, \"off_deg\": %.3f, \"score\": %.4f, "
+        "\"rival\": %.4f, \"near\": %.4f, \"through\": %.4f, \"looked\": %.1f, "
+        "\"fine\": %.4f, \"aside\": %.4f, \"peak\": %.3f, \"matched\": %.0f, "
+        "\"chance\": %.2f, \"right\": %.4f}",
+        how, same_place ? off.translation().norm() : 99.0, off.angle() * 180.0 / std::numbers::pi,
+        score, rival, e.near, e.seen_through, e.looked_at, e.fine, e.fine_aside, e.peak_off_m,
+        e.matched, e.by_chance,
+        chance_of_right(e, score, rival != score ? std::optional(rival) : std::nullopt));
   };
   for (std::size_t k = 0; k < found.size(); ++k) {
     if (k > 0) std::printf(", ");

@@ -23,8 +23,7 @@ void write_scan(const std::string& path, const Scan& scan, const TestFrames& sit
   std::ofstream file(path, std::ios::binary);
   for (const ScanPoint& point : scan.points) {
     const Pose still = lidar_from_world * site.world_from_lidar(scan, 1e-9 * point.t_ns);
-    const Eigen::Vector3f at =
-        (still * Eigen::Vector3d(point.x, point.y, point.z)).cast<float>();
+    const Eigen::Vector3f at = (still * Eigen::Vector3d(point.x, point.y, point.z)).cast<float>();
     const float row[4] = {at.x(), at.y(), at.z(), point.intensity};
     file.write(reinterpret_cast<const char*>(row), sizeof row);
   }

@@ -1,11 +1,12 @@
 #include "understory/registration/global/global_match.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <utility>
 
+#include "understory/registration/global/global_constants.h"
 #include "understory/registration/global/pose_evidence.h"
 #include "understory/registration/global/upright_search.h"
-#include "understory/registration/global/global_constants.h"
 
 namespace understory {
 namespace {
@@ -30,6 +31,34 @@ void drop_doubles(std::vector<GlobalCandidate>& candidates) {
   candidates = std::move(kept);
 }
 
+// Matches a few points of the source from where uprights put it, raised by so much.
+void refine_coarsely(const SearchCloud& target, const SearchCloud& source, const Points& few,
+                     double raised_m, GlobalCandidate& candidate) {
+  const Pose up(Eigen::Quaterniond::Identity(), {0.0, 0.0, raised_m});
+  const RegistrationResult result = target.target->match(
+      few, up * candidate.by_uprights, upright_terms(candidate, kLevelSd), MatchStart::kFar);
+  if (!result.usable()) return;
+  candidate.target_from_source = result.target_from_source;
+  candidate.score = pose_score(target, source, candidate.target_from_source);
+}
+
+// Uprights tell no height, and where the ground is hidden its height is off by a metre: a match
+// that begins there tilts the source until some ground meets. Of several heights the one whose
+// match has the most voxels in common is taken.
+void try_heights(const SearchCloud& target, const SearchCloud& source, const Points& few,
+                 GlobalCandidate& best) {
+  double most = common_voxels(target, source, best.target_from_source);
+  const GlobalCandidate start = best;
+  for (const double raised_m : kHeights) {
+    GlobalCandidate candidate = start;
+    refine_coarsely(target, source, few, raised_m, candidate);
+    const double common = common_voxels(target, source, candidate.target_from_source);
+    if (common <= most) continue;
+    most = common;
+    best = candidate;
+  }
+}
+
 }  // namespace
 
 std::vector<GlobalCandidate> search_poses(const SearchCloud& target, const SearchCloud& source) {
@@ -44,25 +73,28 @@ std::vector<GlobalCandidate> search_poses(const SearchCloud& target, const Searc
   candidates.resize(std::min(candidates.size(), kRefined));
   Points few = thin_evenly(source.plants, kFewPlants, source.plants.size() + 1);
   few.insert(few.end(), source.ground.begin(), source.ground.end());
-  for (GlobalCandidate& candidate : candidates) {
-    const RegistrationResult result =
-        target.target->match(few, candidate.target_from_source, upright_terms(candidate),
-                             MatchStart::kFar);
-    if (!result.usable()) continue;
-    candidate.target_from_source = result.target_from_source;
-    candidate.score = pose_score(target, source, candidate.target_from_source);
-  }
+  for (GlobalCandidate& candidate : candidates)
+    refine_coarsely(target, source, few, 0.0, candidate);
   sort_by_score(candidates);
   drop_doubles(candidates);
+  if (!candidates.empty() && candidates.front().score < kSureScore)
+    try_heights(target, source, few, candidates.front());
   return candidates;
 }
 
-PoseTerms upright_terms(const GlobalCandidate& candidate) {
+PoseTerms upright_terms(const GlobalCandidate& candidate, double level_sd_rad) {
   if (candidate.uprights < kFewestUprights) return {};
   const double place = candidate.uprights / (kUprightSd * kUprightSd);
+  const double tilt = 1.0 / (level_sd_rad * level_sd_rad);
   PosePrior prior{candidate.by_uprights, Matrix6d::Zero()};
-  prior.information.diagonal() << 0.0, 0.0, place * kSpread * kSpread, place, place, 0.0;
+  prior.information.diagonal() << tilt, tilt, place * kSpread * kSpread, place, place, 0.0;
   return {prior};
+}
+
+RegistrationResult last_steps(const SearchCloud& target, const SearchCloud& source,
+                              const GlobalCandidate& candidate) {
+  return refine_pose(target, source, candidate.target_from_source,
+                     upright_terms(candidate, kLastLevelSd));
 }
 
 RegistrationResult refine_pose(const SearchCloud& target, const SearchCloud& source,

@@ -23,8 +23,11 @@ struct GlobalCandidate {
 // The match of NDT with small cells from a pose near the right one.
 [[nodiscard]] RegistrationResult refine_pose(const SearchCloud& target, const SearchCloud& source,
                                              const Pose& start, const PoseTerms& terms = {});
-// What uprights tell of heading and place beside the match of points.
-[[nodiscard]] PoseTerms upright_terms(const GlobalCandidate& candidate);
+// What uprights tell of place and heading beside the match of points, and the level frames of tilt.
+[[nodiscard]] PoseTerms upright_terms(const GlobalCandidate& candidate, double level_sd_rad);
+// refine_pose of a candidate with what its uprights tell.
+[[nodiscard]] RegistrationResult last_steps(const SearchCloud& target, const SearchCloud& source,
+                                            const GlobalCandidate& candidate);
 // The pose of a match without terms; `start` if it finds nothing.
 [[nodiscard]] Pose refined_pose(const SearchCloud& target, const SearchCloud& source,
                                 const Pose& start);

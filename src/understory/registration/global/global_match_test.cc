@@ -101,8 +101,14 @@ TEST(MatchVerdict, AMatchThatDidNotConvergeOrLeavesDirectionsOpenIsRefused) {
 
 // Each trait moves the chance the way that it should.
 TEST(MatchVerdict, TheChanceGrowsWithWhatSpeaksForThePose) {
-  PoseEvidence even{.near = 0.5, .seen_through = 0.02, .looked_at = 1.0, .fine = 0.03,
-                    .fine_aside = 0.012, .peak_off_m = 0.0, .matched = 6.0, .by_chance = 2.0};
+  PoseEvidence even{.near = 0.5,
+                    .seen_through = 0.02,
+                    .looked_at = 1.0,
+                    .fine = 0.03,
+                    .fine_aside = 0.012,
+                    .peak_off_m = 0.0,
+                    .matched = 6.0,
+                    .by_chance = 2.0};
   const double usual = chance_of_right(even, 0.7, 0.4);
   EXPECT_GT(usual, 0.0);
   EXPECT_LT(usual, 1.0);
@@ -134,11 +140,11 @@ TEST(GlobalMatch, OddCloudsAreRefusedWithAReason) {
     point *= 1000.0F;
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const Points ten(scans.source.begin(), scans.source.begin() + 10);
-  for (const Points& odd : {Points(), ten, plane, line, millimetres,
-                            Points(1000, Eigen::Vector3f(nan, nan, nan))}) {
+  for (const Points& odd :
+       {Points(), ten, plane, line, millimetres, Points(1000, Eigen::Vector3f(nan, nan, nan))}) {
     for (const bool as_source : {true, false}) {
-      const GlobalRegistration done = as_source ? register_globally(scans.target, odd)
-                                                : register_globally(odd, scans.source);
+      const GlobalRegistration done =
+          as_source ? register_globally(scans.target, odd) : register_globally(odd, scans.source);
       EXPECT_FALSE(done.verdict.trusted) << odd.size();
       EXPECT_FALSE(done.verdict.reason.empty()) << odd.size();
       EXPECT_TRUE(done.result.target_from_source.matrix().allFinite());

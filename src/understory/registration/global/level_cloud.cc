@@ -160,8 +160,8 @@ Points voxel_means(const Points& points, double edge_m) {
 UpEstimate estimate_up(const Points& points) {
   const std::vector<UprightHint> hints = hints_of(points);
   UpEstimate best;
-  for (const Eigen::Vector3d& start : {Eigen::Vector3d(Eigen::Vector3d::UnitZ()),
-                                       ground_normal(hints)}) {
+  for (const Eigen::Vector3d& start :
+       {Eigen::Vector3d(Eigen::Vector3d::UnitZ()), ground_normal(hints)}) {
     const UpEstimate found = follow(hints, start);
     if (found.weight > best.weight && found.up.z() > kLeastCosine) best = found;
   }

@@ -87,8 +87,7 @@ double chance_of_right(const PoseEvidence& evidence, double score,
 }
 
 MatchVerdict judge_pose(const SearchCloud& target, const SearchCloud& source,
-                        const Pose& target_from_source,
-                        const std::vector<GlobalCandidate>& found) {
+                        const Pose& target_from_source, const std::vector<GlobalCandidate>& found) {
   if (std::string refusal = refusal_of(target, source); !refusal.empty())
     return refused_verdict(std::move(refusal));
   MatchVerdict verdict;
@@ -102,8 +101,7 @@ MatchVerdict judge_pose(const SearchCloud& target, const SearchCloud& source,
   verdict.chance =
       chance_of_right(verdict.evidence, verdict.score,
                       verdict.rival ? std::optional(verdict.rival->score) : std::nullopt);
-  const Pose on = target_from_source.inverse() *
-                  refined_pose(target, source, target_from_source);
+  const Pose on = target_from_source.inverse() * refined_pose(target, source, target_from_source);
   verdict.moved_m = on.translation().norm();
   verdict.moved_deg = degrees(on.angle());
   verdict.trusted = verdict.chance >= kTrusted;
@@ -111,9 +109,10 @@ MatchVerdict judge_pose(const SearchCloud& target, const SearchCloud& source,
     verdict.reason = reason_of(verdict, target_from_source);
   } else if (verdict.moved_m > kMostMoved || verdict.moved_deg > kMostTurned) {
     verdict.trusted = false;
-    verdict.reason = fmt::format("matching with small cells moves the pose on by {:.2f} m and "
-                                 "{:.1f} degrees",
-                                 verdict.moved_m, verdict.moved_deg);
+    verdict.reason = fmt::format(
+        "matching with small cells moves the pose on by {:.2f} m and "
+        "{:.1f} degrees",
+        verdict.moved_m, verdict.moved_deg);
   }
   return verdict;
 }
@@ -126,8 +125,7 @@ MatchVerdict judge_match(const Points& target, const Points& source,
   const SearchCloud b = prepare_search(source);
   if (std::string refusal = refusal_of(a, b); !refusal.empty())
     return refused_verdict(std::move(refusal));
-  const Pose pose =
-      a.level_from_cloud * result.target_from_source * b.level_from_cloud.inverse();
+  const Pose pose = a.level_from_cloud * result.target_from_source * b.level_from_cloud.inverse();
   return judge_pose(a, b, pose, search_poses(a, b));
 }
 
@@ -146,8 +144,7 @@ GlobalRegistration register_globally(const Points& target, const Points& source)
     done.verdict.reason = done.result.reason;
     return done;
   }
-  done.result =
-      refine_pose(a, b, found.front().target_from_source, upright_terms(found.front()));
+  done.result = last_steps(a, b, found.front());
   done.verdict = judge_pose(a, b, done.result.target_from_source, found);
   if (const std::string trouble = trouble_of(done.result); !trouble.empty()) {
     done.verdict.trusted = false;

@@ -36,14 +36,14 @@ Looks look(const SearchCloud& target, const SearchCloud& source, const Pose& tar
   return {looks.near / all, looks.seen_through / all};
 }
 
-// Share of the source's points above the ground in voxels that the target holds.
-double fine_share(const SearchCloud& target, const SearchCloud& source, const Pose& pose) {
+// Share of some points of the source in voxels that the target holds.
+double held_share(const SearchCloud& target, const Points& source, const Pose& pose) {
   const Eigen::Matrix3f rotation = pose.rotation_matrix().cast<float>();
   const Eigen::Vector3f shift = pose.translation().cast<float>();
-  const std::size_t count = std::min(source.plants.size(), kFinePoints);
+  const std::size_t count = std::min(source.size(), kFinePoints);
   std::size_t held = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const Eigen::Vector3f& point = source.plants[i * source.plants.size() / count];
+    const Eigen::Vector3f& point = source[i * source.size() / count];
     held += holds_points(target, rotation * point + shift) ? 1 : 0;
   }
   return static_cast<double>(held) / std::max(1.0, static_cast<double>(count));
@@ -59,13 +59,14 @@ double top_of(double before, double middle, double after, double step) {
 void weigh_fine(const SearchCloud& target, const SearchCloud& source, const Pose& pose,
                 PoseEvidence& evidence) {
   const auto both = [&](const Pose& at) {
-    return 0.5 * (fine_share(target, source, at) + fine_share(source, target, at.inverse()));
+    return 0.5 * (held_share(target, source.plants, at) +
+                  held_share(source, target.plants, at.inverse()));
   };
   const auto moved = [&](double x, double y, double yaw) {
     // Turned about the source's origin.
-    return Pose(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())) *
-                    pose.rotation(),
-                pose.translation() + Eigen::Vector3d(x, y, 0.0));
+    return Pose(
+        Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())) * pose.rotation(),
+        pose.translation() + Eigen::Vector3d(x, y, 0.0));
   };
   evidence.fine = both(pose);
   const double left = both(moved(-kAside, 0.0, 0.0));
@@ -102,6 +103,16 @@ QuickFit quick_fit(const SearchCloud& target, const SearchCloud& source,
                    const Pose& target_from_source) {
   const Looks looks = look(target, source, target_from_source, kQuickPoints);
   return {looks.near, looks.seen_through};
+}
+
+double common_voxels(const SearchCloud& target, const SearchCloud& source,
+                     const Pose& target_from_source) {
+  const Pose back = target_from_source.inverse();
+  double sum = 0.0;
+  for (const Points SearchCloud::*part : {&SearchCloud::plants, &SearchCloud::ground})
+    sum += held_share(target, source.*part, target_from_source) +
+           held_share(source, target.*part, back);
+  return 0.5 * sum;
 }
 
 PoseEvidence weigh_pose(const SearchCloud& target, const SearchCloud& source,

@@ -16,6 +16,11 @@ struct QuickFit {
 [[nodiscard]] QuickFit quick_fit(const SearchCloud& target, const SearchCloud& source,
                                  const Pose& target_from_source);
 
+// Share of the source's points, on and above the ground, in a voxel of 0.2 m that the target holds,
+// too, added up for both directions: 0..2.
+[[nodiscard]] double common_voxels(const SearchCloud& target, const SearchCloud& source,
+                                   const Pose& target_from_source);
+
 // What speaks for and against a pose of the source on the target. Shares are means of both
 // directions: source on target and target on source.
 struct PoseEvidence {

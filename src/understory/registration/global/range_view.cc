@@ -54,7 +54,6 @@ RangeView::RangeView(const Points& points, const Eigen::Vector3f& eye)
               static_cast<double>(at_one_range - nearest) > kOneViewShare * others;
 }
 
-
 RangeView::Sight RangeView::look(const Eigen::Vector3f& point) const {
   const Eigen::Vector3f ray = point - eye_;
   const float range = ray.norm();

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "understory/geometry/rotation_between.h"
+#include "understory/registration/global/global_constants.h"
 #include "understory/registration/global/level_cloud.h"
 #include "understory/registration/ndt/ndt_matcher.h"
-#include "understory/registration/global/global_constants.h"
 #include "understory/util/median.h"
 
 namespace understory {

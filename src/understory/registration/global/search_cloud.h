@@ -36,7 +36,7 @@ class NearGrid {
 struct SearchCloud {
   std::string trouble;  // why the cloud cannot be matched; empty: it can
   Pose level_from_cloud;
-  double up_weight = 0.0;  // see UpEstimate
+  double up_weight = 0.0;      // see UpEstimate
   Points points;               // one for each voxel of 0.2 m
   std::vector<float> above_m;  // their heights above the ground
   Points plants;               // those that stand above the ground, at most a few thousand

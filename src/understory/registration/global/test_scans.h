@@ -65,8 +65,7 @@ struct ScanStand {
                                   std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
         const double range =
             cast(world_from_lidar.translation(), world_from_lidar.rotation() * ray);
-        if (range > 0.5)
-          points.push_back(((range + 0.01 * random.normal()) * ray).cast<float>());
+        if (range > 0.5) points.push_back(((range + 0.01 * random.normal()) * ray).cast<float>());
       }
     }
     return points;

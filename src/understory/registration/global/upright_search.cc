@@ -68,8 +68,7 @@ class MotionVotes {
     const int row = static_cast<int>(std::floor((middle.y() - low_.y()) / kCell));
     if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return;
     const double turns = yaw / (2.0 * M_PI);
-    const int heading =
-        static_cast<int>((turns - std::floor(turns)) * kHeadings) % kHeadings;
+    const int heading = static_cast<int>((turns - std::floor(turns)) * kHeadings) % kHeadings;
     ++votes_[index(heading, row, column)];
   }
   // The middles of the cells that hold more votes, with their neighbours, than any neighbour does.
@@ -165,8 +164,8 @@ std::vector<PlaneStart> starts_of(const std::vector<Upright>& target,
                         source[static_cast<std::size_t>(pair.a)].ground_m;
     const double most_off = kRise + kRisePerM * pair.length;
     const Eigen::Vector2d to_middle = middle - a - 0.5 * d;
-    for (std::size_t k = first;
-         k < targets.size() && targets[k].length <= pair.length + tolerance; ++k) {
+    for (std::size_t k = first; k < targets.size() && targets[k].length <= pair.length + tolerance;
+         ++k) {
       const Upright& p = target[static_cast<std::size_t>(targets[k].a)];
       const Upright& q = target[static_cast<std::size_t>(targets[k].b)];
       const double climb = q.ground_m - p.ground_m;

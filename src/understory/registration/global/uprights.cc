@@ -105,9 +105,8 @@ std::vector<Upright> find_uprights(const Points& points, const std::vector<float
   std::sort(found.begin(), found.end(), [](const Upright& a, const Upright& b) {
     // Many levels show of far things alone: enough is enough, and near things are seen best.
     return std::make_tuple(-std::min(a.levels, kEnoughLevels), a.at.squaredNorm(), a.at.x(),
-                           a.at.y()) <
-           std::make_tuple(-std::min(b.levels, kEnoughLevels), b.at.squaredNorm(), b.at.x(),
-                           b.at.y());
+                           a.at.y()) < std::make_tuple(-std::min(b.levels, kEnoughLevels),
+                                                       b.at.squaredNorm(), b.at.x(), b.at.y());
   });
   std::vector<Upright> kept;
   for (const Upright& upright : found) {
