@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
