@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import resource
+import struct
 import subprocess
 import sys
 import tempfile
@@ -47,6 +48,73 @@ def check_samples(folder):
                                 ("gnss", "fixes")):
                 assert again[kind][count] == first[kind][count], (target, kind, count)
             assert abs(again["duration_s"] - first["duration_s"]) < 1e-6, target
+
+
+def datagram(stamp_ns, source_port, port, payload):
+    """A record of a .pcap"""
+    udp = struct.pack(">HHHH", source_port, port, 8 + len(payload), 0) + payload
+    ip = bytes([0x45, 0]) + struct.pack(">HHHBBH", 20 + len(udp), 1, 0, 64, 17, 0) \
+        + bytes([192, 168, 1, 201, 192, 168, 1, 1]) + udp
+    frame = bytes(12) + b"\x08\x00" + ip
+    return struct.pack("<IIII", stamp_ns // 10**9, stamp_ns % 10**9 // 1000, len(frame),
+                       len(frame)) + frame
+
+
+def hesai_packet(i):
+    """Of a PandarXT-32 that turns ten times a second, 2023-11-14 22:13:20 + 0.4 ms i"""
+    blocks = b"".join(struct.pack("<H", (144 * i + 18 * b) % 36000)
+                      + struct.pack("<HBB", 2500, 9, 0) * 32 for b in range(8))
+    return bytes([0xEE, 0xFF, 6, 1, 0, 0, 32, 8, 0, 4, 2, 1]) + blocks + bytes(10) + b"\x37" \
+        + struct.pack("<H", 600) + bytes([123, 11, 14, 22, 13, 20]) \
+        + struct.pack("<I", 400 * i) + b"\x42" + struct.pack("<I", i)
+
+
+def livox_packet(i, imu=False):
+    """Of a Mid-360, 0.48 ms each"""
+    data = struct.pack("<6f", 0, 0, 0.1, 0, 0, 1) if imu else \
+        struct.pack("<iiiBB", 3000, -500, 700, 20, 0) * 96
+    return struct.pack("<BHHHHBBB", 0, 36 + len(data), 4800, 1 if imu else 96, i, 0,
+                       0 if imu else 1, 1) + bytes(16) \
+        + struct.pack("<q", 1_700_000_000 * 10**9 + 480_000 * i) + data
+
+
+def check_captures(folder):
+    start = 1_700_000_000 * 10**9
+    head = struct.pack("<IHHQII", 0xA1B2C3D4, 2, 4, 0, 65535, 1)
+    hesai, livox, other = (folder / name for name in ("hesai.pcap", "livox.pcap", "other.pcap"))
+    hesai.write_bytes(head + b"".join(datagram(start + 400_000 * i, 10000, 2368, hesai_packet(i))
+                                      for i in range(750)))
+    livox.write_bytes(head + b"".join(
+        datagram(start + 480_000 * i, 56300, 56301, livox_packet(i))
+        + datagram(start + 480_000 * i, 56400, 56401, livox_packet(i, imu=True))
+        for i in range(650)))
+    other.write_bytes(head + datagram(start, 6699, 6699, b"\x55\xAA\x05" + bytes(1245)) * 50)
+    first = info(hesai)
+    assert first["lidar"]["scans"] == 3 and first["lidar"]["rings"] == 32, first["lidar"]
+    assert any("angle correction" in each for each in first["warnings"]), first["warnings"]
+    # With the sensor's own file nothing is to be warned of but the IMU that is not there.
+    angles = folder / "hesai_angles.csv"
+    angles.write_text("Channel,Elevation,Azimuth\n" + "".join(f"{i},{16 - i},0.1\n"
+                                                              for i in range(1, 33)))
+    assert len(info(hesai)["warnings"]) == 1, info(hesai)["warnings"]
+    angles.write_text("Channel,Elevation,Azimuth\n1,0,0\n")
+    code, _, errors = run("info", hesai)
+    assert code == 3 and "hesai_angles.csv" in errors and "1 channels" in errors, errors
+    angles.write_text("Channel,Elevation,Azimuth\n1,0\n")
+    code, _, errors = run("info", hesai, "--metadata", angles)
+    assert code == 3 and "line 2" in errors, errors
+    angles.unlink()
+    mid = info(livox)
+    assert mid["lidar"]["model"] == "Mid-360" and mid["imu"]["samples"] == 650, mid
+    assert mid["lidar"]["scans"] == 4 and mid["lidar"]["rings"] == 0, mid["lidar"]
+    for recording, seen in ((hesai, first), (livox, mid)):
+        target = folder / (recording.stem + ".mcap")
+        assert run("convert", recording, target)[0] == 0
+        again = info(target)
+        for kind, count in (("lidar", "scans"), ("lidar", "points"), ("imu", "samples")):
+            assert again[kind][count] == seen[kind][count], (recording, kind, count)
+    code, _, errors = run("info", other)
+    assert code == 3 and "RoboSense" in errors and "PointCloud2" in errors, errors
 
 
 def check_refusals(folder):
@@ -134,6 +202,7 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         check_samples(folder)
+        check_captures(folder)
         check_refusals(folder)
         check_damage(folder)
         check_copies(folder)

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("t", "<u4"),
-                  ("ring", "<u2"), ("return_index", "u1"), ("reserved", "u1")])
+                  ("ring", "<u2"), ("return_index", "u1"), ("tag", "u1")])
 DATA = pathlib.Path(os.environ["UNDERSTORY_DATA"]) / "drivers"
 
 
@@ -20,10 +20,10 @@ def skip_without(path):
     return path
 
 
-def read_scans(recording):
+def read_scans(recording, *metadata):
     """[(stamp in ns, points)]"""
     program = pathlib.Path(os.environ["UNDERSTORY_BUILD"]) / "tests" / "dump_scans"
-    raw = subprocess.run([program, recording], check=True, stdout=subprocess.PIPE).stdout
+    raw = subprocess.run([program, recording, *metadata], check=True, stdout=subprocess.PIPE).stdout
     scans, at = [], 0
     while at < len(raw):
         stamp, count = struct.unpack_from("<qQ", raw, at)

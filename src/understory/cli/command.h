@@ -58,6 +58,7 @@ void add_register_command(CLI::App& app, Command& chosen);
 void add_inventory_command(CLI::App& app, Command& chosen);
 void add_georeference_command(CLI::App& app, Command& chosen);
 void add_merge_command(CLI::App& app, Command& chosen);
+void add_calibrate_command(CLI::App& app, Command& chosen);
 void add_evaluate_command(CLI::App& app, Command& chosen);
 
 }  // namespace understory

@@ -147,6 +147,7 @@ int run(int argc, char** argv) {
   add_evaluate_command(app, chosen);
   add_merge_command(app, chosen);
   add_georeference_command(app, chosen);
+  add_calibrate_command(app, chosen);
   if (const std::string complaint = unknown_command(app, argc, argv); !complaint.empty())
     return complain(kExitUsage, complaint);
   try {

@@ -8,7 +8,8 @@ namespace understory {
 void add_open_options(CLI::App& command, OpenOptions& options) {
   command.add_option("--rate-hz", options.rate_hz, "Scans per second of a folder of clouds")
       ->check(CLI::Range(0.01, 1000.0));
-  command.add_option("--metadata", options.metadata_file, "Metadata JSON of an Ouster capture");
+  command.add_option("--metadata", options.metadata_file,
+                     "Metadata JSON of an Ouster, or angle correction CSV of a Hesai");
   command.add_option("--lidar-topic", options.lidar_topic, "Topic of the lidar, if there are more");
   command.add_option("--imu-topic", options.imu_topic, "Topic of the IMU, if there are more");
   command.add_option("--gnss-topic", options.gnss_topic, "Topic of the GNSS, if there are more");

@@ -1,3 +1,4 @@
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -5,11 +6,13 @@
 #include <vector>
 
 #include "understory/cli/command.h"
+#include "understory/cli/register_features.h"
 #include "understory/cli/register_output.h"
 #include "understory/cli/register_stems.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/recording/finding.h"
+#include "understory/registration/global/match_verdict.h"
 #include "understory/registration/matchers.h"
 #include "understory/util/error.h"
 
@@ -41,6 +44,8 @@ void describe(ConfigTable& table, RegisterConfig& config) {
   table.section("stem_icp", [&] { describe(table, config.stem_icp); });
   table.section("go_icp", [&] { describe(table, config.go_icp); });
 }
+
+constexpr const char* kGlobal = "global";
 
 struct RegisterOptions {
   std::string target;
@@ -81,32 +86,51 @@ Pose parse_guess(const std::vector<double>& numbers) {
       {"--guess: expected x,y,z or x,y,z,qx,qy,qz,qw or a rigid motion as 16 numbers row by row"});
 }
 
-// A cloud in a frame of its own: `shift` takes its points back to the frame of the file.
+// A cloud in a frame of its own, so that single precision is enough in any coordinate system.
 struct Loaded {
   Points points;
-  Eigen::Vector3d shift;
+  std::vector<std::uint16_t> ring;  // of each point, or empty
+  Pose file_from_points;
 };
 
-Loaded load(const std::string& path, const Eigen::Vector3d* frame, Log& log) {
+Loaded load(const std::string& path, Log& log) {
   PointCloudFile file = read_cloud(path, log);
-  Loaded loaded{std::move(file.points), frame != nullptr ? *frame : file.origin};
-  const Eigen::Vector3f offset = (file.origin - loaded.shift).cast<float>();
-  for (Eigen::Vector3f& point : loaded.points)
+  return {std::move(file.points), std::move(file.ring),
+          Pose(Eigen::Quaterniond::Identity(), file.origin)};
+}
+
+// The same in another frame that is turned like it.
+Points in_frame(const Loaded& cloud, const Pose& file_from_frame) {
+  const Eigen::Vector3f offset =
+      (cloud.file_from_points.translation() - file_from_frame.translation()).cast<float>();
+  Points moved = cloud.points;
+  for (Eigen::Vector3f& point : moved)
     point += offset;
-  return loaded;
+  return moved;
 }
 
 RegistrationResult match(const RegisterOptions& options, const RegisterConfig& config,
-                         const Points& target, const Points& source, const Pose& guess) {
+                         const Loaded& target_cloud, const Loaded& source_cloud,
+                         const Pose& guess) {
+  const Points& target = target_cloud.points;
+  const Points& source = source_cloud.points;
   VoxelFilter filter;
-  const Points thinned = filter.filter(source, config.source_voxel_m);
   const auto matcher = make_matcher(config.matcher, options.method);
+  if (const auto finder = matcher->feature_finder()) {
+    const FeaturePoints a =
+        features_of_cloud(*finder, target, target_cloud.ring, config.target_voxel_m);
+    const FeaturePoints b =
+        features_of_cloud(*finder, source, source_cloud.ring, config.source_voxel_m);
+    return match_clouds_by_features(*matcher, a, b, guess);
+  }
+  const Points thinned = filter.filter(source, config.source_voxel_m);
   const double voxel_m = matcher->sums_up_points() ? config.target_voxel_m : config.source_voxel_m;
   return matcher->make_target(filter.filter(target, voxel_m))
       ->match(thinned, guess, {}, MatchStart::kFar);
 }
 
-void print_json(const RegistrationResult& result, const Pose& a_from_b) {
+void print_json(const RegistrationResult& result, const MatchVerdict& verdict,
+                const Pose& a_from_b) {
   nlohmann::json out;
   out["a_from_b"] = numbers_of(a_from_b.matrix());
   out["status"] = to_string(result.status);
@@ -119,10 +143,12 @@ void print_json(const RegistrationResult& result, const Pose& a_from_b) {
   out["degenerate_directions"] = nlohmann::json::array();
   for (Eigen::Index i = 0; i < result.degenerate_directions.cols(); ++i)
     out["degenerate_directions"].push_back(numbers_of(result.degenerate_directions.col(i)));
+  out["verdict"] = verdict_json(verdict);
   std::printf("%s\n", out.dump(2).c_str());
 }
 
-void print_text(const RegistrationResult& result, const Pose& a_from_b) {
+void print_text(const RegistrationResult& result, const MatchVerdict& verdict,
+                const Pose& a_from_b) {
   print_motion(a_from_b);
   std::printf("status %s%s%s\n", to_string(result.status).c_str(),
               result.reason.empty() ? "" : ": ", result.reason.c_str());
@@ -139,6 +165,32 @@ void print_text(const RegistrationResult& result, const Pose& a_from_b) {
     for (int r = 0; r < 6; ++r)
       std::printf("%.4f%c", result.degenerate_directions(r, i), r == 5 ? '\n' : ' ');
   }
+  print_verdict(verdict);
+}
+
+// What a method made of the clouds, and the verdict on it; between the frames of the points.
+GlobalRegistration registered(const RegisterOptions& options, const RegisterConfig& config,
+                              const Loaded& target, const Loaded& source, const Pose& guess) {
+  if (options.method == kGlobal) return register_globally(target.points, source.points);
+  GlobalRegistration done;
+  done.result = match(options, config, target, source, guess);
+  done.verdict = judge_match(target.points, source.points, done.result);
+  return done;
+}
+
+int print_registration(const RegisterOptions& options, const GlobalRegistration& done,
+                       const Pose& a_from_b, CommandContext& context) {
+  if (options.json)
+    print_json(done.result, done.verdict, a_from_b);
+  else
+    print_text(done.result, done.verdict, a_from_b);
+  const std::string damage = found(context.log, Finding::kDamage).first;
+  if (!damage.empty()) {
+    context.log.warn("register.untrusted", "a cloud is not whole: " + damage);
+    return kExitUntrusted;
+  }
+  if (!done.verdict.trusted) context.log.warn("register.untrusted", done.verdict.reason);
+  return done.verdict.trusted ? kExitDone : kExitUntrusted;
 }
 
 int run_register(const RegisterOptions& options, CommandContext& context) {
@@ -154,35 +206,23 @@ int run_register(const RegisterOptions& options, CommandContext& context) {
   if (options.target.empty() || options.source.empty())
     throw ConfigError({"register: expected two clouds, A and B"});
   context.stop_at_once();
-  // Both clouds relative to A's origin, so that single precision is enough in any coordinate
-  // system.
-  const Loaded target = load(options.target, nullptr, context.log);
-  const Loaded source = load(options.source, &target.shift, context.log);
-  const Pose shift(Eigen::Quaterniond::Identity(), target.shift);
-  const Pose guess = shift.inverse() * parse_guess(options.guess) * shift;
+  const Loaded target = load(options.target, context.log);
+  const Loaded source = load(options.source, context.log);
+  const Pose& a_from_target = target.file_from_points;
+  const Pose guess = parse_guess(options.guess);
   if (options.method == "go-icp" || options.method == "stem-icp") {
-    const StemClouds clouds{options.target, options.source, target.points, source.points,
-                            guess,          shift,          options.json};
+    const Pose guess_in_target = a_from_target.inverse() * guess * a_from_target;
+    const StemClouds clouds{
+        options.target,  options.source, target.points, in_frame(source, a_from_target),
+        guess_in_target, a_from_target,  options.json};
     return options.method == "go-icp" ? register_by_go_icp(clouds, config.go_icp, context)
                                       : register_by_stem_icp(clouds, config.stem_icp, context);
   }
-  const RegistrationResult result = match(options, config, target.points, source.points, guess);
-  const Pose a_from_b = shift * result.target_from_source * shift.inverse();
-  if (options.json)
-    print_json(result, a_from_b);
-  else
-    print_text(result, a_from_b);
-  const std::string damage = found(context.log, Finding::kDamage).first;
-  if (!damage.empty()) {
-    context.log.warn("register.untrusted", "a cloud is not whole: " + damage);
-    return kExitUntrusted;
-  }
-  const bool trusted =
-      result.status == RegistrationStatus::kConverged && result.degenerate_directions.cols() == 0;
-  if (!trusted)
-    context.log.warn("register.untrusted",
-                     result.reason.empty() ? "some directions are undetermined" : result.reason);
-  return trusted ? kExitDone : kExitUntrusted;
+  const GlobalRegistration done = registered(
+      options, config, target, source, a_from_target.inverse() * guess * source.file_from_points);
+  const Pose a_from_b =
+      a_from_target * done.result.target_from_source * source.file_from_points.inverse();
+  return print_registration(options, done, a_from_b, context);
 }
 
 }  // namespace
@@ -193,11 +233,12 @@ void add_register_command(CLI::App& app, Command& chosen) {
   command->add_option("A", options->target, "Target cloud (.las, .laz, .e57, .pcd, .ply, .bin)");
   command->add_option("B", options->source, "Source cloud");
   std::vector<std::string> methods = matcher_names();
-  methods.insert(methods.end(), {"stem-icp", "go-icp"});
+  methods.insert(methods.end(), {kGlobal, "stem-icp", "go-icp"});
   command
       ->add_option("--method", options->method,
                    matcher_summaries() +
-                       "; for sparse clouds of stems, z up: stem-icp (trimmed, from the guess) or "
+                       ", global (no guess, any place and heading; z about up); for sparse clouds "
+                       "of stems, z up: stem-icp (trimmed, from the guess) or "
                        "go-icp (searches)")
       ->check(CLI::IsMember(methods));
   command
@@ -212,7 +253,7 @@ void add_register_command(CLI::App& app, Command& chosen) {
       "Example: understory register a.pcd b.pcd --method ndt --guess 1.2,0,0 --json\n"
       "prints a_from_b, the motion that takes points of B to A, row by row. Exit code 4: the "
       "match\n"
-      "did not converge or leaves directions undetermined.");
+      "is not to be trusted; a warning says why.");
   command->callback([options, &chosen] {
     chosen = [options](CommandContext& context) { return run_register(*options, context); };
   });

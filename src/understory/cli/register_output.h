@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "understory/geometry/pose.h"
+#include "understory/registration/global/match_verdict.h"
 
 namespace understory {
 
@@ -12,5 +14,9 @@ namespace understory {
 
 // "a_from_b" on stdout and below it the motion's 4 x 4 matrix, a line a row.
 void print_motion(const Pose& a_from_b);
+
+// The verdict on a match as an object of numbers and words, and as lines of text on stdout.
+[[nodiscard]] nlohmann::ordered_json verdict_json(const MatchVerdict& verdict);
+void print_verdict(const MatchVerdict& verdict);
 
 }  // namespace understory

@@ -1,3 +1,4 @@
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
@@ -6,6 +7,7 @@
 #include <vector>
 
 #include "understory/cli/command.h"
+#include "understory/output/las_writer.h"
 #include "understory/recording/bags/mcap_writer.h"
 #include "understory/simulation/sensors/field_log.h"
 #include "understory/simulation/simulator.h"
@@ -93,12 +95,15 @@ void write_event(const Event& event, const Simulator& simulator, McapWriter& wri
 template <typename Writer>
 bool write_events(Simulator& simulator, Writer& writer, CommandContext& context) {
   const double duration = simulator.duration_s();
+  constexpr std::size_t kEventsATime = 1000;  // of a recording without scans
   std::size_t scans = 0;
+  std::size_t others = 0;
   bool stopped = false;
   while (std::optional<Event> event = simulator.next()) {
     write_event(*event, simulator, writer);
-    if (!std::holds_alternative<ScanPtr>(*event)) continue;
-    ++scans;
+    const bool scan = std::holds_alternative<ScanPtr>(*event);
+    if (!scan && (simulator.site().scans || ++others % kEventsATime != 0)) continue;
+    if (scan) ++scans;
     context.progress({"simulating", simulator.progress() * duration, duration, "s of recording",
                       std::to_string(scans) + " scans"});
     stopped = context.stop_requested();
@@ -106,6 +111,49 @@ bool write_events(Simulator& simulator, Writer& writer, CommandContext& context)
   }
   writer.finish();
   return !stopped;
+}
+
+// The ASPRS class of what gave an echo: 2 ground, 3 low plants, 5 trees, 6 things that are no
+// trees; 1 for what has none of these.
+std::uint8_t class_of(Surface surface) {
+  switch (surface) {
+    case Surface::kGround:
+      return 2;
+    case Surface::kPlant:
+    case Surface::kDeadWood:
+      return 3;
+    case Surface::kStem:
+    case Surface::kFoliage:
+      return 5;
+    case Surface::kBuilding:
+    case Surface::kObject:
+      return 6;
+    default:
+      return 1;
+  }
+}
+
+// points.laz of the truth, filled while the simulator is read.
+std::unique_ptr<LasWriter> write_points(const std::string& folder, Simulator& simulator) {
+  std::filesystem::create_directories(folder);
+  LasOptions options;
+  options.trees = true;
+  auto writer = std::make_unique<LasWriter>(std::filesystem::path(folder) / "points.laz", options);
+  simulator.tell_points([&las = *writer](const std::vector<TruePoint>& points) {
+    for (const TruePoint& point : points) {
+      LasRecord record;
+      record.x = point.place.x();
+      record.y = point.place.y();
+      record.z = point.place.z();
+      record.stamp = point.stamp;
+      record.intensity = static_cast<std::uint16_t>(point.intensity);
+      record.classification = class_of(point.source.surface);
+      record.tree_id = static_cast<std::uint32_t>(point.source.tree);
+      record.height_above_ground = std::numeric_limits<float>::quiet_NaN();
+      las.add(record);
+    }
+  });
+  return writer;
 }
 
 // No file that the site is read from is replaced, by whichever of the outputs; and every place is
@@ -130,16 +178,21 @@ int simulate(const SimulateOptions& options, CommandContext& context) {
   refuse_places(options, capture);
   Outputs outputs(options, capture);
   Simulator simulator(load_site(options.site, options.settings));
+  std::unique_ptr<LasWriter> points;
+  if (simulator.site().truth.points) points = write_points(outputs.truth_part(), simulator);
   bool whole = false;
   if (capture) {
     FieldLogWriter writer(outputs.part(), simulator.site(), simulator.rig());
     whole = write_events(simulator, writer, context);
   } else {
-    McapWriter writer(outputs.part());
+    McapWriterOptions as_driver;
+    as_driver.livox = simulator.site().lidar.model == "Mid-360";
+    McapWriter writer(outputs.part(), as_driver);
     writer.set_rig(simulator.rig());
     whole = write_events(simulator, writer, context);
   }
   simulator.write_truth(outputs.truth_part());
+  if (points) points->commit();
   if (!whole && outputs.replaces()) {
     context.log.warn("simulate.stopped", "stopped early: " + options.output + " is left as it was");
     return kExitUntrusted;

@@ -76,6 +76,14 @@ inline constexpr float kLinkSds = 4.0F;
 inline constexpr float kLinkDepth = 0.4F;
 }  // namespace ring_view
 
+namespace scan_rings {  // features/scan_rings.cc
+// Points of a ring by which its spread is told [chosen]
+inline constexpr double kFewestPoints = 50.0;
+// rad: standard deviation of the elevations of a level ring. Vertical offsets of beams give 0.01 at
+// a metre, a line of a Mid-360 0.3 [chosen]
+inline constexpr double kMostSdRad = 0.08;
+}  // namespace scan_rings
+
 namespace stem_chain {  // features/stem_chain.cc
 // Squared Mahalanobis distance in the plane within which a section is on a line; chi squared of 2
 // degrees, 99.8 % [bound: statistics]

@@ -126,6 +126,55 @@ inline constexpr double kStartReach = 0.4;
 inline constexpr double kFitReach = 0.35;
 }  // namespace stem_detector
 
+namespace not_a_tree {  // forest/stems/not_a_tree.cc
+// m above the ground: posts and people end below [bound: people]
+inline constexpr double kLowEnd = 2.3;
+// m above the end of a stem that are left out: the end is blurred [chosen]
+inline constexpr double kAboveEnd = 0.15;
+// m of a stem, and of the heights above it, that there have to be [chosen]
+inline constexpr double kLeastSpan = 0.5;
+// m from the surface: points that are on it [chosen]
+inline constexpr double kOnSurface = 0.03;
+// m beyond the surface: points above the end that may be the tree's own, by its branches or by an
+// error of the lean [tuned on random seeds]
+inline constexpr double kNearAxis = 0.3;
+// m beyond the surface: from here on points are around it [chosen]
+inline constexpr double kNotNear = 0.4;
+// m from the axis: points around it at most [chosen]
+inline constexpr double kAroundReach = 3.0;
+// thinned points around it that show that the heights above were in view [tuned on random seeds]
+inline constexpr int kAroundPoints = 40;
+// thinned points that a stem would have above its end: with fewer expected nothing is said
+// [bound: by chance none of 20 is there once in 500 million times]
+inline constexpr double kLeastExpected = 20.0;
+// Of the points that a stem would have above its end: with more it goes on [tuned on random seeds]
+inline constexpr double kAboveShare = 0.005;
+// m beyond the surface of a stem from which on a plane is looked for beside it [chosen]
+inline constexpr double kBesideFrom = 0.05;
+// m of such a plane [chosen]
+inline constexpr double kBesideLength = 0.5;
+// m: half of its thickness [chosen]
+inline constexpr double kSlabHalf = 0.03;
+// m from its middle: points that are beside it [chosen]
+inline constexpr double kSlabFar = 0.15;
+// Pieces of it along [chosen]
+inline constexpr std::size_t kColumns = 5;
+// The same upwards [chosen]
+inline constexpr std::size_t kRows = 8;
+// Share of the pieces that hold points, of a wall at least [tuned on random seeds]
+inline constexpr double kCovered = 0.7;
+// thinned points of a wall at one side of a stem at least [chosen]
+inline constexpr int kWallPoints = 60;
+// m of height in which a wall has to show [chosen]
+inline constexpr double kWallHeight = 1.0;
+// Points a thickness beside a wall over those on it, at most [tuned on random seeds]
+inline constexpr double kBesideShare = 0.15;
+// Directions of planes that are tried [bound: time]
+inline constexpr int kTurns = 36;
+// m by which a leaning stem's points lie farther from its place at breast height [chosen]
+inline constexpr double kLeanReach = 0.3;
+}  // namespace not_a_tree
+
 namespace ring_linker {  // forest/stems/ring_linker.cc
 // m: edge of the cells in which rings of other slices are looked for [chosen]
 inline constexpr double kRingCell = 1.0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numbers>
 
+#include "understory/geometry/matrix_inverse.h"
+
 namespace understory {
 namespace {
 
@@ -30,7 +32,7 @@ void describe(ConfigTable& table, FirstKeyframesConfig& config) {
 
 std::vector<Pose> refine_first_keyframes(
     std::span<const Keyframe> segment,
-    const std::function<std::shared_ptr<const Points>(std::size_t)>& points,
+    const std::function<std::shared_ptr<const FeaturePoints>(std::size_t)>& points,
     const LocalMapConfig& map_config, const FirstKeyframesConfig& config) {
   const auto count = static_cast<std::size_t>(config.keyframes);
   const std::size_t known = count + static_cast<std::size_t>(config.map_keyframes);
@@ -44,9 +46,9 @@ std::vector<Pose> refine_first_keyframes(
   for (std::size_t i = count; i-- > 0;) {
     const auto cloud = points(i);
     const Pose guess = moved * segment[i].world_from_body;
-    const PosePrior prior{guess, segment[i + 1].covariance.inverse()};
+    const PosePrior prior{guess, inverse_matrix(segment[i + 1].covariance)};
     const RegistrationResult match =
-        map.snapshot()->match(*cloud, guess, {prior}, MatchStart::kNear);
+        map.snapshot()->match_features(*cloud, guess, {prior}, MatchStart::kNear);
     result[i] = is_acceptable(match, guess, config) ? match.target_from_source : guess;
     moved = result[i] * segment[i].world_from_body.inverse();
     map.insert({cloud.get(), result[i]}, false);

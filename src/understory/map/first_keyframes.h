@@ -33,7 +33,7 @@ void describe(ConfigTable& table, FirstKeyframesConfig& config);
 // threads.
 [[nodiscard]] std::vector<Pose> refine_first_keyframes(
     std::span<const Keyframe> segment,
-    const std::function<std::shared_ptr<const Points>(std::size_t)>& points,
+    const std::function<std::shared_ptr<const FeaturePoints>(std::size_t)>& points,
     const LocalMapConfig& map_config, const FirstKeyframesConfig& config);
 
 }  // namespace understory

@@ -13,7 +13,7 @@ constexpr int kKeyframes = 12;
 // A straight path through a stand, each keyframe one scan of 16 rings.
 struct Path {
   std::vector<Keyframe> truth;
-  std::vector<std::shared_ptr<const Points>> points;
+  std::vector<std::shared_ptr<const FeaturePoints>> points;
 
   Path() {
     testing::Stand stand = testing::make_stand({.half_width_m = 30.0}, 2);
@@ -24,8 +24,8 @@ struct Path {
           Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.5 * i - 3.0, 0.0, 1.6));
       keyframe.covariance = 1e-3 * Matrix6d::Identity();
       truth.push_back(keyframe);
-      points.push_back(std::make_shared<Points>(
-          testing::scan_stand(stand, keyframe.world_from_body, testing::vlp16(), 100 + i)));
+      points.push_back(std::make_shared<FeaturePoints>(FeaturePoints{
+          testing::scan_stand(stand, keyframe.world_from_body, testing::vlp16(), 100 + i), {}}));
     }
   }
 

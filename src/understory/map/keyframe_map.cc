@@ -83,7 +83,7 @@ bool KeyframeMap::wants(const Pose& world_from_body) const {
 }
 
 std::optional<Pose> KeyframeMap::add(TimeNs stamp, const Pose& world_from_body,
-                                     const Points& points_in_body) {
+                                     const FeaturePoints& points_in_body) {
   const ScopedTimer timer(times_, "keyframe");
   std::optional<Pose> moved;
   if (auto outcome = loops_.take(keyframes_.size(), false, takes_loops_when_found_)) {
@@ -266,7 +266,8 @@ RangeCheck KeyframeMap::check_ranges(const Eigen::Vector3d& lidar_in_body,
                                      const ProgressSink& progress) const {
   const auto points_of = [&](std::size_t i) {
     progress.poll();
-    return points_->get(i);
+    const std::shared_ptr<const FeaturePoints> cloud = points_->get(i);
+    return std::shared_ptr<const Points>(cloud, &cloud->points);
   };
   const RangeCheck check = understory::check_ranges(keyframes_, segment_starts_, points_of,
                                                     lidar_in_body, config_.range_check);

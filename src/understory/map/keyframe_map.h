@@ -72,7 +72,7 @@ class KeyframeMap {
   // Adds a keyframe and updates the local map. Returns the motion of the world, if it moved, that
   // has been applied to the new keyframe as well.
   [[nodiscard]] std::optional<Pose> add(TimeNs stamp, const Pose& world_from_body,
-                                        const Points& points_in_body);
+                                        const FeaturePoints& points_in_body);
   // Begins anew after the scans could not be matched any more: the next keyframe is joined to the
   // last one by a prediction only, and the local map starts empty.
   void start_segment();

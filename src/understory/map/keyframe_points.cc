@@ -1,6 +1,7 @@
 #include "understory/map/keyframe_points.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace understory {
 
@@ -11,35 +12,42 @@ KeyframePoints::KeyframePoints(const std::filesystem::path& file, const RecordCo
                                std::size_t cached)
     : clouds_(file, known), cached_(cached) {}
 
-void KeyframePoints::append(TimeNs stamp, const Points& points) {
+// What says that a cloud has features stands in the column of intensities, which these clouds do
+// not have: a feature is its number and one, and 0 is none at all.
+void KeyframePoints::append(TimeNs stamp, const FeaturePoints& cloud) {
   const std::lock_guard lock(mutex_);
-  KeyframeCloud cloud{static_cast<std::int32_t>(clouds_.size()), stamp, {}, {}};
-  cloud.points.reserve(points.size());
-  for (const Eigen::Vector3f& p : points)
-    cloud.points.push_back({p.x(), p.y(), p.z(), 0, 0});
-  remember(clouds_.size(), std::make_shared<const Points>(points));
-  clouds_.append(cloud);
+  KeyframeCloud stored{static_cast<std::int32_t>(clouds_.size()), stamp, {}, {}};
+  stored.points.reserve(cloud.points.size());
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    const Eigen::Vector3f& p = cloud.points[i];
+    const int feature = cloud.features.empty() ? 0 : static_cast<int>(cloud.features[i]) + 1;
+    stored.points.push_back({p.x(), p.y(), p.z(), static_cast<std::uint16_t>(feature), 0});
+  }
+  remember(clouds_.size(), std::make_shared<const FeaturePoints>(cloud));
+  clouds_.append(stored);
 }
 
-std::shared_ptr<const Points> KeyframePoints::get(std::size_t keyframe) {
+std::shared_ptr<const FeaturePoints> KeyframePoints::get(std::size_t keyframe) {
   const std::lock_guard lock(mutex_);
   const auto found = cache_.find(keyframe);
   if (found != cache_.end()) {
     found->second.used = ++uses_;
-    return found->second.points;
+    return found->second.cloud;
   }
-  const KeyframeCloud cloud = clouds_.read(keyframe);
-  Points points;
-  points.reserve(cloud.points.size());
-  for (const KeyframePoint& p : cloud.points)
-    points.emplace_back(p.x, p.y, p.z);
-  auto shared = std::make_shared<const Points>(std::move(points));
+  const KeyframeCloud stored = clouds_.read(keyframe);
+  FeaturePoints cloud;
+  cloud.points.reserve(stored.points.size());
+  for (const KeyframePoint& p : stored.points) {
+    cloud.points.emplace_back(p.x, p.y, p.z);
+    if (p.intensity > 0) cloud.features.push_back(static_cast<PointFeature>(p.intensity - 1));
+  }
+  auto shared = std::make_shared<const FeaturePoints>(std::move(cloud));
   remember(keyframe, shared);
   return shared;
 }
 
-void KeyframePoints::remember(std::size_t keyframe, std::shared_ptr<const Points> points) {
-  cache_[keyframe] = {std::move(points), ++uses_};
+void KeyframePoints::remember(std::size_t keyframe, std::shared_ptr<const FeaturePoints> cloud) {
+  cache_[keyframe] = {std::move(cloud), ++uses_};
   if (cache_.size() <= cached_) return;
   const auto oldest =
       std::min_element(cache_.begin(), cache_.end(),

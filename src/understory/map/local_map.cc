@@ -27,8 +27,8 @@ LocalMap::LocalMap(const LocalMapConfig& config)
       builder_(make_matcher(config.matcher)->make_builder(config.viewpoint)) {}
 
 void LocalMap::insert(const PlacedPoints& keyframe, bool forget) {
-  builder_->insert(*keyframe.points_in_body, keyframe.world_from_body,
-                   forget ? std::optional(radius_m_) : std::nullopt);
+  builder_->insert_features(*keyframe.points_in_body, keyframe.world_from_body,
+                            forget ? std::optional(radius_m_) : std::nullopt);
 }
 
 void LocalMap::clear() {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "understory/geometry/points.h"
+#include "understory/geometry/feature_points.h"
 #include "understory/geometry/pose.h"
 #include "understory/registration/matchers.h"
 #include "understory/util/config/config.h"
@@ -29,7 +29,7 @@ void describe(ConfigTable& table, LocalMapConfig& config);
 
 // A keyframe's thinned cloud and where it is.
 struct PlacedPoints {
-  const Points* points_in_body = nullptr;
+  const FeaturePoints* points_in_body = nullptr;
   Pose world_from_body;
 };
 

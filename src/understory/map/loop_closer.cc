@@ -33,7 +33,7 @@ void add_points_seen_from(const Search& search, std::size_t keyframe, std::size_
   const Pose here_from_there = poses[from].inverse() * poses[keyframe];
   const Eigen::Matrix3f rotation = here_from_there.rotation_matrix().cast<float>();
   const Eigen::Vector3f translation = here_from_there.translation().cast<float>();
-  for (const Eigen::Vector3f& p : *search.points->get(keyframe))
+  for (const Eigen::Vector3f& p : search.points->get(keyframe)->points)
     all.push_back(rotation * p + translation);
 }
 
@@ -116,7 +116,7 @@ LoopAttempt try_in_present(const Search& search, std::size_t query, const LoopCa
   for (const std::size_t i : present.keyframes)
     add_points_seen_from(search, i, query, input.map_points_in_query);
   input.candidate_points =
-      VoxelFilter().filter(*search.points->get(from), search.config.voxel_size_m);
+      VoxelFilter().filter(search.points->get(from)->points, search.config.voxel_size_m);
   input.world_from_candidate = poses[from];
   input.world_from_query = poses[query];
   const Pose estimated = poses[from].inverse() * poses[query];

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <numbers>
 #include <set>
+#include <span>
 
 #include "understory/map/keyframe_clouds.h"
 #include "understory/map/keyframe_map.h"
@@ -155,6 +156,26 @@ TEST(MapTiles, HandsBackEveryPointOnceInOrderOfTiles) {
   EXPECT_EQ(count, 10'000U);
   EXPECT_EQ(stamps.size(), 10'000U);
   EXPECT_NEAR(sum_back, sum, 1e-2);
+}
+
+// One tile has more points than are handed over at once.
+TEST(MapTiles, PlacesComeInTheOrderOfPoints) {
+  const test::TemporaryFolder folder;
+  MapTiles tiles(folder / "places", {100.0, 0.0});
+  Random random(4);
+  for (int i = 0; i < 100'000; ++i)
+    tiles.add({random.uniform(0, 110), random.uniform(-1, 99), random.uniform(0, 5), i, 1});
+  std::vector<Eigen::Vector3d> expected;
+  tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+    for (const MapPoint& p : points)
+      expected.emplace_back(p.x, p.y, p.z);
+  });
+  std::vector<Eigen::Vector3d> places;
+  tiles.for_each_place([&](std::span<const Eigen::Vector3d> block) {
+    EXPECT_FALSE(block.empty());
+    places.insert(places.end(), block.begin(), block.end());
+  });
+  EXPECT_EQ(places, expected);
 }
 
 TEST(MapTiles, ThinsToTheFirstPointOfEachCube) {

@@ -1,5 +1,7 @@
 #include "understory/map/map_tiles.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 
@@ -10,6 +12,8 @@ namespace understory {
 namespace {
 
 constexpr std::uint64_t kBufferedPoints = 2'000'000;  // 48 MB over all tiles
+constexpr std::size_t kBlock = 1 << 16;  // points; 1.5 MB, so that they stay in the cache
+constexpr std::size_t kKeysAhead = 32;
 
 }  // namespace
 
@@ -88,30 +92,38 @@ void MapTiles::write_out(TileIndex index, Tile& tile) {
   std::vector<Record>().swap(tile.buffer);
 }
 
-std::vector<MapTiles::Record> MapTiles::load(TileIndex index, const Tile& tile) const {
-  std::vector<Record> records(tile.written);
-  if (tile.written > 0) {
-    const std::filesystem::path path = file_of(index);
-    std::ifstream file(path, std::ios::binary);
-    file.read(reinterpret_cast<char*>(records.data()),
-              static_cast<std::streamsize>(tile.written * sizeof(Record)));
-    if (!file) throw InputError(path.string(), "", "a temporary tile cannot be read back");
-  }
-  records.insert(records.end(), tile.buffer.begin(), tile.buffer.end());
-  return records;
+// Those of a tile that was never written lie in memory; `loaded` holds those that were.
+std::span<const MapTiles::Record> MapTiles::records_of(TileIndex index, const Tile& tile,
+                                                       std::vector<Record>& loaded) const {
+  if (tile.written == 0) return tile.buffer;
+  loaded.resize(tile.written);
+  const std::filesystem::path path = file_of(index);
+  std::ifstream file(path, std::ios::binary);
+  file.read(reinterpret_cast<char*>(loaded.data()),
+            static_cast<std::streamsize>(tile.written * sizeof(Record)));
+  if (!file) throw InputError(path.string(), "", "a temporary tile cannot be read back");
+  loaded.insert(loaded.end(), tile.buffer.begin(), tile.buffer.end());
+  return loaded;
 }
 
-std::vector<MapTiles::Record> MapTiles::thinned(const std::vector<Record>& records) const {
+std::vector<MapTiles::Record> MapTiles::thinned(std::span<const Record> records) const {
   VoxelIndex taken;
   const auto cell = [&](float value) {
     return voxel_floor(static_cast<double>(value) / config_.thin_m);
   };
+  const auto key_of = [&](const Record& r) { return voxel_key(cell(r.x), cell(r.y), cell(r.z)); };
+  // The index is larger than the cache: its memory is asked for some points ahead.
+  std::array<std::uint64_t, kKeysAhead> keys;
   std::vector<Record> kept;
-  for (const Record& r : records) {
-    const std::uint64_t key = voxel_key(cell(r.x), cell(r.y), cell(r.z));
-    if (taken.find(key) != VoxelIndex::kNone) continue;
-    taken.set(key, 0);
-    kept.push_back(r);
+  for (std::size_t begin = 0; begin < records.size(); begin += kKeysAhead) {
+    const std::size_t count = std::min(kKeysAhead, records.size() - begin);
+    for (std::size_t i = 0; i < count; ++i)
+      taken.prefetch(keys[i] = key_of(records[begin + i]));
+    for (std::size_t i = 0; i < count; ++i) {
+      if (taken.find(keys[i]) != VoxelIndex::kNone) continue;
+      taken.set(keys[i], 0);
+      kept.push_back(records[begin + i]);
+    }
   }
   return kept;
 }
@@ -119,8 +131,9 @@ std::vector<MapTiles::Record> MapTiles::thinned(const std::vector<Record>& recor
 void MapTiles::thin_all() {
   thinned_ = true;
   if (config_.thin_m <= 0.0) return;
+  std::vector<Record> loaded;
   for (auto& [index, tile] : tiles_) {
-    std::vector<Record> kept = thinned(load(index, tile));
+    std::vector<Record> kept = thinned(records_of(index, tile, loaded));
     const bool on_disk = tile.written > 0;
     if (on_disk) {
       std::filesystem::remove(file_of(index));
@@ -131,21 +144,48 @@ void MapTiles::thin_all() {
   }
 }
 
+std::vector<std::pair<MapTiles::TileIndex, const MapTiles::Tile*>> MapTiles::tiles_in_order()
+    const {
+  std::vector<std::pair<TileIndex, const Tile*>> tiles;
+  for (const auto& [index, tile] : tiles_)
+    tiles.emplace_back(index, &tile);
+  std::sort(tiles.begin(), tiles.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.first.second, a.first.first) < std::pair(b.first.second, b.first.first);
+  });
+  return tiles;
+}
+
 void MapTiles::for_each(const std::function<void(TileIndex, const std::vector<MapPoint>&)>& visit) {
   if (!thinned_) thin_all();
-  std::map<TileIndex, const Tile*> in_order;  // by y, then x
-  for (const auto& [index, tile] : tiles_)
-    in_order[{index.second, index.first}] = &tile;
   std::vector<MapPoint> points;
-  for (const auto& [swapped, tile] : in_order) {
-    const TileIndex index{swapped.second, swapped.first};
+  std::vector<Record> loaded;
+  for (const auto& [index, tile] : tiles_in_order()) {
     points.clear();
-    for (const Record& r : load(index, *tile)) {
+    for (const Record& r : records_of(index, *tile, loaded)) {
       points.push_back({index.first * config_.tile_m + static_cast<double>(r.x),
                         index.second * config_.tile_m + static_cast<double>(r.y),
                         static_cast<double>(r.z), r.stamp, r.intensity, r.of_neighbour});
     }
     visit(index, points);
+  }
+}
+
+void MapTiles::for_each_place(const std::function<void(std::span<const Eigen::Vector3d>)>& visit) {
+  if (!thinned_) thin_all();
+  std::vector<Eigen::Vector3d> places;
+  std::vector<Record> loaded;
+  for (const auto& [index, tile] : tiles_in_order()) {
+    const double x0 = index.first * config_.tile_m;
+    const double y0 = index.second * config_.tile_m;
+    const std::span<const Record> records = records_of(index, *tile, loaded);
+    for (std::size_t begin = 0; begin < records.size(); begin += kBlock) {
+      places.clear();
+      for (const Record& r : records.subspan(begin, std::min(kBlock, records.size() - begin))) {
+        places.emplace_back(x0 + static_cast<double>(r.x), y0 + static_cast<double>(r.y),
+                            static_cast<double>(r.z));
+      }
+      visit(places);
+    }
   }
 }
 

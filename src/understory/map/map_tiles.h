@@ -1,9 +1,11 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -45,6 +47,9 @@ class MapTiles {
   // Calls `visit` with each non-empty tile's points, tiles in order of y then x. May be called
   // again, but after the first call no point may be added.
   void for_each(const std::function<void(TileIndex, const std::vector<MapPoint>&)>& visit);
+  // Calls `visit` with the places of all points (world frame, metres), in the order of for_each, a
+  // few ten thousand at a time. May be called again, like for_each.
+  void for_each_place(const std::function<void(std::span<const Eigen::Vector3d>)>& visit);
   [[nodiscard]] std::uint64_t points_added() const { return points_added_; }
 
  private:
@@ -54,8 +59,10 @@ class MapTiles {
   void write_out(TileIndex index, Tile& tile);
   void thin_all();
   [[nodiscard]] std::filesystem::path file_of(TileIndex index) const;
-  [[nodiscard]] std::vector<Record> load(TileIndex index, const Tile& tile) const;
-  [[nodiscard]] std::vector<Record> thinned(const std::vector<Record>& records) const;
+  [[nodiscard]] std::span<const Record> records_of(TileIndex index, const Tile& tile,
+                                                   std::vector<Record>& loaded) const;
+  [[nodiscard]] std::vector<Record> thinned(std::span<const Record> records) const;
+  [[nodiscard]] std::vector<std::pair<TileIndex, const Tile*>> tiles_in_order() const;
 
   std::filesystem::path folder_;
   Config config_;

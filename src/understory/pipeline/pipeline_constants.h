@@ -123,6 +123,8 @@ inline constexpr std::size_t kClouds = 60;
 inline constexpr double kReach = 60.0;
 // m between poses: what is seen hardly changes sooner [chosen]
 inline constexpr double kStep = 1.0;
+// Slope by which a point lies lower than another whatever their rounding [bound: doubles]
+inline constexpr double kSureSlope = 1e-9;
 }  // namespace lidar_view
 
 namespace georeferencing {  // pipeline/georeferencing/methods/place_by_*.cc

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "understory/geometry/feature_points.h"
 #include "understory/geometry/points.h"
 #include "understory/util/time.h"
 
@@ -17,7 +18,8 @@ struct BodyCloud {
   std::vector<float> intensity;  // as the sensor gives it
   std::vector<float> range;      // metres from the lidar's origin when measured
   std::vector<std::uint16_t> ring;
-  std::vector<std::uint32_t> t_ns;  // since `stamp`
+  std::vector<std::uint32_t> t_ns;    // since `stamp`
+  std::vector<PointFeature> feature;  // only where a matcher asks for it; else empty
 
   [[nodiscard]] std::size_t size() const { return points.size(); }
   [[nodiscard]] bool empty() const { return points.empty(); }

@@ -119,10 +119,10 @@ DeskewResult deskew(const Scan& scan, const Rig& rig, std::span<const StampedPos
   if (result.deskewed) {
     const PoseTrack track(poses, config.max_extrapolation_s);
     motions = motions_of_steps(scan, rig, track, step);
-    for (const ScanPoint& point : scan.points) {
-      const TimeNs time = scan.stamp + point.t_ns;
-      if (time < poses.front().stamp || time > poses.back().stamp) ++result.extrapolated;
-    }
+    const TimeNs first = poses.front().stamp - scan.stamp;
+    const TimeNs last = poses.back().stamp - scan.stamp;
+    for (const ScanPoint& point : scan.points)
+      result.extrapolated += point.t_ns < first || point.t_ns > last ? 1 : 0;
   }
   const Motion still = motion_of(rig.body_from_lidar);
   const std::vector<std::uint32_t> indices = kept_indices(scan.points.size(), keep);

@@ -1,6 +1,7 @@
 #include "understory/preprocess/isolated_points.h"
 
 #include <array>
+#include <limits>
 
 #include "understory/preprocess/preprocess_constants.h"
 
@@ -8,6 +9,17 @@ namespace understory {
 namespace {
 
 using namespace preprocess_constants::isolated_points;
+
+// A point of a ring that waits for those after it. Where there is none yet, it lies nowhere:
+// neither near another nor near the lidar.
+struct Seen {
+  float x = std::numeric_limits<float>::infinity();
+  float y = std::numeric_limits<float>::infinity();
+  float z = std::numeric_limits<float>::infinity();
+  float range2 = std::numeric_limits<float>::infinity();  // squared
+  std::uint32_t index = 0;
+  bool alone = true;
+};
 
 }  // namespace
 
@@ -24,41 +36,33 @@ void describe(ConfigTable& table, IsolatedPointsConfig& config) {
 std::size_t drop_isolated(const Scan& scan, const IsolatedPointsConfig& config,
                           std::vector<std::uint8_t>& keep) {
   if (config.within_m <= 0.0 || scan.ring_count < 2) return 0;
-  constexpr std::uint32_t kNone = 0xffffffffU;
   const auto reach = static_cast<float>(config.within_m * config.within_m);
   const auto gap = static_cast<float>(config.gap_m * config.gap_m);
-  struct Seen {
-    std::uint32_t index = kNone;
-    bool alone = true;
-  };
   // The last two points of each ring: of two beams, or of the one before with two returns.
   std::vector<std::array<Seen, 2>> rings;
   std::vector<std::uint32_t> alone_near;
   std::size_t near = 0;
   const auto judge = [&](const Seen& point) {
-    if (point.index == kNone) return;
-    const ScanPoint& p = scan.points[point.index];
-    if (p.x * p.x + p.y * p.y + p.z * p.z >= reach) return;
-    ++near;
-    if (point.alone) alone_near.push_back(point.index);
+    const bool is_near = point.range2 < reach;
+    near += is_near ? 1 : 0;
+    if (is_near && point.alone) alone_near.push_back(point.index);
   };
   for (std::uint32_t i = 0; i < scan.points.size(); ++i) {
     const ScanPoint& p = scan.points[i];
     if (p.ring >= rings.size()) rings.resize(std::size_t{p.ring} + 1);
     std::array<Seen, 2>& before = rings[p.ring];
-    Seen self{i, true};
+    Seen self{p.x, p.y, p.z, p.x * p.x + p.y * p.y + p.z * p.z, i, true};
     for (Seen& other : before) {
-      if (other.index == kNone) continue;
-      const ScanPoint& q = scan.points[other.index];
-      const float dx = p.x - q.x;
-      const float dy = p.y - q.y;
-      const float dz = p.z - q.z;
-      if (dx * dx + dy * dy + dz * dz > gap) continue;
-      other.alone = false;
-      self.alone = false;
+      const float dx = p.x - other.x;
+      const float dy = p.y - other.y;
+      const float dz = p.z - other.z;
+      const bool apart = !(dx * dx + dy * dy + dz * dz <= gap);
+      other.alone = other.alone && apart;
+      self.alone = self.alone && apart;
     }
     judge(before[0]);
-    before = {before[1], self};
+    before[0] = before[1];
+    before[1] = self;
   }
   for (const auto& last : rings) {
     judge(last[0]);

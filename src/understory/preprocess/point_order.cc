@@ -40,6 +40,12 @@ std::size_t different_times(const std::vector<TimedAngles>& in_order) {
   return count;
 }
 
+// How far two angles of the same axis are apart, both within a half turn of 0.
+double angle_between(double a, double b) {
+  const double apart = std::abs(a - b);
+  return apart <= M_PI ? apart : std::abs(2.0 * M_PI - apart);
+}
+
 // Median angle about an axis to the nearest of the points that follow. Several, because beams of
 // one moment may look into different directions.
 double median_step(const std::vector<TimedAngles>& points, std::size_t axis) {
@@ -48,8 +54,7 @@ double median_step(const std::vector<TimedAngles>& points, std::size_t axis) {
     double nearest = M_PI;
     for (std::size_t k = 1; k <= kFollowing; ++k)
       nearest =
-          std::min(nearest, std::abs(std::remainder(
-                                points[i + k].angles[axis] - points[i].angles[axis], 2.0 * M_PI)));
+          std::min(nearest, angle_between(points[i + k].angles[axis], points[i].angles[axis]));
     steps.push_back(nearest);
   }
   return upper_median(steps);

@@ -14,6 +14,18 @@ namespace {
 
 constexpr std::size_t kKeysAhead = 64;
 
+constexpr auto take_all = [](std::uint32_t) { return true; };
+constexpr auto take_no_note = [](const auto&, std::uint32_t) {};
+
+// Without its feature.
+void append_point(const BodyCloud& from, std::size_t i, BodyCloud& to) {
+  to.points.push_back(from.points[i]);
+  to.intensity.push_back(from.intensity[i]);
+  to.range.push_back(from.range[i]);
+  to.ring.push_back(from.ring[i]);
+  to.t_ns.push_back(from.t_ns[i]);
+}
+
 }  // namespace
 
 void describe(ConfigTable& table, VoxelFilterConfig& config) {
@@ -59,7 +71,8 @@ void VoxelFilter::grow() {
   }
 }
 
-std::uint32_t VoxelFilter::find_or_add(std::uint64_t key, std::uint32_t index) {
+inline std::uint32_t VoxelFilter::find_or_add(std::uint64_t key, std::uint32_t index,
+                                              const Eigen::Vector3f& point) {
   std::uint64_t at = voxel_hash(key) & mask_;
   while (slots_[at].epoch == epoch_) {
     if (slots_[at].key == key) return slots_[at].voxel;
@@ -67,15 +80,17 @@ std::uint32_t VoxelFilter::find_or_add(std::uint64_t key, std::uint32_t index) {
   }
   const auto voxel = static_cast<std::uint32_t>(voxels_.size());
   slots_[at] = {key, epoch_, voxel};
-  voxels_.push_back({{0.0F, 0.0F, 0.0F}, 0.0F, 0.0F, 0.0F, 0, index, index});
+  voxels_.push_back(
+      {{point.x(), point.y(), point.z()}, {0.0F, 0.0F, 0.0F}, 0.0F, 0.0F, 0.0F, 0, index, index});
   keys_.push_back(key);
   if (voxels_.size() * 2 > slots_.size()) grow();
   return voxel;
 }
 
-template <typename InRange>
+// `note(voxel, index)` is told of each point that fell into a voxel.
+template <typename InRange, typename Note>
 void VoxelFilter::sort_into_voxels(const Points& points, double voxel_size_m,
-                                   const InRange& in_range) {
+                                   const InRange& in_range, const Note& note) {
   UNDERSTORY_CHECK(voxel_size_m > 0.0);
   start(points.size());
   const auto scale = static_cast<float>(1.0 / voxel_size_m);
@@ -89,22 +104,23 @@ void VoxelFilter::sort_into_voxels(const Points& points, double voxel_size_m,
                                   voxel_floor(p.z() * scale));
       __builtin_prefetch(slots_.data() + (voxel_hash(keys[i - begin]) & mask_));
     }
+    // Found first and added to then: the memory of the voxels is asked for in between.
     for (std::size_t i = begin; i < end; ++i) {
       const auto index = static_cast<std::uint32_t>(i);
-      if (in_range(index)) add_point(points, keys[i - begin], index);
+      if (!in_range(index)) continue;
+      voxel_of_point_[i] = find_or_add(keys[i - begin], index, points[i]);
+      __builtin_prefetch(voxels_.data() + voxel_of_point_[i]);
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      if (voxel_of_point_[i] == kNone) continue;
+      Voxel& voxel = voxels_[voxel_of_point_[i]];
+      voxel.sum[0] += points[i].x() - voxel.origin[0];
+      voxel.sum[1] += points[i].y() - voxel.origin[1];
+      voxel.sum[2] += points[i].z() - voxel.origin[2];
+      ++voxel.count;
+      note(voxel, static_cast<std::uint32_t>(i));
     }
   }
-}
-
-void VoxelFilter::add_point(const Points& points, std::uint64_t key, std::uint32_t index) {
-  const std::uint32_t found = find_or_add(key, index);
-  voxel_of_point_[index] = found;
-  Voxel& voxel = voxels_[found];
-  const Eigen::Vector3f from_first = points[index] - points[voxel.first];
-  voxel.sum[0] += from_first.x();
-  voxel.sum[1] += from_first.y();
-  voxel.sum[2] += from_first.z();
-  ++voxel.count;
 }
 
 void VoxelFilter::choose_nearest_to_mean(const Points& points) {
@@ -127,20 +143,15 @@ void VoxelFilter::choose_nearest_to_mean(const Points& points) {
 BodyCloud VoxelFilter::filter(const BodyCloud& cloud, const VoxelFilterConfig& config) {
   const auto low = static_cast<float>(config.range_min_m);
   const auto high = static_cast<float>(config.range_max_m);
-  sort_into_voxels(cloud.points, config.voxel_size_m, [&](std::uint32_t i) {
-    return cloud.range[i] >= low && cloud.range[i] <= high;
-  });
   const bool mean = config.point == VoxelPoint::kMean;
-  if (mean) {
-    for (std::uint32_t i = 0; i < cloud.size(); ++i) {
-      if (voxel_of_point_[i] == kNone) continue;
-      Voxel& voxel = voxels_[voxel_of_point_[i]];
-      voxel.intensity += cloud.intensity[i];
-      voxel.range += cloud.range[i];
-    }
-  } else if (config.point == VoxelPoint::kNearestToMean) {
-    choose_nearest_to_mean(cloud.points);
-  }
+  sort_into_voxels(
+      cloud.points, config.voxel_size_m,
+      [&](std::uint32_t i) { return cloud.range[i] >= low && cloud.range[i] <= high; },
+      [&](Voxel& voxel, std::uint32_t i) {
+        voxel.intensity += cloud.intensity[i];
+        voxel.range += cloud.range[i];
+      });
+  if (config.point == VoxelPoint::kNearestToMean) choose_nearest_to_mean(cloud.points);
   BodyCloud thinned;
   thinned.stamp = cloud.stamp;
   thinned.resize(voxels_.size());
@@ -162,8 +173,29 @@ BodyCloud VoxelFilter::filter(const BodyCloud& cloud, const VoxelFilterConfig& c
   return thinned;
 }
 
+BodyCloud VoxelFilter::filter_features(const BodyCloud& cloud, const VoxelFilterConfig& config,
+                                       bool keep_none) {
+  UNDERSTORY_CHECK(cloud.feature.size() == cloud.size());
+  BodyCloud filtered;
+  filtered.stamp = cloud.stamp;
+  for (const PointFeature kind :
+       {PointFeature::kEdge, PointFeature::kPlane, PointFeature::kGround, PointFeature::kNone}) {
+    if (kind == PointFeature::kNone && !keep_none) break;
+    BodyCloud part;
+    part.stamp = cloud.stamp;
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      if (cloud.feature[i] == kind) append_point(cloud, i, part);
+    }
+    const BodyCloud thinned = filter(part, config);
+    for (std::size_t i = 0; i < thinned.size(); ++i)
+      append_point(thinned, i, filtered);
+    filtered.feature.resize(filtered.size(), kind);
+  }
+  return filtered;
+}
+
 Points VoxelFilter::filter(const Points& points, double voxel_size_m) {
-  sort_into_voxels(points, voxel_size_m, [](std::uint32_t) { return true; });
+  sort_into_voxels(points, voxel_size_m, take_all, take_no_note);
   Points thinned;
   thinned.reserve(voxels_.size());
   for (const Voxel& voxel : voxels_) {
@@ -175,7 +207,7 @@ Points VoxelFilter::filter(const Points& points, double voxel_size_m) {
 
 std::vector<std::uint32_t> VoxelFilter::keep(const Points& points, double voxel_size_m,
                                              VoxelPoint point) {
-  sort_into_voxels(points, voxel_size_m, [](std::uint32_t) { return true; });
+  sort_into_voxels(points, voxel_size_m, take_all, take_no_note);
   if (point != VoxelPoint::kFirst) choose_nearest_to_mean(points);
   std::vector<std::uint32_t> indices;
   indices.reserve(voxels_.size());

@@ -33,6 +33,9 @@ class VoxelFilter {
  public:
   // Ranges are measured from the lidar where the cloud has them.
   [[nodiscard]] BodyCloud filter(const BodyCloud& cloud, const VoxelFilterConfig& config);
+  // Each kind of feature by itself, edges first; those of kNone last, or left out.
+  [[nodiscard]] BodyCloud filter_features(const BodyCloud& cloud, const VoxelFilterConfig& config,
+                                          bool keep_none);
   // Without range limits; points only. `keep` returns indices instead: the point of each voxel that
   // VoxelPoint names (kMean counts as kNearestToMean).
   [[nodiscard]] Points filter(const Points& points, double voxel_size_m);
@@ -41,7 +44,8 @@ class VoxelFilter {
 
  private:
   struct Voxel {
-    float sum[3];     // from the first point of the voxel
+    float origin[3];  // the first point of the voxel
+    float sum[3];     // from there
     float intensity;  // sum
     float range;      // sum
     float best;       // squared distance of the chosen point from the mean
@@ -56,11 +60,11 @@ class VoxelFilter {
   };
   static constexpr std::uint32_t kNone = 0xffffffffU;
   void start(std::size_t points);
-  std::uint32_t find_or_add(std::uint64_t key, std::uint32_t index);
+  std::uint32_t find_or_add(std::uint64_t key, std::uint32_t index, const Eigen::Vector3f& point);
   void grow();
-  template <typename InRange>
-  void sort_into_voxels(const Points& points, double voxel_size_m, const InRange& in_range);
-  void add_point(const Points& points, std::uint64_t key, std::uint32_t index);
+  template <typename InRange, typename Note>
+  void sort_into_voxels(const Points& points, double voxel_size_m, const InRange& in_range,
+                        const Note& note);
   void choose_nearest_to_mean(const Points& points);
 
   std::vector<Slot> slots_;

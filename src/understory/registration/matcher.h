@@ -1,11 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "understory/geometry/feature_points.h"
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
 #include "understory/registration/registration.h"
@@ -46,6 +48,13 @@ class MatchTarget {
   [[nodiscard]] virtual RegistrationResult match(const Points& source, const Pose& guess,
                                                  const PoseTerms& terms,
                                                  MatchStart start) const = 0;
+  // The same of points with features (Matcher::feature_finder). Methods without features take all
+  // points alike; those with features find nothing in points that have none.
+  [[nodiscard]] virtual RegistrationResult match_features(const FeaturePoints& source,
+                                                          const Pose& guess, const PoseTerms& terms,
+                                                          MatchStart start) const {
+    return match(source.points, guess, terms, start);
+  }
   // A point farther than about this from all that the target shows matches nothing, metres. If
   // points lay there by chance, they would be half of it (RMS) from what they match.
   [[nodiscard]] virtual double reach_m() const = 0;
@@ -56,6 +65,10 @@ class MatchTarget {
     static_cast<void>(source);
     static_cast<void>(start);
     return nullptr;
+  }
+  [[nodiscard]] virtual std::unique_ptr<const MatchCost> cost_of_features(
+      const FeaturePoints& source, MatchStart start) const {
+    return cost(source.points, start);
   }
 };
 using MatchTargetPtr = std::shared_ptr<const MatchTarget>;
@@ -69,6 +82,11 @@ class TargetBuilder {
   // Adds a cloud. Then, if given, forgets what is farther than `forget_beyond_m` from its origin.
   virtual void insert(const Points& points_in_source, const Pose& target_from_source,
                       std::optional<double> forget_beyond_m) = 0;
+  virtual void insert_features(const FeaturePoints& points_in_source,
+                               const Pose& target_from_source,
+                               std::optional<double> forget_beyond_m) {
+    insert(points_in_source.points, target_from_source, forget_beyond_m);
+  }
   virtual void clear() = 0;
   // The target as it is now. Quickest if nobody holds the last one any more: its memory may then be
   // written on.
@@ -81,6 +99,21 @@ struct Viewpoint {
   std::optional<Eigen::Vector3d> lidar_in_source;
 };
 
+// A whole scan with its rings: parallel arrays in the order in which it was measured. Axes with z
+// about upwards; the lidar near their origin.
+struct RingPoints {
+  const Points* points = nullptr;
+  const std::vector<std::uint16_t>* ring = nullptr;
+};
+
+// Finds what the rings of a scan tell of its points. Immutable, thread-safe.
+class FeatureFinder {
+ public:
+  virtual ~FeatureFinder() = default;
+  // Of each point. Throws InputError for a scan of one ring or without rings.
+  [[nodiscard]] virtual std::vector<PointFeature> find(const RingPoints& scan) const = 0;
+};
+
 // A method with its settings. Immutable, thread-safe.
 class Matcher {
  public:
@@ -90,6 +123,10 @@ class Matcher {
       const Viewpoint& viewpoint) const = 0;
   // Of a single cloud, in its own frame.
   [[nodiscard]] virtual MatchTargetPtr make_target(const Points& points) const;
+  // Of a method that matches features alone; null: it matches points.
+  [[nodiscard]] virtual std::shared_ptr<const FeatureFinder> feature_finder() const {
+    return nullptr;
+  }
   // See MatchTarget::reach_m; of all its targets.
   [[nodiscard]] virtual double reach_m() const = 0;
   // Whether the method sums up the points of a target, so that many tell more than few. If not, it

@@ -5,10 +5,14 @@
 #include <tuple>
 #include <vector>
 
+#include "understory/registration/gaussian/gaussian_matcher.h"
 #include "understory/registration/gicp/gicp_matcher.h"
 #include "understory/registration/icp/icp_matcher.h"
+#include "understory/registration/loam/loam_matcher.h"
 #include "understory/registration/matcher.h"
 #include "understory/registration/ndt/ndt_matcher.h"
+#include "understory/registration/ndt_d2d/ndt_d2d_matcher.h"
+#include "understory/registration/vgicp/vgicp_matcher.h"
 #include "understory/util/config/config.h"
 
 namespace understory {
@@ -19,9 +23,15 @@ namespace understory {
 //   void describe(ConfigTable&, C&);                               the settings in section kName
 //   std::unique_ptr<const Matcher> make_matcher(const C&);         throws ConfigError
 //   std::vector<SuitedSetting> suited_settings(const C&, const ScanTraits&);
-using MatcherConfigs = std::tuple<NdtMatcherConfig,  //
-                                  IcpMatcherConfig,  //
-                                  GicpMatcherConfig>;
+using MatcherConfigs = std::tuple<NdtMatcherConfig,          //
+                                  NdtD2dMatcherConfig,       //
+                                  IcpMatcherConfig,          //
+                                  GicpMatcherConfig,         //
+                                  VgicpMatcherConfig,        //
+                                  PointToGaussianConfig,     //
+                                  GaussianToGaussianConfig,  //
+                                  LoamMatcherConfig,         //
+                                  LoamGroundMatcherConfig>;
 
 // The method chosen, and the settings of all of them.
 struct MatcherConfig {

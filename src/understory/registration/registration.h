@@ -24,9 +24,25 @@ struct PositionPrior {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();      // of the position, 1/m^2
 };
 
+// A point whose partner is known, P3 (7): e = position_in_target - target_from_source *
+// point_in_source counts in the metric of the covariance.
+struct PenaltyPoint {
+  Eigen::Vector3d position_in_target = Eigen::Vector3d::Zero();
+  Eigen::Vector3d point_in_source = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // axes of the target, m^2
+};
+
+// Penalty points of P3 (6): the mean over them of e^T W^-1 e counts as much as the mean over the
+// matched points, whatever their numbers. `scale` > 0: s of (8), by which the points count more.
+// See penalties.h for the points of position, gravity and heading.
+struct PointPenalties {
+  std::vector<PenaltyPoint> points;
+  double scale = 1.0;
+};
+
 // What counts beside the points. A new kind of term is one more type here and its `add_term` in
 // solve.cc; every matcher then takes it.
-using PoseTerm = std::variant<PosePrior, PositionPrior>;
+using PoseTerm = std::variant<PosePrior, PositionPrior, PointPenalties>;
 using PoseTerms = std::vector<PoseTerm>;
 
 // Cost of a pose (for information) with its gradient and a positive semidefinite (or exact) Hessian

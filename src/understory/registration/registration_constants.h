@@ -61,16 +61,46 @@ inline constexpr std::size_t kMaxNeighbours = 100;
 namespace surface {  // registration/icp/surface.cc
 // points of a surface at least [bound: a plane has three parameters]
 inline constexpr std::size_t kFewestPoints = 4;
+// Neighbours of a surface at most [bound: time]
+inline constexpr std::size_t kMaxNeighbours = 100;
 // Middle over largest variance: below, a line [chosen, as in NDT]
 inline constexpr double kLineRatio = 0.05;
 // Of a line against z: steeper ones are stems, not rings; 45 degrees [chosen, as in NDT]
 inline constexpr double kPoleCosine = 0.7;
 }  // namespace surface
 
-namespace gicp {  // registration/gicp/gicp.cc
-// Neighbours of a surface at most [bound: time]
-inline constexpr std::size_t kMaxNeighbours = 100;
-}  // namespace gicp
+namespace gaussian_voxels {  // registration/gaussian/gaussian_voxels.cc
+// Middle over largest variance: below, a line [chosen, as in NDT]
+inline constexpr double kLineRatio = 0.05;
+// Smallest over middle variance: below, a surface [chosen, as in NDT]
+inline constexpr double kPlaneRatio = 0.15;
+// m: standard deviation of a point along its surface, at least [chosen, as in GICP]
+inline constexpr double kAlong = 1.0;
+}  // namespace gaussian_voxels
+
+namespace robust_loss {  // registration/robust_loss.cc
+// Standard deviations of the scale of Huber's loss: 95 % efficient where errors are normal, by the
+// efficiency (E psi')^2 / E psi^2 [Huber 1981]
+inline constexpr double kHuberWidth = 1.345;
+// The same of Welsch's loss [Dennis and Welsch 1978]
+inline constexpr double kWelschWidth = 2.985;
+// The same of Geman and McClure's loss [bound: the efficiency, worked out]
+inline constexpr double kGemanMcClureWidth = 3.79;
+// Of FRMSD in three dimensions [Phillips et al. 2007, section 3]
+inline constexpr double kFractionPower = 1.3;
+// Share of the residuals that counts at least [chosen]
+inline constexpr double kLeastShare = 0.3;
+// An estimated scale is at least this share of the setting [chosen]
+inline constexpr double kLeastScale = 0.01;
+}  // namespace robust_loss
+
+namespace ring_features {  // registration/loam/ring_features.cc
+// Directions in which the slope from ring to ring is found; 0.2 degrees [chosen: about a column of
+// an Ouster with 2048 or a VLP-16 with 1800]
+inline constexpr std::size_t kAzimuthBins = 1800;
+// m: smoothness divides by the range [bound: no lidar measures nearer]
+inline constexpr double kLeastRange = 0.1;
+}  // namespace ring_features
 
 namespace solve {  // registration/solve.cc
 // A step is taken back and halved if it ends on a rise steeper than this share of the fall at its

@@ -2,8 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <variant>
 
 #include "understory/registration/registration_constants.h"
 #include "understory/util/parallel.h"
@@ -101,9 +103,27 @@ void add_term(const PositionPrior& prior, const Pose& pose, PoseCost& to) {
   to.hessian += weighted * jacobian;
 }
 
-void add_terms(const PoseTerms& terms, const Pose& pose, PoseCost& to) {
-  for (const PoseTerm& term : terms)
-    std::visit([&](const auto& each) { add_term(each, pose, to); }, term);
+void add_term(const PointPenalties& penalties, const Pose& pose, double points_weight,
+              PoseCost& to) {
+  const auto count = static_cast<double>(penalties.points.size());
+  const double weight = points_weight / (penalties.scale * count);
+  for (const PenaltyPoint& point : penalties.points) {
+    add_term(PositionPrior{point.position_in_target, point.point_in_source,
+                           weight * point.covariance.inverse()},
+             pose, to);
+  }
+}
+
+void add_terms(const PoseTerms& terms, const Pose& pose, double points_weight, PoseCost& to) {
+  for (const PoseTerm& term : terms) {
+    if (const auto* penalties = std::get_if<PointPenalties>(&term)) {
+      add_term(*penalties, pose, points_weight, to);
+    } else if (const auto* prior = std::get_if<PosePrior>(&term)) {
+      add_term(*prior, pose, to);
+    } else {
+      add_term(std::get<PositionPrior>(term), pose, to);
+    }
+  }
 }
 
 Eigen::Matrix<double, 6, Eigen::Dynamic> degenerate_directions(const Matrix6d& information,

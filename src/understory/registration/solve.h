@@ -40,7 +40,12 @@ struct Minimum {
 void add_term(const PosePrior& prior, const Pose& pose, PoseCost& to);
 // Adds 1/2 |pose * point - position|^2 in the metric of the prior's information.
 void add_term(const PositionPrior& prior, const Pose& pose, PoseCost& to);
-void add_terms(const PoseTerms& terms, const Pose& pose, PoseCost& to);
+// Adds the penalties of P3 (6, 8), where the points' part of the cost is `points_weight` times half
+// the mean of their squared normalised residuals.
+void add_term(const PointPenalties& penalties, const Pose& pose, double points_weight,
+              PoseCost& to);
+// Adds all terms. `points_weight`: matched points times the share of them that counts.
+void add_terms(const PoseTerms& terms, const Pose& pose, double points_weight, PoseCost& to);
 
 // Unit directions, rotation scaled by `range_m`, whose information is below `ratio` of the largest.
 [[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> degenerate_directions(

@@ -18,7 +18,7 @@ struct ScanPoint {
   std::uint32_t t_ns = 0;         // since Scan::stamp
   std::uint16_t ring = 0;         // laser number, from the lowest beam up where the sensor tells
   std::uint8_t return_index = 0;  // 0 strongest or only, 1 second return of a dual-return sensor
-  std::uint8_t reserved = 0;
+  std::uint8_t tag = 0;           // marks of a Livox as they come: 0 is an ordinary point
 };
 
 // One revolution (or frame) of a lidar, in the order in which it was measured where the source

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "understory/recording/messages/baseline_headings.h"
 #include "understory/simulation/scene/scan_cache.h"
@@ -16,6 +17,7 @@
 #include "understory/simulation/stand/stand.h"
 #include "understory/simulation/truth.h"
 #include "understory/simulation/world.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -67,7 +69,7 @@ class Simulator::Impl : public SimulatedWorld {
     const TimeNs imu_time = site.imu.enabled ? imu.next_stamp() : kNever;
     const TimeNs mag_time = site.mag.enabled ? mag.next_stamp() : kNever;
     const TimeNs fix_time = next_fix ? next_fix->stamp + from_seconds(site.gnss.latency_s) : kNever;
-    const TimeNs scan_time = scanner.end(number_of(scan_number));
+    const TimeNs scan_time = site.scans ? scanner.end(number_of(scan_number)) : kNever;
     const TimeNs first = std::min({imu_time, mag_time, fix_time, scan_time});
     if (first >= end) return false;
     if (imu_time == first) {
@@ -126,6 +128,7 @@ class Simulator::Impl : public SimulatedWorld {
   std::vector<TopicReport> reports;
   TruthLog truths;
   std::unique_ptr<ScanCache> cache;
+  std::function<void(const std::vector<TruePoint>&)> point_sink;
   // Biases at the stamps of scans that are not finished yet.
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> biases;
 
@@ -142,6 +145,7 @@ class Simulator::Impl : public SimulatedWorld {
 
   // Keeps the biases of the scans that began before a sample.
   void note_biases(TimeNs stamp) {
+    if (!site.scans) return;
     while (scanner.stamp(number_of(static_cast<std::int64_t>(biases.size()))) <= stamp)
       biases.emplace_back(imu.gyro_bias(), imu.accel_bias());
   }
@@ -176,6 +180,7 @@ class Simulator::Impl : public SimulatedWorld {
       ScanReadings readings = measure(number);
       ScanPtr scan = scanner.assemble(number, readings);
       reports[0].points += scan->points.size();
+      if (point_sink) point_sink(scanner.true_points(*scan, readings));
       stems = std::move(readings.stems);
       event = std::move(scan);
     }
@@ -221,7 +226,7 @@ class Simulator::Impl : public SimulatedWorld {
           Pose(Eigen::Quaterniond::Identity(), rig.body_from_gnss->translation() + line);
       rig.second_gnss_extrinsic_source = "simulation";
     }
-    rig.lidar_model = site.lidar.model;
+    if (site.scans) rig.lidar_model = site.lidar.model;
     if (rig.lidar_model.rfind("OS", 0) == 0) rig.lidar_model.insert(2, "-");
     rig.lidar_extrinsic_source = "simulation";
     if (site.imu.enabled) rig.imu_extrinsic_source = "simulation";
@@ -279,7 +284,7 @@ const Rig& Simulator::rig() const {
 
 std::vector<TopicReport> Simulator::topics() const {
   const SiteConfig& site = impl_->site;
-  const bool present[] = {true, site.imu.enabled, site.gnss.enabled, site.mag.enabled};
+  const bool present[] = {site.scans, site.imu.enabled, site.gnss.enabled, site.mag.enabled};
   std::vector<TopicReport> reports;
   for (std::size_t i = 0; i < impl_->reports.size(); ++i) {
     if (present[i]) reports.push_back(impl_->reports[i]);
@@ -288,8 +293,8 @@ std::vector<TopicReport> Simulator::topics() const {
 }
 
 std::string Simulator::format() const {
-  return "simulation (" + impl_->site.lidar.model + ", seed " + std::to_string(impl_->site.seed) +
-         ")";
+  const std::string lidar = impl_->site.scans ? impl_->site.lidar.model : "no lidar";
+  return "simulation (" + lidar + ", seed " + std::to_string(impl_->site.seed) + ")";
 }
 
 double Simulator::progress() const {
@@ -299,6 +304,12 @@ double Simulator::progress() const {
 
 const std::optional<GnssFix>& Simulator::second_fix() const {
   return impl_->second_fix;
+}
+
+void Simulator::tell_points(std::function<void(const std::vector<TruePoint>&)> sink) {
+  UNDERSTORY_CHECK(!impl_->cache);
+  impl_->scanner.keep_sources();
+  impl_->point_sink = std::move(sink);
 }
 
 const SiteConfig& Simulator::site() const {
@@ -331,6 +342,11 @@ std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {
     }
   }
   const SiteConfig site = load_site(parts.site, settings);
+  if (site.truth.points) {
+    throw ConfigError(
+        {"truth.points: only `understory simulate` writes points.laz; simulate a "
+         "recording and map that"});
+  }
   log.debug("simulating " + parts.site);
   if (folder.empty()) return std::make_unique<Simulator>(site);
   return std::make_unique<Simulator>(site, folder, log);

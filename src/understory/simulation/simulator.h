@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "understory/recording/recording.h"
+#include "understory/simulation/sensors/scanner.h"
 #include "understory/simulation/site.h"
 
 namespace understory {
@@ -34,6 +36,10 @@ class Simulator : public Recording {
   // Where the second antenna gives positions (gnss.second_antenna_positions): that of the moment of
   // the fix that `next` gave last. That fix has the heading by both then, as recording/ finds it.
   [[nodiscard]] const std::optional<GnssFix>& second_fix() const;
+
+  // From now on hands over the points of each scan that is cast, at their true places. Not
+  // together with a folder of casts, which does not keep what gave an echo.
+  void tell_points(std::function<void(const std::vector<TruePoint>&)> sink);
 
   [[nodiscard]] const SiteConfig& site() const;
   [[nodiscard]] double duration_s() const;

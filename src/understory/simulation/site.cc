@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "understory/simulation/drawn_site.h"
 #include "understory/simulation/presets.h"
+#include "understory/simulation/stand/objects.h"
 #include "understory/simulation/stand/stand.h"
 #include "understory/util/error.h"
 #include "understory/util/files/text_file.h"
@@ -15,8 +17,8 @@ namespace {
 
 const ConfigTable::Range kPositive{1e-9, 1e9};
 const ConfigTable::Range kNotNegative{0.0, 1e9};
-const std::vector<std::string> kLidarModels = {"OS0-128", "VLP-16", "OS1-64",
-                                               "OS1-128", "HDL-64", "RS-16"};
+const std::vector<std::string> kLidarModels = {"OS0-128", "VLP-16", "OS1-64", "OS1-128",
+                                               "HDL-64",  "RS-16",  "Mid-360", "VLP-32C"};
 
 void describe_mag(ConfigTable& table, MagnetometerConfig& c) {
   table.section("mag", [&] {
@@ -110,7 +112,7 @@ void describe_stand(ConfigTable& table, StandConfig& c) {
 
 void describe_carrier(ConfigTable& table, CarrierConfig& c) {
   table.section("carrier", [&] {
-    table.add_choice("kind", c.kind, {"walk", "harvester", "uav", "sleigh"},
+    table.add_choice("kind", c.kind, {"walk", "harvester", "uav", "sleigh", "still"},
                      "how the sensors are carried");
     table.add_choice("body", c.body, {"imu", "base_link"}, "frame whose path is planned");
     table.add("length_m", c.length_m, {1.0, 5000.0}, "m", "of the route");
@@ -295,6 +297,40 @@ void describe_scanned(ConfigTable& table, SiteConfig& config) {
   describe_mag(table, config.mag);
 }
 
+void describe_truth(ConfigTable& table, TruthConfig& c) {
+  table.section("truth", [&] {
+    table.add("points", c.points, "write points.laz: every point at its true place, with its tree");
+  });
+}
+
+void describe_scans(ConfigTable& table, SiteConfig& config) {
+  table.add("scans", config.scans, "whether there is a lidar");
+}
+
+void describe_usual(ConfigTable& table, SiteConfig& config) {
+  describe_scanned(table, config);
+  table.section("receiver_hold", [&] {
+    table.add("below_m_s", config.receiver_hold.below_m_s, {0.0, 100.0}, "m/s",
+              "speed below which the GNSS receiver holds its position, 0 = never");
+    table.add("release_m", config.receiver_hold.release_m, {0.0, 1000.0}, "m",
+              "until its solution lies so far away in the plane");
+  });
+  describe_total_station(table, config.total_station);
+  table.section("head_log", [&] {
+    table.add("sd_m", config.head_log.sd_m, {0.0, 10.0}, "m",
+              "error of the harvester head's place at a cut, each axis");
+    table.add("bias_sd_m", config.head_log.bias_sd_m, {0.0, 10.0}, "m",
+              "the same for all cuts of a recording");
+    table.add("missed", config.head_log.missed, {0.0, 1.0}, "", "share of the cuts not noted");
+  });
+  table.add("imu_preset", config.imu_preset,
+            "measured IMU: site (as the site says), vectornav, xsens");
+  table.add(
+      "gnss_preset", config.gnss_preset,
+      "measured receiver: site (as the site says), phone, phone_wild, faitli_evo1, faitli_evo2, "
+      "faitli_tuusniemi1, faitli_tuusniemi3");
+}
+
 void check_triple(const std::string& key, const std::vector<double>& value,
                   std::vector<std::string>& problems) {
   if (value.size() != 3) problems.push_back(key + ": expected three numbers");
@@ -326,6 +362,9 @@ void check_site(const SiteConfig& site) {
   if (site.carrier.narrow_from > site.carrier.narrow_to) {
     problems.push_back("carrier: narrow_from is larger than narrow_to");
   }
+  if (site.carrier.kind == "still" && site.duration_s <= 0.0) {
+    problems.push_back("carrier: kind still needs duration_s");
+  }
   if (site.carrier.work == "thinning" && site.carrier.route_time_s <= 0.0) {
     problems.push_back("carrier: work thinning needs route_time_s");
   }
@@ -334,28 +373,21 @@ void check_site(const SiteConfig& site) {
 
 }  // namespace
 
+void describe_used(ConfigTable& table, SiteConfig& config) {
+  describe_usual(table, config);
+  if (!config.scans) describe_scans(table, config);
+  if (config.objects.any()) describe_objects(table, config.objects);
+  if (config.truth.points) describe_truth(table, config.truth);
+}
+
 void describe(ConfigTable& table, SiteConfig& config) {
-  describe_scanned(table, config);
-  table.section("receiver_hold", [&] {
-    table.add("below_m_s", config.receiver_hold.below_m_s, {0.0, 100.0}, "m/s",
-              "speed below which the GNSS receiver holds its position, 0 = never");
-    table.add("release_m", config.receiver_hold.release_m, {0.0, 1000.0}, "m",
-              "until its solution lies so far away in the plane");
-  });
-  describe_total_station(table, config.total_station);
-  table.section("head_log", [&] {
-    table.add("sd_m", config.head_log.sd_m, {0.0, 10.0}, "m",
-              "error of the harvester head's place at a cut, each axis");
-    table.add("bias_sd_m", config.head_log.bias_sd_m, {0.0, 10.0}, "m",
-              "the same for all cuts of a recording");
-    table.add("missed", config.head_log.missed, {0.0, 1.0}, "", "share of the cuts not noted");
-  });
-  table.add("imu_preset", config.imu_preset,
-            "measured IMU: site (as the site says), vectornav, xsens");
-  table.add(
-      "gnss_preset", config.gnss_preset,
-      "measured receiver: site (as the site says), phone, phone_wild, faitli_evo1, faitli_evo2, "
-      "faitli_tuusniemi1, faitli_tuusniemi3");
+  describe_usual(table, config);
+  describe_scans(table, config);
+  describe_objects(table, config.objects);
+  describe_truth(table, config.truth);
+  table.add("draw", config.draw,
+            "whether the seed draws ground, stand, objects, carrier and scanner; what a setting "
+            "names is not drawn");
 }
 
 namespace {
@@ -375,6 +407,7 @@ std::uint64_t site_key(const SiteConfig& config) {
   SiteConfig copy = config;
   ConfigTable table;
   describe_scanned(table, copy);
+  if (copy.objects.any()) describe_objects(table, copy.objects);
   // The number counts what the program itself makes otherwise of the same settings.
   const bool bundles = config.lidar.rays_per_beam >= kBundleRays;
   std::string text = (bundles ? "3\n" : "2\n") + table.to_yaml(false);
@@ -402,6 +435,14 @@ void work_in_presets(SiteConfig& site, ConfigTable& table,
   site.imu_preset = site.gnss_preset = "site";
 }
 
+// What the seed draws goes under the settings. The site that comes of it draws nothing more.
+void work_in_draws(SiteConfig& site, ConfigTable& table, const std::vector<std::string>& settings) {
+  if (!site.draw) return;
+  table.set(drawn_settings(static_cast<std::uint64_t>(site.seed)));
+  table.set(settings);
+  site.draw = false;
+}
+
 }  // namespace
 
 SiteConfig load_site(const std::string& name_or_path, const std::vector<std::string>& settings) {
@@ -424,6 +465,7 @@ SiteConfig load_site(const std::string& name_or_path, const std::vector<std::str
         "no such site: expected one of " + names + ", or the path of a site's YAML file");
   }
   table.set(settings);
+  work_in_draws(site, table, settings);
   work_in_presets(site, table, settings);
   check_site(site);
   return site;

@@ -75,6 +75,22 @@ struct StandConfig {
   int buildings = 0;  // beside the route: the first at its start, the second at its end
 };
 
+// Things among the trees that are none, beside the route.
+struct ObjectsConfig {
+  int houses = 0;  // corners of buildings: two walls each
+  int posts = 0;
+  int fences = 0;
+  int vehicles = 0;
+  int people = 0;            // who stand
+  int walkers = 0;           // who walk to and fro
+  double clearance_m = 1.5;  // from the route to the nearest part
+  double reach_m = 10.0;     // farther than that from there, none is placed
+
+  [[nodiscard]] bool any() const {
+    return houses + posts + fences + vehicles + people + walkers > 0;
+  }
+};
+
 // What carries the sensors, and how it moves.
 struct CarrierConfig {
   std::string kind = "walk";
@@ -244,10 +260,15 @@ struct HeadLogConfig {  // what a harvester's computer notes at each felling cut
   double missed = 0.02;     // share of the cuts that are not in the log
 };
 
+struct TruthConfig {    // what the truth has beside its usual files
+  bool points = false;  // points.laz: every point with its tree
+};
+
 // All that a site is made of: the keys of configs/sites/*.yaml.
 struct SiteConfig {
   int seed = 1;
   double duration_s = 0.0;  // 0: as long as the route takes
+  bool scans = true;        // false: no lidar, the other sensors alone
   OriginConfig origin;
   TerrainConfig terrain;
   StandConfig stand;
@@ -259,12 +280,18 @@ struct SiteConfig {
   TotalStationConfig total_station;
   HeadLogConfig head_log;
   ReceiverHoldConfig receiver_hold;
-  std::string imu_preset = "site";  // a loaded site has its presets worked in and says "site"
+  ObjectsConfig objects;
+  TruthConfig truth;
+  bool draw = false;  // stand, ground, scanner, carrier and objects are drawn by the seed
+  std::string imu_preset = "site";  // a loaded site has them worked in: "site"
   std::string gnss_preset = "site";
 };
 
 // Binds every key of a site to `config`.
 void describe(ConfigTable& table, SiteConfig& config);
+// The same without the sections that ask for nothing: objects of a site without any, and truth
+// where it is the usual one. The site.yaml of a truth has these keys.
+void describe_used(ConfigTable& table, SiteConfig& config);
 
 // Names a site with all its settings but those of the total station and the receiver's hold, and
 // with the content of its list of trees and of their clouds, for the cache of scans.

@@ -14,6 +14,9 @@
 #include <map>
 
 #include "understory/sensor/tree.h"
+#include "understory/simulation/scene/true_crowns.h"
+#include "understory/simulation/stand/objects.h"
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -114,15 +117,15 @@ bool has_known_stem(const GrownTree& grown) {
 
 // Over bark, from the ground to the end of the stem, in slices of a centimetre.
 double stem_volume_m3(const GrownTree& grown) {
-  constexpr double kSlice = 0.01;
+  constexpr double kVolumeSlice = 0.01;
   double volume = 0.0;
-  for (double height = 0.5 * kSlice; height < stem_end_m(grown); height += kSlice)
-    volume += 0.25 * M_PI * std::pow(grown.diameter(height), 2) * kSlice;
+  for (double height = 0.5 * kVolumeSlice; height < stem_end_m(grown); height += kVolumeSlice)
+    volume += 0.25 * M_PI * std::pow(grown.diameter(height), 2) * kVolumeSlice;
   return volume;
 }
 
 // As it grew: nothing of it is uncertain.
-Tree truth_of(const GrownTree& grown) {
+Tree truth_of(const GrownTree& grown, const TrueCrown& crown) {
   Tree tree;
   tree.id = grown.id;
   tree.x = grown.foot.x();
@@ -136,6 +139,9 @@ Tree truth_of(const GrownTree& grown) {
     tree.stem_volume_m3 = stem_volume_m3(grown);
     tree.stem_volume_sd_m3 = 0.0;
   }
+  tree.crown_base_m = crown.base_m;
+  tree.crown_area_m2 = crown.area_m2;
+  tree.crown_volume_m3 = crown.volume_m3;
   return tree;
 }
 
@@ -158,6 +164,7 @@ std::string stem_curves_text(const Stand& stand) {
 
 std::string trees_text(const SimulatedWorld& world, TimeNs start, const TruthLog& log) {
   const std::vector<ScanTruth>& scans = log.scans();
+  const TrueCrowns crowns(world.site.stand, world.seed);
   std::map<int, int> observations;
   for (std::size_t i = 0; i < scans.size(); ++i) {
     for (const StemReturns& stem : log.stems(i))
@@ -172,10 +179,22 @@ std::string trees_text(const SimulatedWorld& world, TimeNs start, const TruthLog
   for (const GrownTree& grown : world.stand.trees) {
     const auto seen = observations.find(grown.id);
     const auto cut = felled.find(grown.id);
-    Tree tree = truth_of(grown);
+    Tree tree = truth_of(grown, crowns.of(grown));
     tree.observations = seen == observations.end() ? 0 : seen->second;
     text += fmt::format("{},{},{}\n", tree_csv_row(tree, 1), species_name(grown.species),
                         cut == felled.end() ? "" : cut->second);
+  }
+  return text;
+}
+
+// Things that are no trees: where they stand at time zero, and how large they are.
+std::string objects_text(const Stand& stand) {
+  std::string text = "kind,x,y,z,length_m,width_m,height_m,yaw_deg,walk_m,speed_m_s\n";
+  for (const StandObject& object : stand.objects) {
+    text += fmt::format("{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{:.2f},{:.2f}\n",
+                        object_name(object.kind), object.foot.x(), object.foot.y(), object.foot.z(),
+                        object.size_m.x(), object.size_m.y(), object.size_m.z(),
+                        object.yaw_rad / kDegree, object.walk_m, object.speed_m_s);
   }
   return text;
 }
@@ -257,9 +276,10 @@ std::vector<StemReturns> TruthLog::stems(std::size_t i) const {
 }
 
 bool is_truth_file(const std::string& name) {
-  constexpr std::array<const char*, 10> kNames = {
-      "trajectory.tum",  "velocity.csv", "imu_bias.csv",      "returns.csv.gz", "trees.csv",
-      "stem_curves.csv", "dtm.tif",      "total_station.csv", "head.csv",       "site.yaml"};
+  constexpr std::array<const char*, 12> kNames = {
+      "trajectory.tum", "velocity.csv",    "imu_bias.csv", "returns.csv.gz",
+      "trees.csv",      "stem_curves.csv", "dtm.tif",      "total_station.csv",
+      "head.csv",       "site.yaml",       "objects.csv",  "points.laz"};
   return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
 }
 
@@ -276,11 +296,12 @@ void write_truth_folder(const std::string& folder, const SimulatedWorld& world, 
   write_text(folder + "/trees.csv", trees_text(world, start, log));
   write_text(folder + "/stem_curves.csv", stem_curves_text(world.stand));
   if (!prism.empty()) write_text(folder + "/total_station.csv", prism_text(prism));
+  if (!world.stand.objects.empty()) write_text(folder + "/objects.csv", objects_text(world.stand));
   if (!cuts.empty()) write_text(folder + "/head.csv", head_text(cuts));
   write_terrain(folder + "/dtm.tif", world.terrain);
   SiteConfig copy = world.site;
   ConfigTable table;
-  describe(table, copy);
+  describe_used(table, copy);
   write_text(folder + "/site.yaml", table.to_yaml(false));
 }
 

@@ -1,9 +1,18 @@
 #include "understory/simulation/world.h"
 
+#include "understory/simulation/stand/objects.h"
+
 namespace understory {
 namespace {
 
 constexpr double kTerrainMargin = 12.0;  // metres of ground around the stand's rectangle
+
+Stand stand_of(const SiteConfig& config, const Terrain& terrain, const Route& route,
+               std::uint64_t seed) {
+  Stand stand = grow_stand(config.stand, config.carrier, terrain, route, seed);
+  add_objects(config.objects, terrain, route, seed, stand);
+  return stand;
+}
 
 }  // namespace
 
@@ -13,7 +22,7 @@ SimulatedWorld::SimulatedWorld(const SiteConfig& config)
       route(config.carrier, seed),
       terrain(config.terrain, 0.5 * config.stand.size_x_m + kTerrainMargin,
               0.5 * config.stand.size_y_m + kTerrainMargin, seed, &route),
-      stand(grow_stand(config.stand, config.carrier, terrain, route, seed)),
+      stand(stand_of(config, terrain, route, seed)),
       plan(plan_carrier(config, route, terrain, stand)),
       scene(config.stand, terrain, stand, seed, config.terrain.snow_m, plan.harvest,
             config.lidar.rays_per_beam >= kBundleRays ? Casting::kBundles : Casting::kRays),

@@ -1,10 +1,10 @@
 #include "understory/forest/ground/low_noise.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "understory/forest/cell_grid.h"
@@ -15,29 +15,43 @@ namespace {
 
 using namespace forest_constants::low_noise;
 
-// How many points a cell has by height, in steps, ascending.
-struct Column {
-  std::vector<std::pair<int, std::uint32_t>> counts;
-
+// How many points a cell has by height, in steps. Steps are counted in spans: a cell has one or
+// two, and a stray point far away makes another one instead of a long array.
+class Column {
+ public:
   void add(int step) {
-    auto at = std::lower_bound(counts.begin(), counts.end(), std::pair(step, std::uint32_t{0}));
-    if (at == counts.end() || at->first != step) at = counts.insert(at, {step, 0});
-    ++at->second;
+    const int first = step & ~(kSpan - 1);
+    auto at = spans_.begin();
+    while (at != spans_.end() && at->first < first)
+      ++at;
+    if (at == spans_.end() || at->first != first) at = spans_.insert(at, {first, {}});
+    ++at->counts[static_cast<std::size_t>(step - first)];
+    ++all_;
   }
-  // The step at which the lowest layer begins; nothing below any other if there is none.
+  // The step at which the lowest layer begins; NaN if there is none.
   [[nodiscard]] float lowest_layer() const {
-    std::uint64_t all = 0;
-    for (const auto& [step, count] : counts)
-      all += count;
-    const double wanted = std::max<double>(kLeast, kLeastShare * static_cast<double>(all));
-    for (std::size_t i = 0; i < counts.size(); ++i) {
-      std::uint32_t within = counts[i].second;
-      if (i + 1 < counts.size() && counts[i + 1].first == counts[i].first + 1)
-        within += counts[i + 1].second;
-      if (within >= wanted) return static_cast<float>(counts[i].first);
+    const double wanted = std::max<double>(kLeast, kLeastShare * static_cast<double>(all_));
+    for (std::size_t i = 0; i < spans_.size(); ++i) {
+      const bool goes_on = i + 1 < spans_.size() && spans_[i + 1].first == spans_[i].first + kSpan;
+      const std::uint32_t after_end = goes_on ? spans_[i + 1].counts.front() : 0;
+      for (std::size_t step = 0; step < kSpan; ++step) {
+        const auto& counts = spans_[i].counts;
+        const std::uint32_t above = step + 1 < kSpan ? counts[step + 1] : after_end;
+        if (counts[step] > 0 && counts[step] + above >= wanted)
+          return static_cast<float>(spans_[i].first + static_cast<int>(step));
+      }
     }
     return std::numeric_limits<float>::quiet_NaN();
   }
+
+ private:
+  static constexpr int kSpan = 64;  // steps; a power of two
+  struct Span {
+    int first;
+    std::array<std::uint32_t, kSpan> counts;
+  };
+  std::vector<Span> spans_;  // ascending
+  std::uint64_t all_ = 0;
 };
 
 }  // namespace

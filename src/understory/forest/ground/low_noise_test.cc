@@ -47,5 +47,15 @@ TEST(LowNoise, WhereNothingIsKnownNothingIsNoise) {
   EXPECT_FALSE(noise.holds({500.0, 500.0, 0.0}));
 }
 
+// Heights are counted in spans of 32 m. Two points on each side of an end make one layer.
+TEST(LowNoise, ALayerGoesOnFromSpanToSpan) {
+  const Points points = {
+      {0.5, 0.5, 0.0}, {0.5, 0.5, 31.8}, {0.5, 1.5, 31.9}, {1.5, 0.5, 32.1}, {1.5, 1.5, 32.2}};
+  const LowNoise noise(blocks(points));
+  EXPECT_TRUE(noise.holds(points[0])) << "alone, far under the layer";
+  for (std::size_t i = 1; i < points.size(); ++i)
+    EXPECT_FALSE(noise.holds(points[i])) << points[i].z();
+}
+
 }  // namespace
 }  // namespace understory

@@ -22,15 +22,16 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 double quick_exp(double x) {
   constexpr double kLog2e = 1.4426950408889634;
   constexpr double kLn2 = 0.6931471805599453;
-  if (x < -60.0) return 0.0;
+  constexpr double kToBits = 0x1.8p52;  // its last bits count ones
   const double whole = std::floor(x * kLog2e + 0.5);
   const double r = x - whole * kLn2;  // at most 0.35
   double sum = 1.0 / 40320.0;
   for (const double term :
        {1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0})
     sum = sum * r + term;
-  const auto exponent = static_cast<std::uint64_t>(static_cast<std::int64_t>(whole) + 1023);
-  return sum * std::bit_cast<double>(exponent << 52);
+  const std::uint64_t exponent = std::bit_cast<std::uint64_t>(whole + kToBits) + 1023;
+  const double power = sum * std::bit_cast<double>(exponent << 52);
+  return x < -60.0 ? 0.0 : power;
 }
 
 // A point seen along the stem: place in the plane across it, relative to the start's centre line.
@@ -129,6 +130,10 @@ class Estimator {
       const double turn = 2.0 * M_PI * (static_cast<double>(b) + 0.5) / static_cast<double>(count);
       outward_.emplace_back(std::cos(turn), std::sin(turn));
     }
+    for (std::size_t b = 0; b < count; ++b)
+      outward_.push_back(outward_[b]);
+    shares_.resize(outward_.size());
+    squares_.resize(outward_.size());
     for (int k = 0; k < kViews; ++k) {
       const double turn = 2.0 * M_PI * k / kViews;
       const Eigen::Vector2d towards(std::cos(turn), std::sin(turn));
@@ -150,6 +155,25 @@ class Estimator {
     double log_likelihood = 0.0;
   };
 
+  // Squared distances of a point from the places [begin, end), and the chances that it came from
+  // them. Loops of their own, so that the compiler makes vectors of the exponentials.
+  void find_shares(int begin, int end, const Eigen::Vector2d& q, double r, double inverse) {
+    const auto count = static_cast<int>(visible_.size());
+    for (int b = begin; b < end; ++b) {
+      const auto i = static_cast<std::size_t>(b);
+      squares_[i] = (q - r * outward_[i]).squaredNorm();
+    }
+    double* shares = shares_.data();
+    const double* squares = squares_.data();
+    for (int b = begin; b < end; ++b)
+      shares[b] = quick_exp(-0.5 * squares[b] * inverse);
+    const int turn = std::min(end, count);
+    for (int b = begin; b < turn; ++b)
+      shares[b] *= visible_[static_cast<std::size_t>(b)];
+    for (int b = turn; b < end; ++b)
+      shares[b] *= visible_[static_cast<std::size_t>(b - count)];
+  }
+
   void add_point(const FlatPoint& point, Sums& sums, std::vector<double>& seen) {
     const Eigen::Vector2d q = point.place - centre_ - point.rise * slope_;
     const double r = radius_ + taper_ * point.rise;
@@ -164,26 +188,26 @@ class Estimator {
         static_cast<int>(std::floor((std::atan2(q.y(), q.x()) / (2.0 * M_PI) + 1.0) * count));
     const int first = middle - std::min(reach, (count - 1) / 2);
     const int last = middle + std::min(reach, count / 2);
-    shares_.clear();
+    const int begin = ((first % count) + count) % count;
+    const int end = begin + last - first + 1;
+    find_shares(begin, end, q, r, inverse);
     double density = 0.0;
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
     double square = 0.0;
-    for (int b = first; b <= last; ++b) {
-      const auto at = static_cast<std::size_t>(((b % count) + count) % count);
-      const double d2 = (q - r * outward_[at]).squaredNorm();
-      const double p = visible_[at] * quick_exp(-0.5 * d2 * inverse);
-      shares_.emplace_back(at, p);
-      density += p;
-      mean += p * outward_[at];
-      square += p * d2;
+    for (int b = begin; b < end; ++b) {
+      const auto i = static_cast<std::size_t>(b);
+      density += shares_[i];
+      mean += shares_[i] * outward_[i];
+      square += shares_[i] * squares_[i];
     }
     const double scale = (1.0 - strays_) * inverse / (2.0 * M_PI);
     const double all = scale * density + strays_ * stray_density_;
     const double w = point.weight * scale / all;
     sums.log_likelihood += point.weight * std::log(all);
     sums.square += w * square;
-    for (const auto& [at, p] : shares_)
-      seen[at] += w * p;
+    for (int b = begin; b < end; ++b)
+      seen[static_cast<std::size_t>(b < count ? b : b - count)] +=
+          w * shares_[static_cast<std::size_t>(b)];
     add_to_system(point, w * density, w * mean, sums);
   }
 
@@ -276,11 +300,13 @@ class Estimator {
   double scatter_ = 0.0;
   double strays_ = kFirstStrays;
   double stray_density_ = 1.0;
-  std::vector<double> visible_;  // share of the returns that come from each place
-  std::vector<Eigen::Vector2d> outward_;
+  std::vector<double> visible_;             // share of the returns that come from each place
+  std::vector<Eigen::Vector2d> outward_;    // of the places, twice round
   std::vector<double> views_;               // share of the returns from each direction
   std::vector<std::vector<double>> lobes_;  // what each direction sees of each place
-  std::vector<std::pair<std::size_t, double>> shares_;
+  // Of a point, along `outward_`: chance that it came from there, and squared distance.
+  std::vector<double> shares_;
+  std::vector<double> squares_;
 };
 
 }  // namespace

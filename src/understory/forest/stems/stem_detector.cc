@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/circle_search.h"
+#include "understory/forest/stems/not_a_tree.h"
 #include "understory/forest/stems/ring_linker.h"
 #include "understory/forest/stems/stem_fit.h"
 #include "understory/util/parallel.h"
@@ -223,6 +225,15 @@ int unclaimed_returns(const StemFitResult& fit, const PointIndex& index,
   return static_cast<int>(returns);
 }
 
+bool is_tree(const StemFit& stem, const PointIndex& index, const std::vector<SlicePoint>& points,
+             const StemDetectorConfig& config) {
+  const PointsNear near = [&](const Eigen::Vector2d& centre, double reach,
+                              const std::function<void(const SlicePoint&)>& visit) {
+    index.near(centre, reach, [&](std::size_t i) { visit(points[i]); });
+  };
+  return doubt_of(stem, near, config) == TreeDoubt::kNone;
+}
+
 // Marks what belongs to a stem: surface, inside, and a margin.
 void mark_explained(const StemFit& stem, const PointIndex& index,
                     const std::vector<SlicePoint>& points, std::vector<char>& explained) {
@@ -285,7 +296,8 @@ std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points, const StemDet
       accepted[i] = is_stem(fits[i], cut, config) ? 1 : 0;
       if (accepted[i] != 0) {
         fits[i] = refine_stem(near, fits[i], config);
-        accepted[i] = is_stem_still(fits[i], config) ? 1 : 0;
+        accepted[i] =
+            is_stem_still(fits[i], config) && is_tree(fits[i].stem, index, points, config);
       }
     });
     std::size_t kept = 0;

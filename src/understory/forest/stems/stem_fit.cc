@@ -1,6 +1,5 @@
 #include "understory/forest/stems/stem_fit.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -9,6 +8,7 @@
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/util/median.h"
 
@@ -283,7 +283,7 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
   // independent measurements is that of patches on the surface, not of points.
   const int patches = std::max(1, result.evidence.patches);
   const double thinning = std::max(1.0, system.weight / patches);
-  const Matrix6 covariance = scatter * scatter * thinning * system.normal.inverse();
+  const Matrix6 covariance = scatter * scatter * thinning * inverse_matrix(system.normal);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j)
       stem.covariance(i, j) = covariance(i < 2 ? i : 4, j < 2 ? j : 4);

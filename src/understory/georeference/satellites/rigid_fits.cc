@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "understory/geometry/best_rotation.h"
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"
@@ -97,7 +98,7 @@ struct PoseProblem {
   const std::vector<FullPair>& pairs;
 
   [[nodiscard]] static Matrix6d information(const FullPair& pair) {
-    return (pair.target_covariance + pair.source_covariance).inverse();
+    return inverse_matrix(pair.target_covariance + pair.source_covariance);
   }
   [[nodiscard]] std::vector<double> squared(const Pose& motion) const {
     std::vector<double> result;

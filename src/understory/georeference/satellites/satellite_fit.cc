@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/georeference/georeference_constants.h"
 
@@ -121,7 +122,7 @@ SixFit fit_six(const std::vector<StampedPose>& trajectory,
     turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() =
         pairs[k].target_from_body.rotation_matrix();
     const Matrix6d information =
-        (pairs[k].target_covariance + pairs[k].source_covariance).inverse();
+        inverse_matrix(pairs[k].target_covariance + pairs[k].source_covariance);
     linear.jacobian.push_back(turn * pose_residual_jacobian(pairs[k], six.fit.target_from_source));
     linear.information.push_back(six.fit.weight[k] * turn * information * turn.transpose());
     attitude +=

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/graph/graph_constants.h"
 #include "understory/graph/stem_matching/pair_matching.h"
 #include "understory/registration/stems/tilt_about.h"
@@ -57,7 +58,7 @@ TreePatterns places_of(const std::vector<SparsePoints>& views, const std::vector
 // The covariance of a loop: its own noise, and what both views got wrong alike.
 Matrix6d loop_covariance(const SparseIcpResult& icp, const SparsePoints& source, double l0_m) {
   Matrix6d information = icp.information + 1e-6 * Matrix6d::Identity();
-  Matrix6d covariance = kLoopVariance * information.inverse();
+  Matrix6d covariance = kLoopVariance * inverse_matrix(information);
   const double shift = kLoopShiftL0 * l0_m;
   covariance.diagonal() +=
       (Vector6d() << 0.0, 0.0, kLoopYaw * kLoopYaw, shift * shift, shift * shift, shift * shift)

@@ -1,8 +1,8 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "understory/geometry/symmetric_solver.h"
 #include "understory/graph/pose_graph.h"
 
 namespace understory {
@@ -73,7 +73,7 @@ bool agree(const Chain& chain, const PoseEdge& i, const PoseEdge& j, const PoseG
   const Vector6d error = circle.log();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
   covariance.diagonal().array() += 1e-12;
-  return error.dot(covariance.ldlt().solve(error)) < limit;
+  return error.dot(SymmetricSolver<6>(covariance).solve(error)) < limit;
 }
 
 using Adjacency = std::vector<std::vector<char>>;
@@ -132,7 +132,7 @@ std::vector<char> consistent_loops(const PoseGraphProblem& problem, const PoseGr
 double edge_residual(const PoseEdge& edge, const Pose& world_from_from, const Pose& world_from_to) {
   const Vector6d error =
       right_difference(world_from_from.inverse() * world_from_to, edge.from_from_to);
-  return std::sqrt(std::max(0.0, error.dot(edge.covariance.ldlt().solve(error))));
+  return std::sqrt(std::max(0.0, error.dot(SymmetricSolver<6>(edge.covariance).solve(error))));
 }
 
 double chi_squared_6(double probability) {

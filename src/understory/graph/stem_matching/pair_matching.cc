@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/graph/graph_constants.h"
 #include "understory/registration/stems/tilt_about.h"
 #include "understory/util/index.h"
@@ -55,7 +56,7 @@ void require_better(PairMatch& match) {
 Matrix6d match_covariance(const Matrix6d& information, const SparsePoints& source,
                           double shift_sd_m) {
   // Heights and tilt hang on feet of stems, which look higher the farther away they are.
-  Matrix6d covariance = kMatchVariance * (information + 1e-6 * Matrix6d::Identity()).inverse();
+  Matrix6d covariance = kMatchVariance * inverse_matrix(information + 1e-6 * Matrix6d::Identity());
   const double shift = shift_sd_m * shift_sd_m;
   covariance.diagonal() +=
       (Vector6d() << 0.0, 0.0, kMatchYaw * kMatchYaw, shift, shift, kMatchHeight * kMatchHeight)

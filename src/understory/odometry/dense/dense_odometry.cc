@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/odometry/imu/imu_smoother.h"
 #include "understory/odometry/odometry_constants.h"
 
@@ -25,6 +26,12 @@ void describe(ConfigTable& table, ScanMatchConfig& config) {
       "reach is the finest cell of NDT");
   table.add("prior_weight", config.prior_weight, {0.0, 1.0}, "",
             "weight of the prediction inside the match");
+  table.add_enum("prior_form", config.prior_form,
+                 {{"direct", PenaltyForm::kDirect},
+                  {"one_point", PenaltyForm::kOnePoint},
+                  {"three_points", PenaltyForm::kThreePoints}},
+                 "how the prediction enters: as a term of the pose, or as penalty points for the "
+                 "position, or for position, gravity and heading");
 }
 
 void describe(ConfigTable& table, DenseOdometryConfig& config) {
@@ -42,10 +49,12 @@ void describe(ConfigTable& table, DenseOdometryConfig& config) {
   });
 }
 
-DenseOdometry::DenseOdometry(const DenseOdometryConfig& config, const Rig& rig, StageTimes& times,
+DenseOdometry::DenseOdometry(const DenseOdometryConfig& config, const Rig& rig,
+                             std::shared_ptr<const FeatureFinder> features, StageTimes& times,
                              Log& log)
     : config_(config),
       rig_(rig),
+      features_(std::move(features)),
       times_(times),
       log_(log),
       uses_imu_(config.imu_enabled && rig.body_from_imu.has_value()) {
@@ -95,7 +104,13 @@ void DenseOdometry::preprocess(const Scan& scan, const std::vector<StampedPose>&
   if (!boxes_.empty()) keep_ = outside_machine(scan, rig_, boxes_);
   drop_isolated(scan, config_.isolated, keep_);
   estimate.cloud = deskew(scan, rig_, path, keep_, config_.deskew).cloud;
-  estimate.thinned = filter_.filter(estimate.cloud, config_.voxel);
+  BodyCloud& cloud = estimate.cloud;
+  if (features_ == nullptr) {
+    estimate.thinned = filter_.filter(cloud, config_.voxel);
+    return;
+  }
+  cloud.feature = features_->find({&cloud.points, &cloud.ring});
+  estimate.thinned = filter_.filter_features(cloud, config_.voxel, false);
 }
 
 bool DenseOdometry::by_scans_alone() const {
@@ -139,10 +154,19 @@ void DenseOdometry::match(const MatchTarget& local_map, const NavState& predicte
   PoseTerms terms;
   if (config.prior_weight > 0.0) {
     const Matrix6d loose = predicted.pose_covariance + 1e-9 * Matrix6d::Identity();
-    terms.push_back(PosePrior{predicted.world_from_body, config.prior_weight * loose.inverse()});
+    if (config.prior_form == PenaltyForm::kDirect) {
+      terms.push_back(PosePrior{predicted.world_from_body, config.prior_weight * inverse_matrix(loose)});
+    } else {
+      terms.push_back(penalty_term(
+          belief_of(predicted.world_from_body, loose / config.prior_weight), config.prior_form));
+    }
   }
-  estimate.match = local_map.match(estimate.thinned.points, predicted.world_from_body, terms,
-                                   far ? MatchStart::kFar : MatchStart::kNear);
+  const MatchStart start = far ? MatchStart::kFar : MatchStart::kNear;
+  estimate.match =
+      features_ == nullptr
+          ? local_map.match(estimate.thinned.points, predicted.world_from_body, terms, start)
+          : local_map.match_features({estimate.thinned.points, estimate.thinned.feature},
+                                     predicted.world_from_body, terms, start);
   const double found = estimate.match.inlier_ratio;
   estimate.matched = estimate.match.usable() && found >= config.min_inlier_ratio;
   if (!estimate.matched) return;

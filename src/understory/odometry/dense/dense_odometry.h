@@ -15,6 +15,7 @@
 #include "understory/preprocess/machine_boxes.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/registration/matcher.h"
+#include "understory/registration/penalties.h"
 #include "understory/sensor/rig.h"
 #include "understory/sensor/scan.h"
 #include "understory/util/config/config.h"
@@ -37,6 +38,7 @@ struct ScanMatchConfig {
   // Weight of the prediction in the match, 0 = it is only the start. In directions that a scan
   // leaves undetermined the prior keeps the match from wandering.
   double prior_weight = 0.0;
+  PenaltyForm prior_form = PenaltyForm::kDirect;  // P3 (6-8) for the other two
 };
 void describe(ConfigTable& table, ScanMatchConfig& config);
 
@@ -76,7 +78,9 @@ struct DenseEstimate {
 class DenseOdometry {
  public:
   // The rig decides whether there is an IMU (body_from_imu). `times` and `log` must outlive it.
-  DenseOdometry(const DenseOdometryConfig& config, const Rig& rig, StageTimes& times, Log& log);
+  // `features`: of the method that scans are matched by; null if it matches points.
+  DenseOdometry(const DenseOdometryConfig& config, const Rig& rig,
+                std::shared_ptr<const FeatureFinder> features, StageTimes& times, Log& log);
 
   void add_imu(const ImuSample& sample);
   [[nodiscard]] DenseEstimate process(const Scan& scan, const MatchTargetPtr& local_map);
@@ -112,6 +116,7 @@ class DenseOdometry {
 
   DenseOdometryConfig config_;
   Rig rig_;
+  std::shared_ptr<const FeatureFinder> features_;
   StageTimes& times_;
   Log& log_;
   bool uses_imu_;

@@ -72,7 +72,7 @@ class LookingAround : public ::testing::Test {
   // RMS error of position over 1.4 seconds, metres.
   [[nodiscard]] double rms_error(DenseOdometryConfig config, StageTimes& times) const {
     Log log;
-    DenseOdometry odometry(config, Rig(), times, log);
+    DenseOdometry odometry(config, Rig(), nullptr, times, log);
     odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     const MatchTargetPtr local_map = map();
     double sum = 0.0;

@@ -18,7 +18,7 @@ using Vector12d = Eigen::Matrix<double, 12, 1>;
 using Matrix12d = Eigen::Matrix<double, 12, 12>;
 
 struct Slice {
-  Points points;
+  FeaturePoints cloud;
   double share = 0.0;  // mean time of the points, of the scan's duration
 };
 
@@ -28,12 +28,14 @@ std::vector<Slice> slices_of(const BodyCloud& source, TimeNs duration) {
     const double share = static_cast<double>(source.t_ns[i]) / static_cast<double>(duration);
     const auto at = static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * kSlices);
     Slice& slice = slices[std::min(at, kSlices - 1)];
-    slice.points.push_back(source.points[i]);
+    slice.cloud.points.push_back(source.points[i]);
+    if (!source.feature.empty()) slice.cloud.features.push_back(source.feature[i]);
     slice.share += share;
   }
-  std::erase_if(slices, [](const Slice& slice) { return slice.points.size() < kFewestPoints; });
+  std::erase_if(slices,
+                [](const Slice& slice) { return slice.cloud.points.size() < kFewestPoints; });
   for (Slice& slice : slices)
-    slice.share /= static_cast<double>(slice.points.size());
+    slice.share /= static_cast<double>(slice.cloud.points.size());
   return slices;
 }
 
@@ -91,7 +93,7 @@ ScanPathCorrection match_scan_path(const MatchTarget& target, const BodyCloud& s
   if (slices.size() < 2) return correction;
   std::vector<std::unique_ptr<const MatchCost>> costs;
   for (const Slice& slice : slices) {
-    costs.push_back(target.cost(slice.points, MatchStart::kNear));
+    costs.push_back(target.cost_of_features(slice.cloud, MatchStart::kNear));
     if (costs.back() == nullptr) return correction;
   }
   const Vector6d information = bend_information(duration, config);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/geometry/pose_io.h"
 #include "understory/geometry/rotation_between.h"
 #include "understory/geometry/symmetric_solver.h"
@@ -43,7 +44,7 @@ Matrix6d step_covariance(const SparseIcpResult& icp) {
   Matrix6d information = icp.information;
   information.topLeftCorner<3, 3>() += Eigen::Matrix3d::Identity();
   information.bottomRightCorner<3, 3>() += 0.01 * Eigen::Matrix3d::Identity();
-  return information.inverse();
+  return inverse_matrix(information);
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 
 #include "understory/output/report/png.h"
 
@@ -12,7 +12,8 @@ namespace {
 constexpr int kGreys = 96;
 constexpr int kGreens = 128;
 constexpr double kFarthestM = 4e7;  // so that differences of columns stay integers
-constexpr int kBlock = 64;  // the grid grows by whole blocks, so that it does not grow often
+constexpr int kBlockBits = 6;
+constexpr int kBlock = 1 << kBlockBits;  // cells along the edge of a block
 
 std::vector<std::array<std::uint8_t, 3>> palette() {
   std::vector<std::array<std::uint8_t, 3>> colours = {{255, 255, 255}};
@@ -29,6 +30,10 @@ std::vector<std::array<std::uint8_t, 3>> palette() {
   return colours;
 }
 
+std::size_t place_in_block(int column, int row) {
+  return static_cast<std::size_t>((row & (kBlock - 1)) * kBlock + (column & (kBlock - 1)));
+}
+
 }  // namespace
 
 MapPicture::MapPicture(double finest_cell_m, int largest_side)
@@ -38,14 +43,49 @@ bool MapPicture::Box::contains(int column, int row) const {
   return column >= column0 && row >= row0 && column < column0 + columns && row < row0 + rows;
 }
 
-bool MapPicture::Box::contains(const Box& other) const {
-  return contains(other.column0, other.row0) &&
-         contains(other.column0 + other.columns - 1, other.row0 + other.rows - 1);
-}
-
 std::size_t MapPicture::Box::at(int column, int row) const {
   return static_cast<std::size_t>(row - row0) * static_cast<std::size_t>(columns) +
          static_cast<std::size_t>(column - column0);
+}
+
+void MapPicture::Cells::cover(const Box& box) {
+  Box wider{box.column0 >> kBlockBits, box.row0 >> kBlockBits, 0, 0};
+  wider.columns = ((box.column0 + box.columns - 1) >> kBlockBits) + 1 - wider.column0;
+  wider.rows = ((box.row0 + box.rows - 1) >> kBlockBits) + 1 - wider.row0;
+  std::vector<std::vector<Cell>> blocks(static_cast<std::size_t>(wider.columns) *
+                                        static_cast<std::size_t>(wider.rows));
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const int column = covered_.column0 + static_cast<int>(i) % covered_.columns;
+    const int row = covered_.row0 + static_cast<int>(i) / covered_.columns;
+    blocks[wider.at(column, row)] = std::move(blocks_[i]);
+  }
+  blocks_ = std::move(blocks);
+  covered_ = wider;
+}
+
+MapPicture::Cell& MapPicture::Cells::at(int column, int row) {
+  std::vector<Cell>& block = blocks_[covered_.at(column >> kBlockBits, row >> kBlockBits)];
+  if (block.empty()) block.resize(std::size_t{kBlock} * kBlock);
+  return block[place_in_block(column, row)];
+}
+
+const MapPicture::Cell* MapPicture::Cells::find(int column, int row) const {
+  if (!covered_.contains(column >> kBlockBits, row >> kBlockBits)) return nullptr;
+  const auto& block = blocks_[covered_.at(column >> kBlockBits, row >> kBlockBits)];
+  return block.empty() ? nullptr : &block[place_in_block(column, row)];
+}
+
+template <typename Visit>
+void MapPicture::Cells::for_each(const Visit& visit) const {
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const int column0 = (covered_.column0 + static_cast<int>(i) % covered_.columns) * kBlock;
+    const int row0 = (covered_.row0 + static_cast<int>(i) / covered_.columns) * kBlock;
+    for (std::size_t k = 0; k < blocks_[i].size(); ++k) {
+      const Cell& cell = blocks_[i][k];
+      if (cell.ground + cell.vegetation == 0) continue;
+      visit(column0 + static_cast<int>(k) % kBlock, row0 + static_cast<int>(k) / kBlock, cell);
+    }
+  }
 }
 
 double MapPicture::x0() const {
@@ -65,14 +105,10 @@ std::array<double, 4> MapPicture::content_box() const {
   const int column1 = seen_.column0 + seen_.columns;
   const int row1 = seen_.row0 + seen_.rows;
   std::array<int, 4> box = {column1, row1, seen_.column0, seen_.row0};
-  for (int row = seen_.row0; row < row1; ++row) {
-    for (int column = seen_.column0; column < column1; ++column) {
-      const Cell& cell = cells_[held_.at(column, row)];
-      if (cell.ground + cell.vegetation == 0) continue;
-      box = {std::min(box[0], column), std::min(box[1], row), std::max(box[2], column + 1),
-             std::max(box[3], row + 1)};
-    }
-  }
+  cells_.for_each([&](int column, int row, const Cell&) {
+    box = {std::min(box[0], column), std::min(box[1], row), std::max(box[2], column + 1),
+           std::max(box[3], row + 1)};
+  });
   return {box[0] * cell_m_, box[1] * cell_m_, box[2] * cell_m_, box[3] * cell_m_};
 }
 
@@ -85,7 +121,7 @@ void MapPicture::add(double x, double y, double z, double height_m) {
     column = static_cast<int>(std::floor(x / cell_m_));
     row = static_cast<int>(std::floor(y / cell_m_));
   }
-  Cell& cell = cells_[held_.at(column, row)];
+  Cell& cell = cells_.at(column, row);
   ++count_;
   constexpr double kVegetation = 0.3;
   const auto height = static_cast<float>(std::isnan(height_m) ? 1.0 : height_m);
@@ -120,28 +156,7 @@ void MapPicture::grow(int column, int row) {
     return;  // the caller finds its cell anew
   }
   seen_ = {c0, r0, c1 - c0, r1 - r0};
-  if (held_.contains(seen_)) return;
-  // A quarter more on each side, no larger than the picture may become.
-  const int columns = std::min(most, seen_.columns + seen_.columns / 2);
-  const int rows = std::min(most, seen_.rows + seen_.rows / 2);
-  hold({c0 - (columns - seen_.columns) / 2, r0 - (rows - seen_.rows) / 2, columns, rows});
-}
-
-// Moves the cells into an array of that box; what lies outside of it is lost.
-void MapPicture::hold(const Box& box) {
-  std::vector<Cell> cells(static_cast<std::size_t>(box.columns) *
-                          static_cast<std::size_t>(box.rows));
-  const int column0 = std::max(box.column0, held_.column0);
-  const int column1 = std::min(box.column0 + box.columns, held_.column0 + held_.columns);
-  const int row0 = std::max(box.row0, held_.row0);
-  const int row1 = std::min(box.row0 + box.rows, held_.row0 + held_.rows);
-  for (int row = row0; row < row1 && column0 < column1; ++row) {
-    std::copy_n(cells_.begin() + static_cast<std::ptrdiff_t>(held_.at(column0, row)),
-                column1 - column0,
-                cells.begin() + static_cast<std::ptrdiff_t>(box.at(column0, row)));
-  }
-  cells_.swap(cells);
-  held_ = box;
+  cells_.cover(seen_);
 }
 
 void MapPicture::coarsen() {
@@ -149,65 +164,52 @@ void MapPicture::coarsen() {
   Box coarse{half(seen_.column0), half(seen_.row0), 0, 0};
   coarse.columns = half(seen_.column0 + seen_.columns - 1) - coarse.column0 + 1;
   coarse.rows = half(seen_.row0 + seen_.rows - 1) - coarse.row0 + 1;
-  std::vector<Cell> cells(static_cast<std::size_t>(coarse.columns) *
-                          static_cast<std::size_t>(coarse.rows));
-  for (int row = seen_.row0; row < seen_.row0 + seen_.rows; ++row) {
-    for (int column = seen_.column0; column < seen_.column0 + seen_.columns; ++column) {
-      const Cell& from = cells_[held_.at(column, row)];
-      Cell& to = cells[coarse.at(half(column), half(row))];
-      if (from.ground > 0) {
-        to.ground_z = to.ground == 0 ? from.ground_z : std::min(to.ground_z, from.ground_z);
-      }
-      to.ground += from.ground;
-      to.vegetation += from.vegetation;
-      to.top_m = std::max(to.top_m, from.top_m);
+  Cells cells;
+  cells.cover(coarse);
+  cells_.for_each([&](int column, int row, const Cell& from) {
+    Cell& to = cells.at(half(column), half(row));
+    if (from.ground > 0) {
+      to.ground_z = to.ground == 0 ? from.ground_z : std::min(to.ground_z, from.ground_z);
     }
-  }
-  cells_.swap(cells);
+    to.ground += from.ground;
+    to.vegetation += from.vegetation;
+    to.top_m = std::max(to.top_m, from.top_m);
+  });
+  cells_ = std::move(cells);
   seen_ = coarse;
-  held_ = coarse;
   cell_m_ *= 2.0;
 }
 
 std::string MapPicture::png() const {
+  if (std::max(seen_.columns, seen_.rows) <= largest_side_) return encode();
   MapPicture small = *this;
   while (std::max(small.seen_.columns, small.seen_.rows) > largest_side_)
     small.coarsen();
-  small.hold(small.seen_);
   return small.encode();
 }
 
-// Ground as if lit from the north-west. The cells held must be those of the picture.
+// Ground as if lit from the north-west.
 std::string MapPicture::encode() const {
-  const auto cell_at = [&](int column, int row) -> const Cell* {
-    if (column < 0 || row < 0 || column >= held_.columns || row >= held_.rows) return nullptr;
-    return &cells_[held_.at(held_.column0 + column, held_.row0 + row)];
-  };
   float top = 1.0F;
-  for (const Cell& cell : cells_)
-    top = std::max(top, cell.top_m);
-  PalettePicture picture{held_.columns, held_.rows, palette(), {}};
-  picture.pixels.assign(cells_.size(), 0);
-  for (int row = 0; row < held_.rows; ++row) {
-    for (int column = 0; column < held_.columns; ++column) {
-      const Cell& cell = *cell_at(column, row);
-      std::uint8_t& pixel = picture.at(column, held_.rows - 1 - row);
-      if (cell.vegetation > 0) {
-        const double u = std::sqrt(static_cast<double>(cell.top_m / top));
-        pixel = static_cast<std::uint8_t>(1 + kGreys + std::lround(u * (kGreens - 1)));
-      } else if (cell.ground > 0) {
-        double rise = 0.0;
-        const Cell* west = cell_at(column - 1, row);
-        const Cell* north = cell_at(column, row + 1);
-        if (west != nullptr && west->ground > 0)
-          rise += static_cast<double>(cell.ground_z - west->ground_z);
-        if (north != nullptr && north->ground > 0)
-          rise += static_cast<double>(cell.ground_z - north->ground_z);
-        const double light = std::clamp(0.62 - 0.6 * rise / cell_m_, 0.0, 1.0);
-        pixel = static_cast<std::uint8_t>(1 + std::lround(light * (kGreys - 1)));
-      }
+  cells_.for_each([&](int, int, const Cell& cell) { top = std::max(top, cell.top_m); });
+  PalettePicture picture{seen_.columns, seen_.rows, palette(), {}};
+  picture.pixels.assign(
+      static_cast<std::size_t>(seen_.columns) * static_cast<std::size_t>(seen_.rows), 0);
+  cells_.for_each([&](int column, int row, const Cell& cell) {
+    std::uint8_t& pixel = picture.at(column - seen_.column0, seen_.rows - 1 - (row - seen_.row0));
+    if (cell.vegetation > 0) {
+      const double u = std::sqrt(static_cast<double>(cell.top_m / top));
+      pixel = static_cast<std::uint8_t>(1 + kGreys + std::lround(u * (kGreens - 1)));
+      return;
     }
-  }
+    double rise = 0.0;
+    for (const Cell* beside : {cells_.find(column - 1, row), cells_.find(column, row + 1)}) {
+      if (beside != nullptr && beside->ground > 0)
+        rise += static_cast<double>(cell.ground_z - beside->ground_z);
+    }
+    const double light = std::clamp(0.62 - 0.6 * rise / cell_m_, 0.0, 1.0);
+    pixel = static_cast<std::uint8_t>(1 + std::lround(light * (kGreys - 1)));
+  });
   return encode_png(picture);
 }
 

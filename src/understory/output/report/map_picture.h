@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -41,19 +42,33 @@ class MapPicture {
   struct Box {
     int column0 = 0, row0 = 0, columns = 0, rows = 0;
     [[nodiscard]] bool contains(int column, int row) const;
-    [[nodiscard]] bool contains(const Box& other) const;
     [[nodiscard]] std::size_t at(int column, int row) const;
   };
+  // Blocks of cells that come to be where something falls into them: a growing picture copies none.
+  class Cells {
+   public:
+    // Makes place for the blocks of a box, which holds all that was covered before.
+    void cover(const Box& box);
+    // A cell of the box.
+    [[nodiscard]] Cell& at(int column, int row);
+    // Null outside of the box, and where no block is.
+    [[nodiscard]] const Cell* find(int column, int row) const;
+    // Calls `visit(column, row, cell)` with each cell that holds something.
+    template <typename Visit>
+    void for_each(const Visit& visit) const;
+
+   private:
+    Box covered_;                            // in blocks
+    std::vector<std::vector<Cell>> blocks_;  // empty: none
+  };
   void grow(int column, int row);
-  void hold(const Box& box);
   void coarsen();
   [[nodiscard]] std::string encode() const;
 
   double cell_m_;
   int largest_side_;
   Box seen_;  // of the picture
-  Box held_;  // of cells_: larger, so that a growing map is not copied for each block
-  std::vector<Cell> cells_;
+  Cells cells_;
   std::uint64_t count_ = 0;
 };
 

@@ -20,11 +20,14 @@ constexpr int kWidestFigure = 640;  // units that fit beside something else
 struct Frame {
   double x_low = 0.0, x_high = 1.0, y_low = 0.0, y_high = 1.0;
   double width = 0.0, height = 0.0;
+  bool logarithmic = false;  // limits are powers of ten then
 
   [[nodiscard]] double x(double value) const {
+    if (logarithmic) value = std::log10(value);
     return kLeft + (value - x_low) / (x_high - x_low) * (width - kLeft - kRight);
   }
   [[nodiscard]] double y(double value) const {
+    if (logarithmic) value = std::log10(value);
     return height - kBottom - (value - y_low) / (y_high - y_low) * (height - kTop - kBottom);
   }
 };
@@ -35,7 +38,29 @@ std::string text_at(double x, double y, const char* anchor, const std::string& t
                      anchor, more, escape_html(text));
 }
 
-std::string axes(const Frame& frame, const std::string& x_label, const std::string& y_label) {
+// Powers of ten on both axes.
+std::string logarithmic_ticks(const Frame& frame) {
+  std::string svg;
+  const auto out = std::back_inserter(svg);
+  for (double power = frame.y_low; power <= frame.y_high; ++power) {
+    const double y = frame.y(std::pow(10.0, power));
+    fmt::format_to(out,
+                   "<line class=\"grid\" x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>",
+                   kLeft, frame.width - kRight, y, y);
+    svg += text_at(kLeft - 6, y + 4, "end", fmt::format("{:g}", std::pow(10.0, power)));
+  }
+  for (double power = frame.x_low; power <= frame.x_high; ++power) {
+    const double x = frame.x(std::pow(10.0, power));
+    fmt::format_to(
+        out, "<line class=\"grid\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\"/>",
+        x, kTop, frame.height - kBottom);
+    svg += text_at(x, frame.height - kBottom + 17, "middle",
+                   fmt::format("{:g}", std::pow(10.0, power)));
+  }
+  return svg;
+}
+
+std::string even_ticks(const Frame& frame) {
   std::string svg;
   const auto out = std::back_inserter(svg);
   const std::vector<double> y_ticks = round_ticks(frame.y_low, frame.y_high, 5);
@@ -54,6 +79,12 @@ std::string axes(const Frame& frame, const std::string& x_label, const std::stri
         frame.x(tick), frame.height - kBottom, frame.height - kBottom + 4);
     svg += text_at(frame.x(tick), frame.height - kBottom + 17, "middle", tick_text(tick, x_step));
   }
+  return svg;
+}
+
+std::string axes(const Frame& frame, const std::string& x_label, const std::string& y_label) {
+  std::string svg = frame.logarithmic ? logarithmic_ticks(frame) : even_ticks(frame);
+  const auto out = std::back_inserter(svg);
   fmt::format_to(out, "<path class=\"axis\" d=\"M{:.1f} {:.1f}V{:.1f}H{:.1f}\"/>", kLeft, kTop,
                  frame.height - kBottom, frame.width - kRight);
   svg += text_at(0.5 * (kLeft + frame.width - kRight), frame.height - 6, "middle", x_label);
@@ -75,7 +106,7 @@ std::string drawn(const PlotSeries& series, const Frame& frame) {
     for (const auto& [x, y] : series.points) {
       if (!std::isfinite(y)) continue;
       fmt::format_to(out, "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.2\" fill=\"{}\"/>", frame.x(x),
-                     frame.y(std::min(y, frame.y_high)), series.colour);
+                     frame.y(frame.logarithmic ? y : std::min(y, frame.y_high)), series.colour);
     }
     return svg;
   }
@@ -87,13 +118,37 @@ std::string drawn(const PlotSeries& series, const Frame& frame) {
       continue;
     }
     fmt::format_to(out, "{}{:.1f} {:.1f}", pen ? 'L' : 'M', frame.x(x),
-                   frame.y(std::clamp(y, frame.y_low, frame.y_high)));
+                   frame.y(frame.logarithmic ? y : std::clamp(y, frame.y_low, frame.y_high)));
     pen = true;
   }
   return svg + "\"/>";
 }
 
+// The whole powers of ten around all values.
+Frame logarithmic_frame_of(const Plot& plot) {
+  Frame frame;
+  frame.logarithmic = true;
+  frame.width = plot.width;
+  frame.height = plot.height;
+  constexpr double kFar = 300.0;
+  frame.x_low = frame.y_low = kFar;
+  frame.x_high = frame.y_high = -kFar;
+  for (const PlotSeries& series : plot.series) {
+    for (const auto& [x, y] : series.points) {
+      if (!(x > 0.0 && y > 0.0)) continue;
+      frame.x_low = std::min(frame.x_low, std::floor(std::log10(x)));
+      frame.x_high = std::max(frame.x_high, std::ceil(std::log10(x)));
+      frame.y_low = std::min(frame.y_low, std::floor(std::log10(y)));
+      frame.y_high = std::max(frame.y_high, std::ceil(std::log10(y)));
+    }
+  }
+  if (frame.x_low >= frame.x_high) frame.x_high = frame.x_low + 1.0;
+  if (frame.y_low >= frame.y_high) frame.y_high = frame.y_low + 1.0;
+  return frame;
+}
+
 Frame frame_of(const Plot& plot) {
+  if (plot.logarithmic) return logarithmic_frame_of(plot);
   Frame frame;
   frame.width = plot.width;
   frame.height = plot.height;

@@ -24,7 +24,8 @@ struct Plot {
   std::vector<PlotSeries> series;
   std::vector<PlotLevel> levels;  // horizontal lines with a name
   double y_min = 0.0;
-  double y_max = 0.0;  // equal to y_min: from the data
+  double y_max = 0.0;        // equal to y_min: from the data
+  bool logarithmic = false;  // both axes; values above zero, y_min and y_max are not heeded
   int width = 720;
   int height = 240;
 };

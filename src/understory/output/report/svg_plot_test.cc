@@ -96,5 +96,18 @@ TEST(SvgPlot, TextCannotEndATag) {
   EXPECT_EQ(escape_html("plot 7"), "plot 7");
 }
 
+TEST(SvgPlot, LogarithmicAxesHavePowersOfTen) {
+  Plot plot;
+  plot.x_label = "averaging time (s)";
+  plot.y_label = "deviation (rad/s)";
+  plot.logarithmic = true;
+  plot.series = {{"x", "red", {{0.1, 1e-3}, {1.0, 1e-4}, {100.0, 1e-5}}, false}};
+  const std::string svg = svg_plot(plot);
+  for (const char* tick : {">0.1<", ">1<", ">10<", ">100<", ">0.001<", ">0.0001<", ">1e-05<"})
+    EXPECT_NE(svg.find(tick), std::string::npos) << tick;
+  // The three points are equally far apart in y, and in x by 1 and 2 decades of three.
+  EXPECT_NE(svg.find("M58.0 12.0L274.0 105.0L706.0 198.0"), std::string::npos) << svg;
+}
+
 }  // namespace
 }  // namespace understory

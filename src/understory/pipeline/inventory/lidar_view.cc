@@ -33,10 +33,16 @@ std::array<double, LidarView::kSectors> LidarView::no_returns() {
 
 void LidarView::add(const std::vector<KeyframePoint>& points) {
   const Pose lidar_from_body = body_from_lidar.inverse();
+  // Points that are surely lower than another of their sector are left out by their slope.
+  std::array<double, kSectors> steepest{};
+  steepest.fill(-std::numeric_limits<double>::infinity());
   for (const KeyframePoint& p : points) {
     const Eigen::Vector3d point = lidar_from_body * Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
-    double& highest = highest_deg[sector_of(point)];
-    highest = std::fmax(highest, elevation_deg(point));
+    const std::size_t sector = sector_of(point);
+    const double flat = point.head<2>().norm();
+    if (point.z() < (steepest[sector] - kSureSlope) * flat) continue;
+    steepest[sector] = std::max(steepest[sector], point.z() / flat);
+    highest_deg[sector] = std::fmax(highest_deg[sector], elevation_deg(point));
   }
 }
 

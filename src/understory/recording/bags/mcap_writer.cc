@@ -45,6 +45,7 @@ enum TopicId : std::uint16_t {
   kTfStatic,
   kGnssNmea,
   kGnssSecond,
+  kLivox,
   kTopicCount
 };
 
@@ -57,6 +58,7 @@ constexpr std::array<Topic, kTopicCount> kTopics = {{
     {"/tf_static", "tf2_msgs/msg/TFMessage"},
     {"/gnss/nmea", "nmea_msgs/msg/Sentence"},
     {"/gnss/second", "sensor_msgs/msg/NavSatFix"},
+    {"/livox/lidar", "livox_ros_driver2/msg/CustomMsg"},
 }};
 
 // One record: content is added between construction and `close`.
@@ -189,6 +191,12 @@ class McapWriter::Impl {
     record.close();
     metadata_.push_back({mcap::kSensorMetadata, file_.size(), out.size()});
     file_.write(out.span());
+  }
+
+  void add_scan(TimeNs time, const Scan& scan) {
+    note_ring_count(scan.ring_count);
+    if (options_.livox) return add(kLivox, time, encode_livox(scan));
+    add(kLidar, time, encode_point_cloud2(scan));
   }
 
   void finish() {
@@ -428,8 +436,7 @@ void McapWriter::write(const Event& event) {
 
 void McapWriter::write(const Event& event, TimeNs log_time) {
   if (const auto* scan = std::get_if<ScanPtr>(&event)) {
-    impl_->note_ring_count((*scan)->ring_count);
-    impl_->add(kLidar, log_time, encode_point_cloud2(**scan));
+    impl_->add_scan(log_time, **scan);
   } else if (const auto* sample = std::get_if<ImuSample>(&event)) {
     impl_->add(kImu, log_time, encode_imu(*sample));
   } else if (const auto* fix = std::get_if<GnssFix>(&event)) {

@@ -17,6 +17,7 @@ struct McapWriterOptions {
   int zstd_level = 1;  // 1..19
   // A chunk is closed once it holds that much; a damaged chunk is lost as a whole.
   std::size_t chunk_size_bytes = 1U << 20;
+  bool livox = false;  // scans as livox_ros_driver2/CustomMsg on /livox/lidar
 };
 
 // Writes the project's native recording: MCAP with ROS 2 messages (CDR), chunks with CRC, message

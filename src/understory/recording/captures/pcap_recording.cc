@@ -9,6 +9,8 @@
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/captures/ouster.h"
 #include "understory/recording/captures/pcap_file.h"
+#include "understory/recording/captures/pcap_sensors.h"
+#include "understory/recording/captures/pcap_stream.h"
 #include "understory/recording/captures/pcap_survey.h"
 #include "understory/recording/captures/udp.h"
 #include "understory/recording/captures/velodyne.h"
@@ -24,169 +26,6 @@ namespace understory {
 namespace {
 
 constexpr int kFramesForPosition = 20'000;
-constexpr std::size_t kMostIgnored = 256;  // streams that are reported
-
-// What both kinds of sensor share: the walk through the file and the reports.
-class PcapRecording : public Recording, public ArrivalTimes {
- public:
-  PcapRecording(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar, Log& log)
-      : log_(log), file_(std::move(file)), survey_(std::move(survey)), lidar_(lidar) {
-    lidar_statistics_.report().name = lidar.name();
-    lidar_statistics_.report().role = "lidar";
-  }
-
-  void apply_extrinsics(const std::string& path) { apply_extrinsics_file(path, {}, rig_, log_); }
-
-  std::optional<Event> next() override {
-    while (ready_.empty()) {
-      CapturedFrame frame;
-      if (!file_->next(frame)) {
-        if (finished_) return std::nullopt;
-        finished_ = true;
-        finish();
-        continue;
-      }
-      arrival_ = frame.stamp;
-      if (frame.truncated) {
-        log_.warn("recording.snapped", place(frame) + ": the capture cut a frame short");
-      }
-      const auto datagram = udp_.add(frame.link_type, frame.bytes, frame.stamp);
-      if (!datagram) continue;
-      if (survey_.trust_checksums() && datagram->has_checksum && !datagram->checksum_ok) {
-        report_finding(log_, Finding::kDamagedPacket,
-                       place(frame) + ": a packet with a wrong checksum, left out");
-        continue;
-      }
-      take(*datagram);
-    }
-    Event event = std::move(ready_.front());
-    ready_.pop_front();
-    return event;
-  }
-
-  bool save(BinaryWriter& writer) const override {
-    file_->save(writer);
-    udp_.save(writer);
-    save_decoder(writer);
-    lidar_statistics_.save(writer);
-    second_statistics_.save(writer);
-    writer.put(static_cast<std::uint64_t>(ignored_.size()));
-    for (const auto& [stream, statistics] : ignored_) {
-      writer.put(stream);
-      statistics.save(writer);
-    }
-    put_events(writer, ready_);
-    writer.put(finished_);
-    return true;
-  }
-  void load(BinaryReader& reader) override {
-    file_->load(reader);
-    udp_.load(reader);
-    load_decoder(reader);
-    lidar_statistics_.load(reader);
-    second_statistics_.load(reader);
-    ignored_.clear();
-    for (auto left = reader.get<std::uint64_t>(); left > 0; --left)
-      ignored_[reader.get<UdpStream>()].load(reader);
-    get_events(reader, ready_);
-    finished_ = reader.get<bool>();
-  }
-
-  const Rig& rig() const override { return rig_; }
-  std::string format() const override {
-    return std::string(file_->is_pcapng() ? "PCAPNG" : "PCAP") + " (" + sensor() + ")";
-  }
-  double progress() const override { return file_->progress(); }
-  std::optional<TimeNs> arrival() const override { return arrival_; }
-  std::vector<TopicReport> topics() const override {
-    std::vector<TopicReport> reports{lidar_statistics_.report()};
-    if (second_statistics_.report().messages > 0) reports.push_back(second_statistics_.report());
-    for (const auto& [key, statistics] : ignored_)
-      reports.push_back(statistics.report());
-    return reports;
-  }
-
- protected:
-  virtual void take(const Datagram& datagram) = 0;
-  virtual void finish() = 0;
-  virtual void save_decoder(BinaryWriter& writer) const = 0;
-  virtual void load_decoder(BinaryReader& reader) = 0;
-  [[nodiscard]] virtual std::string sensor() const = 0;
-  // Of which sensor a datagram is that is not used; empty if of none that could be.
-  [[nodiscard]] virtual std::string unused_sensor(const Datagram& datagram) const {
-    return is_velodyne_data(datagram.payload) ? "another lidar" : "";
-  }
-
-  [[nodiscard]] bool from_lidar(const Datagram& datagram) const {
-    return datagram.source == lidar_.source && datagram.port == lidar_.port;
-  }
-  void emit_scan(ScanPtr scan) {
-    lidar_statistics_.add_stamp(scan->stamp);
-    lidar_statistics_.report().points += scan->points.size();
-    ready_.emplace_back(std::move(scan));
-  }
-  void ignore(const Datagram& datagram) {
-    const UdpStream key{datagram.source, datagram.port};
-    const bool is_new = ignored_.count(key) == 0;
-    if (is_new && ignored_.size() >= kMostIgnored) return;
-    const std::string sensor = unused_sensor(datagram);
-    if (is_new && !sensor.empty() && survey_.streams.count(key) == 0) {
-      report_finding(log_, Finding::kLateSensor,
-                     file_->name() + ": " + key.name() + ": packets of " + sensor +
-                         " begin late in the capture; they are not used");
-    }
-    TopicReport& report = ignored_[key].report();
-    report.name = key.name();
-    report.type = "UDP datagrams";
-    report.role = "ignored";
-    ignored_[key].add_stamp(datagram.stamp);
-  }
-
-  Log& log_;
-  std::unique_ptr<PcapFile> file_;
-  PcapSurvey survey_;
-  UdpStream lidar_;
-  Rig rig_;
-  TopicStatistics lidar_statistics_;
-  TopicStatistics second_statistics_;  // IMU or GNSS
-  std::deque<Event> ready_;
-
- private:
-  [[nodiscard]] std::string place(const CapturedFrame& frame) const {
-    return file_->name() + ": at byte " + std::to_string(frame.position);
-  }
-
-  UdpAssembler udp_;
-  std::map<UdpStream, TopicStatistics> ignored_;
-  std::optional<TimeNs> arrival_;  // of the frame read last
-  bool finished_ = false;
-};
-
-// With the decoder of one kind of sensor.
-template <typename Decoder>
-class DecodedPcap : public PcapRecording {
- protected:
-  template <typename Settings>
-  DecodedPcap(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar,
-              const Settings& settings, Log& log)
-      : PcapRecording(std::move(file), std::move(survey), lidar, log),
-        decoder_(settings, file_->name(), log) {}
-
-  void finish() override {
-    decoder_.finish();
-    take_scans();
-  }
-
-  void save_decoder(BinaryWriter& writer) const override { decoder_.save(writer); }
-  void load_decoder(BinaryReader& reader) override { decoder_.load(reader); }
-
-  void take_scans() {
-    while (ScanPtr scan = decoder_.take_scan())
-      emit_scan(std::move(scan));
-  }
-
-  Decoder decoder_;
-};
 
 class VelodynePcap : public DecodedPcap<VelodyneDecoder> {
  public:
@@ -327,6 +166,11 @@ class OusterPcap : public DecodedPcap<OusterDecoder> {
   std::optional<UdpStream> imu_;
 };
 
+// Hesai's angle corrections are .csv files, the metadata of an Ouster .json.
+bool names_calibration(const OpenOptions& options) {
+  return options.metadata_file.ends_with(".csv") || options.metadata_file.ends_with(".CSV");
+}
+
 // The stream with most packets that `count` counts, or the one that the option names.
 template <typename Count>
 std::optional<UdpStream> choose(const PcapSurvey& survey, const OpenOptions& options,
@@ -343,16 +187,33 @@ std::optional<UdpStream> choose(const PcapSurvey& survey, const OpenOptions& opt
       best = key;
     }
   }
-  if (best && streams > 1 && options.lidar_topic.empty()) {
-    log.warn("recording.lidars", file + ": packets of " + std::to_string(streams) +
-                                     " lidars; only those of " + best->name() +
-                                     " are used (choose with --lidar-topic)");
+  int same_name = 0;
+  for (const auto& [key, stream] : survey.streams)
+    same_name += best && key.name() == best->name() && count(stream) > 0 ? 1 : 0;
+  if (best && streams > 1 && (options.lidar_topic.empty() || same_name > 1)) {
+    log.warn("recording.lidars",
+             file + ": packets of " + std::to_string(streams) + " lidars; only those of " +
+                 best->name() + (same_name > 1 ? " from " + best->address() : "") + " are used" +
+                 (same_name > 1 ? ": several send to that port" : " (choose with --lidar-topic)"));
   }
   return best;
 }
 
-std::uint64_t velodyne_packets(const PcapSurvey::Stream& stream) {
-  return stream.velodyne;
+// Packets of lidars that need no metadata. With a calibration file (.csv) it is a Hesai.
+std::uint64_t packets_of_lidar(const PcapSurvey::Stream& stream, const OpenOptions& options) {
+  if (options.metadata_file.empty()) return stream.velodyne + stream.hesai + stream.livox;
+  return names_calibration(options) ? stream.hesai : 0;
+}
+
+std::unique_ptr<PcapRecording> open_lidar(std::unique_ptr<PcapFile> file, PcapSurvey survey,
+                                          const UdpStream& lidar, const OpenOptions& options,
+                                          Log& log) {
+  const PcapSurvey::Stream& stream = survey.streams[lidar];
+  if (stream.hesai > stream.velodyne && stream.hesai > stream.livox)
+    return open_hesai_pcap(std::move(file), std::move(survey), lidar, options.metadata_file, log);
+  if (stream.livox > stream.velodyne)
+    return open_livox_pcap(std::move(file), std::move(survey), lidar, log);
+  return std::make_unique<VelodynePcap>(std::move(file), std::move(survey), lidar, log);
 }
 
 // The Ouster's metadata that go with a capture.
@@ -365,6 +226,7 @@ struct FoundMetadata {
 FoundMetadata metadata_of(const std::string& capture, const OpenOptions& options) {
   FoundMetadata found;
   try {
+    if (names_calibration(options)) return found;
     found.file =
         options.metadata_file.empty() ? find_ouster_metadata(capture) : options.metadata_file;
     if (!found.file.empty()) found.metadata = read_ouster_metadata(found.file);
@@ -382,20 +244,29 @@ std::unique_ptr<PcapRecording> open(std::unique_ptr<ByteSource> source, const Op
   const std::string name = file->name();
   const FoundMetadata beside = metadata_of(name, options);
   PcapWanted wanted;
-  wanted.velodyne = options.metadata_file.empty();
+  wanted.velodyne = wanted.livox = options.metadata_file.empty();
+  wanted.hesai = wanted.velodyne || names_calibration(options);
   if (beside.metadata) wanted.ouster_packet_size = beside.metadata->lidar_packet_size();
   wanted.stream = options.lidar_topic;
   PcapSurvey survey = survey_pcap(*file, wanted);
   file->rewind(log);
-  if (options.metadata_file.empty()) {
-    if (const auto lidar = choose(survey, options, name, log, velodyne_packets))
-      return std::make_unique<VelodynePcap>(std::move(file), std::move(survey), *lidar, log);
-  }
+  const auto count = [&](const PcapSurvey::Stream& stream) {
+    return packets_of_lidar(stream, options);
+  };
+  if (const auto lidar = choose(survey, options, name, log, count))
+    return open_lidar(std::move(file), std::move(survey), *lidar, options, log);
+  const std::string unread = survey.unread();
+  if (!unread.empty() && !beside.metadata)
+    throw InputError(name, "",
+                     "packets of " + unread +
+                         " are not read: replay the capture through the sensor's ROS driver and "
+                         "record its PointCloud2");
   if (beside.trouble) throw InputError(*beside.trouble);
   if (!beside.metadata) {
     throw InputError(name, "",
-                     "expected Velodyne packets, or Ouster packets with their metadata (--metadata "
-                     "FILE, or a .json beside it whose name its name begins with); found " +
+                     "expected packets of a Velodyne, Hesai or Livox, or Ouster packets with their "
+                     "metadata (--metadata FILE, or a .json beside it whose name its name begins "
+                     "with); found " +
                          survey.list());
   }
   const auto lidar = choose(survey, options, name, log,

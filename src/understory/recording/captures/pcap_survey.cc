@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "understory/recording/captures/hesai_tables.h"
+#include "understory/recording/captures/livox_packets.h"
 #include "understory/recording/captures/velodyne.h"
 #include "understory/util/files/read_error.h"
 
@@ -15,6 +17,60 @@ namespace {
 constexpr std::size_t kFrames = 20'000;
 constexpr std::size_t kMostStreams = 256;
 constexpr std::size_t kMostSizes = 16;
+
+constexpr std::uint16_t kMid360Port = 56300;  // from which it sends its points
+
+// A lidar whose packets are known and not read; empty for other datagrams.
+std::string unread_lidar(ByteSpan payload) {
+  constexpr std::uint8_t kVls128 = 0xA1;
+  if (is_velodyne_data(payload) && payload[VelodyneDecoder::kDataPacketSize - 1] == kVls128)
+    return "a Velodyne VLS-128";
+  const std::uint8_t msop[] = {0x55, 0xAA, 0x05};
+  const bool robosense = payload.size() == 1248 && std::memcmp(payload.data(), msop, 3) == 0;
+  return robosense ? "a RoboSense" : "";
+}
+
+// What a datagram is of, by its bytes.
+struct LidarKind {
+  LidarKind(const Datagram& datagram, const PcapWanted& wanted) {
+    const ByteSpan payload = datagram.payload;
+    unread = unread_lidar(payload);
+    velodyne = is_velodyne_data(payload) && unread.empty();
+    ouster = wanted.ouster_packet_size > 0 && payload.size() == wanted.ouster_packet_size;
+    if (velodyne || ouster || !unread.empty()) return;
+    if (is_hesai_data(payload)) {
+      const HesaiKind kind = hesai_kind(payload);
+      hesai = kind.model != HesaiModel::kUnknown;
+      model = hesai_table(kind.model).name;
+      unread = kind.other.empty() ? "" : "Hesai: " + kind.other;
+    } else if (const auto head = livox_head(payload)) {
+      (head->imu ? livox_imu : livox) = true;
+      if (head->protocol == 2 && datagram.source_port == kMid360Port) model = "Mid-360";
+    }
+  }
+  [[nodiscard]] bool is_lidar() const { return velodyne || ouster || hesai || livox; }
+  [[nodiscard]] bool is_wanted(const PcapWanted& wanted) const {
+    return (velodyne && wanted.velodyne) || (hesai && wanted.hesai) || (livox && wanted.livox) ||
+           ouster;
+  }
+  void count_in(PcapSurvey::Stream& stream) const {
+    stream.velodyne += velodyne ? 1 : 0;
+    stream.ouster += ouster ? 1 : 0;
+    stream.hesai += hesai ? 1 : 0;
+    stream.livox += livox ? 1 : 0;
+    stream.livox_imu += livox_imu ? 1 : 0;
+    if (stream.model.empty()) stream.model = model;
+    if (stream.unread.empty()) stream.unread = unread;
+  }
+
+  bool velodyne = false;
+  bool ouster = false;
+  bool hesai = false;
+  bool livox = false;
+  bool livox_imu = false;
+  std::string model;
+  std::string unread;
+};
 
 // The place where this datagram is counted; null where there are too many streams already.
 PcapSurvey::Stream* stream_of(PcapSurvey& survey, const UdpStream& key, bool is_lidar) {
@@ -62,6 +118,15 @@ std::string PcapSurvey::list() const {
          (text.empty() ? "no UDP packets" : text);
 }
 
+std::string PcapSurvey::unread() const {
+  std::string text;
+  for (const auto& [key, stream] : streams) {
+    if (stream.unread.empty()) continue;
+    text += (text.empty() ? "" : ", ") + stream.unread + " on " + key.name();
+  }
+  return text;
+}
+
 PcapSurvey survey_pcap(PcapFile& file, const PcapWanted& wanted) {
   PcapSurvey survey;
   UdpAssembler udp;
@@ -82,26 +147,34 @@ PcapSurvey survey_pcap(PcapFile& file, const PcapWanted& wanted) {
     if (datagram->has_checksum)
       ++(datagram->checksum_ok ? survey.good_checksums : survey.bad_checksums);
     const std::size_t size = datagram->payload.size();
-    const bool velodyne = is_velodyne_data(datagram->payload);
-    const bool ouster = wanted.ouster_packet_size > 0 && size == wanted.ouster_packet_size;
+    const LidarKind kind(*datagram, wanted);
     const UdpStream key{datagram->source, datagram->port};
-    const bool is_wanted = ((velodyne && wanted.velodyne) || ouster) &&
-                           (wanted.stream.empty() || wanted.stream == key.name());
+    const bool is_wanted =
+        kind.is_wanted(wanted) && (wanted.stream.empty() || wanted.stream == key.name());
     // Where the lidar starts late, as much is looked at from there on.
     if (is_wanted && !found && survey.frames > kFrames) enough = survey.frames + kFrames;
     found = found || is_wanted;
-    PcapSurvey::Stream* at = stream_of(survey, key, velodyne || ouster);
+    PcapSurvey::Stream* at = stream_of(survey, key, kind.is_lidar());
     if (at == nullptr) continue;
     PcapSurvey::Stream& stream = *at;
     ++stream.datagrams;
-    stream.velodyne += velodyne ? 1 : 0;
-    stream.ouster += ouster ? 1 : 0;
+    kind.count_in(stream);
     if (is_velodyne_position(datagram->payload)) ++stream.position;
     if (stream.by_size.size() < kMostSizes || stream.by_size.count(size) > 0)
       ++stream.by_size[size];
   }
   return survey;
 }
+
+namespace {
+
+// "walk_0" is "walk" with a number.
+bool is_numbered(const std::string& stem, const std::string& capture) {
+  if (stem.size() < capture.size() + 2 || stem.rfind(capture + "_", 0) != 0) return false;
+  return stem.find_first_not_of("0123456789", capture.size() + 1) == std::string::npos;
+}
+
+}  // namespace
 
 std::string find_ouster_metadata(const std::string& capture) {
   namespace fs = std::filesystem;
@@ -113,7 +186,9 @@ std::string find_ouster_metadata(const std::string& capture) {
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (entry.path().extension() != ".json") continue;
     const std::string stem = entry.path().stem().string();
-    if (!stem.empty() && name.rfind(stem, 0) == 0) found.push_back(entry.path().string());
+    if (stem.empty()) continue;
+    if (name.rfind(stem, 0) == 0 || is_numbered(stem, path.stem().string()))
+      found.push_back(entry.path().string());
   }
   if (found.empty()) return "";
   std::sort(found.begin(), found.end());

@@ -15,17 +15,29 @@ struct UdpStream {
   std::uint16_t port = 0;
   auto operator<=>(const UdpStream&) const = default;  // NOLINT(modernize-use-nullptr)
   [[nodiscard]] std::string name() const { return "udp " + std::to_string(port); }
+  // "192.168.1.201"; meaningless for IPv6.
+  [[nodiscard]] std::string address() const {
+    return std::to_string(source >> 24) + "." + std::to_string(source >> 16 & 255) + "." +
+           std::to_string(source >> 8 & 255) + "." + std::to_string(source & 255);
+  }
 };
 
 // What the datagrams of a capture are, as far as they were looked at.
 struct PcapSurvey {
   struct Stream {
     std::uint64_t datagrams = 0;
-    std::uint64_t velodyne = 0;                    // Velodyne data packets
-    std::uint64_t ouster = 0;                      // of the size that Ouster's metadata gives
-    std::uint64_t position = 0;                    // Velodyne position packets
+    std::uint64_t velodyne = 0;  // Velodyne data packets
+    std::uint64_t hesai = 0;     // of models that are read
+    std::uint64_t livox = 0;     // packets of points
+    std::uint64_t livox_imu = 0;
+    std::string model;           // of a Hesai or Livox, where the packets tell it
+    std::string unread;          // a lidar whose packets are not read: "a Pandar128 ..."
+    std::uint64_t ouster = 0;    // of the size that Ouster's metadata gives
+    std::uint64_t position = 0;  // Velodyne position packets
     std::map<std::size_t, std::uint64_t> by_size;  // at most 16 sizes
-    [[nodiscard]] bool has_lidar() const { return velodyne > 0 || ouster > 0; }
+    [[nodiscard]] bool has_lidar() const {
+      return velodyne > 0 || ouster > 0 || hesai > 0 || livox > 0;
+    }
   };
   std::map<UdpStream, Stream> streams;  // at most 256; of more, those without a lidar are left out
   std::uint64_t frames = 0;             // looked at
@@ -35,6 +47,8 @@ struct PcapSurvey {
   // Checksums tell of damage only where most are right: a capture made on the sending machine has
   // none of them filled in.
   [[nodiscard]] bool trust_checksums() const { return good_checksums > 10 * bad_checksums; }
+  // What lidars there are whose packets are not read; empty: none.
+  [[nodiscard]] std::string unread() const;
   // For messages: "1500 frames: udp 7502: 192 x 8448 bytes, ..."
   [[nodiscard]] std::string list() const;
 };
@@ -46,6 +60,8 @@ struct PcapSurvey {
 // The lidar that is looked for.
 struct PcapWanted {
   bool velodyne = true;
+  bool hesai = true;
+  bool livox = true;
   std::size_t ouster_packet_size = 0;  // of the payload; 0: no Ouster
   std::string stream;                  // "udp 2368"; empty: any
 };
@@ -54,8 +70,10 @@ struct PcapWanted {
 // behind its first packet, wherever in the file that is.
 [[nodiscard]] PcapSurvey survey_pcap(PcapFile& file, const PcapWanted& wanted);
 
-// The path of the only .json file beside a capture whose name the capture's name begins with; empty
-// if there is none. Throws InputError if there are several.
+// The path of the only .json file beside a capture that belongs to it; empty if there is none. Its
+// name begins the capture's name (walk.json, walk_1.pcap), or it is the capture's name and a
+// number, as ouster-cli names them (walk.pcap, walk_0.json). Throws InputError if there are
+// several.
 [[nodiscard]] std::string find_ouster_metadata(const std::string& capture);
 
 }  // namespace understory

@@ -3,6 +3,7 @@
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/captures/packet_test_support.h"
 #include "understory/recording/captures/pcap_recording.h"
+#include "understory/recording/captures/pcap_survey.h"
 #include "understory/recording/recording_test_support.h"
 #include "understory/util/error.h"
 
@@ -279,6 +280,15 @@ TEST(Pcap, FindsTheMetadataBesideAnOusterCapture) {
   EXPECT_NE(message().find("drive.json"), std::string::npos) << message();
   std::ofstream(folder / "drive_one.json") << "{}";
   EXPECT_NE(message().find("several"), std::string::npos) << message();
+}
+
+// ouster-cli writes walk.pcap and walk_0.json.
+TEST(Pcap, FindsTheMetadataAsOusterCliNamesThem) {
+  const test::TemporaryFolder folder;
+  for (const char* name : {"walk_0.json", "walk_x.json", "walk_.json"})
+    std::ofstream(folder / name) << "{}";
+  EXPECT_EQ(find_ouster_metadata(folder / "walk.pcap"), folder / "walk_0.json");
+  EXPECT_EQ(find_ouster_metadata(folder / "wal.pcap"), "");
 }
 
 // The real captures; what their points must be is checked by tests/recording/packages.py.

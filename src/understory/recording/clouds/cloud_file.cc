@@ -76,6 +76,11 @@ PointCloudFile read_e57_cloud(ByteSource& file, Log& log, const ProgressSink& pr
   return cloud;
 }
 
+std::uint16_t ring_number(double value) {
+  constexpr double kMost = std::numeric_limits<std::uint16_t>::max();
+  return value >= 0.0 && value <= kMost ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+}
+
 PointCloudFile from_table(const CloudTable& table, const std::string& name) {
   const PointCloud2Message message = table.message(0);
   const auto layout = CloudLayout::find(message);
@@ -90,6 +95,7 @@ PointCloudFile from_table(const CloudTable& table, const std::string& name) {
     if (!collector.add(position)) continue;
     if (layout->intensity().size > 0)
       cloud.intensity.push_back(static_cast<float>(layout->intensity().read(raw)));
+    if (layout->has_ring()) cloud.ring.push_back(ring_number(layout->ring().read(raw)));
   }
   if (layout->x().type == FieldType::kFloat32) {
     const auto far = static_cast<float>(cloud.origin.cwiseAbs().maxCoeff());

@@ -20,6 +20,7 @@ struct PointCloudFile {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3f> points;       // metres, relative to origin; finite
   std::vector<float> intensity;              // as the file has it
+  std::vector<std::uint16_t> ring;           // PCD, PLY with a field of rings: laser number
   std::vector<std::uint8_t> classification;  // ASPRS classes, LAS only
   std::vector<double> gps_time;              // LAS: GPS time as stored (week or adjusted standard)
   bool gps_week_time = false;                // LAS: gps_time counts from the beginning of a week

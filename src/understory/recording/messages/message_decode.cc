@@ -6,6 +6,9 @@ namespace understory {
 namespace {
 
 constexpr std::size_t kVelodynePacketBytes = 1206;
+constexpr std::size_t kPandarPacketBytes = 1500;
+constexpr std::size_t kLivoxPointBytes = 19;
+constexpr std::size_t kLivoxCdrStep = 20;  // a point begins at a multiple of four bytes
 
 // ROS 1 stamps are two unsigned, ROS 2 stamps a signed and an unsigned number.
 TimeNs read_time(MessageReader& reader) {
@@ -131,6 +134,36 @@ std::optional<PointCloud2Message> decode_point_cloud2(MessageReader reader) {
   return message;
 }
 
+// The last point of a CDR sequence lacks the padding that follows the others. So the cloud begins
+// one byte before its first point, where the sequence has its length, and its fields lie one byte
+// later: then every point has its whole step.
+std::optional<LivoxMessage> decode_livox(MessageReader reader) {
+  LivoxMessage message;
+  PointCloud2Message& cloud = message.cloud;
+  cloud.header = read_header(reader);
+  message.timebase = reader.get<std::uint64_t>();
+  message.stated_points = reader.get<std::uint32_t>();
+  message.lidar_id = reader.get<std::uint8_t>();
+  (void)reader.take(3);  // reserved
+  const std::size_t count = reader.length(kLivoxPointBytes);
+  const std::uint32_t shift = reader.is_ros1() ? 0 : 1;
+  cloud.point_step =
+      static_cast<std::uint32_t>(reader.is_ros1() ? kLivoxPointBytes : kLivoxCdrStep);
+  const ByteSpan points = reader.take(count == 0 ? 0 : count * cloud.point_step - shift);
+  if (!reader.ok()) return std::nullopt;
+  if (count > 0) cloud.data = {points.data() - shift, points.size() + shift};
+  cloud.height = 1;
+  cloud.width = static_cast<std::uint32_t>(count);
+  cloud.row_step = cloud.width * cloud.point_step;
+  cloud.big_endian = reader.swaps_bytes();
+  cloud.fields = {
+      {"offset_time", shift, FieldType::kUint32, 1},      {"x", shift + 4, FieldType::kFloat32, 1},
+      {"y", shift + 8, FieldType::kFloat32, 1},           {"z", shift + 12, FieldType::kFloat32, 1},
+      {"reflectivity", shift + 16, FieldType::kUint8, 1}, {"tag", shift + 17, FieldType::kUint8, 1},
+      {"line", shift + 18, FieldType::kUint8, 1}};
+  return message;
+}
+
 std::optional<ImuMessage> decode_imu(MessageReader reader) {
   ImuMessage message;
   message.header = read_header(reader);
@@ -245,6 +278,39 @@ std::optional<PacketsMessage> decode_nebula_packets(MessageReader reader) {
     SensorPacket packet;
     packet.stamp = read_time(reader);
     packet.data = reader.byte_sequence();
+    message.packets.push_back(packet);
+  }
+  if (!reader.ok()) return std::nullopt;
+  return message;
+}
+
+std::optional<PacketsMessage> decode_pandar_scan(MessageReader reader) {
+  PacketsMessage message;
+  message.header = read_header(reader);
+  const auto count = reader.length(8 + kPandarPacketBytes + 4);
+  message.packets.reserve(count);
+  for (std::uint32_t i = 0; i < count && reader.ok(); ++i) {
+    SensorPacket packet;
+    packet.stamp = read_time(reader);
+    packet.data = reader.take(kPandarPacketBytes);
+    const auto size = reader.get<std::uint32_t>();
+    if (size < packet.data.size()) packet.data = packet.data.first(size);
+    message.packets.push_back(packet);
+  }
+  if (!reader.ok()) return std::nullopt;
+  return message;
+}
+
+std::optional<PacketsMessage> decode_hesai_frame(MessageReader reader) {
+  PacketsMessage message;
+  message.header = read_header(reader);
+  const auto count = reader.length(16);
+  for (std::uint32_t i = 0; i < count && reader.ok(); ++i) {
+    SensorPacket packet;
+    packet.stamp = read_time(reader);
+    packet.data = reader.byte_sequence();
+    const auto size = reader.get<std::uint32_t>();
+    if (size < packet.data.size()) packet.data = packet.data.first(size);
     message.packets.push_back(packet);
   }
   if (!reader.ok()) return std::nullopt;

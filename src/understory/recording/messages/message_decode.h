@@ -74,7 +74,16 @@ struct TransformMessage {
   Pose parent_from_child;
 };
 
-// velodyne_msgs/VelodyneScan and nebula_msgs/NebulaPackets: packets as the sensor sent them.
+// livox_ros_driver2/CustomMsg, and livox_ros_driver/CustomMsg, which has the same fields: the
+// points as a cloud with the fields offset_time (ns), x, y, z, reflectivity, tag and line.
+struct LivoxMessage {
+  PointCloud2Message cloud;
+  std::uint64_t timebase = 0;       // ns, of the first point on the sensor's clock
+  std::uint32_t stated_points = 0;  // point_num
+  std::uint8_t lidar_id = 0;
+};
+
+// VelodyneScan, NebulaPackets, PandarScan and UdpFrame: packets as the sensor sent them.
 struct SensorPacket {
   TimeNs stamp = 0;
   ByteSpan data;
@@ -88,6 +97,7 @@ struct PacketsMessage {
 
 // Nothing where the bytes are no whole message of the type.
 [[nodiscard]] std::optional<PointCloud2Message> decode_point_cloud2(MessageReader reader);
+[[nodiscard]] std::optional<LivoxMessage> decode_livox(MessageReader reader);
 [[nodiscard]] std::optional<ImuMessage> decode_imu(MessageReader reader);
 [[nodiscard]] std::optional<MagMessage> decode_magnetic_field(MessageReader reader);
 [[nodiscard]] std::optional<GnssMessage> decode_nav_sat_fix(MessageReader reader);
@@ -96,5 +106,9 @@ struct PacketsMessage {
 [[nodiscard]] std::optional<std::vector<TransformMessage>> decode_transforms(MessageReader reader);
 [[nodiscard]] std::optional<PacketsMessage> decode_velodyne_scan(MessageReader reader);
 [[nodiscard]] std::optional<PacketsMessage> decode_nebula_packets(MessageReader reader);
+// pandar_msgs/PandarScan and hesai_lidar/PandarScan: packets of 1500 bytes and their true length.
+[[nodiscard]] std::optional<PacketsMessage> decode_pandar_scan(MessageReader reader);
+// hesai_ros_driver/UdpFrame.
+[[nodiscard]] std::optional<PacketsMessage> decode_hesai_frame(MessageReader reader);
 
 }  // namespace understory

@@ -1,5 +1,6 @@
 #include "understory/recording/messages/message_encode.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -16,6 +17,7 @@ constexpr std::uint8_t kFloat32 = 7;
 
 constexpr std::uint32_t kRingOffset = 16;
 constexpr std::uint32_t kReturnOffset = 18;
+constexpr std::uint32_t kTagOffset = 19;
 constexpr std::uint32_t kTimeOffset = 20;
 constexpr std::uint32_t kPointStep = 24;
 
@@ -30,17 +32,32 @@ void put_field(CdrWriter& out, const std::string& name, std::uint32_t offset, st
   out.put(std::uint32_t{1});
 }
 
+// What some scans have and others lack.
+struct CloudContent {
+  explicit CloudContent(const Scan& scan) : times(scan.has_point_times) {
+    for (const ScanPoint& point : scan.points) {
+      returns = returns || point.return_index != 0;
+      tags = tags || point.tag != 0;
+    }
+  }
+  bool times = false;
+  bool returns = false;
+  bool tags = false;
+};
+
 // The design's fields; `t` only where there are times, `return_index` only where a second return
-// occurs.
-void put_fields(CdrWriter& out, bool with_times, bool with_returns) {
-  out.put(static_cast<std::uint32_t>(5 + (with_returns ? 1 : 0) + (with_times ? 1 : 0)));
+// occurs, `tag` only where a point is marked.
+void put_fields(CdrWriter& out, const CloudContent& has) {
+  out.put(static_cast<std::uint32_t>(5 + (has.returns ? 1 : 0) + (has.tags ? 1 : 0) +
+                                     (has.times ? 1 : 0)));
   put_field(out, "x", 0, kFloat32);
   put_field(out, "y", 4, kFloat32);
   put_field(out, "z", 8, kFloat32);
   put_field(out, "intensity", 12, kFloat32);
   put_field(out, "ring", kRingOffset, kUint16);
-  if (with_returns) put_field(out, "return_index", kReturnOffset, kUint8);
-  if (with_times) put_field(out, "t", kTimeOffset, kUint32);
+  if (has.returns) put_field(out, "return_index", kReturnOffset, kUint8);
+  if (has.tags) put_field(out, "tag", kTagOffset, kUint8);
+  if (has.times) put_field(out, "t", kTimeOffset, kUint32);
 }
 
 void pack_point(const ScanPoint& point, std::uint8_t* raw) {
@@ -50,7 +67,7 @@ void pack_point(const ScanPoint& point, std::uint8_t* raw) {
   std::memcpy(raw + 12, &point.intensity, 4);
   std::memcpy(raw + kRingOffset, &point.ring, 2);
   raw[kReturnOffset] = point.return_index;
-  raw[kReturnOffset + 1] = 0;
+  raw[kTagOffset] = point.tag;
   std::memcpy(raw + kTimeOffset, &point.t_ns, 4);
 }
 
@@ -155,16 +172,13 @@ std::uint8_t* CdrWriter::put_space(std::size_t size) {
 }
 
 ByteBuffer encode_point_cloud2(const Scan& scan) {
-  bool with_returns = false;
-  for (const ScanPoint& point : scan.points)
-    with_returns = with_returns || point.return_index != 0;
   const auto count = static_cast<std::uint32_t>(scan.points.size());
 
   CdrWriter out;
   out.put_header(scan.stamp, "lidar");
   out.put(std::uint32_t{1});  // height
   out.put(count);             // width
-  put_fields(out, scan.has_point_times, with_returns);
+  put_fields(out, CloudContent(scan));
   out.put(std::uint8_t{0});  // is_bigendian
   out.put(kPointStep);
   out.put(kPointStep * count);
@@ -175,6 +189,27 @@ ByteBuffer encode_point_cloud2(const Scan& scan) {
     raw += kPointStep;
   }
   out.put(std::uint8_t{1});  // is_dense
+  return out.bytes();
+}
+
+ByteBuffer encode_livox(const Scan& scan) {
+  const auto count = static_cast<std::uint32_t>(scan.points.size());
+  CdrWriter out;
+  out.put_header(scan.stamp, "lidar");
+  out.put(static_cast<std::uint64_t>(scan.stamp));  // timebase
+  out.put(count);
+  for (int i = 0; i < 4; ++i)
+    out.put(std::uint8_t{0});  // lidar_id and three reserved bytes
+  out.put(count);
+  for (const ScanPoint& point : scan.points) {
+    out.put(point.t_ns);
+    out.put(point.x);
+    out.put(point.y);
+    out.put(point.z);
+    out.put(static_cast<std::uint8_t>(std::clamp(point.intensity, 0.0F, 255.0F)));
+    out.put(point.tag);
+    out.put(static_cast<std::uint8_t>(point.ring));
+  }
   return out.bytes();
 }
 

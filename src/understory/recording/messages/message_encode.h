@@ -46,6 +46,9 @@ struct NamedTransform {
 
 // The project's messages (design: formats), frames as named there. Pure functions.
 [[nodiscard]] ByteBuffer encode_point_cloud2(const Scan& scan);
+// livox_ros_driver2/CustomMsg: the line of a point is its ring; its return is told by the tag
+// alone.
+[[nodiscard]] ByteBuffer encode_livox(const Scan& scan);
 [[nodiscard]] ByteBuffer encode_imu(const ImuSample& sample);
 [[nodiscard]] ByteBuffer encode_nav_sat_fix(const GnssFix& fix, const std::string& frame = "gnss");
 [[nodiscard]] ByteBuffer encode_gps_fix(const GnssFix& fix);

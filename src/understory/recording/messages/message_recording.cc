@@ -9,13 +9,14 @@
 #include "understory/recording/extrinsics.h"
 #include "understory/recording/finding.h"
 #include "understory/recording/messages/arrival_times.h"
+#include "understory/recording/messages/cloud_topic.h"
 #include "understory/recording/messages/event_bytes.h"
 #include "understory/recording/messages/fix_joiner.h"
 #include "understory/recording/messages/imu_unit.h"
+#include "understory/recording/messages/livox_sensor.h"
 #include "understory/recording/messages/message_decode.h"
 #include "understory/recording/messages/message_survey.h"
 #include "understory/recording/messages/packet_topic.h"
-#include "understory/recording/messages/point_cloud.h"
 #include "understory/recording/messages/sensor_places.h"
 #include "understory/recording/messages/topic_statistics.h"
 #include "understory/recording/messages/two_receivers.h"
@@ -41,6 +42,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
                    Log& log)
       : file_(std::move(file)),
         log_(log),
+        clouds_(file_, log),
         places_(survey_.transforms, options.extrinsics_file, log),
         receivers_(file_, !options.gnss_topic.empty(), log) {
     Log quiet;  // the same damage will be met again when reading
@@ -53,7 +55,10 @@ class MessageRecording : public Recording, public ArrivalTimes {
     for (const TopicSurvey& topic : survey_.topics)
       frame_of_topic_[topic.topic] = topic.frame;
     source_ = open(log_);
+    calibration_file_ = options.metadata_file;
     places_.frames() = frames_of(choice_, survey_);
+    clouds_.know_livox(survey_.find(choice_.lidar), places_, survey_.transforms);
+    warn_of_unread_lidars(survey_, file_, log_);
     make_rig(ahead->sensor_metadata());
     if (places_.lacks_any() && survey_late_transforms(*ahead, survey_)) place_sensors();
     warn_of_missing_place();
@@ -95,9 +100,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
       writer.put(text);
     put_rig(writer, places_.rig());
     writer.put(scan_given_);
-    writer.put(convention_.has_value());
-    if (convention_) put_convention(writer, *convention_);
-    writer.put(ring_count_);
+    clouds_.save(writer);
     imu_unit_.save(writer);
     writer.put(static_cast<std::uint64_t>(topics_.size()));
     for (const auto& [name, statistics] : topics_)
@@ -105,7 +108,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     put_events(writer, events_);
     fixes_.save(writer);
     receivers_.save(writer);
-    writer.put(packets_ != nullptr);
+    writer.put(packet_maker_);
     if (packets_) packets_->save(writer);
     writer.put(ended_);
     return true;
@@ -121,9 +124,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
       *text = reader.get_string();
     places_.rig() = get_rig(reader);
     scan_given_ = reader.get<bool>();
-    convention_.reset();
-    if (reader.get<bool>()) convention_ = get_convention(reader);
-    ring_count_ = reader.get<int>();
+    clouds_.load(reader);
     imu_unit_.load(reader);
     topics_.clear();
     for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
@@ -134,7 +135,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
     get_events(reader, events_);
     fixes_.load(reader);
     receivers_.load(reader);
-    if (reader.get<bool>()) packets().load(reader);
+    const auto maker = reader.get_enum(PacketMaker::kHesai);
+    if (maker != PacketMaker::kNone) packets(maker).load(reader);
     ended_ = reader.get<bool>();
   }
 
@@ -154,7 +156,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
     const auto model = metadata.find("lidar_model");
     if (model != metadata.end()) places_.rig().lidar_model = model->second;
     const auto rings = metadata.find("ring_count");
-    if (rings != metadata.end()) ring_count_ = std::atoi(rings->second.substr(0, 6).c_str());
+    if (rings != metadata.end()) clouds_.know_rings(std::atoi(rings->second.substr(0, 6).c_str()));
     place_sensors();
   }
 
@@ -182,20 +184,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
 
   void judge_lidar() {
     const TopicSurvey* lidar = survey_.find(choice_.lidar);
-    if (lidar == nullptr || lidar->role != TopicRole::kCloud) return;
+    if (lidar == nullptr) return;
     const TopicSurvey* imu = survey_.find(choice_.imu);
-    const auto clouds = lidar->clouds.find(lidar->frame);
-    if (clouds == lidar->clouds.end()) return;
-    set_convention(detect_point_times(lidar->time_field, lidar->time_type, clouds->second,
-                                      imu == nullptr ? std::vector<TimeNs>() : imu->delays));
-  }
-
-  void set_convention(TimeConvention convention) {
-    convention_ = std::move(convention);
-    if (convention_->warning.empty()) return;
-    const bool missing = convention_->kind == TimeConvention::Kind::kNone;
-    log_.warn(missing ? key_of(Finding::kNoPointTimes) : "recording.point_times",
-              file_ + ": " + choice_.lidar + ": " + convention_->warning);
+    clouds_.judge(*lidar, imu == nullptr ? std::vector<TimeNs>() : imu->delays);
   }
 
   void judge_imu() {
@@ -226,11 +217,14 @@ class MessageRecording : public Recording, public ArrivalTimes {
       case TopicRole::kCloud:
         decoded = take_cloud(topic, reader, message.log_time);
         break;
-      case TopicRole::kVelodynePackets:
-        decoded = take_packets(topic, decode_velodyne_scan(reader));
+      case TopicRole::kLivox:
+        decoded = take_livox(topic, reader, message.log_time);
         break;
+      case TopicRole::kVelodynePackets:
       case TopicRole::kNebulaPackets:
-        decoded = take_packets(topic, decode_nebula_packets(reader));
+      case TopicRole::kPandarPackets:
+      case TopicRole::kHesaiFrames:
+        decoded = take_packets(topic, decode_packets(role, reader));
         break;
       case TopicRole::kImu:
         decoded = take_imu(topic, reader);
@@ -267,8 +261,11 @@ class MessageRecording : public Recording, public ArrivalTimes {
     };
     switch (role) {
       case TopicRole::kCloud:
+      case TopicRole::kLivox:
       case TopicRole::kVelodynePackets:
       case TopicRole::kNebulaPackets:
+      case TopicRole::kPandarPackets:
+      case TopicRole::kHesaiFrames:
         return adopt(choice_.lidar);
       case TopicRole::kImu:
         return adopt(choice_.imu);
@@ -330,36 +327,32 @@ class MessageRecording : public Recording, public ArrivalTimes {
     const auto cloud = decode_point_cloud2(reader);
     if (!cloud) return false;
     if (is_of_another(topic, cloud->header.frame, "clouds")) return true;
-    const auto layout = CloudLayout::find(*cloud);
-    if (!layout) return false;
-    if (!convention_)
-      set_convention(detect_point_times(layout->time_field(), layout->time_type(),
-                                        {measure_times(*cloud, *layout, log_time)}, {}));
-    ConvertedCloud converted = convert_cloud(*cloud, *layout, *convention_);
-    ring_count_ = std::max(ring_count_, converted.scan->ring_count);
-    converted.scan->ring_count = ring_count_;
-    if (converted.bad_times > 0)
-      log_.warn("recording.bad_point_times",
-                file_ + ": " + topic.report().name + ": " + std::to_string(converted.bad_times) +
-                    " points of the scan at " + format_seconds(converted.scan->stamp) +
-                    " have impossible times; dropped");
-    topic.add_stamp(cloud->header.stamp);
-    topic.report().frame = cloud->header.frame;
-    note_frame(places_.frames().lidar, cloud->header.frame);
-    topic.report().conventions = convention_->text;
-    topic.report().points += converted.scan->points.size();
-    topic.report().empty_points += converted.without_return;
-    events_.emplace_back(ScanPtr(std::move(converted.scan)));
+    return emit(topic, cloud->header, clouds_.add(*cloud, log_time, topic.report()));
+  }
+
+  bool take_livox(TopicStatistics& topic, const MessageReader& reader, TimeNs log_time) {
+    const auto message = decode_livox(reader);
+    if (!message) return false;
+    const MessageHeader& header = message->cloud.header;
+    if (is_of_another(topic, header.frame, "clouds")) return true;
+    if (clouds_.is_of_another(*message, topic.report())) return true;
+    return emit(topic, header, clouds_.add(*message, log_time, topic.report()));
+  }
+
+  bool emit(TopicStatistics& topic, const MessageHeader& header, ScanPtr scan) {
+    if (scan == nullptr) return false;
+    topic.add_stamp(header.stamp);
+    topic.report().frame = header.frame;
+    note_frame(places_.frames().lidar, header.frame);
+    events_.emplace_back(std::move(scan));
     return true;
   }
 
-  // The clouds that go with packets: the ROS 1 driver's calibration has the beams' vertical
-  // offsets, that of nebula for ROS 2 has not.
-  PacketTopic& packets() {
+  PacketTopic& packets(PacketMaker maker) {
     if (!packets_) {
-      VelodyneConfig config;
-      config.vertical_offsets = source_->format().rfind("ROS 1", 0) == 0;
-      packets_ = std::make_unique<PacketTopic>(config, file_ + " " + choice_.lidar, log_);
+      packet_maker_ = maker;
+      const bool ros1 = source_->format().rfind("ROS 1", 0) == 0;
+      packets_ = make_packet_topic(maker, {file_, choice_.lidar, ros1, calibration_file_}, log_);
     }
     return *packets_;
   }
@@ -370,7 +363,8 @@ class MessageRecording : public Recording, public ArrivalTimes {
     topic.add_stamp(message->header.stamp);
     topic.report().frame = message->header.frame;
     note_frame(places_.frames().lidar, message->header.frame);
-    topic.report().points += packets().add(*message, events_);
+    if (!packets_ && message->packets.empty()) return true;
+    topic.report().points += packets(packet_maker(*message)).add(*message, events_);
     topic.report().conventions = packets_->conventions();
     if (places_.rig().lidar_model.empty()) places_.rig().lidar_model = packets_->model();
     return true;
@@ -472,18 +466,19 @@ class MessageRecording : public Recording, public ArrivalTimes {
   Log& log_;
   MessageSurvey survey_;
   TopicChoice choice_;
+  CloudTopic clouds_;
   std::map<std::string, std::string> frame_of_topic_;  // of the sensor that is used
   std::unique_ptr<MessageSource> source_;
   SensorPlaces places_;
   TwoReceivers receivers_;
   bool scan_given_ = false;
-  std::optional<TimeConvention> convention_;
-  int ring_count_ = 0;
   ImuUnit imu_unit_;
   std::map<std::string, TopicStatistics> topics_;
   std::deque<Event> events_;
   std::optional<TimeNs> last_log_time_;  // of the message that the waiting events came with
   FixJoiner fixes_;
+  std::string calibration_file_;  // that the options name
+  PacketMaker packet_maker_ = PacketMaker::kNone;
   std::unique_ptr<PacketTopic> packets_;
   bool ended_ = false;
 };

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "understory/recording/messages/message_encode.h"
+#include "understory/recording/messages/stored_messages_test_support.h"
 #include "understory/recording/recording_test_support.h"
 #include "understory/util/error.h"
 
@@ -14,44 +15,6 @@ namespace understory {
 namespace {
 
 using namespace test;
-
-struct Stored {
-  std::shared_ptr<const MessageChannel> channel;
-  TimeNs log_time = 0;
-  std::vector<std::uint8_t> data;
-};
-
-class StoredSource : public MessageSource {
- public:
-  explicit StoredSource(const std::vector<Stored>& messages) : messages_(messages) {}
-  bool next(RawMessage& message) override {
-    if (at_ == messages_.size()) return false;
-    const Stored& stored = messages_[at_++];
-    message = {stored.channel, stored.log_time, stored.data};
-    return true;
-  }
-  void save(BinaryWriter& writer) const override { writer.put(static_cast<std::uint64_t>(at_)); }
-  void load(BinaryReader& reader) override {
-    at_ = static_cast<std::size_t>(reader.get<std::uint64_t>());
-  }
-  [[nodiscard]] std::string format() const override { return "test"; }
-  [[nodiscard]] double progress() const override { return 0.0; }
-
- private:
-  const std::vector<Stored>& messages_;
-  std::size_t at_ = 0;
-};
-
-std::shared_ptr<const MessageChannel> channel(const std::string& topic, const std::string& type) {
-  auto made = std::make_shared<MessageChannel>();
-  made->topic = topic;
-  made->type = type;
-  return made;
-}
-
-std::vector<std::uint8_t> bytes_of(const ByteBuffer& buffer) {
-  return {buffer.span().begin(), buffer.span().end()};
-}
 
 // A message whose frame "lidar" is replaced by another name of five letters.
 std::vector<std::uint8_t> with_frame(std::vector<std::uint8_t> data, const std::string& frame) {

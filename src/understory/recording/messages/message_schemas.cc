@@ -40,6 +40,14 @@ constexpr Definition kDefinitions[] = {
      "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\n"
      "bool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n",
      {"std_msgs/Header", "sensor_msgs/PointField"}},
+    {"livox_ros_driver2/CustomPoint",
+     "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\n"
+     "uint8 line\n",
+     {}},
+    {"livox_ros_driver2/CustomMsg",
+     "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
+     "livox_ros_driver2/CustomPoint[] points\n",
+     {"std_msgs/Header", "livox_ros_driver2/CustomPoint"}},
     {"sensor_msgs/Imu",
      "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\n"
      "float64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n"

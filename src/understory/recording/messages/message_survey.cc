@@ -6,8 +6,10 @@
 #include <tuple>
 #include <utility>
 
+#include "understory/recording/captures/hesai_tables.h"
 #include "understory/recording/captures/nmea.h"
 #include "understory/recording/messages/message_decode.h"
+#include "understory/recording/messages/packet_topic.h"
 #include "understory/recording/messages/point_cloud.h"
 #include "understory/util/error.h"
 #include "understory/util/files/read_error.h"
@@ -34,10 +36,13 @@ class Surveyor {
     switch (topic.role) {
       case TopicRole::kCloud:
         return add_cloud(topic, reader, message.log_time);
+      case TopicRole::kLivox:
+        return add_livox(topic, decode_livox(reader), message.log_time);
       case TopicRole::kVelodynePackets:
-        return add_packets(topic, decode_velodyne_scan(reader));
       case TopicRole::kNebulaPackets:
-        return add_packets(topic, decode_nebula_packets(reader));
+      case TopicRole::kPandarPackets:
+      case TopicRole::kHesaiFrames:
+        return add_packets(topic, decode_packets(topic.role, reader));
       case TopicRole::kImu:
         return add_imu(topic, reader, message.log_time);
       case TopicRole::kNavSatFix:
@@ -71,15 +76,12 @@ class Surveyor {
   }
 
  private:
-  static bool is_packets(TopicRole role) {
-    return role == TopicRole::kVelodynePackets || role == TopicRole::kNebulaPackets;
-  }
-
   TopicSurvey& topic_of(const MessageChannel& channel) {
     const auto [at, is_new] = index_.try_emplace(channel.topic, survey_.topics.size());
     if (is_new) {
       survey_.topics.emplace_back();
       survey_.topics.back().topic = channel.topic;
+      survey_.topics.back().type = channel.type;
       survey_.topics.back().role = role_of(channel);
     }
     return survey_.topics[at->second];
@@ -87,7 +89,22 @@ class Surveyor {
 
   static void add_cloud(TopicSurvey& topic, const MessageReader& reader, TimeNs log_time) {
     const auto cloud = decode_point_cloud2(reader);
-    if (!cloud) return;
+    if (cloud) add_cloud(topic, *cloud, log_time);
+  }
+
+  static void add_livox(TopicSurvey& topic, const std::optional<LivoxMessage>& message,
+                        TimeNs log_time) {
+    constexpr std::size_t kMostIds = 16;
+    if (!message) return;
+    add_cloud(topic, message->cloud, log_time);
+    if (topic.livox_ids.size() < kMostIds || topic.livox_ids.count(message->lidar_id) > 0)
+      topic.livox_ids[message->lidar_id] += message->cloud.width + 1;
+    const auto layout = CloudLayout::find(message->cloud);
+    if (layout) topic.lines = std::max(topic.lines, highest_ring(message->cloud, *layout) + 1);
+  }
+
+  static void add_cloud(TopicSurvey& topic, const PointCloud2Message& message, TimeNs log_time) {
+    const PointCloud2Message* cloud = &message;
     const auto layout = CloudLayout::find(*cloud);
     if (!layout) return;
     topic.time_field = layout->time_field();
@@ -112,7 +129,9 @@ class Surveyor {
   static void add_packets(TopicSurvey& topic, const std::optional<PacketsMessage>& message) {
     if (!message) return;
     note_frame(topic, message->header.frame, message->packets.size());
-    topic.points += 384 * message->packets.size();  // a Velodyne packet holds as many
+    const bool hesai = packet_maker(*message) == PacketMaker::kHesai;
+    topic.points += (hesai ? 256 : 384) * message->packets.size();  // as many in a packet
+    if (hesai) topic.unread = hesai_kind(message->packets.front().data).other;
   }
 
   static void add_imu(TopicSurvey& topic, const MessageReader& reader, TimeNs log_time) {
@@ -150,8 +169,7 @@ std::string short_type(const std::string& type) {
 }
 
 bool is_lidar(TopicRole role) {
-  return role == TopicRole::kCloud || role == TopicRole::kVelodynePackets ||
-         role == TopicRole::kNebulaPackets;
+  return role == TopicRole::kCloud || role == TopicRole::kLivox || is_packets(role);
 }
 
 // Chooses among the topics that `wanted` accepts: the one named, else that of the highest `score`.
@@ -182,8 +200,14 @@ std::string choose(const MessageSurvey& survey, const std::string& named, const 
 TopicRole role_of(const MessageChannel& channel) {
   static const std::map<std::string, TopicRole> kRoles = {
       {"sensor_msgs/PointCloud2", TopicRole::kCloud},
+      {"livox_ros_driver/CustomMsg", TopicRole::kLivox},
+      {"livox_ros_driver2/CustomMsg", TopicRole::kLivox},
+      {"livox_interfaces/CustomMsg", TopicRole::kLivox},
       {"velodyne_msgs/VelodyneScan", TopicRole::kVelodynePackets},
       {"nebula_msgs/NebulaPackets", TopicRole::kNebulaPackets},
+      {"pandar_msgs/PandarScan", TopicRole::kPandarPackets},
+      {"hesai_lidar/PandarScan", TopicRole::kPandarPackets},
+      {"hesai_ros_driver/UdpFrame", TopicRole::kHesaiFrames},
       {"sensor_msgs/Imu", TopicRole::kImu},
       {"sensor_msgs/MagneticField", TopicRole::kMag},
       {"sensor_msgs/NavSatFix", TopicRole::kNavSatFix},
@@ -205,8 +229,11 @@ TopicRole role_of(const MessageChannel& channel) {
 const char* role_name(TopicRole role) {
   switch (role) {
     case TopicRole::kCloud:
+    case TopicRole::kLivox:
     case TopicRole::kVelodynePackets:
     case TopicRole::kNebulaPackets:
+    case TopicRole::kPandarPackets:
+    case TopicRole::kHesaiFrames:
       return "lidar";
     case TopicRole::kImu:
       return "imu";

@@ -17,7 +17,10 @@ enum class TopicRole {
   kIgnored,
   kCloud,            // sensor_msgs/PointCloud2
   kVelodynePackets,  // velodyne_msgs/VelodyneScan
-  kNebulaPackets,    // nebula_msgs/NebulaPackets of a Velodyne
+  kLivox,            // CustomMsg of livox_ros_driver, livox_ros_driver2
+  kNebulaPackets,    // nebula_msgs/NebulaPackets
+  kPandarPackets,    // PandarScan of pandar_msgs and hesai_lidar
+  kHesaiFrames,      // hesai_ros_driver/UdpFrame
   kImu,
   kMag,
   kNavSatFix,
@@ -35,15 +38,19 @@ enum class TopicRole {
 // What the first seconds of a recording say of one topic.
 struct TopicSurvey {
   std::string topic;
+  std::string type;
   TopicRole role = TopicRole::kIgnored;
   std::string frame;  // of most of its data
   std::uint64_t messages = 0;
   std::uint64_t points = 0;
   std::uint64_t headings = 0;  // sentences with one
+  std::string unread;          // what its packets are of, if of a sensor that is not read
   std::string time_field;
   std::string time_type;
   std::map<std::string, std::uint64_t> frames;            // points (IMU: messages) of each
   std::map<std::string, std::vector<CloudTimes>> clouds;  // of PointCloud2, by frame
+  int lines = 0;                                          // of a Livox
+  std::map<int, std::uint64_t> livox_ids;                 // points of each lidar_id
   std::vector<TimeNs> delays;                             // log time - stamp
   double specific_force_sum = 0.0;                        // of norms, as they come
   bool late = false;                                      // first seen behind the start

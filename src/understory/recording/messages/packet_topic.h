@@ -1,50 +1,53 @@
 #pragma once
 
 #include <deque>
+#include <memory>
+#include <optional>
 #include <string>
 
-#include "understory/recording/captures/velodyne.h"
 #include "understory/recording/messages/message_decode.h"
+#include "understory/recording/messages/message_survey.h"
 #include "understory/recording/recording.h"
 
 namespace understory {
 
-// A topic of Velodyne packets: hands them to the decoder and its scans on.
+// A topic of packets of a lidar: hands them to the decoder of the sensor and its scans on. Not
+// thread-safe.
 class PacketTopic {
  public:
-  // `source` names the stream in warnings.
-  PacketTopic(const VelodyneConfig& config, const std::string& source, Log& log)
-      : decoder_(config, source, log) {}
-
+  virtual ~PacketTopic() = default;
   // Returns the number of points of the scans that were finished.
-  std::uint64_t add(const PacketsMessage& message, std::deque<Event>& events) {
-    std::uint64_t points = 0;
-    for (const SensorPacket& packet : message.packets) {
-      decoder_.add_packet(packet.data.data(), packet.data.size(), packet.stamp);
-      points += drain(events);
-    }
-    return points;
-  }
-  void finish(std::deque<Event>& events) {
-    decoder_.finish();
-    (void)drain(events);
-  }
-  void save(BinaryWriter& writer) const { decoder_.save(writer); }
-  void load(BinaryReader& reader) { decoder_.load(reader); }
-  [[nodiscard]] std::string model() const { return decoder_.model_name(); }
-  [[nodiscard]] std::string conventions() const { return decoder_.conventions(); }
-
- private:
-  std::uint64_t drain(std::deque<Event>& events) {
-    std::uint64_t points = 0;
-    while (ScanPtr scan = decoder_.take_scan()) {
-      points += scan->points.size();
-      events.emplace_back(std::move(scan));
-    }
-    return points;
-  }
-
-  VelodyneDecoder decoder_;
+  virtual std::uint64_t add(const PacketsMessage& message, std::deque<Event>& events) = 0;
+  virtual void finish(std::deque<Event>& events) = 0;
+  virtual void save(BinaryWriter& writer) const = 0;
+  virtual void load(BinaryReader& reader) = 0;
+  [[nodiscard]] virtual std::string model() const = 0;
+  [[nodiscard]] virtual std::string conventions() const = 0;
 };
+
+// Whose packets a topic holds.
+enum class PacketMaker : std::uint8_t { kNone, kVelodyne, kHesai };
+
+// By the first bytes of the first packet; kNone for a message without packets.
+[[nodiscard]] PacketMaker packet_maker(const PacketsMessage& message);
+
+// What packet topics need to know of their recording.
+struct PacketSource {
+  std::string file;
+  std::string topic;
+  bool ros1 = false;
+  std::string calibration_file;  // as --metadata names it; empty: what lies beside the recording
+};
+
+// The decoder of a maker. The clouds that go with packets of a Velodyne: the ROS 1 driver's
+// calibration has the beams' vertical offsets, that of nebula for ROS 2 has not. Throws InputError
+// for a wrong calibration.
+[[nodiscard]] std::unique_ptr<PacketTopic> make_packet_topic(PacketMaker maker,
+                                                             const PacketSource& source, Log& log);
+
+// Whether topics of a role hold packets.
+[[nodiscard]] bool is_packets(TopicRole role);
+// A message of such a topic; nothing where the bytes are no whole message of its type.
+[[nodiscard]] std::optional<PacketsMessage> decode_packets(TopicRole role, MessageReader reader);
 
 }  // namespace understory

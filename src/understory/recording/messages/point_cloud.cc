@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <string_view>
 #include <type_traits>
 
@@ -24,6 +25,7 @@ constexpr std::string_view kTimeNames[] = {
     "timestamps", "rel_time",    "relative_time",   "stamp",       "t_offset",
     "ts",         "gps_time",    "timestamp_offset"};
 constexpr std::string_view kReturnNames[] = {"return_index"};
+constexpr std::string_view kTagNames[] = {"tag"};
 
 template <typename Result, typename T>
 Result load(const std::uint8_t* raw, bool swap) {
@@ -155,15 +157,34 @@ struct RelativeTimes {
   }
 };
 
+// First and last of the points' times, relative to the header stamp.
+struct TimeRange {
+  TimeNs first = std::numeric_limits<TimeNs>::max();
+  TimeNs last = std::numeric_limits<TimeNs>::min();
+  TimeNs before = std::numeric_limits<TimeNs>::min();
+
+  // Whether the time is no earlier than the one before it.
+  bool add(TimeNs time) {
+    const bool in_order = time >= before;
+    before = time;
+    first = std::min(first, time);
+    last = std::max(last, time);
+    return in_order;
+  }
+};
+
 // Makes the scan begin at its first point. Where that lies just behind the header stamp, the stamp
 // itself is kept: it is the start of the revolution, in which the first beams may have missed.
-void count_from_first(const std::vector<TimeNs>& relative, TimeNs header, Scan& scan) {
-  const auto [first, last] = std::minmax_element(relative.begin(), relative.end());
-  const bool keep = *first >= 0 && *first <= (*last - *first) / 4;
-  const TimeNs start = keep ? 0 : *first;
-  scan.stamp = header + start;
-  for (std::size_t i = 0; i < relative.size(); ++i)
-    scan.points[i].t_ns = static_cast<std::uint32_t>(relative[i] - start);
+// Until now the points hold the last 32 bits of their times relative to the header stamp.
+void count_from_first(const TimeRange& times, TimeNs header, Scan& scan) {
+  const bool keep = times.first >= 0 && times.first <= (times.last - times.first) / 4;
+  if (keep) {
+    scan.stamp = header;
+    return;
+  }
+  scan.stamp = header + times.first;
+  for (ScanPoint& point : scan.points)
+    point.t_ns -= static_cast<std::uint32_t>(times.first);
 }
 
 }  // namespace
@@ -196,6 +217,7 @@ std::optional<CloudLayout> CloudLayout::find(const PointCloud2Message& cloud) {
   take(kIntensityNames, layout.intensity_);
   take(kRingNames, layout.ring_);
   take(kReturnNames, layout.return_index_);
+  take(kTagNames, layout.tag_);
   layout.time_name_ = take(kTimeNames, layout.time_);
   if (layout.x_.size == 0 || layout.y_.size == 0 || layout.z_.size == 0) return std::nullopt;
   return layout;
@@ -242,6 +264,15 @@ CloudTimes measure_times(const PointCloud2Message& cloud, const CloudLayout& lay
   return times;
 }
 
+int highest_ring(const PointCloud2Message& cloud, const CloudLayout& layout) {
+  int highest = -1;
+  if (!layout.has_ring()) return highest;
+  for_each_point(cloud, [&](const std::uint8_t* raw, std::size_t) {
+    highest = std::max(highest, static_cast<int>(to_ring(layout.ring().read(raw))));
+  });
+  return highest;
+}
+
 ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout& layout,
                              const TimeConvention& convention) {
   ConvertedCloud result;
@@ -255,10 +286,9 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
     relative_time.foreign_start =
         raw_time_to_ns(measure_times(cloud, layout, 0).low, convention.unit_s);
 
-  std::vector<TimeNs> relative;
+  TimeRange times;
   const std::size_t most = cloud.point_step > 0 ? cloud.data.size() / cloud.point_step : 0;
   scan.points.reserve(most);
-  relative.reserve(scan.has_point_times ? most : 0);
   std::uint16_t highest_ring = 0;
   const PositionReader read_position(layout);
   const SlotReader<float, FieldType::kFloat32> read_intensity(layout.intensity());
@@ -275,7 +305,8 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
         ++result.bad_times;
         return;
       }
-      relative.push_back(time);
+      if (!times.add(time)) ++result.backward_times;
+      point.t_ns = static_cast<std::uint32_t>(time);
     }
     if (layout.intensity().size > 0) {
       const float intensity = read_intensity(raw);
@@ -285,10 +316,13 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
     if (rows_are_rings) point.ring = static_cast<std::uint16_t>(row);
     if (layout.return_index().size > 0)
       point.return_index = static_cast<std::uint8_t>(to_ring(layout.return_index().read(raw)));
+    if (layout.tag().size > 0)
+      point.tag = static_cast<std::uint8_t>(to_ring(layout.tag().read(raw)));
     highest_ring = std::max(highest_ring, point.ring);
     scan.points.push_back(point);
   });
-  if (!relative.empty()) count_from_first(relative, cloud.header.stamp, scan);
+  if (scan.has_point_times && !scan.points.empty())
+    count_from_first(times, cloud.header.stamp, scan);
   if (layout.has_ring()) scan.ring_count = highest_ring + 1;
   if (rows_are_rings) scan.ring_count = static_cast<int>(cloud.height);
   return result;

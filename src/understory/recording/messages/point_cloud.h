@@ -34,9 +34,10 @@ class CloudLayout {
   [[nodiscard]] const Slot& ring() const { return ring_; }
   [[nodiscard]] const Slot& time() const { return time_; }
   [[nodiscard]] const Slot& return_index() const { return return_index_; }
+  [[nodiscard]] const Slot& tag() const { return tag_; }  // of Livox
 
  private:
-  Slot x_, y_, z_, intensity_, ring_, time_, return_index_;
+  Slot x_, y_, z_, intensity_, ring_, time_, return_index_, tag_;
   std::string time_name_;
 };
 
@@ -44,11 +45,15 @@ class CloudLayout {
 [[nodiscard]] CloudTimes measure_times(const PointCloud2Message& cloud, const CloudLayout& layout,
                                        TimeNs log_time);
 
+// The highest ring number of the points; -1 where they have none.
+[[nodiscard]] int highest_ring(const PointCloud2Message& cloud, const CloudLayout& layout);
+
 // A scan made of a message, and how many of its points were dropped.
 struct ConvertedCloud {
   std::shared_ptr<Scan> scan;
   std::size_t without_return = 0;  // NaN or range zero: dropped
   std::size_t bad_times = 0;       // times far outside of the scan: dropped
+  std::size_t backward_times = 0;  // earlier than the point before them: kept
 };
 
 // Makes a scan by the convention found for the topic. Points beyond the end of the data are not

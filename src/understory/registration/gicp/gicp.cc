@@ -1,19 +1,15 @@
 #include "understory/registration/gicp/gicp.h"
 
 #include <Eigen/LU>
-#include <array>
+#include <cmath>
 #include <string>
 
-#include "understory/geometry/kd_tree.h"
 #include "understory/registration/describe_steps.h"
 #include "understory/registration/judged_match.h"
-#include "understory/registration/registration_constants.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
-
-using namespace registration_constants::gicp;
 
 class Accumulator {
  public:
@@ -26,28 +22,27 @@ class Accumulator {
         pose_(pose),
         rotation_(pose.rotation_matrix()),
         config_(config),
-        kernel_(config.kernel_sigmas * config.kernel_sigmas) {}
+        loss_(loss_of_step(source.size(), config.kernel_sigmas, config.loss,
+                           [this](std::size_t i) { return squared_of(i); })),
+        unmatched_(0.5 * loss_.of_unmatched(0.5 * config.max_distance_m * config.max_distance_m /
+                                            (config.sigma_m * config.sigma_m))) {}
 
   void operator()(MatchSums& sums, std::size_t i) const {
     const Eigen::Vector3d point = source_[i].cast<double>();
     IcpPair pair;
     if (!target_.nearest(pose_ * point, config_.max_distance_m, pair, known_[i])) {
-      sums.cost += 0.5 * kernel_;  // as much as the worst match: leaving is no gain
+      sums.cost += unmatched_;
       return;
     }
     ++sums.matched;
     sums.nearest_squared += static_cast<double>(pair.squared_m2);
-    const Eigen::Matrix3d covariance =
-        surface_covariance(pair.patch, config_) +
-        rotation_ * surface_covariance(surfaces_[i], config_) * rotation_.transpose();
-    const Eigen::Matrix3d information = covariance.inverse();
+    const Eigen::Matrix3d information = information_of(pair, i);
     const Eigen::Vector3d pull = information * pair.offset;
     const double squared = pair.offset.dot(pull);
-    const double share = kernel_ / (kernel_ + squared);  // Geman-McClure
-    const double weight = share * share;
+    const auto [loss, weight] = loss_.at(squared);
     Eigen::Matrix<double, 3, 6> jacobian;
     jacobian << -rotation_ * skew(point), rotation_;
-    sums.cost += 0.5 * share * squared;
+    sums.cost += 0.5 * loss;
     sums.hessian += weight * jacobian.transpose() * information * jacobian;
     sums.gradient += weight * jacobian.transpose() * pull;
     sums.weight += weight;
@@ -59,6 +54,20 @@ class Accumulator {
   }
 
  private:
+  // In the metric of both surfaces, m^-2.
+  [[nodiscard]] Eigen::Matrix3d information_of(const IcpPair& pair, std::size_t i) const {
+    const Eigen::Matrix3d covariance =
+        surface_covariance(pair.patch, config_) +
+        rotation_ * surface_covariance(surfaces_[i], config_) * rotation_.transpose();
+    return covariance.inverse();
+  }
+  [[nodiscard]] double squared_of(std::size_t i) const {
+    IcpPair pair;
+    const Eigen::Vector3d at = pose_ * source_[i].cast<double>();
+    if (!target_.nearest(at, config_.max_distance_m, pair, known_[i])) return std::nan("");
+    return pair.offset.dot(information_of(pair, i) * pair.offset);
+  }
+
   const IcpMap& target_;
   const Points& source_;
   std::vector<IcpMap::Known>& known_;  // each element belongs to one point
@@ -66,7 +75,8 @@ class Accumulator {
   const Pose& pose_;
   Eigen::Matrix3d rotation_;
   const GicpConfig& config_;
-  double kernel_;
+  RobustLoss loss_;   // asks what stands above it
+  double unmatched_;  // cost of a point without a match
 };
 
 }  // namespace
@@ -78,7 +88,8 @@ void describe(ConfigTable& table, GicpConfig& config) {
   table.add("along_sigma_m", config.along_sigma_m, {0.001, 100.0}, "m",
             "how far along its surface a point may lie from what it matches");
   table.add("kernel_sigmas", config.kernel_sigmas, {0.1, 100.0}, "",
-            "scale of the Geman-McClure kernel: matches much farther apart hardly count");
+            "scale of the kernel: matches much farther apart hardly count");
+  describe(table, config.loss);
   table.add("source_neighbours", config.source_neighbours, {4, 100}, "",
             "points from which the surface of a source point is found");
   table.add("max_planarity", config.max_planarity, {0.0, 1.0}, "",
@@ -105,22 +116,7 @@ Eigen::Matrix3d surface_covariance(const SurfacePatch& patch, const GicpConfig& 
 }
 
 std::vector<SurfacePatch> source_surfaces(const Points& source, const GicpConfig& config) {
-  std::vector<SurfacePatch> surfaces(source.size());
-  if (source.empty()) return surfaces;
-  const KdTreePoints adaptor{&source};
-  const KdTree tree(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(10));
-  parallel_for(source.size(), 256, [&](std::size_t i) {
-    std::array<std::uint32_t, kMaxNeighbours> index;
-    std::array<float, kMaxNeighbours> squared;
-    const std::size_t n =
-        tree.knnSearch(source[i].data(), static_cast<std::size_t>(config.source_neighbours),
-                       index.data(), squared.data());
-    SurfaceSums sums;
-    for (std::size_t k = 0; k < n; ++k)
-      sums.add(source[index[k]] - source[i]);
-    surfaces[i] = surface_of(sums, config.max_planarity);
-  });
-  return surfaces;
+  return surfaces_of(source, config.source_neighbours, config.max_planarity);
 }
 
 MatchSums gicp_cost(const IcpMap& target, const Points& source,
@@ -146,7 +142,7 @@ RegistrationResult register_gicp(const IcpMap& target, const Points& source,
     at = gicp_cost(target, source, surfaces, pose, config, known);
     const double share = config.independent_share;
     PoseCost sum{share * at.cost, share * at.gradient, share * at.hessian};
-    internal::add_terms(terms, pose, sum);
+    internal::add_terms(terms, pose, share * static_cast<double>(at.matched), sum);
     return sum;
   };
   const double range = internal::mean_range(source);

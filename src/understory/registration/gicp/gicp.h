@@ -6,6 +6,7 @@
 #include "understory/registration/icp/surface.h"
 #include "understory/registration/match_sums.h"
 #include "understory/registration/registration.h"
+#include "understory/registration/robust_loss.h"
 #include "understory/util/config/config.h"
 
 namespace understory {
@@ -17,7 +18,8 @@ struct GicpConfig {
   // `along_sigma_m`. Segal et al., section III.B, have 1 and sqrt(1e-3) of it.
   double sigma_m = 0.03;
   double along_sigma_m = 1.0;
-  double kernel_sigmas = 3.0;  // of the Geman-McClure kernel
+  double kernel_sigmas = 3.0;  // scale of the kernel
+  RobustLossConfig loss;
   int source_neighbours = 12;  // from which a source point's surface is found
   double max_planarity = 0.1;  // see IcpConfig
   int max_iterations = 30;

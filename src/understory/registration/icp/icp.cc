@@ -13,18 +13,34 @@ namespace understory {
 void describe(ConfigTable& table, IcpConfig& config) {
   table.add_enum("metric", config.metric,
                  {{"point_to_point", IcpConfig::Metric::kPointToPoint},
-                  {"point_to_plane", IcpConfig::Metric::kPointToPlane}},
+                  {"point_to_plane", IcpConfig::Metric::kPointToPlane},
+                  {"symmetric", IcpConfig::Metric::kSymmetric},
+                  {"trimmed", IcpConfig::Metric::kTrimmed}},
                  "distance that is minimised");
   table.add("max_distance_m", config.max_distance_m, {0.05, 20.0}, "m",
             "farther neighbours are no match");
   table.add("kernel_m", config.kernel_m, {0.005, 10.0}, "m",
-            "scale of the Geman-McClure kernel: matches much farther apart hardly count");
+            "scale of the kernel: matches much farther apart hardly count");
+  describe(table, config.loss);
   table.add("normal_neighbours", config.normal_neighbours, {4, 100}, "",
             "points from which a normal is estimated");
   table.add("max_planarity", config.max_planarity, {0.0, 1.0}, "",
             "smallest through middle variance of a neighbourhood that still has a normal");
   table.add("sigma_m", config.sigma_m, {0.001, 1.0}, "m", "noise of a point");
+  table.add("source_neighbours", config.source_neighbours, {4, 100}, "",
+            "metric symmetric: points from which the surface of a source point is found");
   internal::describe_steps(table, config);
+}
+
+bool has_planes(const IcpConfig& config) {
+  return config.metric == IcpConfig::Metric::kPointToPlane ||
+         config.metric == IcpConfig::Metric::kSymmetric;
+}
+
+IcpConfig settled(const IcpConfig& config) {
+  IcpConfig steps = config;
+  if (config.metric == IcpConfig::Metric::kTrimmed) steps.loss.kind = LossKind::kTrimmed;
+  return steps;
 }
 
 namespace {
@@ -54,7 +70,7 @@ struct IcpTarget::Tree {
 
 IcpTarget::IcpTarget(const Points& points, const IcpConfig& config)
     : tree_(std::make_unique<Tree>()) {
-  const bool planes = config.metric == IcpConfig::Metric::kPointToPlane;
+  const bool planes = has_planes(config);
   tree_->points = points;
   tree_->adaptor.points = &tree_->points;
   tree_->patches.assign(points.size(), {planes ? SurfaceKind::kNothing : SurfaceKind::kPoint,
@@ -85,7 +101,7 @@ bool IcpTarget::nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPai
 
 RegistrationResult register_icp(const IcpTarget& target, const Points& source, const Pose& guess,
                                 const PoseTerms& terms, const IcpConfig& config) {
-  return internal::icp_match(target, source, guess, terms, config);
+  return internal::icp_match(target, source, guess, terms, settled(config));
 }
 
 }  // namespace understory

@@ -4,21 +4,26 @@
 
 #include "understory/registration/icp/surface.h"
 #include "understory/registration/registration.h"
+#include "understory/registration/robust_loss.h"
 #include "understory/util/config/config.h"
 
 namespace understory {
 
 // Settings of ICP.
 struct IcpConfig {
-  enum class Metric { kPointToPoint, kPointToPlane };
+  // kSymmetric: across the mean of the normals of both surfaces (Rusinkiewicz 2019); kTrimmed: as
+  // kPointToPoint with the nearest `loss.trim_share` of the pairs (Chetverikov et al. 2002).
+  enum class Metric { kPointToPoint, kPointToPlane, kSymmetric, kTrimmed };
 
   Metric metric = Metric::kPointToPlane;
   double max_distance_m = 1.0;  // farther neighbours are no match
-  double kernel_m = 0.1;        // scale of the Geman-McClure kernel
+  double kernel_m = 0.1;        // scale of the kernel
+  RobustLossConfig loss;
   int normal_neighbours = 16;
   double max_planarity = 0.1;       // smallest / middle eigenvalue; above it a point says nothing
   double sigma_m = 0.03;            // noise of a point, for the cost against the prior
   double independent_share = 0.05;  // share of the points that counts as independent
+  int source_neighbours = 12;       // kSymmetric: from which a source point's surface is found
   int max_iterations = 50;
   double max_step_m = 0.5;
   double step_translation_m = 2e-4;
@@ -27,6 +32,10 @@ struct IcpConfig {
   int min_matches = 50;
 };
 void describe(ConfigTable& table, IcpConfig& config);
+// Whether targets have the surface around each point.
+[[nodiscard]] bool has_planes(const IcpConfig& config);
+// The settings with what the metric implies.
+[[nodiscard]] IcpConfig settled(const IcpConfig& config);
 
 // Target of ICP: points with a search tree and normals. Thin the points by a voxel filter first:
 // the nearest few of a dense cloud span less than its noise. Immutable, shared between threads.

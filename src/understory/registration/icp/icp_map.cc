@@ -136,6 +136,7 @@ void IcpMapBuilder::settle_due() {
   own_map();
   const std::size_t known = map_->spots_.size();
   map_->spots_.resize(cubes_.size());
+  if (config_.covariances) map_->covariances_.resize(cubes_.size());
   for (const std::uint32_t number : due_) {
     Cube& cube = cubes_[number];
     IcpMap::Spot& spot = map_->spots_[number];
@@ -164,11 +165,13 @@ void IcpMapBuilder::remove(std::uint32_t cube) {
   if (cube != last) {
     cubes_[cube] = cubes_[last];
     map_->spots_[cube] = map_->spots_[last];
+    if (config_.covariances) map_->covariances_[cube] = map_->covariances_[last];
     index_.set(key_of(cubes_[cube].at), cube);
     map_->blocks_.set(cubes_[cube].at, cube);
   }
   cubes_.pop_back();
   map_->spots_.pop_back();
+  if (config_.covariances) map_->covariances_.pop_back();
 }
 
 void IcpMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m) {
@@ -182,8 +185,7 @@ void IcpMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m
   }
 }
 
-SurfacePatch IcpMapBuilder::patch_around(std::uint32_t cube) const {
-  if (!config_.planes) return {SurfaceKind::kPoint, Eigen::Vector3f::Zero()};
+SurfaceSums IcpMapBuilder::sums_around(std::uint32_t cube) const {
   const auto edge = static_cast<float>(config_.cube_m);
   SurfaceSums sums;
   map_->blocks_.for_each_near(
@@ -192,7 +194,18 @@ SurfacePatch IcpMapBuilder::patch_around(std::uint32_t cube) const {
                                    static_cast<float>(z));
         sums.add(edge * step + map_->spots_[near].from_centre);
       });
-  return surface_of(sums, config_.max_planarity);
+  return sums;
+}
+
+// The surface and the covariance around a cube.
+void IcpMapBuilder::work_out(std::uint32_t cube) {
+  IcpMap::Spot& spot = map_->spots_[cube];
+  if (!config_.planes) spot.patch = {SurfaceKind::kPoint, Eigen::Vector3f::Zero()};
+  if (!config_.planes && !config_.covariances) return;
+  const SurfaceSums sums = sums_around(cube);
+  if (config_.planes) spot.patch = surface_of(sums, config_.max_planarity);
+  if (config_.covariances)
+    map_->covariances_[cube] = covariance_of(sums).value_or(Eigen::Matrix3f::Constant(-1.0F));
 }
 
 IcpMapPtr IcpMapBuilder::snapshot() {
@@ -201,8 +214,7 @@ IcpMapPtr IcpMapBuilder::snapshot() {
   map_->blocks_.for_each_affected([](std::uint32_t) { return kSurroundings; },
                                   [&](std::uint32_t cube) { affected.push_back(cube); });
   map_->blocks_.forget_changes();
-  parallel_for(affected.size(), 256,
-               [&](std::size_t i) { map_->spots_[affected[i]].patch = patch_around(affected[i]); });
+  parallel_for(affected.size(), 256, [&](std::size_t i) { work_out(affected[i]); });
   return map_;
 }
 

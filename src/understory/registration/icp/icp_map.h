@@ -24,6 +24,7 @@ struct IcpMapConfig {
   double moved_m = 0.01;
   bool planes = true;          // the surface around each point; false: points alone
   double max_planarity = 0.1;  // see IcpConfig
+  bool covariances = false;    // the covariance around each point, too
 };
 
 // Target of ICP made of clouds that come one after another: points with the surface around each.
@@ -39,12 +40,17 @@ class IcpMap {
   struct Known {
     Eigen::Vector3d searched_at = Eigen::Vector3d::Zero();
     double slack_m = 0.0;
-    std::uint32_t spot = 0;
+    std::uint32_t spot = 0;  // of the map, for covariance()
   };
   // The nearest point within the distance, at most kMaxReach cubes; false if none. `known` is that
   // of the same point and distance before, or new.
   [[nodiscard]] bool nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& pair,
                              Known& known) const;
+  // The covariance around a point, m^2 (axes of the map); null where it tells nothing. Of a map
+  // with IcpMapConfig::covariances.
+  [[nodiscard]] const Eigen::Matrix3f* covariance(std::uint32_t spot) const {
+    return covariances_[spot](0, 0) >= 0.0F ? &covariances_[spot] : nullptr;
+  }
   // Calls act(point in the map frame, surface) for each point, in no order that means anything.
   template <typename Act>
   void for_each(const Act& act) const {
@@ -73,6 +79,7 @@ class IcpMap {
 
   double cube_m_ = 1.0;
   std::vector<Spot> spots_;
+  std::vector<Eigen::Matrix3f> covariances_;  // of the spots, if wanted; first entry -1: nothing
   internal::CellBlocks blocks_;
 };
 using IcpMapPtr = std::shared_ptr<const IcpMap>;
@@ -104,7 +111,8 @@ class IcpMapBuilder {
   void own_map();
   void settle_due();
   void remove(std::uint32_t cube);
-  [[nodiscard]] SurfacePatch patch_around(std::uint32_t cube) const;
+  [[nodiscard]] SurfaceSums sums_around(std::uint32_t cube) const;
+  void work_out(std::uint32_t cube);
 
   IcpMapConfig config_;
   std::vector<Cube> cubes_;  // those in the map first, in its order

@@ -19,7 +19,7 @@ IcpConfig far_steps(const IcpConfig& steps, const IcpMatcherConfig& config) {
 
 IcpMapConfig map_config(const IcpMatcherConfig& config) {
   IcpMapConfig map = config.map;
-  map.planes = config.steps.metric == IcpConfig::Metric::kPointToPlane;
+  map.planes = has_planes(config.steps);
   map.max_planarity = config.steps.max_planarity;
   return map;
 }
@@ -29,11 +29,14 @@ template <typename Target>
 class IcpCost : public MatchCost {
  public:
   IcpCost(const Target& target, const Points& source, const IcpConfig& steps)
-      : target_(target), source_(source), steps_(steps) {}
+      : target_(target),
+        source_(source),
+        steps_(steps),
+        surfaces_(internal::icp_source_surfaces(source, steps)) {}
   [[nodiscard]] PoseCost at(const Pose& target_from_source) const override {
     std::vector<typename Target::Known> known(source_.size());
     return internal::icp_cost(
-        internal::icp_sums(target_, source_, target_from_source, steps_, known), steps_);
+        internal::icp_sums(target_, source_, target_from_source, steps_, surfaces_, known), steps_);
   }
   [[nodiscard]] double step_translation_m() const override { return steps_.step_translation_m; }
   [[nodiscard]] double step_rotation_rad() const override { return steps_.step_rotation_rad; }
@@ -42,6 +45,7 @@ class IcpCost : public MatchCost {
   const Target& target_;
   const Points& source_;
   IcpConfig steps_;
+  std::vector<SurfacePatch> surfaces_;
 };
 
 template <typename Target>
@@ -98,7 +102,9 @@ class IcpTargetBuilder : public internal::IcpMapTargetBuilder {
 
 class IcpMatcher : public Matcher {
  public:
-  explicit IcpMatcher(const IcpMatcherConfig& config) : config_(config) {}
+  explicit IcpMatcher(const IcpMatcherConfig& config) : config_(config) {
+    config_.steps = settled(config.steps);
+  }
 
   [[nodiscard]] std::unique_ptr<TargetBuilder> make_builder(const Viewpoint&) const override {
     internal::check_reach(

@@ -3,6 +3,10 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "understory/geometry/points.h"
 
 namespace understory {
 
@@ -34,6 +38,17 @@ struct SurfacePatch {
   Eigen::Vector3f direction = Eigen::Vector3f::Zero();
 };
 [[nodiscard]] SurfacePatch surface_of(const SurfaceSums& sums, double max_planarity);
+
+// Covariance of a neighbourhood, m^2; nothing where it is the trace of a ring of the lidar on level
+// ground, which tells nothing, or too few points. P3 (3): W of a point of the map.
+[[nodiscard]] std::optional<Eigen::Matrix3f> covariance_of(const SurfaceSums& sums);
+// Of each point of a cloud, from its `neighbours` (4 to 100) nearest points, m^2. Traces of rings
+// count as what they are: long, and thin across.
+[[nodiscard]] std::vector<Eigen::Matrix3f> covariances_of(const Points& points, int neighbours);
+
+// The surface around each point of a cloud, found from its `neighbours` (4 to 100) nearest points.
+[[nodiscard]] std::vector<SurfacePatch> surfaces_of(const Points& points, int neighbours,
+                                                    double max_planarity);
 
 // A point beside the target point nearest to it.
 struct IcpPair {

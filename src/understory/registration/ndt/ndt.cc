@@ -49,7 +49,7 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
     summed_at = pose;
     const double share = config.independent_share;
     PoseCost sum{share * sums.cost, share * sums.gradient, share * sums.hessian};
-    internal::add_terms(terms, pose, sum);
+    internal::add_terms(terms, pose, share * static_cast<double>(sums.matched), sum);
     return sum;
   };
   internal::StepLimits limits{config.max_iterations, config.step_translation_m,

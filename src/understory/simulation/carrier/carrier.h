@@ -52,8 +52,8 @@ struct CarrierPlan {
 
 // The motion along a route: a walker with a pole (gait, sway, quick turns), a harvester (work
 // stops, cabin swings, rocking), a UAV (hover, tilt with the acceleration) or a sleigh (jolts,
-// halts, near tumbles). config.duration_s cuts it or lengthens it by standing still. A harvester
-// that thins fells trees of the stand, whose ids must differ.
+// halts, near tumbles), or one that stands still for ever. config.duration_s cuts it or lengthens
+// it by standing still. A harvester that thins fells trees of the stand, whose ids must differ.
 [[nodiscard]] CarrierPlan plan_carrier(const SiteConfig& config, const Route& route,
                                        const Terrain& terrain, const Stand& stand);
 

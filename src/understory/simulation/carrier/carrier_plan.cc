@@ -225,6 +225,16 @@ CarrierPlan plan_harvester(const SiteConfig& config, const Route& route, const T
           {}};
 }
 
+// Sensors on a table: the path is one point, which the spline holds for ever.
+CarrierPlan plan_still(const SiteConfig& config, const Route& route, const Terrain& terrain) {
+  const Eigen::Vector2d place = route.place(0.0);
+  Vector6d control = Vector6d::Zero();
+  control.head<2>() = place;
+  control[2] = terrain.smooth_height(place.x(), place.y(), 0.6) + config.carrier.height_m;
+  control[5] = route.heading(0.0);
+  return {CarrierPath(CarrierPath::Spline({control}, kStep)), BoomPath(), {}, {}};
+}
+
 }  // namespace
 
 CarrierPlan plan_carrier(const SiteConfig& config, const Route& route, const Terrain& terrain,
@@ -232,6 +242,7 @@ CarrierPlan plan_carrier(const SiteConfig& config, const Route& route, const Ter
   if (config.carrier.kind == "harvester" && config.carrier.work == "thinning") {
     return plan_thinning(config, route, terrain, stand);
   }
+  if (config.carrier.kind == "still") return plan_still(config, route, terrain);
   if (config.carrier.kind == "uav") return plan_uav(config, route, terrain);
   if (config.carrier.kind == "sleigh") return plan_sleigh(config, route, terrain);
   if (config.carrier.kind == "harvester") return plan_harvester(config, route, terrain);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "understory/simulation/sensors/counter_noise.h"
 
@@ -59,6 +60,13 @@ GrownShapes grow_shapes(const StandConfig& config, std::uint64_t seed) {
     }
   }
   return shapes;
+}
+
+std::pair<float, float> quarter_turn(double yaw_rad) {
+  constexpr std::array<std::pair<float, float>, 4> kQuarters = {
+      {{1.0F, 0.0F}, {0.0F, 1.0F}, {-1.0F, 0.0F}, {0.0F, -1.0F}}};
+  const auto quarter = static_cast<std::size_t>(std::max(0.0, yaw_rad / (0.5 * std::numbers::pi)));
+  return kQuarters[quarter % 4];
 }
 
 std::size_t nearest_crown(const std::vector<GrownCrown>& crowns, const GrownTree& tree) {

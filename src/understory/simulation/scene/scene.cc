@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "understory/simulation/scene/scene_content.h"
+#include "understory/simulation/stand/objects.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
@@ -82,8 +83,11 @@ class ForestScene::Impl : private SceneContent {
       if (bundles_) bundles_->field().show(part.instance, present);
       moved = true;
     }
-    const bool swayed = !sways_.empty() && wind_s != wind_s_;
-    if (swayed) sway(wind_s);
+    const bool swayed = (!sways_.empty() || !walkers_.empty()) && wind_s != wind_s_;
+    if (swayed) {
+      sway(wind_s);
+      walk(wind_s);
+    }
     if (bundles_) {
       if (swayed) bundles_->field().commit();
     } else if (moved || swayed) {
@@ -143,15 +147,30 @@ class ForestScene::Impl : private SceneContent {
       // x += bend (z - stiff), z above the foot.
       world_from_shape.col(2).head<2>() += world_from_shape(2, 2) * tree.bend;
       world_from_shape.col(3).head<2>() -= static_cast<float>(tree.stiff_m) * tree.bend;
-      if (bundles_) {
-        bundles_->field().move(part.instance, world_from_shape);
-        return;
-      }
-      RTCGeometry geometry = rtcGetGeometry(top_, part.instance);
-      rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR,
-                              world_from_shape.data());
-      rtcCommitGeometry(geometry);
+      move(part.instance, world_from_shape);
     });
+  }
+
+  void walk(double time_s) {
+    for (Walker& walker : walkers_) {
+      const ObjectMotion motion = motion_at(walker.object, time_s);
+      walker.velocity = motion.velocity.cast<float>();
+      for (const unsigned instance : walker.instances) {
+        Eigen::Matrix<float, 3, 4> world_from_shape = shapes_[instance].second;
+        world_from_shape.col(3) = motion.foot.cast<float>();
+        move(instance, world_from_shape);
+      }
+    }
+  }
+
+  void move(unsigned instance, const Eigen::Matrix<float, 3, 4>& world_from_shape) {
+    if (bundles_) {
+      bundles_->field().move(instance, world_from_shape);
+      return;
+    }
+    RTCGeometry geometry = rtcGetGeometry(top_, instance);
+    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, world_from_shape.data());
+    rtcCommitGeometry(geometry);
   }
 
   // A part of a felled tree: its shape, where the tree stood, the height above which it is there.
@@ -233,6 +252,10 @@ class ForestScene::Impl : private SceneContent {
     if (instance.sway != kStands && ray.time_s != 0.0F) {
       move_on(sways_[instance.sway], turned / std::max(length, 1e-20F), ray, hit);
     }
+    if (instance.walker != kStands) {
+      const Eigen::Vector2f way = ray.time_s * walkers_[instance.walker].velocity;
+      shift(way, turned / std::max(length, 1e-20F), ray, hit);
+    }
     return hit;
   }
 
@@ -255,7 +278,12 @@ class ForestScene::Impl : private SceneContent {
                       Hit& hit) {
     const float above = ray.origin.z() + hit.range_m * ray.direction.z() - tree.foot_z -
                         static_cast<float>(tree.stiff_m);
-    const Eigen::Vector2f way = ray.time_s * above * tree.bend_rate;
+    shift(ray.time_s * above * tree.bend_rate, normal, ray, hit);
+  }
+
+  // The plane that was hit lies `way` farther on.
+  static void shift(const Eigen::Vector2f& way, const Eigen::Vector3f& normal, const Ray& ray,
+                    Hit& hit) {
     const float facing = normal.dot(ray.direction);
     // Seen at a slant a plane's own way along the ray is without bounds: leaves end before.
     const float sure = std::copysign(std::max(kSlant, std::abs(facing)), facing);

@@ -23,7 +23,8 @@ enum class Surface : std::uint8_t {
   kMachine,
   kBoulder,
   kBuilding,
-  kSnow
+  kSnow,
+  kObject
 };
 
 // How a scene is cast: ray by ray, or in bundles of rays that belong to one beam. What the two say
@@ -42,7 +43,7 @@ struct Hit {
   float range_m = 0.0F;
   float cosine = 1.0F;  // of the angle of incidence, 0..1
   float reflectivity = 0.0F;
-  int tree = 0;  // id of the tree whose stem was hit, 0 for anything else
+  int tree = 0;  // id of the tree whose stem, branches or leaves were hit, 0 for anything else
   Surface surface = Surface::kNone;
 };
 

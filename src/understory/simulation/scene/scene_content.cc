@@ -13,6 +13,8 @@
 namespace understory {
 namespace {
 
+constexpr float kThingReflectivity = 0.4F;  // of paint, plaster, sawn wood and clothes alike
+
 // The same with a number of one's own choice.
 void attach_as(RTCScene scene, RTCGeometry geometry, unsigned id) {
   rtcCommitGeometry(geometry);
@@ -26,15 +28,6 @@ unsigned attach(RTCScene scene, RTCGeometry geometry) {
   const unsigned id = rtcAttachGeometry(scene, geometry);
   rtcReleaseGeometry(geometry);
   return id;
-}
-
-// Cosine and sine of the quarter turn below an angle in [0, 2 pi). Boxes around shapes that are
-// turned by quarters stay as narrow as the shapes: rays look into a fifth fewer of them.
-std::pair<float, float> quarter_turn(double yaw_rad) {
-  constexpr std::array<std::pair<float, float>, 4> kQuarters = {
-      {{1.0F, 0.0F}, {0.0F, 1.0F}, {-1.0F, 0.0F}, {0.0F, -1.0F}}};
-  const auto quarter = static_cast<std::size_t>(std::max(0.0, yaw_rad / (0.5 * std::numbers::pi)));
-  return kQuarters[quarter % 4];
 }
 
 // One cone of a stem.
@@ -122,6 +115,7 @@ SceneContent::SceneContent(const StandConfig& config, const Terrain& terrain, co
   add_plants(stand);
   still_ = copy_of_instances();
   add_remains(harvest, stand);
+  add_things(stand);
   if (bundles_) {
     bundles_->finish();
   } else {
@@ -287,7 +281,7 @@ void SceneContent::add_cloud(const GrownTree& tree, std::size_t sway) {
       if (instance.sway != kStands) swaying_.push_back({number, sway});
     };
     add(scenes.stem[above ? 1 : 0], Surface::kStem, tree.bark_reflectivity, tree.id);
-    add(scenes.crown[above ? 1 : 0], Surface::kFoliage, 0.42, 0);
+    add(scenes.crown[above ? 1 : 0], Surface::kFoliage, 0.42, tree.id);
   }
 }
 
@@ -326,6 +320,7 @@ std::pair<unsigned, unsigned> SceneContent::add_crown(const GrownTree& tree,
   world_from_shape.col(3) = tree.foot.cast<float>();
   const auto add = [&, x = cos_yaw, y = sin_yaw](RTCScene scene, float reflectivity) {
     Instance instance{Surface::kFoliage, x, y, reflectivity};
+    instance.tree = tree.id;
     instance.sway = sway;
     const unsigned number = add_instance(top_, scene, world_from_shape, instance);
     if (sway != kStands) swaying_.push_back({number, sway});
@@ -383,6 +378,31 @@ void SceneContent::add_plants(const Stand& stand) {
     const Plant& plant = stand.plants[i];
     if (snowy_ && plant.height_m < snow_m_) continue;  // covered
     add_plant(rooted_, plant, plant_scene(plant.kind, i), snowy_ ? snow_m_ : 0.0);
+  }
+}
+
+void SceneContent::add_things(const Stand& stand) {
+  for (const StandObject& object : stand.objects) {
+    const bool walks = object.walk_m > 0.0;
+    const auto cos_yaw = static_cast<float>(std::cos(object.yaw_rad));
+    const auto sin_yaw = static_cast<float>(std::sin(object.yaw_rad));
+    Eigen::Matrix<float, 3, 4> world_from_shape;
+    world_from_shape.col(0) << cos_yaw, sin_yaw, 0.0F;
+    world_from_shape.col(1) << -sin_yaw, cos_yaw, 0.0F;
+    world_from_shape.col(2) << 0.0F, 0.0F, 1.0F;
+    world_from_shape.col(3) = object.foot.cast<float>();
+    Instance instance{Surface::kObject, cos_yaw, sin_yaw, kThingReflectivity};
+    if (walks) instance.walker = walkers_.size();
+    std::vector<RTCScene> parts;
+    if (!object.boards.empty()) parts.push_back(shape_scene(board_shape(object)));
+    if (!object.rods.empty()) {
+      const Cones rods = rod_cones(object);
+      parts.push_back(scene_of(cone_geometry(device_, rods), rods));
+    }
+    std::vector<unsigned> instances;
+    for (const RTCScene part : parts)
+      instances.push_back(add_instance(walks ? top_ : rooted_, part, world_from_shape, instance));
+    if (walks) walkers_.push_back({object, instances});
   }
 }
 

@@ -45,8 +45,9 @@ class SceneContent {
     float cos_yaw;
     float sin_yaw;
     float reflectivity;
-    int tree = 0;                // whose stem this is
-    std::size_t sway = kStands;  // in sways_
+    int tree = 0;                  // whose stem or crown this is
+    std::size_t sway = kStands;    // in sways_
+    std::size_t walker = kStands;  // in walkers_
   };
   static constexpr std::size_t kStands = ~std::size_t{0};
 
@@ -64,6 +65,12 @@ class SceneContent {
     float foot_z;
     Eigen::Vector2f bend = Eigen::Vector2f::Zero();       // now, metres a metre of height
     Eigen::Vector2f bend_rate = Eigen::Vector2f::Zero();  // 1/s
+  };
+  // A thing that walks, and its parts.
+  struct Walker {
+    StandObject object;
+    std::vector<unsigned> instances;
+    Eigen::Vector2f velocity = Eigen::Vector2f::Zero();  // now
   };
   // A part that is there for a time only.
   struct Timed {
@@ -92,6 +99,7 @@ class SceneContent {
   std::vector<bool> present_;                                            // of the instances
   std::vector<Swaying> swaying_;
   std::vector<TreeSway> sways_;
+  std::vector<Walker> walkers_;
   std::vector<Timed> timed_;
   std::vector<double> changes_;
   std::map<int, FelledTree> felled_;  // by id
@@ -129,6 +137,8 @@ class SceneContent {
   void add_wood(const Wood& wood, double from_s);
   void time_limit(unsigned instance, double from_s, double until_s);
   void add_plants(const Stand& stand);
+  // Things that are no trees: those that stand, and those that walk.
+  void add_things(const Stand& stand);
   [[nodiscard]] RTCScene plant_scene(PlantKind kind, std::size_t variant) const;
   unsigned add_plant(RTCScene where, const Plant& plant, RTCScene scene, double sunk_m);
   RTCScene new_scene();

@@ -72,6 +72,36 @@ Shape terrain_shape(const Terrain& terrain) {
   return shape;
 }
 
+Shape board_shape(const StandObject& object) {
+  Shape shape;
+  for (const StandObject::Board& board : object.boards) {
+    const int first = static_cast<int>(shape.vertices.size());
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3d place((corner & 1) != 0 ? board.high.x() : board.low.x(),
+                                  (corner & 2) != 0 ? board.high.y() : board.low.y(),
+                                  (corner & 4) != 0 ? board.high.z() : board.low.z());
+      shape.vertices.push_back(place.cast<float>());
+    }
+    constexpr int kFaces[6][4] = {{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                  {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}};
+    for (const auto& face : kFaces) {
+      shape.triangles.emplace_back(first + face[0], first + face[1], first + face[2]);
+      shape.triangles.emplace_back(first + face[0], first + face[2], first + face[3]);
+    }
+  }
+  return shape;
+}
+
+Cones rod_cones(const StandObject& object) {
+  Cones cones;
+  for (const Wood& rod : object.rods) {
+    cones.add(rod.from, rod.radius_from_m);
+    cones.join();
+    cones.add(rod.to, rod.radius_to_m);
+  }
+  return cones;
+}
+
 Shape building_shape(const Building& house) {
   const Eigen::Vector3f half = 0.5F * house.size_m.cast<float>();
   const float wall = house.size_m.cast<float>().z();

@@ -41,4 +41,8 @@ struct Cones {
 // Walls and a pitched roof in the world frame.
 [[nodiscard]] Shape building_shape(const Building& house);
 
+// Boards and rods of a thing, in its own frame.
+[[nodiscard]] Shape board_shape(const StandObject& object);
+[[nodiscard]] Cones rod_cones(const StandObject& object);
+
 }  // namespace understory

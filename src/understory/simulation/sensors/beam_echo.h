@@ -13,7 +13,7 @@ struct BeamEcho {
   float range_m = 0.0F;
   float energy = 0.0F;  // reflectivity x cosine x share of the beam
   float cosine = 1.0F;  // of the angle of incidence
-  int tree = 0;         // whose stem gave most of it, or 0
+  int tree = 0;         // whose stem or crown gave most of it, or 0
   Surface surface = Surface::kNone;
 };
 

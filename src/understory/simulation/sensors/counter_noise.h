@@ -126,6 +126,8 @@ enum class NoiseStream : std::uint64_t {
   kWeather,
   kTotalStation,
   kHeadLog,
+  kDrawnSite,
+  kObjects,
 };
 
 // The number of a stream, for seeds.

@@ -1,6 +1,8 @@
 #include "understory/simulation/sensors/lidar_model.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "understory/util/angles.h"
@@ -76,7 +78,55 @@ LidarModel vlp_16(const LidarConfig& config) {
   return model;
 }
 
+// Four lines from -7 to 52 degrees and 200 000 points a second (Mid-360 User Manual v1.2,
+// "Specifications"). Livox publishes no equation of the pattern. This one stands in for it: one
+// turn a frame, and a golden share of a swing left over from turn to turn, so that swings of later
+// turns fall between those of earlier ones.
+LidarModel mid_360(const LidarConfig& config) {
+  constexpr int kLines = 4;
+  constexpr double kSwingsPerTurn = 17.0 + 0.6180339887498949;
+  LidarModel model;
+  model.revolution_ns = 1e9 / config.rate_hz;
+  model.firing_ns = 20000.0;
+  model.swing_hz = config.rate_hz * kSwingsPerTurn;
+  model.swing_low_rad = -7.0 * kDegree;
+  model.swing_high_rad = 52.0 * kDegree;
+  // Up and down strokes are half a swing's turn apart, and the lines share that angle.
+  const double apart = kTau / (2.0 * kSwingsPerTurn * kLines);
+  for (int i = 0; i < kLines; ++i)
+    model.beams.push_back({0.0, apart * (i - 1.5), 0.0, static_cast<std::uint16_t>(i)});
+  model.beams_at_once = true;
+  return model;
+}
+
+// 32 lasers of uneven elevations, dense around the horizon, in the firing order of the data sheet:
+// a pair every 2.304 us, 55.296 us a sequence. Azimuth offsets are only similar.
+LidarModel vlp_32c(const LidarConfig& config) {
+  constexpr double kElevations[32] = {
+      -25.0,  -1.0,   -1.667, -15.639, -11.31, 0.0,    -0.667, -8.843, -7.254, 0.333,  -0.333,
+      -6.148, -5.333, 1.333,  0.667,   -4.0,   -4.667, 1.667,  1.0,    -3.667, -3.333, 3.333,
+      2.333,  -2.667, -3.0,   7.0,     4.667,  -2.333, -2.0,   15.0,   10.333, -1.333};
+  constexpr double kColumns[4] = {1.4, -4.2, 4.2, -1.4};
+  LidarModel model;
+  for (int i = 0; i < 32; ++i) {
+    const auto below = std::count_if(std::begin(kElevations), std::end(kElevations),
+                                     [&](double other) { return other < kElevations[i]; });
+    model.beams.push_back({kDegree * kElevations[i], kDegree * kColumns[i % 4],
+                           2304.0 * static_cast<double>(i / 2), static_cast<std::uint16_t>(below)});
+  }
+  model.revolution_ns = 1e9 / config.rate_hz;
+  model.firing_ns = 55296.0;
+  return model;
+}
+
 }  // namespace
+
+double LidarModel::elevation(std::size_t beam, double time_ns) const {
+  if (!swings()) return beams[beam].elevation_rad;
+  const double swung = time_ns * 1e-9 * swing_hz;
+  const double share = std::abs(2.0 * (swung - std::floor(swung)) - 1.0);
+  return swing_low_rad + share * (swing_high_rad - swing_low_rad);
+}
 
 double LidarModel::azimuth(double time_ns) const {
   const double turns = time_ns / revolution_ns;
@@ -99,8 +149,10 @@ LidarModel::Firings LidarModel::firings(std::int64_t scan) const {
 LidarModel make_lidar_model(const LidarConfig& config) {
   LidarModel model;
   if (config.model == "VLP-16") model = vlp_16(config);
+  if (config.model == "VLP-32C") model = vlp_32c(config);
   if (config.model == "RS-16") model = rs_16(config);
   if (config.model == "HDL-64") model = hdl_64(config);
+  if (config.model == "Mid-360") model = mid_360(config);
   if (config.model == "OS0-128") {
     model = ouster(config, {128, 45.0, {11.1, 3.7, -3.7, -11.1}, 0.02767});
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -26,7 +27,15 @@ struct LidarModel {
   double beam_origin_m = 0.0;  // of the beams, off the axis of rotation
   bool beams_at_once = false;  // all delays are zero
   double half_fov_rad = 0.0;
+  // A pattern that does not repeat: all beams swing up and down at an even rate while the head
+  // turns, so many times a second. 0: each beam keeps its elevation.
+  double swing_hz = 0.0;
+  double swing_low_rad = 0.0;
+  double swing_high_rad = 0.0;
 
+  [[nodiscard]] bool swings() const { return swing_hz > 0.0; }
+  // Of a beam at a time since the start of the first revolution.
+  [[nodiscard]] double elevation(std::size_t beam, double time_ns) const;
   // Azimuth of the head at a time since the start of the first revolution: radians from the
   // sensor's x axis against the clock, in [-pi, pi].
   [[nodiscard]] double azimuth(double time_ns) const;

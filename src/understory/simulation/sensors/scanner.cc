@@ -23,20 +23,7 @@ constexpr double kSnowDropPerM = 0.03;      // flakes in a metre of beam then
 constexpr float kFlakeEnergy = 0.06F;       // of a large flake, as reflectivity x share of the beam
 constexpr float kGlaring = 130.0F;          // intensity from which an echo blooms
 
-// A rotation about the sensor's axis.
-struct Turn {
-  explicit Turn(double angle) : cosine(std::cos(angle)), sine(std::sin(angle)) {}
-  Eigen::Vector3d operator*(const Eigen::Vector3d& v) const {
-    return {cosine * v.x() - sine * v.y(), sine * v.x() + cosine * v.y(), v.z()};
-  }
-  [[nodiscard]] Eigen::Matrix3d matrix() const {
-    Eigen::Matrix3d m;
-    m << cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0;
-    return m;
-  }
-  double cosine;
-  double sine;
-};
+using Turn = HeadTurn;
 
 // Returns of stems, given one by one as tree << 16 | ring.
 std::vector<StemReturns> count_stems(std::vector<std::uint64_t> returns) {
@@ -65,6 +52,7 @@ struct Scanner::Look {
   Eigen::Matrix3f world_from_head;
   Eigen::Vector3f place;  // of the sensor in the world
   float time_s;           // after the moment of the scene
+  const BeamDirections& beams;
 };
 
 namespace {
@@ -109,6 +97,8 @@ struct Scanner::Block {
   std::vector<Eigen::Vector3f> origin_in_lidar;     // by firing; only beside a machine
   std::vector<BeamReading> readings;                // by beam
   std::vector<BeamReading> seconds;                 // by beam, if two returns are asked for
+  std::vector<EchoSource> sources;                  // by beam, if asked for
+  std::vector<EchoSource> second_sources;           // by beam, if two returns are asked for too
   std::vector<std::uint64_t> stems;                 // tree << 16 | ring of each return from a stem
 };
 
@@ -130,22 +120,9 @@ Scanner::Scanner(const SiteConfig& config, ForestScene& scene, const CarrierPath
       seed_(hash_numbers(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kLidar))),
       model_(make_lidar_model(config.lidar)),
       body_from_lidar_(mount_pose(config.lidar.mount_m, config.lidar.mount_rpy_deg)),
+      beams_(model_, 0.0),
       order_(trace_order()) {
   UNDERSTORY_CHECK(model_.beams.size() <= kMostBeams);
-  for (const Beam& beam : model_.beams) {
-    const Turn turn(beam.azimuth_offset_rad);
-    const Eigen::Vector3d direction =
-        turn * Eigen::Vector3d(std::cos(beam.elevation_rad), 0.0, std::sin(beam.elevation_rad));
-    const Eigen::Vector3d side = turn * Eigen::Vector3d::UnitY();
-    beams_.x.push_back(direction.x());
-    beams_.y.push_back(direction.y());
-    beams_.z.push_back(direction.z());
-    beams_.near_x.push_back(static_cast<float>(direction.x()));
-    beams_.near_y.push_back(static_cast<float>(direction.y()));
-    beams_.near_z.push_back(static_cast<float>(direction.z()));
-    beams_.near_side_x.push_back(static_cast<float>(side.x()));
-    beams_.near_side_y.push_back(static_cast<float>(side.y()));
-  }
 }
 
 // Tiles of neighbours in azimuth and elevation, sixteen rays each: strips of a few firings' width,
@@ -185,6 +162,13 @@ void Scanner::find_slots(std::size_t firings, Block& block) const {
   for (const std::uint32_t beam : order_) {
     if (beam < beams) block.slots[beam] = slot++;
   }
+}
+
+// Those of all firings, or of this one, for which `swung` is the room.
+const BeamDirections& Scanner::directions(std::int64_t firing, BeamDirections& swung) const {
+  if (!model_.swings()) return beams_;
+  swung = BeamDirections(model_, static_cast<double>(model_.firing_time(firing)));
+  return swung;
 }
 
 TimeNs Scanner::stamp(std::int64_t scan) const {
@@ -231,6 +215,9 @@ ScanReadings Scanner::measure(std::int64_t number) {
   for (const Block& block : blocks) {
     readings.beams.insert(readings.beams.end(), block.readings.begin(), block.readings.end());
     readings.seconds.insert(readings.seconds.end(), block.seconds.begin(), block.seconds.end());
+    readings.sources.insert(readings.sources.end(), block.sources.begin(), block.sources.end());
+    readings.second_sources.insert(readings.second_sources.end(), block.second_sources.begin(),
+                                   block.second_sources.end());
     stems.insert(stems.end(), block.stems.begin(), block.stems.end());
   }
   readings.stems = count_stems(std::move(stems));
@@ -242,13 +229,15 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
   const std::size_t beams = model_.beams.size();
   auto scan = std::make_shared<Scan>();
   scan->stamp = stamp(number);
-  scan->ring_count = static_cast<int>(beams);
+  scan->ring_count = model_.swings() ? 0 : static_cast<int>(beams);
   const auto present = [](const BeamReading& reading) { return reading.range_m > 0.0F; };
   scan->points.reserve(static_cast<std::size_t>(
       std::count_if(readings.beams.begin(), readings.beams.end(), present)));
   std::size_t i = 0;
+  BeamDirections swung;
   for (std::int64_t firing = firings.first; firing < firings.end; ++firing) {
     const TimeNs firing_time = model_.firing_time(firing);
+    const BeamDirections& looks = directions(firing, swung);
     Turn head(0.0);
     Eigen::Vector3f origin = Eigen::Vector3f::Zero();
     for (std::size_t b = 0; b < beams; ++b, ++i) {
@@ -261,7 +250,7 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
       const auto add = [&](const BeamReading& reading, std::uint8_t return_index) {
         if (!present(reading)) return;
         const Eigen::Vector3f point =
-            origin + reading.range_m * (head * beams_.direction(b)).cast<float>();
+            origin + reading.range_m * (head * looks.direction(b)).cast<float>();
         scan->points.push_back({point.x(), point.y(), point.z(), reading.intensity,
                                 static_cast<std::uint32_t>(start_ + time - scan->stamp),
                                 model_.beams[b].ring, return_index, 0});
@@ -287,6 +276,8 @@ void Scanner::cast_block(double moment_s, Block& block) const {
   block.readings.resize(block.slots.size());
   const bool two = config_.returns == 2;
   if (two) block.seconds.resize(block.readings.size());
+  if (keeps_sources_) block.sources.resize(block.readings.size());
+  if (keeps_sources_ && two) block.second_sources.resize(block.readings.size());
   NoiseRow row(seed_, 0);
   for (std::size_t i = 0; i < block.readings.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;
@@ -301,12 +292,16 @@ void Scanner::cast_block(double moment_s, Block& block) const {
       meet_snow(CounterNoise(seed_ + 6, firing, i % beams), snow_per_m(time), echo);
       if (two && echo.surface == Surface::kSnow) second = behind;
     }
+    if (keeps_sources_) {
+      block.sources[i] = {echo.tree, echo.surface};
+      if (two) block.second_sources[i] = {second.tree, second.surface};
+    }
     if (second.surface != Surface::kNone) {
       block.seconds[i] = read_echo(second, config_, CounterNoise(seed_ + 5, firing, i % beams));
     }
     if (echo.surface == Surface::kNone) continue;
     block.readings[i] = read_echo(echo, config_, row.at(i % beams));
-    if (echo.tree > 0 && block.readings[i].range_m > 0.0F) {
+    if (echo.surface == Surface::kStem && echo.tree > 0 && block.readings[i].range_m > 0.0F) {
       block.stems.push_back(static_cast<std::uint64_t>(echo.tree) << 16 |
                             model_.beams[i % beams].ring);
     }
@@ -357,6 +352,7 @@ void Scanner::add_ghosts(Block& block) const {
       const double range = config_.min_range_m + noise.uniform() * 0.6 * config_.max_range_m;
       block.readings[i] = {std::round(static_cast<float>(range) / step) * step,
                            std::round(1.0F + 12.0F * noise.uniform())};
+      if (keeps_sources_) block.sources[i] = {};
       continue;
     }
     const bool blooms = noise.uniform() < config_.blooming;
@@ -365,8 +361,9 @@ void Scanner::add_ghosts(Block& block) const {
       if (other >= real.size() || other / group != i / group) continue;
       if (real[other].intensity < kGlaring) continue;
       const bool behind = real[i].range_m <= 0.0F || real[i].range_m > real[other].range_m + 0.3F;
-      if (behind)
-        block.readings[i] = {real[other].range_m, std::round(0.3F * real[other].intensity)};
+      if (!behind) continue;
+      block.readings[i] = {real[other].range_m, std::round(0.3F * real[other].intensity)};
+      if (keeps_sources_) block.sources[i] = {};
     }
   }
 }
@@ -378,9 +375,11 @@ void Scanner::make_rays(double moment_s, Block& block) const {
   block.rays.resize(firings * beams * static_cast<std::size_t>(config_.rays_per_beam));
   // Beams that look out at the same time share a pose.
   const std::size_t together = model_.beams_at_once ? beams : 1;
+  BeamDirections swung;
   for (std::size_t f = 0; f < firings; ++f) {
     const std::int64_t firing = block.first + static_cast<std::int64_t>(f);
     const TimeNs firing_time = model_.firing_time(firing);
+    const BeamDirections& looks = directions(firing, swung);
     CounterNoise jitter(seed_ + 1, static_cast<std::uint64_t>(firing), 0);
     const Turn shaken(config_.azimuth_jitter_deg * kDegree * jitter.normal());
     for (std::size_t b = 0; b < beams; b += together) {
@@ -391,12 +390,12 @@ void Scanner::make_rays(double moment_s, Block& block) const {
       const Pose world_from_lidar = path_.pose(to_seconds(time)) * body_from_lidar_;
       const Look look{shaken, (world_from_lidar.rotation_matrix() * head.matrix()).cast<float>(),
                       world_from_lidar.translation().cast<float>(),
-                      static_cast<float>(to_seconds(time) - moment_s)};
+                      static_cast<float>(to_seconds(time) - moment_s), looks};
       look_out(look, firing, {b, b + together}, &block.slots[f * beams], block.rays);
       if (machine_.empty()) continue;
       if (b == 0) block.origin_in_lidar.push_back(origin.cast<float>());
       for (std::size_t i = b; i < b + together; ++i)
-        block.direction_in_lidar.push_back((head * beams_.direction(i)).cast<float>());
+        block.direction_in_lidar.push_back((head * looks.direction(i)).cast<float>());
     }
   }
 }
@@ -422,11 +421,11 @@ void Scanner::look_out(const Look& look, std::int64_t firing,
     noise[i] = row.at(begin + i);
   Drawn drawn;
   Made made;
-  const float* bx = &beams_.near_x[begin];
-  const float* by = &beams_.near_y[begin];
-  const float* bz = &beams_.near_z[begin];
-  const float* side_x = &beams_.near_side_x[begin];
-  const float* side_y = &beams_.near_side_y[begin];
+  const float* bx = &look.beams.near_x[begin];
+  const float* by = &look.beams.near_y[begin];
+  const float* bz = &look.beams.near_z[begin];
+  const float* side_x = &look.beams.near_side_x[begin];
+  const float* side_y = &look.beams.near_side_y[begin];
   for (std::size_t k = 0; k < rays_per_beam; ++k) {
     draw(noise, count, drawn);
     for (std::size_t i = 0; i < count; ++i) {

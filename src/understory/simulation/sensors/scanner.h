@@ -8,6 +8,7 @@
 #include "understory/simulation/carrier/carrier.h"
 #include "understory/simulation/carrier/machine.h"
 #include "understory/simulation/scene/scene.h"
+#include "understory/simulation/sensors/beam_directions.h"
 #include "understory/simulation/sensors/beam_echo.h"
 #include "understory/simulation/sensors/counter_noise.h"
 #include "understory/simulation/sensors/lidar_model.h"
@@ -22,12 +23,29 @@ struct StemReturns {
   int returns = 0;
 };
 
+// What gave an echo. Nothing: a ghost.
+struct EchoSource {
+  std::int32_t tree = 0;  // id of the tree, by its stem or its crown; 0 for anything else
+  Surface surface = Surface::kNone;
+};
+
+// A point of a scan where it really lies, but for the errors of the lidar itself.
+struct TruePoint {
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // world frame
+  TimeNs stamp = 0;                                 // as recorded
+  float intensity = 0.0F;
+  EchoSource source;
+};
+
 // What the beams of one scan measured, firing by firing and beam by beam in the order of the model.
 struct ScanReadings {
   std::vector<BeamReading> beams;
   std::vector<BeamReading>
       seconds;                     // the weaker of two echoes, beam by beam; empty if not asked for
   std::vector<StemReturns> stems;  // by increasing id
+  // Of the beams and of the weaker echoes; empty if not asked for (keep_sources).
+  std::vector<EchoSource> sources;
+  std::vector<EchoSource> second_sources;
 };
 
 // A scan and which stems its returns came from.
@@ -53,6 +71,12 @@ class Scanner {
   [[nodiscard]] SimulatedScan cast(std::int64_t scan);
   // The two halves of `cast`: what the beams measure, and the points that follow from it.
   [[nodiscard]] ScanReadings measure(std::int64_t scan);
+  // From now on `measure` tells what gave each echo.
+  void keep_sources() { keeps_sources_ = true; }
+  // The points of a scan, in its order, by the true pose of each. `readings` must have their
+  // sources.
+  [[nodiscard]] std::vector<TruePoint> true_points(const Scan& scan,
+                                                   const ScanReadings& readings) const;
   [[nodiscard]] ScanPtr assemble(std::int64_t scan, const ScanReadings& readings) const;
 
   [[nodiscard]] const Pose& body_from_lidar() const { return body_from_lidar_; }
@@ -65,6 +89,7 @@ class Scanner {
   void make_rays(double moment_s, Block& block) const;
   void look_out(const Look& look, std::int64_t firing, std::pair<std::size_t, std::size_t> range,
                 const std::uint32_t* slots, std::vector<Ray>& rays) const;
+  [[nodiscard]] const BeamDirections& directions(std::int64_t firing, BeamDirections& swung) const;
   [[nodiscard]] std::vector<std::uint32_t> trace_order() const;
   void find_slots(std::size_t firings, Block& block) const;
   void meet_machine(Block& block) const;
@@ -77,18 +102,11 @@ class Scanner {
   const CarrierPath& path_;
   const Machine& machine_;
   TimeNs start_;
+  bool keeps_sources_ = false;
   std::uint64_t seed_;
   LidarModel model_;
   Pose body_from_lidar_;
-  // Directions of the beams at azimuth 0 of the head, and level ones to the left of each.
-  struct Directions {
-    [[nodiscard]] Eigen::Vector3d direction(std::size_t beam) const {
-      return {x[beam], y[beam], z[beam]};
-    }
-    std::vector<double> x, y, z;
-    std::vector<float> near_x, near_y, near_z, near_side_x, near_side_y;  // for casting
-  };
-  Directions beams_;
+  BeamDirections beams_;  // of a lidar whose beams keep their elevations
   // The beams of a full block (firing by firing, beam by beam), those together that look in nearly
   // the same direction.
   std::vector<std::uint32_t> order_;

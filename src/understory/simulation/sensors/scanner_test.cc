@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -134,6 +135,60 @@ TEST(Scanner, NarrowViewKeepsToItsSector) {
     widest = std::max(widest, std::abs(std::atan2(point.y, point.x)) / kDegree);
   EXPECT_LT(widest, 105.1);
   EXPECT_GT(widest, 104.0);
+}
+
+// Beams that swing: the places of the ground that they meet are those of the directions that the
+// points claim, at the times that they claim.
+TEST(Scanner, Mid360SwingsOverItsFieldAndMeetsTheGroundThere) {
+  SiteConfig site = quiet_site();
+  site.terrain.relief_m = site.terrain.slope_deg = 0.0;
+  site.terrain.hummock_m = site.terrain.roughness_m = 0.0;
+  site.stand.trees_per_ha = 0.0;
+  site.carrier.height_m = 0.0;
+  site.carrier.still_s = 20.0;
+  site.lidar.model = "Mid-360";
+  site.lidar.mount_m = {0.0, 0.0, 1.5};
+  World world(site);
+  const SimulatedScan simulated = world.scanner.cast(20);
+  const Scan& scan = *simulated.scan;
+  EXPECT_EQ(scan.ring_count, 0);
+  // Of 5000 firings of four lines, those from -7 to -1.6 degrees meet the ground within 55 m.
+  EXPECT_NEAR(static_cast<double>(scan.points.size()), 20'000.0 * (7.0 - 1.56) / 59.0, 300.0);
+  for (const ScanPoint& point : scan.points) {
+    const double flat = std::hypot(point.x, point.y);
+    const double elevation = std::atan2(point.z, flat) / kDegree;
+    EXPECT_GE(elevation, -7.0 - 1e-4);
+    EXPECT_NEAR(std::hypot(flat, point.z) * std::sin(-elevation * kDegree), 1.5, 5e-3);
+    EXPECT_LT(point.ring, 4);
+    EXPECT_EQ(point.t_ns % 20'000, 0U);
+    EXPECT_LT(point.t_ns, 100'000'000U);
+  }
+}
+
+// In ten turns no direction comes back: the swing has moved by a golden share of itself each time.
+TEST(LidarModels, PatternOfTheMid360DoesNotRepeat) {
+  LidarConfig config;
+  config.model = "Mid-360";
+  const LidarModel model = make_lidar_model(config);
+  EXPECT_NEAR(1e9 / model.firing_ns * static_cast<double>(model.beams.size()), 200'000.0, 1e-6);
+  double lowest = 1e9;
+  double highest = -1e9;
+  for (int firing = 0; firing < 5000; ++firing) {
+    const double elevation = model.elevation(0, firing * model.firing_ns) / kDegree;
+    lowest = std::min(lowest, elevation);
+    highest = std::max(highest, elevation);
+  }
+  EXPECT_NEAR(lowest, -7.0, 0.5);
+  EXPECT_NEAR(highest, 52.0, 0.5);
+  for (int turn = 1; turn <= 10; ++turn) {
+    int same = 0;
+    for (int firing = 0; firing < 5000; ++firing) {
+      const double now = model.elevation(0, firing * model.firing_ns);
+      const double then = model.elevation(0, firing * model.firing_ns + turn * model.revolution_ns);
+      same += std::abs(now - then) < 0.1 * kDegree ? 1 : 0;
+    }
+    EXPECT_LT(same, 100) << turn;
+  }
 }
 
 TEST(Scanner, PointsAtTheirOwnTimesLieOnTheSurfaces) {

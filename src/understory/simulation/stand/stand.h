@@ -78,6 +78,31 @@ struct Building {
   Eigen::Vector3d size_m = Eigen::Vector3d(9.0, 6.0, 3.0);  // length, width, height of the walls
 };
 
+// Kinds of things that are no trees. A wall is one side of a building.
+enum class ObjectKind { kWall, kPost, kFence, kVehicle, kPerson, kWalker };
+
+// A thing that is no tree, made of boards and rods. Its own frame has the origin at its foot on the
+// ground, x along its length, z up.
+struct StandObject {
+  // A box with its edges along the axes.
+  struct Board {
+    Eigen::Vector3d low = Eigen::Vector3d::Zero();
+    Eigen::Vector3d high = Eigen::Vector3d::Zero();
+  };
+
+  ObjectKind kind = ObjectKind::kPost;
+  Eigen::Vector3d foot = Eigen::Vector3d::Zero();    // world frame; of a walker: middle of its line
+  double yaw_rad = 0.0;                              // of its length, from east to north
+  Eigen::Vector3d size_m = Eigen::Vector3d::Zero();  // length, width, height above the foot
+  std::vector<Board> boards;
+  std::vector<Wood> rods;
+  // A walker goes to and fro over this length along its yaw; 0: it stands.
+  double walk_m = 0.0;
+  double speed_m_s = 0.0;
+  double start_m = 0.0;          // how far it has come at time zero
+  std::vector<double> ground_m;  // along its line, evenly apart, over the foot
+};
+
 // All that grows and lies in a site.
 struct Stand {
   std::vector<GrownTree> trees;
@@ -85,6 +110,7 @@ struct Stand {
   std::vector<Plant> plants;
   std::vector<Wood> boulders;
   std::vector<Building> buildings;
+  std::vector<StandObject> objects;
 };
 
 // Places trees and undergrowth at random in the stand's rectangle, clear of the route; or the trees

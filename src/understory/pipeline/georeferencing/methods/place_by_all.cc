@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/georeference/combined_place.h"
 #include "understory/georeference/satellites/split_fit.h"
 #include "understory/pipeline/georeferencing/gnss_fixes.h"
@@ -54,7 +55,7 @@ PlaceEvidence evidence_of_fixes(const Placement& placed, const Vector3d& middle,
   if (!placed.covariance.allFinite()) return evidence;
   const Matrix6d spread = spread_from_right(placed.covariance, placed.target_from_world, middle);
   if (heights)
-    evidence.information = spread.inverse();
+    evidence.information = inverse_matrix(spread);
   else
     evidence.information.topLeftCorner<5, 5>() = spread.topLeftCorner<5, 5>().inverse();
   return evidence;
@@ -181,7 +182,7 @@ void lay_on_terrain(const GeoreferenceRequest& request, const MovableRun& run,
                     const CombinedPlace& combined, Log& log, GatheredPlace& gathered) {
   Placement& placement = gathered.placement;
   TerrainFitConfig config = request.terrain;
-  Matrix6d information = combined.spread.inverse();
+  Matrix6d information = inverse_matrix(combined.spread);
   config.known = PlaceEvidence{Pose(), combined.middle, information};
   const LevelledRun levelled =
       level_run(request, run, combined.target_from_world, placement.origin, config);

@@ -13,15 +13,17 @@ namespace {
 constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
 
-Points points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) {
+FeaturePoints points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) {
   const auto low = static_cast<float>(config.range_min_m);
   const auto high = static_cast<float>(config.range_max_m);
-  Points points;
-  points.reserve(cloud.size());
+  FeaturePoints kept;
+  kept.points.reserve(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    if (cloud.range[i] >= low && cloud.range[i] <= high) points.push_back(cloud.points[i]);
+    if (!(cloud.range[i] >= low && cloud.range[i] <= high)) continue;
+    kept.points.push_back(cloud.points[i]);
+    if (!cloud.feature.empty()) kept.features.push_back(cloud.feature[i]);
   }
-  return points;
+  return kept;
 }
 
 }  // namespace
@@ -37,6 +39,13 @@ DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTrait
       recovery_(config.lost_after_scans),
       imu_doubted_(conditions.imu_doubted),
       opening_(std::make_unique<Opening>()) {
+  const LoopClosureConfig& loops = config.keyframe_map.loop_closure.verification;
+  for (const std::string& method : {loops.matcher.method, loops.refine}) {
+    if (method == LoopClosureConfig::kNoRefinement) continue;
+    if (make_matcher(loops.matcher, method)->feature_finder() == nullptr) continue;
+    throw ConfigError({"loop_closure.verification: expected a method that takes points; \"" +
+                       method + "\" takes whole scans with rings"});
+  }
   if (!conditions.imu_refused.empty()) refuse_imu(conditions.imu_refused);
 }
 
@@ -126,7 +135,9 @@ void DenseFrontEnd::complete_rig(const Rig& rig) {
 
 void DenseFrontEnd::make_odometry(const Rig& rig) {
   rig_ = rig;
-  odometry_ = std::make_unique<DenseOdometry>(config_.odometry, rig_, times_, log_);
+  odometry_ = std::make_unique<DenseOdometry>(
+      config_.odometry, rig_,
+      make_matcher(config_.keyframe_map.local_map.matcher)->feature_finder(), times_, log_);
 }
 
 // An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
@@ -328,13 +339,18 @@ void DenseFrontEnd::move_world(const Pose& new_world_from_old_world) {
 }
 
 // What the map takes from a scan: more than what is matched.
-Points DenseFrontEnd::map_points(const DenseEstimate& estimate) {
+FeaturePoints DenseFrontEnd::map_points(const DenseEstimate& estimate) {
   VoxelFilterConfig voxel = config_.odometry.voxel;
   const double edge = config_.keyframe_map.keyframe.voxel_size_m;
   if (edge == 0.0) return points_in_range(estimate.cloud, voxel);
   voxel.voxel_size_m = std::min(voxel.voxel_size_m, edge);
-  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m) return estimate.thinned.points;
-  return cloud_filter_.filter(estimate.cloud, voxel).points;
+  if (!estimate.cloud.feature.empty()) {
+    BodyCloud thinned = cloud_filter_.filter_features(estimate.cloud, voxel, true);
+    return {std::move(thinned.points), std::move(thinned.feature)};
+  }
+  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m)
+    return {estimate.thinned.points, {}};
+  return {cloud_filter_.filter(estimate.cloud, voxel).points, {}};
 }
 
 ScanCloudsConfig DenseFrontEnd::clouds_config() const {

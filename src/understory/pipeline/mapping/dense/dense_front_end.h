@@ -134,7 +134,7 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
   void move_world(const Pose& new_world_from_old_world);
-  [[nodiscard]] Points map_points(const DenseEstimate& estimate);
+  [[nodiscard]] FeaturePoints map_points(const DenseEstimate& estimate);
   [[nodiscard]] ScanCloudsConfig clouds_config() const;
   void offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
                    const Pose& keyframe_from_body);

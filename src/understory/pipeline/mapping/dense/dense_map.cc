@@ -14,15 +14,7 @@ namespace {
 
 // The finished cloud as the forest layer wants it.
 PointBlocks blocks_of(MapTiles& tiles) {
-  return [&tiles](const PointVisitor& visit) {
-    std::vector<Eigen::Vector3d> block;
-    tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
-      block.clear();
-      for (const MapPoint& p : points)
-        block.emplace_back(p.x, p.y, p.z);
-      visit(block);
-    });
-  };
+  return [&tiles](const PointVisitor& visit) { tiles.for_each_place(visit); };
 }
 
 std::vector<Pose> poses_of(const std::vector<Keyframe>& keyframes) {

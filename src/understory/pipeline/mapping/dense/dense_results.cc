@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "understory/forest/inventory.h"
+#include "understory/geometry/matrix_inverse.h"
 #include "understory/output/inventory_files.h"
 #include "understory/output/las_writer.h"
 #include "understory/output/layer_files.h"
@@ -130,13 +131,14 @@ void write_graph(const std::filesystem::path& folder, const KeyframeMap& map) {
     poses.add({keyframe.stamp, keyframe.world_from_body});
     vertices.push_back({id, keyframe.world_from_body, id == 0});
     if (id > 0) {
-      edges.push_back({id - 1, id, keyframe.previous_from_this, keyframe.covariance.inverse()});
+      edges.push_back(
+          {id - 1, id, keyframe.previous_from_this, inverse_matrix(keyframe.covariance)});
     }
   }
   for (std::size_t i = 0; i < map.loops().size(); ++i) {
     if (!map.loops_used()[i]) continue;
     const PoseEdge& edge = map.loops()[i].edge;
-    edges.push_back({edge.from, edge.to, edge.from_from_to, edge.covariance.inverse()});
+    edges.push_back({edge.from, edge.to, edge.from_from_to, inverse_matrix(edge.covariance)});
   }
   poses.commit();
   write_g2o(folder / "graph.g2o", vertices, edges);

@@ -4,8 +4,10 @@
 
 #include <utility>
 
+#include "understory/features/scan_rings.h"
 #include "understory/geometry/pose_io.h"
 #include "understory/sensor/scan_content.h"
+#include "understory/util/error.h"
 #include "understory/util/timing.h"
 
 namespace understory {
@@ -40,6 +42,12 @@ void SparseFrontEnd::on_sample(const ImuSample& sample, const Rig& rig) {
 
 std::vector<PositionedScan> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig) {
   const ScopedTimer timer(times_, "scan");
+  if (scans_ == 0 && !has_level_rings(*scan)) {
+    throw InputError(rig.lidar_model.empty() ? "the lidar" : rig.lidar_model, "",
+                     "its lines sweep over the whole field of view, so that no stem can be cut "
+                     "from a single scan: stems need the rings of a spinning lidar. Use "
+                     "--front-end dense");
+  }
   ++scans_;
   const std::uint64_t content = content_of(*scan);
   repeated_ += is_repetition(content, last_content_) ? 1 : 0;

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "understory/geometry/stamped_pose.h"
+#include "understory/odometry/imu/imu_buffer.h"
+
+namespace understory {
+
+// What is fitted: how the IMU sits on the lidar and by how much its clock is late, and what the
+// IMU and the path's frame add of their own.
+struct LidarImuState {
+  Pose lidar_from_imu;
+  double imu_late_s = 0.0;  // the IMU's stamp less that of the lidar, for one moment
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   // rad/s
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  // m/s^2
+  Eigen::Vector3d gravity = {0.0, 0.0, -9.81};           // m/s^2, in the frame of the path
+  // What scale and axes of the sensors are off by: the true value is (1 + error) times the sample.
+  Eigen::Matrix3d gyro_axes = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d accel_axes = Eigen::Matrix3d::Zero();
+  // By how much the path is off where the motion within a scan bends: times the cube of the step
+  // between scans and the third derivative of attitude and place. To a swing that looks like a
+  // lateness which grows with the square of its frequency.
+  double turn_bend = 0.0;
+  double place_bend = 0.0;
+};
+
+// Order of a step: rotation (3, right perturbation, in the frame of the IMU) and place (3, in the
+// frame of the lidar) of the IMU, lateness (1), biases (3 + 3), gravity (3), errors of the axes
+// (9 + 9, column by column), bends (1 + 1). Radians, metres, seconds.
+inline constexpr Eigen::Index kLidarImuParameters = 36;
+inline constexpr Eigen::Index kLatenessParameter = 6;
+using LidarImuStep = Eigen::Matrix<double, kLidarImuParameters, 1>;
+using LidarImuMatrix = Eigen::Matrix<double, kLidarImuParameters, kLidarImuParameters>;
+[[nodiscard]] LidarImuState stepped(const LidarImuState& state, const LidarImuStep& step);
+
+// By how much path and IMU differ at one scan after the other, an axis a column: rows 3 k to
+// 3 k + 2 are those of scan k.
+struct PathResiduals {
+  Eigen::VectorXd values;
+  Eigen::Matrix<double, Eigen::Dynamic, kLidarImuParameters> by_step;
+};
+
+// Poses in a row that the samples of the IMU cover without a gap.
+using PathRun = std::vector<StampedPose>;
+
+// Cuts a path where scans lie more than half a second apart or the IMU is silent at any lateness
+// within `latest_s` of `imu_late_s`; runs have at least 20 poses and at most 1000.
+[[nodiscard]] std::vector<PathRun> runs_with_imu(const std::vector<StampedPose>& world_from_lidar,
+                                                 const ImuBuffer& imu, double imu_late_s,
+                                                 double latest_s);
+
+// Turns from scan to scan: the rotation vector from what the gyroscope says, P2 (3), to what the
+// path says, in the frame of the IMU, radians. One for each step of the run.
+// Velocities from step to step: the change of the IMU's mean velocity from one step of the path to
+// the next, less that which gravity and accelerometer make of it; P2 (4) with the velocity
+// eliminated; in the frame of the path, m/s. One for each pair of steps. With derivatives, found
+// numerically. Throws InternalError where the IMU does not cover the run at the state's lateness.
+struct LidarImuResiduals {
+  PathResiduals turns;
+  PathResiduals velocities;
+};
+[[nodiscard]] LidarImuResiduals lidar_imu_residuals(const PathRun& run, const ImuBuffer& imu,
+                                                    const LidarImuState& state);
+
+}  // namespace understory

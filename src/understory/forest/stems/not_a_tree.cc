@@ -1,0 +1,132 @@
+#include "understory/forest/stems/not_a_tree.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "understory/forest/stem_constants.h"
+#include "understory/forest/stems/stem_axis.h"
+
+namespace understory {
+namespace {
+
+using namespace stem_constants::not_a_tree;
+
+// A tree goes on upwards. What ends low, with nothing above it near its axis, is none: but only
+// where the heights above were in view, as points around it show.
+bool ends_low(const StemFit& stem, const PointsNear& near, const StemDetectorConfig& config) {
+  if (stem.highest_m > kLowEnd || config.highest_m < kLowEnd + kLeastSpan) return false;
+  const StemAxis axis(stem);
+  const double from = stem.highest_m + kAboveEnd;
+  int on = 0;
+  int above = 0;
+  int around = 0;
+  near(stem.centre, kAroundReach, [&](const SlicePoint& point) {
+    const auto height = static_cast<double>(point.height_m);
+    const AxisPlace place = axis.place(point);
+    if (height <= stem.highest_m) {
+      on += std::abs(axis.surface_error(place)) <= kOnSurface ? 1 : 0;
+    } else if (height > from) {
+      const double off = place.distance_m - stem.radius_m;
+      above += off <= kNearAxis ? 1 : 0;
+      around += off > kNotNear && place.distance_m <= kAroundReach ? 1 : 0;
+    }
+  });
+  const double span = std::max(stem.highest_m - stem.lowest_m, kLeastSpan);
+  const double expected = on * (config.highest_m - from) / span;
+  return expected >= kLeastExpected && around >= kAroundPoints && above <= kAboveShare * expected;
+}
+
+// The points beside a stem as they lie in one vertical slab through it.
+class Slab {
+ public:
+  // Along `direction`, its middle `offset` from the stem's axis.
+  Slab(const StemFit& stem, const Eigen::Vector2d& direction, double offset)
+      : stem_(stem), along_(direction), across_(-direction.y(), direction.x()), offset_(offset) {}
+
+  void add(const Eigen::Vector2d& off_axis, double height_m) {
+    const double across = off_axis.dot(across_) - offset_;
+    const double along = off_axis.dot(along_);
+    const double beside = std::abs(along) - stem_.radius_m - kBesideFrom;
+    if (beside < 0.0 || beside >= kBesideLength) return;
+    const std::size_t side = along > 0.0 ? 1 : 0;
+    if (std::abs(across) > kSlabHalf) {
+      off_[side] += std::abs(across) <= kSlabFar ? 1 : 0;
+      return;
+    }
+    ++on_[side];
+    const auto column = static_cast<std::size_t>(beside / kBesideLength * kColumns);
+    const auto row = static_cast<std::size_t>(
+        std::clamp((height_m - stem_.lowest_m) / span(), 0.0, 0.999) * kRows);
+    filled_[side][std::min(row, kRows - 1) * kColumns + std::min(column, kColumns - 1)] = true;
+  }
+
+  // Whether one side of the slab is a wall: covered with points, and little else beside it.
+  [[nodiscard]] bool is_wall() const {
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (on_[side] < kWallPoints) continue;
+      const auto filled = std::count(filled_[side].begin(), filled_[side].end(), true);
+      if (static_cast<double>(filled) < kCovered * static_cast<double>(kRows * kColumns)) continue;
+      // The slabs beside are together wider than the slab by this.
+      constexpr double kWider = (kSlabFar - kSlabHalf) / kSlabHalf;
+      if (static_cast<double>(off_[side]) <= kBesideShare * kWider * on_[side]) return true;
+    }
+    return false;
+  }
+
+ private:
+  [[nodiscard]] double span() const { return std::max(stem_.highest_m - stem_.lowest_m, 0.1); }
+
+  const StemFit& stem_;
+  Eigen::Vector2d along_;
+  Eigen::Vector2d across_;
+  double offset_;
+  std::array<int, 2> on_{};
+  std::array<int, 2> off_{};
+  std::array<std::array<bool, kRows * kColumns>, 2> filled_{};
+};
+
+// A wall, or one of a corner, whose plane touches or cuts the stem.
+bool part_of_plane(const StemFit& stem, const PointsNear& near) {
+  if (stem.highest_m - stem.lowest_m < kWallHeight) return false;
+  struct Beside {
+    Eigen::Vector2d off_axis;
+    double height_m;
+  };
+  std::vector<Beside> points;
+  const double reach = stem.radius_m + kBesideFrom + kBesideLength + kSlabFar;
+  near(stem.centre, reach + kLeanReach, [&](const SlicePoint& point) {
+    const auto height = static_cast<double>(point.height_m);
+    if (height < stem.lowest_m || height > stem.highest_m) return;
+    const Eigen::Vector2d place(static_cast<double>(point.x), static_cast<double>(point.y));
+    const Eigen::Vector2d off = place - stem.centre - (height - kBreastHeight) * stem.slope;
+    const double distance = off.norm();
+    if (distance > stem.radius_m + kBesideFrom && distance <= reach) points.push_back({off, height});
+  });
+  if (points.size() < kRows * kColumns) return false;
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const double angle = M_PI * turn / kTurns;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+    const double farthest = stem.radius_m + kSlabHalf;
+    const int steps = static_cast<int>(std::ceil(2.0 * farthest / kSlabHalf));
+    for (int step = 0; step <= steps; ++step) {
+      Slab slab(stem, direction, farthest * (2.0 * step / steps - 1.0));
+      for (const Beside& point : points)
+        slab.add(point.off_axis, point.height_m);
+      if (slab.is_wall()) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+TreeDoubt doubt_of(const StemFit& stem, const PointsNear& near, const StemDetectorConfig& config) {
+  if (ends_low(stem, near, config)) return TreeDoubt::kEndsLow;
+  if (part_of_plane(stem, near)) return TreeDoubt::kPartOfPlane;
+  return TreeDoubt::kNone;
+}
+
+}  // namespace understory

@@ -1,0 +1,122 @@
+#include "understory/registration/global/global_match.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <utility>
+
+#include "understory/registration/global/global_constants.h"
+#include "understory/registration/global/pose_evidence.h"
+#include "understory/registration/global/upright_search.h"
+
+namespace understory {
+namespace {
+
+using namespace registration_constants::global_match;
+
+void sort_by_score(std::vector<GlobalCandidate>& candidates) {
+  std::stable_sort(
+      candidates.begin(), candidates.end(),
+      [](const GlobalCandidate& a, const GlobalCandidate& b) { return a.score > b.score; });
+}
+
+// Of poses that are the same the first stays.
+void drop_doubles(std::vector<GlobalCandidate>& candidates) {
+  std::vector<GlobalCandidate> kept;
+  for (const GlobalCandidate& candidate : candidates) {
+    const bool known = std::any_of(kept.begin(), kept.end(), [&](const GlobalCandidate& other) {
+      return same_pose(other.target_from_source, candidate.target_from_source);
+    });
+    if (!known) kept.push_back(candidate);
+  }
+  candidates = std::move(kept);
+}
+
+// Matches a few points of the source from where uprights put it, raised by so much.
+void refine_coarsely(const SearchCloud& target, const SearchCloud& source, const Points& few,
+                     double raised_m, GlobalCandidate& candidate) {
+  const Pose up(Eigen::Quaterniond::Identity(), {0.0, 0.0, raised_m});
+  const RegistrationResult result = target.target->match(
+      few, up * candidate.by_uprights, upright_terms(candidate, kLevelSd), MatchStart::kFar);
+  if (!result.usable()) return;
+  candidate.target_from_source = result.target_from_source;
+  candidate.score = pose_score(target, source, candidate.target_from_source);
+}
+
+// Uprights tell no height, and where the ground is hidden its height is off by a metre: a match
+// that begins there tilts the source until some ground meets. Of several heights the one whose
+// match has the most voxels in common is taken.
+void try_heights(const SearchCloud& target, const SearchCloud& source, const Points& few,
+                 GlobalCandidate& best) {
+  double most = common_voxels(target, source, best.target_from_source);
+  const GlobalCandidate start = best;
+  for (const double raised_m : kHeights) {
+    GlobalCandidate candidate = start;
+    refine_coarsely(target, source, few, raised_m, candidate);
+    const double common = common_voxels(target, source, candidate.target_from_source);
+    if (common <= most) continue;
+    most = common;
+    best = candidate;
+  }
+}
+
+}  // namespace
+
+std::vector<GlobalCandidate> search_poses(const SearchCloud& target, const SearchCloud& source) {
+  std::vector<GlobalCandidate> candidates;
+  for (const UprightMatch& match : match_uprights(target.uprights, source.uprights, kCandidates)) {
+    candidates.push_back({match.target_from_source,
+                          pose_score(target, source, match.target_from_source),
+                          match.target_from_source, match.matched});
+  }
+  sort_by_score(candidates);
+  drop_doubles(candidates);
+  candidates.resize(std::min(candidates.size(), kRefined));
+  Points few = thin_evenly(source.plants, kFewPlants, source.plants.size() + 1);
+  few.insert(few.end(), source.ground.begin(), source.ground.end());
+  for (GlobalCandidate& candidate : candidates)
+    refine_coarsely(target, source, few, 0.0, candidate);
+  sort_by_score(candidates);
+  drop_doubles(candidates);
+  if (!candidates.empty() && candidates.front().score < kSureScore)
+    try_heights(target, source, few, candidates.front());
+  return candidates;
+}
+
+PoseTerms upright_terms(const GlobalCandidate& candidate, double level_sd_rad) {
+  if (candidate.uprights < kFewestUprights) return {};
+  const double place = candidate.uprights / (kUprightSd * kUprightSd);
+  const double tilt = 1.0 / (level_sd_rad * level_sd_rad);
+  PosePrior prior{candidate.by_uprights, Matrix6d::Zero()};
+  prior.information.diagonal() << tilt, tilt, place * kSpread * kSpread, place, place, 0.0;
+  return {prior};
+}
+
+RegistrationResult last_steps(const SearchCloud& target, const SearchCloud& source,
+                              const GlobalCandidate& candidate) {
+  return refine_pose(target, source, candidate.target_from_source,
+                     upright_terms(candidate, kLastLevelSd));
+}
+
+RegistrationResult refine_pose(const SearchCloud& target, const SearchCloud& source,
+                               const Pose& start, const PoseTerms& terms) {
+  const Points some = thin_evenly(source.points, kLastPoints, source.points.size() + 1);
+  return target.fine_target->match(some, start, terms, MatchStart::kFar);
+}
+
+Pose refined_pose(const SearchCloud& target, const SearchCloud& source, const Pose& start) {
+  const RegistrationResult result = refine_pose(target, source, start);
+  return result.usable() ? result.target_from_source : start;
+}
+
+double pose_score(const SearchCloud& target, const SearchCloud& source,
+                  const Pose& target_from_source) {
+  return quick_fit(target, source, target_from_source).score() +
+         quick_fit(source, target, target_from_source.inverse()).score();
+}
+
+bool same_pose(const Pose& a, const Pose& b) {
+  const Pose step = a.inverse() * b;
+  return step.translation().norm() < kSamePose && step.angle() < kSameHeading;
+}
+
+}  // namespace understory

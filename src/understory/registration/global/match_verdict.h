@@ -1,0 +1,60 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "understory/geometry/points.h"
+#include "understory/geometry/pose.h"
+#include "understory/registration/global/global_match.h"
+#include "understory/registration/global/pose_evidence.h"
+#include "understory/registration/global/search_cloud.h"
+#include "understory/registration/registration.h"
+
+namespace understory {
+
+// The best of the poses that the search found and that are not the one judged.
+struct RivalPose {
+  Pose target_from_source;  // level frames
+  double score = 0.0;       // as GlobalCandidate::score
+};
+
+// Whether a pose may be believed, and why not.
+struct MatchVerdict {
+  bool trusted = false;
+  double chance = 0.0;  // that the pose is right, within 0.5 m and 2 degrees: 0..1
+  std::string reason;   // in plain words; empty if trusted
+  PoseEvidence evidence;
+  double score = 0.0;  // of the pose, as GlobalCandidate::score
+  std::optional<RivalPose> rival;
+  double moved_m = 0.0;  // how far NDT with small cells moves the pose on
+  double moved_deg = 0.0;
+};
+
+// The chance that a pose is right, by logistic regression on simulated and real pairs
+// (benchmarks/registration/fit_verdict.py). `rival_score`: of the best other pose, if there is one.
+[[nodiscard]] double chance_of_right(const PoseEvidence& evidence, double score,
+                                     std::optional<double> rival_score);
+
+// Judges a pose between the level frames of two clouds. `found`: what search_poses gave for them.
+// Thread-safe, deterministic.
+[[nodiscard]] MatchVerdict judge_pose(const SearchCloud& target, const SearchCloud& source,
+                                      const Pose& target_from_source,
+                                      const std::vector<GlobalCandidate>& found);
+
+// The same for the outcome of any method, between the frames of the points (metres, z about up). A
+// match that did not converge, or that leaves directions open, is never trusted.
+[[nodiscard]] MatchVerdict judge_match(const Points& target, const Points& source,
+                                       const RegistrationResult& result);
+
+// A match without a guess, and what is to be thought of it.
+struct GlobalRegistration {
+  RegistrationResult result;  // of NDT at the end; kTooFewMatches where no pose was found
+  MatchVerdict verdict;
+};
+
+// Finds the pose of the source on the target anywhere and at any heading. Both clouds: metres, z
+// within 40 degrees of up, each in its own frame. Thread-safe; same bits for any number of threads.
+[[nodiscard]] GlobalRegistration register_globally(const Points& target, const Points& source);
+
+}  // namespace understory

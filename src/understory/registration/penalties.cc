@@ -1,0 +1,69 @@
+#include "understory/registration/penalties.h"
+
+#include <Eigen/LU>
+
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+// A point of the source that lies at `arm` (axes of the target) from the antenna, as believed.
+PenaltyPoint point_at(const PoseBelief& belief, const Eigen::Vector3d& arm) {
+  PenaltyPoint point;
+  point.position_in_target = belief.target_from_source * belief.point_in_source + arm;
+  point.point_in_source =
+      belief.point_in_source + belief.target_from_source.rotation().conjugate() * arm;
+  // A small turn w of the target's axes moves it by w x arm.
+  const Eigen::Matrix3d lever = skew(arm);
+  point.covariance =
+      belief.position_covariance + lever * belief.attitude_covariance * lever.transpose();
+  return point;
+}
+
+// The x axis of the source, laid into the x-y plane.
+Eigen::Vector3d heading_of(const Pose& target_from_source) {
+  Eigen::Vector3d ahead = target_from_source.rotation() * Eigen::Vector3d::UnitX();
+  ahead.z() = 0.0;
+  if (ahead.norm() < 1e-6) return Eigen::Vector3d::UnitX();  // it points up or down
+  return ahead.normalized();
+}
+
+// In the metric of both covariances; around the belief, where a position of the antenna and a turn
+// are independent.
+PosePrior direct_term(const PoseBelief& belief) {
+  const Eigen::Matrix3d rotation = belief.target_from_source.rotation_matrix();
+  // Right perturbation (w, v): the antenna moves by R (v - skew(point) w), the axes turn by R w.
+  Eigen::Matrix<double, 6, 6> moved = Eigen::Matrix<double, 6, 6>::Zero();
+  moved.topLeftCorner<3, 3>() = rotation;
+  moved.bottomLeftCorner<3, 3>() = -rotation * skew(belief.point_in_source);
+  moved.bottomRightCorner<3, 3>() = rotation;
+  Matrix6d information = Matrix6d::Zero();
+  information.topLeftCorner<3, 3>() = belief.attitude_covariance.inverse();
+  information.bottomRightCorner<3, 3>() = belief.position_covariance.inverse();
+  return {belief.target_from_source, moved.transpose() * information * moved};
+}
+
+}  // namespace
+
+PoseBelief belief_of(const Pose& target_from_source, const Matrix6d& covariance) {
+  const Eigen::Matrix3d rotation = target_from_source.rotation_matrix();
+  PoseBelief belief;
+  belief.target_from_source = target_from_source;
+  belief.position_covariance =
+      rotation * covariance.bottomRightCorner<3, 3>() * rotation.transpose();
+  belief.attitude_covariance = rotation * covariance.topLeftCorner<3, 3>() * rotation.transpose();
+  return belief;
+}
+
+PoseTerm penalty_term(const PoseBelief& belief, PenaltyForm form, double arm_m, double scale) {
+  UNDERSTORY_CHECK(arm_m > 0.0 && scale > 0.0);
+  if (form == PenaltyForm::kDirect) return direct_term(belief);
+  PointPenalties penalties{{point_at(belief, Eigen::Vector3d::Zero())}, scale};
+  if (form == PenaltyForm::kThreePoints) {
+    penalties.points.push_back(point_at(belief, -arm_m * Eigen::Vector3d::UnitZ()));
+    penalties.points.push_back(point_at(belief, arm_m * heading_of(belief.target_from_source)));
+  }
+  return penalties;
+}
+
+}  // namespace understory

@@ -1,0 +1,85 @@
+"""`understory calibrate` on good recordings and on such as tell nothing: exit codes, files, and what is said."""
+
+import csv
+import json
+
+from program import Cases, program, snapshot
+
+cases = Cases()
+STILL = "sim:still?imu_preset=vectornav&imu.rate_hz=20&seed=4"
+
+
+@cases.case("an IMU that stands for hours has all figures")
+def still(folder):
+    noise = folder / "noise"
+    done = program("calibrate", "imu", f"{STILL}&duration_s=30000", "-o", noise)
+    assert done.returncode in (0, 4), done
+    assert sorted(path.name for path in noise.iterdir()) == [
+        "allan.csv", "imu.yaml", "imu_noise.csv", "imu_noise.html"]
+    rows = list(csv.DictReader((noise / "imu_noise.csv").open()))
+    assert len(rows) == 18, rows
+    white = [float(r["value"]) for r in rows if r["sensor"] == "gyroscope" and r["figure"] == "white_noise"]
+    assert all(abs(value / 5.55e-5 - 1) < 0.02 for value in white), white  # allan-vectornav.txt
+    done = program("map", "--config", noise / "imu.yaml", "--print-config")
+    assert done.returncode == 0 and "set by" in done.stdout, done
+    return "files"
+
+
+@cases.case("a few minutes have the white noise alone")
+def minutes(folder):
+    done = program("calibrate", "imu", f"{STILL}&duration_s=120", "-o", folder / "noise")
+    assert done.returncode == 4, done
+    assert "the bias instability on x, y, z does not stand out in 120 s" in done.stderr, done.stderr
+    assert "bias_walk" not in (folder / "noise" / "imu.yaml").read_text()
+    return done.stderr
+
+
+@cases.case("motion and short recordings are refused, and nothing is written")
+def refusals(folder):
+    walk = folder / "walk.mcap"
+    words = [word for setting in ("lidar.model=VLP-16", "carrier.still_s=6", "stand.size_x_m=30", "stand.size_y_m=30",
+                                  "gnss.enabled=false") for word in ("--set", setting)]
+    assert program("simulate", "demo", "-o", walk, "--duration-s", "12", *words).returncode == 0
+    before = snapshot(folder)
+    for more, said in (((), "it stood from 0.0 s to 6"), (("--to-s", "5"), "at least 60 s of standing"),
+                       (("--from-s", "100"), "expected samples of an IMU")):
+        done = program("calibrate", "imu", walk, "-o", folder / "noise", *more)
+        assert done.returncode == 3 and said in done.stderr and not done.stdout, done
+    assert program("calibrate", "imu", walk, "-o", folder / "noise", "--from-s", "9", "--to-s", "3").returncode == 2
+    assert program("calibrate").returncode == 2
+    assert snapshot(folder) == before
+    return "nothing"
+
+
+@cases.case("an IMU is found on the lidar of a walk")
+def lidar_imu(folder):
+    walk, rig = folder / "walk.mcap", folder / "rig"
+    words = [word for setting in ("lidar.model=VLP-16", "carrier.still_s=1", "carrier.turn_interval_s=3",
+                                  "stand.size_x_m=60", "stand.size_y_m=60", "imu.time_offset_s=0.02",
+                                  "gnss.enabled=false") for word in ("--set", setting)]
+    assert program("simulate", "demo", "-o", walk, "--duration-s", "20", *words).returncode == 0
+    before = snapshot(folder)
+    done = program("calibrate", "lidar-imu", walk, "-o", rig, "--path", walk)
+    assert done.returncode == 3, done  # no trajectory
+    assert snapshot(folder) == before
+    done = program("calibrate", "lidar-imu", walk, "-o", rig)
+    assert done.returncode in (0, 4), done
+    assert sorted(path.name for path in rig.iterdir()) == ["calibration.json", "extrinsics.yaml", "path.tum"]
+    found = json.loads((rig / "calibration.json").read_text())
+    assert abs(found["imu_late_s"] - 0.02) < 0.005, found
+    assert len(found["covariance"]) == 7
+    assert program("info", walk, "--extrinsics", rig / "extrinsics.yaml").returncode == 0
+    return done.stdout
+
+
+@cases.case("what tells nothing of lidar and IMU is refused")
+def no_lidar_imu(folder):
+    for recording, said in ((f"{STILL}&duration_s=20", "lidar"),
+                            ("sim:demo?lidar.model=VLP-16&duration_s=4&gnss.enabled=false&stand.size_x_m=30"
+                             "&stand.size_y_m=30", "at least 10 s of a path")):
+        done = program("calibrate", "lidar-imu", recording, "-o", folder / "rig")
+        assert done.returncode == 3 and said in done.stderr and not done.stdout, done
+    assert not list(folder.iterdir())
+
+
+cases.run()
