@@ -226,7 +226,10 @@ namespace canopy_crowns {  // forest/trees/canopy_crowns.cc
 inline constexpr int kFillPasses = 2;
 // Known cells around one that give it their median [chosen]
 inline constexpr std::size_t kLeastAround = 5;
-// m below that median: the pulses went through the crown [chosen]
+// Cells around one that are higher where the pulses went through the crown, at least [chosen: at a
+// straight edge five are]
+inline constexpr std::size_t kAroundPit = 6;
+// m: how much higher [chosen]
 inline constexpr float kPit = 2.0F;
 }  // namespace canopy_crowns
 

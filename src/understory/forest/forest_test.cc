@@ -418,10 +418,42 @@ TEST(Inventory, AnAirborneCloudSaysThatStemsAreNotSeen) {
   Random random(9);
   for (int i = 0; i < 4000; ++i)
     plot.cloud.emplace_back(random.uniform(0, 20), random.uniform(0, 20), random.uniform(108, 120));
-  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  InventoryConfig by_stems;
+  by_stems.crowns.search = CrownSearch::kNever;
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), by_stems);
   EXPECT_TRUE(result.trees.empty());
   EXPECT_TRUE(result.too_sparse);
+  EXPECT_TRUE(result.from_above);
   EXPECT_FALSE(result.remarks.empty());
+}
+
+TEST(Inventory, AnAirborneCloudHasTreesByTheirCrowns) {
+  Plot plot(9);
+  plot.add_ground(20.0, 4);
+  Random random(10);
+  const std::vector<Eigen::Vector2d> places = {{5.0, 6.0}, {13.0, 12.0}};
+  for (const Eigen::Vector2d& place : places) {
+    for (int i = 0; i < 2000; ++i) {  // a cone of 3 m at 8 m above the ground, 16 m high
+      const double r = 3.0 * std::sqrt(random.uniform());
+      const double turn = 2.0 * M_PI * random.uniform();
+      const double x = place.x() + r * std::cos(turn);
+      const double y = place.y() + r * std::sin(turn);
+      plot.cloud.emplace_back(x, y, plot.ground(place.x(), place.y()) + 16.0 - 8.0 * r / 3.0);
+    }
+  }
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  ASSERT_EQ(result.trees.size(), 2U);
+  EXPECT_TRUE(result.stems.empty());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Tree& tree = result.trees[i];
+    EXPECT_LT((Eigen::Vector2d(tree.x, tree.y) - places[i]).norm(), 0.4);
+    EXPECT_NEAR(tree.height_m, 16.0, 0.5);
+    EXPECT_NEAR(tree.crown_area_m2, M_PI * 9.0, 4.0);
+    EXPECT_TRUE(std::isnan(tree.dbh_m));
+    const Eigen::Vector3d in_crown(places[i].x() + 1.0, places[i].y(), tree.z + 12.0);
+    EXPECT_EQ(tree_at(result, in_crown, 12.0), static_cast<std::uint32_t>(tree.id));
+    EXPECT_EQ(tree_at(result, in_crown, 1.0), 0U) << "what is low below a crown may be undergrowth";
+  }
 }
 
 // Arcs of a quarter of a circle in each slice of 25 cm, turned by `turn_deg` from slice to slice.

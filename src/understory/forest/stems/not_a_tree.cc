@@ -103,7 +103,8 @@ bool part_of_plane(const StemFit& stem, const PointsNear& near) {
     const Eigen::Vector2d place(static_cast<double>(point.x), static_cast<double>(point.y));
     const Eigen::Vector2d off = place - stem.centre - (height - kBreastHeight) * stem.slope;
     const double distance = off.norm();
-    if (distance > stem.radius_m + kBesideFrom && distance <= reach) points.push_back({off, height});
+    if (distance > stem.radius_m + kBesideFrom && distance <= reach)
+      points.push_back({off, height});
   });
   if (points.size() < kRows * kColumns) return false;
   for (int turn = 0; turn < kTurns; ++turn) {

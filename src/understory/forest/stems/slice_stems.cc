@@ -107,16 +107,16 @@ class RadialProfile {
     std::array<double, kSteps> smooth{};
     for (std::size_t i = 1; i + 1 < kSteps; ++i)
       smooth[i] = 0.25 * counts_[i - 1] + 0.5 * counts_[i] + 0.25 * counts_[i + 1];
-    const auto first = static_cast<std::size_t>(
-        std::max_element(smooth.begin(), smooth.end()) - smooth.begin());
+    const auto first =
+        static_cast<std::size_t>(std::max_element(smooth.begin(), smooth.end()) - smooth.begin());
     double apart = 0.0;
     double best = 0.0;
     for (std::size_t i = 0; i < kSteps; ++i) {
       const std::size_t low = std::min(i, first);
       const std::size_t high = std::max(i, first);
-      const double valley = *std::min_element(smooth.begin() + static_cast<std::ptrdiff_t>(low),
-                                              smooth.begin() + static_cast<std::ptrdiff_t>(high) +
-                                                  1);
+      const double valley =
+          *std::min_element(smooth.begin() + static_cast<std::ptrdiff_t>(low),
+                            smooth.begin() + static_cast<std::ptrdiff_t>(high) + 1);
       if (smooth[i] <= best || smooth[i] < kSecondSummit * smooth[first] ||
           valley > kValley * smooth[i])
         continue;

@@ -8,7 +8,6 @@
 #include <tuple>
 
 #include "understory/forest/forest_constants.h"
-#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -25,8 +24,8 @@ void around(const Raster& raster, int column, int row, const Visit& visit) {
   }
 }
 
-// Cells without a point and cells whose pulses went through the crown take the median of the cells
-// around them.
+// Cells without a point and cells whose pulses went through the crown take the (lower) median of
+// the cells around them. The edges of crowns stay: a pit is low beside most of its neighbours.
 Raster filled(const Raster& canopy) {
   Raster result = canopy;
   std::vector<float> near;
@@ -39,9 +38,11 @@ Raster filled(const Raster& canopy) {
           if (std::isfinite(before.values[i])) near.push_back(before.values[i]);
         });
         if (near.size() < kLeastAround) continue;
-        const float median = upper_median(near);
+        std::sort(near.begin(), near.end());
+        const float median = near[(near.size() - 1) / 2];
         float& value = result.values[before.index(column, row)];
-        if (!std::isfinite(value) || value < median - kPit) value = median;
+        const bool pit = near.size() >= kAroundPit && value < near[near.size() - kAroundPit] - kPit;
+        if (!std::isfinite(value) || pit) value = median;
       }
     }
   }
@@ -85,6 +86,7 @@ class Watershed {
           take(other, crowns_.owner[cell], height);
       });
     }
+    measure();
   }
 
  private:
@@ -111,8 +113,27 @@ class Watershed {
   // A cell behind a lower one is uncovered with that one.
   void take(std::size_t cell, std::int32_t crown, float at_most) {
     crowns_.owner[cell] = crown;
-    crowns_.crowns[static_cast<std::size_t>(crown)].area_m2 += heights_.cell_m * heights_.cell_m;
     next_.emplace(std::min(heights_.values[cell], at_most), -(order_++), cell);
+  }
+
+  // A cell counts as a crown where any of its points is one, so cells at the open edge hold half of
+  // what they seem to.
+  void measure() {
+    const double cell_m2 = heights_.cell_m * heights_.cell_m;
+    for (int row = 0; row < heights_.rows; ++row) {
+      for (int column = 0; column < heights_.columns; ++column) {
+        const std::int32_t crown = crowns_.owner[heights_.index(column, row)];
+        if (crown == CanopyCrowns::kNone) continue;
+        const bool edge = is_open(column - 1, row) || is_open(column + 1, row) ||
+                          is_open(column, row - 1) || is_open(column, row + 1);
+        crowns_.crowns[static_cast<std::size_t>(crown)].area_m2 += (edge ? 0.5 : 1.0) * cell_m2;
+      }
+    }
+  }
+
+  [[nodiscard]] bool is_open(int column, int row) const {
+    return heights_.contains(column, row) &&
+           crowns_.owner[heights_.index(column, row)] == CanopyCrowns::kNone;
   }
 
   const Raster& heights_;  // smoothed: the valleys

@@ -17,7 +17,8 @@ struct Cone {
   double radius_m;
 };
 
-// Cones that fall to half of their height at their edge, on open ground.
+// Cones that fall to half of their height at their edge, on open ground: the highest of 25 points
+// of each cell, as in a canopy model.
 Raster canopy_of(const std::vector<Cone>& cones) {
   Raster canopy;
   canopy.x0 = 100.0;
@@ -27,12 +28,15 @@ Raster canopy_of(const std::vector<Cone>& cones) {
   canopy.values.assign(60 * 60, 0.0F);
   for (int row = 0; row < canopy.rows; ++row) {
     for (int column = 0; column < canopy.columns; ++column) {
-      const Eigen::Vector2d at(canopy.x0 + 0.5 * (column + 0.5), canopy.y0 + 0.5 * (row + 0.5));
       float& value = canopy.values[canopy.index(column, row)];
-      for (const Cone& cone : cones) {
-        const double off = (at - cone.top).norm() / cone.radius_m;
-        if (off <= 1.0)
-          value = std::max(value, static_cast<float>(cone.height_m * (1.0 - 0.5 * off)));
+      for (int part = 0; part < 25; ++part) {
+        const Eigen::Vector2d at(canopy.x0 + 0.5 * (column + 0.1 + 0.2 * (part % 5)),
+                                 canopy.y0 + 0.5 * (row + 0.1 + 0.2 * (part / 5)));
+        for (const Cone& cone : cones) {
+          const double off = (at - cone.top).norm() / cone.radius_m;
+          if (off <= 1.0)
+            value = std::max(value, static_cast<float>(cone.height_m * (1.0 - 0.5 * off)));
+        }
       }
     }
   }

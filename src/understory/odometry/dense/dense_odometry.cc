@@ -155,7 +155,8 @@ void DenseOdometry::match(const MatchTarget& local_map, const NavState& predicte
   if (config.prior_weight > 0.0) {
     const Matrix6d loose = predicted.pose_covariance + 1e-9 * Matrix6d::Identity();
     if (config.prior_form == PenaltyForm::kDirect) {
-      terms.push_back(PosePrior{predicted.world_from_body, config.prior_weight * inverse_matrix(loose)});
+      terms.push_back(
+          PosePrior{predicted.world_from_body, config.prior_weight * inverse_matrix(loose)});
     } else {
       terms.push_back(penalty_term(
           belief_of(predicted.world_from_body, loose / config.prior_weight), config.prior_form));
