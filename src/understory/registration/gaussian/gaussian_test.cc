@@ -228,8 +228,8 @@ TEST(GaussianVoxels, HoldTheMeanAndTheCovarianceOfTheirPoints) {
   const Eigen::Vector3d mean = sum / n;
   for (const bool of_surfaces : {false, true}) {
     Eigen::Vector3d offset;
-    const GaussianVoxel* voxel =
-        grid(of_surfaces, 1.0)->find(Eigen::Vector3d(0.5, 0.5, 0.5), false, offset);
+    const auto voxels = grid(of_surfaces, 1.0);
+    const GaussianVoxel* voxel = voxels->find(Eigen::Vector3d(0.5, 0.5, 0.5), false, offset);
     ASSERT_NE(voxel, nullptr);
     EXPECT_LT((Eigen::Vector3d(0.5, 0.5, 0.5) - offset - mean).norm(), 1e-5);
     const Eigen::Matrix3d own = voxel->covariance.cast<double>();
