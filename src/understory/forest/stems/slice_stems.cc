@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "understory/forest/slice_constants.h"
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/circle_search.h"
 #include "understory/forest/stems/stem_axis.h"

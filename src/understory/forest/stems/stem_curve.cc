@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "understory/forest/stem_constants.h"
+#include "understory/forest/stem_curve_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
 #include "understory/forest/stems/stem_axis.h"

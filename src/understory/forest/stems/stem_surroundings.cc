@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "understory/forest/stem_constants.h"
+#include "understory/forest/stem_curve_constants.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/trees/tree_heights.h"
 

@@ -1,176 +1,24 @@
+#include "understory/forest/inventory.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
-#include "understory/forest/inventory.h"
-#include "understory/forest/stems/stem_fit.h"
+#include "understory/forest/test_plot.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
-using Cloud = std::vector<Eigen::Vector3d>;
-
-PointBlocks blocks_of(const Cloud& cloud) {
-  return [&cloud](const PointVisitor& visit) { visit(cloud); };
-}
-
-// A plot with a known terrain and known stems.
-class Plot {
- public:
-  explicit Plot(std::uint64_t seed) : random_(seed) {}
-
-  double slope_x = 0.0;
-  double bump_m = 0.0;
-
-  [[nodiscard]] double ground(double x, double y) const {
-    return 100.0 + slope_x * x + bump_m * std::sin(0.4 * x) * std::cos(0.3 * y);
-  }
-  void add_ground(double side, int per_m2) {
-    const int count = static_cast<int>(side * side) * per_m2;
-    for (int i = 0; i < count; ++i) {
-      const double x = random_.uniform(0.0, side);
-      const double y = random_.uniform(0.0, side);
-      cloud.emplace_back(x, y, ground(x, y) + random_.normal(0.0, 0.02));
-    }
-  }
-  // More of it in a square around a place.
-  void add_ground_at(double x, double y, double half_m, int count) {
-    for (int i = 0; i < count; ++i) {
-      const double px = x + random_.uniform(-half_m, half_m);
-      const double py = y + random_.uniform(-half_m, half_m);
-      cloud.emplace_back(px, py, ground(px, py) + random_.normal(0.0, 0.02));
-    }
-  }
-  struct Stem {
-    double x, y, dbh;
-    double lean_x = 0.0;     // metres per metre
-    double arc_deg = 360.0;  // of the circumference that is seen
-    int points = 900;        // between the ground and 4 m
-    double noise_m = 0.008;
-  };
-  void add_stem(const Stem& stem) {
-    for (int i = 0; i < stem.points; ++i) {
-      const double h = random_.uniform(0.1, 4.0);
-      const double turn = random_.uniform(0.0, stem.arc_deg * M_PI / 180.0);
-      const double r = 0.5 * stem.dbh - 0.008 * (h - 1.3) + random_.normal(0.0, stem.noise_m);
-      cloud.emplace_back(stem.x + stem.lean_x * h + r * std::cos(turn), stem.y + r * std::sin(turn),
-                         ground(stem.x, stem.y) + h);
-    }
-    for (int i = 0; i < 300; ++i) {  // a crown to take a height from
-      cloud.emplace_back(stem.x + random_.normal(0.0, 0.6), stem.y + random_.normal(0.0, 0.6),
-                         ground(stem.x, stem.y) + random_.uniform(4.0, 15.0));
-    }
-  }
-  // A bush: points all through a ball.
-  void add_bush(double x, double y, double radius, int points) {
-    for (int i = 0; i < points;) {
-      const Eigen::Vector3d p(random_.uniform(-1, 1), random_.uniform(-1, 1),
-                              random_.uniform(-1, 1));
-      if (p.norm() > 1.0) continue;
-      cloud.emplace_back(x + radius * p.x(), y + radius * p.y(),
-                         ground(x, y) + radius + 1.2 * radius * p.z());
-      ++i;
-    }
-  }
-  Cloud cloud;
-
- private:
-  Random random_;
-};
-
-const Tree* nearest(const std::vector<Tree>& trees, double x, double y) {
-  const Tree* best = nullptr;
-  double least = 0.3;
-  for (const Tree& tree : trees) {
-    const double distance = std::hypot(tree.x - x, tree.y - y);
-    if (distance < least) best = &tree;
-    least = std::min(least, distance);
-  }
-  return best;
-}
-
-TEST(Ground, LiesUnderStemsAndBushesOnASlope) {
-  Plot plot(1);
-  plot.slope_x = 0.4;
-  plot.bump_m = 0.6;
-  plot.add_ground(20.0, 40);
-  for (int i = 0; i < 8; ++i)
-    plot.add_bush(2.0 + 2.2 * i, 3.0 + 1.8 * i, 0.9, 2000);
-  plot.add_stem({10.0, 4.0, 0.4});
-  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
-  double squares = 0.0;
-  double worst = 0.0;
-  int count = 0;
-  for (double x = 1.0; x < 19.0; x += 0.7) {
-    for (double y = 1.0; y < 19.0; y += 0.7) {
-      const double error = model.terrain.interpolate(x, y) - plot.ground(x, y);
-      ASSERT_TRUE(std::isfinite(error));
-      squares += error * error;
-      worst = std::max(worst, std::abs(error));
-      ++count;
-    }
-  }
-  EXPECT_LT(std::sqrt(squares / count), 0.04);
-  EXPECT_LT(worst, 0.25);
-}
-
-TEST(Ground, AStrayPointDeepBelowDoesNotPullItDown) {
-  Plot plot(2);
-  plot.add_ground(10.0, 40);
-  plot.cloud.emplace_back(5.0, 5.0, 90.0);
-  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
-  EXPECT_NEAR(model.terrain.interpolate(5.0, 5.0), 100.0, 0.05);
-  EXPECT_EQ(model.las_class(model.height_above({5.0, 5.0, 90.0})), 7);
-  EXPECT_EQ(model.las_class(model.height_above({5.0, 5.0, 100.01})), 2);
-  EXPECT_EQ(model.las_class(model.height_above({5.0, 5.0, 101.5})), 4);
-}
-
-// A tilted lidar with crosstalk over many scans: ghosts below every cell, spread over the depth.
-TEST(Ground, GhostsBelowEveryCellDoNotPullItDown) {
-  Plot plot(4);
-  plot.slope_x = 0.5;
-  plot.add_ground(20.0, 1500);
-  Random random(5);
-  for (int i = 0; i < 2000; ++i) {
-    const double x = random.uniform(0.0, 20.0);
-    const double y = random.uniform(0.0, 20.0);
-    plot.cloud.emplace_back(x, y, plot.ground(x, y) - random.uniform(0.5, 40.0));
-  }
-  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
-  double squares = 0.0;
-  double worst = 0.0;
-  int count = 0;
-  for (double x = 1.0; x < 19.0; x += 0.5) {
-    for (double y = 1.0; y < 19.0; y += 0.5) {
-      const double error = model.terrain.interpolate(x, y) - plot.ground(x, y);
-      squares += error * error;
-      worst = std::max(worst, std::abs(error));
-      ++count;
-    }
-  }
-  EXPECT_LT(std::sqrt(squares / count), 0.03);
-  EXPECT_LT(worst, 0.4);  // a ghost just below its cell may stay
-}
-
-TEST(Ground, NothingIsInventedFarFromTheGround) {
-  Plot plot(3);
-  plot.add_ground(10.0, 40);
-  plot.cloud.emplace_back(60.0, 5.0, 130.0);
-  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
-  EXPECT_TRUE(std::isnan(model.terrain.interpolate(35.0, 5.0)));
-  EXPECT_TRUE(std::isnan(estimate_ground(blocks_of({}), {}).height_above({0.0, 0.0, 0.0})));
-}
-
 TEST(Inventory, DiametersPositionsAndHeightsOfAStand) {
-  Plot plot(4);
+  TestPlot plot(4);
   plot.slope_x = 0.25;
   plot.add_ground(24.0, 40);
-  std::vector<Plot::Stem> stems;
+  std::vector<TestPlot::Stem> stems;
   for (int i = 0; i < 16; ++i) {
-    Plot::Stem stem{3.0 + 6.0 * (i % 4), 3.0 + 6.0 * (i / 4), 0.08 + 0.03 * i};
+    TestPlot::Stem stem{3.0 + 6.0 * (i % 4), 3.0 + 6.0 * (i / 4), 0.08 + 0.03 * i};
     stem.lean_x = 0.01 * (i % 5);
     stem.noise_m = 0.01;
     stems.push_back(stem);
@@ -178,7 +26,7 @@ TEST(Inventory, DiametersPositionsAndHeightsOfAStand) {
   }
   const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
   EXPECT_EQ(result.trees.size(), stems.size());
-  for (const Plot::Stem& stem : stems) {
+  for (const TestPlot::Stem& stem : stems) {
     const Tree* tree = nearest(result.trees, stem.x, stem.y);
     ASSERT_NE(tree, nullptr) << stem.x << " " << stem.y;
     EXPECT_NEAR(tree->dbh_m, stem.dbh, 0.012);
@@ -191,7 +39,7 @@ TEST(Inventory, DiametersPositionsAndHeightsOfAStand) {
 }
 
 TEST(Inventory, AFullOneHasCurvesVolumesCrownsAndTheTreeOfEachPoint) {
-  Plot plot(4);
+  TestPlot plot(4);
   plot.slope_x = 0.25;
   plot.add_ground(18.0, 40);
   plot.add_stem({5.0, 9.0, 0.3});
@@ -225,7 +73,7 @@ TEST(Inventory, AFullOneHasCurvesVolumesCrownsAndTheTreeOfEachPoint) {
 // Beside a path the ground has a hundred times the points of a crown; the canopy model had holes
 // over such trees.
 TEST(Inventory, ACrownOverAGroundSeenMuchMoreIsPartOfTheCanopy) {
-  Plot plot(4);
+  TestPlot plot(4);
   plot.add_ground(12.0, 40);
   plot.add_stem({6.0, 6.0, 0.3});
   plot.add_ground_at(6.0, 6.0, 2.0, 60'000);
@@ -245,7 +93,7 @@ TEST(Inventory, ACrownOverAGroundSeenMuchMoreIsPartOfTheCanopy) {
 }
 
 TEST(Inventory, ABasicOneHasNoneOfThat) {
-  Plot plot(4);
+  TestPlot plot(4);
   plot.add_ground(12.0, 40);
   plot.add_stem({6.0, 6.0, 0.3});
   const InventoryResult result = take_inventory(blocks_of(plot.cloud), basic_inventory());
@@ -258,10 +106,10 @@ TEST(Inventory, ABasicOneHasNoneOfThat) {
 }
 
 TEST(Inventory, StemsOfAnInventoryAreItsTreesAsOneView) {
-  Plot plot(4);
+  TestPlot plot(4);
   plot.slope_x = 0.25;
   plot.add_ground(24.0, 40);
-  Plot::Stem stem{12.0, 9.0, 0.3};
+  TestPlot::Stem stem{12.0, 9.0, 0.3};
   stem.lean_x = 0.05;
   plot.add_stem(stem);
   const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
@@ -280,10 +128,10 @@ TEST(Inventory, StemsOfAnInventoryAreItsTreesAsOneView) {
 }
 
 TEST(Inventory, StemsSeenFromOneSideKeepTheirDiameter) {
-  Plot plot(5);
+  TestPlot plot(5);
   plot.add_ground(20.0, 40);
   for (int i = 0; i < 9; ++i) {
-    Plot::Stem stem{3.0 + 6.0 * (i % 3), 3.0 + 6.0 * (i / 3), 0.2 + 0.03 * i};
+    TestPlot::Stem stem{3.0 + 6.0 * (i % 3), 3.0 + 6.0 * (i / 3), 0.2 + 0.03 * i};
     stem.arc_deg = 150.0;
     plot.add_stem(stem);
   }
@@ -297,7 +145,7 @@ TEST(Inventory, StemsSeenFromOneSideKeepTheirDiameter) {
 }
 
 TEST(Inventory, BushesAreNoTrees) {
-  Plot plot(6);
+  TestPlot plot(6);
   plot.add_ground(20.0, 40);
   for (int i = 0; i < 16; ++i)
     plot.add_bush(2.0 + 5.0 * (i % 4), 2.0 + 5.0 * (i / 4), 0.6 + 0.1 * (i % 5), 3000);
@@ -305,7 +153,7 @@ TEST(Inventory, BushesAreNoTrees) {
 }
 
 TEST(Inventory, AStemInABushIsFound) {
-  Plot plot(7);
+  TestPlot plot(7);
   plot.add_ground(12.0, 40);
   plot.add_stem({6.0, 6.0, 0.3});
   plot.add_bush(6.5, 6.0, 0.7, 800);
@@ -315,10 +163,10 @@ TEST(Inventory, AStemInABushIsFound) {
 }
 
 TEST(Inventory, FewReturnsAreEnoughForAFreeStem) {
-  Plot plot(8);
+  TestPlot plot(8);
   plot.add_ground(16.0, 40);
   for (int i = 0; i < 4; ++i) {
-    Plot::Stem stem{4.0 + 8.0 * (i % 2), 4.0 + 8.0 * (i / 2), 0.3};
+    TestPlot::Stem stem{4.0 + 8.0 * (i % 2), 4.0 + 8.0 * (i / 2), 0.3};
     stem.points = 80;  // about 60 of them in the searched layer
     plot.add_stem(stem);
   }
@@ -326,7 +174,7 @@ TEST(Inventory, FewReturnsAreEnoughForAFreeStem) {
 }
 
 TEST(Inventory, AHeightDoesNotReachOverAGapOfSky) {
-  Plot plot(14);
+  TestPlot plot(14);
   plot.add_ground(20.0, 40);
   plot.add_stem({6.0, 6.0, 0.3});
   plot.add_stem({14.0, 14.0, 0.3});
@@ -346,7 +194,7 @@ TEST(Inventory, AHeightDoesNotReachOverAGapOfSky) {
 
 // Defect: ghosts of other pulses over a path where a sleigh had stood made trees 14 m too high.
 TEST(Inventory, GhostsInTheSkyAreNoTops) {
-  Plot plot(17);
+  TestPlot plot(17);
   plot.add_ground(20.0, 40);
   plot.add_stem({6.0, 6.0, 0.3});
   plot.add_stem({14.0, 14.0, 0.3});
@@ -378,7 +226,7 @@ TEST(Inventory, GhostsInTheSkyAreNoTops) {
 }
 
 TEST(Inventory, ATreeThatMayGoOnAboveTheViewHasNoHeight) {
-  Plot plot(19);
+  TestPlot plot(19);
   plot.add_ground(20.0, 40);
   plot.add_stem({6.0, 6.0, 0.3});
   plot.add_stem({14.0, 14.0, 0.3});
@@ -399,9 +247,9 @@ TEST(Inventory, ATreeThatMayGoOnAboveTheViewHasNoHeight) {
 }
 
 TEST(Inventory, AStemHiddenAroundBreastHeightIsNotMeasured) {
-  Plot plot(15);
+  TestPlot plot(15);
   plot.add_ground(12.0, 40);
-  Plot::Stem stem{6.0, 6.0, 0.3};
+  TestPlot::Stem stem{6.0, 6.0, 0.3};
   stem.points = 3000;
   plot.add_stem(stem);
   EXPECT_EQ(take_inventory(blocks_of(plot.cloud), {}).trees.size(), 1U);
@@ -413,7 +261,7 @@ TEST(Inventory, AStemHiddenAroundBreastHeightIsNotMeasured) {
 }
 
 TEST(Inventory, AnAirborneCloudSaysThatStemsAreNotSeen) {
-  Plot plot(9);
+  TestPlot plot(9);
   plot.add_ground(20.0, 4);
   Random random(9);
   for (int i = 0; i < 4000; ++i)
@@ -428,7 +276,7 @@ TEST(Inventory, AnAirborneCloudSaysThatStemsAreNotSeen) {
 }
 
 TEST(Inventory, AnAirborneCloudHasTreesByTheirCrowns) {
-  Plot plot(9);
+  TestPlot plot(9);
   plot.add_ground(20.0, 4);
   Random random(10);
   const std::vector<Eigen::Vector2d> places = {{5.0, 6.0}, {13.0, 12.0}};
@@ -456,52 +304,8 @@ TEST(Inventory, AnAirborneCloudHasTreesByTheirCrowns) {
   }
 }
 
-// Arcs of a quarter of a circle in each slice of 25 cm, turned by `turn_deg` from slice to slice.
-std::vector<SlicePoint> arcs(double turn_deg) {
-  Random random(11);
-  std::vector<SlicePoint> points;
-  for (int slice = 0; slice < 12; ++slice) {
-    for (int i = 0; i < 60; ++i) {
-      const double angle = (turn_deg * slice + random.uniform(0.0, 110.0)) * M_PI / 180.0;
-      const double r = 0.15 + random.normal(0.0, 0.008);
-      points.push_back({static_cast<float>(r * std::cos(angle)),
-                        static_cast<float>(r * std::sin(angle)),
-                        static_cast<float>(0.5 + 0.25 * (slice + random.uniform())), 1});
-    }
-  }
-  return points;
-}
-
-TEST(StemDetector, WhatShowsAnotherSideInEachSliceIsNoStem) {
-  // Pieces of a machine that stood in many places made such rings.
-  std::vector<SlicePoint> stem = arcs(0.0);
-  std::vector<SlicePoint> pieces = arcs(140.0);
-  EXPECT_EQ(detect_stems(stem, {}).size(), 1U);
-  EXPECT_TRUE(detect_stems(pieces, {}).empty());
-}
-
-TEST(StemDetector, AThinStemWithWideScatterIsNotTheEdgeOfAThickOne) {
-  Random random(12);
-  std::vector<SlicePoint> points;
-  for (int i = 0; i < 1200; ++i) {
-    const double angle = random.uniform(0.0, 2.0 * M_PI);
-    points.push_back({static_cast<float>(0.045 * std::cos(angle) + random.normal(0.0, 0.018)),
-                      static_cast<float>(0.045 * std::sin(angle) + random.normal(0.0, 0.018)),
-                      static_cast<float>(random.uniform(0.5, 3.5)), 1});
-  }
-  StemFitResult fit;
-  fit.stem.centre = {0.12, 0.0};  // a circle that only touches it
-  fit.stem.radius_m = 0.13;
-  fit.stem.taper = -0.008;
-  fit.evidence.scatter_m = 0.02;
-  const StemFitResult refined = refine_stem(points, fit, {});
-  ASSERT_TRUE(refined.converged);
-  EXPECT_NEAR(refined.stem.radius_m, 0.045, 0.01);
-  EXPECT_NEAR(refined.stem.centre.x(), 0.0, 0.01);
-}
-
 TEST(Inventory, ThreadsDoNotChangeAnything) {
-  Plot plot(10);
+  TestPlot plot(10);
   plot.add_ground(16.0, 40);
   for (int i = 0; i < 9; ++i)
     plot.add_stem({3.0 + 5.0 * (i % 3), 3.0 + 5.0 * (i / 3), 0.15 + 0.04 * i});

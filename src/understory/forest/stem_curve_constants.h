@@ -1,0 +1,119 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+// The numbers of curves along stems that are no settings, in the form of forest_constants.h.
+namespace understory::stem_constants {
+
+namespace stem_surroundings {  // forest/stems/stem_surroundings.cc
+// m: edge of the squares that know the stems nearby [chosen]
+inline constexpr double kSquare = 1.0;
+// m: one point per cube [chosen]
+inline constexpr double kCube = 0.02;
+// m around the surface whose points are kept at breast height ... [chosen]
+inline constexpr double kReach = 0.2;
+// ... and m per metre above it, added: stems bend [chosen]
+inline constexpr double kReachPerMetre = 0.03;
+// m above the ground: higher points are no tree [bound: the tallest trees have 116 m]
+inline constexpr double kHighest = 120.0;
+// Points that are gathered before they are thinned [bound: memory]
+inline constexpr std::size_t kFirstLimit = 2'000'000;
+}  // namespace stem_surroundings
+
+namespace stem_curve {  // forest/stems/stem_curve.cc
+// m between the sections that are fitted [chosen]
+inline constexpr double kStep = 0.25;
+// m: half of the height of a section [chosen]
+inline constexpr double kHalfWindow = 0.3;
+// m between the sections of a curve [bound: by decimetres]
+inline constexpr double kSectionStep = 0.1;
+// m: a top so near over a section needs none of its own [bound: the decimals of stem_curves.csv]
+inline constexpr double kSameHeight = 0.01;
+// m above the ground: the lowest section that is fitted [chosen]
+inline constexpr double kLowest = 0.3;
+// m: up to here roots make a stem thicker than its form [chosen]
+inline constexpr double kFlareEnd = 1.0;
+// m/m: radius lost per metre of height [as in stem_fit]
+inline constexpr double kUsualTaper = -0.008;
+// m of the radius: thinner stems are not followed [chosen]
+inline constexpr double kThinnest = 0.015;
+// m without a section after which a stem is not followed any more [chosen]
+inline constexpr double kLongestGap = 2.0;
+// m of the radius by which a prediction is wrong [chosen]
+inline constexpr double kPredictionSd = 0.006;
+// Share of a section's shift that turns the axis [chosen]
+inline constexpr double kSlopeGain = 0.15;
+// m around the predicted surface whose points enter a fit [chosen]
+inline constexpr double kFitReach = 0.1;
+// Share of the points that belong to something else at most [chosen]
+inline constexpr double kMostStrays = 0.45;
+// Times the fit's own error: returns are not independent [as in stem_fit]
+inline constexpr double kLinear = 1.5;
+// 1/m: what the error of a radius grows by with its own square [as in stem_fit]
+inline constexpr double kSquare = 1400.0;
+// m of the radius: keyframes do not quite lie on each other [as in stem_fit]
+inline constexpr double kMapError = 0.002;
+// Radii: error of a section at most ... [chosen]
+inline constexpr double kMostSdShare = 0.12;
+// ... and m, added [chosen]
+inline constexpr double kMostSd = 0.003;
+// Radii: scatter of a section's points at most ... [as in stem_detector]
+inline constexpr double kMostScatterShare = 0.2;
+// ... and m, added [as in stem_detector]
+inline constexpr double kMostScatter = 0.012;
+// m: shift of a section from where it was expected at most ... [chosen]
+inline constexpr double kMostShift = 0.03;
+// ... and radii, added [chosen]
+inline constexpr double kMostShiftShare = 0.2;
+// Radii: change from the expected radius at most ... [chosen]
+inline constexpr double kMostChangeShare = 0.1;
+// ... and m, added [chosen]
+inline constexpr double kMostChange = 0.01;
+// Radii: the same growth towards the roots [chosen]
+inline constexpr double kFlare = 0.5;
+// Scatters: points so near to the surface are on it [as in stem_fit]
+inline constexpr double kBandScatters = 2.5;
+// m: the same at least [as in stem_fit]
+inline constexpr double kLeastBand = 0.015;
+// Bands under the surface from which on a point is inside ... [as in stem_fit]
+inline constexpr double kInsideBands = 2.0;
+// ... or radii under it, whichever is more [as in stem_fit]
+inline constexpr double kInsideShare = 0.3;
+// Points inside a section over those on it at most [chosen]
+inline constexpr double kMostInside = 0.3;
+// Points on a section at least [chosen]
+inline constexpr int kFewestPoints = 10;
+// degrees of a section that are seen at least [chosen]
+inline constexpr double kLeastArcDeg = 60.0;
+// Power of the distance to the top that a stem's diameter follows: most stems lie between a
+// paraboloid (0.5) and a cone (1) [bound: Laasasenaho 1982 has 0.6 to 0.7 for pine and spruce]
+inline constexpr double kUsualPower = 0.7;
+// How far stems differ from it [chosen]
+inline constexpr double kPowerSd = 0.12;
+// The least power that is tried [chosen]
+inline constexpr double kLeastPower = 0.4;
+// The greatest one [chosen]
+inline constexpr double kMostPower = 1.2;
+// The step between those that are tried [chosen]
+inline constexpr double kPowerStep = 0.02;
+// Sections that share errors, such as those of the map [chosen]
+inline constexpr double kCorrelatedRings = 4.0;
+// m of the radius: sections scatter about the form by that at least [chosen]
+inline constexpr double kLeastSpread = 0.004;
+// Spreads beyond which a section does not belong to the stem [chosen]
+inline constexpr double kOutlierSpreads = 3.0;
+// m of height over which sections are averaged: one standard deviation [chosen]
+inline constexpr double kSmoothing = 0.35;
+// Diameters per metre beyond what was seen: error of the form ... [chosen]
+inline constexpr double kModelSdPerMetre = 0.03;
+// ... and at most [chosen]
+inline constexpr double kMostModelSd = 0.25;
+// Heights of the last section: where the outline of a tree of unknown height ends [chosen]
+inline constexpr double kUnknownTop = 2.0;
+// m: lower trees have no stem curve [bound: breast height]
+inline constexpr double kLeastTop = 2.0;
+}  // namespace stem_curve
+
+}  // namespace understory::stem_constants
