@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "understory/recording/bags/ros2_bag.h"
+#include "understory/simulation/simulation_uri.h"
 #include "understory/simulation/simulator.h"
 #include "understory/util/error.h"
 

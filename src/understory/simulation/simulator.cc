@@ -1,4 +1,5 @@
 #include "understory/simulation/simulator.h"
+#include "understory/simulation/simulation_uri.h"
 
 #include <algorithm>
 #include <cmath>

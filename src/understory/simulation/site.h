@@ -312,13 +312,4 @@ struct ShippedSite {
 [[nodiscard]] SiteConfig load_site(const std::string& name_or_path,
                                    const std::vector<std::string>& settings);
 
-// "sim:handheld?seed=3&lidar.rays_per_beam=1" in its parts.
-struct SimulationUri {
-  std::string site;
-  std::vector<std::string> settings;
-};
-[[nodiscard]] bool is_simulation_uri(const std::string& text);
-// Throws ConfigError if the text is no such URI.
-[[nodiscard]] SimulationUri parse_simulation_uri(const std::string& text);
-
 }  // namespace understory
