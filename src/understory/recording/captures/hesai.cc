@@ -276,8 +276,7 @@ void HesaiDecoder::add_return(const std::uint8_t* raw, const Beam& beam, const F
   point.intensity = raw[2];
   point.ring = beam.ring;
   point.return_index = return_index;
-  points_.push_back(point);
-  point_times_.push_back(firing.time + beam.firing_ns);
+  growing_.add(point, firing.time + beam.firing_ns);
 }
 
 // Ends the scan when the head passes the start angle, whichever way it turns. Small steps across it
@@ -288,17 +287,16 @@ void HesaiDecoder::turn_to(double azimuth_deg, TimeNs time) {
   const bool jumped = turned_deg_ >= 0.0 && std::abs(turned - turned_deg_) > 0.5 * kTurnDeg;
   const bool short_scan = time - scan_begin_ < kNsPerSecond / 100;
   const bool endless =
-      !points_.empty() && (time - scan_begin_ > kLongestTurn || time < scan_begin_ - kLongestTurn);
+      !growing_.empty() && (time - scan_begin_ > kLongestTurn || time < scan_begin_ - kLongestTurn);
   if (endless) missing_deg_ = 0.0;  // it does not spin
   if ((jumped && !short_scan) || endless) close_scan();
   if (missing_deg_ < 0.0) missing_deg_ = turned;
-  if (points_.empty()) scan_begin_ = time;
+  if (growing_.empty()) scan_begin_ = time;
   turned_deg_ = turned;
 }
 
 void HesaiDecoder::close_scan() {
-  finished_.add(make_scan(points_, point_times_, static_cast<int>(table_.channels)),
-                missing_deg_ / kTurnDeg);
+  finished_.add(growing_.take(static_cast<int>(table_.channels)), missing_deg_ / kTurnDeg);
   missing_deg_ = -1.0;
 }
 
@@ -319,8 +317,7 @@ void HesaiDecoder::save(BinaryWriter& writer) const {
   writer.put(turned_deg_);
   writer.put(missing_deg_);
   writer.put(scan_begin_);
-  writer.put(points_);
-  writer.put(point_times_);
+  growing_.save(writer);
   finished_.save(writer);
 }
 
@@ -338,10 +335,7 @@ void HesaiDecoder::load(BinaryReader& reader) {
   turned_deg_ = reader.get<double>();
   missing_deg_ = reader.get<double>();
   scan_begin_ = reader.get<TimeNs>();
-  points_ = reader.get_vector<ScanPoint>();
-  point_times_ = reader.get_vector<TimeNs>();
-  if (points_.size() != point_times_.size())
-    throw InputError(source_, "", "expected as many times as points of the scan in progress");
+  growing_.load(reader, source_);
   finished_.load(reader);
 }
 

@@ -9,6 +9,7 @@
 
 #include "understory/recording/captures/hesai_calibration.h"
 #include "understory/recording/captures/hesai_tables.h"
+#include "understory/recording/captures/scan_assembly.h"
 #include "understory/recording/captures/sensor_clock.h"
 #include "understory/recording/first_scan.h"
 #include "understory/sensor/scan.h"
@@ -106,8 +107,7 @@ class HesaiDecoder {
   double turned_deg_ = -1.0;               // azimuth since the scan's start angle; -1: no scan yet
   double missing_deg_ = -1.0;              // of the scan in progress, at its beginning
   TimeNs scan_begin_ = 0;
-  std::vector<ScanPoint> points_;  // of the scan in progress
-  std::vector<TimeNs> point_times_;
+  GrowingScan growing_;
   FinishedScans finished_;
 };
 

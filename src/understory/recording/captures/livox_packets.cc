@@ -224,7 +224,7 @@ void LivoxDecoder::decode_waiting(TimeNs next) {
 void LivoxDecoder::decode(ByteSpan packet, const LivoxHead& head, TimeNs time, double interval_ns) {
   for (std::size_t firing = 0; firing < head.firings; ++firing) {
     const TimeNs at = time + std::llround(static_cast<double>(firing) * interval_ns);
-    if (!points_.empty() && (at - scan_begin_ >= config_.scan || at < scan_begin_ - config_.scan))
+    if (!growing_.empty() && (at - scan_begin_ >= config_.scan || at < scan_begin_ - config_.scan))
       close_scan();
     for (std::size_t number = 0; number < head.returns; ++number)
       add_point(packet.data() + head.data_at + firing * head.firing_bytes, head, firing, number,
@@ -239,7 +239,7 @@ void LivoxDecoder::add_point(const std::uint8_t* raw, const LivoxHead& head, std
                               ? spherical(bytes, head, number)
                               : cartesian(bytes, head, number);
   if (found.place.isZero(0.0)) return;
-  if (points_.empty()) scan_begin_ = time;
+  if (growing_.empty()) scan_begin_ = time;
   ScanPoint point;
   point.x = static_cast<float>(found.place.x());
   point.y = static_cast<float>(found.place.y());
@@ -248,12 +248,11 @@ void LivoxDecoder::add_point(const std::uint8_t* raw, const LivoxHead& head, std
   point.ring = static_cast<std::uint16_t>(firing % (head.protocol == 2 ? 4 : 6));
   point.tag = found.tag;
   if (head.protocol == 1) point.return_index = livox_return(found.tag);
-  points_.push_back(point);
-  point_times_.push_back(time);
+  growing_.add(point, time);
 }
 
 void LivoxDecoder::close_scan() {
-  finished_.add(make_scan(points_, point_times_, 0), 0.0);
+  finished_.add(growing_.take(0), 0.0);
 }
 
 std::optional<ImuSample> LivoxDecoder::add_imu_packet(const std::uint8_t* data, std::size_t size,
@@ -302,8 +301,7 @@ void LivoxDecoder::save(BinaryWriter& writer) const {
   writer.put(data_type_);
   writer.put(protocol_);
   writer.put(scan_begin_);
-  writer.put(points_);
-  writer.put(point_times_);
+  growing_.save(writer);
   finished_.save(writer);
 }
 
@@ -331,10 +329,7 @@ void LivoxDecoder::load(BinaryReader& reader) {
   data_type_ = reader.get<std::uint8_t>();
   protocol_ = reader.get<int>();
   scan_begin_ = reader.get<TimeNs>();
-  points_ = reader.get_vector<ScanPoint>();
-  point_times_ = reader.get_vector<TimeNs>();
-  if (points_.size() != point_times_.size())
-    throw InputError(source_, "", "expected as many times as points of the scan in progress");
+  growing_.load(reader, source_);
   finished_.load(reader);
 }
 

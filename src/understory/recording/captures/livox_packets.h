@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "understory/recording/bytes.h"
+#include "understory/recording/captures/scan_assembly.h"
 #include "understory/recording/captures/sensor_clock.h"
 #include "understory/recording/first_scan.h"
 #include "understory/sensor/imu_sample.h"
@@ -99,8 +100,7 @@ class LivoxDecoder {
   std::uint8_t data_type_ = 0;
   int protocol_ = 0;
   TimeNs scan_begin_ = 0;
-  std::vector<ScanPoint> points_;  // of the scan in progress
-  std::vector<TimeNs> point_times_;
+  GrowingScan growing_;
   FinishedScans finished_;
 };
 

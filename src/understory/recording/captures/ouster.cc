@@ -213,13 +213,11 @@ void OusterDecoder::add_return(const Beam& beam, const Column& column, std::uint
   point.intensity = intensity;
   point.ring = beam.ring;
   point.return_index = return_index;
-  points_.push_back(point);
-  point_times_.push_back(column.time);
+  growing_.add(point, column.time);
 }
 
 void OusterDecoder::close_scan() {
-  finished_.add(make_scan(points_, point_times_, metadata_.pixels_per_column),
-                missing_at_beginning());
+  finished_.add(growing_.take(metadata_.pixels_per_column), missing_at_beginning());
   std::fill(seen_.begin(), seen_.end(), false);
 }
 
@@ -283,8 +281,7 @@ void OusterDecoder::save(BinaryWriter& writer) const {
   put_optional(writer, last_imu_);
   put_optional(writer, strange_imu_);
   put_flags(writer, seen_);
-  writer.put(points_);
-  writer.put(point_times_);
+  growing_.save(writer);
   finished_.save(writer);
 }
 
@@ -299,10 +296,7 @@ void OusterDecoder::load(BinaryReader& reader) {
   if (seen.size() != seen_.size())
     throw InputError(source_, "", "its metadata are not those that the run was begun with");
   seen_ = seen;
-  points_ = reader.get_vector<ScanPoint>();
-  point_times_ = reader.get_vector<TimeNs>();
-  if (points_.size() != point_times_.size())
-    throw InputError(source_, "", "expected as many times as points of the scan in progress");
+  growing_.load(reader, source_);
   finished_.load(reader);
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "understory/recording/captures/ouster_metadata.h"
+#include "understory/recording/captures/scan_assembly.h"
 #include "understory/recording/first_scan.h"
 #include "understory/sensor/imu_sample.h"
 #include "understory/sensor/scan.h"
@@ -95,8 +96,7 @@ class OusterDecoder {
   std::optional<TimeNs> strange_imu_;
   std::vector<bool> seen_;  // columns of the scan in progress
   double encoder_cos_ = 1.0, encoder_sin_ = 0.0;
-  std::vector<ScanPoint> points_;
-  std::vector<TimeNs> point_times_;
+  GrowingScan growing_;
   FinishedScans finished_;
 };
 

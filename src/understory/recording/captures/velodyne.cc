@@ -243,8 +243,7 @@ void VelodyneDecoder::add_return(const std::uint8_t* raw, std::size_t laser, con
   point.intensity = raw[2];
   point.ring = beam.ring;
   point.return_index = return_index;
-  points_.push_back(point);
-  point_times_.push_back(shot.time);
+  growing_.add(point, shot.time);
 }
 
 // Ends the scan when the head passes the start angle. Small steps back (the head's encoder is noisy
@@ -254,17 +253,16 @@ void VelodyneDecoder::turn_to(double azimuth_cdeg, TimeNs time) {
   const bool passed = turned < turned_cdeg_ - 0.5 * kTurnCdeg;
   const bool back = turned_cdeg_ >= 0.0 && turned > turned_cdeg_ + 0.5 * kTurnCdeg;
   const bool endless =
-      !points_.empty() && (time - scan_begin_ > kLongestScan || time < scan_begin_);
+      !growing_.empty() && (time - scan_begin_ > kLongestScan || time < scan_begin_);
   if (endless) missing_cdeg_ = 0.0;  // it does not spin
   if (passed || endless) close_scan();
   if (missing_cdeg_ < 0.0) missing_cdeg_ = turned;
-  if (points_.empty()) scan_begin_ = time;
+  if (growing_.empty()) scan_begin_ = time;
   if (!back || endless) turned_cdeg_ = turned;
 }
 
 void VelodyneDecoder::close_scan() {
-  finished_.add(make_scan(points_, point_times_, static_cast<int>(table_.lasers.size())),
-                missing_cdeg_ / kTurnCdeg);
+  finished_.add(growing_.take(static_cast<int>(table_.lasers.size())), missing_cdeg_ / kTurnCdeg);
   missing_cdeg_ = -1.0;
 }
 
@@ -306,8 +304,7 @@ void VelodyneDecoder::save(BinaryWriter& writer) const {
   for (const double value : {rate_cdeg_per_us_, turned_cdeg_, missing_cdeg_})
     writer.put(value);
   writer.put(scan_begin_);
-  writer.put(points_);
-  writer.put(point_times_);
+  growing_.save(writer);
   finished_.save(writer);
 }
 
@@ -324,10 +321,7 @@ void VelodyneDecoder::load(BinaryReader& reader) {
   for (double* value : {&rate_cdeg_per_us_, &turned_cdeg_, &missing_cdeg_})
     *value = reader.get<double>();
   scan_begin_ = reader.get<TimeNs>();
-  points_ = reader.get_vector<ScanPoint>();
-  point_times_ = reader.get_vector<TimeNs>();
-  if (points_.size() != point_times_.size())
-    throw InputError(source_, "", "expected as many times as points of the scan in progress");
+  growing_.load(reader, source_);
   finished_.load(reader);
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/recording/captures/scan_assembly.h"
 #include "understory/recording/captures/velodyne_clock.h"
 #include "understory/recording/captures/velodyne_tables.h"
 #include "understory/recording/first_scan.h"
@@ -118,8 +119,7 @@ class VelodyneDecoder {
   double rate_cdeg_per_us_ = 0.36;
   double turned_cdeg_ = -1.0;  // azimuth since the scan's start angle; -1: no scan yet
   TimeNs scan_begin_ = 0;
-  std::vector<ScanPoint> points_;  // of the scan in progress
-  std::vector<TimeNs> point_times_;
+  GrowingScan growing_;
   double missing_cdeg_ = -1.0;  // of the scan in progress, at its beginning; -1: no firing yet
   FinishedScans finished_;
 };
