@@ -236,35 +236,33 @@ std::string single_trees(const InventoryResult& inventory) {
   return html + "</div>";
 }
 
-std::string diameters(const std::vector<Tree>& trees) {
-  Histogram histogram;
-  histogram.x_label = "diameter at 1.3 m, cm";
+// How many trees have which value, `scale` times the member.
+std::string distribution(const char* title, Histogram histogram, const std::vector<Tree>& trees,
+                         double Tree::*member, double scale) {
   histogram.y_label = "trees";
-  histogram.step = 4.0;
   for (const Tree& tree : trees) {
-    if (!std::isfinite(tree.dbh_m)) continue;
-    const auto bin = static_cast<std::size_t>(100.0 * tree.dbh_m / histogram.step);
-    if (histogram.counts.size() <= bin) histogram.counts.resize(bin + 1, 0);
-    ++histogram.counts[bin];
-  }
-  histogram.counts.push_back(0);
-  return "<figure><h3>Diameters</h3>" + svg_histogram(histogram) + "</figure>";
-}
-
-std::string heights(const std::vector<Tree>& trees) {
-  Histogram histogram;
-  histogram.x_label = "height above the ground, m";
-  histogram.y_label = "trees";
-  histogram.step = 2.0;
-  for (const Tree& tree : trees) {
-    if (!std::isfinite(tree.height_m)) continue;
-    const auto bin = static_cast<std::size_t>(tree.height_m / histogram.step);
+    if (!std::isfinite(tree.*member)) continue;
+    const auto bin = static_cast<std::size_t>(scale * (tree.*member) / histogram.step);
     if (histogram.counts.size() <= bin) histogram.counts.resize(bin + 1, 0);
     ++histogram.counts[bin];
   }
   if (histogram.counts.empty()) return "";
   histogram.counts.push_back(0);
-  return "<figure><h3>Heights</h3>" + svg_histogram(histogram) + "</figure>";
+  return fmt::format("<figure><h3>{}</h3>{}</figure>", title, svg_histogram(histogram));
+}
+
+std::string diameters(const std::vector<Tree>& trees) {
+  Histogram histogram;
+  histogram.x_label = "diameter at 1.3 m, cm";
+  histogram.step = 4.0;
+  return distribution("Diameters", histogram, trees, &Tree::dbh_m, 100.0);
+}
+
+std::string heights(const std::vector<Tree>& trees) {
+  Histogram histogram;
+  histogram.x_label = "height above the ground, m";
+  histogram.step = 2.0;
+  return distribution("Heights", histogram, trees, &Tree::height_m, 1.0);
 }
 
 // How trees are found and what their figures mean, in a forester's words.
