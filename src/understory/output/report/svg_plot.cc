@@ -22,6 +22,10 @@ struct Frame {
   double width = 0.0, height = 0.0;
   bool logarithmic = false;  // limits are powers of ten then
 
+  // Whether a value has a place.
+  [[nodiscard]] bool holds(double x, double y) const {
+    return std::isfinite(y) && (!logarithmic || (x > 0.0 && y > 0.0));
+  }
   [[nodiscard]] double x(double value) const {
     if (logarithmic) value = std::log10(value);
     return kLeft + (value - x_low) / (x_high - x_low) * (width - kLeft - kRight);
@@ -38,6 +42,12 @@ std::string text_at(double x, double y, const char* anchor, const std::string& t
                      anchor, more, escape_html(text));
 }
 
+// Short, as there is little room beside the axis.
+std::string power_text(double power) {
+  return std::abs(power) > 3.0 ? fmt::format("1e{:.0f}", power)
+                               : fmt::format("{:g}", std::pow(10.0, power));
+}
+
 // Powers of ten on both axes.
 std::string logarithmic_ticks(const Frame& frame) {
   std::string svg;
@@ -47,15 +57,14 @@ std::string logarithmic_ticks(const Frame& frame) {
     fmt::format_to(out,
                    "<line class=\"grid\" x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>",
                    kLeft, frame.width - kRight, y, y);
-    svg += text_at(kLeft - 6, y + 4, "end", fmt::format("{:g}", std::pow(10.0, power)));
+    svg += text_at(kLeft - 6, y + 4, "end", power_text(power));
   }
   for (double power = frame.x_low; power <= frame.x_high; ++power) {
     const double x = frame.x(std::pow(10.0, power));
     fmt::format_to(
         out, "<line class=\"grid\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\"/>",
         x, kTop, frame.height - kBottom);
-    svg += text_at(x, frame.height - kBottom + 17, "middle",
-                   fmt::format("{:g}", std::pow(10.0, power)));
+    svg += text_at(x, frame.height - kBottom + 17, "middle", power_text(power));
   }
   return svg;
 }
@@ -104,7 +113,7 @@ std::string drawn(const PlotSeries& series, const Frame& frame) {
   const auto out = std::back_inserter(svg);
   if (series.dots) {
     for (const auto& [x, y] : series.points) {
-      if (!std::isfinite(y)) continue;
+      if (!frame.holds(x, y)) continue;
       fmt::format_to(out, "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.2\" fill=\"{}\"/>", frame.x(x),
                      frame.y(frame.logarithmic ? y : std::min(y, frame.y_high)), series.colour);
     }
@@ -113,7 +122,7 @@ std::string drawn(const PlotSeries& series, const Frame& frame) {
   fmt::format_to(out, "<path class=\"line\" stroke=\"{}\" d=\"", series.colour);
   bool pen = false;
   for (const auto& [x, y] : series.points) {
-    if (!std::isfinite(y)) {
+    if (!frame.holds(x, y)) {
       pen = false;
       continue;
     }

@@ -103,10 +103,19 @@ TEST(SvgPlot, LogarithmicAxesHavePowersOfTen) {
   plot.logarithmic = true;
   plot.series = {{"x", "red", {{0.1, 1e-3}, {1.0, 1e-4}, {100.0, 1e-5}}, false}};
   const std::string svg = svg_plot(plot);
-  for (const char* tick : {">0.1<", ">1<", ">10<", ">100<", ">0.001<", ">0.0001<", ">1e-05<"})
+  for (const char* tick : {">0.1<", ">1<", ">10<", ">100<", ">0.001<", ">1e-4<", ">1e-5<"})
     EXPECT_NE(svg.find(tick), std::string::npos) << tick;
   // The three points are equally far apart in y, and in x by 1 and 2 decades of three.
   EXPECT_NE(svg.find("M58.0 12.0L274.0 105.0L706.0 198.0"), std::string::npos) << svg;
+}
+
+TEST(SvgPlot, WhatHasNoLogarithmIsNotDrawn) {
+  Plot plot;
+  plot.logarithmic = true;
+  plot.series = {{"x", "red", {{0.1, 1e-3}, {1.0, 0.0}, {10.0, -1.0}, {100.0, 1e-5}}, true}};
+  const std::string svg = svg_plot(plot);
+  EXPECT_EQ(svg.find("inf"), std::string::npos) << svg;
+  EXPECT_EQ(svg.find("nan"), std::string::npos) << svg;
 }
 
 }  // namespace

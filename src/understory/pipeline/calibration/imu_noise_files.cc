@@ -92,7 +92,7 @@ std::string plot_of(const NamedSensor& sensor) {
   const char* colours[] = {"var(--bad)", "var(--good)", "var(--path)"};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     PlotSeries measured{std::string(kAxisNames[axis]), colours[axis], {}, true};
-    PlotSeries fitted{axis == 2 ? "lines: fitted" : "", colours[axis], {}, false};
+    PlotSeries fitted{"", colours[axis], {}, false};
     for (const AllanPoint& point : sensor.noise->curves[axis]) {
       if (!(point.deviation > 0.0)) continue;
       measured.points.emplace_back(point.time_s, point.deviation);
@@ -137,8 +137,10 @@ std::string page_of(const ImuNoise& noise, const ImuNoiseFacts& facts) {
     html += "</ul></section>";
   }
   for (const NamedSensor& sensor : sensors_of(noise))
-    html += fmt::format("<section><h2>{}</h2>{}{}</section>", sensor.name, table_of(sensor),
-                        plot_of(sensor));
+    html += fmt::format(
+        "<section><h2>{}</h2>{}<p class=\"sub\">Dots are measured, lines are "
+        "fitted.</p>{}</section>",
+        sensor.name, table_of(sensor), plot_of(sensor));
   return html + "</main></body></html>\n";
 }
 

@@ -45,7 +45,7 @@ std::string reason_of(const MatchVerdict& verdict, const Pose& pose) {
   return "the chance that the pose is right is only " + share_of(verdict.chance);
 }
 
-// Poses the refusal that holds whatever the evidence is; empty: none.
+// Why no pose between these clouds can be judged; empty: it can.
 std::string refusal_of(const SearchCloud& target, const SearchCloud& source) {
   if (!target.trouble.empty()) return "the target cannot be judged: " + target.trouble;
   if (!source.trouble.empty()) return "the source cannot be judged: " + source.trouble;
