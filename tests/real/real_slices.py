@@ -53,6 +53,19 @@ def check_exact(folder):
     assert json.loads((run / "run.json").read_text())["status"] == "complete"
 
 
+def check_slope(folder):
+    """The same stems on a slope of 30 degrees: a cut may follow the ground."""
+    las = laspy.read(EXACT)
+    z = np.asarray(las.z) + np.tan(np.radians(30.0)) * np.asarray(las.x)
+    las.z = z
+    las.write(str(folder / "slope.laz"))
+    code, trees, _ = measure(folder / "slope.laz", folder, "--slice")
+    assert code == 0 and len(trees) == 20, (code, len(trees))
+    for tree in trees:
+        assert abs(float(tree["z"]) - 1.3 - np.tan(np.radians(30.0)) * float(tree["x"])) < 0.6
+    print("slope: 20 stems")
+
+
 def main():
     if not EXACT.exists() or not CUTS.exists():
         return 77
@@ -65,6 +78,12 @@ def main():
             print(f"{name}: {[f'{100 * d:.1f} cm' for d in found]}")
             assert code == 0 and len(found) == len(expected)
             assert all(abs(a - b) < 0.01 for a, b in zip(found, expected))
+        check_slope(folder)
+        whole = DATA / "spanner_mls_uas_als" / "MLS_Clip.laz"
+        refused = subprocess.run([PROGRAM, "inventory", str(whole), "--slice", "-o", str(folder / "whole")],
+                                 capture_output=True, text=True, check=False)
+        assert refused.returncode == 3 and "m thick" in refused.stderr, refused.stderr
+        assert not (folder / "whole" / "trees.csv").exists()
         code, trees, _ = measure(EXACT, folder)
         assert code == 4 and not trees
         assert "--slice" in json.loads((folder / EXACT.stem / "run.json").read_text())["reasons"][0]

@@ -6,11 +6,14 @@
 #include <cmath>
 #include <limits>
 #include <unordered_set>
+#include <utility>
+#include <vector>
 
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/slice_stems.h"
 #include "understory/forest/stems/slice_thinner.h"
 #include "understory/forest/stems/stem_axis.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -35,19 +38,58 @@ Extent extent_of(const PointBlocks& cloud) {
   return extent;
 }
 
-// A level plane for the drawings.
-Raster plane_below(const Extent& extent) {
-  Raster plane;
-  plane.cell_m = std::max(1.0, (extent.high - extent.low).head<2>().maxCoeff() / kMostCells);
-  plane.x0 = std::floor(extent.low.x()) - plane.cell_m;
-  plane.y0 = std::floor(extent.low.y()) - plane.cell_m;
-  plane.z0 = 0.5 * (extent.low.z() + extent.high.z()) - kBreastHeight;
-  plane.columns = static_cast<int>((extent.high.x() - plane.x0) / plane.cell_m) + 2;
-  plane.rows = static_cast<int>((extent.high.y() - plane.y0) / plane.cell_m) + 2;
-  plane.values.assign(
-      static_cast<std::size_t>(plane.columns) * static_cast<std::size_t>(plane.rows), 0.0F);
-  return plane;
-}
+// The middle of the cut in each square, as a surface; where it holds nothing, that of all points.
+class CutSurface {
+ public:
+  explicit CutSurface(const Extent& extent) {
+    raster_.cell_m = std::max(1.0, (extent.high - extent.low).head<2>().maxCoeff() / kMostCells);
+    raster_.x0 = std::floor(extent.low.x()) - raster_.cell_m;
+    raster_.y0 = std::floor(extent.low.y()) - raster_.cell_m;
+    raster_.z0 = 0.5 * (extent.low.z() + extent.high.z());
+    raster_.columns = raster_.column_of(extent.high.x()) + 2;
+    raster_.rows = raster_.row_of(extent.high.y()) + 2;
+    const auto cells =
+        static_cast<std::size_t>(raster_.columns) * static_cast<std::size_t>(raster_.rows);
+    raster_.values.assign(cells, 0.0F);
+    squares_.assign(cells, {});
+  }
+
+  void add(const Eigen::Vector3d& point) {
+    const std::size_t at = raster_.index(raster_.column_of(point.x()), raster_.row_of(point.y()));
+    Square& square = squares_[at];
+    const auto z = static_cast<float>(point.z() - raster_.z0);
+    square.low = std::min(square.low, z);
+    square.high = std::max(square.high, z);
+  }
+
+  // Metres from the lowest to the highest point of a square, exceeded by a tenth of them.
+  [[nodiscard]] double thickness() const {
+    std::vector<float> all;
+    for (const Square& square : squares_)
+      if (square.high > square.low) all.push_back(square.high - square.low);
+    if (all.empty()) return 0.0;
+    const auto at = static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(all.size() - 1));
+    std::nth_element(all.begin(), all.begin() + at, all.end());
+    return static_cast<double>(all[static_cast<std::size_t>(at)]);
+  }
+
+  // Lowered by breast height, as if it were ground.
+  [[nodiscard]] Raster as_ground() {
+    for (std::size_t i = 0; i < squares_.size(); ++i)
+      if (squares_[i].high >= squares_[i].low)
+        raster_.values[i] = 0.5F * (squares_[i].low + squares_[i].high);
+    raster_.z0 -= kBreastHeight;
+    return std::move(raster_);
+  }
+
+ private:
+  struct Square {
+    float low = std::numeric_limits<float>::max();
+    float high = std::numeric_limits<float>::lowest();
+  };
+  Raster raster_;
+  std::vector<Square> squares_;
+};
 
 // Squares of a metre that hold points.
 double area_of(const std::vector<SlicePoint>& points) {
@@ -66,7 +108,7 @@ Tree tree_of(const InventoryResult& result, const StemFit& stem, int id) {
   tree.id = id;
   tree.x = result.origin.x() + stem.centre.x();
   tree.y = result.origin.y() + stem.centre.y();
-  tree.z = result.ground.terrain.z0 + kBreastHeight;
+  tree.z = result.ground.terrain.cell_value(tree.x, tree.y) + kBreastHeight;
   tree.dbh_m = 2.0 * stem.radius_m;
   tree.dbh_sd_m = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
   tree.observations = stem.returns;
@@ -91,8 +133,8 @@ void remark(const std::vector<SliceStem>& stems, double thickness_m, InventoryRe
 
 }  // namespace
 
-InventoryResult take_slice(const PointBlocks& unasked, const InventoryConfig& config,
-                           const ProgressSink& progress) {
+InventoryResult take_slice(const PointBlocks& unasked, const std::string& name,
+                           const InventoryConfig& config, const ProgressSink& progress) {
   const PointBlocks cloud = polled(unasked, progress);
   InventoryResult result;
   const Extent extent = extent_of(cloud);
@@ -101,8 +143,20 @@ InventoryResult take_slice(const PointBlocks& unasked, const InventoryConfig& co
     result.remarks.emplace_back("The cloud holds no points.");
     return result;
   }
+  CutSurface surface(extent);
+  cloud([&](std::span<const Eigen::Vector3d> points) {
+    for (const Eigen::Vector3d& point : points)
+      surface.add(point);
+  });
+  const double thickness_m = surface.thickness();
+  if (thickness_m > kThickest)
+    throw InputError(
+        name, "",
+        fmt::format("expected one thin cut, up to {:.1f} m thick: the cloud is {:.1f} m "
+                    "thick. Leave out --slice",
+                    kThickest, thickness_m));
   result.ground.config = config.ground;
-  result.ground.terrain = plane_below(extent);
+  result.ground.terrain = surface.as_ground();
   result.origin = {std::round(extent.low.x()), std::round(extent.low.y()),
                    result.ground.terrain.z0};
   SliceThinner thinner(std::min(kThin, config.stems.thin_m));
@@ -117,7 +171,7 @@ InventoryResult take_slice(const PointBlocks& unasked, const InventoryConfig& co
     result.trees.push_back(tree_of(result, slice.stem, static_cast<int>(result.stems.size())));
   }
   result.area_m2 = area_of(result.slices);
-  remark(stems, extent.high.z() - extent.low.z(), result);
+  remark(stems, thickness_m, result);
   return result;
 }
 

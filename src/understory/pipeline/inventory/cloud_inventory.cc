@@ -259,7 +259,7 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
   {
     const ScopedTimer timer(times, "inventory");
     stock.inventory = request.slice
-                          ? take_slice(blocks, request.config, progress)
+                          ? take_slice(blocks, stock.path.string(), request.config, progress)
                           : take_inventory(blocks, request.config, progress,
                                            stock.of_run ? seen_in_run(request.cloud) : SeenTest());
   }
