@@ -7,6 +7,7 @@
 #include "understory/registration/global/global_match.h"
 #include "understory/registration/global/level_cloud.h"
 #include "understory/registration/global/match_verdict.h"
+#include "understory/registration/global/pose_evidence.h"
 #include "understory/registration/global/range_view.h"
 #include "understory/registration/global/search_cloud.h"
 #include "understory/registration/global/test_scans.h"
@@ -97,6 +98,34 @@ TEST(MatchVerdict, AMatchThatDidNotConvergeOrLeavesDirectionsOpenIsRefused) {
   result.status = RegistrationStatus::kConverged;
   result.degenerate_directions = Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, 1);
   EXPECT_FALSE(judge_match(scans.target, scans.source, result).trusted);
+}
+
+// What speaks for a pose is counted at the right one, and what speaks against it at a wrong one.
+TEST(MatchVerdict, TheEvidenceTellsTheRightPoseFromAWrongOne) {
+  const TwoScans& scans = two_scans();
+  const SearchCloud target = prepare_search(scans.target);
+  const SearchCloud source = prepare_search(scans.source);
+  const Pose right = target.level_from_cloud * scans.truth * source.level_from_cloud.inverse();
+  const PoseEvidence good = weigh_pose(target, source, right);
+  EXPECT_GE(good.matched, 8.0);
+  EXPECT_GT(good.matched, 2.0 * good.by_chance);
+  EXPECT_LT(good.seen_through, 0.02);
+  const PoseEvidence bad = weigh_pose(target, source, right * turned(2.5, 1.5, 0.0, 0.4));
+  EXPECT_LT(bad.matched, 0.5 * good.matched);
+  EXPECT_GT(bad.seen_through, 3.0 * good.seen_through + 0.02);
+  EXPECT_LT(bad.near, good.near);
+}
+
+TEST(MatchVerdict, AMatchBesideTheRightPoseIsRefused) {
+  const TwoScans& scans = two_scans();
+  RegistrationResult result;
+  result.status = RegistrationStatus::kConverged;
+  for (const double off : {0.35, 0.45}) {
+    result.target_from_source = scans.truth * turned(off, 0.0, 0.0, 0.0);
+    const MatchVerdict verdict = judge_match(scans.target, scans.source, result);
+    EXPECT_FALSE(verdict.trusted) << off << " m beside it";
+    EXPECT_GT(verdict.moved_m, 0.25) << off;
+  }
 }
 
 // Each trait moves the chance the way that it should.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -148,6 +149,27 @@ TEST(RingFeatures, GroundIsWhereRingsRiseLittle) {
   }
   ASSERT_GT(ground, 2000.0);
   EXPECT_GT(low / ground, 0.95);
+}
+
+TEST(RingFeatures, TheHighestAndTheLowestRingOnTheGroundAreGround) {
+  // Rings of a level floor around the lidar: those at both ends have one neighbour each.
+  RingScan scan;
+  for (std::uint16_t ring = 0; ring < 4; ++ring) {
+    for (int i = 0; i < 720; ++i) {
+      const double turn = i * M_PI / 360.0;
+      const double range = 3.0 + 0.5 * ring;
+      scan.points.emplace_back(static_cast<float>(range * std::cos(turn)),
+                               static_cast<float>(range * std::sin(turn)), -1.6F);
+      scan.ring.push_back(ring);
+    }
+  }
+  const std::vector<PointFeature> features =
+      RingFeatureFinder({}, true).find({&scan.points, &scan.ring});
+  std::array<int, 4> ground{};
+  for (std::size_t i = 0; i < features.size(); ++i)
+    ground[scan.ring[i]] += features[i] == PointFeature::kGround ? 1 : 0;
+  for (std::size_t ring = 0; ring < 4; ++ring)
+    EXPECT_GT(ground[ring], 450) << "ring " << ring;
 }
 
 TEST(RingFeatures, ACloudWithoutRingsIsAnInputError) {
