@@ -178,6 +178,27 @@ TEST(Hesai, NamesPacketsThatAreCutDoubledMissingOrStrange) {
   EXPECT_NE(all.find("has 900 bytes, expected 1080"), std::string::npos) << all;
 }
 
+TEST(Hesai, AFiringWithAnImpossibleAzimuthIsLeftOutAndSaid) {
+  Log log;
+  HesaiDecoder whole({}, "walk.pcap", log);
+  HesaiDecoder broken({}, "walk.pcap", log);
+  Bytes packet = HesaiPacket{}.bytes();
+  whole.add_packet(packet.data(), packet.size(), kHesaiTime);
+  EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 0U);
+  const std::size_t third = 12 + 2 * (2 + 32 * 4);  // header, then blocks of 32 channels
+  packet[third] = 0x40;
+  packet[third + 1] = 0x9C;  // 400.00 degrees
+  broken.add_packet(packet.data(), packet.size(), kHesaiTime);
+  EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 1U);
+  whole.finish();
+  broken.finish();
+  const ScanPtr all = whole.take_scan();
+  const ScanPtr rest = broken.take_scan();
+  ASSERT_NE(all, nullptr);
+  ASSERT_NE(rest, nullptr);
+  EXPECT_EQ(rest->points.size() + 32, all->points.size());
+}
+
 TEST(Hesai, SaysWhatItDoesNotRead) {
   Bytes packet = HesaiPacket().bytes();
   packet[2] = 4;
