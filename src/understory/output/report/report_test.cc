@@ -79,6 +79,31 @@ TEST(Report, AFullInventoryHasTheStemVolumePerHectare) {
   EXPECT_NE(html.find("<td class=\"n\">12.3</td>"), std::string::npos);
 }
 
+// Trees by their crowns come after those with stems, and have no figures of a stem.
+TEST(Report, TreesByTheirCrownsStandInTheTableWithoutAStem) {
+  InventoryResult inventory;
+  inventory.area_m2 = 1'000.0;
+  inventory.trees.resize(2);
+  inventory.stems.resize(1);
+  inventory.stems[0].arc_deg = 123.0;
+  inventory.trees[0].dbh_m = 0.25;
+  inventory.trees[1].height_m = 18.4;
+  inventory.trees[1].crown_area_m2 = 9.5;
+  ReportInput input;
+  input.inventory = &inventory;
+  const std::string both = report_html(input);
+  EXPECT_EQ(count_of(both, "<td class=\"n\">123</td>"), 1U);
+  EXPECT_NE(both.find("<td class=\"n\">18.4</td>"), std::string::npos);
+  EXPECT_NE(both.find("trees found by their crowns"), std::string::npos);
+  EXPECT_NE(both.find("25.0 cm"), std::string::npos) << "the mean of the one diameter";
+  inventory.trees.erase(inventory.trees.begin());
+  inventory.stems.clear();
+  const std::string crowns = report_html(input);
+  EXPECT_EQ(crowns.find("seen around"), std::string::npos);
+  EXPECT_EQ(crowns.find("diameter, cm"), std::string::npos);
+  EXPECT_NE(crowns.find("height above the ground, m"), std::string::npos);
+}
+
 // "distance 20 cm; less is better" was taken for the error of the map.
 TEST(Report, TellsWhatTheDistanceOfMatchedPointsIs) {
   ReportInput input;

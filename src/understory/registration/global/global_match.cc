@@ -103,9 +103,11 @@ RegistrationResult refine_pose(const SearchCloud& target, const SearchCloud& sou
   return target.fine_target->match(some, start, terms, MatchStart::kFar);
 }
 
-Pose refined_pose(const SearchCloud& target, const SearchCloud& source, const Pose& start) {
+std::optional<Pose> refined_pose(const SearchCloud& target, const SearchCloud& source,
+                                 const Pose& start) {
   const RegistrationResult result = refine_pose(target, source, start);
-  return result.usable() ? result.target_from_source : start;
+  if (!result.usable()) return std::nullopt;
+  return result.target_from_source;
 }
 
 double pose_score(const SearchCloud& target, const SearchCloud& source,

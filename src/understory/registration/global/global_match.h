@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "understory/geometry/pose.h"
@@ -28,9 +29,9 @@ struct GlobalCandidate {
 // refine_pose of a candidate with what its uprights tell.
 [[nodiscard]] RegistrationResult last_steps(const SearchCloud& target, const SearchCloud& source,
                                             const GlobalCandidate& candidate);
-// The pose of a match without terms; `start` if it finds nothing.
-[[nodiscard]] Pose refined_pose(const SearchCloud& target, const SearchCloud& source,
-                                const Pose& start);
+// The pose of a match without terms; nothing if it finds none.
+[[nodiscard]] std::optional<Pose> refined_pose(const SearchCloud& target, const SearchCloud& source,
+                                               const Pose& start);
 
 // How well a pose fits, see GlobalCandidate::score.
 [[nodiscard]] double pose_score(const SearchCloud& target, const SearchCloud& source,

@@ -120,7 +120,7 @@ TEST(MatchVerdict, AMatchBesideTheRightPoseIsRefused) {
   const TwoScans& scans = two_scans();
   RegistrationResult result;
   result.status = RegistrationStatus::kConverged;
-  for (const double off : {0.35, 0.45}) {
+  for (const double off : {0.28, 0.3, 0.35, 0.45}) {
     result.target_from_source = scans.truth * turned(off, 0.0, 0.0, 0.0);
     const MatchVerdict verdict = judge_match(scans.target, scans.source, result);
     EXPECT_FALSE(verdict.trusted) << off << " m beside it";

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -103,9 +104,11 @@ MatchVerdict judge_pose(const SearchCloud& target, const SearchCloud& source,
   verdict.chance =
       chance_of_right(verdict.evidence, verdict.score,
                       verdict.rival ? std::optional(verdict.rival->score) : std::nullopt);
-  const Pose on = target_from_source.inverse() * refined_pose(target, source, target_from_source);
-  verdict.moved_m = on.translation().norm();
-  verdict.moved_deg = degrees(on.angle());
+  if (const std::optional<Pose> refined = refined_pose(target, source, target_from_source)) {
+    const Pose on = target_from_source.inverse() * *refined;
+    verdict.moved_m = on.translation().norm();
+    verdict.moved_deg = degrees(on.angle());
+  }
   verdict.trusted = verdict.chance >= kTrusted;
   if (!verdict.trusted) {
     verdict.reason = reason_of(verdict, target_from_source);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,8 +28,10 @@ struct MatchVerdict {
   PoseEvidence evidence;
   double score = 0.0;  // of the pose, as GlobalCandidate::score
   std::optional<RivalPose> rival;
-  double moved_m = 0.0;  // how far NDT with small cells moves the pose on
-  double moved_deg = 0.0;
+  // How far NDT with small cells moves the pose on; NaN where sparse clouds have too little for it,
+  // and then it says nothing against the pose.
+  double moved_m = std::numeric_limits<double>::quiet_NaN();
+  double moved_deg = std::numeric_limits<double>::quiet_NaN();
 };
 
 // The chance that a pose is right, by logistic regression on simulated and real pairs
