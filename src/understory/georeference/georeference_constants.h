@@ -24,6 +24,30 @@ namespace satellite_pairs {  // georeference/satellites/satellite_pairs.cc
 inline constexpr double kUpright = 0.5;
 }  // namespace satellite_pairs
 
+namespace satellite_belief {  // georeference/satellites/satellite_belief.cc
+// m: steps of the path that show which way the carrier goes [chosen]
+inline constexpr double kCourseStepM = 1.0;
+// m/s below which a course of `course_way_m` tells no heading [chosen: slow walking]
+inline constexpr double kSlowestCourseMS = 0.4;
+// m from the body's origin beyond which a centre of turning is none [bound: a lidar's range]
+inline constexpr double kFarthestCentreM = 50.0;
+// Fixes kept for the course, at most [bound: memory]
+inline constexpr std::size_t kMostFixes = 2'000;
+// A fix whose way since the one before the course's way is off that of the odometry by more
+// standard deviations counts less [chosen]
+inline constexpr double kFarSteps = 4.0;
+// Error of the odometry over that way, m [chosen: ten times that of a good one]
+inline constexpr double kOdometryErrorM = 0.03;
+// and as a share of it [chosen: ten times that of a good one]
+inline constexpr double kOdometryErrorShare = 0.02;
+// Share of the distrust that is left at the next fix [chosen: gone after some ten seconds]
+inline constexpr double kDistrustKept = 0.95;
+// Standard deviation of a height that nothing tells, m [chosen: as good as nothing]
+inline constexpr double kUnknownM = 1e3;
+// and of an angle, rad [chosen: as good as nothing]
+inline constexpr double kUnknownRad = 10.0;
+}  // namespace satellite_belief
+
 namespace second_antenna {  // georeference/satellites/second_antenna.cc
 // Pairs with a heading at least [bound: a median that leaves one out]
 inline constexpr std::size_t kFewestHeadings = 3;

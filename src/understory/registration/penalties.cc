@@ -55,6 +55,16 @@ PoseBelief belief_of(const Pose& target_from_source, const Matrix6d& covariance)
   return belief;
 }
 
+// A push F at p moves by v without a turn if F = I_tt v and p x F = I_rt v.
+Eigen::Vector3d centre_of_turning(const Matrix6d& information) {
+  const Eigen::Matrix3d holds = information.bottomRightCorner<3, 3>();
+  const Eigen::FullPivLU<Eigen::Matrix3d> solver(holds);
+  if (!solver.isInvertible()) return Eigen::Vector3d::Zero();
+  const Eigen::Matrix3d turns = information.topRightCorner<3, 3>() * solver.inverse();
+  return 0.5 * Eigen::Vector3d(turns(2, 1) - turns(1, 2), turns(0, 2) - turns(2, 0),
+                               turns(1, 0) - turns(0, 1));
+}
+
 PoseTerm penalty_term(const PoseBelief& belief, PenaltyForm form, double arm_m, double scale) {
   UNDERSTORY_CHECK(arm_m > 0.0 && scale > 0.0);
   if (form == PenaltyForm::kDirect) return direct_term(belief);

@@ -176,5 +176,25 @@ TEST(Penalties, OnePointDriftsInPitchAndThreePointsDoNot) {
   EXPECT_LT(three.off_m, 0.5 * none.off_m);
 }
 
+// Points that are held in all directions alike turn about their centroid.
+TEST(Penalties, APushAtTheCentreOfTurningTurnsNothing) {
+  const std::vector<Eigen::Vector3d> points = {
+      {4.0, 1.0, -1.0}, {-2.0, 3.0, 2.0}, {1.0, -5.0, 5.0}};
+  Matrix6d information = Matrix6d::Zero();
+  for (const Eigen::Vector3d& point : points) {
+    Eigen::Matrix<double, 3, 6> moved;
+    moved << -skew(point), Eigen::Matrix3d::Identity();
+    information += 40.0 * moved.transpose() * moved;
+  }
+  const Eigen::Vector3d centre = centre_of_turning(information);
+  EXPECT_LT((centre - Eigen::Vector3d(1.0, -1.0 / 3.0, 2.0)).norm(), 1e-9);
+  const Eigen::Vector3d push(3.0, -2.0, 1.0);
+  Vector6d wrench;
+  wrench << centre.cross(push), push;
+  const Vector6d motion = information.ldlt().solve(wrench);
+  EXPECT_LT(motion.head<3>().norm(), 1e-9);
+  EXPECT_EQ(centre_of_turning(Matrix6d::Zero()), Eigen::Vector3d::Zero());
+}
+
 }  // namespace
 }  // namespace understory

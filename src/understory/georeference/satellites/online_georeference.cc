@@ -8,6 +8,7 @@
 
 #include "understory/geometry/pose_io.h"
 #include "understory/georeference/georeference_constants.h"
+#include "understory/sensor/fix_position.h"
 #include "understory/sensor/sensor_io.h"
 #include "understory/util/angles.h"
 
@@ -33,11 +34,6 @@ Vector4d plane_sd() {
 Vector3d height_sd(const OnlineGeoreferenceConfig& config) {
   const double tilt = config.tilt_sd_deg * kDegree;
   return {kFarM, tilt, tilt};
-}
-
-bool has_position(const GnssFix& fix) {
-  return fix.quality != 0 && std::isfinite(fix.latitude_deg) && std::isfinite(fix.longitude_deg) &&
-         std::abs(fix.latitude_deg) <= 90.0 && std::abs(fix.longitude_deg) <= 360.0;
 }
 
 Matrix2d turn_by(double angle) {

@@ -67,7 +67,8 @@ void DenseOdometry::add_imu(const ImuSample& sample) {
   if (uses_imu_) motion_->add_imu(sample);
 }
 
-DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& local_map) {
+DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& local_map,
+                                     const ScanKnowledge& known) {
   DenseEstimate estimate;
   const double cpu_start = process_cpu_seconds();
   {
@@ -75,7 +76,8 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
     estimate.scan_end = scan.end();
     const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, estimate.scan_end);
     preprocess(scan, guess, estimate);
-    if (local_map) match(*local_map, motion_->predict(scan.stamp), estimate);
+    const bool by_match = local_map && !known.pose;
+    if (by_match) match(*local_map, motion_->predict(scan.stamp), known.terms, estimate);
     watch_scan_motion(scan, local_map, guess, estimate);
     if (config_.elastic_scans && estimate.matched && by_scans_alone())
       match_elastically(scan, *local_map, guess, estimate);
@@ -83,6 +85,13 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
     if (estimate.matched) {
       factor = LidarFactor{estimate.match.target_from_source, estimate.match.fitness_m2,
                            estimate.match.information};
+    }
+    if (local_map && known.pose) {
+      factor = known.pose;
+      estimate.matched = true;
+      estimate.match.status = RegistrationStatus::kConverged;
+      estimate.match.target_from_source = known.pose->world_from_body;
+      estimate.match.inlier_ratio = 1.0;
     }
     {
       const ScopedTimer smoothing(times_, "smoothing");
@@ -146,12 +155,12 @@ void DenseOdometry::match_elastically(const Scan& scan, const MatchTarget& targe
 }
 
 void DenseOdometry::match(const MatchTarget& local_map, const NavState& predicted,
-                          DenseEstimate& estimate) {
+                          const PoseTerms& known, DenseEstimate& estimate) {
   const ScopedTimer timer(times_, "matching");
   const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
   const ScanMatchConfig& config = config_.match;
   const bool far = !last_matched_ || sigma > config.coarse_above_sigma * local_map.reach_m();
-  PoseTerms terms;
+  PoseTerms terms = known;
   if (config.prior_weight > 0.0) {
     const Matrix6d loose = predicted.pose_covariance + 1e-9 * Matrix6d::Identity();
     if (config.prior_form == PenaltyForm::kDirect) {

@@ -72,6 +72,12 @@ struct DenseEstimate {
   double cpu_ms = 0.0;
 };
 
+// What is known of a scan's pose besides its points.
+struct ScanKnowledge {
+  PoseTerms terms;                  // count in its match
+  std::optional<LidarFactor> pose;  // stands instead of a match
+};
+
 // Dense lidar-inertial odometry, P4 F2 (left graph) and P2 section 2: predict, deskew, thin, match
 // to the local map (null: none yet), smooth. The local map is the caller's; one scan after another
 // in order of time. Not thread-safe; parallel inside.
@@ -83,7 +89,8 @@ class DenseOdometry {
                 std::shared_ptr<const FeatureFinder> features, StageTimes& times, Log& log);
 
   void add_imu(const ImuSample& sample);
-  [[nodiscard]] DenseEstimate process(const Scan& scan, const MatchTargetPtr& local_map);
+  [[nodiscard]] DenseEstimate process(const Scan& scan, const MatchTargetPtr& local_map,
+                                      const ScanKnowledge& known = {});
   // See MotionModel; before the first scan.
   void set_initial_motion(const Eigen::Vector3d& velocity_m_s,
                           const Eigen::Vector3d& angular_rate_rad_s);
@@ -112,7 +119,8 @@ class DenseOdometry {
                          const std::vector<StampedPose>& guess, DenseEstimate& estimate);
   void watch_scan_motion(const Scan& scan, const MatchTargetPtr& local_map,
                          const std::vector<StampedPose>& guess, const DenseEstimate& estimate);
-  void match(const MatchTarget& local_map, const NavState& predicted, DenseEstimate& estimate);
+  void match(const MatchTarget& local_map, const NavState& predicted, const PoseTerms& known,
+             DenseEstimate& estimate);
 
   DenseOdometryConfig config_;
   Rig rig_;

@@ -242,12 +242,14 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
     return update;
   }
   std::optional<PoseFactor> lidar;
+  bool matched = false;
   Eigen::Vector3d match_velocity = before.velocity;
   if (factor) {
     const Matrix6d adjoint = body_from_imu_.inverse().adjoint();
     lidar = PoseFactor{factor->world_from_body * body_from_imu_,
                        adjoint * lidar_covariance(*factor, config_.lidar) * adjoint.transpose()};
-    if (last_match_) {
+    matched = !factor->covariance;
+    if (matched && last_match_) {
       match_velocity =
           (lidar->world_from_imu.translation() - last_match_->world_from_imu.translation()) /
           to_seconds(stamp - last_match_->stamp);
@@ -255,7 +257,7 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
   }
   MotionInterval interval = make_interval(before.stamp, stamp);
   const bool was_usable = use_imu();
-  watch_imu(stamp, interval, lidar);
+  watch_imu(stamp, interval, matched ? lidar : std::nullopt);
 
   MotionUpdate update;
   if (was_usable != use_imu()) {
@@ -263,8 +265,12 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
     update.status = MotionStatus::kAccepted;
   } else {
     learn_vertical(interval);
-    if (lidar) {
+    if (matched) {
       update = add_matched(stamp, interval, *lidar, match_velocity);
+    } else if (lidar) {
+      // A pose by other sensors has its own covariance, and jumps within it.
+      add_state(stamp, interval, lidar);
+      update.status = MotionStatus::kAccepted;
     } else {
       update.reason = "no match";
       add_state(stamp, interval, std::nullopt);

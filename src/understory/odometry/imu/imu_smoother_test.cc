@@ -137,6 +137,26 @@ void expect_good(const Outcome& run) {
   EXPECT_TRUE(run.trust.trusted) << run.trust.reason;
 }
 
+// P3 "prior": positions of other sensors, whose rotation says nothing, stand instead of matches.
+TEST(ImuSmoother, PositionsWithTheirOwnCovarianceKeepItOnItsWay) {
+  Play setup;
+  setup.spoil_match = [](double t, std::optional<LidarFactor>& match) {
+    if (t < 8.0 || !match) return;
+    Vector6d variance;
+    variance << Eigen::Vector3d::Constant(100.0), Eigen::Vector3d::Constant(0.03 * 0.03);
+    match->covariance = Matrix6d(variance.asDiagonal());
+    const Eigen::Vector3d off(0.03 * std::sin(9.0 * t), 0.03 * std::cos(7.0 * t), 0.0);
+    const Pose& there = match->world_from_body;
+    match->world_from_body = Pose(so3_exp(Eigen::Vector3d(0.3, -0.2, 0.5)) * there.rotation(),
+                                  there.translation() + off);
+  };
+  const Outcome run = play(setup);
+  EXPECT_LT(run.position_rmse, 0.04);
+  EXPECT_LT(run.rotation_rmse_deg, 1.0);
+  EXPECT_EQ(run.gated, 0);
+  EXPECT_TRUE(run.trust.trusted) << run.trust.reason;
+}
+
 TEST(ImuSmoother, FollowsFromAStillStart) {
   Play setup;
   setup.carrier.still_s = 2.0;

@@ -87,6 +87,7 @@ void describe(ConfigTable& table, MotionConfig& config) {
 }
 
 Matrix6d lidar_covariance(const LidarFactor& factor, const LidarNoiseConfig& config) {
+  if (factor.covariance) return *factor.covariance;
   // P4 (36), with the printed form's "low fitness" read as a large mean squared distance.
   const double excess = std::max(0.0, factor.fitness_m2 - config.fitness_threshold_m2);
   const double growth = 1.0 + config.fitness_scale * excess * excess;

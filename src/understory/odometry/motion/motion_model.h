@@ -31,6 +31,9 @@ struct LidarFactor {
   Pose world_from_body;                     // at the stamp of the scan
   double fitness_m2 = 0.0;                  // mean squared distance of matches, lower is better
   Matrix6d information = Matrix6d::Zero();  // of a right perturbation, as the matcher gives it
+  // The pose is of other sensors, with this covariance of a right perturbation: it counts instead
+  // of fitness and information. Neither is the IMU judged by it, nor it by the IMU (P2-8).
+  std::optional<Matrix6d> covariance = {};
 };
 
 // What became of one scan's match.

@@ -9,6 +9,7 @@
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/georeferencing/methods/placement_methods.h"
 #include "understory/pipeline/georeferencing/movable_run.h"
+#include "understory/sensor/fix_position.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -20,11 +21,6 @@ const PlacementMethod& method_of(GeoreferenceMethod wanted) {
                                   [&](const PlacementMethod& one) { return one.method == wanted; });
   UNDERSTORY_CHECK(found != methods.end());
   return *found;
-}
-
-bool has_position(const GnssFix& fix) {
-  return fix.quality != 0 && std::isfinite(fix.latitude_deg) && std::isfinite(fix.longitude_deg) &&
-         std::abs(fix.latitude_deg) <= 90.0 && std::abs(fix.longitude_deg) <= 360.0;
 }
 
 // One row for each fix, as far as nothing is known of its place in the world frame.

@@ -86,7 +86,7 @@ void DenseFrontEnd::take(const Event& event, const Rig& rig) {
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
     take_sample(*sample);
   } else if (const auto* fix = std::get_if<GnssFix>(&event)) {
-    received_.fixes.push_back(*fix);
+    take_fix(*fix);
   } else if (const auto* scan = std::get_if<ScanPtr>(&event)) {
     if (!started()) {
       opening_->events.push_back(event);
@@ -146,6 +146,7 @@ void DenseFrontEnd::start_anew() {
   clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, times_);
   map_->start();
   make_odometry(rig_);
+  make_satellites();
   if (opening_->rounds > 0) {
     odometry_->set_initial_motion(opening_->motion.velocity_m_s,
                                   opening_->motion.angular_rate_rad_s);
@@ -219,6 +220,7 @@ DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_t
   if (odometry_->uses_imu() && !proven) odometry_->suspect_imu(scan.stamp);
   // A better guess than standing still.
   odometry_->set_initial_motion(recovery_.last_velocity_in_body(), Eigen::Vector3d::Zero());
+  if (satellites_) satellites_->begin_piece();
   map_->start_segment();
   positioned_.begins_piece = true;
   if (received_.counts.segments++ == 1) received_.counts.first_lost = scan.stamp;
@@ -234,7 +236,7 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
   positioned_ = {};
   const NavState predicted =
       recovery_.is_outage(scan.stamp) ? odometry_->motion().predict(scan.stamp) : NavState();
-  DenseEstimate estimate = odometry_->process(scan, map_->local_map());
+  DenseEstimate estimate = odometry_->process(scan, map_->local_map(), knowledge_of(scan));
   if (estimate.update.status == MotionStatus::kIgnored) return;
   if (!map_->keyframes().empty() && estimate.thinned.size() >= kFewPoints) {
     if (recovery_.lost_over_outage(scan.stamp, estimate)) {
@@ -299,8 +301,13 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   NavState state = estimate.state;
   if (estimate.update.new_world_from_old_world) {
     map_->move_world(*estimate.update.new_world_from_old_world);
+    if (satellites_) satellites_->level_world(*estimate.update.new_world_from_old_world);
   }
   positioned_.pose = {record.stamp, state.world_from_body};
+  if (satellites_) {
+    satellites_->add_pose(positioned_.pose);
+    if (estimate.match.usable()) satellites_->note_match(estimate.match.information);
+  }
   positioned_.new_world_from_old_world = estimate.update.new_world_from_old_world;
   const bool good =
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
@@ -333,6 +340,7 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
 // Loops have moved the present, too.
 void DenseFrontEnd::move_world(const Pose& new_world_from_old_world) {
   odometry_->move_world(new_world_from_old_world);
+  if (satellites_) satellites_->move_present(new_world_from_old_world);
   std::optional<Pose>& so_far = positioned_.new_world_from_old_world;
   so_far = so_far ? new_world_from_old_world * *so_far : new_world_from_old_world;
   positioned_.pose.world_from_body = new_world_from_old_world * positioned_.pose.world_from_body;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "understory/georeference/satellites/satellite_belief.h"
 #include "understory/map/keyframe_map.h"
 #include "understory/map/scan_clouds.h"
 #include "understory/odometry/dense/dense_odometry.h"
@@ -38,8 +39,9 @@ struct DenseCounts {
   TimeNs first_lost = 0;    // when the second piece began
   std::uint64_t imu_samples = 0;
   std::uint64_t points = 0;
-  std::uint64_t repeated = 0;      // scans that hold the same points as the one before
-  std::uint64_t last_content = 0;  // of the last scan, see content_of
+  std::uint64_t by_satellites = 0;  // scans whose match or place satellites told something of
+  std::uint64_t repeated = 0;       // scans that hold the same points as the one before
+  std::uint64_t last_content = 0;   // of the last scan, see content_of
 };
 
 // The front end that matches all points of a scan to a local map: keeps positioning (first graph),
@@ -56,7 +58,7 @@ class DenseFrontEnd : public FrontEnd {
   // `rig` is looked at when the first scan comes, and for the places of sensors that become known
   // later: they are used from then on.
   std::vector<PositionedScan> handle(const Event& event, const Rig& rig) override;
-  std::vector<PositionedScan> finish(const Rig& /*rig*/) override { return {}; }
+  std::vector<PositionedScan> finish(const Rig& rig) override;
   // Loops are taken over as soon as they are found.
   void run_in_real_time() override { map_->take_loops_when_found(); }
   [[nodiscard]] TimeNs first_scan() const override { return traits_.first_scan; }
@@ -92,6 +94,8 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_->clouds(); }
   [[nodiscard]] const std::vector<GnssFix>& fixes() const { return received_.fixes; }
   [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
+  // What satellites say of the scans; null where they do nothing (`gnss.match.use`).
+  [[nodiscard]] const SatelliteBelief* satellites() const { return satellites_.get(); }
   [[nodiscard]] StageTimes& times() { return times_; }
   // Set after each scan, for progress and latency.
   [[nodiscard]] TimeNs last_scan_end() const override { return last_scan_end_; }
@@ -123,6 +127,9 @@ class DenseFrontEnd : public FrontEnd {
   void take(const Event& event, const Rig& rig);
   void load_fixes(const RecordCount& known);
   void make_odometry(const Rig& rig);
+  void make_satellites();
+  void take_fix(const GnssFix& fix);
+  [[nodiscard]] ScanKnowledge knowledge_of(const Scan& scan);
   void complete_rig(const Rig& rig);
   [[nodiscard]] bool without_samples() const;
   void take_sample(const ImuSample& sample);
@@ -148,6 +155,7 @@ class DenseFrontEnd : public FrontEnd {
   Rig rig_;
   Received received_;
   std::unique_ptr<DenseOdometry> odometry_;
+  std::unique_ptr<SatelliteBelief> satellites_;
   std::unique_ptr<KeyframeMap> map_;
   std::unique_ptr<Journal> journal_;
   std::unique_ptr<ScanClouds> clouds_;

@@ -63,6 +63,7 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   writer.put(clouds_->clouds().count());
   map_->save(writer);
   odometry_->save(writer);
+  if (satellites_) satellites_->save(writer);
 }
 
 void DenseFrontEnd::load_fixes(const RecordCount& known) {
@@ -106,6 +107,8 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   map_->load(reader);
   make_odometry(Rig(rig_));
   odometry_->load(reader);
+  make_satellites();
+  if (satellites_) satellites_->load(reader);
 }
 
 }  // namespace understory

@@ -31,7 +31,10 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   });
   table.section("inventory", [&] { describe(table, config.inventory); });
   table.section("georeference", [&] { describe(table, config.georeference); });
-  table.section("gnss", [&] { describe(table, config.gnss); });
+  table.section("gnss", [&] {
+    describe(table, config.gnss);
+    table.section("match", [&] { describe(table, config.satellites); });
+  });
   table.section("judgement", [&] {
     describe(table, config.judgement);
     table.section("motion", [&] { describe(table, config.motion_limits); });

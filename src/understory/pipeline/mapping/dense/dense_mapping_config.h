@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "understory/forest/inventory.h"
+#include "understory/georeference/satellites/satellite_belief.h"
 #include "understory/map/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/odometry/dense/dense_odometry.h"
@@ -31,6 +32,7 @@ struct DenseMappingConfig {
   InventoryConfig inventory = basic_inventory();
   GeoreferenceConfig georeference;
   GnssUseConfig gnss;
+  SatelliteBeliefConfig satellites;
   JudgementConfig judgement;
   MotionLimits motion_limits;
   double cloud_distance_m = 1.0;  // weighted distance (37) between scans whose clouds are kept

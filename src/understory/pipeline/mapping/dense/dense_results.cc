@@ -254,6 +254,8 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
   documents.count("imu_samples", counts.imu_samples);
   documents.count("gnss_fixes", front_end.fixes().size());
   documents.count("lidar_points", counts.points);
+  if (front_end.satellites() != nullptr)
+    documents.count("scans_by_satellites", counts.by_satellites);
 }
 
 // Whether the work on a scan grows with the length of the run.
@@ -284,6 +286,11 @@ void fill_quality(const DenseFrontEnd& front_end, const TrajectoryFacts& traject
   summary.quality["match_distance_rms_m"] = trajectory.match.fitness_rms_m;
   summary.quality["weak_scans_percent"] =
       100.0 * static_cast<double>(trajectory.weak) / static_cast<double>(trajectory.scans.size());
+  const SatelliteBelief* satellites = front_end.satellites();
+  if (satellites != nullptr && satellites->aligned_at() != 0) {
+    summary.quality["gnss_match_from_s"] =
+        to_seconds(satellites->aligned_at() - front_end.first_scan());
+  }
   summary.quality["imu_without_place_s"] = to_seconds(front_end.imu_usage().without_place());
   summary.quality["loop_search_cpu_s"] = front_end.map().search_cpu_seconds();
 }

@@ -1,0 +1,267 @@
+#include "understory/georeference/satellites/satellite_belief.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "understory/util/angles.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+using Eigen::Vector3d;
+
+const GeodeticPlace kPlace{47.3, -71.2, 640.0};
+const Vector3d kArm(-0.3, 0.3, 1.5);
+const Pose kEnuFromWorld(Eigen::Quaterniond(Eigen::AngleAxisd(1.9, Vector3d::UnitZ())),
+                         Vector3d(8.0, -5.0, 2.0));
+
+constexpr double kStatedVariance = 3.0 * 0.03 * 0.03;
+
+TimeNs stamp(double time_s) {
+  return 500 * kNsPerSecond + from_seconds(time_s);
+}
+
+// A sleigh that stands for 5 s and then goes 2 m/s in bends.
+Pose body_at(double time_s) {
+  const double way_m = 2.0 * std::max(0.0, time_s - 5.0);
+  const double heading = 0.5 * std::sin(0.03 * way_m);
+  const Vector3d place(way_m, 0.5 / 0.03 * (1.0 - std::cos(0.03 * way_m)), 0.0);
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(heading, Vector3d::UnitZ())), place};
+}
+
+// What an odometry makes of it: after `from_s` its heading drifts by `drift_deg` each 100 m.
+class Sleigh {
+ public:
+  explicit Sleigh(const SatelliteBeliefConfig& config, double drift_deg = 0.0, double from_s = 1e9)
+      : belief_(config, 0.05), random_(3), drift_deg_(drift_deg), from_s_(from_s) {}
+
+  void until(double time_s) {
+    while (0.1 * steps_ <= time_s)
+      step();
+  }
+  void step() {
+    const double time_s = 0.1 * steps_;
+    if (steps_ % 2 == 0) belief_.add_fix(fix_at(time_s), kArm);
+    const Pose truth = true_body(time_s);
+    const Pose moved = steps_ > 0 ? true_body(time_s - 0.1).inverse() * truth : Pose();
+    const double metres = moved.translation().norm();
+    const double turn = time_s > from_s_ ? drift_deg_ * kDegree * metres / 100.0 : 0.0;
+    odometry_ = steps_ > 0 ? odometry_ * moved * Pose(so3_exp({0.0, 0.0, turn}), Vector3d::Zero())
+                           : truth;
+    belief_.add_pose({stamp(time_s), world_from_first_ * odometry_});
+    ++steps_;
+  }
+  void jump(const Vector3d& metres) { jump_ = metres; }
+  void stand() { stands_from_s_ = 0.1 * steps_; }
+  void move(const Pose& motion, bool level) {
+    world_from_first_ = motion * world_from_first_;
+    level ? belief_.level_world(motion) : belief_.move_present(motion);
+  }
+  [[nodiscard]] Pose world_from_body() const { return world_from_first_ * odometry_; }
+  [[nodiscard]] Pose truth() const { return true_body(0.1 * (steps_ - 1)); }
+  [[nodiscard]] std::optional<PoseBelief> belief() const {
+    return belief_.at({stamp(0.1 * (steps_ - 1)), world_from_body()});
+  }
+  SatelliteBelief& filter() { return belief_; }
+
+ private:
+  [[nodiscard]] Pose true_body(double time_s) const {
+    return body_at(std::min(time_s, stands_from_s_));
+  }
+  GnssFix fix_at(double time_s) {
+    const double x = random_.normal();
+    const double y = random_.normal();
+    const Vector3d error = 0.02 * Vector3d(x, y, random_.normal());
+    const GeodeticPlace place =
+        EastNorthUp(kPlace).to_place(kEnuFromWorld * (true_body(time_s) * kArm) + error + jump_);
+    GnssFix fix;
+    fix.stamp = stamp(time_s);
+    fix.latitude_deg = place.latitude_deg;
+    fix.longitude_deg = place.longitude_deg;
+    fix.height_m = place.height_m;
+    fix.covariance = kStatedVariance / 3.0 * Eigen::Matrix3d::Identity();
+    fix.quality = 4;
+    return fix;
+  }
+
+  SatelliteBelief belief_;
+  Random random_;
+  double drift_deg_;
+  double from_s_;
+  double stands_from_s_ = 1e9;
+  Vector3d jump_ = Vector3d::Zero();
+  Pose odometry_;
+  Pose world_from_first_;
+  int steps_ = 0;
+};
+
+SatelliteBeliefConfig with(SatellitesInMatch use) {
+  SatelliteBeliefConfig config;
+  config.use = use;
+  config.first_heading_sd_deg = 0.1;
+  return config;
+}
+
+double heading_difference(const Pose& a, const Pose& b) {
+  return so3_log(a.rotation() * b.rotation().conjugate()).z();
+}
+
+// P3 section 5.1: a short first stretch tells the heading; a sleigh that stands tells none.
+TEST(SatelliteBelief, BeginsAfterAFirstStretch) {
+  Sleigh sleigh(with(SatellitesInMatch::kPenalty));
+  sleigh.until(5.0);
+  EXPECT_FALSE(sleigh.filter().aligned());
+  EXPECT_FALSE(sleigh.belief().has_value());
+  sleigh.until(60.0);
+  ASSERT_TRUE(sleigh.filter().aligned());
+  EXPECT_GT(sleigh.filter().aligned_at(), stamp(5.0));
+  const auto belief = sleigh.belief();
+  ASSERT_TRUE(belief.has_value());
+  // Where the odometry is right, it agrees.
+  EXPECT_LT((belief->target_from_source * kArm - sleigh.truth() * kArm).norm(), 0.4);
+  EXPECT_LT(std::abs(heading_difference(belief->target_from_source, sleigh.truth())), 0.01);
+  EXPECT_EQ(belief->point_in_source, kArm);
+}
+
+// What the penalty is for: the map has drifted, the belief has not.
+TEST(SatelliteBelief, StaysWhereTheFirstStretchLaidTheWorldWhileTheOdometryDrifts) {
+  Sleigh sleigh(with(SatellitesInMatch::kPenalty), 1.0, 60.0);
+  sleigh.until(340.0);  // 560 m later
+  ASSERT_TRUE(sleigh.filter().aligned());
+  const auto belief = sleigh.belief();
+  ASSERT_TRUE(belief.has_value());
+  const Vector3d drifted = sleigh.world_from_body() * kArm - sleigh.truth() * kArm;
+  const Vector3d error = belief->target_from_source * kArm - sleigh.truth() * kArm;
+  EXPECT_GT(drifted.norm(), 15.0);
+  EXPECT_LT(error.norm(), 2.0) << "0.2 degrees of the first stretch's heading over 600 m";
+  EXPECT_GT(heading_difference(sleigh.world_from_body(), sleigh.truth()), 5.0 * kDegree);
+  EXPECT_LT(std::abs(heading_difference(belief->target_from_source, sleigh.truth())),
+            3.0 * kDegree);
+}
+
+// A receiver that jumps and goes on saying centimetres.
+TEST(SatelliteBelief, AFixThatLeavesTheWayOfTheOdometryCountsLess) {
+  Sleigh sleigh(with(SatellitesInMatch::kPenalty));
+  sleigh.until(60.0);
+  const double before = sleigh.belief()->position_covariance.trace();
+  sleigh.jump(Vector3d(1.0, -0.5, 0.0));
+  sleigh.step();
+  sleigh.step();
+  EXPECT_GT(sleigh.belief()->position_covariance.trace(), 25.0 * before);
+  sleigh.until(100.0);
+  EXPECT_NEAR(sleigh.belief()->position_covariance.trace(), before, 1e-9) << "it is steady again";
+}
+
+// The vertical of the IMU, whatever the map's is.
+TEST(SatelliteBelief, GravityIsTheImus) {
+  Sleigh sleigh(with(SatellitesInMatch::kPenalty));
+  sleigh.until(60.0);
+  const Eigen::Quaterniond level = so3_exp(Vector3d(0.02, -0.01, 0.0));
+  const auto belief = sleigh.filter().at({stamp(60.0), sleigh.world_from_body()}, level);
+  ASSERT_TRUE(belief.has_value());
+  const Vector3d up = belief->target_from_source.rotation().conjugate() * Vector3d::UnitZ();
+  const Vector3d expected =
+      sleigh.world_from_body().rotation().conjugate() * (level.conjugate() * Vector3d::UnitZ());
+  EXPECT_LT((up - expected).norm(), 1e-9);
+  EXPECT_LT((belief->target_from_source * kArm - sleigh.belief()->target_from_source * kArm).norm(),
+            1e-9)
+      << "the antenna stays at the fix";
+}
+
+// While it stands nothing tells its heading, P3 section 5.2.
+TEST(SatelliteBelief, ACarrierThatStandsHasNoHeading) {
+  Sleigh sleigh(with(SatellitesInMatch::kPenalty));
+  sleigh.until(60.0);
+  EXPECT_LT(sleigh.belief()->attitude_covariance(2, 2), 0.1);
+  sleigh.stand();
+  sleigh.until(90.0);
+  EXPECT_GT(sleigh.belief()->attitude_covariance(2, 2), 10.0);
+  EXPECT_LT(sleigh.belief()->attitude_covariance(0, 0), 0.01);
+}
+
+// The prior is the fix itself; its heading follows the course.
+TEST(SatelliteBelief, ThePriorIsTheFixAndTheCourse) {
+  Sleigh sleigh(with(SatellitesInMatch::kPrior), 1.2, 100.0);
+  sleigh.until(250.0);
+  const auto belief = sleigh.belief();
+  ASSERT_TRUE(belief.has_value());
+  EXPECT_LT((belief->target_from_source * kArm - sleigh.truth() * kArm).norm(), 1.0);
+  const double off = heading_difference(sleigh.world_from_body(), sleigh.truth());
+  EXPECT_GT(off, 3.0 * kDegree);
+  EXPECT_LT(std::abs(heading_difference(belief->target_from_source, sleigh.truth())),
+            2.5 * kDegree);
+  EXPECT_NEAR(belief->position_covariance.trace(), kStatedVariance + 3.0 * 0.01 * 0.01, 1e-9)
+      << "stated, and the least that a fix can be";
+  EXPECT_GT(belief->attitude_covariance(0, 0), 10.0) << "nothing tells roll";
+}
+
+// An old fix says nothing.
+TEST(SatelliteBelief, ThePriorOfAnOldFixIsNone) {
+  Sleigh sleigh(with(SatellitesInMatch::kPrior));
+  sleigh.until(60.0);
+  ASSERT_TRUE(sleigh.belief().has_value());
+  EXPECT_FALSE(sleigh.filter().at({stamp(62.0), sleigh.world_from_body()}).has_value());
+}
+
+// A levelled world takes the belief along. A loop moves the present alone: the belief stays.
+TEST(SatelliteBelief, LevellingTakesItAlongAndALoopDoesNot) {
+  const Pose turn(so3_exp(Vector3d(0.0, 0.0, 0.3)), Vector3d(1.0, -2.0, 0.5));
+  Sleigh still(with(SatellitesInMatch::kPenalty));
+  Sleigh levelled = still;
+  Sleigh looped = still;
+  for (Sleigh* each : {&still, &levelled, &looped})
+    each->until(60.0);
+  levelled.move(turn, true);
+  looped.move(turn, false);
+  for (Sleigh* each : {&still, &levelled, &looped})
+    each->step();
+  const Vector3d before = still.belief()->target_from_source * kArm;
+  EXPECT_LT((levelled.belief()->target_from_source * kArm - turn * before).norm(), 0.02);
+  EXPECT_LT((looped.belief()->target_from_source * kArm - before).norm(), 0.1)
+      << "the last step of 0.2 m turned with it";
+}
+
+// East, north, up was laid on a world that was not level yet. It is level in the new one.
+TEST(SatelliteBelief, ALevelledWorldHasFixesAtTheirHeights) {
+  SatelliteBeliefConfig config = with(SatellitesInMatch::kPenalty);
+  config.place = PenaltyPlace::kAntenna;
+  Sleigh sleigh(config);
+  sleigh.until(60.0);
+  const double before = (sleigh.belief()->target_from_source * kArm).z();
+  sleigh.move(Pose(so3_exp(Vector3d(0.05, -0.08, 0.0)), Vector3d::Zero()), true);
+  sleigh.step();
+  sleigh.step();
+  const double after = (sleigh.belief()->target_from_source * kArm).z();
+  EXPECT_GT((sleigh.world_from_body() * kArm).z(), before + 5.0) << "8 % of 110 m";
+  // All the way from the end of the first stretch, 15 m from the origin, it lies level.
+  EXPECT_LT(std::abs(after - before), 3.0);
+}
+
+TEST(SatelliteBelief, GoesOnFromItsState) {
+  for (const SatellitesInMatch use : {SatellitesInMatch::kPenalty, SatellitesInMatch::kPrior}) {
+    Sleigh sleigh(with(use), 1.0, 20.0);
+    sleigh.until(70.0);
+    BinaryWriter writer;
+    sleigh.filter().save(writer);
+    SatelliteBelief other(with(use), 0.05);
+    const std::string state = writer.bytes();
+    BinaryReader reader(state, "state");
+    other.load(reader);
+    Sleigh second = sleigh;
+    second.filter() = other;
+    sleigh.until(90.0);
+    second.until(90.0);
+    ASSERT_TRUE(sleigh.belief().has_value());
+    EXPECT_EQ(sleigh.belief()->target_from_source.translation(),
+              second.belief()->target_from_source.translation());
+    EXPECT_EQ(sleigh.belief()->position_covariance, second.belief()->position_covariance);
+  }
+}
+
+}  // namespace
+}  // namespace understory
