@@ -27,8 +27,8 @@ using Json = nlohmann::ordered_json;
 struct Epoch {
   std::string name;
   std::vector<Tree> trees;
-  Trajectory path;     // empty: not known
-  LayerFrame layers;   // of a run folder on the globe; else the frame of the list
+  Trajectory path;    // empty: not known
+  LayerFrame layers;  // of a run folder on the globe; else the frame of the list
 };
 
 Epoch read_epoch(const std::string& given, const std::string& path) {
@@ -92,8 +92,8 @@ std::string stand_complaint(const Epoch& before, const Epoch& after,
                             const std::vector<TreePair>& pairs, const TreeOptions& options) {
   if (are_copies(before.trees, after.trees)) return "one list is a copy of the other";
   const bool searched = options.alignment != "none";
-  const MatchChance chance = match_chance(before.trees, after.trees, pairs,
-                                          options.assignment.radius_m, searched);
+  const MatchChance chance =
+      match_chance(before.trees, after.trees, pairs, options.assignment.radius_m, searched);
   if (std::string complaint = chance_complaint(chance); !complaint.empty())
     return complaint + (searched ? "" : ", or in different frames: try --align yaw");
   return diameter_complaint(before.trees, after.trees, pairs);
@@ -111,7 +111,7 @@ struct EpochResult {
 };
 
 Json increments_json(const IncrementSummary& s) {
-  return {{"known", s.known},   {"mean", s.mean},     {"mean_sd", s.mean_sd},
+  return {{"known", s.known}, {"mean", s.mean},     {"mean_sd", s.mean_sd},
           {"grown", s.grown}, {"shrunk", s.shrunk}, {"stand_in_sd", s.stand_in_sd}};
 }
 
@@ -153,13 +153,12 @@ std::string epochs_text(const Epoch& before, const Epoch& after, const EpochResu
       "trees               {} in OLD, {} in NEW\n"
       "stay                {}\n"
       "gone                {} in the area that NEW saw",
-      before.trees.size(), after.trees.size(), c.count(TreeFate::kStays),
-      c.count(TreeFate::kGone));
+      before.trees.size(), after.trees.size(), c.count(TreeFate::kStays), c.count(TreeFate::kGone));
   if (std::isfinite(c.expected_missed))
     text += fmt::format("; of these about {:.1f} +- {:.1f} stand, but NEW missed them",
                         c.expected_missed, c.expected_missed_sd);
-  text += fmt::format("\nnew                 {} in the area that OLD saw\n",
-                      c.count(TreeFate::kNew));
+  text +=
+      fmt::format("\nnew                 {} in the area that OLD saw\n", c.count(TreeFate::kNew));
   if (std::isfinite(c.ingrowth_limit_m))
     text += fmt::format(
         "missed before       {}: too thick to be new (over {:.3f} m), so OLD missed them ({:.1f} % "
@@ -192,12 +191,12 @@ int evaluate_epochs(const TreeOptions& options, CommandContext& context) {
   const bool moves_path = options.other_path.empty();
   lay_by_globe(before, after, moves_path);
   if (!lay_by_trees(before, after, options, moves_path)) {
-    context.log.warn("evaluate.stands",
-                     "no motion lays three trees of OLD on trees of NEW: they are not of one stand");
+    context.log.warn(
+        "evaluate.stands",
+        "no motion lays three trees of OLD on trees of NEW: they are not of one stand");
     return kExitUntrusted;
   }
-  const std::vector<TreePair> pairs =
-      assign_trees(before.trees, after.trees, options.assignment);
+  const std::vector<TreePair> pairs = assign_trees(before.trees, after.trees, options.assignment);
   if (const std::string complaint = stand_complaint(before, after, pairs, options);
       !complaint.empty()) {
     context.log.warn("evaluate.stands", "nothing was compared: " + complaint);

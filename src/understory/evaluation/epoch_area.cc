@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "understory/evaluation/evaluation_constants.h"
 #include "understory/evaluation/tree_changes.h"

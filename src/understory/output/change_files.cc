@@ -1,6 +1,7 @@
 #include "understory/output/change_files.h"
 
 #include <cmath>
+#include <utility>
 
 namespace understory {
 namespace {

@@ -22,7 +22,8 @@ namespace fs = std::filesystem;
 }
 
 // From the layer's system to longitude and latitude.
-std::unique_ptr<OGRCoordinateTransformation> way_to_globe(OGRLayer& layer, const fs::path& package) {
+std::unique_ptr<OGRCoordinateTransformation> way_to_globe(OGRLayer& layer,
+                                                          const fs::path& package) {
   const OGRSpatialReference* system = layer.GetSpatialRef();
   if (system == nullptr || system->IsLocal() != 0)
     throw InputError(package.string(), layer.GetName(),
@@ -75,8 +76,7 @@ std::size_t write_geojson(const fs::path& package, const std::string& layer, con
       GDALDataset::Open(package.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));
   if (source == nullptr) throw InputError(package.string(), "", "expected a GeoPackage");
   OGRLayer* from = source->GetLayerByName(layer.c_str());
-  if (from == nullptr)
-    throw InputError(package.string(), "", "expected a layer `" + layer + "`");
+  if (from == nullptr) throw InputError(package.string(), "", "expected a layer `" + layer + "`");
   const auto way = way_to_globe(*from, package);
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("GeoJSON");
   if (driver == nullptr) throw InternalError("this GDAL has no driver GeoJSON");

@@ -24,9 +24,8 @@ std::string on_one_line(const char* message) {
 // What the user gave, after what is usual here, so that the user's comes last and counts.
 std::vector<std::pair<std::string, std::string>> parameters_of(const std::string& target) {
   std::vector<std::pair<std::string, std::string>> result = {
-      {"application_name", "understory"}, {"connect_timeout", "10"},
-      {"keepalives_idle", "10"},          {"keepalives_interval", "5"},
-      {"keepalives_count", "3"},          {"tcp_user_timeout", "30000"}};
+      {"application_name", "understory"}, {"connect_timeout", "10"}, {"keepalives_idle", "10"},
+      {"keepalives_interval", "5"},       {"keepalives_count", "3"}, {"tcp_user_timeout", "30000"}};
   char* complaint = nullptr;
   PQconninfoOption* options = PQconninfoParse(target.c_str(), &complaint);
   if (options == nullptr) {
@@ -71,7 +70,8 @@ PgConnection::PgConnection(const std::string& target) : impl_(std::make_unique<I
           text(PQport(connection));
   if (PQstatus(connection) != CONNECTION_OK)
     throw OutputError(name_, "no connection: " + on_one_line(PQerrorMessage(connection)));
-  PQsetNoticeProcessor(connection, [](void*, const char*) {}, nullptr);
+  PQsetNoticeProcessor(
+      connection, [](void*, const char*) {}, nullptr);
   PQsetClientEncoding(connection, "UTF8");
   run("BEGIN");
 }
@@ -81,8 +81,8 @@ PgConnection::~PgConnection() = default;
 void PgConnection::fail(const std::string& what) const {
   const std::string said = on_one_line(PQerrorMessage(impl_->connection.get()));
   const bool lost = PQstatus(impl_->connection.get()) != CONNECTION_OK;
-  throw OutputError(name_, (lost ? "the connection was lost " : "the server refused ") + what + ": " +
-                               said + "; nothing was written");
+  throw OutputError(name_, (lost ? "the connection was lost " : "the server refused ") + what +
+                               ": " + said + "; nothing was written");
 }
 
 void PgConnection::run(const std::string& sql) {

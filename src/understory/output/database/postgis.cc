@@ -4,7 +4,6 @@
 #include <ogrsf_frmts.h>
 
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -94,10 +93,10 @@ class Transfer {
     database_.run("SELECT pg_advisory_xact_lock(hashtext(" +
                   database_.literal("understory " + request_.schema) + "))");
     find_postgis();
-    const bool there =
-        !database_.value_of("SELECT 1 FROM pg_namespace WHERE nspname = " +
-                            database_.literal(request_.schema))
-             .empty();
+    const bool there = !database_
+                            .value_of("SELECT 1 FROM pg_namespace WHERE nspname = " +
+                                      database_.literal(request_.schema))
+                            .empty();
     if (!there) make_schema(srid);
     check_schema(srid);
   }
@@ -167,8 +166,9 @@ class Transfer {
     const std::string place = database_.name() + ", schema " + request_.schema;
     if (database_.value_of("SELECT to_regclass(" + database_.literal(schema_ + ".layout") + ")")
             .empty())
-      throw OutputError(place, "is there, and this program did not make it; choose another by "
-                               "--schema");
+      throw OutputError(place,
+                        "is there, and this program did not make it; choose another by "
+                        "--schema");
     const std::string version = database_.value_of("SELECT version FROM " + schema_ + ".layout");
     if (version != std::to_string(kPostgisLayout))
       throw OutputError(place, "has layout " + version + ", and this program writes layout " +
@@ -176,9 +176,10 @@ class Transfer {
                                    "; choose another schema by --schema");
     const std::string held = database_.value_of("SELECT srid FROM " + schema_ + ".layout");
     if (held != std::to_string(srid))
-      throw OutputError(place, fmt::format("holds EPSG:{}, and the run is in EPSG:{} (0: no place on "
-                                           "the globe); choose another schema by --schema",
-                                           held, srid));
+      throw OutputError(place,
+                        fmt::format("holds EPSG:{}, and the run is in EPSG:{} (0: no place on "
+                                    "the globe); choose another schema by --schema",
+                                    held, srid));
   }
 
   // Makes the table, or the columns that it lacks. The names of the columns, in order.
@@ -212,8 +213,7 @@ class Transfer {
 };
 
 GDALDatasetUniquePtr open_package(const fs::path& path) {
-  GDALDatasetUniquePtr dataset(
-      GDALDataset::Open(path.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));
+  GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));
   if (dataset == nullptr || dataset->GetLayerCount() == 0)
     throw InputError(path.string(), "", "expected a GeoPackage with layers");
   return dataset;
