@@ -94,7 +94,7 @@ def evaluate(folder, alignment):
 
 def add_trees(table, seed, folder):
     truth = truth_of(folder)
-    result = understory_json("evaluate", "trees", folder, truth, "--align", "yaw",
+    result = understory_json("evaluate", "trees", folder, truth, "--matching", "nearest", "--align", "yaw",
                              "--truth-returns", truth, "--path", truth, "--within-m", 15,
                              "--min-returns", 30)["visible"]
     table.add("recall", seed, 100.0 * result["recall"] if result["expected"] else None)

@@ -45,7 +45,7 @@ def number(value, decimals, scale=1.0):
 
 def tree_cells(folder):
     truth = truth_of(folder)
-    seen = understory_json("evaluate", "trees", folder, truth, "--align", "yaw", "--truth-returns",
+    seen = understory_json("evaluate", "trees", folder, truth, "--matching", "nearest", "--align", "yaw", "--truth-returns",
                            truth, "--path", truth, "--within-m", 15, "--min-returns",
                            30)["visible"]
     return [str(seen["expected"]),

@@ -68,7 +68,7 @@ def measure_road(site, seed, folder):
     level = folder / f"{run.name}_level"
     terrain = understory_json("georeference", run, "--method", "terrain", "--dem", truth / "dtm.tif",
                               "--start", *start_of(run, truth), "-o", level, "--overwrite")
-    rings = understory_json("evaluate", "trees", level, truth, "--truth-returns", truth, "--path", truth,
+    rings = understory_json("evaluate", "trees", level, truth, "--matching", "nearest", "--truth-returns", truth, "--path", truth,
                             "--bin-m", RING_M, "--reach-m", REACH_M)["by_distance"]
     sharp = understory_json("evaluate", "map", run / "stems.csv.gz", run)
     true = understory_json("evaluate", "map", run / "stems.csv.gz", truth)

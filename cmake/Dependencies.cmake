@@ -1,5 +1,5 @@
 # Every third-party library as an imported target, so that its headers count as system headers.
-#   Eigen3::Eigen TBB::tbb fmt::fmt understory::nanoflann understory::gdal understory::embree
+#   Eigen3::Eigen TBB::tbb fmt::fmt understory::nanoflann understory::gdal understory::pq understory::embree
 #   understory::deflate understory::lz4 understory::zstd understory::bz2 ZLIB::ZLIB OpenSSL::Crypto SQLite::SQLite3 yaml-cpp
 #   CLI11::CLI11 nlohmann_json::nlohmann_json pugixml::pugixml GTest::gtest_main understory::gtsam understory::laszip
 include(Gtsam)
@@ -53,6 +53,7 @@ understory_find(deflate HEADER libdeflate.h LIBRARY deflate)
 understory_find(lz4 HEADER lz4frame.h LIBRARY lz4)
 understory_find(zstd HEADER zstd.h LIBRARY zstd)
 understory_find(gdal HEADER gdal_priv.h LIBRARY gdal SUFFIXES gdal)
+understory_find(pq HEADER libpq-fe.h LIBRARY pq SUFFIXES postgresql)
 
 # Embree 4 (Debian 13) and 3 (Debian 12) differ in the header's folder and a few calls.
 find_path(EMBREE_HEADERS NAMES embree4/rtcore.h embree3/rtcore.h REQUIRED)

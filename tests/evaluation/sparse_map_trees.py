@@ -22,7 +22,7 @@ def main():
         folder = Path(scratch) / "run"
         run("map", "sim:lieksa2?seed=7&duration_s=60", "-o", folder)
         truth = Path(f"{folder}.truth")
-        seen = json.loads(run("evaluate", "trees", folder, truth, "--align", "yaw", "--truth-returns", truth,
+        seen = json.loads(run("evaluate", "trees", folder, truth, "--matching", "nearest", "--align", "yaw", "--truth-returns", truth,
                               "--path", truth, "--within-m", 15, "--min-returns", 30, "--json"))["visible"]
     said = f"{100 * seen['recall']:.0f} % of {seen['expected']} trees, {100 * seen['false_share']:.0f} % false"
     print(said)

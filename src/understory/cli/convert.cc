@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "understory/cli/command.h"
+#include "understory/cli/convert_layers.h"
 #include "understory/cli/convert_stems.h"
 #include "understory/cli/open_options.h"
 #include "understory/output/las_writer.h"
@@ -30,6 +31,7 @@ struct ConvertOptions {
   std::string format;
   std::string compression = "zstd";
   bool overwrite = false;
+  LayerConversion layers;
 };
 
 // What a recording is written to; it appears with `commit`.
@@ -177,7 +179,16 @@ class Copier {
 };
 
 int run_convert(const ConvertOptions& options, CommandContext& context) {
-  if (options.output.empty()) throw ConfigError({"OUT is empty"});
+  const bool to_database = !options.layers.target.empty();
+  if (to_database && !options.output.empty()) throw ConfigError({"expected OUT or --to, not both"});
+  if (!to_database && options.output.empty()) throw ConfigError({"expected OUT, or --to PG:..."});
+  if (to_database || is_layer_output(options.output)) {
+    LayerConversion conversion = options.layers;
+    conversion.input = options.input;
+    conversion.output = options.output;
+    conversion.overwrite = options.overwrite;
+    return convert_layers(conversion, context);
+  }
   refuse_input_as_output(options.output, files_of(options.input, options.open));
   if (is_stems_file(options.output))
     return convert_to_stems(options.input, options.output, options.open, options.overwrite,
@@ -201,28 +212,43 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
   return commit_conversion(*target, stopped, options.output, context);
 }
 
+void add_layer_options(CLI::App& command, LayerConversion& layers) {
+  command.add_option("--to", layers.target,
+                     "Trees and path of a run into a PostGIS database: PG:host=... dbname=...");
+  command.add_option("--schema", layers.schema, "Schema of the database")->capture_default_str();
+  command.add_option("--run-id", layers.run_id,
+                     "Rows of the same run are replaced (default: by the hashes of its input)");
+}
+
 }  // namespace
 
 void add_convert_command(CLI::App& app, Command& chosen) {
   auto options = std::make_shared<ConvertOptions>();
-  CLI::App* command = app.add_subcommand("convert",
-                                         "Write a recording as MCAP (OUT ends in .mcap), as a "
-                                         "folder of clouds, or as the stems seen in "
-                                         "it (OUT ends in .csv.gz; of a cloud, too)");
-  command->add_option("IN", options->input, "Recording: file or folder, or sim:SITE?key=value")
+  CLI::App* command =
+      app.add_subcommand("convert",
+                         "Write a recording as MCAP (OUT ends in .mcap), as a "
+                         "folder of clouds, or as the stems seen in "
+                         "it (OUT ends in .csv.gz; of a cloud, too); or the trees of "
+                         "a run as GeoJSON (.geojson) or into PostGIS (--to)");
+  command
+      ->add_option("IN", options->input,
+                   "Recording: file or folder, or sim:SITE?key=value; or a run folder")
       ->required();
-  command->add_option("OUT", options->output, "File .mcap or .csv.gz, or a folder")->required();
+  command->add_option("OUT", options->output, "File .mcap, .csv.gz or .geojson, or a folder");
   command->add_flag("--overwrite", options->overwrite, "Replace a file OUT that is there already");
   command->add_option("--format", options->format, "Clouds of a folder (default pcd)")
       ->check(CLI::IsMember({"pcd", "ply", "las", "laz", "bin"}));
   command->add_option("--compression", options->compression, "Chunks of an MCAP file")
       ->check(CLI::IsMember({"none", "lz4", "zstd"}))
       ->capture_default_str();
+  add_layer_options(*command, options->layers);
   add_open_options(*command, options->open);
   command->footer(
       "Examples:\n  understory convert walk.bag walk.mcap\n"
       "  understory convert walk.mcap walk_clouds --format ply\n"
-      "  understory convert plot.laz plot.stems.csv.gz");
+      "  understory convert plot.laz plot.stems.csv.gz\n"
+      "  understory convert RUN trees.geojson\n"
+      "  understory convert RUN --to 'PG:host=localhost dbname=forest'");
   command->callback([options, &chosen] {
     chosen = [options](CommandContext& context) { return run_convert(*options, context); };
   });

@@ -36,6 +36,48 @@ inline constexpr double kMostShift = 5.0;
 inline constexpr double kLeastSpreadM = 0.005;
 }  // namespace tree_match_chance
 
+namespace tree_matching {  // evaluation/tree_matching.cc
+// Cost of a pair for its diameters where one of them is unknown; 0 to 1 else [chosen: half way, so
+// that a tree whose diameter fits comes first, and one whose diameter does not comes last]
+inline constexpr double kUnknownDiameterCost = 0.5;
+// Cost of a tree without a partner: that of the worst pair [chosen: no two near trees are left]
+inline constexpr double kUnmatchedCost = 2.0;
+}  // namespace tree_matching
+
+namespace tree_class_errors {  // evaluation/tree_class_errors.cc
+// Classes of diameter at most; larger diameters are in another unit [bound: memory and a table that
+// can be read]
+inline constexpr double kMostClasses = 1000.0;
+// Of a class: a diameter so near below its border counts as on it, as 0.3 / 0.1 does [bound:
+// rounding]
+inline constexpr double kOnTheBorder = 1e-9;
+}  // namespace tree_class_errors
+
+namespace tree_changes {  // evaluation/tree_changes.cc, epoch_area.cc
+// Standard deviations beyond which an increment is significant [bound: 95 % of normal errors]
+inline constexpr double kSignificance = 1.96;
+// Trees that tell a spread or a quantile at least [chosen]
+inline constexpr std::size_t kLeastTrees = 8;
+// Share of the trees of OLD that are thinner than what it lists reliably [chosen]
+inline constexpr double kThinShare = 0.05;
+// Share of the increments that are below the fastest growth [chosen: single wrong pairs are beyond]
+inline constexpr double kFastShare = 0.98;
+// Share of the trees that stand within the reach of a scan [chosen: beyond it trees are missed more
+// often]
+inline constexpr double kReachShare = 0.9;
+// m: the least reach that is tried [bound: handheld scanners]
+inline constexpr double kLeastReachM = 3.0;
+// m: the largest [bound: lidars that reach 200 m]
+inline constexpr double kMostReachM = 200.0;
+// Ratio of one reach to the next [chosen: a tenth]
+inline constexpr double kReachStep = 1.1;
+// Share of the thick trees of NEW that OLD missed, above which the lists do not fit together
+// [chosen: a scan that misses half of the thick trees lists no stand]
+inline constexpr double kMostMissedShare = 0.5;
+// m: places of a path are that far apart [chosen: small beside a reach]
+inline constexpr double kPathStepM = 0.5;
+}  // namespace tree_changes
+
 namespace tree_list_check {  // evaluation/tree_list_check.cc
 // m: no stand has a larger median of diameters; groves of giant sequoias come near it [bound:
 // forests]
@@ -71,6 +113,10 @@ inline constexpr double kMaxPairM = 25.0;
 inline constexpr std::size_t kMaxPairsOfA = 400;
 // Motions that are tried at most [bound: time]
 inline constexpr std::size_t kMaxHypotheses = 200'000;
+// Trees of a list in which every n-th tells how good a motion is [bound: time]
+inline constexpr std::size_t kMany = 5'000;
+// How many of such a list do [bound: time]
+inline constexpr std::size_t kCountedOfMany = 1'000;
 // Trees that have to lie on trees at least [bound: two are a pair that was tried]
 inline constexpr std::size_t kMinMatches = 3;
 // Steps of the last fit at most [bound: convergence]

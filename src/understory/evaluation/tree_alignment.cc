@@ -3,6 +3,7 @@
 #include <tuple>
 
 #include "understory/evaluation/evaluation_constants.h"
+#include "understory/evaluation/plane_cells.h"
 #include "understory/evaluation/tree_errors.h"
 
 namespace understory {
@@ -17,24 +18,35 @@ struct Span {
   std::size_t to;
 };
 
+// In ascending order of both indices.
 std::vector<Span> spans(const std::vector<Tree>& trees, bool both_directions) {
+  const PlaneCells cells(
+      trees.size(), kMaxPairM, [&](std::size_t k) { return trees[k].x; },
+      [&](std::size_t k) { return trees[k].y; });
   std::vector<Span> result;
+  std::vector<Span> of_one;
   for (std::size_t i = 0; i < trees.size(); ++i) {
-    for (std::size_t j = both_directions ? 0 : i + 1; j < trees.size(); ++j) {
+    of_one.clear();
+    cells.around(trees[i].x, trees[i].y, [&](std::size_t j) {
+      if (i == j || (!both_directions && j < i)) return;
       const double x = trees[i].x - trees[j].x;
       const double y = trees[i].y - trees[j].y;
       const double square = x * x + y * y;  // most pairs are too long, and roots are slow
-      if (i == j || square > kMaxPairM * kMaxPairM || square < kMinPairM * kMinPairM) continue;
-      result.push_back({std::sqrt(square), i, j});
-    }
+      if (square > kMaxPairM * kMaxPairM || square < kMinPairM * kMinPairM) return;
+      of_one.push_back({std::sqrt(square), i, j});
+    });
+    std::sort(of_one.begin(), of_one.end(),
+              [](const Span& p, const Span& q) { return p.to < q.to; });
+    result.insert(result.end(), of_one.begin(), of_one.end());
   }
   return result;
 }
 
 // Every n-th, so that at most `limit` are left, spread over the whole list.
-std::vector<Span> thinned(const std::vector<Span>& all, std::size_t limit) {
+template <typename T>
+std::vector<T> thinned(const std::vector<T>& all, std::size_t limit) {
   if (all.size() <= limit) return all;
-  std::vector<Span> result;
+  std::vector<T> result;
   for (std::size_t k = 0; k < limit; ++k)
     result.push_back(all[k * all.size() / limit]);
   return result;
@@ -130,6 +142,7 @@ std::optional<Pose> best_hypothesis(const std::vector<Tree>& a, const std::vecto
     return std::tie(p.length, p.from, p.to) < std::tie(q.length, q.from, q.to);
   });
   const TreeGrid grid(b, radius_m);
+  const std::vector<Tree> counted = thinned(a, a.size() > kMany ? kCountedOfMany : kMany);
   std::optional<Pose> best;
   std::size_t best_count = kMinMatches - 1;
   std::size_t tried = 0;
@@ -142,7 +155,7 @@ std::optional<Pose> best_hypothesis(const std::vector<Tree>& a, const std::vecto
     for (; at != spans_b.end() && at->length <= span.length + slack; ++at) {
       if (++tried > kMaxHypotheses) return best;
       const Pose b_from_a = from_spans(a, span, b, *at);
-      const std::size_t count = count_near(a, b_from_a, grid, radius_m, best_count);
+      const std::size_t count = count_near(counted, b_from_a, grid, radius_m, best_count);
       if (count <= best_count) continue;
       best_count = count;
       best = b_from_a;

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <tuple>
 
+#include "understory/evaluation/plane_cells.h"
 #include "understory/util/error.h"
 #include "understory/util/files/csv.h"
 
@@ -30,39 +30,36 @@ void read_cell(const CsvReader& table, const TreeColumn& column, Tree& tree) {
   }
 }
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-double plane_distance(const Tree& a, const Tree& b) {
-  return std::hypot(a.x - b.x, a.y - b.y);
-}
-
 double ratio(std::size_t part, std::size_t whole) {
-  return whole == 0 ? kUnknown : static_cast<double>(part) / static_cast<double>(whole);
+  return whole == 0 ? Tree::kUnknown : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-// Root mean square and mean of the differences that are numbers.
-struct Differences {
-  double sum = 0.0;
-  double sum_of_squares = 0.0;
-  std::size_t n = 0;
-  void add(double d) {
-    if (!std::isfinite(d)) return;
-    sum += d;
-    sum_of_squares += d * d;
-    ++n;
+// Tells which trees stand near a path.
+class NearPath {
+ public:
+  NearPath(const Trajectory& path, double within_m)
+      : path_(path),
+        within_m_(within_m),
+        cells_(
+            path.size(), within_m,
+            [&](std::size_t k) { return path[k].world_from_body.translation().x(); },
+            [&](std::size_t k) { return path[k].world_from_body.translation().y(); }) {}
+
+  bool holds(const Tree& tree) const {
+    bool near = false;
+    cells_.around(tree.x, tree.y, [&](std::size_t k) {
+      if (near) return;
+      const Eigen::Vector3d& p = path_[k].world_from_body.translation();
+      near = std::hypot(tree.x - p.x(), tree.y - p.y()) <= within_m_;
+    });
+    return near;
   }
-  [[nodiscard]] double mean() const { return n == 0 ? kUnknown : sum / static_cast<double>(n); }
-  [[nodiscard]] double rms() const {
-    return n == 0 ? kUnknown : std::sqrt(sum_of_squares / static_cast<double>(n));
-  }
+
+ private:
+  const Trajectory& path_;
+  double within_m_;
+  PlaneCells cells_;
 };
-
-bool near_path(const Tree& tree, const Trajectory& path, double within_m) {
-  return std::any_of(path.begin(), path.end(), [&](const StampedPose& pose) {
-    const Eigen::Vector3d& p = pose.world_from_body.translation();
-    return std::hypot(tree.x - p.x(), tree.y - p.y()) <= within_m;
-  });
-}
 
 }  // namespace
 
@@ -83,35 +80,6 @@ std::vector<Tree> read_trees(const std::filesystem::path& path) {
   return trees;
 }
 
-std::vector<TreePair> match_trees(const std::vector<Tree>& a, const std::vector<Tree>& b,
-                                  double radius_m) {
-  struct Candidate {
-    double distance;
-    std::size_t i;
-    std::size_t j;
-  };
-  std::vector<Candidate> candidates;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const double distance = plane_distance(a[i], b[j]);
-      if (distance <= radius_m) candidates.push_back({distance, i, j});
-    }
-  }
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& p, const Candidate& q) {
-    return std::tie(p.distance, p.i, p.j) < std::tie(q.distance, q.i, q.j);
-  });
-  std::vector<bool> taken_a(a.size(), false);
-  std::vector<bool> taken_b(b.size(), false);
-  std::vector<TreePair> pairs;
-  for (const Candidate& c : candidates) {
-    if (taken_a[c.i] || taken_b[c.j]) continue;
-    taken_a[c.i] = taken_b[c.j] = true;
-    pairs.emplace_back(c.i, c.j);
-  }
-  std::sort(pairs.begin(), pairs.end());
-  return pairs;
-}
-
 std::vector<Tree> moved(const std::vector<Tree>& trees, const Pose& target_from_source) {
   std::vector<Tree> result = trees;
   for (Tree& tree : result) {
@@ -123,52 +91,26 @@ std::vector<Tree> moved(const std::vector<Tree>& trees, const Pose& target_from_
   return result;
 }
 
-TreeErrors compare_trees(const std::vector<Tree>& a, const std::vector<Tree>& b, double radius_m) {
-  TreeErrors errors;
-  Differences position;
-  Differences dbh;
-  Differences height;
-  const auto felled = [](const Tree& tree) { return tree.felled; };
-  errors.trees_a = a.size();
-  errors.trees_b = b.size() - static_cast<std::size_t>(std::count_if(b.begin(), b.end(), felled));
-  for (const auto& [i, j] : match_trees(a, b, radius_m)) {
-    if (b[j].felled) {
-      --errors.trees_a;
-      continue;
-    }
-    ++errors.matched;
-    position.add(plane_distance(a[i], b[j]));
-    dbh.add(a[i].dbh_m - b[j].dbh_m);
-    height.add(a[i].height_m - b[j].height_m);
-  }
-  errors.recall = ratio(errors.matched, errors.trees_b);
-  errors.precision = ratio(errors.matched, errors.trees_a);
-  errors.position_rmse_m = position.rms();
-  errors.dbh_rmse_m = dbh.rms();
-  errors.dbh_bias_m = dbh.mean();
-  errors.height_rmse_m = height.rms();
-  return errors;
-}
-
 VisibleTreeErrors compare_visible_trees(const std::vector<Tree>& a, const std::vector<Tree>& b,
-                                        double radius_m, const Visibility& visibility) {
+                                        const std::vector<TreePair>& pairs,
+                                        const Visibility& visibility) {
+  const NearPath near_path(visibility.path, visibility.within_m);
   std::vector<bool> matched_a(a.size(), false);
   std::vector<bool> matched_b(b.size(), false);
-  for (const auto& [i, j] : match_trees(a, b, radius_m))
+  for (const auto& [i, j] : pairs)
     matched_a[i] = matched_b[j] = true;
   VisibleTreeErrors errors;
   for (std::size_t j = 0; j < b.size(); ++j) {
     const auto returns = visibility.returns_by_tree.find(b[j].id);
     if (b[j].felled || returns == visibility.returns_by_tree.end() ||
-        returns->second < visibility.min_returns ||
-        !near_path(b[j], visibility.path, visibility.within_m)) {
+        returns->second < visibility.min_returns || !near_path.holds(b[j])) {
       continue;
     }
     ++errors.expected;
     if (matched_b[j]) ++errors.found;
   }
   for (std::size_t i = 0; i < a.size(); ++i) {
-    if (!near_path(a[i], visibility.path, visibility.within_m)) continue;
+    if (!near_path.holds(a[i])) continue;
     ++errors.reported;
     if (!matched_a[i]) ++errors.false_trees;
   }
@@ -177,20 +119,22 @@ VisibleTreeErrors compare_visible_trees(const std::vector<Tree>& a, const std::v
   return errors;
 }
 
-MapAgreement compare_maps(const std::vector<Tree>& a, const std::vector<Tree>& b, double radius_m,
-                          const Trajectory& path, double within_m) {
+MapAgreement compare_maps(const std::vector<Tree>& a, const std::vector<Tree>& b,
+                          const std::vector<TreePair>& pairs, const Trajectory& path,
+                          double within_m) {
+  const NearPath near_path(path, within_m);
   std::vector<bool> paired_a(a.size(), false);
   std::vector<bool> paired_b(b.size(), false);
-  for (const auto& [i, j] : match_trees(a, b, radius_m))
+  for (const auto& [i, j] : pairs)
     paired_a[i] = paired_b[j] = true;
   MapAgreement result;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    if (!near_path(a[i], path, within_m)) continue;
+    if (!near_path.holds(a[i])) continue;
     ++result.trees_a;
     if (paired_a[i]) ++result.paired_a;
   }
   for (std::size_t j = 0; j < b.size(); ++j) {
-    if (!near_path(b[j], path, within_m)) continue;
+    if (!near_path.holds(b[j])) continue;
     ++result.trees_b;
     if (paired_b[j]) ++result.paired_b;
   }

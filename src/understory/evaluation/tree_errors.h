@@ -3,11 +3,11 @@
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "understory/evaluation/alignment.h"
 #include "understory/evaluation/trajectory.h"
+#include "understory/evaluation/tree_matching.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/progress.h"
 
@@ -17,14 +17,6 @@ namespace understory {
 // felled_at marks a tree as felled. Throws InputError with the line where a position is missing or
 // a cell is no number.
 [[nodiscard]] std::vector<Tree> read_trees(const std::filesystem::path& path);
-
-// An index into A and one into B.
-using TreePair = std::pair<std::size_t, std::size_t>;
-
-// One-to-one pairs within the radius in the plane, the nearest pair first (greedy by distance, ties
-// by index). In ascending order of the index into A.
-[[nodiscard]] std::vector<TreePair> match_trees(const std::vector<Tree>& a,
-                                                const std::vector<Tree>& b, double radius_m);
 
 // Finds the motion that lays A on B without a start value: hypotheses from pairs of trees of A and
 // equally distant pairs of B, the one with most matches, then least squares over the matches until
@@ -45,15 +37,46 @@ struct TreeErrors {
   std::size_t trees_a = 0;
   std::size_t trees_b = 0;
   std::size_t matched = 0;
-  double recall = 0.0;           // matched of B
-  double precision = 0.0;        // matched of A
+  double recall = 0.0;           // completeness: matched of B
+  double precision = 0.0;        // correctness: matched of A
   double position_rmse_m = 0.0;  // horizontal
   double dbh_rmse_m = 0.0;       // of pairs in which both have a diameter
   double dbh_bias_m = 0.0;       // mean of A minus B
   double height_rmse_m = 0.0;
+  double height_bias_m = 0.0;
+  double x_bias_m = 0.0;
+  double y_bias_m = 0.0;
+  double volume_rmse_m3 = 0.0;  // of the stem
+  double volume_bias_m3 = 0.0;
+  // Pairs whose stems overlap, seen from above: their distance is at most the sum of both radii (0
+  // where a diameter is unknown). The ratio is over B, P4 section 3.4.1.
+  std::size_t overlapping = 0;
+  double overlapping_tree_ratio = 0.0;
 };
+// Over `pairs` of A and B, at most one for each tree.
+[[nodiscard]] TreeErrors errors_of_pairs(const std::vector<Tree>& a, const std::vector<Tree>& b,
+                                         const std::vector<TreePair>& pairs);
+// The same for groups of trees, such as classes of diameter: each tree has its group, or -1. A
+// pair counts in the group of its tree of B, and so does its tree of A.
+[[nodiscard]] std::vector<TreeErrors> errors_by_group(
+    const std::vector<Tree>& a, const std::vector<Tree>& b, const std::vector<TreePair>& pairs,
+    const std::vector<int>& group_of_a, const std::vector<int>& group_of_b, std::size_t groups);
+// Over the pairs that match_trees finds, the nearest first.
 [[nodiscard]] TreeErrors compare_trees(const std::vector<Tree>& a, const std::vector<Tree>& b,
                                        double radius_m);
+
+// Trees of one class of diameter. A tree without a diameter is in none.
+struct DiameterClass {
+  double from_m = 0.0;  // within the class
+  double to_m = 0.0;    // not within it
+  TreeErrors errors;
+};
+// Classes that are `width_m` wide and hold a tree, thin ones first. Throws InputError where there
+// would be more than a thousand.
+[[nodiscard]] std::vector<DiameterClass> errors_by_diameter(const std::vector<Tree>& a,
+                                                            const std::vector<Tree>& b,
+                                                            const std::vector<TreePair>& pairs,
+                                                            double width_m);
 
 // The same for what the scanner could have seen. Felled trees of B are not expected, and a tree of
 // A that matches one is not false.
@@ -62,7 +85,7 @@ struct VisibleTreeErrors {
   std::size_t found = 0;        // of these, matched
   double recall = 0.0;          // found / expected
   std::size_t reported = 0;     // of A: near the path
-  std::size_t false_trees = 0;  // of these, without any tree of B within the radius left for them
+  std::size_t false_trees = 0;  // of these, not paired with any tree of B
   double false_share = 0.0;     // false_trees / reported
 };
 struct Visibility {
@@ -72,7 +95,8 @@ struct Visibility {
   double within_m = 15.0;
 };
 [[nodiscard]] VisibleTreeErrors compare_visible_trees(const std::vector<Tree>& a,
-                                                      const std::vector<Tree>& b, double radius_m,
+                                                      const std::vector<Tree>& b,
+                                                      const std::vector<TreePair>& pairs,
                                                       const Visibility& visibility);
 
 // Agreement of two maps of one place near a path, P1 (10): trees of either that are paired one to
@@ -85,7 +109,8 @@ struct MapAgreement {
   double agreement = 0.0;  // (paired_a + paired_b) / (trees_a + trees_b); NaN if both are empty
 };
 [[nodiscard]] MapAgreement compare_maps(const std::vector<Tree>& a, const std::vector<Tree>& b,
-                                        double radius_m, const Trajectory& path, double within_m);
+                                        const std::vector<TreePair>& pairs, const Trajectory& path,
+                                        double within_m);
 
 // Sums the column `returns` per `tree_id` of a truth folder's returns.csv.gz. Throws InputError.
 [[nodiscard]] std::map<int, long> read_returns(const std::filesystem::path& path);

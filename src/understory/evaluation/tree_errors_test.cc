@@ -105,7 +105,7 @@ TEST(TreeErrors, OnlyVisibleTreesNearThePathAreExpected) {
   Visibility visibility;
   visibility.returns_by_tree = {{1, 30}, {2, 500}, {3, 29}, {4, 1000}};
   visibility.path = {{0, Pose(Eigen::Quaterniond::Identity(), {0, 0, 0})}};
-  const VisibleTreeErrors errors = compare_visible_trees(a, b, 0.5, visibility);
+  const VisibleTreeErrors errors = compare_visible_trees(a, b, match_trees(a, b, 0.5), visibility);
   EXPECT_EQ(errors.expected, 2u);
   EXPECT_EQ(errors.found, 1u);
   EXPECT_EQ(errors.reported, 3u);
@@ -130,7 +130,7 @@ TEST(TreeErrors, FelledTreesAreNeitherMissedNorFalse) {
   Visibility visibility;
   visibility.returns_by_tree = {{1, 90}, {2, 90}, {3, 90}, {4, 90}};
   visibility.path = {{0, Pose(Eigen::Quaterniond::Identity(), {0, 0, 0})}};
-  const VisibleTreeErrors visible = compare_visible_trees(a, b, 0.5, visibility);
+  const VisibleTreeErrors visible = compare_visible_trees(a, b, match_trees(a, b, 0.5), visibility);
   EXPECT_EQ(visible.expected, 2u);
   EXPECT_EQ(visible.found, 1u);
   EXPECT_EQ(visible.false_trees, 0u);
@@ -152,13 +152,13 @@ TEST(TreeErrors, AgreementOfTwoMapsNearAPath) {
   b.push_back(tree_at(55.0, -3.0));
   a.push_back(tree_at(50.0, 14.9));
   b.push_back(tree_at(50.0, 15.1));
-  const MapAgreement found = compare_maps(a, b, 0.5, path, 15.0);
+  const MapAgreement found = compare_maps(a, b, match_trees(a, b, 0.5), path, 15.0);
   EXPECT_EQ(found.trees_a, 11U);
   EXPECT_EQ(found.trees_b, 9U);
   EXPECT_EQ(found.paired_a, 9U);
   EXPECT_EQ(found.paired_b, 8U);
   EXPECT_DOUBLE_EQ(found.agreement, 17.0 / 20.0);
-  EXPECT_TRUE(std::isnan(compare_maps({}, {}, 0.5, path, 15.0).agreement));
+  EXPECT_TRUE(std::isnan(compare_maps({}, {}, {}, path, 15.0).agreement));
 }
 
 TEST(TreeErrors, ReadsTheColumnsByName) {

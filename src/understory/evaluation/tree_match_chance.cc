@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <iterator>
 #include <limits>
 
@@ -46,23 +47,33 @@ std::vector<Tree> scrambled(std::vector<Tree> trees, double max_m, Random& rando
   return trees;
 }
 
-void judge_copies(const std::vector<Tree>& s, const std::vector<Tree>& l, double weight,
-                  const TreeMergeConfig& config, bool searched, const ProgressSink& progress,
-                  MatchChance& chance) {
+// Sum of 1 - d^2 / r^2 over pairs within the radius.
+double weight_of(const std::vector<Tree>& a, const std::vector<Tree>& b,
+                 const std::vector<TreePair>& pairs, double radius_m) {
+  double weight = 0.0;
+  for (const auto& [i, j] : pairs)
+    weight += 1.0 - std::pow(std::hypot(a[i].x - b[j].x, a[i].y - b[j].y) / radius_m, 2.0);
+  return weight;
+}
+
+// Copies of `l` that lost the places of their trees, weighed against `s` by `weight_with`.
+void judge_copies(const std::vector<Tree>& s, const std::vector<Tree>& l, double reach_m,
+                  const std::function<double(const std::vector<Tree>&)>& weight_with, bool searched,
+                  const ProgressSink& progress, MatchChance& chance) {
   constexpr std::uint64_t kSeed = 20'210'707;
   std::vector<double> found(searched ? kSearchedCopies : kShiftedCopies,
                             std::numeric_limits<double>::quiet_NaN());
   parallel_for(found.size(), 1, [&](std::size_t k) {
     progress.poll();
     Random random(kSeed, k);
-    std::vector<Tree> copy = searched ? scrambled(l, k == 0 ? 0.0 : 2.0 * config.reach_m, random)
-                                      : shifted(l, config.reach_m, random);
+    std::vector<Tree> copy =
+        searched ? scrambled(l, k == 0 ? 0.0 : 2.0 * reach_m, random) : shifted(l, reach_m, random);
     if (searched) {
-      const auto motion = align_trees(copy, s, Alignment::kYaw, config.reach_m, progress);
+      const auto motion = align_trees(copy, s, Alignment::kYaw, reach_m, progress);
       if (!motion) return;
       copy = moved(copy, *motion);
     }
-    found[k] = weight_of(merge_trees(s, copy, weight, config), config.duplicate_m);
+    found[k] = weight_with(copy);
   });
   std::vector<double> weights;
   std::copy_if(found.begin(), found.end(), std::back_inserter(weights),
@@ -77,14 +88,11 @@ void judge_copies(const std::vector<Tree>& s, const std::vector<Tree>& l, double
   chance.chance_sd = n > 1.0 ? std::sqrt(chance.chance_sd / (n - 1.0)) : 0.0;
 }
 
-void judge_diameters(const std::vector<Tree>& s, const std::vector<Tree>& l,
-                     const MergedTrees& merged, MatchChance& chance) {
+// `diameters`: of the trees of each pair, NaN where unknown.
+void judge_diameters(const std::vector<Eigen::Vector2d>& diameters, MatchChance& chance) {
   std::vector<Eigen::Vector2d> pairs;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (std::size_t k = 0; k < merged.trees.size(); ++k) {
-    if (merged.index_in_s[k] < 0 || merged.index_in_l[k] < 0) continue;
-    const Eigen::Vector2d dbh(s[static_cast<std::size_t>(merged.index_in_s[k])].dbh_m,
-                              l[static_cast<std::size_t>(merged.index_in_l[k])].dbh_m);
+  for (const Eigen::Vector2d& dbh : diameters) {
     if (!dbh.allFinite()) continue;
     pairs.push_back(dbh);
     mean += dbh;
@@ -103,6 +111,15 @@ void judge_diameters(const std::vector<Tree>& s, const std::vector<Tree>& l,
       std::atanh(std::clamp(chance.diameter_correlation, -0.999999, 0.999999)) * std::sqrt(n - 3.0);
 }
 
+// The verdict from what was found.
+void judge(MatchChance& chance) {
+  chance.sigmas = (chance.weight - chance.chance_weight) /
+                  std::max({1.0, chance.chance_sd, std::sqrt(chance.chance_weight)});
+  chance.beyond_chance =
+      chance.pairs >= kLeastPairs &&
+      (chance.sigmas > kLeastSigmas || chance.diameter_sigmas > kLeastDiameterSigmas);
+}
+
 }  // namespace
 
 MatchChance match_chance(const std::vector<Tree>& s, const std::vector<Tree>& l,
@@ -112,13 +129,41 @@ MatchChance match_chance(const std::vector<Tree>& s, const std::vector<Tree>& l,
   chance.pairs = merged.joined;
   chance.weight = weight_of(merged, config.duplicate_m);
   if (merged.joined == 0) return chance;
-  judge_copies(s, l, weight, config, searched, progress, chance);
-  chance.sigmas = (chance.weight - chance.chance_weight) /
-                  std::max({1.0, chance.chance_sd, std::sqrt(chance.chance_weight)});
-  judge_diameters(s, l, merged, chance);
-  chance.beyond_chance =
-      chance.pairs >= kLeastPairs &&
-      (chance.sigmas > kLeastSigmas || chance.diameter_sigmas > kLeastDiameterSigmas);
+  judge_copies(
+      s, l, config.reach_m,
+      [&](const std::vector<Tree>& copy) {
+        return weight_of(merge_trees(s, copy, weight, config), config.duplicate_m);
+      },
+      searched, progress, chance);
+  std::vector<Eigen::Vector2d> diameters;
+  for (std::size_t k = 0; k < merged.trees.size(); ++k) {
+    if (merged.index_in_s[k] < 0 || merged.index_in_l[k] < 0) continue;
+    diameters.emplace_back(s[static_cast<std::size_t>(merged.index_in_s[k])].dbh_m,
+                           l[static_cast<std::size_t>(merged.index_in_l[k])].dbh_m);
+  }
+  judge_diameters(diameters, chance);
+  judge(chance);
+  return chance;
+}
+
+MatchChance match_chance(const std::vector<Tree>& a, const std::vector<Tree>& b,
+                         const std::vector<TreePair>& pairs, double radius_m, bool searched,
+                         const ProgressSink& progress) {
+  MatchChance chance;
+  chance.pairs = pairs.size();
+  chance.weight = weight_of(a, b, pairs, radius_m);
+  if (pairs.empty()) return chance;
+  judge_copies(
+      b, a, radius_m,
+      [&](const std::vector<Tree>& copy) {
+        return weight_of(copy, b, match_trees(copy, b, radius_m), radius_m);
+      },
+      searched, progress, chance);
+  std::vector<Eigen::Vector2d> diameters;
+  for (const auto& [i, j] : pairs)
+    diameters.emplace_back(a[i].dbh_m, b[j].dbh_m);
+  judge_diameters(diameters, chance);
+  judge(chance);
   return chance;
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/evaluation/tree_matching.h"
 #include "understory/evaluation/tree_merge.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/progress.h"
@@ -38,6 +39,13 @@ struct MatchChance {
                                        const MergedTrees& merged, double weight,
                                        const TreeMergeConfig& config, bool searched,
                                        const ProgressSink& progress = {});
+
+// The same for two lists whose trees stay where they are: `pairs` of A and B within `radius_m`, as
+// match_trees or assign_trees finds them. The copies are matched by match_trees. `searched`: A was
+// first laid on B by the trees alone. Deterministic. Polls `progress`.
+[[nodiscard]] MatchChance match_chance(const std::vector<Tree>& a, const std::vector<Tree>& b,
+                                       const std::vector<TreePair>& pairs, double radius_m,
+                                       bool searched, const ProgressSink& progress = {});
 
 // Why the maps may be of different stands, in words for the user; empty if they are of one.
 [[nodiscard]] std::string chance_complaint(const MatchChance& chance);

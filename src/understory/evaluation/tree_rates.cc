@@ -31,6 +31,20 @@ double distance_m(const Tree& tree, const PlaneGrid& path, double reach_m) {
   return found.index < 0 ? std::numeric_limits<double>::infinity() : std::sqrt(found.squared_m2);
 }
 
+// The ring around the path that each tree stands in; -1 beyond the reach.
+std::vector<int> rings_of(const std::vector<Tree>& trees, const Trajectory& path, double bin_m,
+                          double reach_m) {
+  const PlaneGrid grid = grid_of(path);
+  const int rings = static_cast<int>(std::ceil(reach_m / bin_m - 1e-9));
+  std::vector<int> result;
+  for (const Tree& tree : trees) {
+    const double d = distance_m(tree, grid, reach_m);
+    // Just below the reach a quotient may round up to the number of rings.
+    result.push_back(d < reach_m ? std::min(rings - 1, static_cast<int>(d / bin_m)) : -1);
+  }
+  return result;
+}
+
 double share(std::size_t part, std::size_t whole) {
   return static_cast<double>(part) / static_cast<double>(whole);
 }
@@ -71,13 +85,14 @@ std::size_t matches_after_motion(std::vector<Tree> a, const std::vector<Tree>& b
 }
 
 std::vector<DistanceRate> rates_over_distance(const std::vector<Tree>& a,
-                                              const std::vector<Tree>& b, double radius_m,
+                                              const std::vector<Tree>& b,
+                                              const std::vector<TreePair>& pairs,
                                               const Trajectory& path, double bin_m,
                                               double reach_m) {
   std::vector<char> matched_a(a.size(), 0);
   std::vector<char> matched_b(b.size(), 0);
   std::vector<char> felled(a.size(), 0);
-  for (const auto& [i, j] : match_trees(a, b, radius_m)) {
+  for (const auto& [i, j] : pairs) {
     matched_a[i] = matched_b[j] = 1;
     felled[i] = b[j].felled ? 1 : 0;
   }
@@ -86,28 +101,26 @@ std::vector<DistanceRate> rates_over_distance(const std::vector<Tree>& a,
     rates[k].from_m = static_cast<double>(k) * bin_m;
     rates[k].to_m = std::min(reach_m, rates[k].from_m + bin_m);
   }
-  const PlaneGrid grid = grid_of(path);
-  const auto bin = [&](const Tree& tree) {
-    const double d = distance_m(tree, grid, reach_m);
-    if (!(d < reach_m)) return static_cast<DistanceRate*>(nullptr);
-    // Just below the reach a quotient may round up to the number of rings.
-    return &rates[std::min(rates.size() - 1, static_cast<std::size_t>(d / bin_m))];
-  };
+  const std::vector<int> rings_a = rings_of(a, path, bin_m, reach_m);
+  const std::vector<int> rings_b = rings_of(b, path, bin_m, reach_m);
   for (std::size_t j = 0; j < b.size(); ++j) {
-    DistanceRate* rate = b[j].felled ? nullptr : bin(b[j]);
-    if (rate == nullptr) continue;
-    ++rate->expected;
-    rate->found += matched_b[j] != 0 ? 1 : 0;
+    if (b[j].felled || rings_b[j] < 0) continue;
+    DistanceRate& rate = rates[static_cast<std::size_t>(rings_b[j])];
+    ++rate.expected;
+    rate.found += matched_b[j] != 0 ? 1 : 0;
   }
   for (std::size_t i = 0; i < a.size(); ++i) {
-    DistanceRate* rate = felled[i] != 0 ? nullptr : bin(a[i]);
-    if (rate == nullptr) continue;
-    ++rate->reported;
-    rate->right += matched_a[i] != 0 ? 1 : 0;
+    if (felled[i] != 0 || rings_a[i] < 0) continue;
+    DistanceRate& rate = rates[static_cast<std::size_t>(rings_a[i])];
+    ++rate.reported;
+    rate.right += matched_a[i] != 0 ? 1 : 0;
   }
-  for (DistanceRate& rate : rates) {
-    rate.recall = share(rate.found, rate.expected);
-    rate.precision = share(rate.right, rate.reported);
+  const std::vector<TreeErrors> errors =
+      errors_by_group(a, b, pairs, rings_a, rings_b, rates.size());
+  for (std::size_t k = 0; k < rates.size(); ++k) {
+    rates[k].recall = share(rates[k].found, rates[k].expected);
+    rates[k].precision = share(rates[k].right, rates[k].reported);
+    rates[k].errors = errors[k];
   }
   return rates;
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
+#include "understory/evaluation/tree_errors.h"
 #include "understory/sensor/tree.h"
 
 namespace understory {
@@ -26,13 +27,15 @@ struct DistanceRate {
   std::size_t right = 0;     // of these, matched
   double recall = 0.0;       // found / expected, NaN without any
   double precision = 0.0;    // right / reported
+  TreeErrors errors;         // of the pairs whose tree of B stands there
 };
 
 // In rings of `bin_m` out to `reach_m`. Both maps in one frame.
 [[nodiscard]] std::vector<DistanceRate> rates_over_distance(const std::vector<Tree>& a,
                                                             const std::vector<Tree>& b,
-                                                            double radius_m, const Trajectory& path,
-                                                            double bin_m, double reach_m);
+                                                            const std::vector<TreePair>& pairs,
+                                                            const Trajectory& path, double bin_m,
+                                                            double reach_m);
 
 // Consistency of two maps of one place (P1 (10), table 1) over the trees that both can have seen:
 // those within `within_m` of both paths.

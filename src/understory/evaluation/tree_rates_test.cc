@@ -49,7 +49,8 @@ TEST(TreeRates, DetectionFallsWithTheDistance) {
   for (const Tree& tree : truth)
     ASSERT_GT(std::hypot(tree.x - wrong.x, tree.y - wrong.y), 0.3);
   found.push_back(wrong);
-  const auto rates = rates_over_distance(found, truth, 0.3, road(0.0), 5.0, 25.0);
+  const auto rates =
+      rates_over_distance(found, truth, match_trees(found, truth, 0.3), road(0.0), 5.0, 25.0);
   ASSERT_EQ(rates.size(), 5U);
   EXPECT_GT(rates[0].expected, 60U);
   EXPECT_DOUBLE_EQ(rates[0].recall, 1.0);
@@ -67,7 +68,8 @@ TEST(TreeRates, FelledTreesAreNeitherMissedNorFalse) {
   const std::vector<Tree> found = truth;
   for (std::size_t k = 0; k < truth.size(); k += 3)
     truth[k].felled = true;
-  const auto rates = rates_over_distance(found, truth, 0.3, road(0.0), 10.0, 20.0);
+  const auto rates =
+      rates_over_distance(found, truth, match_trees(found, truth, 0.3), road(0.0), 10.0, 20.0);
   EXPECT_DOUBLE_EQ(rates[0].recall, 1.0);
   EXPECT_EQ(rates[0].reported, rates[0].expected);
   EXPECT_DOUBLE_EQ(rates[0].precision, 1.0);
@@ -80,7 +82,8 @@ TEST(TreeRates, TheLastRingEndsAtTheReach) {
   trees[0].y = 1.7;
   const Trajectory path = {{0, Pose()},
                            {1, Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d::UnitX())}};
-  const auto rates = rates_over_distance(trees, trees, 0.3, path, 0.1, 17 * 0.1);
+  const auto rates =
+      rates_over_distance(trees, trees, match_trees(trees, trees, 0.3), path, 0.1, 17 * 0.1);
   ASSERT_EQ(rates.size(), 17U);
   EXPECT_EQ(rates.back().found, 1U);
 }

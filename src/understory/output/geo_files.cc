@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "understory/geometry/quiet_gdal.h"
+#include "understory/output/point_table.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
 
@@ -171,12 +172,8 @@ void add_line(OGRLayer& layer, const PathLine& line, const std::filesystem::path
   if (layer.CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
 }
 
-}  // namespace
-
-void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
-                      const std::string& crs_wkt, const PathLine& line,
-                      const std::string& heights) {
-  const QuietGdal quiet;
+// An empty package under the name that it has until it is whole.
+GDALDatasetUniquePtr new_package(const std::filesystem::path& path) {
   // The same rows give the same bytes: without this the file holds the time of writing.
   CPLSetThreadLocalConfigOption("OGR_CURRENT_DATE", "2000-01-01T00:00:00.000Z");
   std::error_code ignored;
@@ -184,6 +181,40 @@ void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>
   GDALDatasetUniquePtr dataset(
       driver("GPKG")->Create(part_path(path).c_str(), 0, 0, 0, GDT_Unknown, nullptr));
   if (dataset == nullptr) fail(path);
+  return dataset;
+}
+
+OGRFieldType type_of(PointColumn::Kind kind) {
+  return kind == PointColumn::Kind::kText    ? OFTString
+         : kind == PointColumn::Kind::kWhole ? OFTInteger
+                                             : OFTReal;
+}
+
+void add_row(OGRLayer& layer, const PointRow& row, const std::filesystem::path& path) {
+  const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer.GetLayerDefn()));
+  for (std::size_t k = 0; k < row.cells.size(); ++k) {
+    const int field = static_cast<int>(k);
+    if (const auto* text = std::get_if<std::string>(&row.cells[k])) {
+      feature->SetField(field, text->c_str());
+    } else if (const auto* whole = std::get_if<int>(&row.cells[k])) {
+      feature->SetField(field, *whole);
+    } else if (const auto* real = std::get_if<double>(&row.cells[k]);
+               real && std::isfinite(*real)) {
+      feature->SetField(field, *real);
+    }
+  }
+  OGRPoint point(row.point.x(), row.point.y(), row.point.z());
+  feature->SetGeometry(&point);
+  if (layer.CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
+}
+
+}  // namespace
+
+void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
+                      const std::string& crs_wkt, const PathLine& line,
+                      const std::string& heights) {
+  const QuietGdal quiet;
+  GDALDatasetUniquePtr dataset = new_package(path);
   const std::string above = heights.empty() ? "" : "; heights are " + heights;
   OGRLayer* layer = add_layer(*dataset, "trees", wkbPoint25D, crs_wkt,
                               "trees where the stem meets the ground" + above, path);
@@ -201,6 +232,23 @@ void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>
   dataset->StartTransaction();
   add_trees(*layer, trees, path);
   if (drawn != nullptr) add_line(*drawn, line, path);
+  if (dataset->CommitTransaction() != OGRERR_NONE) fail(path);
+  close(std::move(dataset), path);
+}
+
+void write_points_gpkg(const std::filesystem::path& path, const PointTable& table,
+                       const std::string& layer, const std::string& description,
+                       const std::string& crs_wkt) {
+  const QuietGdal quiet;
+  GDALDatasetUniquePtr dataset = new_package(path);
+  OGRLayer* points = add_layer(*dataset, layer.c_str(), wkbPoint25D, crs_wkt, description, path);
+  for (const PointColumn& column : table.columns) {
+    OGRFieldDefn field(column.name.c_str(), type_of(column.kind));
+    if (points->CreateField(&field) != OGRERR_NONE) fail(path);
+  }
+  dataset->StartTransaction();
+  for (const PointRow& row : table.rows)
+    add_row(*points, row, path);
   if (dataset->CommitTransaction() != OGRERR_NONE) fail(path);
   close(std::move(dataset), path);
 }

@@ -50,6 +50,12 @@ class Sha256 {
 
 }  // namespace
 
+std::string hash_text(const std::string& text) {
+  Sha256 hash;
+  hash.update(text.data(), text.size());
+  return hash.finish();
+}
+
 InputHash hash_input(const std::filesystem::path& path, const ProgressSink& progress) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(path.string(), "", std::strerror(errno));

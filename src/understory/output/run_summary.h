@@ -37,6 +37,9 @@ struct InputHash {
 [[nodiscard]] InputHash hash_input(const std::filesystem::path& path,
                                    const ProgressSink& progress = {});
 
+// SHA-256 of a text, lower-case hexadecimal.
+[[nodiscard]] std::string hash_text(const std::string& text);
+
 // Time that one stage took, over all its runs.
 struct StageSummary {
   Distribution wall_ms;
