@@ -245,6 +245,20 @@ inline constexpr double kThickest = 1.5;
 inline constexpr double kMostCells = 1000.0;
 }  // namespace slice_inventory
 
+namespace tree_doubt {  // forest/trees/tree_doubt.cc
+// Standard deviation over diameter: above, the diameter is doubtful [chosen: the volume of such a
+// tree is off by more than a half]
+inline constexpr double kWeakShare = 0.3;
+// degrees of a stem's circumference: who saw less saw less than a half of it [bound: geometry]
+inline constexpr double kHalfTurn = 180.0;
+// Doubt of a tree without a height [chosen]
+inline constexpr double kNoHeight = 0.5;
+// Doubt that the worst standard deviation adds: that of three diameters [chosen]
+inline constexpr double kMostShares = 10.0;
+// Doubt of a tree without a diameter: more than all that is above [bound: order]
+inline constexpr double kNoDiameter = 13.0;
+}  // namespace tree_doubt
+
 namespace tree_segments {  // forest/trees/tree_segments.cc
 // m: one point per cube near breast height, where the cross section is drawn [chosen]
 inline constexpr double kLowThin = 0.015;

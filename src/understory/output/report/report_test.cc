@@ -1,6 +1,9 @@
 #include "understory/output/report/report.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <string>
 
 namespace understory {
 namespace {
@@ -102,6 +105,40 @@ TEST(Report, TreesByTheirCrownsStandInTheTableWithoutAStem) {
   EXPECT_EQ(crowns.find("seen around"), std::string::npos);
   EXPECT_EQ(crowns.find("diameter, cm"), std::string::npos);
   EXPECT_NE(crowns.find("height above the ground, m"), std::string::npos);
+}
+
+Tree tree_at_origin(int id, double dbh_m, double dbh_sd_m, double height_m) {
+  Tree tree;
+  tree.id = id;
+  tree.dbh_m = dbh_m;
+  tree.dbh_sd_m = dbh_sd_m;
+  tree.height_m = height_m;
+  return tree;
+}
+
+// The scripts of the page read the trees from the picture: place, true radius, how sure it is.
+TEST(Report, TheMapTellsWhichTreesAreDoubtful) {
+  constexpr double kUnknown = Tree::kUnknown;
+  InventoryResult inventory;
+  inventory.trees = {tree_at_origin(1, 0.2, 0.01, 12.0), tree_at_origin(2, 0.2, 0.07, kUnknown),
+                     tree_at_origin(3, kUnknown, kUnknown, 18.0)};
+  inventory.trees[0].x = 40.0;
+  inventory.stems.resize(2);
+  ReportInput input;
+  input.inventory = &inventory;
+  const std::string html = report_html(input);
+  EXPECT_NE(html.find("<circle class=\"sure\" data-id=\"1\""), std::string::npos);
+  EXPECT_NE(html.find("<circle class=\"weak\" data-id=\"2\""), std::string::npos);
+  EXPECT_NE(html.find("<circle class=\"crown\" data-id=\"3\""), std::string::npos);
+  EXPECT_NE(html.find("tree 1: 20.0 ± 1.0 cm, 12.0 m high"), std::string::npos);
+  EXPECT_NE(html.find("tree 2: 20.0 ± 7.0 cm<"), std::string::npos);
+  EXPECT_NE(html.find("tree 3: no diameter, 18.0 m high"), std::string::npos);
+  // 40 m and a margin of 2 % on each side are 1,100 units; the first stem has a radius of 10 cm.
+  const std::size_t at = html.find("data-metre=\"");
+  ASSERT_NE(at, std::string::npos);
+  const double per_metre = std::stod(html.substr(at + 12));
+  EXPECT_NEAR(per_metre, 1100.0 / 41.6, 1e-3);
+  EXPECT_NE(html.find(fmt::format("data-r=\"{:.2f}\"", 0.1 * per_metre)), std::string::npos);
 }
 
 // "distance 20 cm; less is better" was taken for the error of the map.
