@@ -230,6 +230,7 @@ std::string map_svg(const ReportInput& input, const MapView& view) {
       view.width * view.scale, view.height * view.scale, view.x0, view.y0 + view.height, view.scale,
       view.per_metre(), grid ? " data-grid=\"\"" : "");
   if (input.picture != nullptr && !input.picture->empty()) svg += picture_svg(*input.picture, view);
+  if (input.inventory != nullptr) svg += thin_svg(*input.inventory, view);
   if (const std::vector<Tree>* trees = report_trees(input)) svg += trees_svg(*trees, view);
   if (!input.falls.empty()) svg += falls_svg(input.falls, view);
   svg += loops_svg(input.loops, view);
@@ -239,6 +240,7 @@ std::string map_svg(const ReportInput& input, const MapView& view) {
     svg += marker(input.scans.back().position, view, "end");
     svg += marker(input.scans.front().position, view, "start");
   }
+  if (input.inventory != nullptr) svg += look_svg(*input.inventory, view);
   if (grid) svg += grid_svg(view);
   svg += scale_bar(view);
   if (input.north_is_up) svg += north_arrow(view);
@@ -272,6 +274,10 @@ std::string map_legend(const ReportInput& input) {
     entry(" class=\"box\"", "background:#4f9a4a", "vegetation, the lighter the higher");
   }
   legend += tree_legend(input);
+  if (input.inventory != nullptr && !input.inventory->thin.corners.empty())
+    legend += "<span><i class=\"box thin\"></i>thin coverage: stems may be missing</span> ";
+  if (input.inventory != nullptr && !input.inventory->look_again.empty())
+    legend += "<span><i class=\"box look\">1</i>walk here (below)</span> ";
   if (!input.falls.empty()) legend += "<span><b>×</b> felled meanwhile</span> ";
   if (!input.scans.empty()) {
     line("--path", "path");
@@ -290,8 +296,10 @@ std::string map_legend(const ReportInput& input) {
 
 std::string map_section(const ReportInput& input) {
   if (input.picture == nullptr && input.scans.empty() && report_trees(input) == nullptr) return "";
-  return "<section><h2>The map from above</h2>" + map_svg(input, map_view(input)) +
-         map_legend(input) + "</section>\n";
+  const MapView view = map_view(input);
+  return "<section><h2>The map from above</h2>" + map_svg(input, view) + map_legend(input) +
+         (input.inventory == nullptr ? std::string() : look_list(*input.inventory, view)) +
+         "</section>\n";
 }
 
 }  // namespace understory

@@ -424,7 +424,8 @@ std::string stand_section(const ReportInput& input) {
   }
   html += cross_sections(inventory);
   if (!inventory.trees.empty())
-    html += single_trees(inventory) + tree_table(inventory.trees, &inventory.stems, true);
+    html += single_trees(inventory) + sheets_part(inventory) +
+            tree_table(inventory.trees, &inventory.stems, true);
   return html + "</section>\n";
 }
 

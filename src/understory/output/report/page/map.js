@@ -26,13 +26,18 @@ function readMap(svg) {
     grid: svg.hasAttribute('data-grid'),
     north: svg.querySelector('.north') !== null,
     picture: null,
+    hidden: {},
     trees: all('.trees circle').map((c) => ({
       id: number(c, 'data-id'), x: number(c, 'cx'), y: number(c, 'cy'), r: number(c, 'data-r'),
       text: c.textContent, look: lookOf(c),
     })),
-    lines: all('.way path, .loops path').map((p) => ({
+    thin: all('.thin-area').map((p) => new Path2D(p.getAttribute('d'))),
+    stands: all('.stand').map((g) => ({
+      x: number(g, 'data-x'), y: number(g, 'data-y'), text: g.querySelector('text').textContent,
+    })),
+    lines: all('.look-sights path, .way path, .loops path').map((p) => ({
       path: new Path2D(p.getAttribute('d')), colour: getComputedStyle(p).stroke,
-      width: number(p, 'stroke-width'), dashed: p.hasAttribute('stroke-dasharray'),
+      width: number(p, 'stroke-width'), look: p.parentNode.classList.contains('look-sights'), dashed: p.hasAttribute('stroke-dasharray'),
     })),
     dots: all('.fixes circle').map((c) => ({
       x: number(c, 'cx'), y: number(c, 'cy'), opacity: number(c, 'opacity'),
@@ -47,6 +52,23 @@ function readMap(svg) {
     map.picture.image.src = image.getAttribute('href');
   }
   return map;
+}
+
+// Boxes that show and hide a layer, for those that the map has.
+function addLayers(map, moving, frame) {
+  const layers = [['thin', 'thin coverage', map.thin], ['stands', 'walk here', map.stands]];
+  const row = makeElement('p', { class: 'layers' });
+  layers.filter(([, , parts]) => parts.length > 0).forEach(([name, text]) => {
+    const label = makeElement('label');
+    const box = makeElement('input', { type: 'checkbox', checked: '' });
+    box.addEventListener('change', () => {
+      map.hidden[name] = !box.checked;
+      moving.repaint();
+    });
+    label.append(box, ' ' + text);
+    row.append(label);
+  });
+  if (row.childElementCount > 0) frame.append(row);
 }
 
 function startMap(svg) {
@@ -65,6 +87,7 @@ function startMap(svg) {
   svg.classList.add('still');
   const hint = 'Drag to move, wheel or two fingers to zoom, click on a tree to find it in the table.';
   const moving = new MovableMap(canvas, map, (text) => { told.textContent = text || hint; });
+  addLayers(map, moving, frame);
   [['+', 'zoom in', () => moving.zoomMiddle(1.5)], ['−', 'zoom out', () => moving.zoomMiddle(1 / 1.5)],
     ['all', 'show the whole map', () => moving.showAll()]].forEach(([text, title, act]) => {
     const button = makeElement('button', { type: 'button', title }, text);

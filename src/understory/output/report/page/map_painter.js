@@ -62,6 +62,7 @@ class MapPainter {
     this.pen.fillStyle = '#fff';
     this.pen.fillRect(0, 0, width, height);
     this.paintPicture();
+    if (!this.map.hidden.thin) this.paintThin(ratio);
     if (this.map.grid) this.paintGrid();
     this.paintTrees(ratio);
     this.paintLines(ratio);
@@ -119,6 +120,7 @@ class MapPainter {
     pen.save();
     pen.setTransform(k, 0, 0, k, -view.x * k, -view.y * k);
     this.map.lines.forEach((line) => {
+      if (line.look && this.map.hidden.stands) return;
       pen.strokeStyle = line.colour;
       pen.lineWidth = line.width / view.scale;
       pen.setLineDash(line.dashed ? [4 / view.scale, 4 / view.scale] : []);
@@ -148,6 +150,44 @@ class MapPainter {
       pen.stroke();
     });
     this.map.marks.forEach((mark) => this.paintMark(mark));
+    if (!this.map.hidden.stands) this.map.stands.forEach((stand) => this.paintStand(stand));
+  }
+
+  // Where to stand, with its number.
+  paintStand(stand) {
+    const { pen } = this;
+    const [x, y] = this.at(stand);
+    pen.fillStyle = '#ffd21f';
+    pen.strokeStyle = '#111';
+    pen.lineWidth = 1.5;
+    pen.fillRect(x - 11, y - 9, 22, 18);
+    pen.strokeRect(x - 11, y - 9, 22, 18);
+    pen.font = '700 14px system-ui, sans-serif';
+    pen.textAlign = 'center';
+    pen.fillStyle = '#111';
+    pen.fillText(stand.text, x, y + 5);
+  }
+
+  // Hatched, with lines that stay apart on the screen.
+  paintThin(ratio) {
+    const { pen, view } = this;
+    if (this.map.thin.length === 0) return;
+    const k = view.scale * ratio;
+    pen.save();
+    pen.setTransform(k, 0, 0, k, -view.x * k, -view.y * k);
+    pen.beginPath();
+    const area = new Path2D();
+    this.map.thin.forEach((part) => area.addPath(part));
+    pen.clip(area);
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.strokeStyle = 'rgba(91,42,134,.5)';
+    pen.lineWidth = 1.5;
+    for (let x = -this.height; x < this.width; x += 10) {
+      pen.moveTo(x, this.height);
+      pen.lineTo(x + this.height, 0);
+    }
+    pen.stroke();
+    pen.restore();
   }
 
   paintMark(mark) {

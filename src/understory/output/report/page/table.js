@@ -133,7 +133,7 @@ class TreeTable {
     const place = this.box.closest('.all-trees');
     const home = makeElement('span', { hidden: '' });
     place.before(home);
-    const move = () => map.append(place);
+    const move = () => map.querySelector('.legend').after(place);
     window.addEventListener('beforeprint', () => home.after(place));
     window.addEventListener('afterprint', move);
     move();
