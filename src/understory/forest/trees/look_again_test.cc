@@ -43,9 +43,8 @@ TEST(LookAgain, ThePlaceLiesOnTheSideThatWasNotSeen) {
 
 // Four stems in a square that were all seen from outside: from the middle all four unseen sides.
 TEST(LookAgain, OnePlaceServesAllThatItShows) {
-  const std::vector<StandingStem> stems = {
-      weak_stem(0.0, 0.0, -135.0), weak_stem(8.0, 0.0, -45.0), weak_stem(8.0, 8.0, 45.0),
-      weak_stem(0.0, 8.0, 135.0)};
+  const std::vector<StandingStem> stems = {weak_stem(0.0, 0.0, -135.0), weak_stem(8.0, 0.0, -45.0),
+                                           weak_stem(8.0, 8.0, 45.0), weak_stem(0.0, 8.0, 135.0)};
   const auto places = places_to_look(stems, anywhere);
   ASSERT_EQ(places.size(), 1U);
   EXPECT_EQ(places[0].stems.size(), 4U);

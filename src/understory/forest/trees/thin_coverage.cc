@@ -23,8 +23,7 @@ ThinCoverage CoverageGrid::thin() const {
             [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
               return a.y() < b.y() || (a.y() == b.y() && a.x() < b.x());
             });
-  if (cells > 0)
-    thin.share = static_cast<double>(thin.corners.size()) / static_cast<double>(cells);
+  if (cells > 0) thin.share = static_cast<double>(thin.corners.size()) / static_cast<double>(cells);
   return thin;
 }
 

@@ -181,8 +181,8 @@ std::vector<TreeSheet> SheetCollector::take() {
       }
     }
     for (const PointSample::Point& point : gathered.section.take())
-      sheet.section.push_back((sheet.section_reach_m / kBytes * Eigen::Vector2d(point.x, point.y))
-                                  .cast<float>());
+      sheet.section.push_back(
+          (sheet.section_reach_m / kBytes * Eigen::Vector2d(point.x, point.y)).cast<float>());
     sheets.push_back(std::move(sheet));
   }
   sheets_.clear();

@@ -26,10 +26,9 @@ std::vector<SlicePoint> surface_of(const StemFit& stem, int from_deg, int to_deg
   for (int degree = from_deg; degree < to_deg; degree += 2) {
     const double angle = degree * std::numbers::pi / 180.0;
     for (const double height : {0.6, 1.0, 1.3, 1.8, 2.4}) {
-      const Eigen::Vector2d place =
-          stem.centre + (height - 1.3) * stem.slope +
-          (stem.radius_m + (height - 1.3) * stem.taper) *
-              Eigen::Vector2d(std::cos(angle), std::sin(angle));
+      const Eigen::Vector2d place = stem.centre + (height - 1.3) * stem.slope +
+                                    (stem.radius_m + (height - 1.3) * stem.taper) *
+                                        Eigen::Vector2d(std::cos(angle), std::sin(angle));
       points.push_back({static_cast<float>(place.x()), static_cast<float>(place.y()),
                         static_cast<float>(height)});
     }

@@ -83,12 +83,11 @@ std::string line_of(const InventoryResult& inventory, const TreeSheet& sheet) {
   const double measured_to_m = sheet.tree < inventory.curves.size()
                                    ? inventory.curves[sheet.tree].measured_to_m
                                    : stem.highest_m;
-  return fmt::format("{},{},{},{},{},{},{},{:x},{},{},{}\n", tree.id,
-                     shortest(100.0 * tree.dbh_m, 1), shortest(100.0 * tree.dbh_sd_m, 1),
-                     shortest(tree.height_m, 1), shortest(stem.arc_deg, 0),
-                     shortest(sheet.section_reach_m, 4), shortest(measured_to_m, 1),
-                     sheet.seen.to_ullong(), outline_of(inventory, sheet.tree),
-                     front_bytes(sheet), section_bytes(sheet));
+  return fmt::format(
+      "{},{},{},{},{},{},{},{:x},{},{},{}\n", tree.id, shortest(100.0 * tree.dbh_m, 1),
+      shortest(100.0 * tree.dbh_sd_m, 1), shortest(tree.height_m, 1), shortest(stem.arc_deg, 0),
+      shortest(sheet.section_reach_m, 4), shortest(measured_to_m, 1), sheet.seen.to_ullong(),
+      outline_of(inventory, sheet.tree), front_bytes(sheet), section_bytes(sheet));
 }
 
 }  // namespace
@@ -101,11 +100,11 @@ std::string sheets_part(const InventoryResult& inventory) {
   const auto doubt = [&](const TreeSheet* sheet) {
     return doubt_of(inventory.trees[sheet->tree], inventory.stems[sheet->tree].arc_deg);
   };
-  std::stable_sort(sheets.begin(), sheets.end(), [&](const TreeSheet* a, const TreeSheet* b) {
-    return doubt(a) > doubt(b);
-  });
+  std::stable_sort(sheets.begin(), sheets.end(),
+                   [&](const TreeSheet* a, const TreeSheet* b) { return doubt(a) > doubt(b); });
   std::string html =
-      "<h3>Tree by tree, the most doubtful first</h3><p>Front view, and the cross section 0.9–1.9 m "
+      "<h3>Tree by tree, the most doubtful first</h3><p>Front view, and the cross section 0.9–1.9 "
+      "m "
       "above the ground. Doubtful are trees whose diameter has a large standard deviation (±), "
       "whose stem was seen from few sides, or whose height is not known.</p>";
   if (sheets.size() < inventory.stems.size())

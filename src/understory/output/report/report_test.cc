@@ -141,6 +141,63 @@ TEST(Report, TheMapTellsWhichTreesAreDoubtful) {
   EXPECT_NE(html.find(fmt::format("data-r=\"{:.2f}\"", 0.1 * per_metre)), std::string::npos);
 }
 
+// Three bytes a point of the side, two a point of the cross section; the most doubtful tree first.
+TEST(Report, SheetsHoldThePointsOfTheTreesMostDoubtfulFirst) {
+  InventoryResult inventory;
+  inventory.trees = {tree_at_origin(1, 0.2, 0.01, 12.0), tree_at_origin(2, 0.3, 0.2, 9.0)};
+  inventory.stems.resize(2);
+  for (StemFit& stem : inventory.stems) {
+    stem.radius_m = 0.1;
+    stem.arc_deg = 90.0;
+  }
+  inventory.sheets.resize(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    TreeSheet& sheet = inventory.sheets[i];
+    sheet.tree = i;
+    sheet.section_reach_m = 0.3;
+    sheet.seen.set(3);
+    // East 1 cube and a half, height 10 cubes and a half, on the stem.
+    sheet.front.push_back({{0.06F, 0.0F, 0.42F}, true, true});
+    sheet.section.emplace_back(0.3F, -0.3F);
+  }
+  ReportInput input;
+  input.inventory = &inventory;
+  const std::string html = report_html(input);
+  const std::size_t first = html.find("\n2,30.0,20.0,9.0,90,0.3000,");
+  const std::size_t at = html.find("class=\"sheet-data\">2,30.0,20.0,9.0,90,0.3000,");
+  EXPECT_EQ(first, std::string::npos) << "it begins the data";
+  ASSERT_NE(at, std::string::npos);
+  const std::size_t second = html.find("\n1,20.0,1.0,12.0,90,0.3000,", at);
+  ASSERT_NE(second, std::string::npos);
+  const std::string line = html.substr(second + 1, html.find('\n', second + 1) - second - 1);
+  // 129, 10 and 0x80: gQqA; 255 and 1: /wE=
+  EXPECT_NE(line.find(",8,"), std::string::npos) << line;
+  EXPECT_EQ(line.substr(line.size() - 10), ",gQqA,/wE=") << line;
+}
+
+TEST(Report, PlacesToWalkToAreOnTheMapAndInWords) {
+  InventoryResult inventory;
+  inventory.trees = {tree_at_origin(1, 0.2, 0.1, 12.0), tree_at_origin(2, 0.3, 0.2, 9.0)};
+  inventory.trees[1].x = 10.0;
+  inventory.stems.resize(2);
+  inventory.look_again.resize(1);
+  inventory.look_again[0].place = {5.0, 1.0, 0.0};
+  inventory.look_again[0].trees = {2, 1};
+  inventory.look_again[0].unseen_sides = 2;
+  inventory.thin = {4.0, {{0.0, 0.0}, {4.0, 0.0}, {12.0, 0.0}}, 0.5};
+  ReportInput input;
+  input.inventory = &inventory;
+  input.summary.notes = {"2 of 2 <diameters> are doubtful"};
+  const std::string html = report_html(input);
+  EXPECT_NE(html.find("<li>x 5.0, y 1.0: trees 2, 1 (unseen side)</li>"), std::string::npos);
+  EXPECT_EQ(count_of(html, "<g class=\"stand\""), 1U);
+  EXPECT_NE(html.find("<li>2 of 2 &lt;diameters&gt; are doubtful</li>"), std::string::npos);
+  // Two neighbours are one rectangle.
+  const std::size_t thin = html.find("class=\"thin-area\"");
+  ASSERT_NE(thin, std::string::npos);
+  EXPECT_EQ(count_of(html.substr(thin, html.find("/>", thin) - thin), "z"), 2U);
+}
+
 // "distance 20 cm; less is better" was taken for the error of the map.
 TEST(Report, TellsWhatTheDistanceOfMatchedPointsIs) {
   ReportInput input;

@@ -25,8 +25,9 @@ std::string doubts_text(const StandDoubts& doubts) {
     text = fmt::format("{} of {} diameters are doubtful (standard deviation over 30 %)",
                        doubts.weak_diameters, doubts.diameters);
   const auto add = [&](std::size_t count, const char* what) {
-    if (count > 0) text += fmt::format("{}{} of {} trees {}", text.empty() ? "" : "; ", count,
-                                       doubts.trees, what);
+    if (count > 0)
+      text +=
+          fmt::format("{}{} of {} trees {}", text.empty() ? "" : "; ", count, doubts.trees, what);
   };
   add(doubts.without_height, "have no height");
   add(doubts.by_crown, "were found by their crowns alone");
