@@ -92,7 +92,8 @@ std::string look_list(const InventoryResult& inventory, const MapView& view) {
   std::string html =
       "<h3>Walk here</h3><p>From these places the lidar sees doubtful stems from a side that it "
       "has "
-      "not seen, or from near. Record again with a way through them.</p><ol class=\"walk\">";
+      "not seen, or from near. Record again with a way through them. Places outside your plot do "
+      "not matter.</p><ol class=\"walk\">";
   for (const LookAgain& look : inventory.look_again) {
     std::string trees;
     for (const int id : look.trees)

@@ -278,7 +278,8 @@ class MapPainter {
       pen.strokeStyle = 'rgba(17,17,17,.35)';
       pen.lineWidth = 0.7;
       pen.strokeRect(-5, y, this.width + 10, 0);
-      this.write('N ' + line.toFixed(digits), 4, y - 4, '12px', 'left');
+      // Beside the buttons, and not below the scale bar.
+      if (y < this.height - 44) this.write('N ' + line.toFixed(digits), y < 150 ? 56 : 4, y - 4, '12px', 'left');
     }
   }
 
