@@ -18,6 +18,9 @@ const selection = {
   },
 };
 
+// A long table is shown in full when it is used: until then the page opens faster.
+document.querySelectorAll('.all-trees').forEach((table) => table.classList.add('short'));
+
 function makeElement(name, attributes, text) {
   const element = document.createElement(name);
   Object.entries(attributes || {}).forEach(([key, value]) => element.setAttribute(key, value));

@@ -57,7 +57,12 @@ class TreeTable {
     this.addFilters();
     this.body.addEventListener('click', (event) => this.pick(event.target.closest('tr')));
     this.box.tabIndex = 0;
+    this.box.addEventListener('scroll', () => this.lengthen(), { once: true });
     this.box.addEventListener('keydown', (event) => this.press(event));
+  }
+
+  lengthen() {
+    this.box.closest('.all-trees').classList.remove('short');
   }
 
   pick(row) {
@@ -91,6 +96,7 @@ class TreeTable {
   }
 
   filter() {
+    this.lengthen();
     const tests = this.filters.map((input) => {
       const text = input.value.trim();
       const test = text === '' ? null : testOf(text);
@@ -121,6 +127,7 @@ class TreeTable {
     this.body.querySelectorAll('.chosen').forEach((row) => row.classList.remove('chosen'));
     const row = this.rows.get(selection.tree);
     if (!row) return;
+    this.lengthen();
     row.classList.add('chosen');
     const inside = row.offsetTop - this.table.tHead.offsetHeight;
     const high = this.box.clientHeight - this.table.tHead.offsetHeight;
