@@ -237,6 +237,7 @@ void judge_density(InventoryResult& result) {
   result.too_sparse = returns < kSparse * std::max(1.0, result.area_m2);
   result.from_above =
       result.too_sparse && returns < kFromAboveShare * static_cast<double>(result.points);
+  if (result.from_above) result.thin = {};  // no stem is looked for there
 }
 
 // Whether the stem of a listed tree stands below a crown's cells, or near its top.

@@ -322,6 +322,7 @@ TEST(Inventory, AnAirborneCloudHasTreesByTheirCrowns) {
   }
   const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
   ASSERT_EQ(result.trees.size(), 2U);
+  EXPECT_TRUE(result.thin.corners.empty()) << "no stem is missed where none is looked for";
   EXPECT_TRUE(result.stems.empty());
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Tree& tree = result.trees[i];
