@@ -245,6 +245,71 @@ inline constexpr double kThickest = 1.5;
 inline constexpr double kMostCells = 1000.0;
 }  // namespace slice_inventory
 
+namespace tree_doubt {  // forest/trees/tree_doubt.cc
+// Standard deviation over diameter: above, the diameter is doubtful [chosen: the volume of such a
+// tree is off by more than a half]
+inline constexpr double kWeakShare = 0.3;
+// degrees of a stem's circumference: who saw less saw less than a half of it [bound: geometry]
+inline constexpr double kHalfTurn = 180.0;
+// Doubt of a tree without a height [chosen]
+inline constexpr double kNoHeight = 0.5;
+// Doubt that the worst standard deviation adds: that of three diameters [chosen]
+inline constexpr double kMostShares = 10.0;
+// Doubt of a tree without a diameter: more than all that is above [bound: order]
+inline constexpr double kNoDiameter = 13.0;
+}  // namespace tree_doubt
+
+namespace tree_sheets {  // forest/trees/tree_sheets.cc
+// Trees whose points are kept [bound: size of the report, 3,000 of them have 7 MB]
+inline constexpr std::size_t kMostSheets = 3'000;
+// Points of a front view near the stem [bound: size of the report]
+inline constexpr std::size_t kNearPoints = 250;
+// The same around it [bound: size of the report]
+inline constexpr std::size_t kAroundPoints = 300;
+// Points of a cross section [bound: size of the report]
+inline constexpr std::size_t kSectionPoints = 250;
+// m: edge of the cubes that the points of a front view are rounded to [bound: a step of a picture]
+inline constexpr double kCube = 0.04;
+// m beyond the surface of a stem: what is drawn as its own [chosen]
+inline constexpr double kNear = 0.06;
+// m beyond the surface that a cross section shows [chosen]
+inline constexpr double kAround = 0.2;
+// m above the ground: the layer of the cross sections begins [P4 figs. 9-12]
+inline constexpr float kCrossLow = 0.9F;
+// m above the ground: it ends [P4 figs. 9-12]
+inline constexpr float kCrossHigh = 1.9F;
+// m: points so near to the surface show it, at least [chosen: the noise of a lidar]
+inline constexpr double kOnSurface = 0.03;
+}  // namespace tree_sheets
+
+namespace look_again {  // forest/trees/look_again.cc
+// m from a stem: nearer, the lidar sees a low part of it only [bound: geometry]
+inline constexpr double kNearest = 2.0;
+// m from a stem: farther, its beams are too wide and too few for a thin stem [chosen]
+inline constexpr double kFarthest = 8.0;
+// m: distance of the places that are tried [chosen: a step]
+inline constexpr double kStep = 1.0;
+// m beyond the surface of a stem that a person needs [chosen]
+inline constexpr double kElbowRoom = 0.5;
+// degrees on both sides that a lidar sees of a stem; beyond, its beams graze it [chosen]
+inline constexpr double kShownDeg = 62.0;
+// degrees of the circumference that have to be new [chosen: half of what is shown]
+inline constexpr int kEnoughDeg = 60;
+// degrees: with fewer unseen a stem was seen all round, and lacks points [chosen]
+inline constexpr int kSeenRoundDeg = 90;
+// Places that are told at most [chosen: more are a survey]
+inline constexpr std::size_t kMostPlaces = 12;
+// Stems that a place has to show [chosen]
+inline constexpr std::size_t kLeastStems = 2;
+}  // namespace look_again
+
+namespace thin_coverage {  // forest/trees/thin_coverage.cc
+// m: edge of the cells that are counted [chosen]
+inline constexpr double kCell = 4.0;
+// points per m2: less is thin [bound: geometry, see thin_coverage.h]
+inline constexpr double kFewPerM2 = 5.0;
+}  // namespace thin_coverage
+
 namespace tree_segments {  // forest/trees/tree_segments.cc
 // m: one point per cube near breast height, where the cross section is drawn [chosen]
 inline constexpr double kLowThin = 0.015;

@@ -28,6 +28,7 @@ using namespace forest_constants::inventory;
 struct Gathered {
   SliceThinner slices;
   CanopyCeiling ceiling;
+  CoverageGrid coverage;
   std::uint64_t points = 0;
   std::uint64_t without_ground = 0;
 };
@@ -47,6 +48,7 @@ void gather(const PointBlocks& cloud, const InventoryConfig& config, const Inven
       if (!(height >= 0.0 && height <= kHighest)) continue;
       const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
       gathered.ceiling.count(place, height);
+      if (height < config.stems.highest_m) gathered.coverage.add(place);
       if (height >= config.stems.lowest_m && height < config.stems.highest_m) {
         gathered.slices.add(place.x(), place.y(), height);
       }
@@ -68,26 +70,35 @@ struct Details {
   TreeOwners owners;
 };
 
+// What the fourth run gathers.
+struct Tops {
+  CanopyGrid canopy;
+  TreeColumns columns;
+  SheetCollector sheets;
+  std::vector<HeldBack> held_back = {};
+  std::optional<Details> details = std::nullopt;
+};
+
 // The fourth: canopy and tops of trees.
 void look_up(const PointBlocks& cloud, const InventoryResult& result, const CanopyCeiling& ceiling,
-             CanopyGrid& canopy, TreeColumns& trees, std::vector<HeldBack>& held_back,
-             Details* details) {
+             Tops& tops) {
   std::vector<double> heights;
   cloud([&](std::span<const Eigen::Vector3d> points) {
     result.ground.heights_above(points, heights);
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!(heights[i] >= 0.0 && heights[i] <= kHighest)) continue;
       const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
-      const std::size_t tree = trees.add(place, heights[i]);
+      const std::size_t tree = tops.columns.add(place, heights[i]);
+      if (tree != TreeColumns::kNone) tops.sheets.add(tree, place, heights[i]);
       if (ceiling.holds(place, heights[i])) {
-        canopy.add(place, heights[i]);
+        tops.canopy.add(place, heights[i]);
       } else if (tree != TreeColumns::kNone) {
-        held_back.push_back({place.cast<float>(), static_cast<float>(heights[i]),
-                             static_cast<std::uint32_t>(tree)});
+        tops.held_back.push_back({place.cast<float>(), static_cast<float>(heights[i]),
+                                  static_cast<std::uint32_t>(tree)});
       }
-      if (details == nullptr) continue;
-      details->surroundings.add(points[i] - result.origin);
-      if (heights[i] > result.ground.config.class_m) details->owners.add(place, heights[i]);
+      if (!tops.details) continue;
+      tops.details->surroundings.add(points[i] - result.origin);
+      if (heights[i] > result.ground.config.class_m) tops.details->owners.add(place, heights[i]);
     }
   });
 }
@@ -226,6 +237,7 @@ void judge_density(InventoryResult& result) {
   result.too_sparse = returns < kSparse * std::max(1.0, result.area_m2);
   result.from_above =
       result.too_sparse && returns < kFromAboveShare * static_cast<double>(result.points);
+  if (result.from_above) result.thin = {};  // no stem is looked for there
 }
 
 // Whether the stem of a listed tree stands below a crown's cells, or near its top.
@@ -353,36 +365,36 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
   const Raster& terrain = result.ground.terrain;
   result.origin = {std::round(terrain.x0), std::round(terrain.y0), terrain.z0};
   tell("heights", 2.0);
-  Gathered gathered{SliceThinner(config.stems.thin_m), CanopyCeiling()};
+  Gathered gathered{SliceThinner(config.stems.thin_m), CanopyCeiling(), CoverageGrid()};
   gather(cloud, config, result, gathered);
   result.points = gathered.points;
   result.slices = gathered.slices.take();
+  result.thin = gathered.coverage.thin();
   tell("stems", 3.0);
   result.stems = detect_stems(result.slices, config.stems, progress);
   tell("tops", 4.0);
-  CanopyGrid canopy(config.canopy_cell_m);
-  TreeColumns columns(result.stems);
+  Tops tops{CanopyGrid(config.canopy_cell_m), TreeColumns(result.stems),
+            SheetCollector(result.stems, result.slices)};
   const bool full = config.extent == InventoryExtent::kFull;
-  std::optional<Details> details;
-  if (full) details.emplace(Details{{result.stems, ground_at_stems(result)}, {}});
-  std::vector<HeldBack> held_back;
-  look_up(cloud, result, gathered.ceiling, canopy, columns, held_back, full ? &*details : nullptr);
-  std::vector<double> tops;
+  if (full) tops.details.emplace(Details{{result.stems, ground_at_stems(result)}, {}});
+  look_up(cloud, result, gathered.ceiling, tops);
+  std::vector<double> heights;
   for (std::size_t i = 0; i < result.stems.size(); ++i)
-    tops.push_back(columns.top(i, config.stems.highest_m));
-  add_trees(tops, held_back, canopy);
-  result.canopy = canopy.raster(result.origin.x(), result.origin.y());
+    heights.push_back(tops.columns.top(i, config.stems.highest_m));
+  add_trees(heights, tops.held_back, tops.canopy);
+  result.canopy = tops.canopy.raster(result.origin.x(), result.origin.y());
   result.area_m2 = area_of(result.canopy);
   judge_density(result);
-  result.trees = trees_of(result, heights_in_view(result, tops, in_view));
+  result.trees = trees_of(result, heights_in_view(result, heights, in_view));
   if (full) {
     tell("stem curves", 5.0);
-    measure_curves(details->surroundings, config.curves, progress, result);
+    measure_curves(tops.details->surroundings, config.curves, progress, result);
     tell("crowns", 6.0);
-    result.owners = std::move(details->owners);
+    result.owners = std::move(tops.details->owners);
     find_crowns(progress, config.stems.highest_m, result);
     add_crowns(config, result);
   }
+  look_at_doubtful_trees(tops.sheets, result);
   remark(gathered, config, result);
   tell("segments", 7.0);
   result.segments =

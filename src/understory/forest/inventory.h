@@ -6,12 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "understory/forest/doubtful_trees.h"
 #include "understory/forest/ground/ground.h"
 #include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/trees/canopy_crowns.h"
+#include "understory/forest/trees/thin_coverage.h"
 #include "understory/forest/trees/tree_owners.h"
 #include "understory/forest/trees/tree_segments.h"
+#include "understory/forest/trees/tree_sheets.h"
 #include "understory/sensor/stem_view.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/log.h"
@@ -56,6 +59,9 @@ struct InventoryResult {
   std::vector<int> crown_ids;      // id of the tree of each crown, 0 where it is none of the list
   std::vector<SlicePoint> slices;  // the thinned points between 0.5 m and 3.5 m that were searched
   std::vector<TreeSegment> segments;  // of a few trees, for the report
+  std::vector<TreeSheet> sheets;      // of the stems that are most in doubt, by their number
+  std::vector<LookAgain> look_again;  // places that would show weak stems, the best first
+  ThinCoverage thin;                  // where stems may be missing, without the origin
   std::uint64_t points = 0;
   double area_m2 = 0.0;     // cells in which the slices hold points, holes filled
   bool too_sparse = false;  // for stems: some are missing from the list

@@ -70,6 +70,37 @@ TEST(Inventory, AFullOneHasCurvesVolumesCrownsAndTheTreeOfEachPoint) {
   EXPECT_EQ(tree_at(result, {8.5, 3.0, plot.ground(8.5, 3.0) + 2.0}, 2.0), 0U);
 }
 
+// Two trees whose crowns touch: on a sheet the points of the other one are marked.
+TEST(Inventory, SheetsShowTheTreesAndWhatIsNotTheirOwn) {
+  TestPlot plot(4);
+  plot.add_ground(18.0, 40);
+  plot.add_stem({8.0, 9.0, 0.3});
+  plot.add_stem({9.8, 9.0, 0.2});
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  ASSERT_EQ(result.sheets.size(), 2U);
+  EXPECT_TRUE(result.look_again.empty()) << "both diameters are sure";
+  for (std::size_t i = 0; i < 2; ++i) {
+    const TreeSheet& sheet = result.sheets[i];
+    ASSERT_EQ(sheet.tree, i);
+    EXPECT_EQ(sheet.seen.count(), 36U);
+    float top = 0.0F;
+    int strangers = 0;
+    for (const TreeSheet::FrontPoint& point : sheet.front) {
+      top = std::max(top, point.place.z());
+      strangers += point.own ? 0 : 1;
+      EXPECT_LT(point.place.head<2>().norm(), 2.0F);
+      if (!point.stem || point.place.z() >= 3.0F) continue;
+      EXPECT_NEAR(static_cast<double>(point.place.head<2>().norm()), result.stems[i].radius_m,
+                  0.08);
+    }
+    EXPECT_NEAR(static_cast<double>(top), result.trees[i].height_m, 1.0);
+    EXPECT_LT(strangers, static_cast<int>(sheet.front.size()) / 2);
+    ASSERT_GT(sheet.section.size(), 100U);
+    for (const Eigen::Vector2f& point : sheet.section)
+      EXPECT_NEAR(static_cast<double>(point.norm()), result.stems[i].radius_m, 0.06);
+  }
+}
+
 // Beside a path the ground has a hundred times the points of a crown; the canopy model had holes
 // over such trees.
 TEST(Inventory, ACrownOverAGroundSeenMuchMoreIsPartOfTheCanopy) {
@@ -291,6 +322,7 @@ TEST(Inventory, AnAirborneCloudHasTreesByTheirCrowns) {
   }
   const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
   ASSERT_EQ(result.trees.size(), 2U);
+  EXPECT_TRUE(result.thin.corners.empty()) << "no stem is missed where none is looked for";
   EXPECT_TRUE(result.stems.empty());
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Tree& tree = result.trees[i];

@@ -13,6 +13,7 @@
 #include "understory/forest/stems/slice_stems.h"
 #include "understory/forest/stems/slice_thinner.h"
 #include "understory/forest/stems/stem_axis.h"
+#include "understory/forest/trees/tree_sheets.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -171,6 +172,7 @@ InventoryResult take_slice(const PointBlocks& unasked, const std::string& name,
     result.trees.push_back(tree_of(result, slice.stem, static_cast<int>(result.stems.size())));
   }
   result.area_m2 = area_of(result.slices);
+  result.sheets = SheetCollector(result.stems, result.slices).take();
   remark(stems, thickness_m, result);
   return result;
 }

@@ -172,6 +172,34 @@ void add_line(OGRLayer& layer, const PathLine& line, const std::filesystem::path
   if (layer.CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
 }
 
+// Places to look from again: a layer with its rows.
+void add_looks(GDALDataset& dataset, const std::vector<LookPoint>& looks,
+               const std::string& crs_wkt, const std::filesystem::path& path) {
+  if (looks.empty()) return;
+  OGRLayer* layer = add_layer(dataset, "look_again", wkbPoint25D, crs_wkt,
+                              "where to stand to measure doubtful stems again", path);
+  for (const char* name : {"trees", "tree_ids", "bearing_deg", "reason"}) {
+    const std::string text = name;
+    OGRFieldDefn field(name, text == "trees"         ? OFTInteger
+                             : text == "bearing_deg" ? OFTReal
+                                                     : OFTString);
+    if (layer->CreateField(&field) != OGRERR_NONE) fail(path);
+  }
+  for (const LookPoint& look : looks) {
+    const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer->GetLayerDefn()));
+    std::string ids;
+    for (const int id : look.trees)
+      ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+    feature->SetField("trees", static_cast<int>(look.trees.size()));
+    feature->SetField("tree_ids", ids.c_str());
+    feature->SetField("bearing_deg", look.bearing_deg);
+    feature->SetField("reason", look.reason.c_str());
+    OGRPoint point(look.place.x(), look.place.y(), look.place.z());
+    feature->SetGeometry(&point);
+    if (layer->CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
+  }
+}
+
 // An empty package under the name that it has until it is whole.
 GDALDatasetUniquePtr new_package(const std::filesystem::path& path) {
   // The same rows give the same bytes: without this the file holds the time of writing.
@@ -211,8 +239,8 @@ void add_row(OGRLayer& layer, const PointRow& row, const std::filesystem::path& 
 }  // namespace
 
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
-                      const std::string& crs_wkt, const PathLine& line,
-                      const std::string& heights) {
+                      const std::string& crs_wkt, const PathLine& line, const std::string& heights,
+                      const std::vector<LookPoint>& look_again) {
   const QuietGdal quiet;
   GDALDatasetUniquePtr dataset = new_package(path);
   const std::string above = heights.empty() ? "" : "; heights are " + heights;
@@ -232,6 +260,7 @@ void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>
   dataset->StartTransaction();
   add_trees(*layer, trees, path);
   if (drawn != nullptr) add_line(*drawn, line, path);
+  add_looks(*dataset, look_again, crs_wkt, path);
   if (dataset->CommitTransaction() != OGRERR_NONE) fail(path);
   close(std::move(dataset), path);
 }

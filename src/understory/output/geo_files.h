@@ -24,11 +24,21 @@ struct PathLine {
   double length_m = 0.0;
 };
 
+// A place to stand at, so that trees are measured again, as a point on a map.
+struct LookPoint {
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // frame of the layer
+  std::vector<int> trees;                           // ids, nearest first
+  double bearing_deg = 0.0;                         // to their middle, clockwise from the y axis
+  std::string reason;
+};
+
 // GeoPackage with the layer `trees` of points (x, y, z = ground) and the columns of trees.csv, and
-// where there is a path with the layer `path`. Without a system the layers have srs_id -1
+// where there is a path with the layer `path`, and where there are places to look from again with
+// the layer `look_again`. Without a system the layers have srs_id -1
 // (undefined Cartesian), which QGIS takes for metres. `heights` says what z is above.
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
                       const std::string& crs_wkt, const PathLine& line = {},
-                      const std::string& heights = "");
+                      const std::string& heights = "",
+                      const std::vector<LookPoint>& look_again = {});
 
 }  // namespace understory

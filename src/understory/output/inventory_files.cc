@@ -16,7 +16,8 @@ void write_tree_tables(const std::filesystem::path& folder, const InventoryResul
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const std::string& crs) {
   write_tree_tables(folder, inventory);
-  write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs);
+  write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs, {}, "",
+                   looks_in(LayerFrame(), inventory.look_again));
   if (!inventory.ground.terrain.empty()) {
     write_geotiff(folder / "dtm.tif", inventory.ground.terrain, crs);
   }
@@ -28,7 +29,7 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const LayerFrame& layers) {
   write_tree_tables(folder, inventory);
-  write_tree_layers(folder, inventory.trees, {}, layers);
+  write_tree_layers(folder, inventory.trees, {}, layers, inventory.look_again);
   write_raster_layers(folder, inventory.ground.terrain, inventory.canopy, change_into(layers),
                       layers);
 }

@@ -72,6 +72,26 @@ PathLine path_in(const LayerFrame& layers, const std::vector<StampedPose>& path)
   return line;
 }
 
+std::vector<LookPoint> looks_in(const LayerFrame& layers, const std::vector<LookAgain>& places) {
+  std::vector<LookPoint> looks;
+  for (const LookAgain& place : places) {
+    LookPoint look;
+    Vector3d from = place.place;
+    if (!std::isfinite(from.z())) from.z() = 0.0;
+    look.place = layers.from_world(from);
+    const Vector3d towards =
+        layers.from_world(from + Vector3d(place.towards.x(), place.towards.y(), 0.0)) - look.place;
+    const bool geographic = layers.system() != nullptr && layers.system()->is_geographic();
+    const double east = geographic ? std::cos(look.place.y() * M_PI / 180.0) : 1.0;
+    const double degrees = std::atan2(east * towards.x(), towards.y()) * 180.0 / M_PI;
+    look.bearing_deg = std::round(degrees < 0.0 ? degrees + 360.0 : degrees);
+    look.trees = place.trees;
+    look.reason = reason_of(place);
+    looks.push_back(std::move(look));
+  }
+  return looks;
+}
+
 LasOptions las_options(const LayerFrame& layers) {
   LasOptions options;
   options.offset = layers.offset();
@@ -81,9 +101,10 @@ LasOptions las_options(const LayerFrame& layers) {
 }
 
 void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
-                       const std::vector<StampedPose>& path, const LayerFrame& layers) {
+                       const std::vector<StampedPose>& path, const LayerFrame& layers,
+                       const std::vector<LookAgain>& look_again) {
   write_trees_gpkg(folder / "trees.gpkg", trees_in(layers, trees), layers.wkt(),
-                   path_in(layers, path), layers.heights());
+                   path_in(layers, path), layers.heights(), looks_in(layers, look_again));
 }
 
 void write_raster_layers(const std::filesystem::path& folder, const Raster& terrain,

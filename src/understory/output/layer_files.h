@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/forest/doubtful_trees.h"
 #include "understory/geometry/raster.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/georeference/systems/layer_frame.h"
@@ -26,9 +27,15 @@ namespace understory {
 // How map.laz is written: coordinate system, offset, steps.
 [[nodiscard]] LasOptions las_options(const LayerFrame& layers);
 
-// Writes trees.gpkg with the layers trees and path. Frame of both: world. Throws OutputError.
+// Places to look from again, in the frame of the layers.
+[[nodiscard]] std::vector<LookPoint> looks_in(const LayerFrame& layers,
+                                              const std::vector<LookAgain>& places);
+
+// Writes trees.gpkg with the layers trees, path and look_again. Frame of all: world. Throws
+// OutputError.
 void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
-                       const std::vector<StampedPose>& path, const LayerFrame& layers);
+                       const std::vector<StampedPose>& path, const LayerFrame& layers,
+                       const std::vector<LookAgain>& look_again = {});
 
 // Writes dtm.tif, and chm.tif and dsm.tif where the canopy is not empty, over cells of the layers'
 // grid. `change` leads there from the frame of the rasters. Throws OutputError.

@@ -29,6 +29,40 @@ std::vector<StampedPose> walk() {
   return path;
 }
 
+// A place to look from again, due east of its trees in a world that is turned on the globe.
+TEST(LayerFiles, PlacesToLookFromAgainAreALayer) {
+  const test::TemporaryFolder folder;
+  const LayerFrame layers = at_evo(0.4);
+  LookAgain look;
+  look.place = {12.0, -7.0, 2.0};
+  look.towards = {-3.0, 0.0};
+  look.trees = {5, 2};
+  look.unseen_sides = 1;
+  write_tree_layers(folder.path(), {}, {}, layers, {look});
+  const QuietGdal quiet;
+  const GDALDatasetUniquePtr dataset(
+      GDALDataset::Open((folder / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
+  ASSERT_NE(dataset, nullptr);
+  OGRLayer* layer = dataset->GetLayerByName("look_again");
+  ASSERT_NE(layer, nullptr);
+  EXPECT_STREQ(layer->GetSpatialRef()->GetAuthorityCode(nullptr), "3067");
+  const OGRFeatureUniquePtr row(layer->GetNextFeature());
+  ASSERT_NE(row, nullptr);
+  const OGRPoint* point = row->GetGeometryRef()->toPoint();
+  const Vector3d expected = layers.exact_from_world(look.place);
+  EXPECT_LT((Vector3d(point->getX(), point->getY(), point->getZ()) - expected).norm(), 1e-3);
+  EXPECT_EQ(row->GetFieldAsInteger("trees"), 2);
+  EXPECT_STREQ(row->GetFieldAsString("tree_ids"), "5, 2");
+  EXPECT_STREQ(row->GetFieldAsString("reason"), "unseen side, few points");
+  // West of the world is 270 degrees; the world is turned by 0.4 rad against the clock, and grid
+  // north by up to 3 degrees.
+  EXPECT_NEAR(row->GetFieldAsDouble("bearing_deg"), 270.0 - 0.4 * 180.0 / M_PI, 3.0);
+  write_tree_layers(folder.path(), {}, {}, layers);
+  const GDALDatasetUniquePtr without(
+      GDALDataset::Open((folder / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
+  EXPECT_EQ(without->GetLayerByName("look_again"), nullptr) << "nothing to look at";
+}
+
 TEST(LayerFiles, TreesAndPathLieInTheSystem) {
   const test::TemporaryFolder folder;
   const LayerFrame layers = at_evo(0.4);

@@ -166,6 +166,7 @@ std::string run_json(const RunSummary& summary) {
   Json json;
   json["status"] = to_string(summary.status);
   json["reasons"] = summary.reasons;
+  json["notes"] = summary.notes;
   json["warnings"] = Json::array();
   for (const Log::Warning& warning : summary.warnings) {
     json["warnings"].push_back(

@@ -86,6 +86,7 @@ struct RunSummary {
   std::string version;
   RunStatus status = RunStatus::kComplete;
   std::vector<std::string> reasons;  // empty if complete
+  std::vector<std::string> notes;    // what is in doubt though it does not lower the status
   std::vector<Log::Warning> warnings;
   ConfigRecord config;
   std::vector<InputHash> inputs;

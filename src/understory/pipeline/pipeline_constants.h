@@ -62,6 +62,11 @@ inline constexpr double kMostTiltDeg = 2.0;
 inline constexpr double kLargeBiasM_s2 = 0.3;
 }  // namespace run_judgement
 
+namespace stand_notes {  // pipeline/judgement/stand_notes.cc
+// Share of the area with points where coverage is thin: less is not told [chosen]
+inline constexpr double kThinShare = 0.05;
+}  // namespace stand_notes
+
 namespace evidence_gathering {  // pipeline/judgement/evidence_gathering.cc
 // s without samples that are told [chosen]
 inline constexpr double kNoticeableS = 0.1;

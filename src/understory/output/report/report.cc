@@ -30,7 +30,8 @@ std::string report_html(const ReportInput& input, const std::vector<std::string>
   html += matching_section(input);
   html += time_section(input);
   html += made_section(input);
-  return html + "</main><script>" + report_script() + "</script></body></html>\n";
+  return html + "</main><script>\n\"use strict\";\n" + report_script() +
+         "</script></body></html>\n";
 }
 
 void write_report(const std::filesystem::path& path, const ReportInput& input) {

@@ -20,7 +20,7 @@ constexpr std::array<ResultFile, 24> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
      {"stem_curves.csv", "diameters along each stem", "a spreadsheet"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
-     {"trees.gpkg", "the same trees as points on a map, and the path",
+     {"trees.gpkg", "the same trees as points on a map, the path, and places to walk to",
       "QGIS: drag the file into the window"},
      {"felled.csv", "trees that were felled meanwhile", "a spreadsheet"},
      {"map.laz", "all points; ground and vegetation have classes of their own",

@@ -224,6 +224,12 @@ std::string verdict_section(const ReportInput& input) {
       html += "<li>" + escape_html(reason) + "</li>";
     html += "</ul>";
   }
+  if (!input.summary.notes.empty()) {
+    html += "<p>Look at these first:</p><ul class=\"notes\">";
+    for (const std::string& note : input.summary.notes)
+      html += "<li>" + escape_html(note) + "</li>";
+    html += "</ul>";
+  }
   return html + "</section>\n";
 }
 

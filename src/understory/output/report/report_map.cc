@@ -3,92 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 
+#include "understory/forest/trees/tree_doubt.h"
+#include "understory/output/report/map_view.h"
 #include "understory/output/report/png.h"
 #include "understory/output/report/report_parts.h"
 #include "understory/output/report/svg_plot.h"
 
 namespace understory {
 namespace {
-
-const std::vector<Tree>* trees_of(const ReportInput& input) {
-  return input.inventory != nullptr ? &input.inventory->trees : input.trees;
-}
-
-constexpr double kWidth = 1100.0;
-
-// From the frame that the map is drawn in to the picture's units, y upwards.
-struct View {
-  double x0 = 0.0, y0 = 0.0, width = 1.0, height = 1.0, scale = 1.0;
-  const LayerFrame* drawing = nullptr;  // null: the world frame
-  [[nodiscard]] double x(double value) const { return (value - x0) * scale; }
-  [[nodiscard]] double y(double value) const { return (y0 + height - value) * scale; }
-  // A point of the world frame in the frame of the map.
-  [[nodiscard]] Eigen::Vector2d drawn(const Eigen::Vector3d& point_in_world) const {
-    if (drawing == nullptr) return point_in_world.head<2>();
-    Eigen::Vector3d point = point_in_world;
-    if (!std::isfinite(point.z())) point.z() = 0.0;
-    return drawing->from_world(point).head<2>();
-  }
-  // The same in the picture's units.
-  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector3d& point_in_world) const {
-    const Eigen::Vector2d point = drawn(point_in_world);
-    return {x(point.x()), y(point.y())};
-  }
-  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector3f& point_in_world) const {
-    return at(Eigen::Vector3d(point_in_world.cast<double>()));
-  }
-  // The picture's units per metre.
-  [[nodiscard]] double per_metre() const {
-    return drawing == nullptr ? scale : scale * drawing->units_per_metre();
-  }
-};
-
-Eigen::Vector3d place_of(const Tree& tree) {
-  return {tree.x, tree.y, tree.z};
-}
-
-View view_of(const ReportInput& input) {
-  View view;
-  view.drawing = input.drawing;
-  constexpr double kFar = std::numeric_limits<double>::max();
-  double x0 = kFar;
-  double y0 = kFar;
-  double x1 = -kFar;
-  double y1 = -kFar;
-  const auto include = [&](double x, double y) {
-    x0 = std::min(x0, x);
-    y0 = std::min(y0, y);
-    x1 = std::max(x1, x);
-    y1 = std::max(y1, y);
-  };
-  const auto include_point = [&](const Eigen::Vector3d& point_in_world) {
-    const Eigen::Vector2d at = view.drawn(point_in_world);
-    include(at.x(), at.y());
-  };
-  if (input.picture != nullptr && !input.picture->empty()) {
-    const auto box = input.picture->content_box();
-    include(box[0], box[1]);
-    include(box[2], box[3]);
-  }
-  for (const ReportScan& scan : input.scans)
-    include_point(scan.position.cast<double>());
-  if (const std::vector<Tree>* trees = trees_of(input)) {
-    for (const Tree& tree : *trees)
-      include_point(place_of(tree));
-  }
-  if (x1 < x0) return view;
-  const double metre = input.drawing == nullptr ? 1.0 : input.drawing->units_per_metre();
-  const double margin = 0.02 * std::max({x1 - x0, y1 - y0, metre});
-  view.x0 = x0 - margin;
-  view.y0 = y0 - margin;
-  view.width = x1 - x0 + 2.0 * margin;
-  view.height = y1 - y0 + 2.0 * margin;
-  // Tall maps are kept to a height that fits a screen.
-  view.scale = std::min(kWidth / view.width, 1.1 * kWidth / view.height);
-  return view;
-}
 
 // How a scan's match is drawn.
 enum class Match { kGood, kWeak, kLost };
@@ -112,8 +35,8 @@ const char* colour_of(Match match) {
 }
 
 // `moved`: of a run that was moved, whose own report tells how its scans were matched.
-std::string path_svg(const std::vector<ReportScan>& scans, const View& view, bool moved) {
-  std::string svg;
+std::string path_svg(const std::vector<ReportScan>& scans, const MapView& view, bool moved) {
+  std::string svg = "<g class=\"way\">";
   const auto out = std::back_inserter(svg);
   const float least = static_cast<float>(0.8 / view.per_metre());  // shorter steps are not seen
   std::size_t begin = 0;
@@ -138,63 +61,89 @@ std::string path_svg(const std::vector<ReportScan>& scans, const View& view, boo
     svg += "\"/>";
     begin = end;
   }
-  return svg;
+  return svg + "</g>";
 }
 
-std::string marker(const Eigen::Vector3f& point, const View& view, const char* text) {
+std::string marker(const Eigen::Vector3f& point, const MapView& view, const char* text) {
   const Eigen::Vector2d at = view.at(point);
   const double x = at.x();
   const double y = at.y();
   return fmt::format(
-      "<circle cx=\"{0:.1f}\" cy=\"{1:.1f}\" r=\"6\" fill=\"#fff\" stroke=\"#111\" "
-      "stroke-width=\"2\"/><text x=\"{2:.1f}\" y=\"{3:.1f}\" font-size=\"15\" font-weight=\"600\" "
-      "stroke=\"#fff\" stroke-width=\"4\" paint-order=\"stroke\">{4}</text>",
+      "<g class=\"mark\" data-x=\"{0:.1f}\" data-y=\"{1:.1f}\"><circle cx=\"{0:.1f}\" "
+      "cy=\"{1:.1f}\" "
+      "r=\"6\" fill=\"#fff\" stroke=\"#111\" stroke-width=\"2\"/><text x=\"{2:.1f}\" y=\"{3:.1f}\" "
+      "font-size=\"15\" font-weight=\"600\" "
+      "stroke=\"#fff\" stroke-width=\"4\" paint-order=\"stroke\">{4}</text></g>",
       x, y, x + 9, y + 5, text);
 }
 
-std::string loops_svg(const std::vector<ReportLoop>& loops, const View& view) {
-  std::string svg;
+std::string loops_svg(const std::vector<ReportLoop>& loops, const MapView& view) {
+  std::string svg = "<g class=\"loops\">";
   for (const ReportLoop& loop : loops) {
     const Eigen::Vector2d from = view.at(loop.from);
     const Eigen::Vector2d to = view.at(loop.to);
     svg += fmt::format(
-        "<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" "
-        "stroke-width=\"{}\" {}/>",
-        from.x(), from.y(), to.x(), to.y(), loop.accepted ? "var(--loop)" : "#888",
-        loop.accepted ? 3 : 1.5, loop.accepted ? "" : "stroke-dasharray=\"4 4\"");
+        "<path d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\" stroke=\"{}\" stroke-width=\"{}\" {}/>", from.x(),
+        from.y(), to.x(), to.y(), loop.accepted ? "var(--loop)" : "#888", loop.accepted ? 3.0 : 1.5,
+        loop.accepted ? "" : "stroke-dasharray=\"4 4\"");
   }
-  return svg;
+  return svg + "</g>";
 }
 
-std::string trees_svg(const std::vector<Tree>& trees, const View& view) {
-  std::string svg;
+// What is known of a tree, in one line.
+std::string text_of(const Tree& tree) {
+  std::string text = fmt::format("tree {}: ", tree.id);
+  if (!std::isfinite(tree.dbh_m)) {
+    text += "no diameter";
+  } else if (std::isfinite(tree.dbh_sd_m)) {
+    text += fmt::format("{:.1f} ± {:.1f} cm", 100.0 * tree.dbh_m, 100.0 * tree.dbh_sd_m);
+  } else {
+    text += fmt::format("{:.1f} cm", 100.0 * tree.dbh_m);
+  }
+  if (std::isfinite(tree.height_m)) text += fmt::format(", {:.1f} m high", tree.height_m);
+  return text;
+}
+
+// How sure a tree is: a class of the page's style, which the moving map draws alike.
+const char* kind_of(const Tree& tree) {
+  if (!std::isfinite(tree.dbh_m)) return "crown";
+  return has_weak_diameter(tree) ? "weak" : "sure";
+}
+
+std::string trees_svg(const std::vector<Tree>& trees, const MapView& view) {
+  constexpr double kUnknownRadiusM = 0.1;
+  constexpr double kLeastRadius = 2.6;
+  std::string svg = "<g class=\"trees\">";
   const auto out = std::back_inserter(svg);
   for (const Tree& tree : trees) {
-    const double radius = std::isfinite(tree.dbh_m) ? 0.5 * tree.dbh_m : 0.1;
+    const double radius =
+        view.per_metre() * (std::isfinite(tree.dbh_m) ? 0.5 * tree.dbh_m : kUnknownRadiusM);
     const Eigen::Vector2d at = view.at(place_of(tree));
-    fmt::format_to(
-        out,
-        "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"#fff2c2\" "
-        "stroke=\"#c0392b\" stroke-width=\"1.6\"><title>tree {}: {:.0f} cm</title></circle>",
-        at.x(), at.y(), std::max(2.6, radius * view.per_metre()), tree.id, 200.0 * radius);
+    fmt::format_to(out,
+                   "<circle class=\"{}\" data-id=\"{}\" cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.1f}\" "
+                   "data-r=\"{:.2f}\"><title>{}</title></circle>",
+                   kind_of(tree), tree.id, at.x(), at.y(), std::max(kLeastRadius, radius), radius,
+                   text_of(tree));
   }
-  return svg;
+  return svg + "</g>";
 }
 
 // Where trees stood that are gone.
-std::string falls_svg(const std::vector<TreeFall>& falls, const View& view) {
-  std::string svg = "<g class=\"falls\" stroke=\"#1b1b1b\" stroke-width=\"2\">";
+std::string falls_svg(const std::vector<TreeFall>& falls, const MapView& view) {
+  std::string svg =
+      "<defs><path id=\"felled\" d=\"M-5-5l10 10m0-10l-10 10\"/></defs><g class=\"falls\" "
+      "stroke=\"#1b1b1b\" stroke-width=\"2\">";
   for (const TreeFall& fall : falls) {
     const Eigen::Vector2d at = view.at(Eigen::Vector3d(fall.x, fall.y, 0.0));
     svg += fmt::format(
-        "<path d=\"M{:.1f} {:.1f}m-5-5l10 10m0-10l-10 10\"><title>tree {}: felled</title></path>",
+        "<use href=\"#felled\" x=\"{:.1f}\" y=\"{:.1f}\"><title>tree {}: felled</title></use>",
         at.x(), at.y(), fall.tree_id);
   }
   return svg + "</g>";
 }
 
 // The receiver's path, at most 2,000 fixes of it, those that were not used paler.
-std::string fixes_svg(const std::vector<ReportFix>& fixes, const View& view) {
+std::string fixes_svg(const std::vector<ReportFix>& fixes, const MapView& view) {
   const std::size_t step = fixes.size() / 2000 + 1;
   std::string svg = "<g class=\"fixes\" fill=\"#8e3fb0\">";
   for (std::size_t i = 0; i < fixes.size(); i += step) {
@@ -206,7 +155,7 @@ std::string fixes_svg(const std::vector<ReportFix>& fixes, const View& view) {
   return svg + "</g>";
 }
 
-std::string scale_bar(const View& view) {
+std::string scale_bar(const MapView& view) {
   const double metres = view.width * view.scale / view.per_metre();
   const std::vector<double> ticks = round_ticks(0.0, metres, 6);
   const double length = ticks.size() > 1 ? ticks[1] : 1.0;
@@ -222,7 +171,7 @@ std::string scale_bar(const View& view) {
 }
 
 // Lines of round coordinates with their numbers: east along the top, north along the left.
-std::string grid_svg(const View& view) {
+std::string grid_svg(const MapView& view) {
   const double width = view.width * view.scale;
   const double height = view.height * view.scale;
   const auto ticks = [](double low, double size, double longer) {
@@ -253,32 +202,36 @@ std::string grid_svg(const View& view) {
       lines, numbers);
 }
 
-std::string north_arrow(const View& view) {
+std::string north_arrow(const MapView& view) {
   const double x = view.width * view.scale - 30.0;
   return fmt::format(
-      "<g><path d=\"M{0:.1f} 14l9 26-9-6-9 6z\" fill=\"#111\" stroke=\"#fff\"/><text x=\"{0:.1f}\" "
+      "<g class=\"north\"><path d=\"M{0:.1f} 14l9 26-9-6-9 6z\" fill=\"#111\" "
+      "stroke=\"#fff\"/><text x=\"{0:.1f}\" "
       "y=\"56\" font-size=\"15\" font-weight=\"600\" text-anchor=\"middle\">N</text></g>",
       x);
 }
 
-}  // namespace
+std::string picture_svg(const MapPicture& picture, const MapView& view) {
+  return fmt::format(
+      "<image x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" "
+      "preserveAspectRatio=\"none\" href=\"data:image/png;base64,{}\"/>",
+      view.x(picture.x0()), view.y(picture.y0() + picture.height_m()),
+      picture.width_m() * view.scale, picture.height_m() * view.scale, base64(picture.png()));
+}
 
-std::string map_section(const ReportInput& input) {
-  const View view = view_of(input);
-  if (input.picture == nullptr && input.scans.empty() && trees_of(input) == nullptr) return "";
+// The whole map as one picture. The page's scripts read its parts and draw them anew where they are
+// moved (report/page/map.js).
+std::string map_svg(const ReportInput& input, const MapView& view) {
+  const bool grid = input.drawing != nullptr && !input.drawing->wkt().empty();
   std::string svg = fmt::format(
-      "<svg class=\"paper map\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"map from "
-      "above\" style=\"max-width:{:.0f}px;margin:0 auto\">",
-      view.width * view.scale, view.height * view.scale, view.width * view.scale);
-  if (input.picture != nullptr && !input.picture->empty()) {
-    const MapPicture& p = *input.picture;
-    svg += fmt::format(
-        "<image x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" "
-        "preserveAspectRatio=\"none\" href=\"data:image/png;base64,{}\"/>",
-        view.x(p.x0()), view.y(p.y0() + p.height_m()), p.width_m() * view.scale,
-        p.height_m() * view.scale, base64(p.png()));
-  }
-  if (const std::vector<Tree>* trees = trees_of(input)) svg += trees_svg(*trees, view);
+      "<svg class=\"paper map\" viewBox=\"0 0 {0:.0f} {1:.0f}\" role=\"img\" aria-label=\"map from "
+      "above\" style=\"max-width:{0:.0f}px;margin:0 auto\" data-x0=\"{2}\" data-y1=\"{3}\" "
+      "data-scale=\"{4}\" data-metre=\"{5}\"{6}>",
+      view.width * view.scale, view.height * view.scale, view.x0, view.y0 + view.height, view.scale,
+      view.per_metre(), grid ? " data-grid=\"\"" : "");
+  if (input.picture != nullptr && !input.picture->empty()) svg += picture_svg(*input.picture, view);
+  if (input.inventory != nullptr) svg += thin_svg(*input.inventory, view);
+  if (const std::vector<Tree>* trees = report_trees(input)) svg += trees_svg(*trees, view);
   if (!input.falls.empty()) svg += falls_svg(input.falls, view);
   svg += loops_svg(input.loops, view);
   if (!input.fixes.empty()) svg += fixes_svg(input.fixes, view);
@@ -287,10 +240,28 @@ std::string map_section(const ReportInput& input) {
     svg += marker(input.scans.back().position, view, "end");
     svg += marker(input.scans.front().position, view, "start");
   }
-  if (input.drawing != nullptr && !input.drawing->wkt().empty()) svg += grid_svg(view);
+  if (input.inventory != nullptr) svg += look_svg(*input.inventory, view);
+  if (grid) svg += grid_svg(view);
   svg += scale_bar(view);
   if (input.north_is_up) svg += north_arrow(view);
-  svg += "</svg>";
+  return svg + "</svg>";
+}
+
+std::string tree_legend(const ReportInput& input) {
+  const std::vector<Tree>* trees = report_trees(input);
+  if (trees == nullptr) return "";
+  const StandDoubts doubts = doubts_of(*trees);
+  std::string legend;
+  const auto entry = [&](bool any, const char* kind, const char* text) {
+    if (any) legend += fmt::format("<span><i class=\"dot {}\"></i>{}</span> ", kind, text);
+  };
+  entry(doubts.diameters > doubts.weak_diameters || trees->empty(), "sure", "tree");
+  entry(doubts.weak_diameters > 0, "weak", "tree, diameter doubtful (± over 30 %)");
+  entry(doubts.by_crown > 0, "crown", "tree without a diameter");
+  return legend;
+}
+
+std::string map_legend(const ReportInput& input) {
   std::string legend = "<p class=\"legend\">";
   const auto entry = [&](const std::string& kind, const std::string& style, const char* text) {
     legend += fmt::format("<span><i{} style=\"{}\"></i>{}</span> ", kind, style, text);
@@ -302,9 +273,11 @@ std::string map_section(const ReportInput& input) {
     entry(" class=\"box\"", "background:#9a9a9a", "ground");
     entry(" class=\"box\"", "background:#4f9a4a", "vegetation, the lighter the higher");
   }
-  if (trees_of(input) != nullptr) {
-    entry(" class=\"dot\"", "border-color:#c0392b;background:#fff2c2", "tree");
-  }
+  legend += tree_legend(input);
+  if (input.inventory != nullptr && !input.inventory->thin.corners.empty())
+    legend += "<span><i class=\"box thin\"></i>thin coverage: stems may be missing</span> ";
+  if (input.inventory != nullptr && !input.inventory->look_again.empty())
+    legend += "<span><i class=\"box look\">1</i>walk here (below)</span> ";
   if (!input.falls.empty()) legend += "<span><b>×</b> felled meanwhile</span> ";
   if (!input.scans.empty()) {
     line("--path", "path");
@@ -316,7 +289,17 @@ std::string map_section(const ReportInput& input) {
   if (!input.fixes.empty())
     entry(" class=\"dot\"", "border-color:#8e3fb0", "GNSS fix (pale: not used)");
   if (!input.loops.empty()) line("--loop", "loop closed");
-  return "<section><h2>The map from above</h2>" + svg + legend + "</p></section>\n";
+  return legend + "</p>";
+}
+
+}  // namespace
+
+std::string map_section(const ReportInput& input) {
+  if (input.picture == nullptr && input.scans.empty() && report_trees(input) == nullptr) return "";
+  const MapView view = map_view(input);
+  return "<section><h2>The map from above</h2>" + map_svg(input, view) + map_legend(input) +
+         (input.inventory == nullptr ? std::string() : look_list(*input.inventory, view)) +
+         "</section>\n";
 }
 
 }  // namespace understory

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/output/report/map_view.h"
 #include "understory/output/report/report.h"
 
 namespace understory {
@@ -13,10 +14,17 @@ namespace understory {
 [[nodiscard]] std::string verdict_section(const ReportInput& input);
 [[nodiscard]] std::string figures_section(const ReportInput& input);
 [[nodiscard]] std::string map_section(const ReportInput& input);
+// Parts of the map: where coverage is thin, and where to stand to see doubtful stems again.
+[[nodiscard]] std::string thin_svg(const InventoryResult& inventory, const MapView& view);
+[[nodiscard]] std::string look_svg(const InventoryResult& inventory, const MapView& view);
+// Below it, the places in words; empty where there are none.
+[[nodiscard]] std::string look_list(const InventoryResult& inventory, const MapView& view);
 // Where the run lies on the globe, how that was found and how sure it is.
 [[nodiscard]] std::string place_section(const ReportInput& input);
 [[nodiscard]] std::string distrust_section(const ReportInput& input);
 [[nodiscard]] std::string stand_section(const ReportInput& input);
+// The sheets of single trees, to look through: a part of the stand's section.
+[[nodiscard]] std::string sheets_part(const InventoryResult& inventory);
 // What lies beside the report and how to open it; `files`: names.
 [[nodiscard]] std::string files_section(const std::vector<std::string>& files);
 [[nodiscard]] std::string matching_section(const ReportInput& input);

@@ -328,19 +328,24 @@ std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
   return columns;
 }
 
-// `stems`: their fits in the same order, or null. `of_cloud`: else trees come from sights of single
-// views, which have no heights.
-std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems,
-                       bool of_cloud) {
-  std::string html =
-      "<h3>All trees</h3><p class=\"so\">x, y and the height of the ground are as in trees.csv. ";
+std::string about_columns(const std::vector<StemFit>* stems, bool of_cloud) {
+  std::string html = "<p class=\"so\">x, y and the height of the ground are as in trees.csv. ";
   const bool with_stems = stems == nullptr || !stems->empty();
   if (with_stems) html += "They are those of the stem's foot. ";
   if (!of_cloud) html += "Views are the scans that show the stem.";
   if (of_cloud && with_stems) html += "Returns are laser points on the stem. ";
   if (stems != nullptr && with_stems)
     html += "Seen around is the part of its circumference that the laser saw.";
-  html += "</p><div class=\"scroll\"><table class=\"sort\"><thead><tr>";
+  return html + "</p>";
+}
+
+// `stems`: their fits in the same order, or null. `of_cloud`: else trees come from sights of single
+// views, which have no heights.
+std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems,
+                       bool of_cloud) {
+  std::string html =
+      "<div class=\"all-trees\"><h3>All trees</h3><div class=\"scroll\"><table "
+      "class=\"sort\"><thead><tr>";
   const std::vector<TableColumn> columns = columns_of(trees, stems, of_cloud);
   for (const TableColumn& column : columns)
     html += fmt::format("<th class=\"n\">{}</th>", column.title);
@@ -356,7 +361,7 @@ std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit
     html += fmt::format("<p class=\"sub\">The first {} of {}; all are in trees.csv.</p>",
                         kLongestTable, trees.size());
   }
-  return html;
+  return html + about_columns(stems, of_cloud) + "</div>";
 }
 
 // `start`: of the recording.
@@ -419,7 +424,8 @@ std::string stand_section(const ReportInput& input) {
   }
   html += cross_sections(inventory);
   if (!inventory.trees.empty())
-    html += single_trees(inventory) + tree_table(inventory.trees, &inventory.stems, true);
+    html += single_trees(inventory) + sheets_part(inventory) +
+            tree_table(inventory.trees, &inventory.stems, true);
   return html + "</section>\n";
 }
 

@@ -1,9 +1,10 @@
+#include "understory/output/report/page_files.h"
 #include "understory/output/report/report_parts.h"
 
 namespace understory {
 
 std::string report_style() {
-  return R"(
+  std::string style = R"(
 :root{--bg:#fbfbf9;--card:#fff;--text:#1d2320;--soft:#5f6b64;--rule:#d9ded9;--line:#2f6f9f;
 --good:#2e7d4f;--fair:#b7791f;--bad:#b3372b;--path:#1769c2;--weak:#e8710a;--lost:#c5221f;--loop:#8e3ab8}
 @media (prefers-color-scheme:dark){:root{--bg:#151816;--card:#1e2320;--text:#e6ebe7;--soft:#9aa8a0;
@@ -43,7 +44,7 @@ margin-right:12px}.legend i{display:inline-block;width:22px;height:0;border-top:
 border-radius:50%;margin-bottom:-1px}.legend i.box{width:13px;height:13px;border:0;margin-bottom:-2px}
 table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
 th,td{text-align:left;padding:3px 14px 3px 0;border-bottom:1px solid var(--rule);vertical-align:top}
-th.n,td.n{text-align:right}table.sort th{cursor:pointer;white-space:nowrap;position:sticky;top:0;background:var(--card)}
+th.n,td.n{text-align:right}table.sort th{cursor:pointer;white-space:nowrap;background:var(--card)}
 table.sort th:hover{color:var(--line)}
 .scroll{max-height:460px;overflow:auto}.wide{overflow-x:auto}code{font-size:.85em;overflow-wrap:anywhere}
 pre{overflow:auto;font-size:.82rem;max-height:480px}
@@ -54,16 +55,17 @@ li,p,td,summary,figcaption{overflow-wrap:anywhere}.wide td,.wide th,.scroll td{o
 .warn{margin:0;padding-left:1.2rem}.so{color:var(--soft)}
 summary{cursor:pointer;font-weight:600}
 )";
+  for (const PageFile& file : page_styles())
+    style += file.text;
+  return style;
 }
 
-// Sorts a table by a click on a column's head; the page is complete without it.
+// The page is complete without them.
 std::string report_script() {
-  return R"(
-document.querySelectorAll('table.sort').forEach(t=>t.querySelectorAll('th').forEach((h,c)=>{
-h.title='sort';h.addEventListener('click',()=>{const b=t.tBodies[0],d=h.dataset.d=h.dataset.d==='1'?'-1':'1';
-const v=r=>{const x=r.cells[c].textContent;return x===''?Infinity*d:parseFloat(x)};
-[...b.rows].sort((p,q)=>(v(p)-v(q))*d||0).forEach(r=>b.appendChild(r))})}));
-)";
+  std::string script;
+  for (const PageFile& file : page_scripts())
+    script += file.text;
+  return script;
 }
 
 }  // namespace understory

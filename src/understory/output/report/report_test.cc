@@ -1,6 +1,9 @@
 #include "understory/output/report/report.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <string>
 
 namespace understory {
 namespace {
@@ -102,6 +105,97 @@ TEST(Report, TreesByTheirCrownsStandInTheTableWithoutAStem) {
   EXPECT_EQ(crowns.find("seen around"), std::string::npos);
   EXPECT_EQ(crowns.find("diameter, cm"), std::string::npos);
   EXPECT_NE(crowns.find("height above the ground, m"), std::string::npos);
+}
+
+Tree tree_at_origin(int id, double dbh_m, double dbh_sd_m, double height_m) {
+  Tree tree;
+  tree.id = id;
+  tree.dbh_m = dbh_m;
+  tree.dbh_sd_m = dbh_sd_m;
+  tree.height_m = height_m;
+  return tree;
+}
+
+// The scripts of the page read the trees from the picture: place, true radius, how sure it is.
+TEST(Report, TheMapTellsWhichTreesAreDoubtful) {
+  constexpr double kUnknown = Tree::kUnknown;
+  InventoryResult inventory;
+  inventory.trees = {tree_at_origin(1, 0.2, 0.01, 12.0), tree_at_origin(2, 0.2, 0.07, kUnknown),
+                     tree_at_origin(3, kUnknown, kUnknown, 18.0)};
+  inventory.trees[0].x = 40.0;
+  inventory.stems.resize(2);
+  ReportInput input;
+  input.inventory = &inventory;
+  const std::string html = report_html(input);
+  EXPECT_NE(html.find("<circle class=\"sure\" data-id=\"1\""), std::string::npos);
+  EXPECT_NE(html.find("<circle class=\"weak\" data-id=\"2\""), std::string::npos);
+  EXPECT_NE(html.find("<circle class=\"crown\" data-id=\"3\""), std::string::npos);
+  EXPECT_NE(html.find("tree 1: 20.0 ± 1.0 cm, 12.0 m high"), std::string::npos);
+  EXPECT_NE(html.find("tree 2: 20.0 ± 7.0 cm<"), std::string::npos);
+  EXPECT_NE(html.find("tree 3: no diameter, 18.0 m high"), std::string::npos);
+  // 40 m and a margin of 2 % on each side are 1,100 units; the first stem has a radius of 10 cm.
+  const std::size_t at = html.find("data-metre=\"");
+  ASSERT_NE(at, std::string::npos);
+  const double per_metre = std::stod(html.substr(at + 12));
+  EXPECT_NEAR(per_metre, 1100.0 / 41.6, 1e-3);
+  EXPECT_NE(html.find(fmt::format("data-r=\"{:.2f}\"", 0.1 * per_metre)), std::string::npos);
+}
+
+// Three bytes a point of the side, two a point of the cross section; the most doubtful tree first.
+TEST(Report, SheetsHoldThePointsOfTheTreesMostDoubtfulFirst) {
+  InventoryResult inventory;
+  inventory.trees = {tree_at_origin(1, 0.2, 0.01, 12.0), tree_at_origin(2, 0.3, 0.2, 9.0)};
+  inventory.stems.resize(2);
+  for (StemFit& stem : inventory.stems) {
+    stem.radius_m = 0.1;
+    stem.arc_deg = 90.0;
+  }
+  inventory.sheets.resize(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    TreeSheet& sheet = inventory.sheets[i];
+    sheet.tree = i;
+    sheet.section_reach_m = 0.3;
+    sheet.seen.set(3);
+    // East 1 cube and a half, height 10 cubes and a half, on the stem.
+    sheet.front.push_back({{0.06F, 0.0F, 0.42F}, true, true});
+    sheet.section.emplace_back(0.3F, -0.3F);
+  }
+  ReportInput input;
+  input.inventory = &inventory;
+  const std::string html = report_html(input);
+  const std::size_t first = html.find("\n2,30.0,20.0,9.0,90,0.3000,");
+  const std::size_t at = html.find("class=\"sheet-data\">2,30.0,20.0,9.0,90,0.3000,");
+  EXPECT_EQ(first, std::string::npos) << "it begins the data";
+  ASSERT_NE(at, std::string::npos);
+  const std::size_t second = html.find("\n1,20.0,1.0,12.0,90,0.3000,", at);
+  ASSERT_NE(second, std::string::npos);
+  const std::string line = html.substr(second + 1, html.find('\n', second + 1) - second - 1);
+  // 129, 10 and 0x80: gQqA; 255 and 1: /wE=
+  EXPECT_NE(line.find(",8,"), std::string::npos) << line;
+  EXPECT_EQ(line.substr(line.size() - 10), ",gQqA,/wE=") << line;
+}
+
+TEST(Report, PlacesToWalkToAreOnTheMapAndInWords) {
+  InventoryResult inventory;
+  inventory.trees = {tree_at_origin(1, 0.2, 0.1, 12.0), tree_at_origin(2, 0.3, 0.2, 9.0)};
+  inventory.trees[1].x = 10.0;
+  inventory.stems.resize(2);
+  inventory.look_again.resize(1);
+  inventory.look_again[0].place = {5.0, 1.0, 0.0};
+  inventory.look_again[0].trees = {2, 1};
+  inventory.look_again[0].unseen_sides = 2;
+  inventory.thin = {4.0, {{0.0, 0.0}, {4.0, 0.0}, {12.0, 0.0}}, 0.5};
+  ReportInput input;
+  input.inventory = &inventory;
+  input.summary.notes = {"2 of 2 <diameters> are doubtful"};
+  const std::string html = report_html(input);
+  EXPECT_NE(html.find("<li>x 5.0, y 1.0: trees 2, 1 (unseen side)</li>"), std::string::npos);
+  EXPECT_EQ(count_of(html, "<g class=\"stand\""), 1U);
+  EXPECT_NE(html.find("<li>2 of 2 &lt;diameters&gt; are doubtful</li>"), std::string::npos);
+  // Two neighbours are one rectangle.
+  const std::size_t thin = html.find("class=\"thin-area\"");
+  ASSERT_NE(thin, std::string::npos);
+  EXPECT_EQ(count_of(html.substr(thin, html.find("/>", thin) - thin), "z"), 2U);
 }
 
 // "distance 20 cm; less is better" was taken for the error of the map.

@@ -19,6 +19,7 @@
 #include "understory/pipeline/inventory/lidar_view.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/pipeline/judgement/stand_notes.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/pipeline/run_folder/run_folder.h"
@@ -291,6 +292,7 @@ void describe(const InventoryRequest& request, const Stock& stock, const Log& lo
   if (!stock.of_run) documents.summary().crs_wkt = cloud.coordinate_system;
   documents.count("points", inventory.points);
   documents.count("trees", inventory.trees.size());
+  if (!request.slice) note_doubts(inventory, documents.summary());
   documents.summary().quality["area_m2"] = inventory.area_m2;
   documents.summary().quality["ground_measured_share"] = inventory.ground.measured_share;
   judge(stock, request, log, documents);
@@ -330,7 +332,8 @@ RunOutcome run_inventory(const InventoryRequest& request, Log& log, const Progre
   documents.write(results);
   place.commit(log);
   place.forget_state();
-  return documents.outcome(fmt::format("{} trees on {:.2f} ha; see {}",
+  return documents.outcome((request.slice ? std::string() : terminal_notes(stock.inventory)) +
+                           fmt::format("{} trees on {:.2f} ha; see {}",
                                        stock.inventory.trees.size(), stock.inventory.area_m2 / 1e4,
                                        (place.path() / "report.html").string()));
 }

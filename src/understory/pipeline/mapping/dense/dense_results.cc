@@ -16,6 +16,7 @@
 #include "understory/pipeline/judgement/match_course.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
+#include "understory/pipeline/judgement/stand_notes.h"
 #include "understory/pipeline/mapping/dense/dense_evidence.h"
 #include "understory/pipeline/mapping/finished_trajectory.h"
 #include "understory/pipeline/mapping/map_documents.h"
@@ -211,7 +212,7 @@ std::uint64_t write_map(const ReadRecording& recording, DenseProducts& made,
   const std::uint64_t points =
       write_cloud(folder / "map.laz", *made.tiles, inventory, frames, picture, recording.progress);
   write_tree_tables(folder, inventory);
-  write_tree_layers(folder, inventory.trees, trajectory, frames.layers);
+  write_tree_layers(folder, inventory.trees, trajectory, frames.layers, inventory.look_again);
   write_raster_layers(folder, inventory.ground.terrain, inventory.canopy,
                       change_into(frames.layers), frames.layers);
   write_layer_project(folder, title_of(recording), trajectory, frames.layers);
@@ -325,7 +326,7 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
     text += fmt::format(", {:.0f} ms a scan (99 %: {:.0f} ms)", scan->second.wall_ms.mean,
                         scan->second.wall_ms.p99);
   }
-  text += fmt::format("\n{} trees\n", inventory.trees.size());
+  text += fmt::format("\n{} trees\n", inventory.trees.size()) + terminal_notes(inventory);
   for (const std::string& reason : summary.reasons) {
     text += to_string(summary.status) + ": " + reason + "\n";
   }
@@ -351,6 +352,7 @@ void add_map(const ReadRecording& recording, DenseProducts& made, const Trajecto
   documents.count("trees", made.inventory.trees.size());
   documents.summary().lidar_view = made.lidar_view;
   if (!made.tiles) return;
+  note_doubts(made.inventory, documents.summary());
   documents.summary().quality["area_m2"] = made.inventory.area_m2;
   documents.count("map_points", write_map(recording, made, trajectory, frames, picture));
   if (!picture.empty()) documents.report().picture = &picture;

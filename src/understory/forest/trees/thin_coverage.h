@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "understory/forest/cell_grid.h"
+
+namespace understory {
+
+// Where a cloud holds few points near the ground, so that stems may be missing.
+struct ThinCoverage {
+  double cell_m = 0.0;
+  std::vector<Eigen::Vector2d> corners;  // south-western ones of the thin cells, by row and column
+  double share = 0.0;                    // of the cells that hold a point near the ground
+};
+
+// Counts points near the ground by cells of 4 m. Not thread-safe.
+class CoverageGrid {
+ public:
+  CoverageGrid();
+  // A point up to 3.5 m above the ground.
+  void add(const Eigen::Vector2d& place) { ++counts_.at(place.x(), place.y()); }
+  // Cells with fewer than 5 points per square metre: at 10 m from a lidar that is held 1.5 m high a
+  // stem of 20 cm then has fewer than 25 points up to 3.5 m, which the search for stems wants.
+  [[nodiscard]] ThinCoverage thin() const;
+
+ private:
+  CellGrid<std::uint32_t> counts_;
+};
+
+}  // namespace understory

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "understory/sensor/tree.h"
+
+namespace understory {
+
+// Whether the standard deviation of a tree's diameter is over 30 % of it: the diameter is hardly
+// more than a guess. False without a diameter.
+[[nodiscard]] bool has_weak_diameter(const Tree& tree);
+
+// How many trees of a list are not to be trusted in which way.
+struct StandDoubts {
+  std::size_t trees = 0;
+  std::size_t diameters = 0;       // trees with a diameter
+  std::size_t weak_diameters = 0;  // of them, see has_weak_diameter
+  std::size_t without_height = 0;
+  std::size_t by_crown = 0;  // found by their crowns alone, without a diameter
+};
+[[nodiscard]] StandDoubts doubts_of(const std::vector<Tree>& trees);
+
+// How doubtful a tree is, to sort trees by it: larger is worse, 0 is certain. The relative standard
+// deviation of the diameter over 30 %, plus the share of the stem's circumference that was not seen
+// beyond a half, plus 0.5 without a height. `arc_deg`: the part that was seen, 0 to 360, NaN if
+// unknown. A tree without a diameter is more doubtful than any with one.
+[[nodiscard]] double doubt_of(const Tree& tree, double arc_deg);
+
+}  // namespace understory

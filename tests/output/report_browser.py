@@ -1,0 +1,152 @@
+"""report.html in a browser: map, table and sheets go together, nothing is loaded from elsewhere, a print holds all."""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import chromium
+
+PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
+ROWS = "[...document.querySelectorAll('.all-trees tbody tr')]"
+CHOSEN = f"{ROWS}.filter((row) => row.classList.contains('chosen')).map((row) => Number(row.cells[0].textContent))"
+
+
+def mouse(browser, kind, x, y, **more):
+    browser.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
+
+
+def click(browser, x, y):
+    for kind in ("mousePressed", "mouseReleased"):
+        mouse(browser, kind, x, y, button="left", clickCount=1)
+
+
+def place_on_screen(browser, tree):
+    """Where the map shows a tree, in the window."""
+    return browser.run(
+        "(() => { const box = document.querySelector('canvas').getBoundingClientRect(); const map = selection.map;"
+        f"map.painter.view = map.view; const at = map.painter.at(map.map.trees.find((t) => t.id === {tree}));"
+        "return [box.x + at[0], box.y + at[1], box.x + box.width / 2, box.y + box.height / 2]; })()")
+
+
+def check_map(browser):
+    """A row centres the map; a click on a tree marks its row; wheel and keys zoom and move."""
+    browser.run("document.querySelector('canvas').scrollIntoView()")
+    browser.run(f"{ROWS}[3].click()")
+    browser.wait()
+    assert browser.run(CHOSEN) == [4]
+    x, y, middle_x, middle_y = place_on_screen(browser, 4)
+    assert abs(x - middle_x) < 2 and abs(y - middle_y) < 2, (x, y, middle_x, middle_y)
+    assert "tree 4: " in browser.run("document.querySelector('.told').textContent")
+    scale = browser.run("selection.map.view.scale")
+    mouse(browser, "mouseWheel", middle_x, middle_y, deltaX=0, deltaY=600)
+    browser.wait()
+    assert browser.run("selection.map.view.scale") < 0.6 * scale
+    browser.run("selection.choose(0, 'test')")
+    x, y, *_ = place_on_screen(browser, 4)
+    click(browser, x, y)
+    browser.wait()
+    assert browser.run(CHOSEN) == [4]
+    for key in ("ArrowRight", "ArrowDown"):
+        browser.run(f"document.querySelector('canvas').dispatchEvent(new KeyboardEvent('keydown', {{key: '{key}'}}))")
+    moved_x, moved_y, *_ = place_on_screen(browser, 4)
+    assert moved_x < x - 20 and moved_y < y - 20, (x, y, moved_x, moved_y)
+    browser.run("document.querySelector('canvas').dispatchEvent(new KeyboardEvent('keydown', {key: '0'}))")
+    assert browser.run("selection.map.view.scale === selection.map.least()")
+    # Labels and circles are there: the map holds more than one colour.
+    browser.wait()
+    colours = browser.run(
+        "(() => { const c = document.querySelector('canvas'); const all = c.getContext('2d')"
+        ".getImageData(0, 0, c.width, c.height).data; const seen = new Set();"
+        "for (let i = 0; i < all.length; i += 4) seen.add(all[i] * 65536 + all[i + 1] * 256 + all[i + 2]);"
+        "return seen.size; })()")
+    assert colours > 20, colours
+
+
+def check_table(browser):
+    """Sorting by a column, empty cells last; a filter hides rows and pales the trees of the map."""
+    heads = browser.run("[...document.querySelector('.all-trees table').tHead.rows[0].cells].map((c) => c.textContent)")
+    column = heads.index("± cm")
+    values = f"{ROWS}.filter((row) => !row.hidden).map((row) => row.cells[{column}].textContent)"
+    head = f"document.querySelector('.all-trees table').tHead.rows[0].cells[{column}]"
+    for ascending in (True, False):
+        browser.run(f"{head}.click()")
+        cells = [float(v) for v in browser.run(values) if v]
+        assert cells == sorted(cells, reverse=not ascending) and len(cells) > 10
+    middle = sorted(cells)[len(cells) // 2]
+    box = f"document.querySelectorAll('tr.filters input')[{column}]"
+    browser.run(f"{box}.value = '>= {middle}'; {box}.dispatchEvent(new Event('input'))")
+    kept = [float(v) for v in browser.run(values)]
+    assert kept and min(kept) >= middle and len(kept) == sum(c >= middle for c in cells)
+    assert browser.run("selection.shown.size") == len(kept)
+    browser.run(f"{box}.value = 'x'; {box}.dispatchEvent(new Event('input'))")
+    assert len(browser.run(values)) >= len(cells), "what is not understood filters nothing"
+    assert browser.run(f"{box}.classList.contains('wrong')")
+    browser.run(f"{box}.value = ''; {box}.dispatchEvent(new Event('input'))")
+
+
+def check_sheets(browser):
+    """The most doubtful tree first; the next one is chosen in the table too."""
+    count = browser.run("document.querySelector('.sheet-data').textContent.trim().split('\\n').length")
+    assert f" of {count} " in browser.run("document.querySelector('.sheet-bar span').textContent")
+    browser.run("document.querySelectorAll('.sheet-bar button')[1].click()")
+    shown = int(re.search(r"Tree (\d+)", browser.run("document.querySelector('.facts').textContent"))[1])
+    assert browser.run(CHOSEN) == [shown]
+    for path in ("figure:first-child svg path", "figure:last-child svg circle"):
+        assert browser.run(f"document.querySelectorAll('.sheet {path}').length") > 0, path
+
+
+def check_print(browser, path):
+    """In print: the still map, all rows, the most doubtful sheets."""
+    browser.print_to(path)
+    assert path.read_bytes().startswith(b"%PDF")
+    assert browser.run("document.querySelectorAll('.printed').length") in (6, 7)
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    shown = "(query) => getComputedStyle(document.querySelector(query)).display !== 'none'"
+    assert browser.run(f"({shown})('svg.map')") and not browser.run(f"({shown})('.moving')")
+    browser.call("Emulation.setEmulatedMedia", media="")
+    assert browser.run(f"({shown})('.moving')") and not browser.run(f"({shown})('svg.map')")
+
+
+def check_without_scripts(page):
+    with chromium.Browser() as browser:
+        browser.call("Emulation.setScriptExecutionDisabled", value=True)
+        browser.open(page)
+        text = browser.call("Runtime.evaluate", expression="1")  # the page itself runs none
+        assert "result" in text
+        tree = browser.call("DOM.getDocument", depth=1)["root"]["nodeId"]
+        for query, there in (("svg.map circle", True), (".all-trees tbody tr", True), ("canvas", False)):
+            found = browser.call("DOM.querySelectorAll", nodeId=tree, selector=query)["nodeIds"]
+            assert bool(found) == there, query
+
+
+def check_narrow(page):
+    with chromium.Browser(390, 800, mobile=True) as browser:
+        browser.open(page)
+        browser.wait()
+        assert browser.run("document.documentElement.scrollWidth") <= 390, "the page scrolls sideways"
+
+
+if chromium.program() is None:
+    print("no Chromium here")
+    sys.exit(77)
+with tempfile.TemporaryDirectory() as scratch:
+    scratch = Path(scratch)
+    done = subprocess.run([PROGRAM, "--quiet", "map", "sim:demo?duration_s=6&seed=4", "-o", scratch / "run"],
+                          capture_output=True, text=True)
+    assert done.returncode in (0, 4), done.stderr
+    page = scratch / "run" / "report.html"
+    with chromium.Browser() as browser:
+        browser.open(page)
+        browser.wait()
+        assert browser.errors() == [], browser.errors()
+        assert len(browser.requests()) == 1, browser.requests()
+        check_map(browser)
+        check_table(browser)
+        check_sheets(browser)
+        check_print(browser, scratch / "report.pdf")
+        assert browser.errors() == [], browser.errors()
+    check_without_scripts(page)
+    check_narrow(page)
