@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/forest/stand/stand_table.h"
 #include "understory/geometry/raster.h"
 #include "understory/sensor/tree.h"
 
@@ -25,10 +26,11 @@ struct PathLine {
 };
 
 // GeoPackage with the layer `trees` of points (x, y, z = ground) and the columns of trees.csv, and
-// where there is a path with the layer `path`. Without a system the layers have srs_id -1
+// where there is a path with the layer `path`, and where there are plots with the layer `plots`
+// (polygons, their rings `drawn`). Without a system the layers have srs_id -1
 // (undefined Cartesian), which QGIS takes for metres. `heights` says what z is above.
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
                       const std::string& crs_wkt, const PathLine& line = {},
-                      const std::string& heights = "");
+                      const std::string& heights = "", const std::vector<StandPlot>& plots = {});
 
 }  // namespace understory

@@ -14,9 +14,9 @@ void write_tree_tables(const std::filesystem::path& folder, const InventoryResul
 }
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
-                           const std::string& crs) {
+                           const std::string& crs, const std::vector<StandPlot>& plots) {
   write_tree_tables(folder, inventory);
-  write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs);
+  write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs, {}, "", plots);
   if (!inventory.ground.terrain.empty()) {
     write_geotiff(folder / "dtm.tif", inventory.ground.terrain, crs);
   }
@@ -26,9 +26,9 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
 }
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
-                           const LayerFrame& layers) {
+                           const LayerFrame& layers, const std::vector<StandPlot>& plots) {
   write_tree_tables(folder, inventory);
-  write_tree_layers(folder, inventory.trees, {}, layers);
+  write_tree_layers(folder, inventory.trees, {}, layers, plots);
   write_raster_layers(folder, inventory.ground.terrain, inventory.canopy, change_into(layers),
                       layers);
 }

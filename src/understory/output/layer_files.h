@@ -26,9 +26,11 @@ namespace understory {
 // How map.laz is written: coordinate system, offset, steps.
 [[nodiscard]] LasOptions las_options(const LayerFrame& layers);
 
-// Writes trees.gpkg with the layers trees and path. Frame of both: world. Throws OutputError.
+// Writes trees.gpkg with the layers trees and path (frame of both: world), and plots. Throws
+// OutputError.
 void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
-                       const std::vector<StampedPose>& path, const LayerFrame& layers);
+                       const std::vector<StampedPose>& path, const LayerFrame& layers,
+                       const std::vector<StandPlot>& plots = {});
 
 // Writes dtm.tif, and chm.tif and dsm.tif where the canopy is not empty, over cells of the layers'
 // grid. `change` leads there from the frame of the rasters. Throws OutputError.

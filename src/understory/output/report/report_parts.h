@@ -17,6 +17,8 @@ namespace understory {
 [[nodiscard]] std::string place_section(const ReportInput& input);
 [[nodiscard]] std::string distrust_section(const ReportInput& input);
 [[nodiscard]] std::string stand_section(const ReportInput& input);
+// The figures of the stand and of its sample plots.
+[[nodiscard]] std::string plots_section(const ReportInput& input);
 // What lies beside the report and how to open it; `files`: names.
 [[nodiscard]] std::string files_section(const std::vector<std::string>& files);
 [[nodiscard]] std::string matching_section(const ReportInput& input);
