@@ -225,6 +225,22 @@ void mark_stems(const std::vector<StemDisc>& stems, const Eigen::Vector2d& corne
   }
 }
 
+// Share of the cells around that has to hold a return: half, or of a thinned cloud half of its
+// median.
+double share_needed(const Cells& reached, const Cells& all, const Cells& full) {
+  std::array<std::uint64_t, 101> histogram{};
+  std::uint64_t count = 0;
+  for (std::size_t i = 0; i < reached.values.size(); ++i) {
+    if (reached.values[i] == 0 || all.values[i] == 0) continue;
+    ++histogram[static_cast<std::size_t>(100 * full.values[i] / all.values[i])];
+    ++count;
+  }
+  std::size_t median = 0;
+  for (std::uint64_t below = histogram[0]; 2 * below < count; below += histogram[median])
+    ++median;
+  return std::clamp(kOfMedian * 0.01 * static_cast<double>(median), kThinnedShare, kDenseShare);
+}
+
 // Cells with the density that stems need, of those with returns. The surroundings of stems say
 // nothing of it.
 Cells dense_of(const Cells& counts, const Cells& reached, const std::vector<StemDisc>& stems,
@@ -235,10 +251,11 @@ Cells dense_of(const Cells& counts, const Cells& reached, const std::vector<Stem
   mark_stems(stems, corner, kBesideStem, 0, held);
   const Cells all = counted_around(open, 1);
   const Cells full = counted_around(held, 1);
+  const double least = share_needed(reached, all, full);
   Cells dense(counts.columns, counts.rows);
   for (std::size_t i = 0; i < dense.values.size(); ++i) {
     if (reached.values[i] == 0) continue;
-    dense.values[i] = full.values[i] >= kDenseShare * all.values[i] ? 1 : 0;
+    dense.values[i] = full.values[i] >= least * all.values[i] ? 1 : 0;
   }
   return dense;
 }

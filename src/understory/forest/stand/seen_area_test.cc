@@ -57,7 +57,15 @@ TEST(VisibleArea, ThinReturnsAndBushesAreNotEnough) {
   const auto all = [](const Vector2d&) { return true; };
   EXPECT_NEAR(find_seen_area(returns_on(30.0, 60.0, all, 3), {0, 0}, {}, {}).area_m2(), 900.0,
               20.0);
-  EXPECT_LT(find_seen_area(returns_on(30.0, 6.0, all, 4), {0, 0}, {}, {}).area_m2(), 90.0);
+  EXPECT_LT(find_seen_area(returns_on(30.0, 0.2, all, 4), {0, 0}, {}, {}).area_m2(), 90.0);
+  EXPECT_NEAR(find_seen_area(returns_on(30.0, 8.0, all, 6), {0, 0}, {}, {}).area_m2(), 900.0, 60.0)
+      << "a thinned cloud";
+  // Beside dense returns the thin ones are those of what lies too far away.
+  const auto thin_east = [](const Vector2d& p) {
+    return p.x() < 20.0 || std::fmod(17.0 * p.y() + 31.0 * p.x(), 1.0) < 0.015;
+  };
+  EXPECT_NEAR(find_seen_area(returns_on(30.0, 150.0, thin_east, 7), {0, 0}, {}, {}).area_m2(),
+              600.0, 30.0);
   SeenCells deep;
   deep.add({1.0, 1.0}, -2.0);
   EXPECT_TRUE(find_seen_area(deep, {0, 0}, {}, {}).empty());

@@ -19,7 +19,7 @@ struct StandTableConfig {
   double class_m = 0.02;       // width of a class of diameters
   double reach_m = 15.0;       // from the path, where there is one
   double least_seen = 0.5;     // share of a plot that gives figures
-  double missed_share = 0.05;  // of the trees where stems could be seen; for deviations alone
+  double missed_share = 0.01;  // of the trees where stems could be seen; for deviations alone
   TaperSpecies species = TaperSpecies::kUnknown;
 };
 void describe(ConfigTable& table, StandTableConfig& config);
