@@ -1,8 +1,12 @@
 #include <cstdio>
 #include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "understory/cli/command.h"
 #include "understory/cli/outcome.h"
+#include "understory/cli/plot_options.h"
 #include "understory/cli/suggestion.h"
 #include "understory/pipeline/inventory/cloud_inventory.h"
 #include "understory/util/error.h"
@@ -13,6 +17,7 @@ namespace {
 struct InventoryOptions {
   InventoryRequest request;
   std::vector<std::string> settings;
+  PlotOptions plots;
   bool print_config = false;
 };
 
@@ -36,7 +41,10 @@ int run(const InventoryOptions& options, CommandContext& context) {
   InventoryRequest request = options.request;
   ConfigTable table;
   describe(table, request.config);
-  request.config_record.origins = read_settings(table, request.config_file, options.settings);
+  std::vector<std::string> settings = options.settings;
+  for (std::string& setting : plot_settings(options.plots, "stand."))
+    settings.push_back(std::move(setting));
+  request.config_record.origins = read_settings(table, request.config_file, settings);
   if (options.print_config) {
     std::printf("%s", table.to_yaml(true).c_str());
     return kExitDone;
@@ -65,6 +73,7 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_flag("--slice", options->request.slice,
                     "The cloud is one thin cut near breast height: only diameters and places are "
                     "measured, at whatever z it lies");
+  add_plot_options(*command, options->plots);
   command->add_option("--crs", options->request.coordinate_system,
                       "Coordinate system of a cloud that names none, for instance EPSG:3067 (a "
                       "cloud that names its own keeps it)");
@@ -73,8 +82,9 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->footer(
       "Writes trees.csv, stem_curves.csv, trees.gpkg, map.laz, dtm.tif, chm.tif, dsm.tif, "
       "map.qgs,\n"
-      "report.html and run.json.\n"
+      "report.html and run.json; with plots also plots.csv and plot_classes.csv.\n"
       "Examples:\n  understory inventory plot.laz -o plot-inventory\n"
+      "  understory inventory plot.laz --plots 512.5,847.0,9 -o plot-inventory\n"
       "  understory inventory cut.laz --slice -o cut-inventory");
   command->callback([options, &chosen] {
     chosen = [options](CommandContext& context) { return run(*options, context); };

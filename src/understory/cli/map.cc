@@ -5,6 +5,7 @@
 #include "understory/cli/command.h"
 #include "understory/cli/open_options.h"
 #include "understory/cli/outcome.h"
+#include "understory/cli/plot_options.h"
 #include "understory/cli/suggestion.h"
 #include "understory/pipeline/mapping/front_end_config.h"
 #include "understory/pipeline/mapping/mapping.h"
@@ -25,6 +26,7 @@ struct MapOptions {
   std::vector<std::string> settings;
   std::string coordinate_system;
   std::string inventory;
+  PlotOptions plots;
   std::string front_end = kDenseFrontEnd;
   bool realtime = false;
   bool overwrite = false;
@@ -102,6 +104,12 @@ int run_map(const MapOptions& options, CommandContext& context) {
            "make: leave it out, or map with --front-end dense"});
     settings.push_back("inventory.extent=" + options.inventory);
   }
+  const std::vector<std::string> plots = plot_settings(options.plots, "inventory.stand.");
+  if (!plots.empty() && options.front_end != kDenseFrontEnd)
+    throw ConfigError(
+        {"--plots and --plot-grid take their figures from the cloud of a map, which a run by stems "
+         "does not make: leave them out, or map with --front-end dense"});
+  settings.insert(settings.end(), plots.begin(), plots.end());
   ReadConfig<FrontEndConfig> read = read_front_end_config(
       options.front_end, options.profile, options.config_file, settings, context.log);
   if (options.print_config) return print_config(options, read, context);
@@ -148,6 +156,7 @@ void add_map_command(CLI::App& app, Command& chosen) {
                    "What is measured of the trees: diameters and heights (basic, if not given), or "
                    "stem curves, volumes, crowns and the tree of each point as well (full)")
       ->check(CLI::IsMember({"basic", "full"}));
+  add_plot_options(*command, options->plots);
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "
                     "(time_repair.window_s is 0, of stems also stems.pace.longest_gap_s)");

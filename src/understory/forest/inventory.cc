@@ -29,6 +29,7 @@ struct Gathered {
   SliceThinner slices;
   CanopyCeiling ceiling;
   CoverageGrid coverage;
+  SeenCells seen = {};
   std::uint64_t points = 0;
   std::uint64_t without_ground = 0;
 };
@@ -45,8 +46,9 @@ void gather(const PointBlocks& cloud, const InventoryConfig& config, const Inven
         ++gathered.without_ground;
         continue;
       }
-      if (!(height >= 0.0 && height <= kHighest)) continue;
       const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
+      if (height < config.stems.highest_m) gathered.seen.add(place, height);
+      if (!(height >= 0.0 && height <= kHighest)) continue;
       gathered.ceiling.count(place, height);
       if (height < config.stems.highest_m) gathered.coverage.add(place);
       if (height >= config.stems.lowest_m && height < config.stems.highest_m) {
@@ -240,6 +242,20 @@ void judge_density(InventoryResult& result) {
   if (result.from_above) result.thin = {};  // no stem is looked for there
 }
 
+// Where stems could be seen. `path`: world frame.
+VisibleArea seen_of(const SeenCells& cells, const std::vector<Eigen::Vector2d>& path,
+                    double reach_m, const InventoryResult& result) {
+  if (result.from_above) return {};
+  std::vector<StemDisc> stems;
+  for (const StemFit& stem : result.stems)
+    stems.push_back({stem.centre, stem.radius_m});
+  SeenFrom from;
+  from.reach_m = reach_m;
+  for (const Eigen::Vector2d& place : path)
+    from.path.emplace_back(place - result.origin.head<2>());
+  return find_seen_area(cells, result.origin.head<2>(), stems, from);
+}
+
 // Whether the stem of a listed tree stands below a crown's cells, or near its top.
 std::vector<char> crowns_with_stems(const InventoryResult& result) {
   std::vector<char> taken(result.crowns->crowns.size(), 0);
@@ -344,13 +360,15 @@ void describe(ConfigTable& table, InventoryConfig& config) {
   table.section("crowns", [&] { describe(table, config.crowns); });
   table.section("ground", [&] { describe(table, config.ground); });
   table.section("stems", [&] { describe(table, config.stems); });
+  table.section("stand", [&] { describe(table, config.stand); });
   table.add("canopy_cell_m", config.canopy_cell_m, {0.1, 10.0}, "m", "cell of the canopy model");
   table.add("segments", config.segments, {0, 50}, "",
             "number of trees that the report shows one by one");
 }
 
 InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig& config,
-                               const ProgressSink& progress, const SeenTest& in_view) {
+                               const ProgressSink& progress, const SeenTest& in_view,
+                               const std::vector<Eigen::Vector2d>& path) {
   const PointBlocks cloud = polled(unasked, progress);
   const auto tell = [&](const char* stage, double done) {
     progress({stage, done, 8.0, "passes", ""});
@@ -385,6 +403,7 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
   result.canopy = tops.canopy.raster(result.origin.x(), result.origin.y());
   result.area_m2 = area_of(result.canopy);
   judge_density(result);
+    result.seen = seen_of(gathered.seen, path, config.stand.reach_m, result);
   result.trees = trees_of(result, heights_in_view(result, heights, in_view));
   if (full) {
     tell("stem curves", 5.0);

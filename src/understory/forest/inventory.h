@@ -8,6 +8,8 @@
 
 #include "understory/forest/doubtful_trees.h"
 #include "understory/forest/ground/ground.h"
+#include "understory/forest/stand/seen_area.h"
+#include "understory/forest/stand/stand_config.h"
 #include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/trees/canopy_crowns.h"
@@ -33,6 +35,7 @@ struct InventoryConfig {
   StemDetectorConfig stems;
   StemCurveConfig curves;
   CanopyCrownConfig crowns;  // of a full inventory
+  StandTableConfig stand;
   double canopy_cell_m = 0.5;
   int segments = 6;  // trees whose points are kept for a look at them
 };
@@ -63,7 +66,8 @@ struct InventoryResult {
   std::vector<LookAgain> look_again;  // places that would show weak stems, the best first
   ThinCoverage thin;                  // where stems may be missing, without the origin
   std::uint64_t points = 0;
-  double area_m2 = 0.0;     // cells in which the slices hold points, holes filled
+  double area_m2 = 0.0;     // squares of 2 m that hold points
+  VisibleArea seen;         // where stems could be seen; empty of a cloud from above and of a cut
   bool too_sparse = false;  // for stems: some are missing from the list
   bool from_above = false;  // too sparse, as hardly any of its points lie near breast height
   std::vector<std::string> remarks;
@@ -73,12 +77,14 @@ struct InventoryResult {
 using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
 
 // Ground, canopy, trees of a whole cloud: seven runs through it. With a test of what was in view,
-// trees that may go on above it have no height. Deterministic for any number of threads. Throws
-// Stopped.
+// trees that may go on above it have no height. `path`: the scanner's places in the plane, world
+// frame; with them only what is in sight of them counts as seen. Deterministic for any number of
+// threads. Throws Stopped.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,
                                              const ProgressSink& progress = {},
-                                             const SeenTest& in_view = {});
+                                             const SeenTest& in_view = {},
+                                             const std::vector<Eigen::Vector2d>& path = {});
 
 // The id of the tree that a point of the cloud belongs to, 0 if none; of a full inventory.
 // `height_m` is its height above the ground.

@@ -16,6 +16,7 @@
 
 #include "understory/geometry/quiet_gdal.h"
 #include "understory/output/point_table.h"
+#include "understory/output/plot_files.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
 
@@ -200,6 +201,53 @@ void add_looks(GDALDataset& dataset, const std::vector<LookPoint>& looks,
   }
 }
 
+void add_plot_fields(OGRLayer& layer, const std::filesystem::path& path) {
+  for (const char* name : {"plot", "kind"}) {
+    OGRFieldDefn field(name, OFTString);
+    if (layer.CreateField(&field) != OGRERR_NONE) fail(path);
+  }
+  for (const PlotColumn& column : plot_columns())
+    add_field(layer, column.name, false, path);
+}
+
+OGRLinearRing closed(const PlaneRing& points) {
+  OGRLinearRing ring;
+  for (const Eigen::Vector2d& point : points)
+    ring.addPoint(point.x(), point.y());
+  ring.closeRings();
+  return ring;
+}
+
+// Each hole belongs to the outer ring before it.
+OGRMultiPolygon polygons_of(const StandPlot& plot) {
+  OGRMultiPolygon all;
+  std::unique_ptr<OGRPolygon> part;
+  for (const PlaneRing& points : plot.drawn) {
+    if (signed_area_m2(points) > 0.0 && part != nullptr) all.addGeometryDirectly(part.release());
+    if (part == nullptr) part = std::make_unique<OGRPolygon>();
+    OGRLinearRing ring = closed(points);
+    part->addRing(&ring);
+  }
+  if (part != nullptr) all.addGeometryDirectly(part.release());
+  return all;
+}
+
+void add_plots(OGRLayer& layer, const std::vector<StandPlot>& plots,
+               const std::filesystem::path& path) {
+  for (const StandPlot& plot : plots) {
+    const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer.GetLayerDefn()));
+    feature->SetField("plot", plot.shape.id.c_str());
+    feature->SetField("kind", plot.shape.kind.c_str());
+    for (const PlotColumn& column : plot_columns()) {
+      const double value = column.value(plot);
+      if (std::isfinite(value)) feature->SetField(column.name, value);
+    }
+    const OGRMultiPolygon shape = polygons_of(plot);
+    feature->SetGeometry(&shape);
+    if (layer.CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
+  }
+}
+
 // An empty package under the name that it has until it is whole.
 GDALDatasetUniquePtr new_package(const std::filesystem::path& path) {
   // The same rows give the same bytes: without this the file holds the time of writing.
@@ -240,7 +288,8 @@ void add_row(OGRLayer& layer, const PointRow& row, const std::filesystem::path& 
 
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
                       const std::string& crs_wkt, const PathLine& line, const std::string& heights,
-                      const std::vector<LookPoint>& look_again) {
+                      const std::vector<LookPoint>& look_again,
+                      const std::vector<StandPlot>& plots) {
   const QuietGdal quiet;
   GDALDatasetUniquePtr dataset = new_package(path);
   const std::string above = heights.empty() ? "" : "; heights are " + heights;
@@ -257,9 +306,16 @@ void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>
     for (const char* name : {"begin_s", "end_s", "length_m"})
       add_field(*drawn, name, false, path);
   }
+  OGRLayer* plotted = nullptr;
+  if (!plots.empty()) {
+    plotted = add_layer(*dataset, "plots", wkbMultiPolygon, crs_wkt,
+                        "sample plots and grid cells with the figures of their trees", path);
+    add_plot_fields(*plotted, path);
+  }
   dataset->StartTransaction();
   add_trees(*layer, trees, path);
   if (drawn != nullptr) add_line(*drawn, line, path);
+  if (plotted != nullptr) add_plots(*plotted, plots, path);
   add_looks(*dataset, look_again, crs_wkt, path);
   if (dataset->CommitTransaction() != OGRERR_NONE) fail(path);
   close(std::move(dataset), path);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/forest/stand/stand_table.h"
 #include "understory/geometry/raster.h"
 #include "understory/sensor/tree.h"
 
@@ -33,12 +34,14 @@ struct LookPoint {
 };
 
 // GeoPackage with the layer `trees` of points (x, y, z = ground) and the columns of trees.csv, and
-// where there is a path with the layer `path`, and where there are places to look from again with
-// the layer `look_again`. Without a system the layers have srs_id -1
-// (undefined Cartesian), which QGIS takes for metres. `heights` says what z is above.
+// where there is a path with the layer `path`, where there are places to look from again with the
+// layer `look_again`, and where there are plots with the layer `plots` (polygons, their rings
+// `drawn`). Without a system the layers have srs_id -1 (undefined Cartesian), which QGIS takes for
+// metres. `heights` says what z is above.
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
                       const std::string& crs_wkt, const PathLine& line = {},
                       const std::string& heights = "",
-                      const std::vector<LookPoint>& look_again = {});
+                      const std::vector<LookPoint>& look_again = {},
+                      const std::vector<StandPlot>& plots = {});
 
 }  // namespace understory

@@ -14,10 +14,10 @@ void write_tree_tables(const std::filesystem::path& folder, const InventoryResul
 }
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
-                           const std::string& crs) {
+                           const std::string& crs, const std::vector<StandPlot>& plots) {
   write_tree_tables(folder, inventory);
   write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs, {}, "",
-                   looks_in(LayerFrame(), inventory.look_again));
+                   looks_in(LayerFrame(), inventory.look_again), plots);
   if (!inventory.ground.terrain.empty()) {
     write_geotiff(folder / "dtm.tif", inventory.ground.terrain, crs);
   }
@@ -27,9 +27,9 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
 }
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
-                           const LayerFrame& layers) {
+                           const LayerFrame& layers, const std::vector<StandPlot>& plots) {
   write_tree_tables(folder, inventory);
-  write_tree_layers(folder, inventory.trees, {}, layers, inventory.look_again);
+  write_tree_layers(folder, inventory.trees, {}, layers, inventory.look_again, plots);
   write_raster_layers(folder, inventory.ground.terrain, inventory.canopy, change_into(layers),
                       layers);
 }

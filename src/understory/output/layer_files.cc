@@ -102,9 +102,10 @@ LasOptions las_options(const LayerFrame& layers) {
 
 void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
                        const std::vector<StampedPose>& path, const LayerFrame& layers,
-                       const std::vector<LookAgain>& look_again) {
+                       const std::vector<LookAgain>& look_again,
+                       const std::vector<StandPlot>& plots) {
   write_trees_gpkg(folder / "trees.gpkg", trees_in(layers, trees), layers.wkt(),
-                   path_in(layers, path), layers.heights(), looks_in(layers, look_again));
+                   path_in(layers, path), layers.heights(), looks_in(layers, look_again), plots);
 }
 
 void write_raster_layers(const std::filesystem::path& folder, const Raster& terrain,

@@ -31,11 +31,12 @@ namespace understory {
 [[nodiscard]] std::vector<LookPoint> looks_in(const LayerFrame& layers,
                                               const std::vector<LookAgain>& places);
 
-// Writes trees.gpkg with the layers trees, path and look_again. Frame of all: world. Throws
-// OutputError.
+// Writes trees.gpkg with the layers trees, path and look_again (frame of all: world), and plots.
+// Throws OutputError.
 void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
                        const std::vector<StampedPose>& path, const LayerFrame& layers,
-                       const std::vector<LookAgain>& look_again = {});
+                       const std::vector<LookAgain>& look_again = {},
+                       const std::vector<StandPlot>& plots = {});
 
 // Writes dtm.tif, and chm.tif and dsm.tif where the canopy is not empty, over cells of the layers'
 // grid. `change` leads there from the frame of the rasters. Throws OutputError.

@@ -170,4 +170,12 @@ inline constexpr double kRing = 5.0;
 inline constexpr int kRings = 8;
 }  // namespace correction_figures
 
+namespace stand_plots {  // pipeline/inventory/stand_plots.cc
+// Share of a plot that was seen: with more it counts as whole, as cells at its border are uncertain
+// [chosen]
+inline constexpr double kWhole = 0.99;
+// Grid cells at most: more are a mistake of the unit [chosen]
+inline constexpr double kMostGridCells = 200'000.0;
+}  // namespace stand_plots
+
 }  // namespace understory::pipeline_constants

@@ -22,6 +22,7 @@ std::string report_html(const ReportInput& input, const std::vector<std::string>
   html += map_section(input);
   html += place_section(input);
   html += distrust_section(input);
+  html += plots_section(input);
   html += stand_section(input);
   html += files_section(files);
   html += truth_section(input);

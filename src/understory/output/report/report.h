@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "understory/forest/inventory.h"
+#include "understory/forest/stand/stand_table.h"
 #include "understory/forest/trees/tree_fall.h"
 #include "understory/georeference/systems/layer_frame.h"
 #include "understory/output/report/map_picture.h"
@@ -106,6 +107,7 @@ struct ReportInput {
   RunSummary summary;
   const MapPicture* picture = nullptr;         // not owned
   const InventoryResult* inventory = nullptr;  // not owned
+  const StandTable* stand = nullptr;           // not owned; of an inventory
   const std::vector<Tree>* trees = nullptr;    // not owned; without an inventory
   std::vector<TreeFall> falls;                 // of these trees
   std::vector<ReportScan> scans;

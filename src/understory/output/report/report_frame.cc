@@ -156,6 +156,29 @@ void add_stand(Tiles& tiles, const std::vector<Tree>& all_trees, double area_m2)
   }
 }
 
+// What stands for a hectare: of the area in which stems could be seen.
+void add_figures(Tiles& tiles, const StandFigures& seen) {
+  if (!(seen.seen_m2 > 0.0)) return;
+  tiles.add(fmt::format("{:.2f} ha", seen.seen_m2 / 1e4), "area seen (not a plot's border)",
+            "Where returns reached the ground or the stems densely enough to find stems. What lies "
+            "behind stems or farther away does not count, nor do trees there. For a plot of your "
+            "own give --plots.");
+  const auto add = [&](const Measured& figure, int decimals, const char* unit, const char* label,
+                       const char* meaning) {
+    if (std::isfinite(figure.value))
+      tiles.add(
+          fmt::format("{:.{}f} ± {:.{}f}{}", figure.value, decimals, figure.sd, decimals, unit),
+          label, meaning);
+  };
+  add(seen.stems_per_ha, 0, "", "stems per hectare",
+      "Trees in the area seen over that area. ± is one standard deviation of the errors of "
+      "measurement.");
+  add(seen.basal_area_m2_per_ha, 1, " m²/ha", "basal area",
+      "Cross sections of these stems at 1.3 m, per hectare of the area seen.");
+  add(seen.volume_m3_per_ha, 0, " m³/ha", "stem volume over bark",
+      "Volume of these stems from the ground to the top, per hectare of the area seen.");
+}
+
 void add_run(Tiles& tiles, const ReportInput& input) {
   if (!input.scans.empty()) {
     tiles.add(fmt::format("{:.0f} m", path_length_m(input.scans)), "length of the path",
@@ -236,7 +259,9 @@ std::string verdict_section(const ReportInput& input) {
 std::string figures_section(const ReportInput& input) {
   Tiles tiles;
   if (input.inventory != nullptr) {
-    add_stand(tiles, input.inventory->trees, input.inventory->area_m2);
+    const bool seen = input.stand != nullptr && input.stand->seen.trees > 0;
+    add_stand(tiles, input.inventory->trees, seen ? 0.0 : input.inventory->area_m2);
+    if (seen) add_figures(tiles, input.stand->seen);
   } else if (input.trees != nullptr && input.trees_of_cloud) {
     add_stand(tiles, *input.trees, input.area_m2);
   } else if (input.trees != nullptr) {

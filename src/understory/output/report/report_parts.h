@@ -25,6 +25,8 @@ namespace understory {
 [[nodiscard]] std::string stand_section(const ReportInput& input);
 // The sheets of single trees, to look through: a part of the stand's section.
 [[nodiscard]] std::string sheets_part(const InventoryResult& inventory);
+// The figures of the stand and of its sample plots.
+[[nodiscard]] std::string plots_section(const ReportInput& input);
 // What lies beside the report and how to open it; `files`: names.
 [[nodiscard]] std::string files_section(const std::vector<std::string>& files);
 [[nodiscard]] std::string matching_section(const ReportInput& input);

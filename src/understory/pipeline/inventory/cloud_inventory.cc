@@ -14,9 +14,12 @@
 #include "understory/output/inventory_files.h"
 #include "understory/output/las_writer.h"
 #include "understory/output/layer_files.h"
+#include "understory/output/plot_files.h"
 #include "understory/output/qgis_project.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/inventory/lidar_view.h"
+#include "understory/pipeline/inventory/stand_documents.h"
+#include "understory/pipeline/inventory/stand_plots.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/pipeline/judgement/stand_notes.h"
@@ -91,6 +94,8 @@ struct Stock {
   ResultFrames frames;            // of that run; the frame of a cloud is its own
   StandCloud stand;
   InventoryResult inventory;
+  std::vector<PlotOutline> plots;
+  StandResult figures;
   MapPicture picture;
 };
 
@@ -244,6 +249,41 @@ std::uint64_t write_labelled_cloud(const Stock& stock, const fs::path& file,
   return too_far;
 }
 
+// The frame of the layers: that of the run, or the cloud's own.
+const LayerFrame& layers_of(const Stock& stock, const LayerFrame& own) {
+  return stock.of_run ? stock.frames.layers : own;
+}
+
+// Figures of the stand and of its plots. Throws InputError where no plot overlaps what was seen.
+void take_figures(const StandTableConfig& config, Stock& stock) {
+  const LayerFrame own;
+  stock.figures = take_stand(stock.inventory, config, stock.plots, layers_of(stock, own));
+  if (!stock.figures.no_overlap) return;
+  const VisibleArea& seen = stock.inventory.seen;
+  throw InputError(
+      config.plots, "",
+      fmt::format("expected plots where stems were seen: none of the {} overlaps x {:.0f} to "
+                  "{:.0f} m, y {:.0f} to {:.0f} m",
+                  stock.plots.size(), seen.x0, seen.x0 + seen.columns * seen.cell_m, seen.y0,
+                  seen.y0 + seen.rows * seen.cell_m));
+}
+
+// trees.csv, trees.gpkg, the rasters, and of plots plots.csv and plot_classes.csv.
+void write_tables(const InventoryRequest& request, const fs::path& results, const Stock& stock) {
+  const StandTable& stand = stock.figures.table;
+  if (request.slice) {
+    write_slice_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
+    return;
+  }
+  if (stock.of_run) {
+    write_inventory_files(results, stock.inventory, stock.frames.layers, stand.plots);
+  } else {
+    write_inventory_files(results, stock.inventory, stock.stand.cloud.coordinate_system,
+                          stand.plots);
+  }
+  if (asks_for_plots(request.config.stand)) write_plot_tables(results, stand);
+}
+
 void take_stock(const InventoryRequest& request, const fs::path& results, Log& log,
                 const ProgressSink& progress, StageTimes& times, Stock& stock) {
   {
@@ -252,6 +292,9 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
                       ? read_run_map(stock.path, stock.frames.layers, request.frame, log, progress)
                       : read_stand(stock.path, with_system(request), log, progress);
     name_system(request, stock);
+    stock.plots =
+        plots_of(request.config.stand,
+                 stock.of_run ? stock.frames.layers.wkt() : stock.stand.cloud.coordinate_system);
   }
   // The map of a run is in metres, and what is wrong with it is a matter of trust.
   if (!stock.stand.doubt.empty() && !stock.of_run && !request.slice)
@@ -262,19 +305,16 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
     stock.inventory = request.slice
                           ? take_slice(blocks, stock.path.string(), request.config, progress)
                           : take_inventory(blocks, request.config, progress,
-                                           stock.of_run ? seen_in_run(request.cloud) : SeenTest());
+                                           stock.of_run ? seen_in_run(request.cloud) : SeenTest(),
+                                           stock.of_run ? path_of_run(request.cloud)
+                                                        : std::vector<Eigen::Vector2d>());
+    if (!request.slice) take_figures(request.config.stand, stock);
   }
   const ScopedTimer timer(times, "writing");
   polled(blocks, progress)([&](std::span<const Eigen::Vector3d> points) {
     add_to_picture(stock.picture, points, stock.inventory.ground, stock.frames.drawing());
   });
-  if (request.slice) {
-    write_slice_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
-  } else if (stock.of_run) {
-    write_inventory_files(results, stock.inventory, stock.frames.layers);
-  } else {
-    write_inventory_files(results, stock.inventory, stock.stand.cloud.coordinate_system);
-  }
+  write_tables(request, results, stock);
   if (stock.inventory.owners) {
     const std::uint64_t too_far = write_labelled_cloud(stock, results / "map.laz", progress);
     if (too_far > 0)
@@ -303,6 +343,9 @@ void describe(const InventoryRequest& request, const Stock& stock, const Log& lo
   documents.inherit(trust_of_run(request.cloud, true));
   for (const std::string& remark : inventory.remarks)
     documents.remark("inventory", remark);
+  if (!request.slice) describe_stand(stock.figures, documents);
+  if (!request.config.stand.plots.empty() && !is_plot_text(request.config.stand.plots))
+    documents.add_input(request.config.stand.plots, progress);
   ReportInput& report = documents.report();
   report.title = stock.path.filename().string();
   report.made_from =
@@ -321,7 +364,14 @@ RunOutcome run_inventory(const InventoryRequest& request, Log& log, const Progre
   RunDocuments documents("inventory", request.config_record, times, log);
   if (!request.coordinate_system.empty()) (void)CoordinateSystem(request.coordinate_system);
   Stock stock = stock_of(request);
-  refuse_input_as_output(request.run_folder, {request.cloud, stock.path, request.config_file});
+  const StandTableConfig& stand = request.config.stand;
+  if (request.slice && asks_for_plots(stand))
+    throw ConfigError(
+        {"--plots and --plot-grid need the ground between the stems, which a cut "
+         "(--slice) does not show"});
+  refuse_input_as_output(request.run_folder,
+                         {request.cloud, stock.path, request.config_file,
+                          is_plot_text(stand.plots) ? std::string() : stand.plots});
   const RunFolder place = RunFolder::claim(request.run_folder, request.overwrite);
   const fs::path results = place.begin_results();
   take_stock(request, results, log, progress, times, stock);
@@ -333,8 +383,8 @@ RunOutcome run_inventory(const InventoryRequest& request, Log& log, const Progre
   place.commit(log);
   place.forget_state();
   return documents.outcome((request.slice ? std::string() : terminal_notes(stock.inventory)) +
-                           fmt::format("{} trees on {:.2f} ha; see {}",
-                                       stock.inventory.trees.size(), stock.inventory.area_m2 / 1e4,
+                           fmt::format("{} trees{}; see {}", stock.inventory.trees.size(),
+                                       stand_in_words(stock.figures.table),
                                        (place.path() / "report.html").string()));
 }
 

@@ -40,4 +40,9 @@ struct LidarView {
 [[nodiscard]] LidarViewFigures figures_of(const LidarView& view);
 [[nodiscard]] SeenTest seen_in_run(const std::filesystem::path& run);
 
+// Where the body was at the keyframes, in the plane of the world frame. Of the recording of a run
+// folder; empty where the folder does not tell.
+[[nodiscard]] std::vector<Eigen::Vector2d> path_of(const std::vector<Pose>& world_from_body);
+[[nodiscard]] std::vector<Eigen::Vector2d> path_of_run(const std::filesystem::path& run);
+
 }  // namespace understory

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "understory/georeference/plot_file.h"
+
 namespace understory {
 namespace {
 
@@ -14,7 +16,8 @@ std::string yaml(SparseMappingConfig config) {
 }
 
 std::vector<std::string> named_files(const DenseMappingConfig& config) {
-  return {config.odometry.machine_boxes_file};
+  const std::string& plots = config.inventory.stand.plots;
+  return {config.odometry.machine_boxes_file, is_plot_text(plots) ? std::string() : plots};
 }
 std::vector<std::string> named_files(const SparseMappingConfig& config) {
   return {config.machine_boxes_file, config.correction.harvester.head_log};
@@ -56,6 +59,11 @@ std::vector<std::string> files_named_in(const FrontEndConfig& config) {
 void check_files_named_in(const FrontEndConfig& config) {
   if (const auto* sparse = std::get_if<SparseMappingConfig>(&config))
     (void)read_head_log(sparse->correction.harvester.head_log);
+  // In which coordinates the plots are is known at the end: here only whether they can be read.
+  if (const auto* dense = std::get_if<DenseMappingConfig>(&config)) {
+    const std::string& plots = dense->inventory.stand.plots;
+    if (!plots.empty()) check_plots(plots);
+  }
 }
 
 bool depends_on_sensors(const FrontEndConfig& config) {

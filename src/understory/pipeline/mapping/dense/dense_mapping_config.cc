@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "understory/georeference/plot_file.h"
 #include "understory/pipeline/profiles.h"
 #include "understory/util/error.h"
 
@@ -97,6 +98,8 @@ void reread(DenseMappingConfig& config, const std::string& yaml, const std::stri
             const std::function<std::string(const std::string&)>& found) {
   dense_mapping_table(config).read_yaml(yaml, origin);
   config.odometry.machine_boxes_file = found(config.odometry.machine_boxes_file);
+  std::string& plots = config.inventory.stand.plots;
+  if (!is_plot_text(plots)) plots = found(plots);
 }
 
 }  // namespace understory

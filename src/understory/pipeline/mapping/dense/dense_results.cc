@@ -11,8 +11,10 @@
 #include "understory/output/inventory_files.h"
 #include "understory/output/las_writer.h"
 #include "understory/output/layer_files.h"
+#include "understory/output/plot_files.h"
 #include "understory/output/report/map_picture.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/inventory/stand_documents.h"
 #include "understory/pipeline/judgement/match_course.h"
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
@@ -22,6 +24,7 @@
 #include "understory/pipeline/mapping/map_documents.h"
 #include "understory/pipeline/run_folder/run_truth.h"
 #include "understory/sensor/second_antenna_place.h"
+#include "understory/util/error.h"
 #include "understory/util/median.h"
 
 namespace understory {
@@ -212,7 +215,9 @@ std::uint64_t write_map(const ReadRecording& recording, DenseProducts& made,
   const std::uint64_t points =
       write_cloud(folder / "map.laz", *made.tiles, inventory, frames, picture, recording.progress);
   write_tree_tables(folder, inventory);
-  write_tree_layers(folder, inventory.trees, trajectory, frames.layers, inventory.look_again);
+  write_tree_layers(folder, inventory.trees, trajectory, frames.layers, inventory.look_again,
+                    made.figures.table.plots);
+  if (asks_for_plots(made.figures.table.config)) write_plot_tables(folder, made.figures.table);
   write_raster_layers(folder, inventory.ground.terrain, inventory.canopy,
                       change_into(frames.layers), frames.layers);
   write_layer_project(folder, title_of(recording), trajectory, frames.layers);
@@ -346,14 +351,30 @@ void fill_report(const ReadRecording& recording, const DenseFrontEnd& front_end,
   report.loop_closure_enabled = front_end.config().keyframe_map.loop_closure.enabled;
 }
 
+// Figures of the stand and of its plots. Hours of mapping are not thrown away because plots do not
+// fit: then the run is partial and says why.
+void take_figures(const StandTableConfig& config, const LayerFrame& layers, DenseProducts& made,
+                  RunDocuments& documents) {
+  std::vector<PlotOutline> plots;
+  try {
+    plots = plots_of(config, layers.wkt());
+  } catch (const InputError& error) {
+    documents.lower(RunStatus::kPartial, std::string("no figures by plots: ") + error.what());
+  }
+  made.figures = take_stand(made.inventory, config, plots, layers);
+  describe_stand(made.figures, documents);
+}
+
 // The files of the map, if one was made.
-void add_map(const ReadRecording& recording, DenseProducts& made, const Trajectory& trajectory,
-             const ResultFrames& frames, MapPicture& picture, RunDocuments& documents) {
+void add_map(const ReadRecording& recording, const StandTableConfig& stand, DenseProducts& made,
+             const Trajectory& trajectory, const ResultFrames& frames, MapPicture& picture,
+             RunDocuments& documents) {
   documents.count("trees", made.inventory.trees.size());
   documents.summary().lidar_view = made.lidar_view;
   if (!made.tiles) return;
   note_doubts(made.inventory, documents.summary());
   documents.summary().quality["area_m2"] = made.inventory.area_m2;
+  take_figures(stand, frames.layers, made, documents);
   documents.count("map_points", write_map(recording, made, trajectory, frames, picture));
   if (!picture.empty()) documents.report().picture = &picture;
   documents.report().inventory = &made.inventory;
@@ -409,7 +430,8 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   MapPicture picture;
   {
     const ScopedTimer timer(front_end.times(), "finish_write_map");
-    add_map(recording, made, trajectory.trajectory, map.frames, picture, documents);
+    add_map(recording, front_end.config().inventory.stand, made, trajectory.trajectory, map.frames,
+            picture, documents);
   }
   fill_report(recording, front_end, trajectory, documents.summary().scans, documents.report());
   documents.write(folder);

@@ -8,6 +8,7 @@
 #include "understory/map/map_tiles.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/georeferencing/map_placing.h"
+#include "understory/pipeline/inventory/stand_plots.h"
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
@@ -18,6 +19,7 @@ namespace understory {
 struct DenseProducts {
   std::unique_ptr<MapTiles> tiles;  // of the finished cloud
   InventoryResult inventory;
+  StandResult figures;      // of the stand and its plots, once the frame of the layers is known
   std::string not_upright;  // why z of the map is not up; empty: it is, or an IMU tells it
   LidarViewFigures lidar_view;
   std::optional<FoundPlacement> placement;  // where it was found before the map was made

@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+"""Stand figures of sample plots against the truth of a simulation.
+
+    benchmarks/stand_table.py --plots TRUTH > plots.csv
+    understory inventory TRUTH/points.laz --plots plots.csv -o RUN
+    benchmarks/stand_table.py RUN TRUTH [RUN TRUTH ...]
+
+The first call writes circles of 15 m along the true path, one every 4 m. The last one compares
+plots.csv of each RUN with what the true trees of 5 cm and more on the whole plot give, and pools all
+plots: mean error, root mean square error, and that of the error over its stated standard deviation
+(1 where the deviations are right). The frame of RUN must be that of the truth. Needs numpy.
+"""
+import csv
+import math
+import sys
+
+import numpy as np
+
+RADIUS_M = 15.0
+STEP_M = 4.0
+MIN_DBH_M = 0.05
+LEAST_SEEN = 0.5
+FIGURES = {
+    "stems_per_ha": "stems_per_ha_sd",
+    "basal_area_m2_per_ha": "basal_area_sd_m2_per_ha",
+    "mean_dbh_m": "mean_dbh_sd_m",
+    "weighted_dbh_m": "weighted_dbh_sd_m",
+    "weighted_height_m": "weighted_height_sd_m",
+    "dominant_height_m": "dominant_height_sd_m",
+    "volume_m3_per_ha": "volume_sd_m3_per_ha",
+}
+
+
+def rows_of(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def number(text):
+    return float(text) if text else math.nan
+
+
+def write_plots(truth):
+    path = np.loadtxt(f"{truth}/trajectory.tum")[:, 1:3]
+    print("id,x,y,radius_m")
+    last = None
+    count = 0
+    for place in path:
+        if last is not None and np.hypot(*(place - last)) < STEP_M:
+            continue
+        last = place
+        count += 1
+        print(f"{count},{place[0]:.3f},{place[1]:.3f},{RADIUS_M:g}")
+
+
+def figures_of_truth(trees, x, y, radius):
+    on_plot = [t for t in trees if t["dbh_m"] >= MIN_DBH_M and math.hypot(t["x"] - x, t["y"] - y) < radius]
+    hectares = math.pi * radius ** 2 / 1e4
+    d = np.array([t["dbh_m"] for t in on_plot])
+    h = np.array([t["height_m"] for t in on_plot])
+    if not len(d):
+        return None
+    area = math.pi / 4 * d ** 2
+    wanted = 100 * hectares
+    weights = np.clip(wanted - np.arange(len(d)), 0, 1)
+    dominant = (weights * h[np.argsort(-d, kind="stable")]).sum() / wanted if len(d) >= wanted else math.nan
+    return {
+        "stems_per_ha": len(d) / hectares,
+        "basal_area_m2_per_ha": area.sum() / hectares,
+        "mean_dbh_m": math.sqrt(np.mean(d ** 2)),
+        "weighted_dbh_m": (area * d).sum() / area.sum(),
+        "weighted_height_m": (area * h).sum() / area.sum(),
+        "dominant_height_m": dominant,
+        "volume_m3_per_ha": sum(t["stem_volume_m3"] for t in on_plot) / hectares,
+    }
+
+
+def compare(run, truth, errors, shares):
+    trees = [{k: number(v) for k, v in row.items() if k not in ("species", "felled_at")} for row in rows_of(f"{truth}/trees.csv")]
+    for row in rows_of(f"{run}/plots.csv"):
+        if row["kind"] != "circle":
+            continue
+        shares.append(number(row["seen_share"]))
+        true = figures_of_truth(trees, number(row["x"]), number(row["y"]), number(row["radius_m"]))
+        if shares[-1] < LEAST_SEEN or true is None:
+            continue
+        for name, sd in FIGURES.items():
+            errors[name].append((number(row[name]), true[name], number(row[sd])))
+
+
+def main():
+    arguments = sys.argv[1:]
+    if len(arguments) == 2 and arguments[0] == "--plots":
+        write_plots(arguments[1])
+        return
+    if not arguments or len(arguments) % 2:
+        sys.exit(__doc__)
+    errors = {name: [] for name in FIGURES}
+    shares = []
+    for run, truth in zip(arguments[::2], arguments[1::2]):
+        compare(run, truth, errors, shares)
+    print(f"{len(shares)} plots, seen {100 * np.mean(shares):.1f} % of them on average, least {100 * min(shares):.1f} %\n")
+    print("| figure | plots | mean error | RMS error | error over its deviation, RMS |\n|---|---|---|---|---|")
+    for name, rows in errors.items():
+        rows = np.array(rows).reshape(-1, 3)
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if not len(rows):
+            print(f"| {name} | 0 | | | |")
+            continue
+        relative = rows[:, 0] / rows[:, 1] - 1
+        score = (rows[:, 0] - rows[:, 1]) / np.maximum(rows[:, 2], 1e-12)
+        print(f"| {name} | {len(rows)} | {100 * relative.mean():+.1f} % | {100 * math.sqrt(np.mean(relative ** 2)):.1f} % | {math.sqrt(np.mean(score ** 2)):.2f} |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,20 @@
+#include "understory/cli/plot_options.h"
+
+namespace understory {
+
+void add_plot_options(CLI::App& command, PlotOptions& options) {
+  command.add_option("--plots", options.plots,
+                     "Sample plots that get figures of their own: X,Y,R (one circle), a .csv with "
+                     "id,x,y,radius_m, or a GeoPackage with polygons (or points with radius_m); in "
+                     "the coordinates of trees.gpkg");
+  command.add_option("--plot-grid", options.grid_m, "Figures by grid cells of this side, metres");
+}
+
+std::vector<std::string> plot_settings(const PlotOptions& options, const std::string& prefix) {
+  std::vector<std::string> settings;
+  if (!options.plots.empty()) settings.push_back(prefix + "plots=" + options.plots);
+  if (!options.grid_m.empty()) settings.push_back(prefix + "grid_m=" + options.grid_m);
+  return settings;
+}
+
+}  // namespace understory

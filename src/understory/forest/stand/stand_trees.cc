@@ -1,0 +1,126 @@
+#include "understory/forest/stand/stand_trees.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/forest/stand/volume_function.h"
+#include "understory/forest/stand_constants.h"
+
+namespace understory {
+namespace {
+
+using namespace forest_constants::stand_trees;
+
+double square(double value) {
+  return value * value;
+}
+
+double positive_or_zero(double value) {
+  return value > 0.0 && std::isfinite(value) ? value : 0.0;
+}
+
+// Basal area times height: the volume of the cylinder.
+double cylinder_m3(const StandTree& tree) {
+  return 0.25 * M_PI * square(tree.dbh_m.value) * tree.height_m.value;
+}
+
+// The form factor, and how far single trees are from it.
+struct FormFactor {
+  double value = std::numeric_limits<double>::quiet_NaN();
+  double sd = 0.0;
+};
+
+FormFactor form_factor_of(const std::vector<StandTree>& trees) {
+  double volumes = 0.0;
+  double cylinders = 0.0;
+  std::size_t count = 0;
+  const auto knows = [](const StandTree& tree) {
+    return std::isfinite(tree.volume_m3.value) && !tree.height_filled_in &&
+           std::isfinite(tree.height_m.value);
+  };
+  for (const StandTree& tree : trees) {
+    if (!knows(tree)) continue;
+    volumes += tree.volume_m3.value;
+    cylinders += cylinder_m3(tree);
+    ++count;
+  }
+  if (count < kLeastVolumes || !(cylinders > 0.0)) return {};
+  FormFactor factor{volumes / cylinders, 0.0};
+  double squares = 0.0;
+  for (const StandTree& tree : trees)
+    if (knows(tree)) squares += square(tree.volume_m3.value / cylinder_m3(tree) - factor.value);
+  factor.sd = std::sqrt(squares / static_cast<double>(count - 1));
+  return factor;
+}
+
+void fill_in_height(const std::optional<HeightCurve>& curve, StandTree& tree) {
+  if (std::isfinite(tree.height_m.value)) {
+    tree.height_m.sd = kHeightSd;
+  } else if (curve) {
+    tree.height_m = {curve->at(tree.dbh_m.value), curve->sd_m};
+    tree.height_filled_in = true;
+  }
+}
+
+void fill_in_volume(const FormFactor& factor, StandTree& tree) {
+  if (std::isfinite(tree.volume_m3.value) || !std::isfinite(factor.value) ||
+      !std::isfinite(tree.height_m.value))
+    return;
+  const double cylinder = cylinder_m3(tree);
+  tree.volume_m3.value = factor.value * cylinder;
+  tree.volume_m3.sd =
+      std::sqrt(square(factor.sd * cylinder) +
+                square(tree.volume_m3.value) * (square(2.0 * tree.dbh_m.sd / tree.dbh_m.value) +
+                                                square(tree.height_m.sd / tree.height_m.value)));
+  tree.volume_filled_in = true;
+}
+
+void apply_function(TaperSpecies species, StandTree& tree) {
+  const double d = tree.dbh_m.value;
+  const double h = tree.height_m.value;
+  const double volume = national_volume_m3(species, d, h);
+  if (!std::isfinite(volume)) return;
+  constexpr double kStep = 1e-4;  // of a central difference, relative
+  const double by_d = (national_volume_m3(species, d * (1.0 + kStep), h) -
+                       national_volume_m3(species, d * (1.0 - kStep), h)) /
+                      (2.0 * kStep * d);
+  const double by_h = (national_volume_m3(species, d, h * (1.0 + kStep)) -
+                       national_volume_m3(species, d, h * (1.0 - kStep))) /
+                      (2.0 * kStep * h);
+  tree.national_volume_m3 = {
+      volume, std::sqrt(square(by_d * tree.dbh_m.sd) + square(by_h * tree.height_m.sd) +
+                        square(national_volume_sd_share(species) * volume))};
+}
+
+}  // namespace
+
+StandTrees stand_trees(const std::vector<Tree>& trees, const StandTableConfig& config) {
+  StandTrees stand;
+  stand.species = config.species;
+  stand.curve = fit_height_curve(trees);
+  for (const Tree& tree : trees) {
+    if (!(tree.dbh_m > 0.0) || !std::isfinite(tree.dbh_m)) {
+      ++stand.without_diameter;
+      continue;
+    }
+    if (tree.dbh_m < config.min_dbh_m) continue;
+    StandTree counted;
+    counted.place = {tree.x, tree.y};
+    counted.place_sd_m = std::sqrt(
+        0.5 * (square(positive_or_zero(tree.x_sd_m)) + square(positive_or_zero(tree.y_sd_m))));
+    counted.dbh_m = {tree.dbh_m, positive_or_zero(tree.dbh_sd_m)};
+    counted.height_m.value = tree.height_m;
+    counted.volume_m3 = {tree.stem_volume_m3, positive_or_zero(tree.stem_volume_sd_m3)};
+    fill_in_height(stand.curve, counted);
+    stand.trees.push_back(counted);
+  }
+  const FormFactor factor = form_factor_of(stand.trees);
+  stand.form_factor = factor.value;
+  for (StandTree& tree : stand.trees) {
+    fill_in_volume(factor, tree);
+    apply_function(config.species, tree);
+  }
+  return stand;
+}
+
+}  // namespace understory

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+
+// More numbers of forest/stand, of files that few others include: see stand_constants.h.
+namespace understory::forest_constants {
+
+namespace stand_errors {  // forest/stand/stand_figures.cc
+// m: standard deviation of what all heights are too high or too low by; without it the mean height
+// of a plot would be surer than it is [tuned: seeds 3 and 4 of the site handheld, 0.3 m too high]
+inline constexpr double kSharedHeightSd = 0.3;
+}  // namespace stand_errors
+
+namespace seen_gaps {  // forest/stand/seen_area.cc
+// Cells: gaps between sparse returns up to twice as wide are filled [tuned: seeds 9 and 16 of the
+// site random: rings of a lidar with 16 or 32 beams leave such gaps on the ground]
+inline constexpr int kFillSparse = 8;
+// Returns in half of the cells around: these are not sparse [chosen]
+inline constexpr std::uint8_t kNotSparse = 2;
+// m beyond the surface of a stem: its returns do not count for the density, or every stem would
+// stand where it is dense [chosen]
+inline constexpr double kBesideStem = 0.5;
+// Share of the cells around that hold a return, over its median in the cloud: a thinned cloud shows
+// stems with fewer returns on the ground [real clouds: one has 8 of them per square metre]
+inline constexpr double kOfMedian = 0.25;
+// The least such share, one return on two square metres [chosen]
+inline constexpr double kThinnedShare = 0.03;
+}  // namespace seen_gaps
+
+}  // namespace understory::forest_constants
