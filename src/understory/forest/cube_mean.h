@@ -2,7 +2,9 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 namespace understory {
@@ -14,8 +16,9 @@ class CubeMean {
   CubeMean() = default;
   // One point; `in_cubes`: its coordinates over the edge of a cube.
   explicit CubeMean(const Eigen::Array3d& in_cubes) : returns_(1) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const double part = in_cubes[axis] - std::floor(in_cubes[axis]);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double value = in_cubes[static_cast<Eigen::Index>(axis)];
+      const double part = value - std::floor(value);
       sums_[axis] = std::min(kParts - 1, static_cast<std::uint32_t>(kParts * part));
     }
   }
@@ -24,13 +27,12 @@ class CubeMean {
   void add(const CubeMean& other) {
     const std::uint64_t all = std::uint64_t{returns_} + other.returns_;
     if (all <= kMostSummed) {
-      for (int axis = 0; axis < 3; ++axis)
+      for (std::size_t axis = 0; axis < 3; ++axis)
         sums_[axis] += other.sums_[axis];
     } else {  // a million points at one place: sums would overflow
-      for (int axis = 0; axis < 3; ++axis) {
-        const double mean =
-            (part_of(axis) * returns_ + other.part_of(axis) * other.returns_) /
-            static_cast<double>(all);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double mean = (part_of(axis) * returns_ + other.part_of(axis) * other.returns_) /
+                            static_cast<double>(all);
         sums_[axis] = static_cast<std::uint32_t>(std::lround(mean * kMostSummed));
       }
     }
@@ -39,7 +41,7 @@ class CubeMean {
 
   [[nodiscard]] std::uint32_t returns() const { return returns_; }
   // Of the cube with this number along an axis, over its edge.
-  [[nodiscard]] double in_cubes(int axis, std::int64_t number) const {
+  [[nodiscard]] double in_cubes(std::size_t axis, std::int64_t number) const {
     return static_cast<double>(number) + (part_of(axis) + 0.5) / kParts;
   }
 
@@ -47,11 +49,11 @@ class CubeMean {
   static constexpr std::uint32_t kParts = 4096;
   static constexpr std::uint32_t kMostSummed = (1U << 20) - 1;
 
-  [[nodiscard]] double part_of(int axis) const {
+  [[nodiscard]] double part_of(std::size_t axis) const {
     return static_cast<double>(sums_[axis]) / std::min(std::max(returns_, 1U), kMostSummed);
   }
 
-  std::uint32_t sums_[3] = {0, 0, 0};
+  std::array<std::uint32_t, 3> sums_{};
   std::uint32_t returns_ = 0;
 };
 

@@ -12,7 +12,8 @@ namespace understory {
 // such a loop it takes up no further piece, so that as many are at work as there are threads.
 template <typename Body>
 void parallel_pieces(std::size_t n, const Body& body) {
-  parallel_for(n, 1, [&](std::size_t i) { oneapi::tbb::this_task_arena::isolate([&] { body(i); }); });
+  parallel_for(n, 1,
+               [&](std::size_t i) { oneapi::tbb::this_task_arena::isolate([&] { body(i); }); });
 }
 
 // Threads that parallel loops called from here may use.

@@ -116,8 +116,8 @@ std::vector<PointGroup> cut(const PointList& points, const PointGroupConfig& con
     here.push_back(points[sorted[i].second]);
     if (i + 1 < sorted.size() && sorted[i + 1].first == key) continue;
     GroundArea window;
-    window.low.x() = kWindow * static_cast<double>(
-                                   static_cast<std::int64_t>(key & 0xffffffffU) - kMiddle);
+    window.low.x() =
+        kWindow * static_cast<double>(static_cast<std::int64_t>(key & 0xffffffffU) - kMiddle);
     window.low.y() = kWindow * static_cast<double>(static_cast<std::int64_t>(key >> 32) - kMiddle);
     window.high = window.low.array() + kWindow;
     if (config.area.touches(window.low, window.high)) {

@@ -55,7 +55,7 @@ SlicePoint SliceThinner::point_of(const Entry& entry) const {
   const auto number = [&](int shift, std::uint64_t mask, std::int64_t middle) {
     return static_cast<std::int64_t>(entry.cube >> shift & mask) - middle;
   };
-  const auto metres = [&](int axis, std::int64_t cube) {
+  const auto metres = [&](std::size_t axis, std::int64_t cube) {
     return static_cast<float>(cube_m_ * entry.mean.in_cubes(axis, cube));
   };
   return {metres(0, number(16, 0xffffff, kMiddle)), metres(1, number(40, 0xffffff, kMiddle)),

@@ -42,7 +42,7 @@ std::optional<std::uint64_t> surrounding_cube(const Eigen::Array3d& in_cubes) {
 }
 
 SlicePoint mean_in_cube(std::uint64_t cube, const CubeMean& mean) {
-  const auto metres = [&](int axis) {
+  const auto metres = [&](std::size_t axis) {
     const auto number = static_cast<std::int64_t>(cube >> (21 * axis) & 0x1fffff) - kMiddleCube;
     return static_cast<float>(kCube * mean.in_cubes(axis, number));
   };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "understory/forest/forest_constants.h"
@@ -28,8 +29,7 @@ struct HeldBack {
 std::vector<double> ground_at_stems(const CrownTask& task, const std::vector<StemFit>& stems) {
   std::vector<double> ground;
   for (const StemFit& stem : stems) {
-    const Eigen::Vector2d foot =
-        task.origin.head<2>() + stem.centre - kBreastHeight * stem.slope;
+    const Eigen::Vector2d foot = task.origin.head<2>() + stem.centre - kBreastHeight * stem.slope;
     ground.push_back(task.ground.terrain.interpolate(foot.x(), foot.y()) - task.origin.z());
   }
   return ground;
@@ -111,8 +111,8 @@ class TileAbove {
       if (task_.ceiling.holds(place, height)) {
         canopy_.add(place, height);
       } else if (tree != TreeColumns::kNone) {
-        held_back_.push_back({place.cast<float>(), static_cast<float>(height),
-                              static_cast<std::uint32_t>(tree)});
+        held_back_.push_back(
+            {place.cast<float>(), static_cast<float>(height), static_cast<std::uint32_t>(tree)});
       }
     }
     if (!task_.full) return;
@@ -137,7 +137,9 @@ class TileAbove {
 
 StemTops look_up(const CrownTask& task, double canopy_cell_m, const ListedHeight& listed) {
   const std::size_t tiles = task.cloud.tiles().size();
-  StemTops result{std::vector<double>(task.stems.size()), {}, CanopyGrid(canopy_cell_m),
+  StemTops result{std::vector<double>(task.stems.size()),
+                  {},
+                  CanopyGrid(canopy_cell_m),
                   TileShelf<std::uint64_t>(tiles, task.cloud.scratch())};
   if (task.full) result.curves.resize(task.stems.size());
   std::vector<std::optional<CanopyGrid>> canopies(tiles);
@@ -173,8 +175,7 @@ std::vector<TreeCrown> OwnerTiles::find(const CrownTask& task, TileShelf<std::ui
     for (const std::size_t i : near.numbers)
       near_trees.push_back(trees[i]);
     TreeOwners owners;
-    for (const std::size_t other :
-         tiles_touching(task.cloud, around.moved(origin_.head<2>())))
+    for (const std::size_t other : tiles_touching(task.cloud, around.moved(origin_.head<2>())))
       owners.add_cubes(cubes.copy(other), around);
     owners.find(near_trees, task.progress);
     const std::vector<TreeCrown> found = measure_crowns(owners, near_trees);

@@ -1,6 +1,8 @@
 #include "understory/forest/tiles/stem_tiles.h"
 
 #include <cmath>
+#include <iterator>
+#include <span>
 #include <utility>
 
 #include "understory/forest/forest_constants.h"
@@ -130,8 +132,7 @@ class StemTiles {
       std::erase_if(points, [](const SlicePoint& point) {
         return std::abs(static_cast<double>(point.height_m) - kBreastHeight) > kShownReach;
       });
-      const std::size_t step =
-          points.size() * cloud_.tiles().size() / kMostShown + 1;
+      const std::size_t step = points.size() * cloud_.tiles().size() / kMostShown + 1;
       for (std::size_t i = 0; i < points.size(); i += step)
         shown.push_back(points[i]);
     }

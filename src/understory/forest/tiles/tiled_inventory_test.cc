@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <memory>
+#include <optional>
 #include <vector>
 
 #include "understory/forest/inventory.h"
@@ -68,7 +68,7 @@ const Cloud& stand() {
     plot.slope_x = 0.1;
     plot.bump_m = 0.5;
     Random random(12);
-    for (int i = 0; i < 30'000; ++i) {
+    for (int i = 0; i < 20'000; ++i) {
       const double x = random.uniform(0.0, 100.0);
       const double y = random.uniform(14.0, 26.0);
       plot.cloud.emplace_back(x, y, plot.ground(x, y) + random.normal(0.0, 0.02));
@@ -81,12 +81,12 @@ const Cloud& stand() {
       stem.lean_x = random.uniform(-0.1, 0.1);
       plot.add_stem(stem);
     }
-    for (int i = 0; i < 16'000; ++i) {
+    for (int i = 0; i < 24'000; ++i) {
       const double x = random.uniform(0.0, 100.0);
-      const double y = 20.0 + 4.0 * std::sin(0.2 * x) + random.normal(0.0, 0.2);
+      const double y = 20.0 + 4.0 * std::sin(0.2 * x) + random.normal(0.0, 0.04);
       plot.cloud.emplace_back(x, y, plot.ground(x, y) + random.uniform(0.3, 2.0));
     }
-    for (int i = 0; i < 10'000; ++i) {
+    for (int i = 0; i < 3'000; ++i) {
       const double x = random.uniform(0.0, 100.0);
       const double y = random.uniform(14.0, 26.0);
       plot.cloud.emplace_back(x, y, plot.ground(x, y) + random.uniform(0.3, 4.0));
@@ -117,11 +117,10 @@ void expect_same(const InventoryResult& a, const InventoryResult& b) {
   for (std::size_t i = 0; i < a.trees.size(); ++i) {
     const Tree& one = a.trees[i];
     const Tree& other = b.trees[i];
-    for (const auto member :
-         {&Tree::x, &Tree::y, &Tree::z, &Tree::dbh_m, &Tree::dbh_sd_m, &Tree::height_m,
-          &Tree::lean_deg, &Tree::x_sd_m, &Tree::y_sd_m, &Tree::stem_volume_m3,
-          &Tree::stem_volume_sd_m3, &Tree::crown_base_m, &Tree::crown_area_m2,
-          &Tree::crown_volume_m3})
+    for (const auto member : {&Tree::x, &Tree::y, &Tree::z, &Tree::dbh_m, &Tree::dbh_sd_m,
+                              &Tree::height_m, &Tree::lean_deg, &Tree::x_sd_m, &Tree::y_sd_m,
+                              &Tree::stem_volume_m3, &Tree::stem_volume_sd_m3, &Tree::crown_base_m,
+                              &Tree::crown_area_m2, &Tree::crown_volume_m3})
       expect_same(one.*member, other.*member);
     EXPECT_EQ(one.observations, other.observations);
     EXPECT_EQ(one.id, other.id);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <utility>
 
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/error.h"
@@ -20,8 +21,7 @@ int floor_by(std::int32_t number, int by) {
 
 // A tile of the user's size is made of whole cells.
 double cell_for(const CloudTilesConfig& config, double extent_m) {
-  if (config.size_m > 0.0)
-    return config.size_m / std::max(1.0, std::floor(config.size_m / kCell));
+  if (config.size_m > 0.0) return config.size_m / std::max(1.0, std::floor(config.size_m / kCell));
   double cell = kCell;
   while (extent_m > kMostCellsAcross * cell)
     cell *= 2.0;
@@ -83,8 +83,7 @@ void CloudTiles::add(const TilePoint& point) {
 
 void CloudTiles::write_out(Cell& cell) {
   if (cell.buffer.empty()) return;
-  cell.parts.push_back(
-      scratch_.append(cell.buffer.data(), cell.buffer.size() * sizeof(TilePoint)));
+  cell.parts.push_back(scratch_.append(cell.buffer.data(), cell.buffer.size() * sizeof(TilePoint)));
   buffered_ -= cell.buffer.size();
   std::vector<TilePoint>().swap(cell.buffer);
 }

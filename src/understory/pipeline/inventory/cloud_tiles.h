@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -17,7 +18,7 @@ namespace understory {
 
 // When an inventory holds a cloud in tiles on disk, and how large they are.
 struct CloudTilesConfig {
-  double size_m = 0.0;         // edge of a tile; 0: as large as the memory allows, if any is needed
+  double size_m = 0.0;  // edge of a tile; 0: as large as the memory allows, if any is needed
   double max_memory_mb = 2000;  // that an inventory should take; MB of 10^6 bytes
 };
 void describe(ConfigTable& table, CloudTilesConfig& config);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <system_error>
+#include <utility>
 
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/recording/bags/byte_source.h"
@@ -60,7 +61,8 @@ void check_space(const CloudTiling& tiling, const Stated& stated) {
 // Takes the points of a file one after another.
 class Sorter {
  public:
-  Sorter(StreamedCloud& cloud, const std::vector<CloudMove>& moves) : cloud_(cloud), moves_(moves) {}
+  Sorter(StreamedCloud& cloud, const std::vector<CloudMove>& moves)
+      : cloud_(cloud), moves_(moves) {}
 
   void add(const Eigen::Vector3d& position, float intensity, double gps_time) {
     if (!position.allFinite()) {

@@ -49,8 +49,8 @@ ScratchFile::Part ScratchFile::append(const void* bytes, std::size_t size) {
   const Part part{state_->end.fetch_add(size), size};
   const auto* at = static_cast<const char*>(bytes);
   for (std::size_t done = 0; done < size;) {
-    const ssize_t written = ::pwrite(state_->descriptor, at + done, size - done,
-                                     static_cast<off_t>(part.begin + done));
+    const ssize_t written =
+        ::pwrite(state_->descriptor, at + done, size - done, static_cast<off_t>(part.begin + done));
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) state_->fail("written", written < 0 ? errno : ENOSPC);
     done += static_cast<std::size_t>(written);
