@@ -328,6 +328,7 @@ std::vector<std::vector<Circle>> find_circles(const std::vector<PointList>& slic
   grouping.margin_m = group_margin_m(config.max_radius_m, config.band_m);
   grouping.area = config.area;
   grouping.origin = config.origin;
+  grouping.whole = config.whole_groups;
   parallel_for(slices.size(), 1, [&](std::size_t s) {
     if (static_cast<int>(slices[s].size()) < config.min_points) return;
     groups[s] = groups_near(slices[s], grouping);
@@ -345,7 +346,8 @@ std::vector<std::vector<Circle>> find_circles(const std::vector<PointList>& slic
   parallel_for(jobs.size(), 1, [&](std::size_t i) {
     const auto [s, g] = jobs[i];
     PointGroup& group = groups[s][g];
-    GroupSearch search(std::move(group.points), config, hash_numbers(seed, s, group.place));
+    GroupSearch search(std::move(group.points), config,
+                       hash_numbers(seed, s, config.whole_groups ? g : group.place));
     found[s][g] = search.run(progress);
     std::erase_if(found[s][g],
                   [&](const Circle& circle) { return !group.window.contains(circle.centre); });

@@ -30,6 +30,8 @@ struct CircleSearchConfig {
   double min_arc_deg = 50.0;
   GroundArea area;  // circles in it are wanted; some beyond come along
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // of the frame of the points
+  // Of a single cut: groups are not cut, and draws are by their number. The area is not looked at.
+  bool whole_groups = false;
 };
 
 // All circles of each slice, by repeated sampling (RANSAC) in each group of points that hang

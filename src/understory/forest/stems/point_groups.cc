@@ -152,7 +152,7 @@ std::vector<PointGroup> groups_near(const PointList& points, const PointGroupCon
       low = low.cwiseMin(point);
       high = high.cwiseMax(point);
     }
-    if (static_cast<double>((high - low).maxCoeff()) > kLongest) {
+    if (!config.whole && static_cast<double>((high - low).maxCoeff()) > kLongest) {
       of_large.insert(of_large.end(), group.points.begin(), group.points.end());
     } else if (config.area.touches(low.cast<double>(), high.cast<double>())) {
       groups.push_back(std::move(group));

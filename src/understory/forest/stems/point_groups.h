@@ -20,6 +20,7 @@ struct PointGroupConfig {
   double reach_m = 0.08;  // cells of this size that touch, also by a corner, hang together
   int min_points = 5;     // of a group
   double margin_m = 1.3;  // a window of a large group also holds the points so near to it
+  bool whole = false;     // none is cut
   GroundArea area;        // groups that reach into it are asked for
   // Where the frame of the points begins; groups of one cloud have the same place in any frame that
   // begins at a multiple of the reach.
