@@ -41,6 +41,7 @@ int run(const InventoryOptions& options, CommandContext& context) {
   InventoryRequest request = options.request;
   ConfigTable table;
   describe(table, request.config);
+  table.section("tiles", [&] { describe(table, request.tiles); });
   std::vector<std::string> settings = options.settings;
   for (std::string& setting : plot_settings(options.plots, "stand."))
     settings.push_back(std::move(setting));
@@ -77,6 +78,12 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_option("--crs", options->request.coordinate_system,
                       "Coordinate system of a cloud that names none, for instance EPSG:3067 (a "
                       "cloud that names its own keeps it)");
+  command->add_option_function<std::string>(
+      "--max-memory-mb",
+      [options](const std::string& mb) {
+        options->settings.push_back("tiles.max_memory_mb=" + mb);
+      },
+      "Memory to take, as tiles.max_memory_mb: a larger cloud is held in tiles on disk");
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
   command->add_flag("--overwrite", options->request.overwrite, kOverwriteMeaning);
   command->footer(

@@ -60,6 +60,18 @@ class CellGrid {
     return area > most ? bounds_of(few) : all;
   }
 
+  // Adds another grid with cells of the same size: visit(own cell, other cell).
+  template <typename Visit>
+  void merge(const CellGrid& other, const Visit& visit) {
+    for (const auto& [key, block] : other.blocks_) {
+      auto& own = blocks_[key];
+      if (own == nullptr) own = std::make_unique<Block>();
+      own->points += block->points;
+      for (std::size_t i = 0; i < own->cells.size(); ++i)
+        visit(own->cells[i], block->cells[i]);
+    }
+  }
+
   template <typename Visit>
   void for_each(const Visit& visit) const {
     for (const auto& [key, block] : blocks_) {

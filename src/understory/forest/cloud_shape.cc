@@ -238,7 +238,10 @@ Eigen::Matrix3d upright_from_cloud(UpAxis axis) {
 
 CloudShape shape_of(const PointBlocks& cloud) {
   const Sample sample = sample_of(cloud);
-  const std::vector<Vector3d>& points = sample.points;
+  return shape_of_sample(sample.points, sample.step);
+}
+
+CloudShape shape_of_sample(const std::vector<Vector3d>& points, std::size_t step) {
   CloudShape shape;
   shape.points = points.size();
   shape.roughness.fill(kNan);
@@ -247,7 +250,7 @@ CloudShape shape_of(const PointBlocks& cloud) {
   if (points.size() < kLeastPoints) return shape;
   shape.extent = percentile(points, kUpperEnd) - percentile(points, kOutliers);
   // A sample of surfaces is as much sparser as if its cubes were smaller by the root.
-  shape.alone_share = alone_share_of(points, kCube * std::sqrt(static_cast<double>(sample.step)));
+  shape.alone_share = alone_share_of(points, kCube * std::sqrt(static_cast<double>(step)));
   for (std::size_t k = 0; k < kUpAxes.size(); ++k) {
     const Eigen::Matrix3d turn = upright_from_cloud(kUpAxes[k]);
     std::vector<Vector3d> turned;

@@ -2,8 +2,10 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "understory/forest/ground/ground.h"
 #include "understory/forest/stems/standing_direction.h"
@@ -37,6 +39,9 @@ struct CloudShape {
 };
 // Deterministic; two runs through the cloud.
 [[nodiscard]] CloudShape shape_of(const PointBlocks& cloud);
+// Of every `step`-th point of a cloud, about the first one.
+[[nodiscard]] CloudShape shape_of_sample(const std::vector<Eigen::Vector3d>& points,
+                                         std::size_t step);
 
 // The axis that is up, if that is clearly not z.
 [[nodiscard]] std::optional<UpAxis> other_up_axis(const CloudShape& shape);

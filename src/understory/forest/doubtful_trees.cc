@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "understory/forest/inventory.h"
 #include "understory/forest/trees/look_again.h"
@@ -12,15 +13,35 @@
 namespace understory {
 namespace {
 
-// Points that hang together with another tree.
-void mark_strangers(const InventoryResult& result, TreeSheet& sheet) {
+// Points that hang together with another tree. `owner`: of a place and a height.
+template <typename Owner>
+void mark_strangers(const InventoryResult& result, const Owner& owner, TreeSheet& sheet) {
   const Eigen::Vector2d foot = stem_place_at(result.stems[sheet.tree], 0.0);
   for (TreeSheet::FrontPoint& point : sheet.front) {
     const auto height = static_cast<double>(point.place.z());
     if (!(height > result.ground.config.class_m)) continue;
-    const std::int32_t owner =
-        result.owners->owner(foot + point.place.head<2>().cast<double>(), height);
-    point.own = owner == TreeOwners::kNobody || owner == static_cast<std::int32_t>(sheet.tree);
+    const std::int32_t found = owner(foot + point.place.head<2>().cast<double>(), height);
+    if (found != TreeOwners::kNobody && found != OwnerTiles::kElsewhere)
+      point.own = found == static_cast<std::int32_t>(sheet.tree);
+  }
+}
+
+void mark_strangers(InventoryResult& result) {
+  if (result.owners) {
+    const auto owner = [&](const Eigen::Vector2d& place, double height) {
+      return result.owners->owner(place, height);
+    };
+    for (TreeSheet& sheet : result.sheets)
+      mark_strangers(result, owner, sheet);
+  }
+  if (!result.owner_tiles) return;
+  for (std::size_t tile = 0; tile < result.owner_tiles->size(); ++tile) {
+    const TreeOwners owners = result.owner_tiles->owners(tile);
+    const auto owner = [&](const Eigen::Vector2d& place, double height) {
+      return result.owner_tiles->owner_in(tile, owners, place, height);
+    };
+    for (TreeSheet& sheet : result.sheets)
+      mark_strangers(result, owner, sheet);
   }
 }
 
@@ -60,17 +81,15 @@ std::string reason_of(const LookAgain& look) {
   return look.unseen_sides == 0 ? "few points" : "unseen side, few points";
 }
 
-void look_at_doubtful_trees(SheetCollector& collector, InventoryResult& result) {
-  const std::vector<StandingStem> stems = standing_stems(result, collector.seen());
+void look_at_doubtful_trees(StemSheets sheets, InventoryResult& result) {
+  const std::vector<StandingStem> stems = standing_stems(result, sheets.seen);
   const auto walkable = [&](const Eigen::Vector2d& place) {
     return std::isfinite(ground_at(result, place));
   };
   for (const LookPlace& found : places_to_look(stems, walkable))
     result.look_again.push_back(described(result, stems, found));
-  result.sheets = collector.take();
-  if (!result.owners) return;
-  for (TreeSheet& sheet : result.sheets)
-    mark_strangers(result, sheet);
+  result.sheets = std::move(sheets.sheets);
+  mark_strangers(result);
 }
 
 }  // namespace understory

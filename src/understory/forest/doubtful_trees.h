@@ -7,7 +7,7 @@
 namespace understory {
 
 struct InventoryResult;
-class SheetCollector;
+struct StemSheets;
 
 // A place to stand at, so that trees are measured again (trees/look_again.h).
 struct LookAgain {
@@ -22,6 +22,6 @@ struct LookAgain {
 
 // Fills in `sheets` and `look_again` of an inventory whose trees are known otherwise. A tree of
 // which a point is follows from `owners`, where there are any.
-void look_at_doubtful_trees(SheetCollector& collector, InventoryResult& result);
+void look_at_doubtful_trees(StemSheets sheets, InventoryResult& result);
 
 }  // namespace understory

@@ -99,6 +99,9 @@ inline constexpr double kAreaCell = 2.0;
 inline constexpr double kHighest = 120.0;
 // m above a top that have to be seen empty for the height to count [chosen]
 inline constexpr double kMargin = 1.0;
+// m: the origin of slices and stems is a multiple of it, as it is one of the cells of all grids
+// (1.5, 2, 8, 12 and 20 cm; 0.5, 1, 2 and 8 m) [chosen]
+inline constexpr double kOriginStep = 48.0;
 // m around a stem whose points are kept for a look at it [chosen]
 inline constexpr double kSegmentReach = 1.5;
 // Returns per square metre near breast height: with fewer, trees are missing [real clouds,
@@ -318,5 +321,26 @@ inline constexpr double kThin = 0.05;
 // points of a picture [bound: size of the report]
 inline constexpr std::size_t kMostPoints = 60'000;
 }  // namespace tree_segments
+
+namespace stem_tiles {  // forest/tiles/stem_tiles.cc
+// m beyond a tile: cubes of thinned points that begin in it reach so far [bound: the largest cube]
+inline constexpr double kCubeReach = 0.11;
+// m from breast height: points that the report shows [bound: what it draws]
+inline constexpr double kShownReach = 0.65;
+// Thinned points of a cloud in tiles that are kept for the report, at most [bound: memory]
+inline constexpr std::size_t kMostShown = 2'000'000;
+}  // namespace stem_tiles
+
+namespace crown_tiles {  // forest/tiles/crown_tiles.cc
+// m beyond a tile: points that decide on tops of stems whose crowns reach into it. A stem leans by
+// 3.5 m up to where it is straight, and its top is looked for within 1.5 m [bound: twice that]
+inline constexpr double kPointsBeyond = 10.0;
+// m beyond a tile: stems that these points may count for [bound: 5 m more]
+inline constexpr double kStemsBeyond = 15.0;
+// m beyond a tile: points near breast height that its stems may show [bound: a stem's radius]
+inline constexpr double kSlicesBeyond = 3.0;
+// m beyond a tile: cubes and trees that compete for them [chosen: the reach of three crowns]
+inline constexpr double kCrownsBeyond = 18.0;
+}  // namespace crown_tiles
 
 }  // namespace understory::forest_constants

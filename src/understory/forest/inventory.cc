@@ -5,115 +5,21 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "understory/forest/cell_grid.h"
 #include "understory/forest/forest_constants.h"
-#include "understory/forest/ground/canopy.h"
-#include "understory/forest/stems/slice_thinner.h"
 #include "understory/forest/stems/stem_axis.h"
-#include "understory/forest/stems/stem_fit.h"
-#include "understory/forest/stems/stem_surroundings.h"
+#include "understory/forest/tiles/stem_tiles.h"
 #include "understory/forest/trees/tree_crowns.h"
 #include "understory/forest/trees/tree_heights.h"
-#include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
 
 using namespace forest_constants::inventory;
-
-// What the third run through the cloud gathers.
-struct Gathered {
-  SliceThinner slices;
-  CanopyCeiling ceiling;
-  CoverageGrid coverage;
-  SeenCells seen = {};
-  std::uint64_t points = 0;
-  std::uint64_t without_ground = 0;
-};
-
-void gather(const PointBlocks& cloud, const InventoryConfig& config, const InventoryResult& result,
-            Gathered& gathered) {
-  std::vector<double> heights;
-  cloud([&](std::span<const Eigen::Vector3d> points) {
-    result.ground.heights_above(points, heights);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      ++gathered.points;
-      const double height = heights[i];
-      if (std::isnan(height)) {
-        ++gathered.without_ground;
-        continue;
-      }
-      const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
-      if (height < config.stems.highest_m) gathered.seen.add(place, height);
-      if (!(height >= 0.0 && height <= kHighest)) continue;
-      gathered.ceiling.count(place, height);
-      if (height < config.stems.highest_m) gathered.coverage.add(place);
-      if (height >= config.stems.lowest_m && height < config.stems.highest_m) {
-        gathered.slices.add(place.x(), place.y(), height);
-      }
-    }
-  });
-  gathered.ceiling.settle();
-}
-
-// A point over the canopy's ceiling, near a stem: part of that tree, or a ghost.
-struct HeldBack {
-  Eigen::Vector2f place;
-  float height_m = 0.0F;
-  std::uint32_t tree = 0;
-};
-
-// What a full inventory gathers beside it.
-struct Details {
-  StemSurroundings surroundings;
-  TreeOwners owners;
-};
-
-// What the fourth run gathers.
-struct Tops {
-  CanopyGrid canopy;
-  TreeColumns columns;
-  SheetCollector sheets;
-  std::vector<HeldBack> held_back = {};
-  std::optional<Details> details = std::nullopt;
-};
-
-// The fourth: canopy and tops of trees.
-void look_up(const PointBlocks& cloud, const InventoryResult& result, const CanopyCeiling& ceiling,
-             Tops& tops) {
-  std::vector<double> heights;
-  cloud([&](std::span<const Eigen::Vector3d> points) {
-    result.ground.heights_above(points, heights);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!(heights[i] >= 0.0 && heights[i] <= kHighest)) continue;
-      const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
-      const std::size_t tree = tops.columns.add(place, heights[i]);
-      if (tree != TreeColumns::kNone) tops.sheets.add(tree, place, heights[i]);
-      if (ceiling.holds(place, heights[i])) {
-        tops.canopy.add(place, heights[i]);
-      } else if (tree != TreeColumns::kNone) {
-        tops.held_back.push_back({place.cast<float>(), static_cast<float>(heights[i]),
-                                  static_cast<std::uint32_t>(tree)});
-      }
-      if (!tops.details) continue;
-      tops.details->surroundings.add(points[i] - result.origin);
-      if (heights[i] > result.ground.config.class_m) tops.details->owners.add(place, heights[i]);
-    }
-  });
-}
-
-// Near a scanner the ground has a hundred times the points of a crown, and the ceiling may lie
-// under it: what is no higher than the top of its tree is real.
-void add_trees(const std::vector<double>& tops, const std::vector<HeldBack>& held_back,
-               CanopyGrid& canopy) {
-  for (const HeldBack& point : held_back) {
-    const auto height = static_cast<double>(point.height_m);
-    if (height <= tops[point.tree]) canopy.add(point.place.cast<double>(), height);
-  }
-}
 
 // Area in which stems could be seen: squares of 2 m with points near breast height or on the
 // ground, that is all in which the cloud holds anything.
@@ -154,41 +60,16 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
 }
 
 // NaN where the tree may go on above the scanner's view.
-std::vector<double> heights_in_view(const InventoryResult& result, std::vector<double> tops,
-                                    const SeenTest& in_view) {
-  for (std::size_t i = 0; i < tops.size(); ++i) {
-    double& height = tops[i];
-    if (in_view && std::isfinite(height)) {
-      const Eigen::Vector2d place = stem_place_at(result.stems[i], height);
-      Eigen::Vector3d above(result.origin.x() + place.x(), result.origin.y() + place.y(), 0.0);
-      above.z() = result.ground.terrain.interpolate(above.x(), above.y()) + height + kMargin;
-      if (!in_view(above)) height = std::numeric_limits<double>::quiet_NaN();
-    }
-  }
-  return tops;
+double height_in_view(const InventoryResult& result, const StemFit& stem, double height,
+                      const SeenTest& in_view) {
+  if (!in_view || !std::isfinite(height)) return height;
+  const Eigen::Vector2d place = stem_place_at(stem, height);
+  Eigen::Vector3d above(result.origin.x() + place.x(), result.origin.y() + place.y(), 0.0);
+  above.z() = result.ground.terrain.interpolate(above.x(), above.y()) + height + kMargin;
+  return in_view(above) ? height : std::numeric_limits<double>::quiet_NaN();
 }
 
-// Height of the ground at each stem over the origin.
-std::vector<double> ground_at_stems(const InventoryResult& result) {
-  std::vector<double> ground;
-  for (const StemFit& stem : result.stems) {
-    const Eigen::Vector2d foot = stem.centre - kBreastHeight * stem.slope;
-    ground.push_back(result.ground.terrain.interpolate(result.origin.x() + foot.x(),
-                                                       result.origin.y() + foot.y()) -
-                     result.origin.z());
-  }
-  return ground;
-}
-
-void measure_curves(StemSurroundings& surroundings, const StemCurveConfig& config,
-                    const ProgressSink& progress, InventoryResult& result) {
-  std::vector<std::vector<SlicePoint>> points = surroundings.take();
-  result.curves.resize(points.size());
-  parallel_for(points.size(), 4, [&](std::size_t i) {
-    progress.poll();
-    result.curves[i] =
-        measure_stem_curve(std::move(points[i]), result.stems[i], result.trees[i].height_m, config);
-  });
+void add_volumes(InventoryResult& result) {
   for (std::size_t i = 0; i < result.curves.size(); ++i) {
     result.trees[i].stem_volume_m3 = result.curves[i].volume_m3;
     result.trees[i].stem_volume_sd_m3 = result.curves[i].volume_sd_m3;
@@ -216,10 +97,17 @@ std::vector<OwnerTree> owner_trees(const InventoryResult& result, double slices_
   return trees;
 }
 
-void find_crowns(const ProgressSink& progress, double slices_end_m, InventoryResult& result) {
-  const std::vector<OwnerTree> trees = owner_trees(result, slices_end_m);
-  result.owners->find(trees, progress);
-  const std::vector<TreeCrown> crowns = measure_crowns(*result.owners, trees);
+void find_crowns(const CrownTask& task, TileShelf<std::uint64_t>& cubes, InventoryResult& result) {
+  const std::vector<OwnerTree> trees = owner_trees(result, task.slices_end_m);
+  std::vector<TreeCrown> crowns;
+  if (task.cloud.tiles().size() == 1) {
+    result.owners = TreeOwners::of_cubes(cubes.take(0), {});
+    result.owners->find(trees, task.progress);
+    crowns = measure_crowns(*result.owners, trees);
+  } else {
+    result.owner_tiles = std::make_shared<OwnerTiles>(task.cloud, task.origin);
+    crowns = result.owner_tiles->find(task, cubes, trees);
+  }
   for (std::size_t i = 0; i < crowns.size(); ++i) {
     result.trees[i].crown_base_m = crowns[i].base_m;
     result.trees[i].crown_area_m2 = crowns[i].area_m2;
@@ -227,23 +115,16 @@ void find_crowns(const ProgressSink& progress, double slices_end_m, InventoryRes
   }
 }
 
-std::uint64_t returns_near_breast(const InventoryResult& result) {
-  std::uint64_t returns = 0;
-  for (const SlicePoint& point : result.slices)
-    returns += point.returns;
-  return returns;
-}
-
-void judge_density(InventoryResult& result) {
-  const auto returns = static_cast<double>(returns_near_breast(result));
+void judge_density(const StemHarvest& gathered, InventoryResult& result) {
+  const auto returns = static_cast<double>(gathered.near_breast);
   result.too_sparse = returns < kSparse * std::max(1.0, result.area_m2);
   result.from_above =
       result.too_sparse && returns < kFromAboveShare * static_cast<double>(result.points);
   if (result.from_above) result.thin = {};  // no stem is looked for there
 }
 
-// Where stems could be seen. `path`: world frame.
-VisibleArea seen_of(const SeenCells& cells, const std::vector<Eigen::Vector2d>& path,
+// Where stems could be seen. `scanner`: world frame.
+VisibleArea seen_of(const SeenCells& cells, const std::vector<Eigen::Vector3d>& scanner,
                     double reach_m, const InventoryResult& result) {
   if (result.from_above) return {};
   std::vector<StemDisc> stems;
@@ -251,8 +132,8 @@ VisibleArea seen_of(const SeenCells& cells, const std::vector<Eigen::Vector2d>& 
     stems.push_back({stem.centre, stem.radius_m});
   SeenFrom from;
   from.reach_m = reach_m;
-  for (const Eigen::Vector2d& place : path)
-    from.path.emplace_back(place - result.origin.head<2>());
+  for (const Eigen::Vector3d& place : scanner)
+    from.path.emplace_back((place - result.origin).head<2>());
   return find_seen_area(cells, result.origin.head<2>(), stems, from);
 }
 
@@ -289,11 +170,11 @@ void add_crowns(const InventoryConfig& config, InventoryResult& result) {
   }
 }
 
-void remark_on_stems(const Gathered& gathered, const InventoryConfig& config,
+void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
                      InventoryResult& result) {
   const double area_m2 = std::max(1.0, result.area_m2);
   const double per_m2 = static_cast<double>(gathered.points) / area_m2;
-  const std::uint64_t returns = returns_near_breast(result);
+  const std::uint64_t returns = gathered.near_breast;
   const double near_breast = static_cast<double>(returns) / area_m2;
   const std::size_t by_crown = result.trees.size() - result.stems.size();
   if (by_crown > 0)
@@ -317,7 +198,7 @@ void remark_on_stems(const Gathered& gathered, const InventoryConfig& config,
   }
 }
 
-void remark(const Gathered& gathered, const InventoryConfig& config, InventoryResult& result) {
+void remark(const StemHarvest& gathered, const InventoryConfig& config, InventoryResult& result) {
   remark_on_stems(gathered, config, result);
   if (result.ground.measured_share < kLeastMeasured) {
     result.remarks.push_back(fmt::format(
@@ -366,67 +247,102 @@ void describe(ConfigTable& table, InventoryConfig& config) {
             "number of trees that the report shows one by one");
 }
 
-InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig& config,
+namespace {
+
+// What is known of the scanner beside its points.
+struct KnownScanner {
+  const SeenTest& in_view;
+  const std::vector<Eigen::Vector3d>& places;
+};
+
+// Tops, heights, curves and crowns of the stems that were found, and the canopy.
+void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
+                   const ProgressSink& progress, const KnownScanner& scanner,
+                   const StemHarvest& gathered, InventoryResult& result) {
+  const auto tell = [&](const char* stage, double done) {
+    progress({stage, done, 8.0, "passes", ""});
+  };
+  const bool full = config.extent == InventoryExtent::kFull;
+  const SlicesNear slices(result.slices, gathered.thinned, cloud, result.origin);
+  const CrownTask task{cloud,        result.ground,
+                       result.origin, result.stems,
+                       slices,       gathered.ceiling,
+                       config.stems.highest_m, full,
+                       config.curves, progress};
+  tell("tops", 4.0);
+  const auto listed = [&](std::size_t i, double top) {
+    return height_in_view(result, result.stems[i], top, scanner.in_view);
+  };
+  StemTops tops = look_up(task, config.canopy_cell_m, listed);
+  result.canopy = tops.canopy.raster(result.origin.x(), result.origin.y());
+  result.area_m2 = area_of(result.canopy);
+  judge_density(gathered, result);
+  result.seen = seen_of(gathered.seen, scanner.places, config.stand.reach_m, result);
+  std::vector<double> heights;
+  for (std::size_t i = 0; i < result.stems.size(); ++i)
+    heights.push_back(listed(i, tops.top_m[i]));
+  result.trees = trees_of(result, heights);
+  if (full) {
+    result.curves = std::move(tops.curves);
+    add_volumes(result);
+    tell("crowns", 6.0);
+    find_crowns(task, tops.cubes, result);
+    add_crowns(config, result);
+  }
+  look_at_doubtful_trees(std::move(tops.sheets), result);
+}
+
+}  // namespace
+
+InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& config,
                                const ProgressSink& progress, const SeenTest& in_view,
-                               const std::vector<Eigen::Vector2d>& path) {
-  const PointBlocks cloud = polled(unasked, progress);
+                               const std::vector<Eigen::Vector3d>& scanner) {
+  return take_inventory(WholeCloud(cloud), config, progress, in_view, scanner);
+}
+
+InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& config,
+                               const ProgressSink& progress, const SeenTest& in_view,
+                               const std::vector<Eigen::Vector3d>& scanner) {
+  const PointBlocks unasked = [&](const PointVisitor& visit) { cloud.all(visit); };
   const auto tell = [&](const char* stage, double done) {
     progress({stage, done, 8.0, "passes", ""});
   };
   InventoryResult result;
   tell("ground", 0.0);
-  result.ground = estimate_ground(unasked, config.ground, progress);
+  result.ground = estimate_ground(unasked, config.ground, progress, cloud.level());
   if (result.ground.terrain.empty()) {
     result.remarks.emplace_back("The cloud holds no points.");
     return result;
   }
   const Raster& terrain = result.ground.terrain;
-  result.origin = {std::round(terrain.x0), std::round(terrain.y0), terrain.z0};
-  tell("heights", 2.0);
-  Gathered gathered{SliceThinner(config.stems.thin_m), CanopyCeiling(), CoverageGrid()};
-  gather(cloud, config, result, gathered);
+  // A multiple of the grids' cells, so that a clip of a cloud has the same cells.
+  result.origin = {kOriginStep * std::floor(terrain.x0 / kOriginStep),
+                   kOriginStep * std::floor(terrain.y0 / kOriginStep), terrain.z0};
+  tell("stems", 2.0);
+  StemHarvest gathered = find_stems(cloud, result.ground, result.origin, config.stems, progress);
   result.points = gathered.points;
-  result.slices = gathered.slices.take();
+  result.slices = std::move(gathered.slices);
+  result.stems = std::move(gathered.stems);
   result.thin = gathered.coverage.thin();
-  tell("stems", 3.0);
-  result.stems = detect_stems(result.slices, config.stems, progress);
-  tell("tops", 4.0);
-  Tops tops{CanopyGrid(config.canopy_cell_m), TreeColumns(result.stems),
-            SheetCollector(result.stems, result.slices)};
-  const bool full = config.extent == InventoryExtent::kFull;
-  if (full) tops.details.emplace(Details{{result.stems, ground_at_stems(result)}, {}});
-  look_up(cloud, result, gathered.ceiling, tops);
-  std::vector<double> heights;
-  for (std::size_t i = 0; i < result.stems.size(); ++i)
-    heights.push_back(tops.columns.top(i, config.stems.highest_m));
-  add_trees(heights, tops.held_back, tops.canopy);
-  result.canopy = tops.canopy.raster(result.origin.x(), result.origin.y());
-  result.area_m2 = area_of(result.canopy);
-  judge_density(result);
-    result.seen = seen_of(gathered.seen, path, config.stand.reach_m, result);
-  result.trees = trees_of(result, heights_in_view(result, heights, in_view));
-  if (full) {
-    tell("stem curves", 5.0);
-    measure_curves(tops.details->surroundings, config.curves, progress, result);
-    tell("crowns", 6.0);
-    result.owners = std::move(tops.details->owners);
-    find_crowns(progress, config.stems.highest_m, result);
-    add_crowns(config, result);
-  }
-  look_at_doubtful_trees(tops.sheets, result);
+  measure_above(cloud, config, progress, {in_view, scanner}, gathered, result);
   remark(gathered, config, result);
   tell("segments", 7.0);
-  result.segments =
-      collect_segments(cloud, result.ground, result.trees, config.segments, kSegmentReach);
+  result.segments = collect_segments(polled(unasked, progress), result.ground, result.trees,
+                                     config.segments, kSegmentReach);
   tell("segments", 8.0);
   return result;
 }
 
 std::uint32_t tree_at(const InventoryResult& inventory, const Eigen::Vector3d& point,
                       double height_m) {
-  if (!inventory.owners || !(height_m > inventory.ground.config.class_m)) return 0;
+  return inventory.owners ? tree_at(inventory, *inventory.owners, point, height_m) : 0;
+}
+
+std::uint32_t tree_at(const InventoryResult& inventory, const TreeOwners& owners,
+                      const Eigen::Vector3d& point, double height_m) {
+  if (!(height_m > inventory.ground.config.class_m)) return 0;
   const Eigen::Vector2d place = (point - inventory.origin).head<2>();
-  const std::int32_t owner = inventory.owners->owner(place, height_m);
+  const std::int32_t owner = owners.owner(place, height_m);
   if (owner != TreeOwners::kNobody)
     return static_cast<std::uint32_t>(inventory.trees[static_cast<std::size_t>(owner)].id);
   if (!inventory.crowns || height_m < forest_constants::tree_owners::kUndergrowth) return 0;

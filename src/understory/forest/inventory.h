@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,8 @@
 #include "understory/forest/stand/stand_config.h"
 #include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
+#include "understory/forest/tiles/crown_tiles.h"
+#include "understory/forest/tiles/tiled_cloud.h"
 #include "understory/forest/trees/canopy_crowns.h"
 #include "understory/forest/trees/thin_coverage.h"
 #include "understory/forest/trees/tree_owners.h"
@@ -55,12 +58,16 @@ struct InventoryResult {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // of slices and stems, world frame
   // By id, from 1: first those with a stem, in order of position, then those by their crowns alone.
   std::vector<Tree> trees;
-  std::vector<StemFit> stems;          // of the same index as the first trees
-  std::vector<StemCurve> curves;       // of the same index; of a full inventory only
-  std::optional<TreeOwners> owners;    // of a full inventory: the trees' points
+  std::vector<StemFit> stems;        // of the same index as the first trees
+  std::vector<StemCurve> curves;     // of the same index; of a full inventory only
+  std::optional<TreeOwners> owners;  // of a full inventory: the trees' points
+  // Instead of them where the cloud lies in several tiles; not without the cloud.
+  std::shared_ptr<OwnerTiles> owner_tiles;
   std::optional<CanopyCrowns> crowns;  // where trees were found by them
-  std::vector<int> crown_ids;      // id of the tree of each crown, 0 where it is none of the list
-  std::vector<SlicePoint> slices;  // the thinned points between 0.5 m and 3.5 m that were searched
+  std::vector<int> crown_ids;  // id of the tree of each crown, 0 where it is none of the list
+  // The thinned points between 0.5 m and 3.5 m that were searched; of a cloud in several tiles some
+  // of those near breast height.
+  std::vector<SlicePoint> slices;
   std::vector<TreeSegment> segments;  // of a few trees, for the report
   std::vector<TreeSheet> sheets;      // of the stems that are most in doubt, by their number
   std::vector<LookAgain> look_again;  // places that would show weak stems, the best first
@@ -76,20 +83,29 @@ struct InventoryResult {
 // Whether a place (world frame) was in the scanner's view, so that a tree's top there would show.
 using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
 
-// Ground, canopy, trees of a whole cloud: seven runs through it. With a test of what was in view,
-// trees that may go on above it have no height. `path`: the scanner's places in the plane, world
-// frame; with them only what is in sight of them counts as seen. Deterministic for any number of
-// threads. Throws Stopped.
+// Ground, canopy, trees of a whole cloud: six runs through it. With a test of what was in view,
+// trees that may go on above it have no height. `scanner`: where it was, metres, world frame; with
+// it only what is in its sight counts as seen. Deterministic for any number of threads. Throws
+// Stopped.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,
                                              const ProgressSink& progress = {},
                                              const SeenTest& in_view = {},
-                                             const std::vector<Eigen::Vector2d>& path = {});
+                                             const std::vector<Eigen::Vector3d>& scanner = {});
+// The same of a cloud in tiles, in the memory that one of them needs: the same trees whatever the
+// tiles are.
+[[nodiscard]] InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& config,
+                                             const ProgressSink& progress = {},
+                                             const SeenTest& in_view = {},
+                                             const std::vector<Eigen::Vector3d>& scanner = {});
 
 // The id of the tree that a point of the cloud belongs to, 0 if none; of a full inventory.
 // `height_m` is its height above the ground.
 [[nodiscard]] std::uint32_t tree_at(const InventoryResult& inventory, const Eigen::Vector3d& point,
                                     double height_m);
+// The same for a point of a tile with these owners.
+[[nodiscard]] std::uint32_t tree_at(const InventoryResult& inventory, const TreeOwners& owners,
+                                    const Eigen::Vector3d& point, double height_m);
 
 // The stems of an inventory as one view of them: foot and centre line, world frame without its
 // `origin` (metres, world frame), so that single precision is enough. In the order of the trees.

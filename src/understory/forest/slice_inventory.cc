@@ -172,7 +172,7 @@ InventoryResult take_slice(const PointBlocks& unasked, const std::string& name,
     result.trees.push_back(tree_of(result, slice.stem, static_cast<int>(result.stems.size())));
   }
   result.area_m2 = area_of(result.slices);
-  result.sheets = SheetCollector(result.stems, result.slices).take();
+  result.sheets = SheetCollector(result.stems, result.slices, most_doubtful(result.stems)).take();
   remark(stems, thickness_m, result);
   return result;
 }

@@ -124,6 +124,11 @@ inline constexpr double kExplainedMargin = 0.06;
 inline constexpr double kStartReach = 0.4;
 // m beyond the radius whose points enter the fit [not recorded]
 inline constexpr double kFitReach = 0.35;
+// m beyond a tile in which stems are looked for: they compete with those of the tile [chosen: two
+// of the largest stems and more]
+inline constexpr double kFitsBeyond = 3.0;
+// m beyond a tile in which circles are looked for: a leaning stem's lie so far apart [chosen]
+inline constexpr double kRingsBeyond = 6.0;
 }  // namespace stem_detector
 
 namespace not_a_tree {  // forest/stems/not_a_tree.cc
@@ -360,5 +365,15 @@ inline constexpr double kLengthOffset = 0.15;
 // Points on a circle that one inside it outweighs [not recorded]
 inline constexpr double kInsideWeight = 1.5;
 }  // namespace circle_search
+
+namespace point_groups {  // forest/stems/point_groups.cc
+// m: edge of the windows that large groups are cut by. The origin of a search is a multiple of it
+// [bound: time]
+inline constexpr double kWindow = 8.0;
+// m: a group that is longer is cut [chosen: longer than a large tree's points at breast height]
+inline constexpr double kLongest = 4.0;
+// m: two cells of the coarsest grouping [bound: cells that touch]
+inline constexpr double kCellSlack = 0.3;
+}  // namespace point_groups
 
 }  // namespace understory::stem_constants

@@ -96,6 +96,35 @@ inline constexpr double kSparseCloudM = 0.1;
 inline constexpr double kSparseInlierRatio = 0.05;
 }  // namespace adaptation
 
+namespace cloud_tiles {  // pipeline/inventory/cloud_tiles.cc, streamed_cloud.cc
+// m: edge of the cells on disk: what lies around a tile is read by them [bound: time]
+inline constexpr double kCell = 10.0;
+// Cells across a cloud, at most: larger clouds have larger cells [bound: time]
+inline constexpr double kMostCellsAcross = 128.0;
+// Cells a side of a tile, at most [bound: time]
+inline constexpr int kMostCellsOfTile = 100;
+// m around a tile whose points are held with it [bound: the reach of stems and crowns]
+inline constexpr double kAround = 20.0;
+// m: tiles are not made smaller to hold two at once [chosen]
+inline constexpr double kSmallestSideBySide = 40.0;
+// Points of a cell that are written at once [bound: time]
+inline constexpr std::size_t kChunk = 8192;
+// Points that wait to be written, at most [bound: memory]
+inline constexpr std::uint64_t kMostBuffered = 4'000'000;
+// Points that are handed over at once [bound: memory]
+inline constexpr std::size_t kBlock = 65'536;
+// Bytes that a tile takes for each point in and around it [measured on simulated clouds]
+inline constexpr double kBytesPerPoint = 40.0;
+// Bytes that an inventory takes beside its tiles [measured on simulated clouds]
+inline constexpr double kBaseBytes = 300e6;
+// Bytes for each point where the whole cloud is held [measured on simulated clouds]
+inline constexpr double kBytesPerPointWhole = 100.0;
+// Bytes on disk for each point: itself, what is thinned, map.laz [measured on simulated clouds]
+inline constexpr double kDiskBytesPerPoint = 45.0;
+// Points whose shape is looked at [as kMostPoints of cloud_shape]
+inline constexpr std::uint64_t kSample = 400'000;
+}  // namespace cloud_tiles
+
 namespace stand_cloud {  // pipeline/inventory/stand_cloud.cc
 // m by which places may be rounded: a tenth of a thin stem [chosen]
 inline constexpr double kCoarsestStepM = 0.01;
@@ -115,6 +144,8 @@ inline constexpr double kTallM = 42.0;
 // Height over diameter: no tall stand is more slender; real ones have 40 to 100, in feet of height
 // and metres of diameter 3.3 times as much [bound: forests]
 inline constexpr double kMostSlender = 150.0;
+// m beside a tile: cubes of crowns that begin in it reach so far [bound: their edge]
+inline constexpr double kBesideTile = 0.25;
 // m: a thinner cloud without a stem may be a cut [chosen: stems need 1.5 m at least]
 inline constexpr double kThinCutM = 1.0;
 // Trees with both figures at least [chosen]

@@ -8,6 +8,13 @@ void CanopyCeiling::count(const Eigen::Vector2d& place, double height_m) {
   ++columns_.at(place.x(), place.y()).points[HeightColumn::metre_of(height_m)];
 }
 
+void CanopyCeiling::add(const CanopyCeiling& other) {
+  columns_.merge(other.columns_, [](HeightColumn& own, const HeightColumn& cell) {
+    for (std::size_t i = 0; i < own.points.size(); ++i)
+      own.points[i] += cell.points[i];
+  });
+}
+
 void CanopyCeiling::settle() {
   columns_.for_each([&](int column, int row, const HeightColumn& cell) {
     const int metre = cell.top(0, HeightColumn::kMetres);
@@ -25,6 +32,12 @@ bool CanopyCeiling::holds(const Eigen::Vector2d& place, double height_m) const {
 void CanopyGrid::add(const Eigen::Vector2d& place, double height_m) {
   float& highest = highest_.at(place.x(), place.y()).highest_m;
   highest = std::max(highest, static_cast<float>(height_m));
+}
+
+void CanopyGrid::add(const CanopyGrid& other) {
+  highest_.merge(other.highest_, [](Cell& own, const Cell& cell) {
+    own.highest_m = std::max(own.highest_m, cell.highest_m);
+  });
 }
 
 Raster CanopyGrid::raster(double x0, double y0) const {

@@ -11,7 +11,9 @@ namespace understory {
 class CanopyCeiling {
  public:
   void count(const Eigen::Vector2d& place, double height_m);  // height >= 0
-  void settle();                                              // after the last `count`
+  // What another one counted, before `settle`.
+  void add(const CanopyCeiling& other);
+  void settle();  // after the last `count`
   [[nodiscard]] bool holds(const Eigen::Vector2d& place, double height_m) const;
 
  private:
@@ -25,6 +27,7 @@ class CanopyGrid {
  public:
   explicit CanopyGrid(double cell_m) : highest_(cell_m) {}
   void add(const Eigen::Vector2d& place, double height_m);  // height >= 0
+  void add(const CanopyGrid& other);                        // of the same cells
   // NaN where there was no point. (x0, y0): origin of the places in the raster's frame, metres.
   [[nodiscard]] Raster raster(double x0, double y0) const;
 

@@ -29,9 +29,12 @@ struct LowCell {
   }
 };
 
+// Sums are whole numbers, so that the order of points changes nothing.
 struct MeanCell {
-  double sum = 0.0;
+  static constexpr double kParts = 1LL << 36;  // of a metre: 60 million points of 2 m have room
+  std::int64_t sum = 0;
   std::uint32_t count = 0;
+  [[nodiscard]] double mean() const { return static_cast<double>(sum) / kParts / count; }
 };
 
 // The lowest point of a cell that another one lies near above; the lowest if there is none.
@@ -148,11 +151,12 @@ void drop_bumps(Raster& grid, float most) {
 }
 
 // Passes 1 and 2: the lowest points on the grid of the cloth, which is also that of the terrain.
-std::vector<LowCell> lowest_points(const PointBlocks& cloud, double cell_m, Raster& grid) {
-  const LowNoise noise(cloud);
+std::vector<LowCell> lowest_points(const PointBlocks& cloud, double cell_m,
+                                   std::optional<double> level_m, Raster& grid) {
+  const LowNoise noise(cloud, level_m);
   CellGrid<LowCell> cells(cell_m);
-  bool first = true;
-  double z0 = 0.0;
+  bool first = !level_m;
+  double z0 = level_m.value_or(0.0);
   cloud([&](std::span<const Eigen::Vector3d> points) {
     for (const Eigen::Vector3d& point : points) {
       if (first) z0 = std::floor(point.z());
@@ -195,7 +199,7 @@ double refine(const PointBlocks& cloud, const GroundConfig& config, Raster& terr
       if (!terrain.contains(column, row)) continue;
       MeanCell& cell = cells[terrain.index(column, row)];
       // Relative to the surface, so that slope and place within the cell do not matter.
-      cell.sum += height;
+      cell.sum += std::llround(MeanCell::kParts * height);
       ++cell.count;
     }
   });
@@ -206,7 +210,7 @@ double refine(const PointBlocks& cloud, const GroundConfig& config, Raster& terr
     ++known;
     if (cells[i].count < 3) continue;
     ++measured;
-    terrain.values[i] += static_cast<float>(cells[i].sum / cells[i].count);
+    terrain.values[i] += static_cast<float>(cells[i].mean());
   }
   return known == 0 ? 0.0 : static_cast<double>(measured) / static_cast<double>(known);
 }
@@ -244,12 +248,12 @@ std::uint8_t GroundModel::las_class(double height_above_ground) const {
 }
 
 GroundModel estimate_ground(const PointBlocks& unasked, const GroundConfig& config,
-                            const ProgressSink& progress) {
+                            const ProgressSink& progress, std::optional<double> level_m) {
   const PointBlocks cloud = polled(unasked, progress);
   GroundModel model;
   model.config = config;
   Raster& terrain = model.terrain;
-  const std::vector<LowCell> low = lowest_points(cloud, config.cell_m, terrain);
+  const std::vector<LowCell> low = lowest_points(cloud, config.cell_m, level_m, terrain);
   if (low.empty()) return model;
   const std::vector<float> floor = floor_heights(terrain, low);
   const std::vector<float> cloth = settle_cloth(floor, terrain.columns, terrain.rows,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -40,8 +41,11 @@ struct GroundModel {
 };
 
 // Memory grows with the area, not with the number of points. Deterministic for any number of
-// threads. The result has an empty terrain if there are no points. Polls `progress`.
+// threads and any order of points, but for `level_m`: heights are held in single precision above
+// it; without it above the first point. The result has an empty terrain if there are no points.
+// Polls `progress`.
 [[nodiscard]] GroundModel estimate_ground(const PointBlocks& cloud, const GroundConfig& config,
-                                          const ProgressSink& progress = {});
+                                          const ProgressSink& progress = {},
+                                          std::optional<double> level_m = std::nullopt);
 
 }  // namespace understory

@@ -56,10 +56,10 @@ class Column {
 
 }  // namespace
 
-LowNoise::LowNoise(const PointBlocks& cloud) {
+LowNoise::LowNoise(const PointBlocks& cloud, std::optional<double> level_m) {
   CellGrid<Column> columns(kCell);
-  bool first = true;
-  double z0 = 0.0;
+  bool first = !level_m;
+  double z0 = level_m.value_or(0.0);
   cloud([&](std::span<const Eigen::Vector3d> points) {
     for (const Eigen::Vector3d& point : points) {
       if (first) z0 = std::floor(point.z());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "understory/forest/point_blocks.h"
 #include "understory/geometry/raster.h"
@@ -13,8 +14,8 @@ namespace understory {
 // m the lowest layer of 1 m that holds a few points, and 0.4 % of all there, is taken for real.
 class LowNoise {
  public:
-  // Runs through the cloud once.
-  explicit LowNoise(const PointBlocks& cloud);
+  // Runs through the cloud once. Heights are counted from `level_m`, or from the first point.
+  explicit LowNoise(const PointBlocks& cloud, std::optional<double> level_m = std::nullopt);
   // Whether a point (world frame, metres) lies more than half a metre below the lowest real layer.
   [[nodiscard]] bool holds(const Eigen::Vector3d& point) const;
 

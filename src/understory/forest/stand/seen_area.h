@@ -20,6 +20,12 @@ class SeenCells {
     std::uint8_t& count = cells_.at(place.x(), place.y());
     if (count < 255) ++count;
   }
+  // What another one counted.
+  void add(const SeenCells& other) {
+    cells_.merge(other.cells_, [](std::uint8_t& own, std::uint8_t cell) {
+      own = static_cast<std::uint8_t>(std::min(255, own + cell));
+    });
+  }
   [[nodiscard]] const CellGrid<std::uint8_t>& cells() const { return cells_; }
 
  private:

@@ -2,14 +2,15 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/cell_index.h"
+#include "understory/forest/stems/point_groups.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
@@ -20,55 +21,6 @@ namespace {
 using namespace stem_constants::circle_search;
 
 using PointList = std::vector<Eigen::Vector2f>;
-
-// Groups of points that hang together: cells of `reach` that touch, also by a corner.
-std::vector<PointList> groups_of(const PointList& points, double reach, int min_points) {
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> cells(points.size());
-  const auto key = [&](std::int64_t column, std::int64_t row) {
-    return static_cast<std::uint64_t>(row + (1LL << 31)) << 32 |
-           static_cast<std::uint64_t>(column + (1LL << 31));
-  };
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    cells[i] = {key(static_cast<std::int64_t>(std::floor(points[i].x() / reach)),
-                    static_cast<std::int64_t>(std::floor(points[i].y() / reach))),
-                static_cast<std::uint32_t>(i)};
-  }
-  std::sort(cells.begin(), cells.end());
-  std::vector<std::uint64_t> keys;
-  for (const auto& cell : cells) {
-    if (keys.empty() || keys.back() != cell.first) keys.push_back(cell.first);
-  }
-  std::vector<std::uint32_t> parent(keys.size());
-  std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i)
-      i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    const auto row = static_cast<std::int64_t>(keys[i] >> 32) - (1LL << 31);
-    const auto column = static_cast<std::int64_t>(keys[i] & 0xffffffffU) - (1LL << 31);
-    constexpr std::array<std::pair<int, int>, 4> kBefore = {{{-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
-    for (const auto& [dx, dy] : kBefore) {
-      const std::uint64_t other = key(column + dx, row + dy);
-      const auto found = std::lower_bound(keys.begin(), keys.end(), other);
-      if (found == keys.end() || *found != other) continue;
-      const std::uint32_t a = root(static_cast<std::uint32_t>(found - keys.begin()));
-      const std::uint32_t b = root(static_cast<std::uint32_t>(i));
-      parent[std::max(a, b)] = std::min(a, b);
-    }
-  }
-  std::vector<PointList> groups(keys.size());
-  std::size_t cell = 0;
-  for (const auto& [k, i] : cells) {
-    while (keys[cell] != k)
-      ++cell;
-    groups[root(static_cast<std::uint32_t>(cell))].push_back(points[i]);
-  }
-  std::erase_if(
-      groups, [&](const PointList& group) { return static_cast<int>(group.size()) < min_points; });
-  return groups;
-}
 
 // The circle through three points; false where they lie on a line.
 bool circle_through(const Eigen::Vector2f& a, const Eigen::Vector2f& b, const Eigen::Vector2f& c,
@@ -369,10 +321,17 @@ Circle refine_circle(const PointList& points, const Circle& start, double band_m
 std::vector<std::vector<Circle>> find_circles(const std::vector<PointList>& slices,
                                               const CircleSearchConfig& config, std::uint64_t seed,
                                               const ProgressSink& progress, std::uint64_t* work) {
-  std::vector<std::vector<PointList>> groups(slices.size());
+  std::vector<std::vector<PointGroup>> groups(slices.size());
+  PointGroupConfig grouping;
+  grouping.reach_m = config.reach_m;
+  grouping.min_points = config.min_points;
+  grouping.margin_m = group_margin_m(config.max_radius_m, config.band_m);
+  grouping.area = config.area;
+  grouping.origin = config.origin;
+  grouping.whole = config.whole_groups;
   parallel_for(slices.size(), 1, [&](std::size_t s) {
     if (static_cast<int>(slices[s].size()) < config.min_points) return;
-    groups[s] = groups_of(slices[s], config.reach_m, config.min_points);
+    groups[s] = groups_near(slices[s], grouping);
   });
   // Large groups take much longer than small ones: all slices' groups together keep all threads
   // busy to the end.
@@ -386,8 +345,12 @@ std::vector<std::vector<Circle>> find_circles(const std::vector<PointList>& slic
   std::vector<std::uint64_t> works(jobs.size(), 0);
   parallel_for(jobs.size(), 1, [&](std::size_t i) {
     const auto [s, g] = jobs[i];
-    GroupSearch search(std::move(groups[s][g]), config, hash_numbers(seed, s, g));
+    PointGroup& group = groups[s][g];
+    GroupSearch search(std::move(group.points), config,
+                       hash_numbers(seed, s, config.whole_groups ? g : group.place));
     found[s][g] = search.run(progress);
+    std::erase_if(found[s][g],
+                  [&](const Circle& circle) { return !group.window.contains(circle.centre); });
     works[i] = search.work();
   });
   if (work != nullptr) *work = std::accumulate(works.begin(), works.end(), std::uint64_t{0});

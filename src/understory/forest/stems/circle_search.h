@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "understory/forest/ground_area.h"
 #include "understory/util/progress.h"
 
 namespace understory {
@@ -27,11 +28,16 @@ struct CircleSearchConfig {
   double reach_m = 0.08;  // points nearer to each other than about this hang together
   int min_points = 5;
   double min_arc_deg = 50.0;
+  GroundArea area;  // circles in it are wanted; some beyond come along
+  Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // of the frame of the points
+  // Of a single cut: groups are not cut, and draws are by their number. The area is not looked at.
+  bool whole_groups = false;
 };
 
 // All circles of each slice, by repeated sampling (RANSAC) in each group of points that hang
-// together and robust least squares (Gauss-Newton on the geometric distance). `seed` and the points
-// decide the result; threads do not. The time is nearly proportional to the number of points. Polls
+// together (see groups_near) and robust least squares (Gauss-Newton on the geometric distance).
+// Draws are by the place of a group: `seed` and the points near a circle decide on it; points far
+// away and threads do not. The time is nearly proportional to the number of points. Polls
 // `progress`. `work` is told how many points were sorted, fitted and taken away, each as often as
 // it was.
 [[nodiscard]] std::vector<std::vector<Circle>> find_circles(

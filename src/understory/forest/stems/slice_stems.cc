@@ -31,6 +31,7 @@ std::vector<Circle> circles_of(const std::vector<SlicePoint>& points,
     search.max_radius_m = 0.5 * config.max_dbh_m;
     search.reach_m = kReach;
     search.band_m = band_m;
+    search.whole_groups = true;
     const std::vector<Circle> found =
         find_circles(slice, search, hash_numbers(1, 0), progress).front();
     all.insert(all.end(), found.begin(), found.end());

@@ -1,28 +1,35 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
+#include "understory/forest/cube_mean.h"
 #include "understory/forest/stems/stem_detector.h"
 
 namespace understory {
 
 // Gathers points near breast height, one per small cube (their mean, with the number of returns),
-// so that memory goes with the surface seen, not with the number of returns.
+// so that memory goes with the surface seen, not with the number of returns. The order of points
+// changes nothing.
 class SliceThinner {
  public:
-  explicit SliceThinner(double cube_m) : cube_m_(cube_m) {}
+  // A cube of less than 1 mm counts as one of 1 mm.
+  explicit SliceThinner(double cube_m);
+  // Points more than 8 million cubes from zero are left out.
   void add(double x, double y, double height_m);
+  // The lower corner of the cube that holds a place.
+  [[nodiscard]] Eigen::Vector2d corner_of(double x, double y) const;
   // The thinned points in order of their cubes; empties the thinner.
   [[nodiscard]] std::vector<SlicePoint> take();
 
  private:
   struct Entry {
     std::uint64_t cube = 0;
-    float x = 0.0F, y = 0.0F, height_m = 0.0F;
-    std::uint32_t returns = 0;
+    CubeMean mean;
   };
   void compact();
+  [[nodiscard]] SlicePoint point_of(const Entry& entry) const;
 
   double cube_m_;
   std::vector<Entry> entries_;

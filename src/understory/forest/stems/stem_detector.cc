@@ -7,6 +7,7 @@
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/circle_search.h"
 #include "understory/forest/stems/not_a_tree.h"
+#include "understory/forest/stems/point_groups.h"
 #include "understory/forest/stems/ring_linker.h"
 #include "understory/forest/stems/stem_fit.h"
 #include "understory/util/parallel.h"
@@ -82,7 +83,8 @@ struct Cut {
 
 std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
                              const std::vector<char>& explained, const Cut& cut,
-                             const StemDetectorConfig& config, const ProgressSink& progress) {
+                             const StemDetectorConfig& config, const StemSearchArea& where,
+                             const ProgressSink& progress) {
   const double span = config.highest_m - config.lowest_m;
   const auto count = static_cast<std::size_t>(std::max(1.0, std::round(span / cut.thickness_m)));
   std::vector<std::vector<Eigen::Vector2f>> slices(count);
@@ -99,6 +101,8 @@ std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
   search.max_radius_m = 0.5 * config.max_dbh_m;
   search.reach_m = cut.reach_m;
   search.band_m = cut.band_m;
+  search.area = where.area.grown(kRingsBeyond);
+  search.origin = where.origin;
   std::vector<Ring> rings;
   const std::vector<std::vector<Circle>> circles =
       find_circles(slices, search, hash_numbers(count, 0), progress);
@@ -265,63 +269,120 @@ void describe(ConfigTable& table, StemDetectorConfig& config) {
             "largest lean of a stem from the vertical");
 }
 
-std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points, const StemDetectorConfig& config,
-                                  const ProgressSink& progress) {
-  const PointIndex index(points);
-  std::vector<char> explained(points.size(), 0);
+namespace {
+
+Cut cut_of(StemCut cut, const StemDetectorConfig& config) {
+  if (cut == StemCut::kThin) return {config.slice_m, config.min_slices, kThinReach, kThinBand};
+  return {kThickSlices * config.slice_m, kLeastThickSlices, kThickReach, kThickBand};
+}
+
+// The thinned points, and which of them the stems found so far explain.
+struct Search {
+  explicit Search(std::vector<SlicePoint>& all)
+      : index(all), points(all), explained(all.size(), 0) {}
+  PointIndex index;
+  const std::vector<SlicePoint>& points;
+  std::vector<char> explained;
   std::vector<StemFit> stems;
-  const std::vector<Cut> cuts = {
-      {config.slice_m, config.min_slices, kThinReach, kThinBand},
-      {kThickSlices * config.slice_m, kLeastThickSlices, kThickReach, kThickBand}};
-  for (const Cut& cut : cuts) {
-    const std::vector<Ring> rings = find_rings(points, explained, cut, config, progress);
-    const std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
-    std::vector<StemFitResult> fits(starts.size());
-    std::vector<char> accepted(starts.size(), 0);
-    parallel_for(starts.size(), 1, [&](std::size_t i) {
-      progress.poll();
-      const StemFit& start = starts[i];
-      const double reach =
-          start.radius_m + kStartReach + start.slope.norm() * (config.highest_m - kBreastHeight);
-      std::vector<SlicePoint> near;
-      const StemAxis axis(start);
-      const double within = start.radius_m + kFitReach;
-      index.near(start.centre, reach, [&](std::size_t k) {
-        if (explained[k] == 0 && axis.may_be_within(points[k], within) &&
-            axis.place(points[k]).distance_m < within) {
-          near.push_back(points[k]);
-        }
-      });
-      fits[i] = fit_stem(near, start, config);
-      accepted[i] = is_stem(fits[i], cut, config) ? 1 : 0;
-      if (accepted[i] != 0) {
-        fits[i] = refine_stem(near, fits[i], config);
-        accepted[i] =
-            is_stem_still(fits[i], config) && is_tree(fits[i].stem, index, points, config);
-      }
-    });
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < fits.size(); ++i) {
-      if (accepted[i] != 0) fits[kept++] = fits[i];
-    }
-    fits.resize(kept);
-    sort_by_support(fits);
-    for (const StemFitResult& fit : fits) {
-      const auto overlaps = [&](const StemFit& other) { return same_stem(fit.stem, other); };
-      if (std::any_of(stems.begin(), stems.end(), overlaps)) continue;
-      // A stem beside another must not live on the other's points.
-      if (unclaimed_returns(fit, index, points, explained) <
-          std::max(config.min_returns, fit.evidence.returns * 2 / 3)) {
-        continue;
-      }
-      stems.push_back(fit.stem);
-      mark_explained(fit.stem, index, points, explained);
-    }
+
+  void know(const StemFit& stem) {
+    stems.push_back(stem);
+    mark_explained(stem, index, points, explained);
   }
+};
+
+// Fits that are stems by themselves.
+std::vector<StemFitResult> fit_starts(const Search& search, const std::vector<StemFit>& starts,
+                                      const Cut& cut, const StemDetectorConfig& config,
+                                      const ProgressSink& progress) {
+  std::vector<StemFitResult> fits(starts.size());
+  std::vector<char> accepted(starts.size(), 0);
+  parallel_for(starts.size(), 1, [&](std::size_t i) {
+    progress.poll();
+    const StemFit& start = starts[i];
+    const double reach =
+        start.radius_m + kStartReach + start.slope.norm() * (config.highest_m - kBreastHeight);
+    std::vector<SlicePoint> near;
+    const StemAxis axis(start);
+    const double within = start.radius_m + kFitReach;
+    search.index.near(start.centre, reach, [&](std::size_t k) {
+      const SlicePoint& point = search.points[k];
+      if (search.explained[k] == 0 && axis.may_be_within(point, within) &&
+          axis.place(point).distance_m < within)
+        near.push_back(point);
+    });
+    fits[i] = fit_stem(near, start, config);
+    accepted[i] = is_stem(fits[i], cut, config) ? 1 : 0;
+    if (accepted[i] != 0) {
+      fits[i] = refine_stem(near, fits[i], config);
+      accepted[i] = is_stem_still(fits[i], config) &&
+                    is_tree(fits[i].stem, search.index, search.points, config);
+    }
+  });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    if (accepted[i] != 0) fits[kept++] = fits[i];
+  }
+  fits.resize(kept);
+  return fits;
+}
+
+void add_stems(const Cut& cut, const StemDetectorConfig& config, const StemSearchArea& where,
+               const ProgressSink& progress, Search& search) {
+  const std::vector<Ring> rings =
+      find_rings(search.points, search.explained, cut, config, where, progress);
+  std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
+  const GroundArea fitted = where.area.grown(kFitsBeyond);
+  std::erase_if(starts, [&](const StemFit& start) { return !fitted.contains(start.centre); });
+  std::vector<StemFitResult> fits = fit_starts(search, starts, cut, config, progress);
+  sort_by_support(fits);
+  for (const StemFitResult& fit : fits) {
+    const auto overlaps = [&](const StemFit& other) { return same_stem(fit.stem, other); };
+    if (std::any_of(search.stems.begin(), search.stems.end(), overlaps)) continue;
+    // A stem beside another must not live on the other's points.
+    if (unclaimed_returns(fit, search.index, search.points, search.explained) <
+        std::max(config.min_returns, fit.evidence.returns * 2 / 3)) {
+      continue;
+    }
+    search.know(fit.stem);
+  }
+}
+
+}  // namespace
+
+std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points, const StemDetectorConfig& config,
+                                  const StemSearchArea& where, const ProgressSink& progress) {
+  Search search(points);
+  for (const StemCut cut : {StemCut::kThin, StemCut::kThick})
+    add_stems(cut_of(cut, config), config, where, progress, search);
+  sort_by_place(search.stems);
+  return search.stems;
+}
+
+std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& points,
+                                         const std::vector<StemFit>& known,
+                                         const StemDetectorConfig& config,
+                                         const StemSearchArea& where,
+                                         const ProgressSink& progress) {
+  Search search(points);
+  for (const StemFit& stem : known)
+    search.know(stem);
+  add_stems(cut_of(cut, config), config, where, progress, search);
+  std::vector<StemFit> stems(search.stems.begin() + static_cast<std::ptrdiff_t>(known.size()),
+                             search.stems.end());
+  std::erase_if(stems, [&](const StemFit& stem) { return !where.area.contains(stem.centre); });
+  return stems;
+}
+
+double stem_search_reach(const StemDetectorConfig& config) {
+  const double radius = 0.5 * config.max_dbh_m;
+  return kRingsBeyond + group_reach_m(radius, std::max(kThinBand, kThickBand));
+}
+
+void sort_by_place(std::vector<StemFit>& stems) {
   std::sort(stems.begin(), stems.end(), [](const StemFit& a, const StemFit& b) {
     return a.centre.x() != b.centre.x() ? a.centre.x() < b.centre.x() : a.centre.y() < b.centre.y();
   });
-  return stems;
 }
 
 }  // namespace understory

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "understory/forest/ground_area.h"
 #include "understory/util/config/config.h"
 #include "understory/util/progress.h"
 
@@ -61,11 +62,32 @@ struct StemFit {
   std::vector<StemSlice> slices;
 };
 
+// Where stems are wanted, in the frame of the points, and where that frame begins.
+struct StemSearchArea {
+  GroundArea area;
+  Eigen::Vector2d origin = Eigen::Vector2d::Zero();
+};
+
 // Stems among the points of the slices. Points may be in any order, and come back sorted by place:
 // there are too many for a second copy. The same points give the same stems for any number of
-// threads. Stems come sorted by x, then y. Polls `progress`.
+// threads; what is far away does not matter. Stems come sorted by x, then y. Polls `progress`.
 [[nodiscard]] std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
                                                 const StemDetectorConfig& config,
+                                                const StemSearchArea& where = {},
                                                 const ProgressSink& progress = {});
+
+// The two searches that detect_stems is made of, one after the other: in thin slices, then in thick
+// ones among the points that the stems of the first do not explain. Of a cloud in tiles the second
+// has to know those of the first beyond the tile. Gives the stems with the centre in the area.
+enum class StemCut { kThin, kThick };
+[[nodiscard]] std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& points,
+                                                       const std::vector<StemFit>& known,
+                                                       const StemDetectorConfig& config,
+                                                       const StemSearchArea& where,
+                                                       const ProgressSink& progress);
+// m around the area: points so far away may matter, and stems known of the first cut.
+[[nodiscard]] double stem_search_reach(const StemDetectorConfig& config);
+// By x, then y of the centre.
+void sort_by_place(std::vector<StemFit>& stems);
 
 }  // namespace understory

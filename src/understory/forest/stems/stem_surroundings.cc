@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tuple>
+#include <optional>
 #include <utility>
 
 #include "understory/forest/stem_curve_constants.h"
@@ -29,14 +29,24 @@ double reach_at(const StemFit& stem, double height_m) {
   return stem.radius_m + kReach + kReachPerMetre * std::max(0.0, height_m - kBreastHeight);
 }
 
-std::uint64_t surrounding_cube(const SlicePoint& point) {
-  const auto part = [](float value) {
-    return static_cast<std::uint64_t>(
-               static_cast<std::int64_t>(std::floor(static_cast<double>(value) / kCube)) +
-               (1 << 20)) &
-           0x1fffff;
+constexpr std::int64_t kMiddleCube = 1 << 20;  // 21 bits each
+
+// The number of a cube; nothing where it has no room.
+std::optional<std::uint64_t> surrounding_cube(const Eigen::Array3d& in_cubes) {
+  const Eigen::Array3d number = in_cubes.floor();
+  if (!(number.abs() < static_cast<double>(kMiddleCube)).all()) return std::nullopt;
+  const auto part = [&](int axis) {
+    return static_cast<std::uint64_t>(static_cast<std::int64_t>(number[axis]) + kMiddleCube);
   };
-  return part(point.height_m) << 42 | part(point.y) << 21 | part(point.x);
+  return part(2) << 42 | part(1) << 21 | part(0);
+}
+
+SlicePoint mean_in_cube(std::uint64_t cube, const CubeMean& mean) {
+  const auto metres = [&](std::size_t axis) {
+    const auto number = static_cast<std::int64_t>(cube >> (21 * axis) & 0x1fffff) - kMiddleCube;
+    return static_cast<float>(kCube * mean.in_cubes(axis, number));
+  };
+  return {metres(0), metres(1), metres(2), mean.returns()};
 }
 
 }  // namespace
@@ -65,9 +75,9 @@ void StemSurroundings::add(const Eigen::Vector3d& point) {
     const double reach = reach_at(stems_[i], height);
     const Eigen::Vector2d off = point.head<2>() - stem_place_at(stems_[i], height);
     if (off.squaredNorm() > reach * reach) continue;
-    const SlicePoint local{static_cast<float>(point.x()), static_cast<float>(point.y()),
-                           static_cast<float>(height), 1};
-    entries_.push_back({surrounding_cube(local), i, local});
+    const Eigen::Array3d in_cubes = Eigen::Array3d(point.x(), point.y(), height) / kCube;
+    if (const auto cube = surrounding_cube(in_cubes))
+      entries_.push_back({*cube, i, CubeMean(in_cubes)});
   }
   if (entries_.size() < limit_) return;
   compact();
@@ -75,24 +85,17 @@ void StemSurroundings::add(const Eigen::Vector3d& point) {
 }
 
 void StemSurroundings::compact() {
-  const auto order = [](const Entry& e) {
-    return std::tuple(e.stem, e.cube, e.point.height_m, e.point.x, e.point.y);
-  };
-  std::sort(entries_.begin(), entries_.end(),
-            [&](const Entry& a, const Entry& b) { return order(a) < order(b); });
+  std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
+    return a.stem != b.stem ? a.stem < b.stem : a.cube < b.cube;
+  });
   std::size_t kept = 0;
   for (std::size_t i = 0; i < entries_.size();) {
-    const Entry first = entries_[i];
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    std::uint32_t returns = 0;
-    for (; i < entries_.size() && entries_[i].stem == first.stem && entries_[i].cube == first.cube;
-         ++i) {
-      const SlicePoint& p = entries_[i].point;
-      sum += static_cast<double>(p.returns) * Eigen::Vector3f(p.x, p.y, p.height_m).cast<double>();
-      returns += p.returns;
-    }
-    const Eigen::Vector3f mean = (sum / returns).cast<float>();
-    entries_[kept++] = {first.cube, first.stem, {mean.x(), mean.y(), mean.z(), returns}};
+    Entry whole = entries_[i];
+    for (++i;
+         i < entries_.size() && entries_[i].stem == whole.stem && entries_[i].cube == whole.cube;
+         ++i)
+      whole.mean.add(entries_[i].mean);
+    entries_[kept++] = whole;
   }
   entries_.resize(kept);
 }
@@ -101,7 +104,7 @@ std::vector<std::vector<SlicePoint>> StemSurroundings::take() {
   compact();
   std::vector<std::vector<SlicePoint>> points(stems_.size());
   for (const Entry& entry : entries_)
-    points[entry.stem].push_back(entry.point);
+    points[entry.stem].push_back(mean_in_cube(entry.cube, entry.mean));
   entries_ = {};
   return points;
 }

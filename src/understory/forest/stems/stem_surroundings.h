@@ -6,17 +6,19 @@
 #include <unordered_map>
 #include <vector>
 
+#include "understory/forest/cube_mean.h"
 #include "understory/forest/stems/stem_detector.h"
 
 namespace understory {
 
 // Gathers the points around each stem from the ground to the top, one per small cube (their mean,
-// with the number of returns). A point near two stems belongs to the surroundings of both.
+// with the number of returns). A point near two stems belongs to the surroundings of both. The
+// order of points changes nothing.
 class StemSurroundings {
  public:
   // `ground_m`: height of the ground at each stem, in the frame of `add`. `stems` outlive this.
   StemSurroundings(const std::vector<StemFit>& stems, std::vector<double> ground_m);
-  // A point in the frame of the stems: metres, z up.
+  // A point in the frame of the stems: metres, z up, within 20 km of its origin.
   void add(const Eigen::Vector3d& point);
   // For each stem its points by height above the ground at the stem; empties this.
   [[nodiscard]] std::vector<std::vector<SlicePoint>> take();
@@ -25,7 +27,7 @@ class StemSurroundings {
   struct Entry {
     std::uint64_t cube = 0;  // of one stem
     std::uint32_t stem = 0;
-    SlicePoint point;
+    CubeMean mean;
   };
   void compact();
 

@@ -10,6 +10,10 @@ using namespace forest_constants::thin_coverage;
 
 CoverageGrid::CoverageGrid() : counts_(kCell) {}
 
+void CoverageGrid::add(const CoverageGrid& other) {
+  counts_.merge(other.counts_, [](std::uint32_t& own, std::uint32_t cell) { own += cell; });
+}
+
 ThinCoverage CoverageGrid::thin() const {
   ThinCoverage thin;
   thin.cell_m = kCell;

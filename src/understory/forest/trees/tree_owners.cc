@@ -232,6 +232,50 @@ void TreeOwners::find(const std::vector<OwnerTree>& trees, const ProgressSink& p
     owners_.push_back(way.owner);
 }
 
+Eigen::Vector2d TreeOwners::corner_of(const Eigen::Vector2d& place) {
+  return {kVoxel * std::floor(place.x() / kVoxel), kVoxel * std::floor(place.y() / kVoxel)};
+}
+
+namespace {
+
+Eigen::Vector2d corner_of_cube(std::uint64_t key) {
+  const Cube cube = unpacked(key);
+  return {kVoxel * static_cast<double>(cube.x), kVoxel * static_cast<double>(cube.y)};
+}
+
+}  // namespace
+
+std::vector<std::uint64_t> TreeOwners::take_cubes() {
+  compact();
+  owners_.clear();
+  return std::exchange(cubes_, {});
+}
+
+void TreeOwners::add_cubes(const std::vector<std::uint64_t>& cubes, const GroundArea& area) {
+  for (const std::uint64_t cube : cubes) {
+    if (area.contains(corner_of_cube(cube))) cubes_.push_back(cube);
+  }
+}
+
+std::pair<std::vector<std::uint64_t>, std::vector<std::int32_t>> TreeOwners::owned_in(
+    const GroundArea& area) const {
+  std::pair<std::vector<std::uint64_t>, std::vector<std::int32_t>> owned;
+  for (std::size_t i = 0; i < cubes_.size(); ++i) {
+    if (!area.contains(corner_of_cube(cubes_[i]))) continue;
+    owned.first.push_back(cubes_[i]);
+    owned.second.push_back(owners_[i]);
+  }
+  return owned;
+}
+
+TreeOwners TreeOwners::of_cubes(std::vector<std::uint64_t> cubes,
+                                std::vector<std::int32_t> owners) {
+  TreeOwners result;
+  result.cubes_ = std::move(cubes);
+  result.owners_ = std::move(owners);
+  return result;
+}
+
 std::int32_t TreeOwners::owner(const Eigen::Vector2d& place, double height_m) const {
   if (!holds(place)) return kNobody;
   const std::uint64_t cube = packed(cube_at(place, height_m));

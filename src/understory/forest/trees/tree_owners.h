@@ -3,8 +3,10 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
+#include "understory/forest/ground_area.h"
 #include "understory/util/progress.h"
 
 namespace understory {
@@ -45,6 +47,20 @@ class TreeOwners {
 
   // Number of the tree that a point belongs to, kNobody if none. After `find`.
   [[nodiscard]] std::int32_t owner(const Eigen::Vector2d& place, double height_m) const;
+
+  // For clouds in tiles, where each holds the cubes whose lower corner lies in it.
+  // The lower corner of the cube that holds a place.
+  [[nodiscard]] static Eigen::Vector2d corner_of(const Eigen::Vector2d& place);
+  // The cubes by number, each once; empties this.
+  [[nodiscard]] std::vector<std::uint64_t> take_cubes();
+  // Adds those of the cubes whose lower corner lies in the area.
+  void add_cubes(const std::vector<std::uint64_t>& cubes, const GroundArea& area);
+  // The cubes of an area and their owners, after `find`.
+  [[nodiscard]] std::pair<std::vector<std::uint64_t>, std::vector<std::int32_t>> owned_in(
+      const GroundArea& area) const;
+  // The same again as a list of owners.
+  [[nodiscard]] static TreeOwners of_cubes(std::vector<std::uint64_t> cubes,
+                                           std::vector<std::int32_t> owners);
 
   [[nodiscard]] std::size_t size() const { return cubes_.size(); }
   [[nodiscard]] Voxel voxel(std::size_t i) const;

@@ -92,25 +92,31 @@ std::vector<PointSample::Point> PointSample::take() {
   return std::move(points_);
 }
 
+std::vector<char> most_doubtful(const std::vector<StemFit>& stems) {
+  std::vector<char> chosen(stems.size(), 1);
+  if (stems.size() <= kMostSheets) return chosen;
+  std::vector<std::size_t> order(stems.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+    order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return doubt_of_stem(stems[a]) > doubt_of_stem(stems[b]);
+  });
+  for (std::size_t k = kMostSheets; k < order.size(); ++k)
+    chosen[order[k]] = 0;
+  return chosen;
+}
+
 SheetCollector::SheetCollector(const std::vector<StemFit>& stems,
-                               const std::vector<SlicePoint>& slices)
+                               const std::vector<SlicePoint>& slices,
+                               const std::vector<char>& with_sheet)
     : stems_(stems), seen_(stems.size()), sheet_of_(stems.size(), -1) {
-  choose();
+  choose(with_sheet);
   look_at_slices(slices);
 }
 
-void SheetCollector::choose() {
-  std::vector<std::size_t> order(stems_.size());
-  for (std::size_t i = 0; i < order.size(); ++i)
-    order[i] = i;
-  if (order.size() > kMostSheets) {
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return doubt_of_stem(stems_[a]) > doubt_of_stem(stems_[b]);
-    });
-    order.resize(kMostSheets);
-    std::sort(order.begin(), order.end());
-  }
-  for (const std::size_t stem : order) {
+void SheetCollector::choose(const std::vector<char>& with_sheet) {
+  for (std::size_t stem = 0; stem < stems_.size(); ++stem) {
+    if (with_sheet[stem] == 0) continue;
     sheet_of_[stem] = static_cast<std::int32_t>(sheets_.size());
     sheets_.push_back(
         {stem, PointSample(kNearPoints), PointSample(kAroundPoints), PointSample(kSectionPoints)});

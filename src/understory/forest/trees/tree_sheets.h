@@ -60,12 +60,23 @@ class PointSample {
   Point last_;
 };
 
+// Sheets by the number of the stem, and from which sides each stem was seen.
+struct StemSheets {
+  std::vector<TreeSheet> sheets;
+  std::vector<SeenSides> seen;
+};
+
+// Which stems have a sheet: 3,000 at most, those whose diameters are most in doubt.
+[[nodiscard]] std::vector<char> most_doubtful(const std::vector<StemFit>& stems);
+
 // Gathers the sheets of the stems that are most in doubt, while a cloud is run through. The same
 // for any order of points. Not thread-safe.
 class SheetCollector {
  public:
-  // `stems` outlive this; `slices` are in their frame (metres).
-  SheetCollector(const std::vector<StemFit>& stems, const std::vector<SlicePoint>& slices);
+  // `stems` outlive this; `slices` are in their frame (metres). A stem has a sheet where
+  // `with_sheet` is not 0.
+  SheetCollector(const std::vector<StemFit>& stems, const std::vector<SlicePoint>& slices,
+                 const std::vector<char>& with_sheet);
 
   // A point of the column around a stem, see TreeColumns; height >= 0.
   void add(std::size_t stem, const Eigen::Vector2d& place, double height_m);
@@ -84,7 +95,7 @@ class SheetCollector {
     PointSample around;
     PointSample section;
   };
-  void choose();
+  void choose(const std::vector<char>& with_sheet);
   void look_at_slices(const std::vector<SlicePoint>& slices);
 
   const std::vector<StemFit>& stems_;

@@ -40,7 +40,7 @@ TEST(TreeSheets, TellFromWhichSidesAStemWasSeen) {
   StemFit stem = stem_at(3.0, -4.0, 0.2);
   stem.slope = {0.1, -0.05};
   const std::vector<StemFit> stems = {stem, stem_at(9.0, -4.0, 0.1)};
-  const SheetCollector collector(stems, surface_of(stem, 31, 120));
+  const SheetCollector collector(stems, surface_of(stem, 31, 120), most_doubtful(stems));
   ASSERT_EQ(collector.seen().size(), 2U);
   for (std::size_t side = 0; side < 36; ++side)
     EXPECT_EQ(collector.seen()[0].test(side), side >= 3 && side < 12) << side;
@@ -51,7 +51,7 @@ TEST(TreeSheets, ACrossSectionIsARingAlsoOfALeaningStem) {
   StemFit stem = stem_at(3.0, -4.0, 0.2);
   stem.slope = {0.2, 0.1};
   const std::vector<StemFit> stems = {stem};
-  SheetCollector collector(stems, surface_of(stem, 0, 360));
+  SheetCollector collector(stems, surface_of(stem, 0, 360), most_doubtful(stems));
   const std::vector<TreeSheet> sheets = collector.take();
   ASSERT_EQ(sheets.size(), 1U);
   ASSERT_EQ(sheets[0].section.size(), 250U) << "of 540 points within the layer";
@@ -68,8 +68,8 @@ TEST(TreeSheets, AreTheSameForAnyOrderOfPoints) {
     const double away = 0.05 + 0.2 * (i % 7);
     points.emplace_back(away * std::cos(angle), away * std::sin(angle), 0.004 * i);
   }
-  SheetCollector one(stems, {});
-  SheetCollector other(stems, {});
+  SheetCollector one(stems, {}, most_doubtful(stems));
+  SheetCollector other(stems, {}, most_doubtful(stems));
   for (const Eigen::Vector3d& p : points)
     one.add(0, p.head<2>(), p.z());
   std::reverse(points.begin(), points.end());

@@ -30,6 +30,8 @@
 #include "understory/util/error.h"
 #include "understory/util/files/output_guard.h"
 #include "understory/util/median.h"
+#include "understory/util/parallel.h"
+#include "understory/util/parallel_pieces.h"
 #include "understory/util/timing.h"
 
 namespace understory {
@@ -100,7 +102,9 @@ struct Stock {
 };
 
 // Metres from the lowest to the highest point.
-double thickness_of(const PointCloudFile& cloud) {
+double thickness_of(const StandCloud& stand) {
+  const PointCloudFile& cloud = stand.cloud;
+  if (stand.streamed) return stand.streamed->tiles->thickness_m();
   if (cloud.points.empty()) return 0.0;
   const auto lower = [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
     return a.z() < b.z();
@@ -129,7 +133,7 @@ void judge(const Stock& stock, const InventoryRequest& request, const Log& log,
   const bool any = !inventory.trees.empty();
   if (any && of_run) return;
   std::string reason = few_points_reason(any);
-  if (const double thick_m = thickness_of(stock.stand.cloud); !any && thick_m < kThinCutM)
+  if (const double thick_m = thickness_of(stock.stand); !any && thick_m < kThinCutM)
     reason += fmt::format(
         ". It is {:.2f} m thick: give --slice if it is a cut through a stand near breast height",
         thick_m);
@@ -201,11 +205,11 @@ LasOptions las_options_of(const Stock& stock) {
 }
 
 // What the intensities of a cloud are multiplied by: some formats have them from 0 to 1.
-float intensity_scale(const PointCloudFile& cloud) {
-  float most = 0.0F;
-  for (const float intensity : cloud.intensity)
+float intensity_scale(const StandCloud& stand) {
+  float most = stand.streamed ? stand.streamed->tiles->most_intensity() : 0.0F;
+  for (const float intensity : stand.cloud.intensity)
     if (intensity > most) most = intensity;
-  const bool las = cloud.format.rfind("LA", 0) == 0;
+  const bool las = stand.cloud.format.rfind("LA", 0) == 0;
   return !las && most <= 1.0F ? 65535.0F : 1.0F;
 }
 
@@ -214,39 +218,116 @@ std::uint16_t las_intensity(float intensity) {
                           : std::uint16_t{0};
 }
 
-// map.laz: the cloud with classes, the tree of each point and heights above the ground. Returns how
-// many points lie too far from the others for it.
-std::uint64_t write_labelled_cloud(const Stock& stock, const fs::path& file,
-                                   const ProgressSink& progress) {
-  const PointCloudFile& cloud = stock.stand.cloud;
-  LasOptions options = las_options_of(stock);
-  options.trees = true;
-  options.gps_week_time = cloud.gps_week_time;
-  LasWriter writer(file, options);
-  const float scale = intensity_scale(cloud);
-  std::uint64_t too_far = 0;
-  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
-    progress.poll();
-    const Eigen::Vector3d in_world = cloud.origin + cloud.points[i].cast<double>();
-    const double height = stock.inventory.ground.height_above(in_world);
-    const Eigen::Vector3d at = stock.of_run ? stock.frames.layers.from_world(in_world) : in_world;
-    if (!has_room(options, at)) {
-      ++too_far;
-      continue;
+// map.laz: the cloud with classes, the tree of each point and heights above the ground.
+class LabelledCloud {
+ public:
+  LabelledCloud(const Stock& stock, const fs::path& file)
+      : stock_(stock),
+        options_(options_of(stock)),
+        scale_(intensity_scale(stock.stand)),
+        writer_(file, options_) {}
+
+  void write_whole(const ProgressSink& progress) {
+    const PointCloudFile& cloud = stock_.stand.cloud;
+    std::vector<TilePoint> points;
+    for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+      progress.poll();
+      points.push_back({cloud.points[i], cloud.intensity.empty() ? 0.0F : cloud.intensity[i],
+                        cloud.gps_time.empty() ? 0.0 : cloud.gps_time[i]});
+      if (points.size() < kAtOnce && i + 1 < cloud.points.size()) continue;
+      write(points, cloud.origin, !cloud.gps_time.empty(), *stock_.inventory.owners);
+      points.clear();
     }
+  }
+
+  // A point belongs to the tile that holds its cube.
+  void write_tiles(const ProgressSink& progress) {
+    const StreamedCloud& streamed = *stock_.stand.streamed;
+    const std::vector<GroundArea>& tiles = streamed.tiles->tiles();
+    for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
+      const OwnerTiles* owner_tiles = stock_.inventory.owner_tiles.get();
+      const TreeOwners of_tile = owner_tiles != nullptr ? owner_tiles->owners(tile) : TreeOwners();
+      const TreeOwners& owners = owner_tiles != nullptr ? of_tile : *stock_.inventory.owners;
+      std::vector<TilePoint> here;
+      streamed.tiles->records_in(
+          tiles[tile].grown(kBesideTile), [&](std::span<const TilePoint> points) {
+            progress.poll();
+            here.clear();
+            for (const TilePoint& point : points) {
+              if (owner_tiles == nullptr || owner_tiles->holds(tile, streamed.tiles->world(point)))
+                here.push_back(point);
+            }
+            write(here, stock_.stand.cloud.origin, streamed.has_times, owners);
+          });
+    }
+  }
+
+  // Returns how many points lie too far from the others.
+  std::uint64_t commit() {
+    writer_.commit();
+    return too_far_;
+  }
+
+ private:
+  static constexpr std::size_t kAtOnce = 65'536;
+
+  static LasOptions options_of(const Stock& stock) {
+    LasOptions options = las_options_of(stock);
+    options.trees = true;
+    options.gps_week_time = stock.stand.cloud.gps_week_time;
+    return options;
+  }
+
+  void write(const std::vector<TilePoint>& points, const Eigen::Vector3d& origin, bool times,
+             const TreeOwners& owners) {
+    records_.resize(points.size());
+    parallel_for(points.size(), 4096,
+                 [&](std::size_t i) { records_[i] = record_of(points[i], origin, times, owners); });
+    for (const LasRecord& record : records_) {
+      if (has_room(options_, {record.x, record.y, record.z})) {
+        writer_.add(record);
+      } else {
+        ++too_far_;
+      }
+    }
+  }
+
+  [[nodiscard]] LasRecord record_of(const TilePoint& point, const Eigen::Vector3d& origin,
+                                    bool times, const TreeOwners& owners) const {
+    const InventoryResult& inventory = stock_.inventory;
+    const Eigen::Vector3d in_world = origin + point.place.cast<double>();
+    const double height = inventory.ground.height_above(in_world);
+    const Eigen::Vector3d at = stock_.of_run ? stock_.frames.layers.from_world(in_world) : in_world;
     LasRecord record;
     record.x = at.x();
     record.y = at.y();
     record.z = at.z();
-    if (!cloud.gps_time.empty()) record.gps_time = cloud.gps_time[i];
-    if (!cloud.intensity.empty()) record.intensity = las_intensity(scale * cloud.intensity[i]);
-    record.classification = stock.inventory.ground.las_class(height);
-    record.tree_id = tree_at(stock.inventory, in_world, height);
+    if (times) record.gps_time = point.gps_time;
+    record.intensity = las_intensity(scale_ * point.intensity);
+    record.classification = inventory.ground.las_class(height);
+    record.tree_id = tree_at(inventory, owners, in_world, height);
     record.height_above_ground = static_cast<float>(height);
-    writer.add(record);
+    return record;
   }
-  writer.commit();
-  return too_far;
+
+  const Stock& stock_;
+  LasOptions options_;
+  float scale_;
+  LasWriter writer_;
+  std::vector<LasRecord> records_;
+  std::uint64_t too_far_ = 0;
+};
+
+// Returns how many points lie too far from the others for it.
+std::uint64_t write_labelled_cloud(const Stock& stock, const fs::path& file,
+                                   const ProgressSink& progress) {
+  LabelledCloud cloud(stock, file);
+  if (stock.stand.streamed) {
+    cloud.write_tiles(progress);
+  } else {
+    cloud.write_whole(progress);
+  }
+  return cloud.commit();
 }
 
 // The frame of the layers: that of the run, or the cloud's own.
@@ -284,30 +365,48 @@ void write_tables(const InventoryRequest& request, const fs::path& results, cons
   if (asks_for_plots(request.config.stand)) write_plot_tables(results, stand);
 }
 
-void take_stock(const InventoryRequest& request, const fs::path& results, Log& log,
-                const ProgressSink& progress, StageTimes& times, Stock& stock) {
-  {
-    const ScopedTimer timer(times, "reading");
-    stock.stand = stock.of_run
-                      ? read_run_map(stock.path, stock.frames.layers, request.frame, log, progress)
-                      : read_stand(stock.path, with_system(request), log, progress);
-    name_system(request, stock);
-    stock.plots =
-        plots_of(request.config.stand,
-                 stock.of_run ? stock.frames.layers.wkt() : stock.stand.cloud.coordinate_system);
-  }
+PointBlocks points_of(const StandCloud& stand) {
+  if (!stand.streamed) return blocks_of(stand.cloud);
+  return [&stand](const PointVisitor& visit) { stand.streamed->tiles->all(visit); };
+}
+
+void read_cloud_of(const InventoryRequest& request, const fs::path& work, Log& log,
+                   const ProgressSink& progress, Stock& stock) {
+  const CloudTiling tiling{request.tiles, work, available_threads()};
+  // A cut is small, and looked at as a whole.
+  const CloudTiling* tiles = request.slice ? nullptr : &tiling;
+  stock.stand = stock.of_run ? read_run_map(stock.path, stock.frames.layers, request.frame, log,
+                                            progress, tiles)
+                             : read_stand(stock.path, with_system(request), log, progress, tiles);
+  name_system(request, stock);
+  stock.plots = plots_of(request.config.stand, stock.of_run
+                                                   ? stock.frames.layers.wkt()
+                                                   : stock.stand.cloud.coordinate_system);
   // The map of a run is in metres, and what is wrong with it is a matter of trust.
   if (!stock.stand.doubt.empty() && !stock.of_run && !request.slice)
     throw InputError(stock.path.string(), "", "expected metres and z up: " + stock.stand.doubt);
-  const PointBlocks blocks = blocks_of(stock.stand.cloud);
+}
+
+InventoryResult inventory_of(const InventoryRequest& request, const Stock& stock,
+                             const PointBlocks& blocks, const ProgressSink& progress) {
+  if (request.slice) return take_slice(blocks, stock.path.string(), request.config, progress);
+  const SeenTest seen = stock.of_run ? seen_in_run(request.cloud) : SeenTest();
+  const std::vector<Eigen::Vector3d> scanner =
+      stock.of_run ? places_in_run(request.cloud) : std::vector<Eigen::Vector3d>();
+  if (!stock.stand.streamed) return take_inventory(blocks, request.config, progress, seen, scanner);
+  return take_inventory(*stock.stand.streamed->tiles, request.config, progress, seen, scanner);
+}
+
+void take_stock(const InventoryRequest& request, const RunFolder& place, const fs::path& results,
+                Log& log, const ProgressSink& progress, StageTimes& times, Stock& stock) {
+  {
+    const ScopedTimer timer(times, "reading");
+    read_cloud_of(request, place.work(), log, progress, stock);
+  }
+  const PointBlocks blocks = points_of(stock.stand);
   {
     const ScopedTimer timer(times, "inventory");
-    stock.inventory = request.slice
-                          ? take_slice(blocks, stock.path.string(), request.config, progress)
-                          : take_inventory(blocks, request.config, progress,
-                                           stock.of_run ? seen_in_run(request.cloud) : SeenTest(),
-                                           stock.of_run ? path_of_run(request.cloud)
-                                                        : std::vector<Eigen::Vector2d>());
+    stock.inventory = inventory_of(request, stock, blocks, progress);
     if (!request.slice) take_figures(request.config.stand, stock);
   }
   const ScopedTimer timer(times, "writing");
@@ -315,7 +414,7 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
     add_to_picture(stock.picture, points, stock.inventory.ground, stock.frames.drawing());
   });
   write_tables(request, results, stock);
-  if (stock.inventory.owners) {
+  if (stock.inventory.owners || stock.inventory.owner_tiles) {
     const std::uint64_t too_far = write_labelled_cloud(stock, results / "map.laz", progress);
     if (too_far > 0)
       stock.inventory.remarks.push_back(fmt::format(
@@ -374,7 +473,7 @@ RunOutcome run_inventory(const InventoryRequest& request, Log& log, const Progre
                           is_plot_text(stand.plots) ? std::string() : stand.plots});
   const RunFolder place = RunFolder::claim(request.run_folder, request.overwrite);
   const fs::path results = place.begin_results();
-  take_stock(request, results, log, progress, times, stock);
+  take_stock(request, place, results, log, progress, times, stock);
   describe(request, stock, log, progress, documents);
   progress.poll();
   for (const std::string& remark : stock.inventory.remarks)

@@ -21,6 +21,7 @@ struct InventoryRequest {
   bool slice = false;  // the cloud is one thin cut near breast height: only diameters and places
   std::string coordinate_system;  // of a cloud that names none: "EPSG:3067" or WKT; empty: unknown
   InventoryConfig config;
+  CloudTilesConfig tiles;
   ConfigRecord config_record;  // for run.json
   std::string config_file;     // that the user named; not to be overwritten
 };

@@ -40,9 +40,9 @@ struct LidarView {
 [[nodiscard]] LidarViewFigures figures_of(const LidarView& view);
 [[nodiscard]] SeenTest seen_in_run(const std::filesystem::path& run);
 
-// Where the body was at the keyframes, in the plane of the world frame. Of the recording of a run
-// folder; empty where the folder does not tell.
-[[nodiscard]] std::vector<Eigen::Vector2d> path_of(const std::vector<Pose>& world_from_body);
-[[nodiscard]] std::vector<Eigen::Vector2d> path_of_run(const std::filesystem::path& run);
+// Where the body of the carrier was at the poses, metres, world frame; and at the keyframes of a
+// run folder, nothing where it has none.
+[[nodiscard]] std::vector<Eigen::Vector3d> places_of(const std::vector<Pose>& world_from_body);
+[[nodiscard]] std::vector<Eigen::Vector3d> places_in_run(const std::filesystem::path& run);
 
 }  // namespace understory

@@ -7,6 +7,7 @@
 #include <optional>
 #include <sstream>
 #include <utility>
+#include <vector>
 
 #include "understory/forest/cloud_shape.h"
 #include "understory/geometry/rotation_between.h"
@@ -47,16 +48,38 @@ std::string text_of(const Eigen::Vector3d& direction) {
   return fmt::format("{:.3f},{:.3f},{:.3f}", direction.x(), direction.y(), direction.z());
 }
 
-void bring_upright(const CloudFrame& frame, const std::string& name, PointCloudFile& cloud,
-                   Log& log) {
+// As the user gives unit and direction; nothing: as it is.
+std::optional<CloudMove> upright_move(const CloudFrame& frame) {
   const double unit = frame.unit_m > 0.0 ? frame.unit_m : 1.0;
   const Eigen::Matrix3d turn =
       frame.up.empty() ? Eigen::Matrix3d::Identity() : upright_from(frame.up).value();
-  if (unit == 1.0 && turn.isIdentity()) return;
+  if (unit == 1.0 && turn.isIdentity()) return std::nullopt;
   const Eigen::Matrix3d change = unit * turn;
-  cloud.origin = change * cloud.origin;
+  return CloudMove{
+      [change](const Eigen::Vector3d& origin) -> Eigen::Vector3d { return change * origin; },
+      [change](const Eigen::Vector3d&, const Eigen::Vector3f& point) -> Eigen::Vector3f {
+        return (change * point.cast<double>()).cast<float>();
+      }};
+}
+
+// From the frame of the layers to the world.
+std::optional<CloudMove> world_move(const LayerFrame& layers) {
+  if (layers.is_world()) return std::nullopt;
+  return CloudMove{
+      [&layers](const Eigen::Vector3d& origin) { return layers.to_world(origin); },
+      [&layers](const Eigen::Vector3d& origin, const Eigen::Vector3f& point) -> Eigen::Vector3f {
+        return (layers.to_world(origin + point.cast<double>()) - layers.to_world(origin))
+            .cast<float>();
+      }};
+}
+
+void move_cloud(const CloudMove& move, PointCloudFile& cloud) {
   for (Eigen::Vector3f& point : cloud.points)
-    point = (change * point.cast<double>()).cast<float>();
+    point = move.point(cloud.origin, point);
+  cloud.origin = move.origin(cloud.origin);
+}
+
+void drop_system(const std::string& name, PointCloudFile& cloud, Log& log) {
   if (cloud.coordinate_system.empty()) return;
   log.warn("inventory.frame", name +
                                   ": its coordinate system does not hold for coordinates that "
@@ -145,49 +168,69 @@ void refuse_rounded(const PointCloudFile& cloud, const std::string& name, const 
                   step_m));
 }
 
-StandCloud checked_stand(PointCloudFile cloud, const std::string& name, const CloudFrame& frame,
-                         Log& log, const ProgressSink& progress) {
-  refuse_rounded(cloud, name, frame);
-  if (cloud.not_finite > 0) {
-    log.warn("inventory.not_numbers",
-             fmt::format("{}: {} of {} points are not numbers; left out", name, cloud.not_finite,
-                         cloud.not_finite + cloud.points.size()));
+void warn_of_lost(const PointCloudFile& cloud, std::uint64_t kept, const std::string& name,
+                  Log& log) {
+  if (cloud.not_finite == 0) return;
+  log.warn("inventory.not_numbers", fmt::format("{}: {} of {} points are not numbers; left out",
+                                                name, cloud.not_finite, cloud.not_finite + kept));
+}
+
+// Reads the cloud in one piece or into tiles, moved. `layers`: of a run, null for another cloud.
+StandCloud moved_stand(const std::string& name, const CloudFrame& frame, const LayerFrame* layers,
+                       Log& log, const ProgressSink& progress, const CloudTiling* tiling) {
+  std::vector<CloudMove> moves;
+  if (layers != nullptr) {
+    if (auto move = world_move(*layers)) moves.push_back(*std::move(move));
   }
+  if (auto move = upright_move(frame)) moves.push_back(*std::move(move));
   StandCloud stand;
-  stand.cloud = std::move(cloud);
-  const std::string& own = stand.cloud.coordinate_system;
-  const std::string system = own.empty() ? frame.coordinate_system : own;
-  bring_upright(frame, name, stand.cloud, log);
-  if (frame.unit_m > 0.0 && !frame.up.empty()) return stand;
-  const PointBlocks blocks = blocks_of(stand.cloud);
-  const CloudShape shape = shape_of(polled(blocks, progress));
-  stand.doubt = doubt_of(shape, system, frame);
-  stand.suspicion = suspicion_of(shape, system, frame);
+  if (tiling != nullptr) stand.streamed = stream_cloud(name, *tiling, moves, log, progress);
+  if (stand.streamed) {
+    stand.cloud = stand.streamed->about;
+    refuse_rounded(stand.cloud, name, frame);
+    warn_of_lost(stand.cloud, stand.streamed->tiles->points(), name, log);
+    return stand;
+  }
+  stand.cloud = read_cloud(name, log, progress);
+  refuse_rounded(stand.cloud, name, frame);
+  warn_of_lost(stand.cloud, stand.cloud.points.size(), name, log);
+  for (const CloudMove& move : moves)
+    move_cloud(move, stand.cloud);
   return stand;
 }
 
-void bring_to_world(const LayerFrame& layers, PointCloudFile& cloud) {
-  if (layers.is_world()) return;
-  const Eigen::Vector3d origin = layers.to_world(cloud.origin);
-  for (Eigen::Vector3f& point : cloud.points)
-    point = (layers.to_world(cloud.origin + point.cast<double>()) - origin).cast<float>();
-  cloud.origin = origin;
-  cloud.coordinate_system.clear();
+CloudShape shape_of_stand(const StandCloud& stand, const ProgressSink& progress) {
+  if (stand.streamed) return shape_of_sample(stand.streamed->sample, stand.streamed->sample_step);
+  const PointBlocks blocks = blocks_of(stand.cloud);
+  return shape_of(polled(blocks, progress));
+}
+
+StandCloud checked_stand(const std::string& name, const CloudFrame& frame, const LayerFrame* layers,
+                         Log& log, const ProgressSink& progress, const CloudTiling* tiling) {
+  StandCloud stand = moved_stand(name, frame, layers, log, progress, tiling);
+  std::string& own = stand.cloud.coordinate_system;
+  if (layers != nullptr && !layers->is_world()) own.clear();
+  const std::string system = own.empty() ? frame.coordinate_system : own;
+  if (upright_move(frame)) drop_system(name, stand.cloud, log);
+  if (frame.unit_m > 0.0 && !frame.up.empty()) return stand;
+  const CloudShape shape = shape_of_stand(stand, progress);
+  stand.doubt = doubt_of(shape, system, frame);
+  stand.suspicion = suspicion_of(shape, system, frame);
+  if (stand.streamed) stand.streamed->sample = {};
+  return stand;
 }
 
 }  // namespace
 
 StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame, Log& log,
-                      const ProgressSink& progress) {
-  return checked_stand(read_cloud(path.string(), log, progress), path.string(), frame, log,
-                       progress);
+                      const ProgressSink& progress, const CloudTiling* tiling) {
+  return checked_stand(path.string(), frame, nullptr, log, progress, tiling);
 }
 
 StandCloud read_run_map(const std::filesystem::path& path, const LayerFrame& layers,
-                        const CloudFrame& frame, Log& log, const ProgressSink& progress) {
-  PointCloudFile cloud = read_cloud(path.string(), log, progress);
-  bring_to_world(layers, cloud);
-  return checked_stand(std::move(cloud), path.string(), frame, log, progress);
+                        const CloudFrame& frame, Log& log, const ProgressSink& progress,
+                        const CloudTiling* tiling) {
+  return checked_stand(path.string(), frame, &layers, log, progress, tiling);
 }
 
 }  // namespace understory

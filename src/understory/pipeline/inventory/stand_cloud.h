@@ -1,10 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "understory/forest/inventory.h"
 #include "understory/georeference/systems/layer_frame.h"
+#include "understory/pipeline/inventory/streamed_cloud.h"
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/progress.h"
 
@@ -28,17 +30,21 @@ struct CloudFrame {
 
 // A cloud in metres with z up, and why it may be none.
 struct StandCloud {
-  PointCloudFile cloud;
-  std::string doubt;      // empty: none
-  std::string suspicion;  // that it is in feet; empty: none
+  PointCloudFile cloud;                   // without points where they lie in tiles
+  std::optional<StreamedCloud> streamed;  // then they are there
+  std::string doubt;                      // empty: none
+  std::string suspicion;                  // that it is in feet; empty: none
 };
 // Reads a cloud and turns and scales it as `frame` says; then its coordinate system is dropped,
-// with a warning. Polls `progress`. Throws InputError where read_cloud does, and for a recording.
+// with a warning. With `tiling` a large cloud is put into tiles on disk instead. Polls `progress`.
+// Throws InputError where read_cloud does, and for a recording; see stream_cloud, too.
 [[nodiscard]] StandCloud read_stand(const std::filesystem::path& path, const CloudFrame& frame,
-                                    Log& log, const ProgressSink& progress = {});
+                                    Log& log, const ProgressSink& progress = {},
+                                    const CloudTiling* tiling = nullptr);
 // The map of a run, brought back from the frame of its layers to the world frame.
 [[nodiscard]] StandCloud read_run_map(const std::filesystem::path& path, const LayerFrame& layers,
                                       const CloudFrame& frame, Log& log,
-                                      const ProgressSink& progress = {});
+                                      const ProgressSink& progress = {},
+                                      const CloudTiling* tiling = nullptr);
 
 }  // namespace understory

@@ -30,8 +30,7 @@ class Collector {
       ++cloud_.not_finite;
       return false;
     }
-    if (cloud_.points.empty() && position.cwiseAbs().maxCoeff() > kFarFromOrigin)
-      cloud_.origin = position.array().round();
+    if (cloud_.points.empty()) cloud_.origin = cloud_origin(position);
     cloud_.points.push_back((position - cloud_.origin).cast<float>());
     return true;
   }
@@ -42,12 +41,7 @@ class Collector {
 
 PointCloudFile read_las_cloud(ByteSource& file, Log& log, const ProgressSink& progress) {
   const LasHeader header = read_las_header(file);
-  PointCloudFile cloud;
-  cloud.coordinate_system = header.coordinate_system;
-  cloud.gps_week_time = header.gps_week_time;
-  cloud.format = std::string(header.compressed ? "LAZ" : "LAS") + " 1." +
-                 std::to_string(header.version_minor) + ", point format " +
-                 std::to_string(header.point_format);
+  PointCloudFile cloud = described_by(header);
   Collector collector(cloud);
   read_las_points(file, header, log, [&](const LasPoint& point) {
     progress.poll();
@@ -61,10 +55,7 @@ PointCloudFile read_las_cloud(ByteSource& file, Log& log, const ProgressSink& pr
 
 PointCloudFile read_e57_cloud(ByteSource& file, Log& log, const ProgressSink& progress) {
   const E57Header header = read_e57_header(file);
-  PointCloudFile cloud;
-  cloud.coordinate_system = header.coordinate_system;
-  cloud.format = "E57, " + std::to_string(header.scans.size()) +
-                 (header.scans.size() == 1 ? " scan" : " scans");
+  PointCloudFile cloud = described_by(header);
   const bool intensity = header.has_intensity();
   Collector collector(cloud);
   read_e57_points(file, header, log, [&](const E57Point& point) {
@@ -105,6 +96,29 @@ PointCloudFile from_table(const CloudTable& table, const std::string& name) {
 }
 
 }  // namespace
+
+Eigen::Vector3d cloud_origin(const Eigen::Vector3d& first) {
+  if (first.cwiseAbs().maxCoeff() <= kFarFromOrigin) return Eigen::Vector3d::Zero();
+  return first.array().round();
+}
+
+PointCloudFile described_by(const LasHeader& header) {
+  PointCloudFile cloud;
+  cloud.coordinate_system = header.coordinate_system;
+  cloud.gps_week_time = header.gps_week_time;
+  cloud.format = std::string(header.compressed ? "LAZ" : "LAS") + " 1." +
+                 std::to_string(header.version_minor) + ", point format " +
+                 std::to_string(header.point_format);
+  return cloud;
+}
+
+PointCloudFile described_by(const E57Header& header) {
+  PointCloudFile cloud;
+  cloud.coordinate_system = header.coordinate_system;
+  cloud.format = "E57, " + std::to_string(header.scans.size()) +
+                 (header.scans.size() == 1 ? " scan" : " scans");
+  return cloud;
+}
 
 PointCloudFile read_cloud(ByteSource& file, Log& log, const ProgressSink& progress) {
   PointCloudFile cloud;

@@ -32,6 +32,15 @@ struct PointCloudFile {
   std::uint64_t not_finite = 0;  // points that were left out
 };
 
+// The origin of a cloud whose first point lies here: zero, or a round place near it.
+[[nodiscard]] Eigen::Vector3d cloud_origin(const Eigen::Vector3d& first);
+
+// What a header says of its cloud: format, coordinate system and times.
+struct LasHeader;
+[[nodiscard]] PointCloudFile described_by(const LasHeader& header);
+struct E57Header;
+[[nodiscard]] PointCloudFile described_by(const E57Header& header);
+
 // Whether the name ends like that of a file that can hold a map: .las, .laz, .e57, .ply, .pcd, in
 // capital letters, too. (.bin is one scan.)
 [[nodiscard]] bool has_map_name(const std::filesystem::path& path);

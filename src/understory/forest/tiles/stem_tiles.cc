@@ -1,0 +1,169 @@
+#include "understory/forest/tiles/stem_tiles.h"
+
+#include <cmath>
+#include <iterator>
+#include <span>
+#include <utility>
+
+#include "understory/forest/forest_constants.h"
+#include "understory/forest/stems/slice_thinner.h"
+#include "understory/forest/stems/stem_axis.h"
+#include "understory/forest/tiles/tile_shelf.h"
+
+namespace understory {
+namespace {
+
+using namespace forest_constants::stem_tiles;
+using forest_constants::inventory::kHighest;
+
+// Of one tile.
+struct GatheredTile {
+  CanopyCeiling ceiling;
+  CoverageGrid coverage;
+  SeenCells seen;
+  std::uint64_t points = 0;
+  std::uint64_t without_ground = 0;
+  std::uint64_t near_breast = 0;
+  std::vector<SlicePoint> slices;
+};
+
+// The points of an area, which is relative to the origin.
+std::vector<SlicePoint> points_in(const TileShelf<SlicePoint>& slices, const TiledCloud& cloud,
+                                  const Eigen::Vector3d& origin, const GroundArea& area) {
+  std::vector<SlicePoint> points;
+  for (const std::size_t tile : tiles_touching(cloud, area.moved(origin.head<2>()))) {
+    for (const SlicePoint& point : slices.copy(tile)) {
+      if (area.contains({static_cast<double>(point.x), static_cast<double>(point.y)}))
+        points.push_back(point);
+    }
+  }
+  return points;
+}
+
+class StemTiles {
+ public:
+  StemTiles(const TiledCloud& cloud, const GroundModel& ground, const Eigen::Vector3d& origin,
+            const StemDetectorConfig& config, const ProgressSink& progress)
+      : cloud_(cloud),
+        ground_(ground),
+        origin_(origin),
+        config_(config),
+        progress_(progress),
+        slices_(cloud.tiles().size(), cloud.scratch()) {}
+
+  StemHarvest run() {
+    StemHarvest harvest;
+    std::vector<GatheredTile> gathered(cloud_.tiles().size());
+    for_tiles(cloud_, [&](std::size_t tile) { gathered[tile] = gather(tile); });
+    for (std::size_t tile = 0; tile < gathered.size(); ++tile) {
+      GatheredTile& part = gathered[tile];
+      harvest.ceiling.add(part.ceiling);
+      harvest.coverage.add(part.coverage);
+      harvest.seen.add(part.seen);
+      harvest.points += part.points;
+      harvest.without_ground += part.without_ground;
+      harvest.near_breast += part.near_breast;
+    }
+    harvest.ceiling.settle();
+    if (gathered.size() == 1) {
+      harvest.slices = slices_.take(0);
+      harvest.stems = detect_stems(harvest.slices, config_, {{}, origin_.head<2>()}, progress_);
+      return harvest;
+    }
+    for (const StemCut cut : {StemCut::kThin, StemCut::kThick})
+      search(cut, harvest.stems);
+    add_shown(harvest.slices);
+    harvest.thinned = std::move(slices_);
+    return harvest;
+  }
+
+ private:
+  [[nodiscard]] GroundArea local(std::size_t tile) const {
+    return cloud_.tiles()[tile].moved(-origin_.head<2>());
+  }
+
+  GatheredTile gather(std::size_t tile) {
+    GatheredTile part;
+    SliceThinner thinner(config_.thin_m);
+    const GroundArea area = local(tile);
+    std::vector<double> heights;
+    // A cube at the border belongs to the tile that holds its corner.
+    cloud_.in(cloud_.tiles()[tile].grown(kCubeReach), [&](std::span<const Eigen::Vector3d> points) {
+      progress_.poll();
+      ground_.heights_above(points, heights);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const Eigen::Vector2d place = (points[i] - origin_).head<2>();
+        const bool here = area.contains(place);
+        const double height = heights[i];
+        part.points += here ? 1 : 0;
+        part.without_ground += here && std::isnan(height) ? 1 : 0;
+        if (here && height < config_.highest_m) part.seen.add(place, height);
+        if (!(height >= 0.0 && height <= kHighest)) continue;
+        if (here) part.ceiling.count(place, height);
+        if (here && height < config_.highest_m) part.coverage.add(place);
+        if (!(height >= config_.lowest_m && height < config_.highest_m)) continue;
+        part.near_breast += here ? 1 : 0;
+        if (area.contains(thinner.corner_of(place.x(), place.y())))
+          thinner.add(place.x(), place.y(), height);
+      }
+    });
+    slices_.put(tile, thinner.take());
+    return part;
+  }
+
+  // Adds the stems of a cut to those of the ones before.
+  void search(StemCut cut, std::vector<StemFit>& stems) {
+    std::vector<std::vector<StemFit>> found(cloud_.tiles().size());
+    const double reach = stem_search_reach(config_);
+    for_tiles(cloud_, [&](std::size_t tile) {
+      progress_.poll();
+      const GroundArea area = local(tile);
+      const GroundArea around = area.grown(reach);
+      std::vector<SlicePoint> points = points_in(slices_, cloud_, origin_, around);
+      std::vector<StemFit> known;
+      for (const StemFit& stem : stems) {
+        if (around.contains(stem.centre)) known.push_back(stem);
+      }
+      found[tile] =
+          detect_stems_in_cut(cut, points, known, config_, {area, origin_.head<2>()}, progress_);
+    });
+    for (std::vector<StemFit>& part : found)
+      stems.insert(stems.end(), std::make_move_iterator(part.begin()),
+                   std::make_move_iterator(part.end()));
+    sort_by_place(stems);
+  }
+
+  // A cloud of any size has no more than so many for the report.
+  void add_shown(std::vector<SlicePoint>& shown) {
+    for (std::size_t tile = 0; tile < cloud_.tiles().size(); ++tile) {
+      std::vector<SlicePoint> points = slices_.copy(tile);
+      std::erase_if(points, [](const SlicePoint& point) {
+        return std::abs(static_cast<double>(point.height_m) - kBreastHeight) > kShownReach;
+      });
+      const std::size_t step = points.size() * cloud_.tiles().size() / kMostShown + 1;
+      for (std::size_t i = 0; i < points.size(); i += step)
+        shown.push_back(points[i]);
+    }
+  }
+
+  const TiledCloud& cloud_;
+  const GroundModel& ground_;
+  Eigen::Vector3d origin_;
+  const StemDetectorConfig& config_;
+  const ProgressSink& progress_;
+  TileShelf<SlicePoint> slices_;
+};
+
+}  // namespace
+
+std::vector<SlicePoint> SlicesNear::in(const GroundArea& area) const {
+  return thinned_ ? points_in(*thinned_, cloud_, origin_, area) : whole_;
+}
+
+StemHarvest find_stems(const TiledCloud& cloud, const GroundModel& ground,
+                       const Eigen::Vector3d& origin, const StemDetectorConfig& config,
+                       const ProgressSink& progress) {
+  return StemTiles(cloud, ground, origin, config, progress).run();
+}
+
+}  // namespace understory

@@ -1,0 +1,173 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "understory/forest/inventory.h"
+#include "understory/forest/test_plot.h"
+#include "understory/util/parallel.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+// Points of a cloud sorted into squares; they come by tile, and backwards within a tile.
+class SortedCloud : public TiledCloud {
+ public:
+  SortedCloud(const Cloud& cloud, double tile_m, bool backwards, bool side_by_side)
+      : side_by_side_(side_by_side), scratch_(std::filesystem::temp_directory_path()) {
+    level_ = std::floor(cloud.front().z());
+    const auto number = [&](double value) { return static_cast<int>(std::floor(value / tile_m)); };
+    for (int row = -1; row < 8; ++row) {
+      for (int column = -1; column < 8; ++column) {
+        std::vector<Eigen::Vector3d> points;
+        for (const Eigen::Vector3d& point : cloud) {
+          if (number(point.x()) == column && number(point.y()) == row) points.push_back(point);
+        }
+        if (points.empty()) continue;
+        if (backwards) std::reverse(points.begin(), points.end());
+        const Eigen::Vector2d low(column * tile_m, row * tile_m);
+        tiles_.push_back({low, {(column + 1) * tile_m, (row + 1) * tile_m}});
+        points_.push_back(std::move(points));
+      }
+    }
+    if (!backwards) return;
+    std::reverse(tiles_.begin(), tiles_.end());
+    std::reverse(points_.begin(), points_.end());
+  }
+
+  [[nodiscard]] const std::vector<GroundArea>& tiles() const override { return tiles_; }
+  [[nodiscard]] bool side_by_side() const override { return side_by_side_; }
+  void all(const PointVisitor& visit) const override {
+    for (const auto& points : points_)
+      visit(points);
+  }
+  void in(const GroundArea& area, const PointVisitor& visit) const override {
+    for (const std::size_t tile : tiles_touching(*this, area))
+      visit(points_[tile]);
+  }
+  [[nodiscard]] std::optional<double> level() const override { return level_; }
+  [[nodiscard]] ScratchFile* scratch() const override { return &scratch_; }
+
+ private:
+  bool side_by_side_;
+  double level_ = 0.0;
+  mutable ScratchFile scratch_;
+  std::vector<GroundArea> tiles_;
+  std::vector<std::vector<Eigen::Vector3d>> points_;
+};
+
+// A strip of 100 m by 12 m on a slope, longer than a tile with all that is around it: stems at the
+// borders of 20 and 25 m and elsewhere, a hedge along it, undergrowth.
+const Cloud& stand() {
+  static const Cloud cloud = [] {
+    TestPlot plot(11);
+    plot.slope_x = 0.1;
+    plot.bump_m = 0.5;
+    Random random(12);
+    for (int i = 0; i < 20'000; ++i) {
+      const double x = random.uniform(0.0, 100.0);
+      const double y = random.uniform(14.0, 26.0);
+      plot.cloud.emplace_back(x, y, plot.ground(x, y) + random.normal(0.0, 0.02));
+    }
+    for (int i = 0; i < 26; ++i) {
+      TestPlot::Stem stem{2.0 + 3.8 * i + random.uniform(-1.0, 1.0), random.uniform(15.0, 25.0),
+                          random.uniform(0.06, 0.4)};
+      if (i % 5 == 1) stem.y = 20.0;  // on a border
+      if (i == 13) stem.x = 50.0;
+      stem.lean_x = random.uniform(-0.1, 0.1);
+      plot.add_stem(stem);
+    }
+    for (int i = 0; i < 24'000; ++i) {
+      const double x = random.uniform(0.0, 100.0);
+      const double y = 20.0 + 4.0 * std::sin(0.2 * x) + random.normal(0.0, 0.04);
+      plot.cloud.emplace_back(x, y, plot.ground(x, y) + random.uniform(0.3, 2.0));
+    }
+    for (int i = 0; i < 3'000; ++i) {
+      const double x = random.uniform(0.0, 100.0);
+      const double y = random.uniform(14.0, 26.0);
+      plot.cloud.emplace_back(x, y, plot.ground(x, y) + random.uniform(0.3, 4.0));
+    }
+    return plot.cloud;
+  }();
+  return cloud;
+}
+
+void expect_same(double a, double b) {
+  EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << a << " " << b;
+}
+
+void expect_same(const Raster& a, const Raster& b) {
+  ASSERT_EQ(a.columns, b.columns);
+  ASSERT_EQ(a.rows, b.rows);
+  for (std::size_t i = 0; i < a.values.size(); ++i)
+    expect_same(static_cast<double>(a.values[i]), static_cast<double>(b.values[i]));
+}
+
+void expect_same(const InventoryResult& a, const InventoryResult& b) {
+  EXPECT_EQ(a.points, b.points);
+  EXPECT_EQ(a.area_m2, b.area_m2);
+  EXPECT_EQ(a.remarks, b.remarks);
+  expect_same(a.ground.terrain, b.ground.terrain);
+  expect_same(a.canopy, b.canopy);
+  ASSERT_EQ(a.trees.size(), b.trees.size());
+  for (std::size_t i = 0; i < a.trees.size(); ++i) {
+    const Tree& one = a.trees[i];
+    const Tree& other = b.trees[i];
+    for (const auto member : {&Tree::x, &Tree::y, &Tree::z, &Tree::dbh_m, &Tree::dbh_sd_m,
+                              &Tree::height_m, &Tree::lean_deg, &Tree::x_sd_m, &Tree::y_sd_m,
+                              &Tree::stem_volume_m3, &Tree::stem_volume_sd_m3, &Tree::crown_base_m,
+                              &Tree::crown_area_m2, &Tree::crown_volume_m3})
+      expect_same(one.*member, other.*member);
+    EXPECT_EQ(one.observations, other.observations);
+    EXPECT_EQ(one.id, other.id);
+  }
+}
+
+// The tree of each point, in the order of the cloud.
+std::vector<std::uint32_t> labels_of(const InventoryResult& result, const TiledCloud* tiled) {
+  std::vector<std::uint32_t> labels(stand().size(), 0);
+  const auto label = [&](const TreeOwners& owners, std::size_t i) {
+    const Eigen::Vector3d& point = stand()[i];
+    labels[i] = tree_at(result, owners, point, result.ground.height_above(point));
+  };
+  const std::size_t tiles = tiled == nullptr ? 1 : tiled->tiles().size();
+  for (std::size_t tile = 0; tile < tiles; ++tile) {
+    const TreeOwners owners =
+        result.owner_tiles ? result.owner_tiles->owners(tile) : *result.owners;
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+      if (!result.owner_tiles || result.owner_tiles->holds(tile, stand()[i])) label(owners, i);
+    }
+  }
+  return labels;
+}
+
+TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
+  const InventoryResult whole = take_inventory(blocks_of(stand()), {});
+  EXPECT_GE(whole.trees.size(), 22U);
+  const std::vector<std::uint32_t> labels = labels_of(whole, nullptr);
+  bool backwards = false;
+  for (const double tile_m : {128.0, 50.0, 25.0, 20.3}) {
+    SCOPED_TRACE(testing::Message() << tile_m);
+    const SortedCloud tiles(stand(), tile_m, backwards, backwards);
+    const InventoryResult tiled = take_inventory(tiles, {});
+    expect_same(whole, tiled);
+    EXPECT_EQ(labels, labels_of(tiled, &tiles));
+    backwards = !backwards;
+  }
+}
+
+TEST(TiledInventory, TheSameBytesForAnyNumberOfThreads) {
+  const SortedCloud tiles(stand(), 50.0, false, true);
+  InventoryResult one;
+  InventoryResult three;
+  with_threads(1, [&] { one = take_inventory(tiles, {}); });
+  with_threads(3, [&] { three = take_inventory(tiles, {}); });
+  expect_same(one, three);
+}
+
+}  // namespace
+}  // namespace understory

@@ -1,0 +1,203 @@
+#include "understory/pipeline/inventory/cloud_tiles.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "understory/pipeline/pipeline_constants.h"
+#include "understory/util/error.h"
+
+namespace understory {
+namespace {
+
+using namespace pipeline_constants::cloud_tiles;
+
+int floor_by(std::int32_t number, int by) {
+  return number >= 0 ? number / by : -((by - 1 - number) / by);
+}
+
+// A tile of the user's size is made of whole cells.
+double cell_for(const CloudTilesConfig& config, double extent_m) {
+  if (config.size_m > 0.0) return config.size_m / std::max(1.0, std::floor(config.size_m / kCell));
+  double cell = kCell;
+  while (extent_m > kMostCellsAcross * cell)
+    cell *= 2.0;
+  return cell;
+}
+
+}  // namespace
+
+void describe(ConfigTable& table, CloudTilesConfig& config) {
+  table.add("size_m", config.size_m, {0.0, 10'000.0}, "m",
+            "edge of the tiles in which a cloud is held; 0: none where it fits into max_memory_mb, "
+            "else as large as that allows");
+  table.add("max_memory_mb", config.max_memory_mb, {400.0, 1e6}, "MB",
+            "memory that an inventory of a LAS, LAZ or E57 cloud should take: a larger cloud is "
+            "sorted into tiles on disk first");
+}
+
+CloudTiles::CloudTiles(const std::filesystem::path& folder, const CloudTilesConfig& config,
+                       double extent_m)
+    : config_(config), scratch_(folder), cell_m_(cell_for(config, extent_m)) {}
+
+CloudTiles::CellIndex CloudTiles::cell_of(const Eigen::Vector3d& point) const {
+  constexpr double kFarthest = 1e9;
+  const auto number = [&](double value) {
+    return static_cast<std::int32_t>(
+        std::clamp(std::floor(value / cell_m_), -kFarthest, kFarthest));
+  };
+  return {number(point.y()), number(point.x())};
+}
+
+GroundArea CloudTiles::area_of(const CellIndex& cell) const {
+  return {{cell_m_ * cell.second, cell_m_ * cell.first},
+          {cell_m_ * (cell.second + 1), cell_m_ * (cell.first + 1)}};
+}
+
+void CloudTiles::add(const TilePoint& point) {
+  const Eigen::Vector3d at = world(point);
+  const CellIndex index = cell_of(at);
+  if (last_ == nullptr || index != last_index_) {
+    last_ = &cells_[index];
+    last_index_ = index;
+  }
+  if (!level_) {
+    level_ = std::floor(at.z());
+    lowest_ = highest_ = point.place.z();
+  }
+  lowest_ = std::min(lowest_, point.place.z());
+  highest_ = std::max(highest_, point.place.z());
+  most_intensity_ = std::max(most_intensity_, point.intensity);
+  last_->buffer.push_back(point);
+  ++last_->points;
+  ++points_;
+  ++buffered_;
+  if (last_->buffer.size() >= kChunk) write_out(*last_);
+  if (buffered_ < kMostBuffered) return;
+  for (auto& [at_index, cell] : cells_)
+    write_out(cell);
+}
+
+void CloudTiles::write_out(Cell& cell) {
+  if (cell.buffer.empty()) return;
+  cell.parts.push_back(scratch_.append(cell.buffer.data(), cell.buffer.size() * sizeof(TilePoint)));
+  buffered_ -= cell.buffer.size();
+  std::vector<TilePoint>().swap(cell.buffer);
+}
+
+void CloudTiles::finish(int threads) {
+  for (auto& [index, cell] : cells_)
+    write_out(cell);
+  const double bytes = 1e6 * config_.max_memory_mb - kBaseBytes;
+  for (at_once_ = std::max(1, threads); at_once_ > 1; --at_once_) {
+    tile_cells_ = largest_tile(bytes / kBytesPerPoint / at_once_);
+    if (tile_cells_ * cell_m_ >= kSmallestSideBySide) break;
+  }
+  if (at_once_ == 1) tile_cells_ = largest_tile(bytes / kBytesPerPoint);
+  if (config_.size_m > 0.0) {
+    tile_cells_ = std::max(1, static_cast<int>(std::lround(config_.size_m / cell_m_)));
+    const double needed = static_cast<double>(most_points(tile_cells_)) * kBytesPerPoint;
+    at_once_ = std::clamp(static_cast<int>(bytes / std::max(1.0, needed)), 1, std::max(1, threads));
+  } else if (tile_cells_ == 0) {
+    throw ConfigError({fmt::format(
+        "tiles.max_memory_mb: expected {:.0f} at least for this cloud: so much takes a tile of "
+        "{:.0f} m of it with what is around",
+        std::ceil((static_cast<double>(most_points(1)) * kBytesPerPoint + kBaseBytes) / 1e6),
+        cell_m_)});
+  }
+  lay_tiles();
+}
+
+std::uint64_t CloudTiles::most_points(int tile_cells) const {
+  std::map<CellIndex, std::uint64_t> tiles;
+  const int around = static_cast<int>(std::ceil(kAround / cell_m_));
+  for (const auto& [index, cell] : cells_) {
+    const auto first = [&](int number) { return floor_by(number - around, tile_cells); };
+    const auto last = [&](int number) { return floor_by(number + around, tile_cells); };
+    for (int row = first(index.first); row <= last(index.first); ++row) {
+      for (int column = first(index.second); column <= last(index.second); ++column)
+        tiles[{row, column}] += cell.points;
+    }
+  }
+  std::uint64_t most = 0;
+  for (const auto& [index, count] : tiles)
+    most = std::max(most, count);
+  return most;
+}
+
+// Cells a side of the largest tile with so many points at most; 0: none.
+int CloudTiles::largest_tile(double points) const {
+  int best = 0;
+  for (int cells = 1; cells <= kMostCellsOfTile; cells = std::max(cells + 1, cells * 5 / 4)) {
+    if (static_cast<double>(most_points(cells)) > points) break;
+    best = cells;
+  }
+  return best;
+}
+
+void CloudTiles::lay_tiles() {
+  std::set<CellIndex> held;
+  for (const auto& [index, cell] : cells_)
+    held.insert({floor_by(index.first, tile_cells_), floor_by(index.second, tile_cells_)});
+  for (const auto& [row, column] : held) {
+    tiles_.push_back({area_of({row * tile_cells_, column * tile_cells_}).low,
+                      area_of({(row + 1) * tile_cells_, (column + 1) * tile_cells_}).low});
+  }
+  if (tiles_.size() == 1) tiles_ = {GroundArea()};
+}
+
+void CloudTiles::visit_cell(const Cell& cell, std::vector<TilePoint>& loaded,
+                            const RecordVisitor& visit) const {
+  for (const ScratchFile::Part& part : cell.parts) {
+    loaded.resize(part.size / sizeof(TilePoint));
+    scratch_.read(part, loaded.data());
+    visit(loaded);
+  }
+}
+
+void CloudTiles::visit_places(const Cell& cell, std::vector<TilePoint>& loaded,
+                              std::vector<Eigen::Vector3d>& places,
+                              const PointVisitor& visit) const {
+  visit_cell(cell, loaded, [&](std::span<const TilePoint> points) {
+    for (const TilePoint& point : points)
+      places.push_back(world(point));
+    if (places.size() < kBlock) return;
+    visit(places);
+    places.clear();
+  });
+}
+
+void CloudTiles::all(const PointVisitor& visit) const {
+  std::vector<TilePoint> loaded;
+  std::vector<Eigen::Vector3d> places;
+  for (const auto& [index, cell] : cells_)
+    visit_places(cell, loaded, places, visit);
+  if (!places.empty()) visit(places);
+}
+
+void CloudTiles::in(const GroundArea& area, const PointVisitor& visit) const {
+  std::vector<TilePoint> loaded;
+  std::vector<Eigen::Vector3d> places;
+  for (const auto& [index, cell] : cells_) {
+    const GroundArea own = area_of(index);
+    if (area.touches(own.low, own.high)) visit_places(cell, loaded, places, visit);
+  }
+  if (!places.empty()) visit(places);
+}
+
+void CloudTiles::records_in(const GroundArea& area, const RecordVisitor& visit) const {
+  std::vector<TilePoint> loaded;
+  for (const auto& [index, cell] : cells_) {
+    const GroundArea own = area_of(index);
+    if (area.touches(own.low, own.high)) visit_cell(cell, loaded, visit);
+  }
+}
+
+double CloudTiles::thickness_m() const {
+  return static_cast<double>(highest_ - lowest_);
+}
+
+}  // namespace understory
