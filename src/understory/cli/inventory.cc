@@ -68,6 +68,10 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_option("--crs", options->request.coordinate_system,
                       "Coordinate system of a cloud that names none, for instance EPSG:3067 (a "
                       "cloud that names its own keeps it)");
+  command->add_option("--trajectory", options->request.trajectory,
+                      "Where the scanner was, in the frame of the cloud: a TUM file. With it and "
+                      "beam.sensor, diameters are corrected for the width of the beams (of a run "
+                      "it is known)");
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
   command->add_flag("--overwrite", options->request.overwrite, kOverwriteMeaning);
   command->footer(

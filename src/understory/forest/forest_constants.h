@@ -93,6 +93,13 @@ inline constexpr double kPlaneMedians = 2.5;
 }  // namespace cloud_shape
 
 namespace inventory {  // forest/inventory.cc
+// Points in the half metre below the top of a tree whose top was seen, at least [bound: what a top
+// is called seen by]
+inline constexpr int kTopPoints = 5;
+// m: standard deviation of a height whose top was seen [chosen]
+inline constexpr double kHeightSd = 0.6;
+// m: the same where the height is a lower bound [chosen]
+inline constexpr double kBoundSd = 2.0;
 // m: edge of the cells that the area of a stand is counted in [chosen]
 inline constexpr double kAreaCell = 2.0;
 // m above the ground: higher points are no tree [bound: the tallest trees have 116 m]

@@ -59,6 +59,7 @@ void gather(const PointBlocks& cloud, const InventoryConfig& config, const Inven
 struct HeldBack {
   Eigen::Vector2f place;
   float height_m = 0.0F;
+  float over_foot_m = 0.0F;  // above the ground at the stem
   std::uint32_t tree = 0;
 };
 
@@ -78,12 +79,13 @@ void look_up(const PointBlocks& cloud, const InventoryResult& result, const Cano
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!(heights[i] >= 0.0 && heights[i] <= kHighest)) continue;
       const Eigen::Vector2d place = (points[i] - result.origin).head<2>();
-      const std::size_t tree = trees.add(place, heights[i]);
+      const std::size_t tree = trees.add(points[i] - result.origin, heights[i]);
       if (ceiling.holds(place, heights[i])) {
         canopy.add(place, heights[i]);
       } else if (tree != TreeColumns::kNone) {
+        const double over_foot = points[i].z() - result.origin.z() - trees.ground_m(tree);
         held_back.push_back({place.cast<float>(), static_cast<float>(heights[i]),
-                             static_cast<std::uint32_t>(tree)});
+                             static_cast<float>(over_foot), static_cast<std::uint32_t>(tree)});
       }
       if (details == nullptr) continue;
       details->surroundings.add(points[i] - result.origin);
@@ -97,8 +99,8 @@ void look_up(const PointBlocks& cloud, const InventoryResult& result, const Cano
 void add_trees(const std::vector<double>& tops, const std::vector<HeldBack>& held_back,
                CanopyGrid& canopy) {
   for (const HeldBack& point : held_back) {
-    const auto height = static_cast<double>(point.height_m);
-    if (height <= tops[point.tree]) canopy.add(point.place.cast<double>(), height);
+    if (static_cast<double>(point.over_foot_m) <= tops[point.tree])
+      canopy.add(point.place.cast<double>(), static_cast<double>(point.height_m));
   }
 }
 
@@ -153,6 +155,32 @@ std::vector<double> heights_in_view(const InventoryResult& result, std::vector<d
     }
   }
   return tops;
+}
+
+// How sure the heights are.
+void judge_tops(const TreeColumns& columns, InventoryResult& result) {
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    Tree& tree = result.trees[i];
+    if (std::isnan(tree.height_m)) continue;
+    const bool seen = columns.points_below(i, tree.height_m) >= kTopPoints;
+    tree.height_is_lower_bound = seen ? 0.0 : 1.0;
+    tree.height_sd_m = seen ? kHeightSd : kBoundSd;
+  }
+}
+
+// Takes away what wide beams add to the radii, and says how sure these are.
+void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3d>& scanner,
+                      InventoryResult& result) {
+  for (StemFit& stem : result.stems) {
+    Eigen::Vector3d place = result.origin;
+    place.head<2>() += stem.centre;
+    place.z() = result.ground.terrain.interpolate(place.x(), place.y()) + kBreastHeight;
+    const double range = mean_range_to(scanner, place);
+    stem.beam = footprint_at(config, range);
+    stem.radius_m -= excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
+    const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam.sd_m > 0.0);
+    stem.covariance(2, 2) = 0.25 * sd * sd;
+  }
 }
 
 // Height of the ground at each stem over the origin.
@@ -329,6 +357,7 @@ void describe(ConfigTable& table, InventoryConfig& config) {
     table.add_enum("species", config.curves.species, names,
                    "species of the stand: its taper curve stands where a stem was not seen");
   });
+  table.section("beam", [&] { describe(table, config.beam); });
   table.section("crowns", [&] { describe(table, config.crowns); });
   table.section("ground", [&] { describe(table, config.ground); });
   table.section("stems", [&] { describe(table, config.stems); });
@@ -338,7 +367,8 @@ void describe(ConfigTable& table, InventoryConfig& config) {
 }
 
 InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig& config,
-                               const ProgressSink& progress, const SeenTest& in_view) {
+                               const ProgressSink& progress, const SeenTest& in_view,
+                               const std::vector<Eigen::Vector3d>& scanner) {
   const PointBlocks cloud = polled(unasked, progress);
   const auto tell = [&](const char* stage, double done) {
     progress({stage, done, 8.0, "passes", ""});
@@ -359,12 +389,14 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
   result.slices = gathered.slices.take();
   tell("stems", 3.0);
   result.stems = detect_stems(result.slices, config.stems, progress);
+  compensate_beams(config.beam, scanner, result);
   tell("tops", 4.0);
   CanopyGrid canopy(config.canopy_cell_m);
-  TreeColumns columns(result.stems);
+  const std::vector<double> ground = ground_at_stems(result);
+  TreeColumns columns(result.stems, ground);
   const bool full = config.extent == InventoryExtent::kFull;
   std::optional<Details> details;
-  if (full) details.emplace(Details{{result.stems, ground_at_stems(result)}, {}});
+  if (full) details.emplace(Details{{result.stems, ground}, {}});
   std::vector<HeldBack> held_back;
   look_up(cloud, result, gathered.ceiling, canopy, columns, held_back, full ? &*details : nullptr);
   std::vector<double> tops;
@@ -375,6 +407,7 @@ InventoryResult take_inventory(const PointBlocks& unasked, const InventoryConfig
   result.area_m2 = area_of(result.canopy);
   judge_density(result);
   result.trees = trees_of(result, heights_in_view(result, tops, in_view));
+  judge_tops(columns, result);
   if (full) {
     tell("stem curves", 5.0);
     measure_curves(details->surroundings, config.curves, progress, result);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "understory/forest/ground/ground.h"
+#include "understory/forest/stems/beam_footprint.h"
 #include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/trees/canopy_crowns.h"
@@ -28,6 +29,7 @@ struct InventoryConfig {
   InventoryExtent extent = InventoryExtent::kFull;
   GroundConfig ground;
   StemDetectorConfig stems;
+  BeamConfig beam;
   StemCurveConfig curves;
   CanopyCrownConfig crowns;  // of a full inventory
   double canopy_cell_m = 0.5;
@@ -67,12 +69,14 @@ struct InventoryResult {
 using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
 
 // Ground, canopy, trees of a whole cloud: seven runs through it. With a test of what was in view,
-// trees that may go on above it have no height. Deterministic for any number of threads. Throws
-// Stopped.
+// trees that may go on above it have no height. With places where the scanner was (world frame,
+// metres) diameters are corrected for the width of its beams. Deterministic for any number of
+// threads. Throws Stopped.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,
                                              const ProgressSink& progress = {},
-                                             const SeenTest& in_view = {});
+                                             const SeenTest& in_view = {},
+                                             const std::vector<Eigen::Vector3d>& scanner = {});
 
 // The id of the tree that a point of the cloud belongs to, 0 if none; of a full inventory.
 // `height_m` is its height above the ground.

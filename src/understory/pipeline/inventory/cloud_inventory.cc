@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "understory/evaluation/trajectory.h"
 #include "understory/forest/slice_inventory.h"
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/inventory_files.h"
@@ -243,6 +244,16 @@ std::uint64_t write_labelled_cloud(const Stock& stock, const fs::path& file,
   return too_far;
 }
 
+// Where the scanner was: by the file that the user names, else by the run.
+std::vector<Eigen::Vector3d> scanner_places(const InventoryRequest& request, const Stock& stock) {
+  if (request.trajectory.empty())
+    return stock.of_run ? places_in_run(request.cloud) : std::vector<Eigen::Vector3d>();
+  std::vector<Eigen::Vector3d> places;
+  for (const StampedPose& pose : read_trajectory(request.trajectory))
+    places.push_back(pose.world_from_body.translation());
+  return places;
+}
+
 void take_stock(const InventoryRequest& request, const fs::path& results, Log& log,
                 const ProgressSink& progress, StageTimes& times, Stock& stock) {
   {
@@ -261,7 +272,8 @@ void take_stock(const InventoryRequest& request, const fs::path& results, Log& l
     stock.inventory = request.slice
                           ? take_slice(blocks, stock.path.string(), request.config, progress)
                           : take_inventory(blocks, request.config, progress,
-                                           stock.of_run ? seen_in_run(request.cloud) : SeenTest());
+                                           stock.of_run ? seen_in_run(request.cloud) : SeenTest(),
+                                           scanner_places(request, stock));
   }
   const ScopedTimer timer(times, "writing");
   polled(blocks, progress)([&](std::span<const Eigen::Vector3d> points) {

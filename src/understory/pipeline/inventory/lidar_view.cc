@@ -106,4 +106,19 @@ SeenTest seen_in_run(const std::filesystem::path& run) {
   return seen_from(view, poses);
 }
 
+std::vector<Eigen::Vector3d> places_of(const std::vector<Pose>& world_from_body) {
+  std::vector<Eigen::Vector3d> places;
+  for (const Pose& pose : world_from_body)
+    places.push_back(pose.translation());
+  return places;
+}
+
+std::vector<Eigen::Vector3d> places_in_run(const std::filesystem::path& run) {
+  if (!std::filesystem::exists(run / "keyframes.tum")) return {};
+  std::vector<Eigen::Vector3d> places;
+  for (const auto& pose : read_trajectory(run / "keyframes.tum"))
+    places.push_back(pose.world_from_body.translation());
+  return places;
+}
+
 }  // namespace understory

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <filesystem>
 #include <vector>
@@ -39,5 +40,10 @@ struct LidarView {
 // recording of a run folder. Empty where the folder does not tell.
 [[nodiscard]] LidarViewFigures figures_of(const LidarView& view);
 [[nodiscard]] SeenTest seen_in_run(const std::filesystem::path& run);
+
+// Where the body of the carrier was at the poses, metres, world frame; and at the keyframes of a
+// run folder, nothing where it has none.
+[[nodiscard]] std::vector<Eigen::Vector3d> places_of(const std::vector<Pose>& world_from_body);
+[[nodiscard]] std::vector<Eigen::Vector3d> places_in_run(const std::filesystem::path& run);
 
 }  // namespace understory

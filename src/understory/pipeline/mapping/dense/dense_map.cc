@@ -53,9 +53,9 @@ class DenseMap : public MapMaker {
     if (!made_.tiles) return;
     const ScopedTimer timer(front_end_.times(), "finish_inventory");
     const LidarView view = learn_view(front_end_.clouds(), front_end_.rig().body_from_lidar);
-    made_.inventory =
-        take_inventory(blocks_of(*made_.tiles), front_end_.config().inventory, recording_.progress,
-                       seen_from(view, poses_of(front_end_.map().keyframes())));
+    const std::vector<Pose> poses = poses_of(front_end_.map().keyframes());
+    made_.inventory = take_inventory(blocks_of(*made_.tiles), front_end_.config().inventory,
+                                     recording_.progress, seen_from(view, poses), places_of(poses));
     made_.lidar_view = figures_of(view);
     if (front_end_.counts().imu_samples == 0)
       made_.not_upright =
