@@ -2,9 +2,9 @@
 // their stems kept, so that a change of the fit is measured on thousands of stems within seconds.
 //   stem_sizes gather SENSOR TRUTH FILE   stems of TRUTH/points.laz and the points around them
 //   stem_sizes fit FILE [FILE ...]        fits them; prints a table (CSV) with a row for each stem
-// TRUTH is the folder of `understory simulate --set truth.points=true`, SENSOR a name of the setting
-// beam.sensor ("unknown": no footprints). Stems within 30 m of the true path are taken that stand
-// within 0.5 m of a true tree. benchmarks/stem_sizes.py fits the constants of diameter_sd_m.
+// TRUTH is the folder of `understory simulate --set truth.points=true`, SENSOR a name of the
+// setting beam.sensor ("unknown": no footprints). Stems within 30 m of the true path are taken that
+// stand within 0.5 m of a true tree. benchmarks/stem_sizes.py fits the constants of diameter_sd_m.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -166,7 +166,8 @@ int main(int argc, char** argv) {
   if (mode == "gather" && argc == 5 && kSensors.count(argv[2]) > 0) {
     gather(kSensors.at(argv[2]), argv[3], argv[4]);
   } else if (mode == "fit") {
-    std::printf("cloud,sensor,path_m,range_m,true_m,dbh_m,excess_m,spread_m,arc_deg,returns,scatter_m\n");
+    std::printf(
+        "cloud,sensor,path_m,range_m,true_m,dbh_m,excess_m,spread_m,arc_deg,returns,scatter_m\n");
     for (int i = 2; i < argc; ++i)
       fit(argv[i]);
   } else {

@@ -52,19 +52,21 @@ double chance_at(double across_m, double radius_m, const BeamFootprint& beam) {
 }  // namespace
 
 void describe(ConfigTable& table, BeamConfig& config) {
-  table.add_enum("sensor", config.sensor,
-                 {{"unknown", LidarSensor::kUnknown},
-                  {"OS0", LidarSensor::kOs0},
-                  {"OS1", LidarSensor::kOs1},
-                  {"VLP-16", LidarSensor::kVlp16},
-                  {"VLP-32C", LidarSensor::kVlp32}},
-                 "lidar whose wide beams the diameters are corrected for; needs to know where it was");
+  table.add_enum(
+      "sensor", config.sensor,
+      {{"unknown", LidarSensor::kUnknown},
+       {"OS0", LidarSensor::kOs0},
+       {"OS1", LidarSensor::kOs1},
+       {"VLP-16", LidarSensor::kVlp16},
+       {"VLP-32C", LidarSensor::kVlp32}},
+      "lidar whose wide beams the diameters are corrected for; needs to know where it was");
   table.add("divergence_mrad", config.divergence_mrad, {0.0, 20.0}, "mrad",
             "full width of a beam, 0: that of the sensor");
   table.add("exit_m", config.exit_m, {0.0, 0.1}, "m",
             "width of a beam at the sensor, 0: that of the sensor");
-  table.add("reach_m", config.reach_m, {0.0, 1000.0}, "m",
-            "distance at which half of the echoes of a surface of 10 % return, 0: that of the sensor");
+  table.add(
+      "reach_m", config.reach_m, {0.0, 1000.0}, "m",
+      "distance at which half of the echoes of a surface of 10 % return, 0: that of the sensor");
 }
 
 BeamFootprint footprint_at(const BeamConfig& config, double range_m) {
@@ -106,9 +108,8 @@ double diameter_sd_m(double spread_m, double arc_deg, double range_m, bool compe
   const double tens = 0.1 * range_m;
   if (compensated)
     return std::hypot(kKnownSpread * spread, kKnownLeastSd, kKnownRangeSd * tens * tens);
-  return std::hypot(
-      std::hypot(kWideSpread * spread, kWideLeastSd, kWideRangeSd * tens * tens),
-      kWideOneSided * one_sided * tens);
+  return std::hypot(std::hypot(kWideSpread * spread, kWideLeastSd, kWideRangeSd * tens * tens),
+                    kWideOneSided * one_sided * tens);
 }
 
 double excess_radius_m(const BeamFootprint& beam, double radius_m, double arc_deg) {

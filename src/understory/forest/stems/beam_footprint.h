@@ -28,8 +28,8 @@ struct BeamFootprint {
 // Of beams that come from `range_m` away; nothing where the range or the beams are not known (0).
 [[nodiscard]] BeamFootprint footprint_at(const BeamConfig& config, double range_m);
 
-// From how far away a place was seen from `scanner` (where the scanner was, metres, the frame of the
-// place), on average over the returns, whose number falls with the square of the distance. What
+// From how far away a place was seen from `scanner` (where the scanner was, metres, the frame of
+// the place), on average over the returns, whose number falls with the square of the distance. What
 // stands in between is not looked at. 0 without places.
 [[nodiscard]] double mean_range_to(const std::vector<Eigen::Vector3d>& scanner,
                                    const Eigen::Vector3d& place);

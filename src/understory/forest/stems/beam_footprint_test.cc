@@ -77,8 +77,9 @@ TEST(BeamFootprint, AStemThatWasSeenAllAroundKeepsItsRadius) {
 TEST(BeamFootprint, DiametersAreSurerNearByAndWithKnownBeams) {
   const double near = diameter_sd_m(0.001, 180.0, 5.0, true);
   const double far = diameter_sd_m(0.001, 180.0, 20.0, true);
-  EXPECT_NEAR(near, std::sqrt(std::pow(2.8 * 0.002, 2) + std::pow(0.0042, 2) +
-                              std::pow(0.0035 * 0.25, 2)), 1e-9);
+  EXPECT_NEAR(
+      near, std::sqrt(std::pow(2.8 * 0.002, 2) + std::pow(0.0042, 2) + std::pow(0.0035 * 0.25, 2)),
+      1e-9);
   EXPECT_LT(near, far);
   EXPECT_LT(far, diameter_sd_m(0.001, 180.0, 20.0, false));
   // Not known from where: the part that was not seen stands for the distance.
