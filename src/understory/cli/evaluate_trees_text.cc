@@ -51,15 +51,15 @@ constexpr std::array kClassColumns = {
 };
 
 // Columns that no class tells are left out, and so are figures that a class does not tell.
-std::string classes_text(const std::vector<DiameterClass>& classes) {
+std::string classes_text(const std::vector<ErrorsOfClass>& classes) {
   if (classes.empty()) return {};
   constexpr int kWidth = 12;
   std::vector<std::string> lines = {fmt::format("{:<16}{:>8}{:>8}", "diameter, m", "of A", "of B")};
-  for (const DiameterClass& each : classes)
+  for (const ErrorsOfClass& each : classes)
     lines.push_back(fmt::format("{:>5.2f} to {:<7.2f}{:>8}{:>8}", each.from_m, each.to_m,
                                 each.errors.trees_a, each.errors.trees_b));
   for (const ClassColumn& column : kClassColumns) {
-    const auto told = [&](const DiameterClass& each) {
+    const auto told = [&](const ErrorsOfClass& each) {
       return std::isfinite(each.errors.*column.figure);
     };
     if (std::none_of(classes.begin(), classes.end(), told)) continue;
@@ -113,7 +113,7 @@ nlohmann::ordered_json comparison_json(const TreeComparison& result, const TreeO
   }
   json["matching"] = options.matching;
   add_errors(json, result.all);
-  for (const DiameterClass& each : result.by_diameter) {
+  for (const ErrorsOfClass& each : result.by_diameter) {
     nlohmann::ordered_json row = {{"from_m", each.from_m}, {"to_m", each.to_m}};
     add_errors(row, each.errors);
     json["by_diameter"].push_back(row);

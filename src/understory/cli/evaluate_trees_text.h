@@ -36,7 +36,7 @@ struct TreeOptions {
 struct TreeComparison {
   std::optional<Pose> b_from_a;  // found by --align
   TreeErrors all;
-  std::vector<DiameterClass> by_diameter;
+  std::vector<ErrorsOfClass> by_diameter;
   std::optional<VisibleTreeErrors> visible;
   std::optional<MapAgreement> agreement;
   std::vector<DistanceRate> by_distance;

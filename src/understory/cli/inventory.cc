@@ -84,6 +84,10 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
         options->settings.push_back("tiles.max_memory_mb=" + mb);
       },
       "Memory to take, as tiles.max_memory_mb: a larger cloud is held in tiles on disk");
+  command->add_option("--trajectory", options->request.trajectory,
+                      "Where the scanner was, in the frame of the cloud: a TUM file. With it and "
+                      "beam.sensor, diameters are corrected for the width of the beams (of a run "
+                      "it is known)");
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
   command->add_flag("--overwrite", options->request.overwrite, kOverwriteMeaning);
   command->footer(

@@ -129,7 +129,7 @@ TreeErrors compare_trees(const std::vector<Tree>& a, const std::vector<Tree>& b,
   return errors_of_pairs(a, b, match_trees(a, b, radius_m));
 }
 
-std::vector<DiameterClass> errors_by_diameter(const std::vector<Tree>& a,
+std::vector<ErrorsOfClass> errors_by_diameter(const std::vector<Tree>& a,
                                               const std::vector<Tree>& b,
                                               const std::vector<TreePair>& pairs, double width_m) {
   const std::vector<int> class_of_a = classes_of(a, width_m);
@@ -141,7 +141,7 @@ std::vector<DiameterClass> errors_by_diameter(const std::vector<Tree>& a,
   const auto groups = static_cast<std::size_t>(last + 1);
   const std::vector<TreeErrors> errors =
       errors_by_group(a, b, pairs, class_of_a, class_of_b, groups);
-  std::vector<DiameterClass> result;
+  std::vector<ErrorsOfClass> result;
   for (std::size_t k = 0; k < groups; ++k) {
     if (errors[k].trees_a + errors[k].trees_b == 0) continue;
     const auto from = static_cast<double>(k);

@@ -66,14 +66,14 @@ struct TreeErrors {
                                        double radius_m);
 
 // Trees of one class of diameter. A tree without a diameter is in none.
-struct DiameterClass {
+struct ErrorsOfClass {
   double from_m = 0.0;  // within the class
   double to_m = 0.0;    // not within it
   TreeErrors errors;
 };
 // Classes that are `width_m` wide and hold a tree, thin ones first. Throws InputError where there
 // would be more than a thousand.
-[[nodiscard]] std::vector<DiameterClass> errors_by_diameter(const std::vector<Tree>& a,
+[[nodiscard]] std::vector<ErrorsOfClass> errors_by_diameter(const std::vector<Tree>& a,
                                                             const std::vector<Tree>& b,
                                                             const std::vector<TreePair>& pairs,
                                                             double width_m);

@@ -60,7 +60,11 @@ Tree joined(const Tree& a, const Tree& b) {
     tree.dbh_m = other.dbh_m;
     tree.dbh_sd_m = other.dbh_sd_m;
   }
-  if (!std::isfinite(tree.height_m)) tree.height_m = other.height_m;
+  if (!std::isfinite(tree.height_m)) {
+    tree.height_m = other.height_m;
+    tree.height_sd_m = other.height_sd_m;
+    tree.height_is_lower_bound = other.height_is_lower_bound;
+  }
   return tree;
 }
 

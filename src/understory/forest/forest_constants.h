@@ -93,6 +93,13 @@ inline constexpr double kPlaneMedians = 2.5;
 }  // namespace cloud_shape
 
 namespace inventory {  // forest/inventory.cc
+// Points in the half metre below the top of a tree whose top was seen, at least [bound: what a top
+// is called seen by]
+inline constexpr int kTopPoints = 5;
+// m: standard deviation of a height whose top was seen [chosen]
+inline constexpr double kHeightSd = 0.6;
+// m: the same where the height is a lower bound [chosen]
+inline constexpr double kBoundSd = 2.0;
 // m: edge of the cells that the area of a stand is counted in [chosen]
 inline constexpr double kAreaCell = 2.0;
 // m above the ground: higher points are no tree [bound: the tallest trees have 116 m]
@@ -216,12 +223,15 @@ inline constexpr double kBranch = 0.35;
 inline constexpr double kWideQuantile = 0.9;
 // Of that width: narrower layers are no crown yet [chosen]
 inline constexpr double kBaseShare = 0.35;
-// Layers at the base of a crown ... [chosen]
-inline constexpr int kBaseLayers = 5;
-// ... and how many of them are wide [chosen]
-inline constexpr int kLeastWideLayers = 3;
+// Part of the layers from below, in which bushes may be wider than the crown: one of so many
+// [chosen]
+inline constexpr std::size_t kLowParts = 3;
+// Layers down to the next wide one that a crown may have between its own [chosen]
+inline constexpr std::size_t kBaseGap = 3;
 // Share of the cubes in a direction that lie within the edge of the crown [chosen]
 inline constexpr double kEdgeQuantile = 0.97;
+// The same of the outline of the whole crown [tuned on random seed 1: 0.97 to 1 were tried]
+inline constexpr double kOutlineQuantile = 0.99;
 }  // namespace tree_crowns
 
 namespace canopy_crowns {  // forest/trees/canopy_crowns.cc

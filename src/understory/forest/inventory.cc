@@ -69,6 +69,32 @@ double height_in_view(const InventoryResult& result, const StemFit& stem, double
   return in_view(above) ? height : std::numeric_limits<double>::quiet_NaN();
 }
 
+// How sure the heights are. `points`: of each stem in the half metre below its top.
+void judge_tops(const std::vector<int>& points, InventoryResult& result) {
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    Tree& tree = result.trees[i];
+    if (std::isnan(tree.height_m)) continue;
+    const bool seen = points[i] >= kTopPoints;
+    tree.height_is_lower_bound = seen ? 0.0 : 1.0;
+    tree.height_sd_m = seen ? kHeightSd : kBoundSd;
+  }
+}
+
+// Takes away what wide beams add to the radii, and says how sure these are.
+void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3d>& scanner,
+                      InventoryResult& result) {
+  for (StemFit& stem : result.stems) {
+    Eigen::Vector3d place = result.origin;
+    place.head<2>() += stem.centre;
+    place.z() = result.ground.terrain.interpolate(place.x(), place.y()) + kBreastHeight;
+    const double range = mean_range_to(scanner, place);
+    stem.beam = footprint_at(config, range);
+    stem.radius_m -= excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
+    const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam.sd_m > 0.0);
+    stem.covariance(2, 2) = 0.25 * sd * sd;
+  }
+}
+
 void add_volumes(InventoryResult& result) {
   for (std::size_t i = 0; i < result.curves.size(); ++i) {
     result.trees[i].stem_volume_m3 = result.curves[i].volume_m3;
@@ -238,6 +264,7 @@ void describe(ConfigTable& table, InventoryConfig& config) {
     table.add_enum("species", config.curves.species, names,
                    "species of the stand: its taper curve stands where a stem was not seen");
   });
+  table.section("beam", [&] { describe(table, config.beam); });
   table.section("crowns", [&] { describe(table, config.crowns); });
   table.section("ground", [&] { describe(table, config.ground); });
   table.section("stems", [&] { describe(table, config.stems); });
@@ -264,10 +291,8 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
   };
   const bool full = config.extent == InventoryExtent::kFull;
   const SlicesNear slices(result.slices, gathered.thinned, cloud, result.origin);
-  const CrownTask task{cloud,        result.ground,
-                       result.origin, result.stems,
-                       slices,       gathered.ceiling,
-                       config.stems.highest_m, full,
+  const CrownTask task{cloud,         result.ground,    result.origin,          result.stems,
+                       slices,        gathered.ceiling, config.stems.highest_m, full,
                        config.curves, progress};
   tell("tops", 4.0);
   const auto listed = [&](std::size_t i, double top) {
@@ -282,6 +307,7 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
   for (std::size_t i = 0; i < result.stems.size(); ++i)
     heights.push_back(listed(i, tops.top_m[i]));
   result.trees = trees_of(result, heights);
+  judge_tops(tops.top_points, result);
   if (full) {
     result.curves = std::move(tops.curves);
     add_volumes(result);
@@ -323,6 +349,7 @@ InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& c
   result.points = gathered.points;
   result.slices = std::move(gathered.slices);
   result.stems = std::move(gathered.stems);
+  compensate_beams(config.beam, scanner, result);
   result.thin = gathered.coverage.thin();
   measure_above(cloud, config, progress, {in_view, scanner}, gathered, result);
   remark(gathered, config, result);

@@ -11,6 +11,7 @@
 #include "understory/forest/ground/ground.h"
 #include "understory/forest/stand/seen_area.h"
 #include "understory/forest/stand/stand_config.h"
+#include "understory/forest/stems/beam_footprint.h"
 #include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/tiles/crown_tiles.h"
@@ -36,6 +37,7 @@ struct InventoryConfig {
   InventoryExtent extent = InventoryExtent::kFull;
   GroundConfig ground;
   StemDetectorConfig stems;
+  BeamConfig beam;
   StemCurveConfig curves;
   CanopyCrownConfig crowns;  // of a full inventory
   StandTableConfig stand;
@@ -85,8 +87,8 @@ using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
 
 // Ground, canopy, trees of a whole cloud: six runs through it. With a test of what was in view,
 // trees that may go on above it have no height. `scanner`: where it was, metres, world frame; with
-// it only what is in its sight counts as seen. Deterministic for any number of threads. Throws
-// Stopped.
+// it only what is in its sight counts as seen, and diameters are corrected for the width of its
+// beams. Deterministic for any number of threads. Throws Stopped.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,
                                              const ProgressSink& progress = {},

@@ -258,6 +258,50 @@ inline constexpr double kThinTryArc = 0.5;
 inline constexpr double kThinStrays = 0.05;
 }  // namespace stem_fit
 
+namespace beam_footprint {  // forest/stems/beam_footprint.cc
+// Reflectivity of bark [tuned like kOneSided; conifers have 0.2 to 0.45, birch 0.5 to 0.75]
+inline constexpr double kBark = 0.5;
+// Cosine of incidence at least: bark is rough [chosen]
+inline constexpr double kLeastCosine = 0.08;
+// Part of a beam that has to be on the stem for half of the echoes to be its own: with less, what
+// lies behind is stronger [tuned with kOneSided: 0.1, 0.15 and 0.2 were tried]
+inline constexpr double kLeastPart = 0.1;
+// Of the excess of the width, that of the radius of a stem seen from one side; twice as much as at
+// half a circumference [tuned on random seeds 1 to 5, 8 to 10, 12 to 16, 18; true poses]
+inline constexpr double kOneSided = 1.4;
+// Radii: a correction is no larger [chosen]
+inline constexpr double kMostShare = 0.4;
+// Standard deviation of a diameter. Of a stem whose beams are compensated: times the spread of the
+// fit ... [tuned: benchmarks/stem_sizes.py]
+inline constexpr double kKnownSpread = 2.8;
+// ... m at least ... [tuned likewise]
+inline constexpr double kKnownLeastSd = 0.0042;
+// ... and m at 10 m, growing with the square of the range [tuned likewise]
+inline constexpr double kKnownRangeSd = 0.0035;
+// Of one whose beams are not known: times the spread ... [tuned likewise]
+inline constexpr double kWideSpread = 2.6;
+// ... m at least ... [tuned likewise]
+inline constexpr double kWideLeastSd = 0.0049;
+// ... m at 10 m, growing with the square of the range ... [tuned likewise]
+inline constexpr double kWideRangeSd = 0.0043;
+// ... and m at 10 m, times the part of the circumference that was not seen [tuned likewise]
+inline constexpr double kWideOneSided = 0.018;
+// Of one whose range is not known, either: times the spread ... [tuned likewise]
+inline constexpr double kBareSpread = 6.0;
+// ... m at least ... [tuned likewise]
+inline constexpr double kBareLeastSd = 0.003;
+// ... and m times the part of the circumference that was not seen [tuned likewise]
+inline constexpr double kBareOneSided = 0.024;
+// Steps over half of a beam [bound: 0.1 mm]
+inline constexpr int kBeamSteps = 16;
+// Standard deviations that a beam reaches to each side [bound: 1 % is farther out]
+inline constexpr double kBeamReach = 2.6;
+// Steps from the centre line to where no beam meets the stem [bound: 0.1 mm]
+inline constexpr int kAcrossSteps = 100;
+// m: nearer places of the scanner count as this far [bound: the mean stays finite]
+inline constexpr double kNearest = 0.5;
+}  // namespace beam_footprint
+
 namespace noisy_cylinder {  // forest/stems/noisy_cylinder.cc
 // m: scatter of ranges at least [bound: noise of lidars]
 inline constexpr double kLeastScatter = 0.004;

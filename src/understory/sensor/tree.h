@@ -15,10 +15,13 @@ struct Tree {
   int id = 0;
   double x = 0.0;  // centre line of the stem at the ground, metres
   double y = 0.0;
-  double z = 0.0;              // ground at the stem, metres
-  double dbh_m = kUnknown;     // diameter 1.3 m above the ground
-  double dbh_sd_m = kUnknown;  // its standard deviation
-  double height_m = kUnknown;  // highest point above the ground
+  double z = 0.0;                 // ground at the stem, metres
+  double dbh_m = kUnknown;        // diameter 1.3 m above the ground
+  double dbh_sd_m = kUnknown;     // its standard deviation
+  double height_m = kUnknown;     // highest point above the ground
+  double height_sd_m = kUnknown;  // its standard deviation
+  // 1 where the top was hardly seen, so that the tree may be higher; 0 where it was seen.
+  double height_is_lower_bound = kUnknown;
   double lean_deg = kUnknown;  // from the vertical
   int observations = 0;        // returns (or views, in a sparse map) that support the stem
   double x_sd_m = kUnknown;    // standard deviation of x
@@ -47,6 +50,8 @@ inline constexpr std::array kTreeColumns = {
     TreeColumn{"dbh_m", &Tree::dbh_m, 4, false},
     TreeColumn{"dbh_sd_m", &Tree::dbh_sd_m, 4, false},
     TreeColumn{"height_m", &Tree::height_m, 2, false},
+    TreeColumn{"height_sd_m", &Tree::height_sd_m, 2, false},
+    TreeColumn{"height_is_lower_bound", &Tree::height_is_lower_bound, 0, false},
     TreeColumn{"lean_deg", &Tree::lean_deg, 2, false},
     TreeColumn{"observations", &Tree::observations, 0, false},
     TreeColumn{"x_sd_m", &Tree::x_sd_m, 4, false},

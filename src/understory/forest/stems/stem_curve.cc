@@ -25,6 +25,7 @@ struct FittedSection {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   double radius_m = 0.0;
   double sd_m = 0.0;
+  double arc_deg = 360.0;
 };
 
 // What speaks for a fitted section: points of the window about its surface.
@@ -142,7 +143,7 @@ class Tracker {
     if (seen.on < kFewestPoints || seen.arc_deg < kLeastArcDeg ||
         seen.inside > kMostInside * seen.on)
       return std::nullopt;
-    return FittedSection{guess.height_m, found.centre, found.radius_m, sd};
+    return FittedSection{guess.height_m, found.centre, found.radius_m, sd, seen.arc_deg};
   }
 
   static constexpr NoisyCylinderConfig kForm{};
@@ -279,6 +280,25 @@ void add_volume(StemCurve& curve) {
   curve.volume_sd_m3 = sd;
 }
 
+// All sections upwards, without the part of their radii that wide beams add.
+std::vector<FittedSection> sections_of(const std::vector<SlicePoint>& points, const StemFit& stem,
+                                       double top_m) {
+  std::vector<FittedSection> rings;
+  Tracker tracker(points, stem);
+  tracker.follow(-kStep, kLowest, rings);
+  std::reverse(rings.begin(), rings.end());
+  std::vector<FittedSection> above;
+  tracker.follow(kStep, top_m - kStep, above);
+  for (std::vector<FittedSection>* part : {&rings, &above}) {
+    for (FittedSection& ring : *part)
+      ring.radius_m -= excess_radius_m(stem.beam, ring.radius_m, ring.arc_deg);
+  }
+  rings.push_back({kBreastHeight, stem.centre, stem.radius_m,
+                   std::sqrt(std::max(0.0, stem.covariance(2, 2))) + kMapError});
+  rings.insert(rings.end(), above.begin(), above.end());
+  return rings;
+}
+
 }  // namespace
 
 StemCurve measure_stem_curve(std::vector<SlicePoint> points, const StemFit& stem, double height_m,
@@ -288,14 +308,7 @@ StemCurve measure_stem_curve(std::vector<SlicePoint> points, const StemFit& stem
   });
   const double highest = points.empty() ? 0.0 : static_cast<double>(points.back().height_m);
   const double top = std::isfinite(height_m) ? height_m : highest;
-  std::vector<FittedSection> rings;
-  Tracker tracker(points, stem);
-  tracker.follow(-kStep, kLowest, rings);
-  std::reverse(rings.begin(), rings.end());
-  rings.push_back({kBreastHeight, stem.centre, stem.radius_m,
-                   std::sqrt(std::max(0.0, stem.covariance(2, 2))) + kMapError});
-  tracker.follow(kStep, top - kStep, rings);
-
+  std::vector<FittedSection> rings = sections_of(points, stem, top);
   StemCurve curve;
   // Without a height the form serves as an outline only: it ends well above what was seen.
   const double outline = std::isfinite(height_m) ? height_m : kUnknownTop * rings.back().height_m;

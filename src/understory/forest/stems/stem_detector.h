@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/forest/ground_area.h"
+#include "understory/forest/stems/beam_footprint.h"
 #include "understory/util/config/config.h"
 #include "understory/util/progress.h"
 
@@ -54,11 +55,13 @@ struct StemFit {
   double taper = 0.0;     // of the radius per metre of height (negative: thinner upwards)
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();       // of centre x, y and radius
   Eigen::Matrix2d foot_covariance = Eigen::Matrix2d::Zero();  // of the centre line at the ground
-  double rms_m = 0.0;                                         // of the points on the surface
-  double arc_deg = 0.0;                                       // covered by points
-  int returns = 0;                                            // of the cloud
+  double spread_m = 0.0;  // of the radius, if returns were independent; see diameter_sd_m
+  double rms_m = 0.0;     // of the points on the surface
+  double arc_deg = 0.0;   // covered by points
+  int returns = 0;        // of the cloud
   double lowest_m = 0.0;  // first and last height with points on the surface
   double highest_m = 0.0;
+  BeamFootprint beam;  // of the beams that met it, where they are known
   std::vector<StemSlice> slices;
 };
 

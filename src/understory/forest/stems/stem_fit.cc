@@ -245,6 +245,7 @@ void set_uncertainty(const NoisyCylinder& fit, StemFit& stem) {
       stem.covariance(i, j) = factor * fit.covariance(i < 2 ? i : 4, j < 2 ? j : 4);
   }
   stem.covariance(2, 2) += kMapError * kMapError;
+  stem.spread_m = spread;
   Eigen::Matrix<double, 2, 6> foot = Eigen::Matrix<double, 2, 6>::Zero();
   foot.leftCols<2>().setIdentity();
   foot.block<2, 2>(0, 2) = -kBreastHeight * Eigen::Matrix2d::Identity();

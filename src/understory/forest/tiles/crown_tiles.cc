@@ -24,6 +24,7 @@ using forest_constants::inventory::kHighest;
 struct HeldBack {
   Eigen::Vector2f place;
   float height_m = 0.0F;
+  float over_foot_m = 0.0F;  // above the ground at the stem
   std::uint32_t tree = 0;
 };
 
@@ -67,7 +68,7 @@ class TileAbove {
         area_(task.cloud.tiles()[tile].moved(-task.origin.head<2>())),
         own_(task.stems, area_),
         around_(task.stems, area_.grown(kStemsBeyond)),
-        columns_(around_.stems),
+        columns_(around_.stems, ground_at_stems(task, around_.stems)),
         sheets_(own_.stems, task.slices.in(area_.grown(kSlicesBeyond)), own_.of(with_sheet)),
         canopy_(canopy_cell_m) {
     own_number_.assign(around_.stems.size(), -1);
@@ -96,8 +97,8 @@ class TileAbove {
     // Near a scanner the ground has a hundred times the points of a crown, and the ceiling may lie
     // under it: what is no higher than the top of its tree is real.
     for (const HeldBack& point : held_back_) {
-      const auto height = static_cast<double>(point.height_m);
-      if (height <= tops_[point.tree]) canopy_.add(point.place.cast<double>(), height);
+      if (static_cast<double>(point.over_foot_m) <= tops_[point.tree])
+        canopy_.add(point.place.cast<double>(), static_cast<double>(point.height_m));
     }
   }
 
@@ -106,7 +107,11 @@ class TileAbove {
     std::vector<double>& tops = result.top_m;
     std::vector<StemCurve>& curves = result.curves;
     for (std::size_t i = 0; i < around_.numbers.size(); ++i) {
-      if (area_.contains(around_.stems[i].centre)) tops[around_.numbers[i]] = tops_[i];
+      if (!area_.contains(around_.stems[i].centre)) continue;
+      const std::size_t stem = around_.numbers[i];
+      tops[stem] = tops_[i];
+      const double height = listed(stem, tops_[i]);
+      if (std::isfinite(height)) result.top_points[stem] = columns_.points_below(i, height);
     }
     if (!task_.full) return;
     std::vector<std::vector<SlicePoint>> points = surroundings_->take();
@@ -132,15 +137,16 @@ class TileAbove {
  private:
   void add(const Eigen::Vector3d& point, double height) {
     const Eigen::Vector2d place = point.head<2>();
-    const std::size_t tree = columns_.add(place, height);
+    const std::size_t tree = columns_.add(point, height);
     if (tree != TreeColumns::kNone && own_number_[tree] >= 0)
       sheets_.add(static_cast<std::size_t>(own_number_[tree]), place, height);
     if (area_.contains(place)) {
       if (task_.ceiling.holds(place, height)) {
         canopy_.add(place, height);
       } else if (tree != TreeColumns::kNone) {
-        held_back_.push_back(
-            {place.cast<float>(), static_cast<float>(height), static_cast<std::uint32_t>(tree)});
+        held_back_.push_back({place.cast<float>(), static_cast<float>(height),
+                              static_cast<float>(point.z() - columns_.ground_m(tree)),
+                              static_cast<std::uint32_t>(tree)});
       }
     }
     if (!task_.full) return;
@@ -154,7 +160,7 @@ class TileAbove {
   StemsNear own_;
   StemsNear around_;
   TreeColumns columns_;
-  SheetCollector sheets_;                  // of own_
+  SheetCollector sheets_;                 // of own_
   std::vector<std::int32_t> own_number_;  // in own_, of each in around_; -1: beside the tile
   std::optional<StemSurroundings> surroundings_;  // in a full inventory
   CanopyGrid canopy_;
@@ -168,6 +174,7 @@ class TileAbove {
 StemTops look_up(const CrownTask& task, double canopy_cell_m, const ListedHeight& listed) {
   const std::size_t tiles = task.cloud.tiles().size();
   StemTops result{std::vector<double>(task.stems.size()),
+                  std::vector<int>(task.stems.size(), 0),
                   {},
                   {{}, std::vector<SeenSides>(task.stems.size())},
                   CanopyGrid(canopy_cell_m),

@@ -26,7 +26,7 @@ struct CrownTask {
   Eigen::Vector3d origin;
   const std::vector<StemFit>& stems;  // by x, then y
   const SlicesNear& slices;
-  const CanopyCeiling& ceiling;       // settled
+  const CanopyCeiling& ceiling;  // settled
   double slices_end_m;
   bool full;  // stem curves and crowns as well
   const StemCurveConfig& curves;
@@ -36,6 +36,7 @@ struct CrownTask {
 // Tops and curves of the stems, and what the crowns are found in.
 struct StemTops {
   std::vector<double> top_m;      // of each stem; NaN where it is not known
+  std::vector<int> top_points;    // of each stem: points in the half metre below its height
   std::vector<StemCurve> curves;  // of each stem, in a full inventory
   StemSheets sheets;              // of each stem that is most in doubt
   CanopyGrid canopy;

@@ -20,7 +20,7 @@ struct StemHarvest {
   CanopyCeiling ceiling;  // settled
   std::uint64_t points = 0;
   std::uint64_t without_ground = 0;
-  std::uint64_t near_breast = 0;   // points in the heights that are searched
+  std::uint64_t near_breast = 0;  // points in the heights that are searched
   CoverageGrid coverage;
   SeenCells seen;
   std::vector<SlicePoint> slices;  // see InventoryResult

@@ -18,21 +18,23 @@ using Places = std::vector<Eigen::Vector2d>;
 // How far nearly all places in one direction reach; negative where there are none.
 using Reaches = std::array<double, kSectors>;
 
-Reaches reaches_of(const Places& places, const Eigen::Vector2d& middle) {
+std::size_t sector_of(const Eigen::Vector2d& off) {
+  const double turn = std::atan2(off.y(), off.x()) / (2.0 * M_PI) + 0.5;
+  return std::min<std::size_t>(kSectors - 1, static_cast<std::size_t>(turn * kSectors));
+}
+
+Reaches reaches_of(const Places& places, const Eigen::Vector2d& middle, double quantile) {
   std::array<std::vector<double>, kSectors> distances;
   for (const Eigen::Vector2d& place : places) {
     const Eigen::Vector2d off = place - middle;
-    const double turn = std::atan2(off.y(), off.x()) / (2.0 * M_PI) + 0.5;
-    const auto sector =
-        std::min<std::size_t>(kSectors - 1, static_cast<std::size_t>(turn * kSectors));
-    distances[sector].push_back(off.norm());
+    distances[sector_of(off)].push_back(off.norm());
   }
   Reaches reaches;
   reaches.fill(-1.0);
   for (std::size_t s = 0; s < kSectors; ++s) {
     std::vector<double>& all = distances[s];
     if (all.empty()) continue;
-    const auto at = static_cast<std::size_t>(kEdgeQuantile * static_cast<double>(all.size() - 1));
+    const auto at = static_cast<std::size_t>(quantile * static_cast<double>(all.size() - 1));
     std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(at), all.end());
     reaches[s] = all[at];
   }
@@ -62,9 +64,48 @@ Reaches without_gaps(const Reaches& reaches) {
 // Area around `middle` that the places fill: a sum of wedges.
 double outline_area(const Places& places, const Eigen::Vector2d& middle) {
   double area = 0.0;
-  for (const double reach : without_gaps(reaches_of(places, middle)))
+  for (const double reach : without_gaps(reaches_of(places, middle, kEdgeQuantile)))
     area += M_PI / kSectors * std::pow(std::max(0.0, reach), 2);
   return area;
+}
+
+// How far to the left of the line from a to b a place lies, times the length of that line.
+double left_of(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& place) {
+  const Eigen::Vector2d along = b - a;
+  const Eigen::Vector2d off = place - a;
+  return along.x() * off.y() - along.y() * off.x();
+}
+
+// The corners of one half of the convex outline of sorted places (A. M. Andrew, Information
+// Processing Letters 9(5), 1979).
+template <typename Iterator>
+Places half_outline(Iterator begin, Iterator end) {
+  Places corners;
+  for (Iterator place = begin; place != end; ++place) {
+    while (corners.size() > 1 &&
+           left_of(corners[corners.size() - 2], corners.back(), *place) <= 0.0)
+      corners.pop_back();
+    corners.push_back(*place);
+  }
+  return corners;
+}
+
+// Area of the convex outline of the places, without the few that stick out of it.
+double convex_area(const Places& places, const Eigen::Vector2d& middle) {
+  const Reaches reaches = reaches_of(places, middle, kOutlineQuantile);
+  Places within;
+  for (const Eigen::Vector2d& place : places)
+    if ((place - middle).norm() <= reaches[sector_of(place - middle)]) within.push_back(place);
+  std::sort(within.begin(), within.end(), [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
+  });
+  double twice = 0.0;
+  for (const Places& half :
+       {half_outline(within.begin(), within.end()), half_outline(within.rbegin(), within.rend())}) {
+    for (std::size_t i = 1; i < half.size(); ++i)
+      twice += half[i - 1].x() * half[i].y() - half[i - 1].y() * half[i].x();
+  }
+  return 0.5 * std::abs(twice);
 }
 
 // The layers of one tree: its cubes by height.
@@ -83,21 +124,22 @@ double width_of(const Places& places, const Eigen::Vector2d& stem) {
   return std::sqrt(outline_area(places, stem) / M_PI);
 }
 
-// The lowest layer from which on most layers are wide; the number of layers if there is none.
+// The lowest wide layer that hangs together with the widest one above the lower third: a bush at
+// the foot of a tree is no crown. The number of layers if there is none.
 std::size_t base_of(const std::vector<double>& widths, double radius_m) {
   std::vector<double> sorted = widths;
   std::sort(sorted.begin(), sorted.end());
   const double wide =
       sorted[static_cast<std::size_t>(kWideQuantile * static_cast<double>(sorted.size() - 1))];
   const double least = std::max(radius_m + kBranch, kBaseShare * wide);
-  for (std::size_t base = 0; base < widths.size(); ++base) {
-    if (widths[base] < least) continue;
-    const auto first = widths.begin() + static_cast<std::ptrdiff_t>(base);
-    const auto end = first + std::min<std::ptrdiff_t>(kBaseLayers, widths.end() - first);
-    const auto many = std::count_if(first, end, [&](double width) { return width >= least; });
-    if (many >= kLeastWideLayers) return base;
+  const auto low = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / kLowParts);
+  const auto widest = std::max_element(low, widths.end());
+  if (*widest < least) return widths.size();
+  auto base = static_cast<std::size_t>(widest - widths.begin());
+  for (std::size_t layer = base; layer-- > 0 && base - layer <= kBaseGap;) {
+    if (widths[layer] >= least) base = layer;
   }
-  return widths.size();
+  return base;
 }
 
 TreeCrown crown_of(const std::vector<TreeOwners::Voxel>& voxels, const OwnerTree& tree) {
@@ -119,7 +161,7 @@ TreeCrown crown_of(const std::vector<TreeOwners::Voxel>& voxels, const OwnerTree
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& place : all)
     middle += place / static_cast<double>(all.size());
-  crown.area_m2 = outline_area(all, middle);
+  crown.area_m2 = convex_area(all, middle);
   return crown;
 }
 

@@ -16,8 +16,8 @@ struct TreeCrown {
   double volume_m3 = kUnknown;  // sum of the outlines of its layers
 };
 
-// Base, area and volume of each crown. Outlines are made of sixteen wedges: each reaches as far
-// from the middle as nearly all cubes in its direction.
+// Base, area and volume of each crown. The area is that of the convex outline; the outlines of the
+// layers are made of sixteen wedges. Nearly all cubes of each of sixteen directions lie within.
 [[nodiscard]] std::vector<TreeCrown> measure_crowns(const TreeOwners& owners,
                                                     const std::vector<OwnerTree>& trees);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/stem_axis.h"
@@ -27,8 +28,8 @@ Eigen::Vector2d stem_place_at(const StemFit& stem, double height_m) {
   return stem.centre + std::min(height_m - kBreastHeight, kStraight) * stem.slope;
 }
 
-TreeColumns::TreeColumns(const std::vector<StemFit>& stems)
-    : stems_(stems), columns_(stems.size()) {
+TreeColumns::TreeColumns(const std::vector<StemFit>& stems, std::vector<double> ground_m)
+    : stems_(stems), ground_m_(std::move(ground_m)), columns_(stems.size()) {
   const Eigen::Vector2d reach(kCrownReach, kCrownReach);
   for (std::size_t i = 0; i < stems.size(); ++i) {
     const Eigen::Vector2d foot = stem_place_at(stems[i], 0.0);
@@ -42,7 +43,8 @@ TreeColumns::TreeColumns(const std::vector<StemFit>& stems)
   }
 }
 
-std::size_t TreeColumns::add(const Eigen::Vector2d& place, double height_m) {
+std::size_t TreeColumns::add(const Eigen::Vector3d& point, double height_m) {
+  const Eigen::Vector2d place = point.head<2>();
   const auto near = near_.find(key(cell_of(place)));
   if (near == near_.end()) return kNone;
   std::size_t nearest = kNone;
@@ -55,9 +57,13 @@ std::size_t TreeColumns::add(const Eigen::Vector2d& place, double height_m) {
   }
   if (nearest == kNone) return kNone;
   Column& column = columns_[nearest];
-  const std::size_t metre = HeightColumn::metre_of(height_m);
+  const double over_foot = std::max(0.0, point.z() - ground_m_[nearest]);
+  const std::size_t metre = HeightColumn::metre_of(over_foot);
   ++column.points[metre];
-  column.highest_m[metre] = std::max(column.highest_m[metre], static_cast<float>(height_m));
+  column.highest_m[metre] = std::max(column.highest_m[metre], static_cast<float>(over_foot));
+  std::uint8_t& count = column.decimetres[std::min(column.decimetres.size() - 1,
+                                                   static_cast<std::size_t>(10.0 * over_foot))];
+  if (count < 255) ++count;
   return nearest;
 }
 
@@ -69,6 +75,15 @@ double TreeColumns::top(std::size_t stem, double slices_end_m) const {
   const auto height =
       static_cast<double>(column.highest_m[static_cast<std::size_t>(column.top(first, end))]);
   return height >= slices_end_m + kLeastAbove ? height : std::numeric_limits<double>::quiet_NaN();
+}
+
+int TreeColumns::points_below(std::size_t stem, double height_m) const {
+  const auto& decimetres = columns_[stem].decimetres;
+  const auto last = std::min(decimetres.size() - 1, static_cast<std::size_t>(10.0 * height_m));
+  int points = 0;
+  for (std::size_t d = last > 4 ? last - 4 : 0; d <= last; ++d)
+    points += decimetres[d];
+  return std::min(points, 255);
 }
 
 }  // namespace understory

@@ -18,23 +18,29 @@ class TreeColumns {
  public:
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-  // `stems` outlive this; their frame is that of `add`.
-  explicit TreeColumns(const std::vector<StemFit>& stems);
-  // Height >= 0. Returns the number of the stem that the point counts for, kNone if it is near
-  // none.
-  std::size_t add(const Eigen::Vector2d& place, double height_m);
+  // `stems` outlive this; their frame is that of `add`. `ground_m`: height of the ground at each.
+  TreeColumns(const std::vector<StemFit>& stems, std::vector<double> ground_m);
+  // A point `height_m` >= 0 above the ground below it. Its height counts from the ground at the
+  // stem: on a slope, a crown reaches out over ground that lies lower. Returns the number of the
+  // stem that the point counts for, kNone if it is near none.
+  std::size_t add(const Eigen::Vector3d& point, double height_m);
 
   // Height of a tree's top above the ground: the highest point that hangs together with its stem
   // (gaps of at most 3 m) and is nearer to it than to any other stem, ghosts of other pulses aside
   // (see HeightColumn). NaN where nothing is seen above the stem's slices, or where the points end
   // as if cut off just above them: that is no tree top.
   [[nodiscard]] double top(std::size_t stem, double slices_end_m) const;
+  [[nodiscard]] double ground_m(std::size_t stem) const { return ground_m_[stem]; }
+  // Points in the half metre below a height, to a decimetre; 255 stand for more.
+  [[nodiscard]] int points_below(std::size_t stem, double height_m) const;
 
  private:
   struct Column : HeightColumn {
-    std::array<float, kMetres> highest_m{};  // within each metre
+    std::array<float, kMetres> highest_m{};               // within each metre
+    std::array<std::uint8_t, 10 * kMetres> decimetres{};  // points of each
   };
   const std::vector<StemFit>& stems_;
+  std::vector<double> ground_m_;
   // Stems by the squares that they or their reach come to at any height.
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> near_;
   std::vector<Column> columns_;

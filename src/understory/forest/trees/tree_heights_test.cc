@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 namespace understory {
 namespace {
@@ -17,12 +18,12 @@ StemFit stem_at(double x, double y, double slope = 0.0) {
 // A crown of full metres over a place.
 void add_crown(TreeColumns& columns, double x, double y, double from_m, double to_m) {
   for (double height = from_m; height <= to_m + 1e-9; height += 0.05)
-    columns.add({x + 0.3 * std::sin(40.0 * height), y}, height);
+    columns.add({x + 0.3 * std::sin(40.0 * height), y, height}, height);
 }
 
 TEST(TreeHeights, ATreeEndsAtItsHighestPoint) {
   const std::vector<StemFit> stems = {stem_at(0.0, 0.0), stem_at(6.0, 0.0)};
-  TreeColumns columns(stems);
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
   add_crown(columns, 0.0, 0.0, 1.0, 18.35);
   add_crown(columns, 6.0, 0.0, 1.0, 11.0);
   EXPECT_NEAR(columns.top(0, 3.5), 18.35, 0.06);
@@ -31,7 +32,7 @@ TEST(TreeHeights, ATreeEndsAtItsHighestPoint) {
 
 TEST(TreeHeights, ACrownOfTheNeighbourIsItsOwn) {
   const std::vector<StemFit> stems = {stem_at(0.0, 0.0), stem_at(2.0, 0.0)};
-  TreeColumns columns(stems);
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
   add_crown(columns, 0.0, 0.0, 1.0, 9.0);
   add_crown(columns, 1.5, 0.0, 1.0, 20.0);  // nearer to the second stem
   EXPECT_NEAR(columns.top(0, 3.5), 9.0, 0.06);
@@ -40,9 +41,9 @@ TEST(TreeHeights, ACrownOfTheNeighbourIsItsOwn) {
 
 TEST(TreeHeights, ALeaningTreeIsFollowedToItsCrown) {
   const std::vector<StemFit> stems = {stem_at(0.0, 0.0, 0.25)};
-  TreeColumns columns(stems);
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
   for (double height = 1.0; height <= 14.0; height += 0.05)
-    columns.add(stem_place_at(stems[0], height), height);
+    columns.add({stem_place_at(stems[0], height).x(), 0.0, height}, height);
   EXPECT_NEAR(columns.top(0, 3.5), 14.0, 0.06);
   EXPECT_NEAR(stem_place_at(stems[0], 3.3).x(), 0.5, 1e-12);
   // Trees straighten: the lean of the foot is carried up by six metres.
@@ -51,7 +52,7 @@ TEST(TreeHeights, ALeaningTreeIsFollowedToItsCrown) {
 
 TEST(TreeHeights, NoTopIsInvented) {
   const std::vector<StemFit> stems = {stem_at(0.0, 0.0), stem_at(10.0, 0.0), stem_at(20.0, 0.0)};
-  TreeColumns columns(stems);
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
   add_crown(columns, 0.0, 0.0, 1.0, 3.5);   // nothing above the slices
   add_crown(columns, 10.0, 0.0, 1.0, 4.4);  // cut off just above them
   add_crown(columns, 20.0, 0.0, 1.0, 6.0);
@@ -59,6 +60,28 @@ TEST(TreeHeights, NoTopIsInvented) {
   EXPECT_TRUE(std::isnan(columns.top(0, 3.5)));
   EXPECT_TRUE(std::isnan(columns.top(1, 3.5)));
   EXPECT_NEAR(columns.top(2, 3.5), 6.0, 0.06);
+}
+
+// A point of the crown a metre down a slope of 27 degrees stands 50 cm higher over its own ground.
+TEST(TreeHeights, OnASlopeTheyCountFromTheFootOfTheTree) {
+  const std::vector<StemFit> stems = {stem_at(0.0, 0.0)};
+  TreeColumns columns(stems, {100.0});
+  for (double z = 101.0; z <= 112.0 + 1e-9; z += 0.05) {
+    columns.add({0.0, 0.0, z}, z - 100.0);
+    columns.add({1.0, 0.0, z}, z - 99.5);
+  }
+  EXPECT_NEAR(columns.top(0, 3.5), 12.0, 1e-4);
+}
+
+TEST(TreeHeights, PointsBelowATopAreCountedToHalfAMetre) {
+  const std::vector<StemFit> stems = {stem_at(0.0, 0.0)};
+  TreeColumns columns(stems, {0.0});
+  for (const double height : {5.0, 9.48, 9.62, 9.75, 10.04})
+    columns.add({0.0, 0.0, height}, height);
+  EXPECT_EQ(columns.points_below(0, 10.04), 3);
+  for (int i = 0; i < 1000; ++i)
+    columns.add({0.0, 0.0, 10.0}, 10.0);
+  EXPECT_EQ(columns.points_below(0, 10.04), 255);
 }
 
 }  // namespace

@@ -186,8 +186,8 @@ std::optional<PoseBelief> SatelliteBelief::at(const StampedPose& predicted,
   if (!aligned() || fixes_.empty()) return std::nullopt;
   const FixOnPath& newest = fixes_.back();
   if (to_seconds(predicted.stamp - newest.stamp) > config_.oldest_fix_s) return std::nullopt;
-  const Vector3d moved = predicted.world_from_body * antenna_in_body_ -
-                         newest.world_from_body * antenna_in_body_;
+  const Vector3d moved =
+      predicted.world_from_body * antenna_in_body_ - newest.world_from_body * antenna_in_body_;
   // The prior leaves gravity to the smoother, which knows it already.
   const bool penalty = config_.use == SatellitesInMatch::kPenalty;
   const double tilt_sd = penalty ? config_.gravity_sd_deg * kDegree : kUnknownRad;
@@ -230,8 +230,8 @@ std::optional<double> SatelliteBelief::heading_error(const FixOnPath& newest,
       to_seconds(newest.stamp - oldest.stamp) > most_s)
     return std::nullopt;
   const Vector3d forward = forward_in_body_.normalized();
-  const Vector3d looked = oldest.world_from_body.rotation() * forward +
-                          predicted.world_from_body.rotation() * forward;
+  const Vector3d looked =
+      oldest.world_from_body.rotation() * forward + predicted.world_from_body.rotation() * forward;
   return std::remainder(heading_of(way) - heading_of(looked), 2.0 * M_PI);
 }
 

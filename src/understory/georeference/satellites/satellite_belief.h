@@ -35,8 +35,8 @@ struct SatelliteBeliefConfig {
   SatellitesInMatch use = SatellitesInMatch::kNone;
   PenaltyForm form = PenaltyForm::kThreePoints;
   PenaltyPlace place = PenaltyPlace::kCentre;
-  double arm_m = 10.0;   // from the antenna to the points of gravity and heading
-  double scale = 30.0;   // s of P3 (8): how much the points of the scan count more
+  double arm_m = 10.0;  // from the antenna to the points of gravity and heading
+  double scale = 30.0;  // s of P3 (8): how much the points of the scan count more
   // Of the vertical by the IMU, as penalty; about each level axis.
   double gravity_sd_deg = 0.5;
   // The first stretch ends, and the world is laid on east, north, up, where heading and place are

@@ -51,8 +51,8 @@ class Sleigh {
     const Pose moved = steps_ > 0 ? true_body(time_s - 0.1).inverse() * truth : Pose();
     const double metres = moved.translation().norm();
     const double turn = time_s > from_s_ ? drift_deg_ * kDegree * metres / 100.0 : 0.0;
-    odometry_ = steps_ > 0 ? odometry_ * moved * Pose(so3_exp({0.0, 0.0, turn}), Vector3d::Zero())
-                           : truth;
+    odometry_ =
+        steps_ > 0 ? odometry_ * moved * Pose(so3_exp({0.0, 0.0, turn}), Vector3d::Zero()) : truth;
     belief_.add_pose({stamp(time_s), world_from_first_ * odometry_});
     ++steps_;
   }

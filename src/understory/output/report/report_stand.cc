@@ -151,6 +151,12 @@ std::string cross_sections(const InventoryResult& inventory) {
   return html;
 }
 
+// With a sign where the top was hardly seen.
+std::string height_text(const Tree& tree) {
+  if (!std::isfinite(tree.height_m)) return {};
+  return fmt::format("{}{:.1f}", tree.height_is_lower_bound > 0.0 ? "≥ " : "", tree.height_m);
+}
+
 // A tree from the side: ground grey, vegetation green, as far up as it was seen.
 std::string front_view(const TreeSegment& segment, double top_m) {
   constexpr double kReach = 1.5;
@@ -226,12 +232,12 @@ std::string single_trees(const InventoryResult& inventory) {
   for (const TreeSegment& segment : inventory.segments) {
     const auto i = static_cast<std::size_t>(segment.tree_id - 1);
     const Tree& tree = inventory.trees[i];
-    html += "<figure>" + front_view(segment, static_cast<double>(top)) +
-            section_of(segment, tree, inventory.stems[i]) +
-            fmt::format("<figcaption>tree {}: {} ± {} cm{}</figcaption></figure>", tree.id,
-                        centimetres(tree.dbh_m), centimetres(tree.dbh_sd_m),
-                        std::isfinite(tree.height_m) ? fmt::format(", {:.1f} m", tree.height_m)
-                                                     : std::string());
+    html +=
+        "<figure>" + front_view(segment, static_cast<double>(top)) +
+        section_of(segment, tree, inventory.stems[i]) +
+        fmt::format("<figcaption>tree {}: {} ± {} cm{}</figcaption></figure>", tree.id,
+                    centimetres(tree.dbh_m), centimetres(tree.dbh_sd_m),
+                    std::isfinite(tree.height_m) ? ", " + height_text(tree) + " m" : std::string());
   }
   return html + "</div>";
 }
@@ -315,7 +321,8 @@ std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
     columns.push_back({"± cm", in_cm(&Tree::dbh_sd_m)});
     columns.push_back({"lean, °", number(&Tree::lean_deg, 1)});
   }
-  if (of_cloud) columns.push_back({"height, m", number(&Tree::height_m, 1)});
+  if (of_cloud)
+    columns.push_back({"height, m", [&trees](std::size_t i) { return height_text(trees[i]); }});
   if (measured) columns.push_back({of_cloud ? "returns" : "views", observations});
   if (measured && stems != nullptr)
     columns.push_back({"seen around, °", [stems](std::size_t i) {

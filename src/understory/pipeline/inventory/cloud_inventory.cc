@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "understory/evaluation/trajectory.h"
 #include "understory/forest/slice_inventory.h"
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/inventory_files.h"
@@ -330,6 +331,16 @@ std::uint64_t write_labelled_cloud(const Stock& stock, const fs::path& file,
   return cloud.commit();
 }
 
+// Where the scanner was: by the file that the user names, else by the run.
+std::vector<Eigen::Vector3d> scanner_places(const InventoryRequest& request, const Stock& stock) {
+  if (request.trajectory.empty())
+    return stock.of_run ? places_in_run(request.cloud) : std::vector<Eigen::Vector3d>();
+  std::vector<Eigen::Vector3d> places;
+  for (const StampedPose& pose : read_trajectory(request.trajectory))
+    places.push_back(pose.world_from_body.translation());
+  return places;
+}
+
 // The frame of the layers: that of the run, or the cloud's own.
 const LayerFrame& layers_of(const Stock& stock, const LayerFrame& own) {
   return stock.of_run ? stock.frames.layers : own;
@@ -379,9 +390,8 @@ void read_cloud_of(const InventoryRequest& request, const fs::path& work, Log& l
                                             progress, tiles)
                              : read_stand(stock.path, with_system(request), log, progress, tiles);
   name_system(request, stock);
-  stock.plots = plots_of(request.config.stand, stock.of_run
-                                                   ? stock.frames.layers.wkt()
-                                                   : stock.stand.cloud.coordinate_system);
+  stock.plots = plots_of(request.config.stand, stock.of_run ? stock.frames.layers.wkt()
+                                                            : stock.stand.cloud.coordinate_system);
   // The map of a run is in metres, and what is wrong with it is a matter of trust.
   if (!stock.stand.doubt.empty() && !stock.of_run && !request.slice)
     throw InputError(stock.path.string(), "", "expected metres and z up: " + stock.stand.doubt);
@@ -391,8 +401,7 @@ InventoryResult inventory_of(const InventoryRequest& request, const Stock& stock
                              const PointBlocks& blocks, const ProgressSink& progress) {
   if (request.slice) return take_slice(blocks, stock.path.string(), request.config, progress);
   const SeenTest seen = stock.of_run ? seen_in_run(request.cloud) : SeenTest();
-  const std::vector<Eigen::Vector3d> scanner =
-      stock.of_run ? places_in_run(request.cloud) : std::vector<Eigen::Vector3d>();
+  const std::vector<Eigen::Vector3d> scanner = scanner_places(request, stock);
   if (!stock.stand.streamed) return take_inventory(blocks, request.config, progress, seen, scanner);
   return take_inventory(*stock.stand.streamed->tiles, request.config, progress, seen, scanner);
 }

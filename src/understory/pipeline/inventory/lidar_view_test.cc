@@ -66,12 +66,15 @@ TEST(LidarView, IsTheSameFromARunFolder) {
   summary.lidar_view = figures_of(view);
   write_run_json(run / "run.json", summary);
   EXPECT_FALSE(seen_in_run(run));  // without keyframes
+  EXPECT_TRUE(places_in_run(run).empty());
   const Pose pose(Eigen::Quaterniond::Identity(), {20.0, 10.0, 0.0});
   TumWriter keyframes(run / "keyframes.tum");
   keyframes.add({0, pose});
   keyframes.commit();
   const SeenTest here = seen_from(view, {pose});
   const SeenTest there = seen_in_run(run);
+  ASSERT_EQ(places_in_run(run).size(), 1U);
+  EXPECT_TRUE(places_in_run(run)[0].isApprox(places_of({pose})[0], 1e-9));
   ASSERT_TRUE(there);
   int seen = 0;
   for (double x = -10.0; x < 50.0; x += 5.0) {

@@ -1,0 +1,53 @@
+#include "understory/forest/trees/tree_crowns.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace understory {
+namespace {
+
+// A disc of points at a height.
+void add_disc(TreeOwners& owners, double radius_m, double height_m) {
+  for (double x = -radius_m; x <= radius_m; x += 0.1) {
+    for (double y = -radius_m; y <= radius_m; y += 0.1)
+      if (std::hypot(x, y) <= radius_m) owners.add({x, y}, height_m);
+  }
+}
+
+OwnerTree tree_of(double height_m) {
+  OwnerTree tree;
+  tree.radius_m = 0.1;
+  tree.height_m = height_m;
+  tree.seen_to_m = 3.5;
+  tree.centres.assign(100, Eigen::Vector2d::Zero());
+  return tree;
+}
+
+// A stem with a crown of 2 m from 8 to 15 m, and a bush of 1.2 m around its foot.
+TreeCrown crown_with_bush(double bush_m) {
+  TreeOwners owners;
+  for (double height = 0.3; height < 15.0; height += 0.1)
+    add_disc(owners, 0.1, height);
+  for (double height = 8.0; height < 15.0; height += 0.1)
+    add_disc(owners, 2.0, height);
+  for (double height = 1.6; height < bush_m; height += 0.1)
+    add_disc(owners, 1.2, height);
+  const std::vector<OwnerTree> trees = {tree_of(15.0)};
+  owners.find(trees, {});
+  return measure_crowns(owners, trees)[0];
+}
+
+TEST(TreeCrowns, TheAreaIsThatOfTheConvexOutline) {
+  const TreeCrown crown = crown_with_bush(0.0);
+  EXPECT_NEAR(crown.area_m2, M_PI * 4.0, 0.06 * M_PI * 4.0);
+  EXPECT_NEAR(crown.volume_m3, 7.0 * M_PI * 4.0, 0.15 * 7.0 * M_PI * 4.0);
+}
+
+TEST(TreeCrowns, ABushAtTheFootIsNotTheBase) {
+  EXPECT_NEAR(crown_with_bush(0.0).base_m, 8.0, 0.51);
+  EXPECT_NEAR(crown_with_bush(4.2).base_m, 8.0, 0.51);
+}
+
+}  // namespace
+}  // namespace understory
