@@ -45,6 +45,7 @@ TEST_F(RunTablesTest, TreesComeBackToTheDecimalsOfTheirColumns) {
     const double value = tree.*std::get<double Tree::*>(column.member);
     EXPECT_NEAR(table.number(column.name), value, 0.51 * std::pow(10.0, -column.decimals))
         << column.name;
+    if (column.decimals == 0) continue;
     EXPECT_NE(table.number(column.name), std::round(value)) << column.name << " lost its decimals";
   }
   ASSERT_TRUE(table.next());
