@@ -163,19 +163,18 @@ void add_figures(Tiles& tiles, const StandFigures& seen) {
             "Where returns reached the ground or the stems densely enough to find stems. What lies "
             "behind stems or farther away does not count, nor do trees there. For a plot of your "
             "own give --plots.");
-  const auto add = [&](const Measured& figure, int decimals, const char* unit, const char* label,
+  const auto add = [&](const Measured& figure, int decimals, const char* label,
                        const char* meaning) {
     if (std::isfinite(figure.value))
-      tiles.add(
-          fmt::format("{:.{}f} ± {:.{}f}{}", figure.value, decimals, figure.sd, decimals, unit),
-          label, meaning);
+      tiles.add(fmt::format("{:.{}f} ± {:.{}f}", figure.value, decimals, figure.sd, decimals),
+                label, meaning);
   };
-  add(seen.stems_per_ha, 0, "", "stems per hectare",
+  add(seen.stems_per_ha, 0, "stems per hectare",
       "Trees in the area seen over that area. ± is one standard deviation of the errors of "
       "measurement.");
-  add(seen.basal_area_m2_per_ha, 1, " m²/ha", "basal area",
+  add(seen.basal_area_m2_per_ha, 1, "basal area, m² per hectare",
       "Cross sections of these stems at 1.3 m, per hectare of the area seen.");
-  add(seen.volume_m3_per_ha, 0, " m³/ha", "stem volume over bark",
+  add(seen.volume_m3_per_ha, 0, "stem volume over bark, m³ per hectare",
       "Volume of these stems from the ground to the top, per hectare of the area seen.");
 }
 
