@@ -124,7 +124,7 @@ def check_georeferenced(las, run_folder, folder):
         assert abs(len(found) - len(expected)) <= 0.1 * len(expected), (len(found), len(expected))
         assert np.median(apart) < limit_m and np.mean(apart < 0.1) > 0.85, apart
         with sqlite3.connect(place / "trees.gpkg") as base:
-            assert base.execute("SELECT srs_id FROM gpkg_contents").fetchall() == [(3067,)]
+            assert set(base.execute("SELECT srs_id FROM gpkg_contents").fetchall()) == {(3067,)}
     return len(expected)
 
 

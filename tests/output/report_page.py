@@ -15,7 +15,7 @@ from pathlib import Path
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 VOID = {"meta", "br", "hr", "img", "input", "link"}
-RUN_SECTIONS = ["The map from above", "Where it is", "What to distrust", "Trees", "The files of this folder",
+RUN_SECTIONS = ["The map from above", "Where it is", "What to distrust", "Stand figures", "Trees", "The files of this folder",
                 "Errors against the known truth", "Places seen again", "How well the scans matched", "Time"]
 
 
@@ -133,9 +133,11 @@ def check_stand(page, folder):
         assert abs(float(row[1]) - float(tree["x"])) < 0.0051, (row, tree)
         assert abs(float(row[4]) - 100 * float(tree["dbh_m"])) < 0.051, (row, tree)
         assert (row[7] == "") == (tree["height_m"] == ""), (row, tree)
-    hectares = number(page.tiles["area with points (not a plot's border)"])
-    per_hectare = number(page.tiles["stems per hectare seen"])
-    assert abs(per_hectare * hectares - len(trees)) < 0.006 / hectares * len(trees) + hectares
+    facts = json.loads((folder / "run.json").read_text())["quality"]
+    assert abs(number(page.tiles["area seen (not a plot's border)"]) - facts["seen_area_m2"] / 1e4) < 0.0051
+    assert abs(number(page.tiles["stems per hectare"]) - facts["stems_per_ha"]) < 0.51
+    # Trees beside the area that was seen are listed, and stand for no hectare.
+    assert 0 < facts["stems_per_ha"] * facts["seen_area_m2"] / 1e4 < len(trees) + 0.5
     return trees
 
 
@@ -186,7 +188,7 @@ def check_inventory(run_folder, folder):
     page, facts = read_page(folder)
     assert page.headings[:2] == ["map.laz", "Complete"], page.headings
     # The run is too short to tell its place, so its inventory has none either.
-    assert page.headings[2:] == RUN_SECTIONS[:1] + RUN_SECTIONS[2:5] + ["Time"] * ("Time" in page.headings)
+    assert page.headings[2:] == RUN_SECTIONS[:1] + RUN_SECTIONS[2:6] + ["Time"] * ("Time" in page.headings)
     check_files(page, folder)
     check_stand(page, folder)
     check_made(page, facts)
