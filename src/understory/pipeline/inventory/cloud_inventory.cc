@@ -351,13 +351,9 @@ void take_figures(const StandTableConfig& config, Stock& stock) {
   const LayerFrame own;
   stock.figures = take_stand(stock.inventory, config, stock.plots, layers_of(stock, own));
   if (!stock.figures.no_overlap) return;
-  const VisibleArea& seen = stock.inventory.seen;
-  throw InputError(
-      config.plots, "",
-      fmt::format("expected plots where stems were seen: none of the {} overlaps x {:.0f} to "
-                  "{:.0f} m, y {:.0f} to {:.0f} m",
-                  stock.plots.size(), seen.x0, seen.x0 + seen.columns * seen.cell_m, seen.y0,
-                  seen.y0 + seen.rows * seen.cell_m));
+  throw InputError(config.plots, "",
+                   fmt::format("expected plots where stems were seen: none of the {} overlaps {}",
+                               stock.plots.size(), stock.figures.seen_at));
 }
 
 // trees.csv, trees.gpkg, the rasters, and of plots plots.csv and plot_classes.csv.

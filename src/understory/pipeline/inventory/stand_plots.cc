@@ -86,6 +86,30 @@ Eigen::Vector4d box_of(const VisibleArea& seen) {
           seen.y0 + seen.rows * seen.cell_m};
 }
 
+// The box, along the axes of another frame, that holds a box.
+template <typename Change>
+std::pair<Eigen::Vector2d, Eigen::Vector2d> corners_of(const Eigen::Vector4d& box,
+                                                       const Change& change) {
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector2d high = -low;
+  for (const int corner : {0, 1, 2, 3}) {
+    const Eigen::Vector2d point = change({box[corner % 2 == 0 ? 0 : 2], box[corner < 2 ? 1 : 3]});
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  return {low, high};
+}
+
+// Where plots would have to lie, in the frame in which they are given.
+std::string place_of(const VisibleArea& seen, const PlotFrame& frame) {
+  if (seen.empty()) return "nothing was seen";
+  const auto [low, high] = corners_of(
+      box_of(seen), [&](const Eigen::Vector2d& point) { return frame.from_world(point); });
+  const int decimals = frame.in_metres() ? 0 : 5;
+  return fmt::format("x {:.{}f} to {:.{}f}, y {:.{}f} to {:.{}f}", low.x(), decimals, high.x(),
+                     decimals, low.y(), decimals, high.y(), decimals);
+}
+
 std::vector<PlotShape> grid_of(const VisibleArea& seen, double side_m, const PlotFrame& frame) {
   std::vector<PlotShape> cells;
   if (seen.empty()) return cells;
@@ -96,14 +120,7 @@ std::vector<PlotShape> grid_of(const VisibleArea& seen, double side_m, const Plo
   const auto to_world = [&](const Eigen::Vector2d& point) {
     return in_layers ? frame.to_world(point) : point;
   };
-  const Eigen::Vector4d box = box_of(seen);
-  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
-  Eigen::Vector2d high = -low;
-  for (const int corner : {0, 1, 2, 3}) {
-    const Eigen::Vector2d point = to_grid({box[corner % 2 == 0 ? 0 : 2], box[corner < 2 ? 1 : 3]});
-    low = low.cwiseMin(point);
-    high = high.cwiseMax(point);
-  }
+  const auto [low, high] = corners_of(box_of(seen), to_grid);
   const Eigen::Vector2d count = ((high - low) / side_m).array().ceil() + 1.0;
   if (count.x() * count.y() > kMostGridCells) return cells;
   const Eigen::Vector2d first = (low / side_m).array().floor();
@@ -139,6 +156,10 @@ StandPlot plot_of(PlotShape shape, const StandTrees& trees, const InventoryResul
   return plot;
 }
 
+std::string percent(double share) {
+  return fmt::format("{:.0f} %", 100.0 * share);
+}
+
 // What is to be said of the user's own plots.
 void judge_plots(const std::vector<StandPlot>& plots, const StandTableConfig& config,
                  StandResult& result) {
@@ -163,13 +184,15 @@ void judge_plots(const std::vector<StandPlot>& plots, const StandTableConfig& co
   result.no_overlap = !plots.empty() && !any;
   if (in_part > 0)
     result.remarks.push_back(fmt::format(
-        "{} plots go beyond what was seen (of plot {} {:.0f} % was seen). Their figures take the "
-        "rest for like what was seen.",
-        in_part, least->shape.id, 100.0 * least->figures.seen_share));
+        "{} beyond what was seen ({} of plot {}). Figures take the rest for like what was seen.",
+        in_part == 1 ? "1 plot goes" : fmt::format("{} plots go", in_part),
+        percent(least->figures.seen_share), least->shape.id));
   if (without > 0)
     result.complaint = fmt::format(
-        "{} plots have no figures, as less than {:.0f} % of them was seen (of plot {} {:.0f} %)",
-        without, 100.0 * config.least_seen, none->shape.id, 100.0 * none->figures.seen_share);
+        "{} no figures: less than {:.0f} % was seen ({} of plot {}). Stems were seen at {}",
+        without == 1 ? "1 plot has" : fmt::format("{} plots have", without),
+        100.0 * config.least_seen, percent(none->figures.seen_share), none->shape.id,
+        result.seen_at);
 }
 
 }  // namespace
@@ -196,6 +219,7 @@ StandResult take_stand(const InventoryResult& inventory, const StandTableConfig&
   for (const PlotOutline& outline : plots)
     table.plots.push_back(
         plot_of(shape_of(outline, inventory, config, frame), trees, inventory, figures, frame));
+  result.seen_at = place_of(inventory.seen, frame);
   judge_plots(table.plots, config, result);
   if (!(config.grid_m > 0.0)) return result;
   const std::vector<PlotShape> cells = grid_of(inventory.seen, config.grid_m, frame);

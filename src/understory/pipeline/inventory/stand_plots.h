@@ -17,6 +17,8 @@ struct StandResult {
   // Why plots have no figures; empty: all have.
   std::string complaint;
   bool no_overlap = false;  // of any plot with what was seen
+  // Where stems were seen, in words, in the frame of the layers.
+  std::string seen_at;
 };
 
 // The outlines that `config.plots` names, in the coordinates of `system`; none where it names none.

@@ -68,13 +68,24 @@ TEST(StandPlots, PlotsBeyondWhatWasSeenAreTold) {
   const StandResult part =
       take_stand(slope(), {}, {circle("A", 20, 30, 9), circle("B", 42, 30, 9)}, world);
   ASSERT_EQ(part.remarks.size(), 1U);
-  EXPECT_NE(part.remarks[0].find("of plot B 7"), std::string::npos) << part.remarks[0];
+  EXPECT_NE(part.remarks[0].find("% of plot B)"), std::string::npos) << part.remarks[0];
   EXPECT_TRUE(part.complaint.empty());
   EXPECT_FALSE(part.no_overlap);
   const StandResult little = take_stand(slope(), {}, {circle("C", 50, 30, 9)}, world);
-  EXPECT_NE(little.complaint.find("1 plots have no figures"), std::string::npos);
+  EXPECT_NE(little.complaint.find("1 plot has no figures"), std::string::npos);
   EXPECT_FALSE(little.no_overlap);
   EXPECT_TRUE(take_stand(slope(), {}, {circle("D", 500, 30, 9)}, world).no_overlap);
+}
+
+// A plot in the wrong frame: the message says where it would have to lie, in the layers' own.
+TEST(StandPlots, WhereStemsWereSeenIsToldInTheFrameOfTheLayers) {
+  const LayerFrame moved(
+      Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(400'000.0, 6'800'000.0, 0.0)));
+  const StandResult far = take_stand(slope(), {}, {circle("D", 20, 30, 9)}, moved);
+  EXPECT_TRUE(far.no_overlap);
+  EXPECT_NE(far.complaint.find("(0 % of plot D)"), std::string::npos) << far.complaint;
+  EXPECT_NE(far.complaint.find("x 400000 to"), std::string::npos) << far.complaint;
+  EXPECT_NE(far.complaint.find("y 6800000 to"), std::string::npos) << far.complaint;
 }
 
 TEST(StandPlots, AreDrawnInTheFrameOfTheLayers) {
