@@ -11,9 +11,17 @@ namespace {
 
 using namespace forest_constants::height_curve;
 
+}  // namespace
+
+bool is_lower_bound(const Tree& tree) {
+  return tree.height_is_lower_bound > 0.5;  // not where it is not known
+}
+
+namespace {
+
 bool has_both(const Tree& tree) {
   return tree.dbh_m > 0.0 && std::isfinite(tree.dbh_m) && tree.height_m > kBreastHeight &&
-         std::isfinite(tree.height_m);
+         std::isfinite(tree.height_m) && !is_lower_bound(tree);
 }
 
 }  // namespace

@@ -21,6 +21,9 @@ struct HeightCurve {
   [[nodiscard]] double at(double dbh_m) const;
 };
 
+// Whether the tree may be higher than its height says. It tells no height then.
+[[nodiscard]] bool is_lower_bound(const Tree& tree);
+
 // Least squares of d / sqrt(h - 1.3) = a + b d over the trees with diameter and height. Nothing
 // where they are fewer than 8, all about as thick, or where thicker ones are no higher.
 [[nodiscard]] std::optional<HeightCurve> fit_height_curve(const std::vector<Tree>& trees);

@@ -113,9 +113,13 @@ TEST(StandFigures, AHeightThatWasNotSeenComesFromTheCurveAndAVolumeFromTheForm) 
     trees[i].height_m = NAN;
     trees[i].stem_volume_m3 = NAN;
   }
+  // A lower bound is no height.
+  trees[6].height_m -= 6.0;
+  trees[6].stem_volume_m3 *= 0.5;
+  trees[6].height_is_lower_bound = 1.0;
   const StandFigures filled = stand_figures(stand_trees(trees, {}), seen, all, {});
-  EXPECT_EQ(filled.heights_filled_in, 3U);
-  EXPECT_EQ(filled.volumes_filled_in, 3U);
+  EXPECT_EQ(filled.heights_filled_in, 4U);
+  EXPECT_EQ(filled.volumes_filled_in, 4U);
   EXPECT_NEAR(filled.volume_m3_per_ha.value, whole.volume_m3_per_ha.value, 1e-6);
   EXPECT_NEAR(filled.weighted_height_m.value, whole.weighted_height_m.value, 1e-9);
   StandTableConfig pine;

@@ -54,12 +54,9 @@ FormFactor form_factor_of(const std::vector<StandTree>& trees) {
 }
 
 void fill_in_height(const std::optional<HeightCurve>& curve, StandTree& tree) {
-  if (std::isfinite(tree.height_m.value)) {
-    tree.height_m.sd = kHeightSd;
-  } else if (curve) {
-    tree.height_m = {curve->at(tree.dbh_m.value), curve->sd_m};
-    tree.height_filled_in = true;
-  }
+  if (std::isfinite(tree.height_m.value) || !curve) return;
+  tree.height_m = {curve->at(tree.dbh_m.value), curve->sd_m};
+  tree.height_filled_in = true;
 }
 
 void fill_in_volume(const FormFactor& factor, StandTree& tree) {
@@ -109,8 +106,12 @@ StandTrees stand_trees(const std::vector<Tree>& trees, const StandTableConfig& c
     counted.place_sd_m = std::sqrt(
         0.5 * (square(positive_or_zero(tree.x_sd_m)) + square(positive_or_zero(tree.y_sd_m))));
     counted.dbh_m = {tree.dbh_m, positive_or_zero(tree.dbh_sd_m)};
-    counted.height_m.value = tree.height_m;
-    counted.volume_m3 = {tree.stem_volume_m3, positive_or_zero(tree.stem_volume_sd_m3)};
+    // A lower bound is no height, nor is the volume up to it one.
+    if (!is_lower_bound(tree)) {
+      const bool known = std::isfinite(tree.height_sd_m);
+      counted.height_m = {tree.height_m, known ? tree.height_sd_m : kHeightSd};
+      counted.volume_m3 = {tree.stem_volume_m3, positive_or_zero(tree.stem_volume_sd_m3)};
+    }
     fill_in_height(stand.curve, counted);
     stand.trees.push_back(counted);
   }

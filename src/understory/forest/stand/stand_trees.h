@@ -40,9 +40,9 @@ struct StandTrees {
   double form_factor = std::numeric_limits<double>::quiet_NaN();
 };
 
-// A height that was not seen is that of the height curve. A stem without a volume has basal area
-// times height times the form factor: the sum of the known volumes over that of the products. Where
-// neither is known, the value stays NaN.
+// A height that was not seen, or is a lower bound, is that of the height curve. A stem without a
+// volume has basal area times height times the form factor: the sum of the known volumes over that
+// of the products. Where neither is known, the value stays NaN.
 [[nodiscard]] StandTrees stand_trees(const std::vector<Tree>& trees,
                                      const StandTableConfig& config);
 
