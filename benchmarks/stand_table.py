@@ -1,23 +1,24 @@
 #!/usr/bin/env python3
 """Stand figures of sample plots against the truth of a simulation.
 
-    benchmarks/stand_table.py --plots TRUTH > plots.csv
+    benchmarks/stand_table.py --plots TRUTH [--radius M] [--step M] > plots.csv
     understory inventory TRUTH/points.laz --plots plots.csv -o RUN
-    benchmarks/stand_table.py RUN TRUTH [RUN TRUTH ...]
+    benchmarks/stand_table.py [--align] RUN TRUTH [RUN TRUTH ...]
 
-The first call writes circles of 15 m along the true path, one every 4 m. The last one compares
+The first call writes circles of 15 m along a path, one every 4 m. The last one compares
 plots.csv of each RUN with what the true trees of 5 cm and more on the whole plot give, and pools all
 plots: mean error, root mean square error, and that of the error over its stated standard deviation
-(1 where the deviations are right). The frame of RUN must be that of the truth. Needs numpy.
+(1 where the deviations are right). The frame of RUN must be that of the truth. Of a map that is made
+from a recording it is not: then the plots lie along the path of the run (--plots RUN), and --align
+lays the truth on the map by the trees. Needs numpy.
 """
+import argparse
 import csv
 import math
-import sys
 
+import inventory_table
 import numpy as np
 
-RADIUS_M = 15.0
-STEP_M = 4.0
 MIN_DBH_M = 0.05
 LEAST_SEEN = 0.5
 FIGURES = {
@@ -40,17 +41,17 @@ def number(text):
     return float(text) if text else math.nan
 
 
-def write_plots(truth):
-    path = np.loadtxt(f"{truth}/trajectory.tum")[:, 1:3]
+def write_plots(folder, radius, step):
+    path = np.loadtxt(f"{folder}/trajectory.tum")[:, 1:3]
     print("id,x,y,radius_m")
     last = None
     count = 0
     for place in path:
-        if last is not None and np.hypot(*(place - last)) < STEP_M:
+        if last is not None and np.hypot(*(place - last)) < step:
             continue
         last = place
         count += 1
-        print(f"{count},{place[0]:.3f},{place[1]:.3f},{RADIUS_M:g}")
+        print(f"{count},{place[0]:.3f},{place[1]:.3f},{radius:g}")
 
 
 def figures_of_truth(trees, x, y, radius):
@@ -75,8 +76,12 @@ def figures_of_truth(trees, x, y, radius):
     }
 
 
-def compare(run, truth, errors, shares):
+def compare(run, truth, align, errors, shares):
     trees = [{k: number(v) for k, v in row.items() if k not in ("species", "felled_at")} for row in rows_of(f"{truth}/trees.csv")]
+    if align:
+        rotation, shift = inventory_table.alignment(run, truth)  # from the map to the truth
+        for tree in trees:
+            tree["x"], tree["y"] = (rotation.T @ (np.array([tree["x"], tree["y"], tree["z"]]) - shift))[:2]
     for row in rows_of(f"{run}/plots.csv"):
         if row["kind"] != "circle":
             continue
@@ -89,16 +94,23 @@ def compare(run, truth, errors, shares):
 
 
 def main():
-    arguments = sys.argv[1:]
-    if len(arguments) == 2 and arguments[0] == "--plots":
-        write_plots(arguments[1])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--plots", metavar="FOLDER")
+    parser.add_argument("--radius", type=float, default=15.0)
+    parser.add_argument("--step", type=float, default=4.0)
+    parser.add_argument("--align", action="store_true")
+    parser.add_argument("folders", nargs="*")
+    arguments = parser.parse_args()
+    if arguments.plots:
+        write_plots(arguments.plots, arguments.radius, arguments.step)
         return
-    if not arguments or len(arguments) % 2:
-        sys.exit(__doc__)
+    folders = arguments.folders
+    if not folders or len(folders) % 2:
+        parser.error("expected RUN TRUTH [RUN TRUTH ...]")
     errors = {name: [] for name in FIGURES}
     shares = []
-    for run, truth in zip(arguments[::2], arguments[1::2]):
-        compare(run, truth, errors, shares)
+    for run, truth in zip(folders[::2], folders[1::2]):
+        compare(run, truth, arguments.align, errors, shares)
     print(f"{len(shares)} plots, seen {100 * np.mean(shares):.1f} % of them on average, least {100 * min(shares):.1f} %\n")
     print("| figure | plots | mean error | RMS error | error over its deviation, RMS |\n|---|---|---|---|---|")
     for name, rows in errors.items():

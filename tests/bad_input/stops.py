@@ -59,7 +59,7 @@ def map_stopped(folder, stages, files, whole, *options):
 
 @cases.case("map, once the scans are positioned")
 def mapping(folder):
-    stages = ("gathering the map", "ground", "heights", "stems", "tops", "segments", "writing map.laz")
+    stages = ("gathering the map", "ground", "stems", "tops", "segments", "writing map.laz")
     return map_stopped(folder, stages, FILES, RUN)
 
 
@@ -92,7 +92,7 @@ def former(folder):
 
 @cases.case("inventory")
 def inventory(folder):
-    for stage in ("ground", "heights", "stems", "tops", "segments"):
+    for stage in ("ground", "stems", "tops", "crowns", "segments"):
         code, said = stop_at(stage, signal.SIGINT, "inventory", RUN / "map.laz", "-o", folder / "plot")
         assert code == 4 and "stopped by the user" in said, (stage, code, said)
         assert not list(folder.iterdir()), stage

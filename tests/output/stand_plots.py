@@ -119,7 +119,7 @@ def check_refusals(folder, cloud):
         assert done.returncode == code and message in done.stderr, (words, done.returncode, done.stderr)
         assert not run.exists() or not any(run.iterdir()), (words, list(run.iterdir()))
     done = inventory(cloud, folder / "corner", "--plots", f"{EAST},{NORTH},9")
-    assert done.returncode == 4 and "have no figures" in done.stderr, (done.returncode, done.stderr)
+    assert done.returncode == 4 and "has no figures" in done.stderr, (done.returncode, done.stderr)
     corner = rows(folder / "corner" / "plots.csv")["1"]
     assert abs(float(corner["seen_share"]) - 0.25) < 0.02 and corner["stems_per_ha"] == ""
 

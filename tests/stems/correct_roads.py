@@ -1,6 +1,7 @@
 """`understory correct` from end to end: made-up strip roads against their truth, one and two
 threads, and input that is damaged or in the wrong place."""
 
+import csv
 import gzip
 import json
 import math
@@ -19,6 +20,11 @@ SITE = cases.folder / "site"
 VIEWS = write_strip_roads(SITE, seed=3)
 STEMS = SITE / "stems.csv.gz"
 LINES = gzip.decompress(STEMS.read_bytes()).decode().splitlines()
+
+
+def table(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def correct(stems, run, *options):
@@ -91,8 +97,8 @@ def methods(folder):
         assert done.returncode in (0, 4), done.stderr
         told = json.loads((run / "run.json").read_text())
         assert told["poses"] == views
-        rows = (run / "corrections.csv").read_text().splitlines()[1:]
-        kept = sum(int(row.split(",")[10]) for row in rows)
+        rows = table(run / "corrections.csv")
+        kept = sum(int(row["kept"]) for row in rows)
         assert kept == told["counts"]["corrections"] and len(rows) >= kept
         sharpness = evaluated("map", folder / "second_look.csv.gz", run)
         noise[method] = sharpness["registration_noise_mean_m"]
@@ -168,8 +174,7 @@ def eliminated(folder):
         assert done.returncode == 0, done.stderr
         told = json.loads((folder / str(factor) / "run.json").read_text())
         assert told["counts"]["views_eliminated"] == (hurt if factor else 0), told["counts"]
-        rows = (folder / str(factor) / "trees.csv").read_text().splitlines()[1:]
-        sights.append(sum(int(row.split(",")[8]) for row in rows))
+        sights.append(sum(int(row["observations"]) for row in table(folder / str(factor) / "trees.csv")))
         noise.append(told["quality"]["sight_noise_m"])
         assert len((folder / str(factor) / "trajectory.tum").read_text().splitlines()) == views
     assert noise[1] < 0.8 * noise[0], (sights, noise)
