@@ -161,6 +161,8 @@ inline constexpr double kReach = 60.0;
 inline constexpr double kStep = 1.0;
 // Slope by which a point lies lower than another whatever their rounding [bound: doubles]
 inline constexpr double kSureSlope = 1e-9;
+// Points after which the slope that all sectors have is looked for again [chosen: speed alone]
+inline constexpr std::size_t kPointsPerLook = 512;
 }  // namespace lidar_view
 
 namespace georeferencing {  // pipeline/georeferencing/methods/place_by_*.cc

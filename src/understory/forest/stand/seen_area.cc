@@ -35,25 +35,51 @@ struct Cells {
   }
 };
 
+// Sums along a line of cells: entry c is how many of the cells before column c - `margin` hold
+// anything, so that every stretch within `margin` of the line is a difference of two entries.
+void sum_line(const Cells& cells, int row, int margin, std::vector<int>& sums) {
+  sums.assign(static_cast<std::size_t>(cells.columns + 2 * margin + 1), 0);
+  int held = 0;
+  for (int column = -margin; column < cells.columns + margin; ++column) {
+    held += cells.at(column, row) != 0 ? 1 : 0;
+    sums[static_cast<std::size_t>(column + margin + 1)] = held;
+  }
+}
+
 // Cells of the disc of `radius` cells around each that holds anything (`grow`), or only those whose
 // whole disc is held.
 Cells with_disc(const Cells& cells, int radius, bool grow) {
   Cells result(cells.columns, cells.rows);
-  parallel_for(static_cast<std::size_t>(cells.rows), 16, [&](std::size_t line) {
-    const auto row = static_cast<int>(line);
-    for (int column = 0; column < cells.columns; ++column) {
-      bool any = false;
-      bool all = true;
-      for (int dy = -radius; dy <= radius; ++dy) {
-        for (int dx = -radius; dx <= radius; ++dx) {
-          if (dx * dx + dy * dy > radius * radius) continue;
-          const bool held = cells.at(column + dx, row + dy) != 0;
-          any = any || held;
-          all = all && held;
-        }
-      }
-      result.values[result.index(column, row)] = (grow ? any : all) ? 1 : 0;
+  std::vector<int> reach;  // of the disc's lines, to each side
+  int size = 0;
+  for (int dy = -radius; dy <= radius; ++dy) {
+    int dx = 0;
+    while ((dx + 1) * (dx + 1) + dy * dy <= radius * radius)
+      ++dx;
+    reach.push_back(dx);
+    size += 2 * dx + 1;
+  }
+  std::vector<std::vector<int>> sums(static_cast<std::size_t>(cells.rows));
+  parallel_for(sums.size(), 16, [&](std::size_t line) {
+    sum_line(cells, static_cast<int>(line), radius, sums[line]);
+  });
+  const auto width = static_cast<std::size_t>(cells.columns);
+  const auto middle = static_cast<std::size_t>(radius);
+  parallel_for(sums.size(), 16, [&](std::size_t line) {
+    std::vector<int> held(width, 0);
+    for (int dy = -radius; dy <= radius; ++dy) {
+      const int row = static_cast<int>(line) + dy;
+      if (row < 0 || row >= cells.rows) continue;
+      const auto dx = static_cast<std::size_t>(reach[static_cast<std::size_t>(dy + radius)]);
+      const int* low = sums[static_cast<std::size_t>(row)].data() + middle - dx;
+      const int* high = sums[static_cast<std::size_t>(row)].data() + middle + dx + 1;
+      for (std::size_t i = 0; i < width; ++i)
+        held[i] += high[i] - low[i];
     }
+    std::uint8_t* values = result.values.data() + line * width;
+    const int least = grow ? 1 : size;
+    for (std::size_t i = 0; i < width; ++i)
+      values[i] = held[i] >= least ? 1 : 0;
   });
   return result;
 }

@@ -160,7 +160,7 @@ void MapPicture::grow(int column, int row) {
 }
 
 void MapPicture::coarsen() {
-  const auto half = [](int value) { return static_cast<int>(std::floor(value / 2.0)); };
+  const auto half = [](int value) { return value >> 1; };  // rounds down, also below 0
   Box coarse{half(seen_.column0), half(seen_.row0), 0, 0};
   coarse.columns = half(seen_.column0 + seen_.columns - 1) - coarse.column0 + 1;
   coarse.rows = half(seen_.row0 + seen_.rows - 1) - coarse.row0 + 1;

@@ -33,13 +33,18 @@ std::array<double, LidarView::kSectors> LidarView::no_returns() {
 
 void LidarView::add(const std::vector<KeyframePoint>& points) {
   const Pose lidar_from_body = body_from_lidar.inverse();
-  // Points that are surely lower than another of their sector are left out by their slope.
+  // Points that are surely lower than another of their sector are left out by their slope: most of
+  // them without looking for the sector, as they are lower than what every sector has.
   std::array<double, kSectors> steepest{};
   steepest.fill(-std::numeric_limits<double>::infinity());
-  for (const KeyframePoint& p : points) {
+  double everywhere = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i % kPointsPerLook == 0) everywhere = *std::min_element(steepest.begin(), steepest.end());
+    const KeyframePoint& p = points[i];
     const Eigen::Vector3d point = lidar_from_body * Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
-    const std::size_t sector = sector_of(point);
     const double flat = point.head<2>().norm();
+    if (point.z() < (everywhere - kSureSlope) * flat) continue;
+    const std::size_t sector = sector_of(point);
     if (point.z() < (steepest[sector] - kSureSlope) * flat) continue;
     steepest[sector] = std::max(steepest[sector], point.z() / flat);
     highest_deg[sector] = std::fmax(highest_deg[sector], elevation_deg(point));

@@ -181,7 +181,7 @@ void RunState::restore(Resumable& session, EventOrderer& orderer, Log& log, cons
 void RunState::save(const MappingRequest& request, Resumable& session, const EventOrderer& orderer,
                     const Log& log, const Recording& source, std::uint64_t events) {
   session.sync();
-  BinaryWriter state;
+  BinaryWriter state(state_bytes_ + state_bytes_ / 4);
   const auto warnings = log.warnings();
   state.put(static_cast<std::uint64_t>(warnings.size()));
   for (const Log::Warning& warning : warnings) {
@@ -192,7 +192,9 @@ void RunState::save(const MappingRequest& request, Resumable& session, const Eve
   orderer.save(state);
   session.save(state);
   last_checkpoint_ = session.last_scan_end();
-  BinaryWriter writer;
+  state_bytes_ = state.bytes().size();
+  constexpr std::size_t kBesideState = 1 << 16;
+  BinaryWriter writer(state_bytes_ + kBesideState);
   put_request(writer, request);
   put_inputs(writer, inputs_);
   writer.put(front_end_);

@@ -85,8 +85,9 @@ class RunState {
   std::optional<std::string> place_;  // where the recording stood, if it could tell
   std::string file_;                  // that was read
   std::vector<InputIdentity> inputs_;
-  std::string passed_over_;  // what kept `reopen` from the newest checkpoint
-  std::string state_;        // of session, orderer and log, as read
+  std::string passed_over_;      // what kept `reopen` from the newest checkpoint
+  std::string state_;            // of session, orderer and log, as read
+  std::size_t state_bytes_ = 0;  // of the last checkpoint
   double earlier_s_ = 0.0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -14,6 +15,10 @@ namespace understory {
 // them. Fixed-size Eigen matrices and other trivially laid-out values go through `put_raw`.
 class BinaryWriter {
  public:
+  BinaryWriter() = default;
+  // With room for about `expected` bytes, so that large content is not moved as it grows.
+  explicit BinaryWriter(std::size_t expected) { bytes_.reserve(expected); }
+
   template <typename T>
   requires std::is_trivially_copyable_v<T>
   void put(const T& value) { bytes_.append(reinterpret_cast<const char*>(&value), sizeof(T)); }
