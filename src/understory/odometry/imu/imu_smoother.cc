@@ -189,6 +189,12 @@ void ImuSmoother::restart_at(TimeNs stamp, const PoseFactor& lidar,
   window_.start(state, up, sigma);
 }
 
+void ImuSmoother::note_residual(const MotionPrediction& predicted, const PoseFactor& lidar) {
+  const Vector6d variance = predicted.covariance.diagonal().head<6>() + lidar.covariance.diagonal();
+  residual_scale_.add((predicted.state.world_from_imu.inverse() * lidar.world_from_imu).log(),
+                      variance);
+}
+
 MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interval,
                                       const PoseFactor& lidar,
                                       const Eigen::Vector3d& match_velocity) {
@@ -208,6 +214,7 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
   }
   if (update.reason.empty()) {
     dropped_in_a_row_ = 0;
+    if (!interval.samples.empty()) note_residual(predicted, lidar);
     return update;
   }
   if (dropped_in_a_row_ >= config_.velocity_gate_patience) {
@@ -285,6 +292,11 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
   MotionPrediction now = predict_full(stamp);
   if (!interval.samples.empty() && use_imu())
     now.angular_rate = interval.samples.back().angular_rate() - now.state.gyro_bias;
+  if (config_.covariance_from_residuals && matched && update.status == MotionStatus::kAccepted &&
+      !interval.samples.empty()) {
+    now.covariance.topLeftCorner<6, 6>() =
+        residual_scale_.scaled(now.covariance.topLeftCorner<6, 6>());
+  }
   update.state = to_nav(now);
   return update;
 }
@@ -340,6 +352,7 @@ void ImuSmoother::save(BinaryWriter& writer) const {
   writer.put(last_match_.has_value());
   writer.put(last_match_ ? last_match_->stamp : TimeNs{0});
   put_pose(writer, last_match_ ? last_match_->world_from_imu : Pose());
+  residual_scale_.save(writer);
 }
 
 void ImuSmoother::load(BinaryReader& reader) {
@@ -362,6 +375,7 @@ void ImuSmoother::load(BinaryReader& reader) {
   const auto stamp = reader.get<TimeNs>();
   const Pose pose = get_pose(reader);
   if (matched) last_match_ = ImuMatch{stamp, pose};
+  residual_scale_.load(reader);
 }
 
 std::unique_ptr<MotionModel> make_imu_smoother(const MotionConfig& config, const Rig& rig,

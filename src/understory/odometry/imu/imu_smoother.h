@@ -7,6 +7,7 @@
 #include "understory/odometry/imu/isam2_smoother.h"
 #include "understory/odometry/imu/window_smoother.h"
 #include "understory/odometry/motion/motion_prediction.h"
+#include "understory/odometry/motion/residual_scale.h"
 
 namespace understory {
 
@@ -46,6 +47,7 @@ class ImuSmoother : public MotionModel {
   MotionUpdate begin(TimeNs stamp);
   void learn_vertical(const MotionInterval& interval);
   [[nodiscard]] MotionInterval make_interval(TimeNs from, TimeNs to) const;
+  void note_residual(const MotionPrediction& predicted, const PoseFactor& lidar);
   MotionUpdate add_matched(TimeNs stamp, const MotionInterval& interval, const PoseFactor& lidar,
                            const Eigen::Vector3d& match_velocity);
   void add_state(TimeNs stamp, const MotionInterval& interval,
@@ -69,6 +71,7 @@ class ImuSmoother : public MotionModel {
   bool levelled_ = false;
   int dropped_in_a_row_ = 0;
   std::optional<ImuMatch> last_match_;
+  ResidualScale residual_scale_;                     // of matches against the prediction by the IMU
   std::optional<Eigen::Vector3d> initial_velocity_;  // body frame; only until the first scan
 };
 

@@ -157,6 +157,46 @@ TEST(ImuSmoother, PositionsWithTheirOwnCovarianceKeepItOnItsWay) {
   EXPECT_TRUE(run.trust.trusted) << run.trust.reason;
 }
 
+// Noise that is stated with a wide margin, as by default, weighs as it did. What the state says of
+// its error is brought to the size of the error.
+TEST(ImuSmoother, StatesErrorsOfTheSizeThatResidualsSpeakFor) {
+  Play setup;
+  setup.motion = MotionConfig();
+  std::vector<NavState> with;
+  setup.states = &with;
+  const Outcome scaled = play(setup);
+  std::vector<NavState> without;
+  setup.states = &without;
+  setup.motion.covariance_from_residuals = false;
+  play(setup);
+  const auto stated = [](const NavState& state) {
+    return std::sqrt(state.pose_covariance.diagonal().tail<3>().sum());
+  };
+  EXPECT_GT(stated(without.back()), 2.5 * scaled.position_rmse);
+  EXPECT_LT(stated(with.back()), 1.6 * scaled.position_rmse);
+  EXPECT_GT(stated(with.back()), 0.6 * scaled.position_rmse);
+  ASSERT_EQ(with.size(), without.size());
+  for (std::size_t i = 0; i < with.size(); ++i)
+    EXPECT_EQ(with[i].world_from_body.matrix(), without[i].world_from_body.matrix());
+}
+
+// A scan that found no match has what the model says: residuals of matches do not speak for it.
+TEST(ImuSmoother, AScanWithoutAMatchKeepsTheModelsCovariance) {
+  Play setup;
+  setup.motion = MotionConfig();
+  setup.duration = 20.0;
+  setup.spoil_match = [](double t, std::optional<LidarFactor>& match) {
+    if (t > 20.35) match.reset();
+  };
+  std::vector<NavState> states;
+  setup.states = &states;
+  play(setup);
+  const auto variance = [&](std::size_t from_end) {
+    return states[states.size() - from_end].pose_covariance(4, 4);
+  };
+  EXPECT_GT(variance(1), 4.0 * variance(3));
+}
+
 TEST(ImuSmoother, FollowsFromAStillStart) {
   Play setup;
   setup.carrier.still_s = 2.0;

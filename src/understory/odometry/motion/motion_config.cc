@@ -79,6 +79,8 @@ void describe(ConfigTable& table, MotionConfig& config) {
   describe_gate(table, config);
   table.add("level_world", config.level_world,
             "level the world once in the first seconds, when the vertical is known");
+  table.add("covariance_from_residuals", config.covariance_from_residuals,
+            "state covariances at the size that residuals between matches and IMU speak for");
   table.add("motion_accel_sigma_m_s2", config.motion_accel_sigma_m_s2, {1e-3, 1e3},
             "m/s^2/sqrt(Hz)", "acceleration of the carrier where no IMU measures it");
   table.add("motion_angular_accel_sigma_rad_s2", config.motion_angular_accel_sigma_rad_s2,

@@ -185,7 +185,10 @@ struct MotionConfig {
   double angular_gate_deg_s = 30.0;  // the same for the turn since the last scan
   VelocityGateReference velocity_gate_reference = VelocityGateReference::kPrediction;
   int velocity_gate_patience = 5;  // drops in a row before a match is accepted after all
-  bool level_world = true;         // allow new_world_from_old_world in the first seconds
+  // NavState::pose_covariance of a matched scan is that of the smoother, brought to the size of the
+  // residuals; weights are as they were.
+  bool covariance_from_residuals = true;
+  bool level_world = true;  // allow new_world_from_old_world in the first seconds
   // Constant-velocity model: acceleration that the carrier is capable of.
   double motion_accel_sigma_m_s2 = 3.0;
   double motion_angular_accel_sigma_rad_s2 = 6.0;
