@@ -165,8 +165,9 @@ inline constexpr int kMemory = 100;
 // residuals do not show [fit: benchmarks/scan_covariance.py, handheld 3 and 4, harvester 3,
 // random 8, 9 and 16]
 inline constexpr double kShared = 1.2;
-// Bounds of the factor of a standard deviation [chosen]
+// Least factor of a standard deviation [chosen]
 inline constexpr double kSmallest = 0.005;
+// Largest factor of it [chosen]
 inline constexpr double kLargest = 10.0;
 }  // namespace residual_scale
 
