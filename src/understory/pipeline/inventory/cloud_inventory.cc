@@ -176,7 +176,7 @@ void write_project(const Stock& stock, const fs::path& results) {
     project.crs_wkt = system->wkt();
     project.crs_code = system->code();
   }
-  write_qgis_project(results, project, false);
+  write_qgis_project(results, project);
 }
 
 // A run's map and its frames.
