@@ -189,8 +189,8 @@ def project(folder):
     for run, code in ((RUN, "EPSG:3067"), (LOCAL, None)):
         root = xml.parse(run / "map.qgs").getroot()
         sources = [layer.findtext("datasource") for layer in root.find("projectlayers")]
-        assert sources == ["./trees.gpkg|layername=trees", "./trees.gpkg|layername=path", "./chm.tif", "./dsm.tif",
-                           "./dtm.tif", "./map.laz"], sources
+        assert sources == ["./trees.gpkg|layername=look_again", "./trees.gpkg|layername=trees",
+                           "./trees.gpkg|layername=path", "./chm.tif", "./dsm.tif", "./dtm.tif", "./map.laz"], sources
         assert all((run / source.split("|")[0]).exists() for source in sources)
         assert root.findtext("projectCrs/spatialrefsys/authid") == (code or ""), code
         assert root.findtext("properties/Paths/Absolute") == "false"

@@ -32,7 +32,13 @@ double spread_of(const std::vector<double>& values) {
   return spread > 0.0 ? spread : Tree::kUnknown;  // copied values have no errors to tell
 }
 
-// Fills one increment of every tree that stays. `sd_of` is null where lists do not tell it.
+// Whether the tree may be higher than its height says. Neither that nor the volume below it tells
+// growth then.
+bool may_be_higher(const Tree& tree) {
+  return tree.height_is_lower_bound > 0.5;  // not where it is not known
+}
+
+// Fills one increment of every tree that stays.
 IncrementSummary add_increments(const std::vector<Tree>& old_trees,
                                 const std::vector<Tree>& new_trees, double Tree::*figure,
                                 double Tree::*sd_of, Increment TreeChange::*increment,
@@ -44,10 +50,11 @@ IncrementSummary add_increments(const std::vector<Tree>& old_trees,
     if (change.fate != TreeFate::kStays) continue;
     const Tree& before = old_trees[*change.in_old];
     const Tree& after = new_trees[*change.in_new];
+    if (figure != &Tree::dbh_m && (may_be_higher(before) || may_be_higher(after))) continue;
     Increment& each = change.*increment;
     each.value = after.*figure - before.*figure;
     if (!std::isfinite(each.value)) continue;
-    if (sd_of != nullptr) each.sd = std::hypot(before.*sd_of, after.*sd_of);
+    each.sd = std::hypot(before.*sd_of, after.*sd_of);
     lacks_sd = lacks_sd || !std::isfinite(each.sd);
     values.push_back(each.value);
   }
@@ -146,7 +153,7 @@ TreeChanges tree_changes(const std::vector<Tree>& old_trees, const std::vector<T
   }
   result.dbh = add_increments(old_trees, new_trees, &Tree::dbh_m, &Tree::dbh_sd_m,
                               &TreeChange::dbh_m, result.trees);
-  result.height = add_increments(old_trees, new_trees, &Tree::height_m, nullptr,
+  result.height = add_increments(old_trees, new_trees, &Tree::height_m, &Tree::height_sd_m,
                                  &TreeChange::height_m, result.trees);
   result.volume = add_increments(old_trees, new_trees, &Tree::stem_volume_m3,
                                  &Tree::stem_volume_sd_m3, &TreeChange::volume_m3, result.trees);

@@ -46,7 +46,8 @@ enum class TreeFate {
 // The word of a fate in tables: stays, gone, new, missed_before, outside_new, outside_old.
 [[nodiscard]] std::string to_string(TreeFate fate);
 
-// NEW less OLD of one figure of a tree. NaN where unknown.
+// NEW less OLD of one figure of a tree. NaN where unknown, as heights and volumes are where one of
+// the heights is a lower bound.
 struct Increment {
   double value = Tree::kUnknown;
   double sd = Tree::kUnknown;  // of both measurements together

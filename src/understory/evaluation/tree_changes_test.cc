@@ -108,6 +108,33 @@ TEST(TreeChanges, CopiedFiguresTellNoSpreadAndNothingIsSignificant) {
   EXPECT_EQ(changes.height.grown, 0U);
 }
 
+TEST(TreeChanges, HeightsHaveTheirOwnDeviationAndLowerBoundsTellNoGrowth) {
+  std::vector<Tree> before = plot(16);
+  for (Tree& tree : before)
+    tree.height_sd_m = 0.6;
+  std::vector<Tree> after = before;
+  after[0].height_m += 1.5;
+  after[1].height_m += 2.0;
+  after[2].height_m += 9.0;
+  after[3].height_m += 9.0;
+  after[2].height_is_lower_bound = 1.0;
+  before[3].height_is_lower_bound = 1.0;
+  const TreeChanges changes = changes_of(before, after);
+  EXPECT_TRUE(std::isnan(changes.height.stand_in_sd));  // none was needed
+  EXPECT_EQ(changes.height.known, before.size() - 2);
+  EXPECT_EQ(changes.height.grown, 1U);
+  for (const TreeChange& change : changes.trees) {
+    if (change.in_old == 1U) {
+      EXPECT_NEAR(change.height_m.sd, 0.6 * std::sqrt(2.0), 1e-12);
+      EXPECT_TRUE(change.height_m.significant);  // 2.0 m over 1.96 times 0.85 m
+    }
+    if (change.in_old == 2U || change.in_old == 3U) {
+      EXPECT_TRUE(std::isnan(change.height_m.value));
+      EXPECT_TRUE(std::isnan(change.volume_m3.value));
+    }
+  }
+}
+
 TEST(TreeChanges, WhatTheOtherDidNotSeeIsNeitherGoneNorNew) {
   const std::vector<Tree> truth = plot(4);
   std::vector<Tree> west;

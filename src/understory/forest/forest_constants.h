@@ -93,19 +93,10 @@ inline constexpr double kPlaneMedians = 2.5;
 }  // namespace cloud_shape
 
 namespace inventory {  // forest/inventory.cc
-// Points in the half metre below the top of a tree whose top was seen, at least [bound: what a top
-// is called seen by]
-inline constexpr int kTopPoints = 5;
-// m: standard deviation of a height whose top was seen [chosen]
-inline constexpr double kHeightSd = 0.6;
-// m: the same where the height is a lower bound [chosen]
-inline constexpr double kBoundSd = 2.0;
 // m: edge of the cells that the area of a stand is counted in [chosen]
 inline constexpr double kAreaCell = 2.0;
 // m above the ground: higher points are no tree [bound: the tallest trees have 116 m]
 inline constexpr double kHighest = 120.0;
-// m above a top that have to be seen empty for the height to count [chosen]
-inline constexpr double kMargin = 1.0;
 // m: the origin of slices and stems is a multiple of it, as it is one of the cells of all grids
 // (1.5, 2, 8, 12 and 20 cm; 0.5, 1, 2 and 8 m) [chosen]
 inline constexpr double kOriginStep = 48.0;
@@ -180,6 +171,62 @@ inline constexpr double kLeastAbove = 1.5;
 // [not recorded]
 inline constexpr double kStraight = 6.0;
 }  // namespace tree_heights
+
+namespace tree_tops {  // forest/tree_tops.cc
+// Points in the half metre below the top of a tree whose top was seen, at least [bound: what a top
+// is called seen by]
+inline constexpr int kTopPoints = 5;
+// m: standard deviation of a height whose top was seen [chosen]
+inline constexpr double kHeightSd = 0.6;
+// m: the same where the height is a lower bound [chosen]
+inline constexpr double kBoundSd = 2.0;
+// m above a top that have to be seen empty for the height to count [chosen]
+inline constexpr double kMargin = 1.0;
+// m below and above a top: how well both were seen tells how many points a higher tree would show
+// [chosen: the middle of a metre, and the margin]
+inline constexpr double kBeside = 1.0;
+// Points that the metre above a top would show, did the tree go on: with fewer its height is a
+// lower bound [tuned on random seeds 8, 9, 16 and handheld seeds 3, 4: 5 to 20 were tried]
+inline constexpr double kLeastExpected = 12.0;
+// m above the ground, of a scanner beside the terrain model [chosen: a person's]
+inline constexpr double kScannerHeight = 1.5;
+// Places of the scanner that a top is looked at from, about [bound: time]
+inline constexpr std::size_t kMostLookouts = 64;
+}  // namespace tree_tops
+
+namespace sight_lines {  // forest/trees/occupied_space.cc
+// m: edge of the cubes of a stand that hold points [chosen]
+inline constexpr double kCell = 1.0;
+// Share of a beam that goes through a cube with points [chosen: exp(-0.36), where foliage has 0.7
+// m2 per m3, and half of it stands across]
+inline constexpr double kThroughMetre = 0.7;
+// m from which a free view counts as one [bound: a unit]
+inline constexpr double kUnitRange = 10.0;
+// Columns of a stand: of more, blocks with few points are left out [bound: memory]
+inline constexpr std::uint64_t kMostCells = 24'000'000;
+// Points of such a block, fewer than this [chosen]
+inline constexpr std::uint64_t kStray = 20;
+}  // namespace sight_lines
+
+namespace view_limit {  // forest/trees/view_limit.cc
+// Share of the trees, the thinnest: they do not reach the canopy [chosen]
+inline constexpr double kThinShare = 0.4;
+// Trees of one distance [chosen]
+inline constexpr std::size_t kNear = 20;
+// Farther ones that they are compared with [chosen]
+inline constexpr std::size_t kFar = 40;
+// Trees from one comparison to the next [chosen]
+inline constexpr std::size_t kStep = 10;
+// Trees of one distance that are higher than the height that was seen there [chosen]
+inline constexpr std::ptrdiff_t kRank = 2;
+// Share of the farther trees above that height, from which on the view is limited [tuned on random
+// seeds 1 to 18, handheld 3 and 4, harvester 3: up to 0.55 by chance]
+inline constexpr double kHigherShare = 0.6;
+// The same where it is limited nearer to the scanner [tuned on the same seeds: 0.4 and 0.5]
+inline constexpr double kStillHigherShare = 0.4;
+// Of the height that was seen: lower trees are complete [tuned on the same seeds: 0.3 to 0.7]
+inline constexpr double kOfReached = 0.45;
+}  // namespace view_limit
 
 namespace tree_owners {  // forest/trees/tree_owners.cc
 // m: edge of the cubes that a tree is made of [chosen]

@@ -59,27 +59,6 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
   return trees;
 }
 
-// NaN where the tree may go on above the scanner's view.
-double height_in_view(const InventoryResult& result, const StemFit& stem, double height,
-                      const SeenTest& in_view) {
-  if (!in_view || !std::isfinite(height)) return height;
-  const Eigen::Vector2d place = stem_place_at(stem, height);
-  Eigen::Vector3d above(result.origin.x() + place.x(), result.origin.y() + place.y(), 0.0);
-  above.z() = result.ground.terrain.interpolate(above.x(), above.y()) + height + kMargin;
-  return in_view(above) ? height : std::numeric_limits<double>::quiet_NaN();
-}
-
-// How sure the heights are. `points`: of each stem in the half metre below its top.
-void judge_tops(const std::vector<int>& points, InventoryResult& result) {
-  for (std::size_t i = 0; i < result.stems.size(); ++i) {
-    Tree& tree = result.trees[i];
-    if (std::isnan(tree.height_m)) continue;
-    const bool seen = points[i] >= kTopPoints;
-    tree.height_is_lower_bound = seen ? 0.0 : 1.0;
-    tree.height_sd_m = seen ? kHeightSd : kBoundSd;
-  }
-}
-
 // Takes away what wide beams add to the radii, and says how sure these are.
 void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3d>& scanner,
                       InventoryResult& result) {
@@ -278,7 +257,7 @@ namespace {
 
 // What is known of the scanner beside its points.
 struct KnownScanner {
-  const SeenTest& in_view;
+  const Lookouts& lookouts;
   const std::vector<Eigen::Vector3d>& places;
 };
 
@@ -291,12 +270,20 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
   };
   const bool full = config.extent == InventoryExtent::kFull;
   const SlicesNear slices(result.slices, gathered.thinned, cloud, result.origin);
-  const CrownTask task{cloud,         result.ground,    result.origin,          result.stems,
-                       slices,        gathered.ceiling, config.stems.highest_m, full,
-                       config.curves, progress};
+  const CrownTask task{cloud,
+                       result.ground,
+                       result.origin,
+                       result.stems,
+                       slices,
+                       gathered.ceiling,
+                       config.stems.highest_m,
+                       full,
+                       static_cast<bool>(scanner.lookouts),
+                       config.curves,
+                       progress};
   tell("tops", 4.0);
   const auto listed = [&](std::size_t i, double top) {
-    return height_in_view(result, result.stems[i], top, scanner.in_view);
+    return listed_height(result, result.stems[i], top, scanner.lookouts);
   };
   StemTops tops = look_up(task, config.canopy_cell_m, listed);
   result.canopy = tops.canopy.raster(result.origin.x(), result.origin.y());
@@ -307,7 +294,7 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
   for (std::size_t i = 0; i < result.stems.size(); ++i)
     heights.push_back(listed(i, tops.top_m[i]));
   result.trees = trees_of(result, heights);
-  judge_tops(tops.top_points, result);
+  judge_tops(tops, scanner.lookouts, scanner.places, result);
   if (full) {
     result.curves = std::move(tops.curves);
     add_volumes(result);
@@ -321,13 +308,13 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
 }  // namespace
 
 InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& config,
-                               const ProgressSink& progress, const SeenTest& in_view,
+                               const ProgressSink& progress, const Lookouts& lookouts,
                                const std::vector<Eigen::Vector3d>& scanner) {
-  return take_inventory(WholeCloud(cloud), config, progress, in_view, scanner);
+  return take_inventory(WholeCloud(cloud), config, progress, lookouts, scanner);
 }
 
 InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& config,
-                               const ProgressSink& progress, const SeenTest& in_view,
+                               const ProgressSink& progress, const Lookouts& lookouts,
                                const std::vector<Eigen::Vector3d>& scanner) {
   const PointBlocks unasked = [&](const PointVisitor& visit) { cloud.all(visit); };
   const auto tell = [&](const char* stage, double done) {
@@ -351,7 +338,7 @@ InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& c
   result.stems = std::move(gathered.stems);
   compensate_beams(config.beam, scanner, result);
   result.thin = gathered.coverage.thin();
-  measure_above(cloud, config, progress, {in_view, scanner}, gathered, result);
+  measure_above(cloud, config, progress, {lookouts, scanner}, gathered, result);
   remark(gathered, config, result);
   tell("segments", 7.0);
   result.segments = collect_segments(polled(unasked, progress), result.ground, result.trees,

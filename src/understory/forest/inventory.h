@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +15,7 @@
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/tiles/crown_tiles.h"
 #include "understory/forest/tiles/tiled_cloud.h"
+#include "understory/forest/tree_tops.h"
 #include "understory/forest/trees/canopy_crowns.h"
 #include "understory/forest/trees/thin_coverage.h"
 #include "understory/forest/trees/tree_owners.h"
@@ -82,23 +82,20 @@ struct InventoryResult {
   std::vector<std::string> remarks;
 };
 
-// Whether a place (world frame) was in the scanner's view, so that a tree's top there would show.
-using SeenTest = std::function<bool(const Eigen::Vector3d&)>;
-
-// Ground, canopy, trees of a whole cloud: six runs through it. With a test of what was in view,
-// trees that may go on above it have no height. `scanner`: where it was, metres, world frame; with
-// it only what is in its sight counts as seen, and diameters are corrected for the width of its
-// beams. Deterministic for any number of threads. Throws Stopped.
+// Ground, canopy, trees of a whole cloud: six runs through it. With `lookouts` trees that may go on
+// above the view have no height, and tops that were hardly seen are lower bounds. `scanner`: where
+// it was, metres, world frame; with it only what is in its sight counts as seen, and diameters are
+// corrected for the width of its beams. Deterministic for any number of threads. Throws Stopped.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,
                                              const ProgressSink& progress = {},
-                                             const SeenTest& in_view = {},
+                                             const Lookouts& lookouts = {},
                                              const std::vector<Eigen::Vector3d>& scanner = {});
 // The same of a cloud in tiles, in the memory that one of them needs: the same trees whatever the
 // tiles are.
 [[nodiscard]] InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& config,
                                              const ProgressSink& progress = {},
-                                             const SeenTest& in_view = {},
+                                             const Lookouts& lookouts = {},
                                              const std::vector<Eigen::Vector3d>& scanner = {});
 
 // The id of the tree that a point of the cloud belongs to, 0 if none; of a full inventory.

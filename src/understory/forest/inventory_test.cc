@@ -262,10 +262,11 @@ TEST(Inventory, ATreeThatMayGoOnAboveTheViewHasNoHeight) {
   plot.add_stem({6.0, 6.0, 0.3});
   plot.add_stem({14.0, 14.0, 0.3});
   // To the left of x = 10 the scanner saw no higher than 15.5 m.
-  const SeenTest in_view = [&](const Eigen::Vector3d& place) {
-    return place.x() > 10.0 || place.z() < plot.ground(place.x(), place.y()) + 15.5;
+  const Lookouts lookouts = [&](const Eigen::Vector3d& place) {
+    const bool seen = place.x() > 10.0 || place.z() < plot.ground(place.x(), place.y()) + 15.5;
+    return std::vector<Eigen::Vector3d>(seen ? 1 : 0, {18.0, 10.0, 101.0});
   };
-  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {}, {}, in_view);
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {}, {}, lookouts);
   const Tree* cut = nearest(result.trees, 6.0, 6.0);
   const Tree* seen = nearest(result.trees, 14.0, 14.0);
   ASSERT_NE(cut, nullptr);
@@ -278,6 +279,33 @@ TEST(Inventory, ATreeThatMayGoOnAboveTheViewHasNoHeight) {
   ASSERT_FALSE(result.remarks.empty());
   EXPECT_NE(result.remarks.back().find("1 of 2 trees have no height"), std::string::npos)
       << result.remarks.back();
+}
+
+// A second crown stands between the scanner and the top of the first tree.
+TEST(Inventory, ATopBehindACrownIsALowerBound) {
+  TestPlot plot(29);
+  plot.add_ground(20.0, 40);
+  plot.add_stem({4.0, 10.0, 0.3});
+  plot.add_stem({14.0, 10.0, 0.3});
+  Random random(30);
+  for (int i = 0; i < 4000; ++i)
+    plot.cloud.emplace_back(random.uniform(6.0, 16.0), random.uniform(8.0, 12.0),
+                            plot.ground(10.0, 10.0) + random.uniform(14.5, 22.0));
+  const auto bound_from = [&](double height_m) {
+    const Lookouts lookouts = [&](const Eigen::Vector3d& place) {
+      // The view ends above the first top where nothing is in the way.
+      const bool low = place.z() < plot.ground(4.0, 10.0) + 15.0;
+      std::vector<Eigen::Vector3d> from = {{19.0, 10.0, 100.0 + height_m}};
+      if (low) from.push_back({-61.0, 10.0, 101.0});
+      return from;
+    };
+    const InventoryResult result =
+        take_inventory(blocks_of(plot.cloud), basic_inventory(), {}, lookouts);
+    const Tree* tree = nearest(result.trees, 4.0, 10.0);
+    return tree == nullptr ? -1.0 : tree->height_is_lower_bound;
+  };
+  EXPECT_EQ(bound_from(80.0), 0.0);  // over the other crown
+  EXPECT_EQ(bound_from(16.5), 1.0);  // through it
 }
 
 TEST(Inventory, WideBeamsAreTakenAwayWhereSensorAndPlacesAreKnown) {

@@ -134,7 +134,7 @@ void write_layer_project(const std::filesystem::path& folder, const std::string&
     project.extent[2] = std::max(project.extent[2], point.x() + around);
     project.extent[3] = std::max(project.extent[3], point.y() + around);
   }
-  write_qgis_project(folder, project, line.points.size() > 1);
+  write_qgis_project(folder, project);
 }
 
 }  // namespace understory

@@ -115,16 +115,24 @@ TEST(LayerFiles, ACloudInDegreesKeepsMillimetres) {
 
 TEST(QgisProject, OpensWhatIsThereByRelativePaths) {
   const std::string text =
-      qgis_project_xml({"plot <7>", "PROJCS[\"x\"]", "EPSG:3067", {0, 0, 5, 5}}, true,
-                       {"trees.gpkg", "dtm.tif", "map.laz"});
+      qgis_project_xml({"plot <7>", "PROJCS[\"x\"]", "EPSG:3067", {0, 0, 5, 5}},
+                       {"trees", "path", "plots"}, {"trees.gpkg", "dtm.tif", "map.laz"});
   EXPECT_NE(text.find("plot &lt;7&gt;"), std::string::npos);
   EXPECT_NE(text.find("<datasource>./trees.gpkg|layername=path</datasource>"), std::string::npos);
   EXPECT_NE(text.find("<datasource>./dtm.tif</datasource>"), std::string::npos);
   EXPECT_NE(text.find("<authid>EPSG:3067</authid>"), std::string::npos);
   EXPECT_EQ(text.find("chm.tif"), std::string::npos);
-  EXPECT_EQ(qgis_project_xml({}, false, {"trees.gpkg"}).find("layername=path"), std::string::npos);
+  EXPECT_NE(text.find("layername=plots</datasource>"), std::string::npos);
+  EXPECT_EQ(text.find("layername=look_again"), std::string::npos);
+  EXPECT_EQ(qgis_project_xml({}, {"trees"}, {"trees.gpkg"}).find("layername=path"),
+            std::string::npos);
   const test::TemporaryFolder folder;
+  LookAgain look;
+  look.place = {1.0, 2.0, 3.0};
+  write_tree_layers(folder.path(), {}, walk(), at_evo(0.0), {look});
   write_layer_project(folder.path(), "walk", walk(), at_evo(0.0));
+  EXPECT_NE(read_text_file(folder / "map.qgs").find("layername=look_again</datasource>"),
+            std::string::npos);
   EXPECT_NE(read_text_file(folder / "map.qgs").find("<xmin>376"), std::string::npos);
 }
 

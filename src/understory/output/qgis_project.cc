@@ -1,9 +1,13 @@
 #include "understory/output/qgis_project.h"
 
 #include <fmt/format.h>
+#include <gdal_priv.h>
+#include <ogrsf_frmts.h>
 
 #include <algorithm>
+#include <utility>
 
+#include "understory/geometry/quiet_gdal.h"
 #include "understory/output/report/svg_plot.h"
 #include "understory/util/files/atomic_file.h"
 
@@ -48,25 +52,54 @@ std::string symbol_xml(const char* type, const char* kind,
       type, kind, map, props);
 }
 
-std::vector<Layer> layers_of(bool has_path, const std::vector<std::string>& files) {
-  const auto there = [&](const char* name) {
-    return std::find(files.begin(), files.end(), name) != files.end();
+bool holds(const std::vector<std::string>& names, const char* name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// The layers of trees.gpkg, the topmost first.
+std::vector<Layer> vector_layers() {
+  const auto layer = [](const char* id, const char* name, const char* geometry,
+                        const std::string& style) {
+    return Layer{id,
+                 name,
+                 fmt::format("./trees.gpkg|layername={}", id),
+                 "ogr",
+                 fmt::format("type=\"vector\" geometry=\"{}\"", geometry),
+                 style,
+                 true};
   };
+  return {layer("look_again", "places to look from again", "Point",
+                symbol_xml("marker", "SimpleMarker",
+                           {{"color", "22,160,133,255"},
+                            {"name", "triangle"},
+                            {"outline_color", "255,255,255,255"},
+                            {"outline_width", "0.3"},
+                            {"size", "4"}})),
+          layer("trees", "trees", "Point",
+                symbol_xml("marker", "SimpleMarker",
+                           {{"color", "255,242,194,255"},
+                            {"name", "circle"},
+                            {"outline_color", "192,57,43,255"},
+                            {"outline_width", "0.4"},
+                            {"size", "2"}})),
+          layer("path", "path of the scanner", "Line",
+                symbol_xml("line", "SimpleLine",
+                           {{"line_color", "37,99,200,255"}, {"line_width", "0.5"}})),
+          layer("plots", "sample plots", "Polygon",
+                symbol_xml("fill", "SimpleFill",
+                           {{"color", "0,0,0,0"},
+                            {"outline_color", "120,60,160,255"},
+                            {"outline_width", "0.6"},
+                            {"style", "no"}}))};
+}
+
+std::vector<Layer> layers_of(const std::vector<std::string>& vectors,
+                             const std::vector<std::string>& files) {
+  const auto there = [&](const char* name) { return holds(files, name); };
   std::vector<Layer> layers;
   if (there("trees.gpkg")) {
-    layers.push_back({"trees", "trees", "./trees.gpkg|layername=trees", "ogr",
-                      "type=\"vector\" geometry=\"Point\"",
-                      symbol_xml("marker", "SimpleMarker",
-                                 {{"color", "255,242,194,255"},
-                                  {"name", "circle"},
-                                  {"outline_color", "192,57,43,255"},
-                                  {"outline_width", "0.4"},
-                                  {"size", "2"}})});
-    if (has_path)
-      layers.push_back({"path", "path of the scanner", "./trees.gpkg|layername=path", "ogr",
-                        "type=\"vector\" geometry=\"Line\"",
-                        symbol_xml("line", "SimpleLine",
-                                   {{"line_color", "37,99,200,255"}, {"line_width", "0.5"}})});
+    for (Layer& layer : vector_layers())
+      if (holds(vectors, layer.id.c_str())) layers.push_back(std::move(layer));
   }
   if (there("chm.tif"))
     layers.push_back({"chm", "height of the canopy", "./chm.tif", "gdal", "type=\"raster\"", ""});
@@ -96,12 +129,24 @@ std::string extent_xml(const std::array<double, 4>& extent) {
       extent[0], extent[1], extent[2], extent[3]);
 }
 
+// Names of the layers of a GeoPackage; none where it is not there.
+std::vector<std::string> vectors_in(const std::filesystem::path& file) {
+  const QuietGdal quiet;
+  std::vector<std::string> names;
+  if (!std::filesystem::exists(file)) return names;
+  const GDALDatasetUniquePtr dataset(
+      GDALDataset::Open(file.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));
+  for (int i = 0; dataset != nullptr && i < dataset->GetLayerCount(); ++i)
+    names.emplace_back(dataset->GetLayer(i)->GetName());
+  return names;
+}
+
 }  // namespace
 
-std::string qgis_project_xml(const QgisProject& project, bool has_path,
+std::string qgis_project_xml(const QgisProject& project, const std::vector<std::string>& vectors,
                              const std::vector<std::string>& files) {
   const std::string system = system_xml(project);
-  const std::vector<Layer> layers = layers_of(has_path, files);
+  const std::vector<Layer> layers = layers_of(vectors, files);
   std::string tree;
   std::string order;
   std::string maps;
@@ -129,14 +174,13 @@ std::string qgis_project_xml(const QgisProject& project, bool has_path,
       order, maps, project.crs_wkt.empty() ? 0 : 1);
 }
 
-void write_qgis_project(const std::filesystem::path& folder, const QgisProject& project,
-                        bool has_path) {
+void write_qgis_project(const std::filesystem::path& folder, const QgisProject& project) {
   std::vector<std::string> files;
   for (const char* name : {"trees.gpkg", "chm.tif", "dsm.tif", "dtm.tif", "map.laz"}) {
     if (std::filesystem::exists(folder / name)) files.emplace_back(name);
   }
   AtomicFile file(folder / "map.qgs");
-  file.write(qgis_project_xml(project, has_path, files));
+  file.write(qgis_project_xml(project, vectors_in(folder / "trees.gpkg"), files));
   file.commit();
 }
 

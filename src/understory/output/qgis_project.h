@@ -16,13 +16,15 @@ struct QgisProject {
   std::array<double, 4> extent{};
 };
 
-// Writes map.qgs, which opens trees.gpkg (trees, and the path if it is there), chm.tif, dtm.tif and
-// map.laz as far as they lie in the folder, by relative paths. QGIS 3.16 or newer; the cloud needs
-// 3.26 and is not shown until it is switched on. Throws OutputError.
-void write_qgis_project(const std::filesystem::path& folder, const QgisProject& project,
-                        bool has_path);
-// Its text. `files`: names of the layers that are there.
-[[nodiscard]] std::string qgis_project_xml(const QgisProject& project, bool has_path,
+// Writes map.qgs, which opens the layers of trees.gpkg (trees, places to look from again, plots and
+// path), chm.tif, dsm.tif, dtm.tif and map.laz as far as they lie in the folder, by relative paths.
+// QGIS 3.16 or newer; the cloud needs 3.26 and is not shown until it is switched on. Throws
+// OutputError.
+void write_qgis_project(const std::filesystem::path& folder, const QgisProject& project);
+// Its text. `files`: names of the files that are there; `vectors`: names of the layers of
+// trees.gpkg.
+[[nodiscard]] std::string qgis_project_xml(const QgisProject& project,
+                                           const std::vector<std::string>& vectors,
                                            const std::vector<std::string>& files);
 
 }  // namespace understory

@@ -28,6 +28,9 @@ struct HeldBack {
   std::uint32_t tree = 0;
 };
 
+// Decimetres.
+constexpr int kHalfMetre = 5;
+
 // Height of the ground at each stem over the origin.
 std::vector<double> ground_at_stems(const CrownTask& task, const std::vector<StemFit>& stems) {
   std::vector<double> ground;
@@ -111,7 +114,9 @@ class TileAbove {
       const std::size_t stem = around_.numbers[i];
       tops[stem] = tops_[i];
       const double height = listed(stem, tops_[i]);
-      if (std::isfinite(height)) result.top_points[stem] = columns_.points_below(i, height);
+      if (!std::isfinite(height)) continue;
+      result.top_points[stem] = columns_.points_below(i, height, kHalfMetre);
+      result.top_metre_points[stem] = columns_.points_below(i, height, 2 * kHalfMetre);
     }
     if (!task_.full) return;
     std::vector<std::vector<SlicePoint>> points = surroundings_->take();
@@ -131,6 +136,7 @@ class TileAbove {
     return sheets;
   }
   [[nodiscard]] const std::vector<std::size_t>& own_numbers() const { return own_.numbers; }
+  [[nodiscard]] OccupiedSpace take_space() { return std::move(space_); }
   [[nodiscard]] CanopyGrid take_canopy() { return std::move(canopy_); }
   [[nodiscard]] std::vector<std::uint64_t> take_cubes() { return owners_.take_cubes(); }
 
@@ -141,6 +147,7 @@ class TileAbove {
     if (tree != TreeColumns::kNone && own_number_[tree] >= 0)
       sheets_.add(static_cast<std::size_t>(own_number_[tree]), place, height);
     if (area_.contains(place)) {
+      if (task_.space) space_.add(place, height);
       if (task_.ceiling.holds(place, height)) {
         canopy_.add(place, height);
       } else if (tree != TreeColumns::kNone) {
@@ -164,6 +171,7 @@ class TileAbove {
   std::vector<std::int32_t> own_number_;  // in own_, of each in around_; -1: beside the tile
   std::optional<StemSurroundings> surroundings_;  // in a full inventory
   CanopyGrid canopy_;
+  OccupiedSpace space_;
   TreeOwners owners_;
   std::vector<HeldBack> held_back_;
   std::vector<double> tops_;  // of around_
@@ -175,12 +183,15 @@ StemTops look_up(const CrownTask& task, double canopy_cell_m, const ListedHeight
   const std::size_t tiles = task.cloud.tiles().size();
   StemTops result{std::vector<double>(task.stems.size()),
                   std::vector<int>(task.stems.size(), 0),
+                  std::vector<int>(task.stems.size(), 0),
                   {},
                   {{}, std::vector<SeenSides>(task.stems.size())},
                   CanopyGrid(canopy_cell_m),
+                  {},
                   TileShelf<std::uint64_t>(tiles, task.cloud.scratch())};
   if (task.full) result.curves.resize(task.stems.size());
   std::vector<std::optional<CanopyGrid>> canopies(tiles);
+  std::vector<OccupiedSpace> spaces(tiles);
   std::vector<std::vector<TreeSheet>> sheets(tiles);
   const std::vector<char> with_sheet = most_doubtful(task.stems);
   for_tiles(task.cloud, [&](std::size_t tile) {
@@ -192,11 +203,16 @@ StemTops look_up(const CrownTask& task, double canopy_cell_m, const ListedHeight
       result.sheets.seen[above.own_numbers()[i]] = own.seen[i];
     sheets[tile] = std::move(own.sheets);
     canopies[tile] = above.take_canopy();
+    spaces[tile] = above.take_space();
     result.cubes.put(tile, above.take_cubes());
   });
   for (std::optional<CanopyGrid>& canopy : canopies) {
     result.canopy.add(*canopy);
     canopy.reset();
+  }
+  for (OccupiedSpace& space : spaces) {
+    result.space.add(space);
+    space = {};
   }
   for (std::vector<TreeSheet>& part : sheets)
     result.sheets.sheets.insert(result.sheets.sheets.end(), std::make_move_iterator(part.begin()),

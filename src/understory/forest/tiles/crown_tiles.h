@@ -11,6 +11,7 @@
 #include "understory/forest/tiles/stem_tiles.h"
 #include "understory/forest/tiles/tile_shelf.h"
 #include "understory/forest/tiles/tiled_cloud.h"
+#include "understory/forest/trees/occupied_space.h"
 #include "understory/forest/trees/tree_crowns.h"
 #include "understory/forest/trees/tree_owners.h"
 #include "understory/forest/trees/tree_sheets.h"
@@ -28,18 +29,21 @@ struct CrownTask {
   const SlicesNear& slices;
   const CanopyCeiling& ceiling;  // settled
   double slices_end_m;
-  bool full;  // stem curves and crowns as well
+  bool full;   // stem curves and crowns as well
+  bool space;  // what stands in the way of a view as well
   const StemCurveConfig& curves;
   const ProgressSink& progress;
 };
 
 // Tops and curves of the stems, and what the crowns are found in.
 struct StemTops {
-  std::vector<double> top_m;      // of each stem; NaN where it is not known
-  std::vector<int> top_points;    // of each stem: points in the half metre below its height
-  std::vector<StemCurve> curves;  // of each stem, in a full inventory
-  StemSheets sheets;              // of each stem that is most in doubt
+  std::vector<double> top_m;          // of each stem; NaN where it is not known
+  std::vector<int> top_points;        // of each stem: points in the half metre below its height
+  std::vector<int> top_metre_points;  // of each stem: in the metre below it
+  std::vector<StemCurve> curves;      // of each stem, in a full inventory
+  StemSheets sheets;                  // of each stem that is most in doubt
   CanopyGrid canopy;
+  OccupiedSpace space;             // where it is asked for
   TileShelf<std::uint64_t> cubes;  // of each tile: see TreeOwners
 };
 

@@ -77,13 +77,14 @@ double TreeColumns::top(std::size_t stem, double slices_end_m) const {
   return height >= slices_end_m + kLeastAbove ? height : std::numeric_limits<double>::quiet_NaN();
 }
 
-int TreeColumns::points_below(std::size_t stem, double height_m) const {
-  const auto& decimetres = columns_[stem].decimetres;
-  const auto last = std::min(decimetres.size() - 1, static_cast<std::size_t>(10.0 * height_m));
+int TreeColumns::points_below(std::size_t stem, double height_m, int decimetres) const {
+  const auto& counts = columns_[stem].decimetres;
+  const auto end =
+      static_cast<int>(std::min(counts.size() - 1, static_cast<std::size_t>(10.0 * height_m))) + 1;
   int points = 0;
-  for (std::size_t d = last > 4 ? last - 4 : 0; d <= last; ++d)
-    points += decimetres[d];
-  return std::min(points, 255);
+  for (int d = std::max(0, end - decimetres); d < end; ++d)
+    points += counts[static_cast<std::size_t>(d)];
+  return points;
 }
 
 }  // namespace understory

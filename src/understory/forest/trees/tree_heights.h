@@ -31,8 +31,8 @@ class TreeColumns {
   // as if cut off just above them: that is no tree top.
   [[nodiscard]] double top(std::size_t stem, double slices_end_m) const;
   [[nodiscard]] double ground_m(std::size_t stem) const { return ground_m_[stem]; }
-  // Points in the half metre below a height, to a decimetre; 255 stand for more.
-  [[nodiscard]] int points_below(std::size_t stem, double height_m) const;
+  // Points in so many decimetres below a height; of each decimetre 255 stand for more.
+  [[nodiscard]] int points_below(std::size_t stem, double height_m, int decimetres) const;
 
  private:
   struct Column : HeightColumn {

@@ -78,10 +78,10 @@ TEST(TreeHeights, PointsBelowATopAreCountedToHalfAMetre) {
   TreeColumns columns(stems, {0.0});
   for (const double height : {5.0, 9.48, 9.62, 9.75, 10.04})
     columns.add({0.0, 0.0, height}, height);
-  EXPECT_EQ(columns.points_below(0, 10.04), 3);
+  EXPECT_EQ(columns.points_below(0, 10.04, 5), 3);
   for (int i = 0; i < 1000; ++i)
     columns.add({0.0, 0.0, 10.0}, 10.0);
-  EXPECT_EQ(columns.points_below(0, 10.04), 255);
+  EXPECT_EQ(columns.points_below(0, 10.04, 1), 255);
 }
 
 }  // namespace

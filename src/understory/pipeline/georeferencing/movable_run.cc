@@ -5,6 +5,7 @@
 
 #include "understory/evaluation/tree_errors.h"
 #include "understory/output/layer_files.h"
+#include "understory/output/moved_vectors.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/head_cut_log.h"
 #include "understory/pipeline/georeferencing/moved_layers.h"
@@ -87,6 +88,7 @@ void write_moved_run(const MovingFolders& folders, const MovedRun& moved,
   if (run.has_trees) write_trees_csv(to / "trees.csv", moved.trees);
   if (run.has_falls) write_tree_falls(to / "felled.csv", placed(run.falls, moved.trees));
   write_tree_layers(to, moved.trees, moved.trajectory, frames.layers);
+  add_moved_vectors(from / "trees.gpkg", to / "trees.gpkg", {*run.layers, motion, frames.layers});
   write_layer_project(to, from.filename().string(), moved.trajectory, frames.layers);
   if (moved.placement.gnss.empty()) return;
   GnssWriter writer(to / "gnss.csv");

@@ -176,7 +176,7 @@ void write_project(const Stock& stock, const fs::path& results) {
     project.crs_wkt = system->wkt();
     project.crs_code = system->code();
   }
-  write_qgis_project(results, project, false);
+  write_qgis_project(results, project);
 }
 
 // A run's map and its frames.
@@ -396,7 +396,7 @@ void read_cloud_of(const InventoryRequest& request, const fs::path& work, Log& l
 InventoryResult inventory_of(const InventoryRequest& request, const Stock& stock,
                              const PointBlocks& blocks, const ProgressSink& progress) {
   if (request.slice) return take_slice(blocks, stock.path.string(), request.config, progress);
-  const SeenTest seen = stock.of_run ? seen_in_run(request.cloud) : SeenTest();
+  const Lookouts seen = stock.of_run ? seen_in_run(request.cloud) : Lookouts();
   const std::vector<Eigen::Vector3d> scanner = scanner_places(request, stock);
   if (!stock.stand.streamed) return take_inventory(blocks, request.config, progress, seen, scanner);
   return take_inventory(*stock.stand.streamed->tiles, request.config, progress, seen, scanner);

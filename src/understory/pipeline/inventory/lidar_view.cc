@@ -64,21 +64,24 @@ LidarView learn_view(const KeyframeClouds& clouds, const Pose& body_from_lidar) 
   return view;
 }
 
-SeenTest seen_from(const LidarView& view, const std::vector<Pose>& world_from_body) {
+Lookouts seen_from(const LidarView& view, const std::vector<Pose>& world_from_body) {
   std::vector<Pose> lidar_from_world;
-  Eigen::Vector3d last;
+  std::vector<Eigen::Vector3d> places;
   for (const Pose& pose : world_from_body) {
     const Pose world_from_lidar = pose * view.body_from_lidar;
     const Eigen::Vector3d& here = world_from_lidar.translation();
-    if (!lidar_from_world.empty() && (here - last).norm() < kStep) continue;
-    last = here;
+    if (!places.empty() && (here - places.back()).norm() < kStep) continue;
+    places.push_back(here);
     lidar_from_world.push_back(world_from_lidar.inverse());
   }
-  return [view, poses = std::move(lidar_from_world)](const Eigen::Vector3d& place) {
-    return std::any_of(poses.begin(), poses.end(), [&](const Pose& lidar_from_here) {
-      const Eigen::Vector3d point = lidar_from_here * place;
-      return point.squaredNorm() < kReach * kReach && view.covers(point);
-    });
+  return [view, places = std::move(places),
+          poses = std::move(lidar_from_world)](const Eigen::Vector3d& place) {
+    std::vector<Eigen::Vector3d> from;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const Eigen::Vector3d point = poses[i] * place;
+      if (point.squaredNorm() < kReach * kReach && view.covers(point)) from.push_back(places[i]);
+    }
+    return from;
   };
 }
 
@@ -93,7 +96,7 @@ LidarViewFigures figures_of(const LidarView& view) {
   return figures;
 }
 
-SeenTest seen_in_run(const std::filesystem::path& run) {
+Lookouts seen_in_run(const std::filesystem::path& run) {
   const RunJson json(run);
   if (!json.has("/lidar_view") || !std::filesystem::exists(run / "keyframes.tum")) return {};
   LidarView view;

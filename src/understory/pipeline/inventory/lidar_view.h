@@ -32,14 +32,14 @@ struct LidarView {
 // From some of the clouds, evenly chosen.
 [[nodiscard]] LidarView learn_view(const KeyframeClouds& clouds, const Pose& body_from_lidar);
 
-// Whether a place (world frame) was in view from within 60 m, from where the lidar was at any of
-// the poses; occlusion is not looked at.
-[[nodiscard]] SeenTest seen_from(const LidarView& view, const std::vector<Pose>& world_from_body);
+// Where the lidar was, of the poses, when a place within 60 m was in its view (world frame, about
+// one place a metre); occlusion is not looked at.
+[[nodiscard]] Lookouts seen_from(const LidarView& view, const std::vector<Pose>& world_from_body);
 
-// For run.json, and back with the keyframes of the run: whether a place was in view of the
-// recording of a run folder. Empty where the folder does not tell.
+// For run.json, and back with the keyframes of the run folder. Empty where the folder does not
+// tell.
 [[nodiscard]] LidarViewFigures figures_of(const LidarView& view);
-[[nodiscard]] SeenTest seen_in_run(const std::filesystem::path& run);
+[[nodiscard]] Lookouts seen_in_run(const std::filesystem::path& run);
 
 // Where the body of the carrier was at the poses, metres, world frame; and at the keyframes of a
 // run folder, nothing where it has none.

@@ -45,17 +45,20 @@ TEST(LidarView, ATopIsSeenFromFarEnoughAndNotFromTooFar) {
   const Eigen::Vector3d low(20.0, 30.0, 6.0);
   const Eigen::Vector3d top(20.0, 30.0, 12.0);
   // The lidar looks to the left, along y.
-  const SeenTest near = seen_from(view, {Pose(Eigen::Quaterniond::Identity(), {20.0, 10.0, 0.0})});
-  EXPECT_TRUE(near(low));
-  EXPECT_FALSE(near(top));
-  const SeenTest also_farther =
+  const Lookouts near = seen_from(view, {Pose(Eigen::Quaterniond::Identity(), {20.0, 10.0, 0.0})});
+  EXPECT_EQ(near(low).size(), 1U);
+  EXPECT_TRUE(near(low).front().isApprox(Eigen::Vector3d(20.0, 10.0, 2.0), 1e-9));
+  EXPECT_TRUE(near(top).empty());
+  const Lookouts also_farther =
       seen_from(view, {Pose(Eigen::Quaterniond::Identity(), {20.0, 10.0, 0.0}),
                        Pose(Eigen::Quaterniond::Identity(), {20.0, -15.0, 0.0})});
-  EXPECT_TRUE(also_farther(top));
-  const SeenTest too_far =
+  ASSERT_EQ(also_farther(top).size(), 1U);
+  EXPECT_TRUE(also_farther(top).front().isApprox(Eigen::Vector3d(20.0, -15.0, 2.0), 1e-9));
+  EXPECT_EQ(also_farther(low).size(), 2U);
+  const Lookouts too_far =
       seen_from(view, {Pose(Eigen::Quaterniond::Identity(), {20.0, -35.0, 0.0})});
-  EXPECT_FALSE(too_far(top));
-  EXPECT_FALSE(seen_from(view, {})(low));
+  EXPECT_TRUE(too_far(top).empty());
+  EXPECT_TRUE(seen_from(view, {})(low).empty());
 }
 
 TEST(LidarView, IsTheSameFromARunFolder) {
@@ -71,8 +74,8 @@ TEST(LidarView, IsTheSameFromARunFolder) {
   TumWriter keyframes(run / "keyframes.tum");
   keyframes.add({0, pose});
   keyframes.commit();
-  const SeenTest here = seen_from(view, {pose});
-  const SeenTest there = seen_in_run(run);
+  const Lookouts here = seen_from(view, {pose});
+  const Lookouts there = seen_in_run(run);
   ASSERT_EQ(places_in_run(run).size(), 1U);
   EXPECT_TRUE(places_in_run(run)[0].isApprox(places_of({pose})[0], 1e-9));
   ASSERT_TRUE(there);
@@ -80,7 +83,7 @@ TEST(LidarView, IsTheSameFromARunFolder) {
   for (double x = -10.0; x < 50.0; x += 5.0) {
     for (double y = -10.0; y < 50.0; y += 5.0) {
       EXPECT_EQ(here({x, y, 5.0}), there({x, y, 5.0})) << x << " " << y;
-      seen += here({x, y, 5.0}) ? 1 : 0;
+      seen += here({x, y, 5.0}).empty() ? 0 : 1;
     }
   }
   EXPECT_GT(seen, 20);

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "understory/forest/tiles/crown_tiles.h"
+
+namespace understory {
+
+struct InventoryResult;
+
+// Where the scanner was when a place was in its view, metres, both in the world frame. What stands
+// in between is not looked at. Empty: the place was never in view.
+using Lookouts = std::function<std::vector<Eigen::Vector3d>(const Eigen::Vector3d& place)>;
+
+// The height of a stem's top as it is listed: NaN where the tree may go on above the view.
+[[nodiscard]] double listed_height(const InventoryResult& result, const StemFit& stem, double top_m,
+                                   const Lookouts& lookouts);
+
+// Says how sure the heights of `result.trees` are, and which are lower bounds:
+// - of fewer than five points in the half metre below the top;
+// - where the view is known (`lookouts`): if the metre above the top would show fewer than twelve
+//   points, did the tree go on as in the metre below. That is their number times the ratio of how
+//   well both are seen;
+// - where tops end with the view (trees/view_limit.h), by their distance from `scanner`, or
+//   without that by the number of returns over the diameter.
+void judge_tops(const StemTops& tops, const Lookouts& lookouts,
+                const std::vector<Eigen::Vector3d>& scanner, InventoryResult& result);
+
+}  // namespace understory

@@ -1,0 +1,116 @@
+#include "understory/output/moved_vectors.h"
+
+#include <gtest/gtest.h>
+#include <ogrsf_frmts.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "understory/geometry/quiet_gdal.h"
+#include "understory/output/layer_files.h"
+#include "understory/util/files/folder_test_support.h"
+
+namespace understory {
+namespace {
+
+using Eigen::Vector3d;
+
+StandPlot circle_at(double x, double y) {
+  StandPlot plot;
+  plot.shape = circle_plot("A7", {x, y}, 8.0);
+  plot.shape.kind = "circle";
+  plot.drawn = plot.shape.rings;
+  plot.figures.area_m2 = plot.shape.area_m2();
+  plot.figures.trees = 12;
+  return plot;
+}
+
+Tree tree_at_height(double z) {
+  Tree tree;
+  tree.id = 1;
+  tree.x = 3.0;
+  tree.y = 4.0;
+  tree.z = z;
+  return tree;
+}
+
+struct Folders {
+  test::TemporaryFolder both;
+  std::filesystem::path own = both / "own";
+  std::filesystem::path placed = both / "placed";
+  Folders() {
+    std::filesystem::create_directory(own);
+    std::filesystem::create_directory(placed);
+  }
+};
+
+// A run in its own frame is laid on the globe, turned by half a radian against the clock.
+TEST(MovedVectors, PlotsAndPlacesGoWithTheRun) {
+  const Folders folders;
+  const auto& [both, own, placed] = folders;
+  const LayerFrame local;
+  LookAgain look;
+  look.place = {12.0, -7.0, 2.0};
+  look.towards = {0.0, 4.0};  // along the y axis
+  look.trees = {5, 2};
+  look.unseen_sides = 2;
+  write_tree_layers(own, {tree_at_height(2.0)}, {}, local, {look}, {circle_at(10.0, 20.0)});
+  const Pose motion(so3_exp(Vector3d(0.0, 0.0, 0.5)), Vector3d(100.0, 50.0, 1.0));
+  const LayerFrame layers(Pose(), {61.2, 24.7, 150.0}, "EPSG:3067");
+  write_tree_layers(placed, {tree_at_height(3.0)}, {}, layers);
+  add_moved_vectors(own / "trees.gpkg", placed / "trees.gpkg", {local, motion, layers});
+  const QuietGdal quiet;
+  const GDALDatasetUniquePtr dataset(
+      GDALDataset::Open((placed / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
+  ASSERT_NE(dataset, nullptr);
+  OGRLayer* plots = dataset->GetLayerByName("plots");
+  OGRLayer* looks = dataset->GetLayerByName("look_again");
+  ASSERT_NE(plots, nullptr);
+  ASSERT_NE(looks, nullptr);
+  for (OGRLayer* layer : {plots, looks})
+    EXPECT_STREQ(layer->GetSpatialRef()->GetAuthorityCode(nullptr), "3067");
+
+  const OGRFeatureUniquePtr place(looks->GetNextFeature());
+  ASSERT_NE(place, nullptr);
+  const OGRPoint* point = place->GetGeometryRef()->toPoint();
+  EXPECT_LT((Vector3d(point->getX(), point->getY(), point->getZ()) -
+             layers.exact_from_world(motion * look.place))
+                .norm(),
+            1e-3);
+  EXPECT_STREQ(place->GetFieldAsString("tree_ids"), "5, 2");
+  EXPECT_STREQ(place->GetFieldAsString("reason"), "unseen side");
+  // Grid north lies up to 3 degrees beside true north here.
+  EXPECT_NEAR(place->GetFieldAsDouble("bearing_deg"), 360.0 - 0.5 * 180.0 / M_PI, 3.0);
+
+  const OGRFeatureUniquePtr plot(plots->GetNextFeature());
+  ASSERT_NE(plot, nullptr);
+  const Vector3d centre = motion * Vector3d(10.0, 20.0, 2.0);
+  OGRPoint middle;
+  plot->GetGeometryRef()->toMultiPolygon()->Centroid(&middle);
+  const Vector3d expected = layers.exact_from_world(centre);
+  EXPECT_NEAR(middle.getX(), expected.x(), 0.01);
+  EXPECT_NEAR(middle.getY(), expected.y(), 0.01);
+  EXPECT_NEAR(plot->GetGeometryRef()->toMultiPolygon()->get_Area(), M_PI * 64.0, 0.3);
+  EXPECT_NEAR(plot->GetFieldAsDouble("x"), centre.x(), 1e-3);
+  EXPECT_NEAR(plot->GetFieldAsDouble("y"), centre.y(), 1e-3);
+  EXPECT_STREQ(plot->GetFieldAsString("plot"), "A7");
+  EXPECT_EQ(plot->GetFieldAsDouble("trees"), 12.0);
+}
+
+TEST(MovedVectors, WhatIsNotThereLeavesThePackageAsItIs) {
+  const Folders folders;
+  const auto& [both, own, placed] = folders;
+  const LayerFrame local;
+  write_tree_layers(placed, {tree_at_height(3.0)}, {}, local);
+  add_moved_vectors(own / "trees.gpkg", placed / "trees.gpkg", {local, Pose(), local});
+  write_tree_layers(own, {tree_at_height(3.0)}, {}, local);
+  add_moved_vectors(own / "trees.gpkg", placed / "trees.gpkg", {local, Pose(), local});
+  const QuietGdal quiet;
+  const GDALDatasetUniquePtr dataset(
+      GDALDataset::Open((placed / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
+  ASSERT_NE(dataset, nullptr);
+  EXPECT_EQ(dataset->GetLayerCount(), 1);
+}
+
+}  // namespace
+}  // namespace understory
