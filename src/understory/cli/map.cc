@@ -28,6 +28,7 @@ struct MapOptions {
   std::string inventory;
   PlotOptions plots;
   std::string front_end = kDenseFrontEnd;
+  bool imu_rate = false;
   bool realtime = false;
   bool overwrite = false;
   bool print_config = false;
@@ -104,6 +105,13 @@ int run_map(const MapOptions& options, CommandContext& context) {
            "make: leave it out, or map with --front-end dense"});
     settings.push_back("inventory.extent=" + options.inventory);
   }
+  if (options.imu_rate) {
+    if (options.front_end != kDenseFrontEnd)
+      throw ConfigError(
+          {"--imu-rate predicts from positioned scans, which a run by stems does not "
+           "have: leave it out, or map with --front-end dense"});
+    settings.emplace_back("imu_rate=true");
+  }
   const std::vector<std::string> plots = plot_settings(options.plots, "inventory.stand.");
   if (!plots.empty() && options.front_end != kDenseFrontEnd)
     throw ConfigError(
@@ -157,6 +165,9 @@ void add_map_command(CLI::App& app, Command& chosen) {
                    "stem curves, volumes, crowns and the tree of each point as well (full)")
       ->check(CLI::IsMember({"basic", "full"}));
   add_plot_options(*command, options->plots);
+  command->add_flag("--imu-rate", options->imu_rate,
+                    "Write trajectory_imu.tum as well: a predicted pose for each sample of the "
+                    "IMU");
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "
                     "(time_repair.window_s is 0, of stems also stems.pace.longest_gap_s)");

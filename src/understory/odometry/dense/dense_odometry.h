@@ -105,6 +105,8 @@ class DenseOdometry {
 
   [[nodiscard]] const MotionModel& motion() const { return *motion_; }
   [[nodiscard]] bool uses_imu() const { return uses_imu_; }
+  // Stamp of the last scan; 0: none yet.
+  [[nodiscard]] TimeNs last_scan() const { return last_scan_; }
   // Whether the times of the points fit the motion from scan to scan.
   [[nodiscard]] ScanMotion scan_motion() const { return scan_motion_.motion(); }
   void save(BinaryWriter& writer) const;

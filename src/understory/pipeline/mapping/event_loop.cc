@@ -6,6 +6,7 @@
 
 #include "understory/preprocess/point_order.h"
 #include "understory/recording/finding.h"
+#include "understory/util/error.h"
 #include "understory/util/files/read_error.h"
 #include "understory/util/time.h"
 #include "understory/util/timing.h"
@@ -32,9 +33,21 @@ EventLoop::EventLoop(const MappingRequest& request, RunState& state, Log& log,
 void EventLoop::begin() {
   request_.conditions.realtime = request_.realtime;
   if (depends_on_sensors(asked_)) source_ = learn_traits(std::move(source_), request_.traits);
+  expect_imu();
   state_.forget_former();
   adapt_to_recording();
   save_state();  // makes the run resumable from the start
+}
+
+// Before anything is mapped: what is asked for by the samples of an IMU needs one.
+void EventLoop::expect_imu() const {
+  const auto* dense = std::get_if<DenseMappingConfig>(&asked_);
+  if (dense == nullptr || !dense->imu_rate || request_.traits.has_imu) return;
+  throw InputError(request_.recording, "",
+                   request_.traits.imu_is_numb
+                       ? "--imu-rate: expected an IMU, and no sample of it is a number"
+                       : "--imu-rate: expected an IMU whose place on the lidar is known; the "
+                         "recording has none (--extrinsics tells the place)");
 }
 
 void EventLoop::go_on() {

@@ -55,6 +55,7 @@ class EventLoop {
 
  private:
   void begin();
+  void expect_imu() const;
   void go_on();
   void adapt_to_recording();
   void play_at_sensor_speed();

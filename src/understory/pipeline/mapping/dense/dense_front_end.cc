@@ -107,7 +107,9 @@ void DenseFrontEnd::take_sample(const ImuSample& sample) {
   const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
   while (received_.imu.size() > most)
     received_.imu.pop_front();
-  if (started()) odometry_->add_imu(sample);
+  if (!started()) return;
+  odometry_->add_imu(sample);
+  if (imu_path_) predict_at(sample.stamp);
 }
 
 // An IMU that sends no numbers is as none until it does.
@@ -143,6 +145,7 @@ void DenseFrontEnd::make_odometry(const Rig& rig) {
 // An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
 void DenseFrontEnd::start_anew() {
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile);
+  begin_paths_between();
   clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, times_);
   map_->start();
   make_odometry(rig_);

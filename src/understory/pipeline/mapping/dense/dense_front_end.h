@@ -17,6 +17,7 @@
 #include "understory/pipeline/judgement/imu_usage.h"
 #include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/run_folder/journal.h"
+#include "understory/pipeline/run_folder/relative_path.h"
 #include "understory/recording/recording.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/util/log.h"
@@ -42,6 +43,8 @@ struct DenseCounts {
   std::uint64_t by_satellites = 0;  // scans whose match or place satellites told something of
   std::uint64_t repeated = 0;       // scans that hold the same points as the one before
   std::uint64_t last_content = 0;   // of the last scan, see content_of
+  std::uint64_t predictions = 0;    // of trajectory_imu.tum
+  std::uint64_t coasted = 0;        // those without the IMU, by constant velocity
 };
 
 // The front end that matches all points of a scan to a local map: keeps positioning (first graph),
@@ -91,6 +94,8 @@ class DenseFrontEnd : public FrontEnd {
   // Whether the configuration of this run has it use an IMU.
   [[nodiscard]] bool imu_wanted() const { return config_.odometry.imu_enabled; }
   [[nodiscard]] const Journal& journal() const { return *journal_; }
+  // A prediction for each sample of the IMU; null without `imu_rate`.
+  [[nodiscard]] RelativePath* imu_path() { return imu_path_.get(); }
   [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_->clouds(); }
   [[nodiscard]] const std::vector<GnssFix>& fixes() const { return received_.fixes; }
   [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
@@ -105,6 +110,7 @@ class DenseFrontEnd : public FrontEnd {
  private:
   static constexpr const char* kJournalFile = "journal.bin";
   static constexpr const char* kCloudsFile = "clouds.bin";
+  static constexpr const char* kImuPathFile = "imu_path.bin";
 
   // What came of the recording so far.
   struct Received {
@@ -134,6 +140,8 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] bool without_samples() const;
   void take_sample(const ImuSample& sample);
   void start_anew();
+  void begin_paths_between();
+  void predict_at(TimeNs stamp);
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
   void begin_again(const AssumedMotion& motion);
   void leave_out_first();
@@ -158,6 +166,7 @@ class DenseFrontEnd : public FrontEnd {
   std::unique_ptr<SatelliteBelief> satellites_;
   std::unique_ptr<KeyframeMap> map_;
   std::unique_ptr<Journal> journal_;
+  std::unique_ptr<RelativePath> imu_path_;
   std::unique_ptr<ScanClouds> clouds_;
   VoxelFilter cloud_filter_;
   std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced

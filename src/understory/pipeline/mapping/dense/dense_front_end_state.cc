@@ -24,6 +24,7 @@ void DenseFrontEnd::sync() {
   }
   if (!started()) return;
   journal_->sync();
+  if (imu_path_) imu_path_->sync();
   clouds_->sync();
   map_->sync();
 }
@@ -34,6 +35,7 @@ std::vector<CountedFile> DenseFrontEnd::files() const {
     files = map_->files();
     files.push_back({kJournalFile, journal_->count()});
     files.push_back({kCloudsFile, clouds_->clouds().count()});
+    if (imu_path_) files.push_back({kImuPathFile, imu_path_->count()});
   }
   if (fixes_file_) files.push_back({kFixesFile, fixes_file_->count()});
   return files;
@@ -60,6 +62,7 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
     put_imu(writer, sample);
   if (!started()) return;
   writer.put(journal_->count());
+  if (imu_path_) writer.put(imu_path_->count());
   writer.put(clouds_->clouds().count());
   map_->save(writer);
   odometry_->save(writer);
@@ -96,6 +99,9 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
     received_.imu.push_back(get_imu(reader));
   if (!was_started) return;
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile, reader.get<RecordCount>());
+  if (config_.imu_rate) {
+    imu_path_ = std::make_unique<RelativePath>(folder_ / kImuPathFile, reader.get<RecordCount>());
+  }
   const auto clouds = reader.get<RecordCount>();
   clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, clouds, last_cloud,
                                          times_);

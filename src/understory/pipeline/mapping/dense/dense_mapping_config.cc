@@ -10,6 +10,8 @@ namespace understory {
 
 ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   ConfigTable table;
+  table.add("imu_rate", config.imu_rate,
+            "write trajectory_imu.tum, a prediction of the pose for each sample of the IMU");
   table.section("time_repair", [&] { EventOrderer::describe(table, config.loop.time_repair); });
   describe(table, config.odometry);
   table.section("registration", [&] {
@@ -90,6 +92,12 @@ ReadConfig<DenseMappingConfig> read_dense_mapping_config(const std::string& prof
   problems.gather([&] { table.set(settings); });
   note_settings(table, settings, origins);
   problems.gather([&] { check(config.georeference); });
+  problems.gather([&] {
+    if (config.imu_rate && !config.odometry.imu_enabled)
+      throw ConfigError(
+          {"imu_rate: predictions for each sample of the IMU need "
+           "motion.imu_enabled=true"});
+  });
   problems.throw_if_any();
   return {config, origins};
 }

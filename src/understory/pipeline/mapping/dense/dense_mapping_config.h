@@ -23,6 +23,7 @@ namespace understory {
 // is only their sum.
 struct DenseMappingConfig {
   EventLoopConfig loop;
+  bool imu_rate = false;  // write trajectory_imu.tum: a prediction for each sample of the IMU
   DenseOdometryConfig odometry;
   KeyframeMap::Config keyframe_map;
   MapTiles::Config map;

@@ -264,6 +264,21 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
     documents.count("scans_by_satellites", counts.by_satellites);
 }
 
+// trajectory_imu.tum.
+void write_paths_between(const ReadRecording& recording, DenseFrontEnd& front_end,
+                         const Trajectory& scans, RunDocuments& documents) {
+  if (front_end.imu_path() == nullptr) return;
+  const DenseCounts& counts = front_end.counts();
+  documents.count("imu_predictions", write_relative_path(recording.results / "trajectory_imu.tum",
+                                                         *front_end.imu_path(), scans));
+  documents.count("imu_predictions_coasted", counts.coasted);
+  if (counts.coasted == 0) return;
+  recording.log.warn("imu_rate.without_imu",
+                     fmt::format("{} of {} poses in trajectory_imu.tum are by constant velocity, "
+                                 "because the IMU was not used then",
+                                 counts.coasted, counts.predictions));
+}
+
 // Whether the work on a scan grows with the length of the run.
 void fill_constancy(RunSummary& summary, const TrajectoryFacts& trajectory) {
   const auto tenth = static_cast<std::ptrdiff_t>(trajectory.cpu_ms.size() / 10);
@@ -421,6 +436,7 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   fill_streams(facts.time_repair, documents);
   fill_counts(front_end, documents);
   documents.judge_path();
+  write_paths_between(recording, front_end, trajectory.trajectory, documents);
   fill_quality(front_end, trajectory, facts, documents.summary());
   if (const auto truth = write_truth(recording.request.run_folder, recording.source))
     documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
