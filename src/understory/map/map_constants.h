@@ -17,7 +17,24 @@ namespace understory::map_constants {
 namespace felled_trees {  // map/felled_trees.cc
 // m in the plane within which a sight is of a tree [chosen]
 inline constexpr double kSameTreeM = 0.6;
+// m between the places of two views from which a tree looks alike [tuned on Wild-Places V-03: of
+// misses from elsewhere the most are of trees that stand]
+inline constexpr double kSamePlaceM = 3.0;
 }  // namespace felled_trees
+
+namespace foot_heights {  // map/foot_heights.cc
+// m in the plane within which feet show the height of the body above the ground [chosen: on a slope
+// feet before and behind a body differ by less than a metre]
+inline constexpr double kNearM = 5.0;
+// feet that a view must have there [chosen]
+inline constexpr std::size_t kFewestFeet = 3;
+// views with so many; fewer tell nothing [chosen]
+inline constexpr std::size_t kFewestViews = 20;
+// Share of the views at either end that is left out [chosen]
+inline constexpr double kTail = 0.05;
+// m: a scanner in the hand or on a machine is not carried over a wider range [chosen]
+inline constexpr double kWidestRangeM = 2.0;
+}  // namespace foot_heights
 
 namespace stem_map {  // map/stem_map.cc
 // views that should have seen both of two trees; with fewer nothing is told [chosen]

@@ -1,8 +1,11 @@
 #include "understory/pipeline/correction/correction_summary.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "understory/map/foot_heights.h"
 #include "understory/pipeline/correction/correction_evidence.h"
 
 namespace understory {
@@ -81,6 +84,23 @@ void add_matching(const CorrectionRun& run, RunSummary& summary) {
   summary.quality["match_outlier_ratio_mean"] = 1.0 - overlap / steps;
 }
 
+// Feet that do not lie on the ground bend the heights of the path, and no loop shows it.
+void add_carried_height(const CorrectionRun& run, RunDocuments& documents) {
+  const auto carried = carried_height(run.views, run.correction.world_from_body);
+  if (!carried) return;
+  RunSummary& summary = documents.summary();
+  summary.quality["carried_height_m"] = carried->middle_m;
+  summary.quality["carried_height_low_m"] = carried->low_m;
+  summary.quality["carried_height_high_m"] = carried->high_m;
+  if (!feet_leave_the_ground(*carried)) return;
+  documents.remark(
+      "stems.heights",
+      fmt::format("the body is {:.1f} to {:.1f} m above the feet of the stems near it: "
+                  "their points do not lie on the ground, so heights of the path and "
+                  "of trees are not to be trusted",
+                  carried->low_m, carried->high_m));
+}
+
 void add_loops(const StemCorrection& correction, RunSummary& summary) {
   summary.counts["loops_found"] = static_cast<std::int64_t>(correction.loops.size());
   summary.counts["loops_verified"] =
@@ -120,6 +140,7 @@ void summarise_correction(const CorrectionConfig& config, const CorrectionRun& r
   summary.quality["sight_noise_m"] = sight_noise_m(run.stems);
   summary.quality["axis_noise_deg"] = axis_noise_deg(run.stems);
   add_self_correction(run, summary);
+  add_carried_height(run, documents);
   documents.judge(correction_evidence(run), config.judgement);
 }
 
