@@ -10,8 +10,8 @@
 #include <cmath>
 #include <memory>
 
-#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/geometry/quiet_gdal.h"
+#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -63,8 +63,7 @@ class Mover {
         at + unit * Vector3d(std::sin(turn) * east_units(move_.from, at), std::cos(turn), 0.0);
     const Vector3d here = place(at);
     const Vector3d way = place(ahead) - here;
-    const double found =
-        std::atan2(way.x() / east_units(move_.to, here), way.y()) * 180.0 / M_PI;
+    const double found = std::atan2(way.x() / east_units(move_.to, here), way.y()) * 180.0 / M_PI;
     return std::round(found < 0.0 ? found + 360.0 : found);
   }
   // A place of the world frame of the run, in that of the result.
@@ -114,10 +113,9 @@ void move_columns(const Mover& mover, const VectorMove& move, OGRFeature& row) {
   const int x = row.GetFieldIndex("x");
   const int y = row.GetFieldIndex("y");
   if (x < 0 || y < 0 || !row.IsFieldSetAndNotNull(x) || !row.IsFieldSetAndNotNull(y)) return;
-  const double ground = move.from
-                            .to_world({0.5 * (box.MinX + box.MaxX), 0.5 * (box.MinY + box.MaxY),
-                                       mover.height()})
-                            .z();
+  const double ground =
+      move.from.to_world({0.5 * (box.MinX + box.MaxX), 0.5 * (box.MinY + box.MaxY), mover.height()})
+          .z();
   const Vector3d at = mover.in_world(row.GetFieldAsDouble(x), row.GetFieldAsDouble(y), ground);
   row.SetField(x, at.x());
   row.SetField(y, at.y());
@@ -157,8 +155,7 @@ void add_moved_vectors(const std::filesystem::path& from_file, const std::filesy
   const GDALDatasetUniquePtr source(
       GDALDataset::Open(from_file.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));
   if (source == nullptr) throw InputError(from_file.string(), "", "expected a GeoPackage");
-  GDALDatasetUniquePtr target(
-      GDALDataset::Open(to_file.c_str(), GDAL_OF_VECTOR | GDAL_OF_UPDATE));
+  GDALDatasetUniquePtr target(GDALDataset::Open(to_file.c_str(), GDAL_OF_VECTOR | GDAL_OF_UPDATE));
   if (target == nullptr) fail_at(to_file);
   const Mover mover(move, mean_height(*source));
   for (const char* name : {"plots", "look_again"}) {

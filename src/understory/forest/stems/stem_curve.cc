@@ -136,8 +136,9 @@ class Tracker {
     // A branch or the foliage around a stem makes it thicker from one section to the next.
     const double change = found.radius_m - guess.radius_m;
     const bool flare = guess.height_m < kBreastHeight;
-    if (change > (flare ? kFlare : kMostChangeShare) * guess.radius_m + kMostChange ||
-        -change > kMostChangeShare * guess.radius_m + kMostChange)
+    const double thicker = flare ? kFlare * guess.radius_m + kMostChange
+                                 : kMostThickerShare * guess.radius_m + kMostThicker;
+    if (change > thicker || -change > kMostChangeShare * guess.radius_m + kMostChange)
       return std::nullopt;
     const SectionEvidence seen = section_evidence(near, ring, found.scatter_m);
     if (seen.on < kFewestPoints || seen.arc_deg < kLeastArcDeg ||

@@ -116,6 +116,26 @@ TEST(StemCurve, BranchesDoNotMakeItThicker) {
     EXPECT_LT(std::abs(error_at(curve, stem, height)), 0.012) << height;
 }
 
+// Where only foliage shows, its surface widens upwards, as no stem does.
+TEST(StemCurve, AStemIsNotFollowedIntoTheFoliageAroundIt) {
+  Random random(6);
+  TestStem stem;
+  stem.seen_to_m = 4.0;
+  std::vector<SlicePoint> points = stem.points(random);
+  for (int i = 0; i < 1600; ++i) {
+    const double h = random.uniform(4.0, 8.0);
+    const double turn = random.uniform(0.0, 2.0 * M_PI);
+    const double r = 0.5 * stem.diameter(h) + 0.06 * (h - 4.0) + random.normal(0.0, 0.006);
+    const Eigen::Vector2d c = stem.centre(h);
+    points.push_back({static_cast<float>(c.x() + r * std::cos(turn)),
+                      static_cast<float>(c.y() + r * std::sin(turn)), static_cast<float>(h), 1});
+  }
+  const StemCurve curve = measure_stem_curve(points, stem.fit(), kTop, {});
+  EXPECT_LT(curve.measured_to_m, 5.2);
+  for (double height = 0.5; height < 7.0; height += 0.5)
+    EXPECT_LT(std::abs(error_at(curve, stem, height)), 0.03) << height;
+}
+
 TEST(StemCurve, WithoutAHeightItEndsWhereTheStemWasSeenAndHasNoVolume) {
   Random random(5);
   const TestStem stem;

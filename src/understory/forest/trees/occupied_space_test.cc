@@ -53,8 +53,8 @@ TEST(OccupiedSpace, IsTheSameInParts) {
   low.add({1.5, 1.5}, 3.5);
   OccupiedSpace high;
   high.add({1.5, 1.5}, 63.9);
-  high.add({1.5, 1.5}, 64.1);   // left out
-  high.add({1.5, 1.5}, -0.1);   // the same
+  high.add({1.5, 1.5}, 64.1);  // left out
+  high.add({1.5, 1.5}, -0.1);  // the same
   parts.add(low);
   parts.add(high);
   EXPECT_EQ(*parts.columns().find(1.2, 1.8), std::uint64_t{1} << 3 | std::uint64_t{1} << 63);

@@ -34,9 +34,8 @@ std::vector<TreeInView> thick_by_distance(const std::vector<TreeInView>& trees) 
   std::vector<TreeInView> thick;
   for (const TreeInView& tree : trees)
     if (is_known(tree) && tree.dbh_m >= least) thick.push_back(tree);
-  std::stable_sort(thick.begin(), thick.end(), [](const TreeInView& a, const TreeInView& b) {
-    return a.farness < b.farness;
-  });
+  std::stable_sort(thick.begin(), thick.end(),
+                   [](const TreeInView& a, const TreeInView& b) { return a.farness < b.farness; });
   return thick;
 }
 
@@ -56,9 +55,9 @@ Reached reached_from(const std::vector<TreeInView>& thick, std::size_t first) {
   Reached reached{thick[end - 1].farness, heights[kRank], 0.0};
   for (std::size_t far = end; far + kFar <= thick.size(); far += kStep) {
     const auto from = thick.begin() + static_cast<std::ptrdiff_t>(far);
-    const auto higher = std::count_if(
-        from, from + static_cast<std::ptrdiff_t>(kFar),
-        [&](const TreeInView& tree) { return tree.height_m > reached.height_m; });
+    const auto higher =
+        std::count_if(from, from + static_cast<std::ptrdiff_t>(kFar),
+                      [&](const TreeInView& tree) { return tree.height_m > reached.height_m; });
     reached.higher_share =
         std::max(reached.higher_share, static_cast<double>(higher) / static_cast<double>(kFar));
   }
