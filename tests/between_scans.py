@@ -1,4 +1,5 @@
-"""Poses between scans: `map --imu-rate` writes one for each sample of the IMU, predicted from what was known then."""
+"""Poses between scans: `map --imu-rate` writes one for each sample of the IMU, predicted from what was known then, and
+`scan_fraction` one for each part of a scan."""
 
 import json
 import math
@@ -41,6 +42,26 @@ def each_sample(folder):
     far = [math.dist(predicted[min(times, key=lambda time: abs(time - scan))][:3], scans[scan][:3])
            for scan in scans if scan > times[0] + 1.0]
     assert 1e-5 < max(far) < 0.05, f"a prediction is {max(far):.6f} m from the scan that comes later"
+
+
+@cases.case("quarters of scans give four poses a scan, and no other file changes")
+def quarters(folder):
+    plain, run = mapped(folder / "plain"), mapped(folder / "parts", "--set", "scan_fraction=0.25")
+    assert not (plain / "trajectory_partial.tum").exists()
+    for name in ("trajectory.tum", "map.laz", "trees.csv"):
+        assert (run / name).read_bytes() == (plain / name).read_bytes(), f"{name} differs"
+    scans, parts = poses(run / "trajectory.tum"), poses(run / "trajectory_partial.tum")
+    facts = json.loads((run / "run.json").read_text())
+    counts, quality = facts["counts"], facts["quality"]
+    # The first scan has no map before it.
+    assert len(parts) == 4 * (len(scans) - 1) == counts["scan_parts"], (len(parts), len(scans))
+    assert counts["scan_parts_matched"] > 0.9 * len(parts), counts
+    times = list(parts)
+    assert times == sorted(times) and set(times[::4]) <= set(scans), "a first part begins where its scan does"
+    # A part is matched from where the scan before says; its scan lies in the same map.
+    far = [math.dist(parts[time][:3], scans[time][:3]) for time in times[::4]]
+    assert 1e-5 < max(far) < 0.1 and sum(far) / len(far) < 0.02, (max(far), sum(far) / len(far))
+    assert 0.0 < quality["partial_latency_ms"] < quality["scan_latency_ms"], quality
 
 
 @cases.case("a run that is moved moves its predictions")

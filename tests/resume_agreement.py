@@ -14,7 +14,8 @@ STEMS = ["stems.csv.gz", "trajectory.tum", "odometry.tum", "steps.csv", "gnss.cs
          "trees.csv", "felled.csv"]
 # Recording, a file that shows how far the run is, its least size then, options, files to compare.
 CASES = {
-    "harvester": ("sim:harvester?seed=21&duration_s=16", "journal.bin", 40_000, ["--imu-rate"], [*DENSE, "trajectory_imu.tum"]),
+    "harvester": ("sim:harvester?seed=21&duration_s=16", "journal.bin", 40_000, ["--imu-rate", "--set", "scan_fraction=0.25"],
+                  [*DENSE, "trajectory_imu.tum", "trajectory_partial.tum"]),
     # What is adapted to sparse scans and what the user set of it are the same after the kill.
     "sparse_scans": ("sim:lieksa2?seed=21&duration_s=60", "journal.bin", 60_000,
                      ["--set", "keyframe.distance_m=0.4"], DENSE),

@@ -1,9 +1,11 @@
 #include "understory/odometry/dense/dense_odometry.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "understory/geometry/matrix_inverse.h"
+#include "understory/odometry/dense/scan_parts.h"
 #include "understory/odometry/imu/imu_smoother.h"
 #include "understory/odometry/odometry_constants.h"
 
@@ -109,6 +111,11 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
 void DenseOdometry::preprocess(const Scan& scan, const std::vector<StampedPose>& path,
                                DenseEstimate& estimate) {
   const ScopedTimer timer(times_, "preprocess");
+  clean(scan, path, estimate);
+}
+
+void DenseOdometry::clean(const Scan& scan, const std::vector<StampedPose>& path,
+                          DenseEstimate& estimate) {
   keep_.clear();
   if (!boxes_.empty()) keep_ = outside_machine(scan, rig_, boxes_);
   drop_isolated(scan, config_.isolated, keep_);
@@ -120,6 +127,47 @@ void DenseOdometry::preprocess(const Scan& scan, const std::vector<StampedPose>&
   }
   cloud.feature = features_->find({&cloud.points, &cloud.ring});
   estimate.thinned = filter_.filter_features(cloud, config_.voxel, false);
+}
+
+std::vector<PartEstimate> DenseOdometry::match_parts(const Scan& scan,
+                                                     const MatchTargetPtr& local_map,
+                                                     double fraction) {
+  if (!local_map || scan.stamp <= last_scan_) return {};
+  std::vector<PartEstimate> estimates;
+  for (const Scan& part : parts_of(scan, fraction)) {
+    const ScopedTimer timer(times_, "scan_part");
+    estimates.push_back(match_part(part, *local_map));
+  }
+  return estimates;
+}
+
+// The match of a part is looser than that of a scan in some directions: there the prediction
+// counts.
+PartEstimate DenseOdometry::match_part(const Scan& part, const MatchTarget& local_map) {
+  PartEstimate estimate;
+  estimate.stamp = part.stamp;
+  estimate.end = part.end();
+  const NavState predicted = motion_->predict(part.stamp);
+  DenseEstimate seen;
+  clean(part, motion_->predict_path(part.stamp, estimate.end), seen);
+  estimate.points = seen.thinned.size();
+  const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
+  const bool far = sigma > config_.match.coarse_above_sigma * local_map.reach_m();
+  const MatchStart start = far ? MatchStart::kFar : MatchStart::kNear;
+  const RegistrationResult match =
+      features_ == nullptr
+          ? local_map.match(seen.thinned.points, predicted.world_from_body, {}, start)
+          : local_map.match_features({seen.thinned.points, seen.thinned.feature},
+                                     predicted.world_from_body, {}, start);
+  const double least =
+      std::max(config_.match.min_inlier_ratio, config_.match.min_inlier_share * usual_inliers_);
+  estimate.matched = match.usable() && match.inlier_ratio >= least;
+  estimate.world_from_body = predicted.world_from_body;
+  if (!estimate.matched) return estimate;
+  const LidarFactor factor{match.target_from_source, match.fitness_m2, match.information};
+  estimate.world_from_body =
+      fuse(predicted, factor.world_from_body, lidar_covariance(factor, config_.motion.lidar));
+  return estimate;
 }
 
 bool DenseOdometry::by_scans_alone() const {

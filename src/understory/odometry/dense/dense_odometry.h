@@ -72,6 +72,15 @@ struct DenseEstimate {
   double cpu_ms = 0.0;
 };
 
+// The pose that a part of a scan gives before the scan is whole, P4 (discussion).
+struct PartEstimate {
+  TimeNs stamp = 0;  // of its first point
+  Pose world_from_body;
+  bool matched = false;    // false: the pose is the prediction
+  TimeNs end = 0;          // of its last point
+  std::size_t points = 0;  // that were matched
+};
+
 // What is known of a scan's pose besides its points.
 struct ScanKnowledge {
   PoseTerms terms;                  // count in its match
@@ -91,6 +100,12 @@ class DenseOdometry {
   void add_imu(const ImuSample& sample);
   [[nodiscard]] DenseEstimate process(const Scan& scan, const MatchTargetPtr& local_map,
                                       const ScanKnowledge& known = {});
+  // Poses from the parts of a scan that comes next (parts_of), each matched to the local map from
+  // where the motion leads; nothing that `process` does depends on it. Empty without a local map,
+  // before the first scan and for a scan that is not after the last one.
+  [[nodiscard]] std::vector<PartEstimate> match_parts(const Scan& scan,
+                                                      const MatchTargetPtr& local_map,
+                                                      double fraction);
   // See MotionModel; before the first scan.
   void set_initial_motion(const Eigen::Vector3d& velocity_m_s,
                           const Eigen::Vector3d& angular_rate_rad_s);
@@ -115,6 +130,8 @@ class DenseOdometry {
  private:
   // The cloud deskewed along a path, and thinned.
   void preprocess(const Scan& scan, const std::vector<StampedPose>& path, DenseEstimate& estimate);
+  void clean(const Scan& scan, const std::vector<StampedPose>& path, DenseEstimate& estimate);
+  [[nodiscard]] PartEstimate match_part(const Scan& part, const MatchTarget& local_map);
   // Whether no IMU tells of the motion.
   [[nodiscard]] bool by_scans_alone() const;
   void match_elastically(const Scan& scan, const MatchTarget& target,

@@ -16,7 +16,7 @@ struct ResultFile {
 };
 
 // In the order in which a user wants them; docs/reference/outputs.md has their columns.
-constexpr std::array<ResultFile, 25> kResultFiles = {
+constexpr std::array<ResultFile, 26> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
      {"stem_curves.csv", "diameters along each stem", "a spreadsheet"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
@@ -30,6 +30,8 @@ constexpr std::array<ResultFile, 25> kResultFiles = {
      {"dsm.tif", "height of the surface, treetops included", "QGIS"},
      {"trajectory.tum", "the path of the scanner: time, place, attitude", "a text editor, evo"},
      {"trajectory_imu.tum", "the path predicted at each sample of the IMU", "a text editor, evo"},
+     {"trajectory_partial.tum", "poses from parts of scans, sooner than the path",
+      "a text editor, evo"},
      {"gnss.csv", "the fixes of the GNSS receiver", "a spreadsheet"},
      {"global.csv.gz", "place on the globe at each scan, while the run went on",
       "a spreadsheet, QGIS"},

@@ -81,7 +81,8 @@ void write_moved_run(const MovingFolders& folders, const MovedRun& moved,
   const Pose& motion = moved.placement.target_from_world;
   write_moved_layers({from, *run.layers, progress}, motion, {to, frames.layers}, frames.drawing(),
                      picture, log);
-  for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum", "trajectory_imu.tum"})
+  for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum", "trajectory_imu.tum",
+                           "trajectory_partial.tum"})
     write_moved_path(from / name, to / name, motion);
   write_moved_cuts(from / "cuts.csv", to / "cuts.csv", motion);
   copy_unmoved(from, to);

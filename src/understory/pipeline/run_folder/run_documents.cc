@@ -21,9 +21,9 @@ std::map<std::string, std::string> frames_of(const std::filesystem::path& folder
                                              const RunPlace& place) {
   const std::string layers = place.on_globe ? place.coordinate_system : "world";
   std::map<std::string, std::string> frames;
-  for (const char* name :
-       {"trajectory.tum", "odometry.tum", "keyframes.tum", "trajectory_imu.tum", "states.csv.gz",
-        "graph.g2o", "gnss.csv", "trees.csv", "felled.csv", "cuts.csv"}) {
+  for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum", "trajectory_imu.tum",
+                           "trajectory_partial.tum", "states.csv.gz", "graph.g2o", "gnss.csv",
+                           "trees.csv", "felled.csv", "cuts.csv"}) {
     if (std::filesystem::exists(folder / name)) frames[name] = "world";
   }
   for (const char* name : {"map.laz", "dtm.tif", "dsm.tif", "chm.tif", "trees.gpkg", "map.qgs"}) {

@@ -9,16 +9,34 @@ namespace understory {
 namespace fs = std::filesystem;
 
 const std::vector<std::string>& result_names() {
-  static const std::vector<std::string> names = {
-      "trajectory.tum",   "odometry.tum",    "keyframes.tum",
-      "states.csv.gz",    "stems.csv.gz",    "trajectory_imu.tum",
-      "graph.g2o",        "gnss.csv",        "global.csv.gz",
-      "steps.csv",        "loops.csv",       "corrections.csv",
-      "map.laz",          "trees.csv",       "stem_curves.csv",
-      "felled.csv",       "cuts.csv",        "trees.gpkg",
-      "dtm.tif",          "dsm.tif",         "chm.tif",
-      "map.qgs",          "deformation.csv", "plots.csv",
-      "plot_classes.csv", "run.json",        "report.html"};
+  static const std::vector<std::string> names = {"trajectory.tum",
+                                                 "odometry.tum",
+                                                 "keyframes.tum",
+                                                 "states.csv.gz",
+                                                 "stems.csv.gz",
+                                                 "trajectory_imu.tum",
+                                                 "trajectory_partial.tum",
+                                                 "graph.g2o",
+                                                 "gnss.csv",
+                                                 "global.csv.gz",
+                                                 "steps.csv",
+                                                 "loops.csv",
+                                                 "corrections.csv",
+                                                 "map.laz",
+                                                 "trees.csv",
+                                                 "stem_curves.csv",
+                                                 "felled.csv",
+                                                 "cuts.csv",
+                                                 "trees.gpkg",
+                                                 "dtm.tif",
+                                                 "dsm.tif",
+                                                 "chm.tif",
+                                                 "map.qgs",
+                                                 "deformation.csv",
+                                                 "plots.csv",
+                                                 "plot_classes.csv",
+                                                 "run.json",
+                                                 "report.html"};
   return names;
 }
 

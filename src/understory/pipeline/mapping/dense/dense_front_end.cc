@@ -95,6 +95,7 @@ void DenseFrontEnd::take(const Event& event, const Rig& rig) {
       if (without_samples()) rig_.body_from_imu.reset();
       start_anew();
     }
+    if (partial_path_) match_parts(**scan);
     on_scan(**scan);
   }
 }

@@ -45,6 +45,13 @@ struct DenseCounts {
   std::uint64_t last_content = 0;   // of the last scan, see content_of
   std::uint64_t predictions = 0;    // of trajectory_imu.tum
   std::uint64_t coasted = 0;        // those without the IMU, by constant velocity
+  // Of trajectory_partial.tum: parts of scans, those with a match, and the sums of the times from
+  // first to last point, of parts and of the scans that they are of.
+  std::uint64_t scan_parts = 0;
+  std::uint64_t scan_parts_matched = 0;
+  std::uint64_t cut_scans = 0;
+  TimeNs parts_span = 0;
+  TimeNs cut_scans_span = 0;
 };
 
 // The front end that matches all points of a scan to a local map: keeps positioning (first graph),
@@ -96,6 +103,8 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] const Journal& journal() const { return *journal_; }
   // A prediction for each sample of the IMU; null without `imu_rate`.
   [[nodiscard]] RelativePath* imu_path() { return imu_path_.get(); }
+  // A pose for each part of each scan but the first; null with `scan_fraction` 1.
+  [[nodiscard]] RelativePath* partial_path() { return partial_path_.get(); }
   [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_->clouds(); }
   [[nodiscard]] const std::vector<GnssFix>& fixes() const { return received_.fixes; }
   [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
@@ -111,6 +120,7 @@ class DenseFrontEnd : public FrontEnd {
   static constexpr const char* kJournalFile = "journal.bin";
   static constexpr const char* kCloudsFile = "clouds.bin";
   static constexpr const char* kImuPathFile = "imu_path.bin";
+  static constexpr const char* kPartialPathFile = "partial_path.bin";
 
   // What came of the recording so far.
   struct Received {
@@ -141,7 +151,9 @@ class DenseFrontEnd : public FrontEnd {
   void take_sample(const ImuSample& sample);
   void start_anew();
   void begin_paths_between();
+  void load_paths_between(BinaryReader& reader);
   void predict_at(TimeNs stamp);
+  void match_parts(const Scan& scan);
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
   void begin_again(const AssumedMotion& motion);
   void leave_out_first();
@@ -167,6 +179,7 @@ class DenseFrontEnd : public FrontEnd {
   std::unique_ptr<KeyframeMap> map_;
   std::unique_ptr<Journal> journal_;
   std::unique_ptr<RelativePath> imu_path_;
+  std::unique_ptr<RelativePath> partial_path_;
   std::unique_ptr<ScanClouds> clouds_;
   VoxelFilter cloud_filter_;
   std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced

@@ -1,4 +1,5 @@
-// Poses between scans, as they were known then (P4 F2: prediction at the rate of the IMU).
+// Poses between scans, as they were known then: predictions at the rate of the IMU (P4 F2), and
+// estimates from parts of a revolution (P4, discussion).
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
 
 namespace understory {
@@ -6,6 +7,39 @@ namespace understory {
 void DenseFrontEnd::begin_paths_between() {
   imu_path_.reset();
   if (config_.imu_rate) imu_path_ = std::make_unique<RelativePath>(folder_ / kImuPathFile);
+  partial_path_.reset();
+  if (config_.scan_fraction < 1.0)
+    partial_path_ = std::make_unique<RelativePath>(folder_ / kPartialPathFile);
+}
+
+void DenseFrontEnd::load_paths_between(BinaryReader& reader) {
+  if (config_.imu_rate) {
+    imu_path_ = std::make_unique<RelativePath>(folder_ / kImuPathFile, reader.get<RecordCount>());
+  }
+  if (config_.scan_fraction < 1.0) {
+    partial_path_ =
+        std::make_unique<RelativePath>(folder_ / kPartialPathFile, reader.get<RecordCount>());
+  }
+}
+
+// As soon as the last point of a part is there, the scan before is positioned, and its map is the
+// local map. So it is here, where all parts come with the last one.
+void DenseFrontEnd::match_parts(const Scan& scan) {
+  if (journal_->size() == 0) return;
+  const std::vector<PartEstimate> parts =
+      odometry_->match_parts(scan, map_->local_map(), config_.scan_fraction);
+  if (parts.empty()) return;
+  const Pose body_from_world =
+      odometry_->motion().predict(odometry_->last_scan()).world_from_body.inverse();
+  DenseCounts& counts = received_.counts;
+  for (const PartEstimate& part : parts) {
+    partial_path_->add({part.stamp, journal_->size() - 1, body_from_world * part.world_from_body});
+    ++counts.scan_parts;
+    counts.scan_parts_matched += part.matched ? 1 : 0;
+    counts.parts_span += part.end - part.stamp;
+  }
+  ++counts.cut_scans;
+  counts.cut_scans_span += scan.end() - scan.stamp;
 }
 
 // What a machine would have had at this sample: the state at the last scan that is positioned, and

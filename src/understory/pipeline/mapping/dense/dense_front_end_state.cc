@@ -25,6 +25,7 @@ void DenseFrontEnd::sync() {
   if (!started()) return;
   journal_->sync();
   if (imu_path_) imu_path_->sync();
+  if (partial_path_) partial_path_->sync();
   clouds_->sync();
   map_->sync();
 }
@@ -36,6 +37,7 @@ std::vector<CountedFile> DenseFrontEnd::files() const {
     files.push_back({kJournalFile, journal_->count()});
     files.push_back({kCloudsFile, clouds_->clouds().count()});
     if (imu_path_) files.push_back({kImuPathFile, imu_path_->count()});
+    if (partial_path_) files.push_back({kPartialPathFile, partial_path_->count()});
   }
   if (fixes_file_) files.push_back({kFixesFile, fixes_file_->count()});
   return files;
@@ -63,6 +65,7 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   if (!started()) return;
   writer.put(journal_->count());
   if (imu_path_) writer.put(imu_path_->count());
+  if (partial_path_) writer.put(partial_path_->count());
   writer.put(clouds_->clouds().count());
   map_->save(writer);
   odometry_->save(writer);
@@ -99,9 +102,7 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
     received_.imu.push_back(get_imu(reader));
   if (!was_started) return;
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile, reader.get<RecordCount>());
-  if (config_.imu_rate) {
-    imu_path_ = std::make_unique<RelativePath>(folder_ / kImuPathFile, reader.get<RecordCount>());
-  }
+  load_paths_between(reader);
   const auto clouds = reader.get<RecordCount>();
   clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, clouds, last_cloud,
                                          times_);

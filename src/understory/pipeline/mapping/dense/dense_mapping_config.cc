@@ -12,6 +12,9 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   ConfigTable table;
   table.add("imu_rate", config.imu_rate,
             "write trajectory_imu.tum, a prediction of the pose for each sample of the IMU");
+  table.add("scan_fraction", config.scan_fraction, {0.05, 1.0}, "",
+            "below 1: each such part of a scan gives a pose as soon as its last point is there, in "
+            "trajectory_partial.tum");
   table.section("time_repair", [&] { EventOrderer::describe(table, config.loop.time_repair); });
   describe(table, config.odometry);
   table.section("registration", [&] {

@@ -24,6 +24,8 @@ namespace understory {
 struct DenseMappingConfig {
   EventLoopConfig loop;
   bool imu_rate = false;  // write trajectory_imu.tum: a prediction for each sample of the IMU
+  // Below 1: each such part of a scan gives a pose of its own, in trajectory_partial.tum.
+  double scan_fraction = 1.0;
   DenseOdometryConfig odometry;
   KeyframeMap::Config keyframe_map;
   MapTiles::Config map;

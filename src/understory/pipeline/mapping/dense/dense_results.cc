@@ -264,9 +264,30 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
     documents.count("scans_by_satellites", counts.by_satellites);
 }
 
+// trajectory_partial.tum. A pose is there when the last point of its part is, and the part is
+// matched: latency counts from its first point.
+void write_partial_path(const ReadRecording& recording, DenseFrontEnd& front_end,
+                        const Trajectory& scans, RunDocuments& documents) {
+  if (front_end.partial_path() == nullptr) return;
+  const DenseCounts& counts = front_end.counts();
+  documents.count("scan_parts", write_relative_path(recording.results / "trajectory_partial.tum",
+                                                    *front_end.partial_path(), scans));
+  documents.count("scan_parts_matched", counts.scan_parts_matched);
+  if (counts.scan_parts == 0) return;
+  const auto mean_ms = [&](const std::string& stage, TimeNs span, std::uint64_t number) {
+    std::vector<double> wall;
+    for (const StageTimes::Sample& sample : front_end.times().samples(stage))
+      wall.push_back(static_cast<double>(sample.wall_ms));
+    return 1e3 * to_seconds(span) / static_cast<double>(number) + distribution_of(wall).mean;
+  };
+  auto& quality = documents.summary().quality;
+  quality["partial_latency_ms"] = mean_ms("scan_part", counts.parts_span, counts.scan_parts);
+  quality["scan_latency_ms"] = mean_ms("scan", counts.cut_scans_span, counts.cut_scans);
+}
+
 // trajectory_imu.tum.
-void write_paths_between(const ReadRecording& recording, DenseFrontEnd& front_end,
-                         const Trajectory& scans, RunDocuments& documents) {
+void write_imu_path(const ReadRecording& recording, DenseFrontEnd& front_end,
+                    const Trajectory& scans, RunDocuments& documents) {
   if (front_end.imu_path() == nullptr) return;
   const DenseCounts& counts = front_end.counts();
   documents.count("imu_predictions", write_relative_path(recording.results / "trajectory_imu.tum",
@@ -436,7 +457,8 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   fill_streams(facts.time_repair, documents);
   fill_counts(front_end, documents);
   documents.judge_path();
-  write_paths_between(recording, front_end, trajectory.trajectory, documents);
+  write_imu_path(recording, front_end, trajectory.trajectory, documents);
+  write_partial_path(recording, front_end, trajectory.trajectory, documents);
   fill_quality(front_end, trajectory, facts, documents.summary());
   if (const auto truth = write_truth(recording.request.run_folder, recording.source))
     documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
