@@ -189,6 +189,12 @@ def head_log(folder):
         assert math.dist(place[:2], (float(found["x"]), float(found["y"]))) < 0.3, (place, found)
         fall = falls[cut["tree_id"]]
         assert fall["seen_until"] == fall["gone_since"] == cut["timestamp"], fall
+        assert abs(float(found["missing_since"]) - float(cut["timestamp"])) < 1e-3, found
+    # Without a log and a profile nobody fells: what is gone is missing.
+    assert not list(csv.DictReader((RUN / "felled.csv").open()))
+    counts = json.loads((RUN / "run.json").read_text())["counts"]
+    missing = [row for row in csv.DictReader((RUN / "trees.csv").open()) if row["missing_since"]]
+    assert counts["trees_felled"] == 0 and counts["trees_missing"] == len(missing), counts
     log = folder / "log.csv"
     log.write_text((TRUTH / "head.csv").read_text() + "1,2,3\n")
     done = sparse(REC, folder / "refused", "--set", f"harvester.head_log={log}")

@@ -64,15 +64,20 @@ nlohmann::ordered_json to_json(const Placed& placed, const MapSharpness& map,
   json["beta_3d"] = map.beta_3d;
   json["box_dimension"] = map.dimension;
   json["box_dimension_3d"] = map.dimension_3d;
+  json["cluster_noise_m"] = map.cluster_noise_m;
+  json["cluster_noise_mean_m"] = map.cluster_noise_mean_m;
   json["registration_noise_m"] = map.noise_m;
   json["registration_noise_mean_m"] = map.noise_mean_m;
   json["trees"] = map.trees;
   json["joined_trees"] = map.joined;
   json["all_stems"] = {{"beta", all.beta},
                        {"box_dimension", all.dimension},
+                       {"cluster_noise_m", all.cluster_noise_m},
+                       {"cluster_noise_mean_m", all.cluster_noise_mean_m},
                        {"registration_noise_m", all.noise_m},
                        {"registration_noise_mean_m", all.noise_mean_m},
-                       {"trees", all.trees}};
+                       {"trees", all.trees},
+                       {"joined_trees", all.joined}};
   json["roads"] = nlohmann::ordered_json::array();
   for (const RoadConsistency& road : roads) {
     json["roads"].push_back({{"road", road.road},
@@ -87,10 +92,20 @@ nlohmann::ordered_json to_json(const Placed& placed, const MapSharpness& map,
   return json;
 }
 
-std::string noise_text(const MapSharpness& map) {
-  if (!std::isfinite(map.noise_m)) return "unknown: no tree was seen often enough";
-  return fmt::format("{:.4f} m over all sights, {:.4f} m mean over trees", map.noise_m,
-                     map.noise_mean_m);
+std::string noise_text(double pooled_m, double mean_m, std::size_t count, const char* of_what) {
+  if (!std::isfinite(pooled_m)) return "unknown: no tree was seen often enough";
+  return fmt::format("{:.4f} m over all sights, {:.4f} m mean over {} {}", pooled_m, mean_m, count,
+                     of_what);
+}
+
+// e_C as P0 (33) prints it.
+std::string cluster_noise(const MapSharpness& map) {
+  return noise_text(map.cluster_noise_m, map.cluster_noise_mean_m, map.trees + map.joined,
+                    "clusters");
+}
+
+std::string tree_noise(const MapSharpness& map) {
+  return noise_text(map.noise_m, map.noise_mean_m, map.trees, "trees");
 }
 
 std::string to_text(const Placed& placed, const MapSharpness& map, const MapSharpness& all,
@@ -99,10 +114,12 @@ std::string to_text(const Placed& placed, const MapSharpness& map, const MapShar
       "views               {} placed, {} without a pose\n"
       "blurred area        {:.4f} of the map from above, {:.6f} in space (beta)\n"
       "box dimension       {:.2f} from above, {:.2f} in space (d)\n"
-      "spread of sights    {}, of {} trees (e_C)\n"
-      "with far and doubtful stems: beta {:.4f}, d {:.2f}, e_C {}\n",
+      "spread of sights    {} (e_C)\n"
+      "of single trees     {} (without clusters of several trees)\n"
+      "with far and doubtful stems: beta {:.4f}, d {:.2f}, e_C {}; of single trees {}\n",
       placed.views.size(), placed.without, map.beta, map.beta_3d, map.dimension, map.dimension_3d,
-      noise_text(map), map.trees, all.beta, all.dimension, noise_text(all));
+      cluster_noise(map), tree_noise(map), all.beta, all.dimension, cluster_noise(all),
+      tree_noise(all));
   for (const RoadConsistency& road : roads) {
     text += fmt::format(
         "roads {} and {}       {} and {} trees, {:.1f} % the same; {:.1f} % after one motion, "

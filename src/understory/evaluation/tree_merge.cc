@@ -65,6 +65,8 @@ Tree joined(const Tree& a, const Tree& b) {
     tree.height_sd_m = other.height_sd_m;
     tree.height_is_lower_bound = other.height_is_lower_bound;
   }
+  // Of two times the earlier one; of a tree that one of the lists alone misses, that one.
+  tree.missing_since_s = std::fmin(tree.missing_since_s, other.missing_since_s);
   return tree;
 }
 

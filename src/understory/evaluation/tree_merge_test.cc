@@ -122,6 +122,7 @@ TEST(TreeMerge, AJoinedTreeKeepsWhatTheSurerKnows) {
   b.dbh_m = 0.40;
   b.dbh_sd_m = 0.05;
   b.height_m = 17.0;
+  b.missing_since_s = 90.5;
   TreeMergeConfig config;
   config.smoothing = 0;
   const MergedTrees merged = merge_trees({a}, {b}, 0.5, config);
@@ -130,6 +131,9 @@ TEST(TreeMerge, AJoinedTreeKeepsWhatTheSurerKnows) {
   EXPECT_EQ(merged.trees[0].observations, 33);
   EXPECT_DOUBLE_EQ(merged.trees[0].dbh_m, 0.30);
   EXPECT_DOUBLE_EQ(merged.trees[0].height_m, 17.0);
+  EXPECT_DOUBLE_EQ(merged.trees[0].missing_since_s, 90.5);
+  a.missing_since_s = 60.0;
+  EXPECT_DOUBLE_EQ(merge_trees({a}, {b}, 0.5, config).trees[0].missing_since_s, 60.0);
   EXPECT_EQ(merge_trees({}, {b}, 0.5, config).trees.size(), 1U);
   EXPECT_TRUE(merge_trees({}, {}, 0.5, config).trees.empty());
 }

@@ -72,6 +72,28 @@ struct Cluster {
   }
 };
 
+// Both kinds of e_C from the sums of squares of the clusters.
+void take_means(const std::vector<Cluster>& clusters, int min_points, RegistrationNoise& noise) {
+  double all = 0.0;
+  double all_means = 0.0;
+  double all_sights = 0.0;
+  double means = 0.0;
+  for (const Cluster& cluster : clusters) {
+    if (cluster.count < min_points) continue;
+    const double rms = std::sqrt(cluster.squares / cluster.count);
+    all += cluster.squares;
+    all_means += rms;
+    all_sights += cluster.count;
+    const bool tree = cluster.is_tree(min_points);
+    ++(tree ? noise.trees : noise.joined);
+    means += tree ? rms : 0.0;
+  }
+  if (noise.trees + noise.joined == 0) return;
+  noise.clusters_m = std::sqrt(all / all_sights);
+  noise.clusters_mean_m = all_means / static_cast<double>(noise.trees + noise.joined);
+  if (noise.trees > 0) noise.mean_m = means / static_cast<double>(noise.trees);
+}
+
 }  // namespace
 
 SparsePoints map_points(const std::vector<SparsePoints>& views,
@@ -144,27 +166,17 @@ RegistrationNoise registration_noise(const std::vector<SparsePoints>& views,
     for (std::size_t k = 0; k < views[v].size(); ++k, ++at) {
       if (cluster_of[at] < 0) continue;
       Cluster& cluster = clusters[static_cast<std::size_t>(cluster_of[at])];
-      if (!cluster.is_tree(config.min_points)) continue;
       const double squared = (flat[at] - cluster.sum / cluster.count).squaredNorm();
       cluster.squares += squared;
+      if (!cluster.is_tree(config.min_points)) continue;
       squares += squared;
       noise.squares_m2[v] += squared;
       ++noise.counts[v];
       ++noise.sights;
     }
   }
-  double means = 0.0;
-  for (const Cluster& cluster : clusters) {
-    if (!cluster.is_tree(config.min_points)) {
-      noise.joined += cluster.count >= config.min_points ? 1 : 0;
-      continue;
-    }
-    ++noise.trees;
-    means += std::sqrt(cluster.squares / cluster.count);
-  }
-  if (noise.trees == 0) return noise;
-  noise.pooled_m = std::sqrt(squares / static_cast<double>(noise.sights));
-  noise.mean_m = means / static_cast<double>(noise.trees);
+  take_means(clusters, config.min_points, noise);
+  if (noise.sights > 0) noise.pooled_m = std::sqrt(squares / static_cast<double>(noise.sights));
   return noise;
 }
 
@@ -178,6 +190,8 @@ MapSharpness map_sharpness(const std::vector<SparsePoints>& views,
   result.beta_3d = blur_ratio_3d(map, config);
   result.dimension = box_dimension(map, config, false);
   result.dimension_3d = box_dimension(map, config, true);
+  result.cluster_noise_m = noise.clusters_m;
+  result.cluster_noise_mean_m = noise.clusters_mean_m;
   result.noise_m = noise.pooled_m;
   result.noise_mean_m = noise.mean_m;
   result.trees = noise.trees;

@@ -38,13 +38,18 @@ struct SharpnessConfig {
                                    bool in_space);
 
 // Tree registration noise, P0 section 2.5 and (33): distances of sights from the mean of their
-// cluster, seen from above. A cluster of which a view in five or more has two sights is several
-// trees side by side, whose sights have run together: its width is no noise, so it is left out. (On
-// a simulated site one such pair among 596 trees took e_C from 4.9 to 7.4 cm.)
+// cluster, seen from above. The paper's e_C is over all clusters. A cluster of which a view in five
+// or more has two sights is several trees side by side, whose sights have run together: its width
+// is no noise, so ours leaves it out. (On a simulated site one such pair among 596 trees took e_C
+// from 4.9 to 7.4 cm.)
 struct RegistrationNoise {
-  // e_C by (33): root mean square over all sights of trees, metres. NaN without a tree.
+  // e_C by (33), as the paper has it: root mean square over the sights of all clusters, metres. NaN
+  // without a cluster.
+  double clusters_m = std::numeric_limits<double>::quiet_NaN();
+  // Mean over all clusters of each one's root mean square: the figure of P0's table 1.
+  double clusters_mean_m = std::numeric_limits<double>::quiet_NaN();
+  // The same two of the clusters that are single trees.
   double pooled_m = std::numeric_limits<double>::quiet_NaN();
-  // Mean over the trees of each one's root mean square: the figure of P0's table 1.
   double mean_m = std::numeric_limits<double>::quiet_NaN();
   std::size_t trees = 0;
   std::size_t joined = 0;  // clusters left out as several trees
@@ -65,10 +70,12 @@ struct MapSharpness {
   double beta_3d = 0.0;
   double dimension = 0.0;
   double dimension_3d = 0.0;
-  double noise_m = 0.0;       // e_C by (33)
-  double noise_mean_m = 0.0;  // by table 1
+  double cluster_noise_m = 0.0;       // e_C by (33), of all clusters
+  double cluster_noise_mean_m = 0.0;  // by table 1
+  double noise_m = 0.0;               // the same of single trees
+  double noise_mean_m = 0.0;
   std::size_t trees = 0;
-  std::size_t joined = 0;  // clusters of several trees, which have no part in e_C
+  std::size_t joined = 0;  // clusters of several trees: clusters are both together
 };
 [[nodiscard]] MapSharpness map_sharpness(const std::vector<SparsePoints>& views,
                                          const std::vector<Pose>& map_from_view,

@@ -79,6 +79,7 @@ TEST(MapSharpness, RegistrationNoiseIsTheNoiseOfTheSights) {
   const Stand few = stand(14, 0.05, 1);
   EXPECT_EQ(registration_noise(few.views, few.poses, {}, {}).trees, 0U);
   EXPECT_TRUE(std::isnan(registration_noise(few.views, few.poses, {}, {}).pooled_m));
+  EXPECT_TRUE(std::isnan(registration_noise(few.views, few.poses, {}, {}).clusters_m));
 }
 
 TEST(MapSharpness, TwoTreesSideBySideAreNoNoise) {
@@ -92,6 +93,14 @@ TEST(MapSharpness, TwoTreesSideBySideAreNoNoise) {
   EXPECT_EQ(noise.joined, 1U);
   EXPECT_EQ(noise.trees, alone.trees - 1);
   EXPECT_NEAR(noise.pooled_m, alone.pooled_m, 0.002);
+  // In the paper's e_C they count. The neighbour turns with the views: 80 of 2,080 sights lie 0.7 m
+  // from the middle of the cluster, where its 80 others are.
+  EXPECT_DOUBLE_EQ(alone.clusters_m, alone.pooled_m);
+  EXPECT_DOUBLE_EQ(alone.clusters_mean_m, alone.mean_m);
+  const double sight = 2.0 * 0.05 * 0.05;
+  EXPECT_NEAR(noise.clusters_m, std::sqrt(sight + 80.0 / 2080.0 * 0.7 * 0.7), 0.003);
+  EXPECT_NEAR(noise.clusters_mean_m,
+              (24.0 * std::sqrt(sight) + std::sqrt(sight + 0.5 * 0.7 * 0.7)) / 25.0, 0.003);
   // A tree that is seen where it is not, in half of the views, does count.
   Stand bent = stand(80, 0.05, 4);
   for (std::size_t v = 0; v < 40; ++v)

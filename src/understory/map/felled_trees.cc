@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "understory/geometry/plane_grid.h"
 #include "understory/graph/loops/view_cone.h"
@@ -42,6 +43,34 @@ bool hidden(const SparsePoints& stems, const Eigen::Vector3d& place, double clea
   return false;
 }
 
+// Places in the plane from which a tree was seen within reach.
+std::vector<Eigen::Vector2d> seen_from(const std::vector<Sight>& sights,
+                                       const std::vector<Pose>& world_from_body) {
+  std::vector<Eigen::Vector2d> places;
+  for (const Sight& sight : sights) {
+    if (sight.seen && sight.tells)
+      places.emplace_back(
+          world_from_body[static_cast<std::size_t>(sight.view)].translation().head<2>());
+  }
+  return places;
+}
+
+// Misses from places that never showed the tree tell nothing, if the configuration says so.
+std::vector<Sight> telling(std::vector<Sight> sights, const std::vector<Pose>& world_from_body,
+                           const FelledConfig& config) {
+  if (config.same_place_m <= 0.0) return sights;
+  const std::vector<Eigen::Vector2d> places = seen_from(sights, world_from_body);
+  const double near = config.same_place_m * config.same_place_m;
+  for (Sight& sight : sights) {
+    const Eigen::Vector2d at =
+        world_from_body[static_cast<std::size_t>(sight.view)].translation().head<2>();
+    sight.tells = sight.tells && std::any_of(places.begin(), places.end(), [&](const auto& place) {
+                    return (place - at).squaredNorm() <= near;
+                  });
+  }
+  return sights;
+}
+
 std::optional<FelledTree> judged(std::size_t tree, const std::vector<Sight>& sights,
                                  const FelledConfig& config) {
   FelledTree felled;
@@ -67,6 +96,12 @@ std::optional<FelledTree> judged(std::size_t tree, const std::vector<Sight>& sig
 }
 
 }  // namespace
+
+FelledConfig FelledConfig::unattended() {
+  FelledConfig config;
+  config.same_place_m = kSamePlaceM;
+  return config;
+}
 
 std::vector<FelledTree> felled_trees(const std::vector<StemView>& views,
                                      const std::vector<Pose>& world_from_body,
@@ -99,7 +134,8 @@ std::vector<FelledTree> felled_trees(const std::vector<StemView>& views,
   }
   std::vector<FelledTree> result;
   for (std::size_t t = 0; t < trees.size(); ++t) {
-    if (const auto felled = judged(t, sights[t], config)) result.push_back(*felled);
+    const auto felled = judged(t, telling(std::move(sights[t]), world_from_body, config), config);
+    if (felled) result.push_back(*felled);
   }
   return result;
 }

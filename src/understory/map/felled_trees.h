@@ -16,7 +16,7 @@ struct FelledTree {
   int missed = 0;  // views near enough, nothing before it, that should have seen it and did not
 };
 
-// When a tree that is no longer seen counts as felled. Metres.
+// When a tree that is no longer seen counts as gone. Metres.
 struct FelledConfig {
   double reach_m = 15.0;     // farther sights and misses tell nothing
   double nearest_m = 1.5;    // nor do those that the machine itself may hide
@@ -24,6 +24,12 @@ struct FelledConfig {
   int min_missed = 9;        // within reach, from then on: misses in a row are not independent
   double chance = 1e-4;      // that a standing tree is missed as often in a row
   double clearance_m = 0.3;  // a stem that near to the line of sight may hide it
+  // Misses tell only in views that stand that near to one that saw the tree; 0: all of them.
+  double same_place_m = 0.0;
+
+  // Where nobody fells. Undergrowth that is no stem hides a tree from one side and not from the
+  // other, so only a view from where the tree was seen before tells that it is gone.
+  [[nodiscard]] static FelledConfig unattended();
 };
 
 // Trees that were seen as a rule until some view and never again, although later views had them

@@ -77,5 +77,37 @@ TEST(FelledTrees, WhatIsHiddenOrOutOfReachIsNotFelled) {
   EXPECT_TRUE(felled_trees({}, {}, {}, {}).empty());
 }
 
+// Undergrowth hides tree 14 from behind. It stands, and where nobody fells nothing says otherwise;
+// once it is not seen from where it was seen before, it is gone.
+TEST(FelledTrees, WhereNobodyFellsOnlyPlacesThatShowedTheTreeTell) {
+  const auto trees = stand();
+  const FelledConfig unattended = FelledConfig::unattended();
+  const auto before = [](int i, std::size_t t) { return t != 14 || i < 30; };
+  Walk once = walk(trees, before);
+  EXPECT_EQ(felled_trees(once.views, once.poses, once.trees, {}).size(), 1U);
+  // Beyond 3 m from the last place that showed it: 12 m are walked in 60 views.
+  for (std::size_t i = 30; i < 60; ++i)
+    once.poses[i] = Pose(Eigen::Quaterniond::Identity(), {9.5 + 0.02 * i, 0.0, 0.0});
+  for (std::size_t i = 30; i < 60; ++i) {
+    once.views[i].stems.clear();
+    for (std::size_t t = 0; t < trees.size(); ++t) {
+      if (t == 14) continue;
+      once.views[i].stems.emplace_back();
+      once.views[i].stems.back().point = (once.poses[i].inverse() * trees[t]).cast<float>();
+    }
+  }
+  EXPECT_EQ(felled_trees(once.views, once.poses, once.trees, {}).size(), 1U);
+  EXPECT_TRUE(felled_trees(once.views, once.poses, once.trees, unattended).empty());
+  Walk again = once;
+  const Walk first = walk(trees, [](int, std::size_t t) { return t != 14; });
+  again.views.insert(again.views.end(), first.views.begin(), first.views.end());
+  again.poses.insert(again.poses.end(), first.poses.begin(), first.poses.end());
+  const auto gone = felled_trees(again.views, again.poses, again.trees, unattended);
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].tree, 14U);
+  EXPECT_EQ(gone[0].last_seen, 29);
+  EXPECT_EQ(gone[0].first_missed, 60);
+}
+
 }  // namespace
 }  // namespace understory

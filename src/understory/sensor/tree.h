@@ -31,6 +31,9 @@ struct Tree {
   double crown_base_m = kUnknown;       // above the ground: where the crown begins
   double crown_area_m2 = kUnknown;      // of its outline seen from above
   double crown_volume_m3 = kUnknown;
+  // Seconds on the clock of the scans: from then on views that should have seen the tree did not.
+  // Unknown while it stands.
+  double missing_since_s = kUnknown;
   bool felled = false;  // of a truth: cut down while it was scanned, so it may be listed or not
 };
 
@@ -61,6 +64,7 @@ inline constexpr std::array kTreeColumns = {
     TreeColumn{"crown_base_m", &Tree::crown_base_m, 2, false},
     TreeColumn{"crown_area_m2", &Tree::crown_area_m2, 2, false},
     TreeColumn{"crown_volume_m3", &Tree::crown_volume_m3, 2, false},
+    TreeColumn{"missing_since", &Tree::missing_since_s, 3, false},
 };
 
 // The names of the columns, and the cells of one tree, separated by commas, without the end of the

@@ -296,7 +296,8 @@ struct TableColumn {
 
 // The columns that hold anything: trees by their crowns alone have no figures of a stem.
 std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
-                                    const std::vector<StemFit>* stems, bool of_cloud) {
+                                    const std::vector<StemFit>* stems, bool of_cloud,
+                                    TimeNs start) {
   const auto number = [&](double Tree::*member, int decimals) {
     return [&trees, member, decimals](std::size_t i) { return metres(trees[i].*member, decimals); };
   };
@@ -332,6 +333,10 @@ std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
   if (any(&Tree::crown_base_m))
     columns.push_back({"crown from, m", number(&Tree::crown_base_m, 1)});
   if (any(&Tree::crown_area_m2)) columns.push_back({"crown, m²", number(&Tree::crown_area_m2, 1)});
+  if (any(&Tree::missing_since_s))
+    columns.push_back({"missing since, s", [&trees, start](std::size_t i) {
+                         return metres(trees[i].missing_since_s - to_seconds(start), 0);
+                       }});
   return columns;
 }
 
@@ -347,13 +352,13 @@ std::string about_columns(const std::vector<StemFit>* stems, bool of_cloud) {
 }
 
 // `stems`: their fits in the same order, or null. `of_cloud`: else trees come from sights of single
-// views, which have no heights.
+// views, which have no heights. `start`: of the recording.
 std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems,
-                       bool of_cloud) {
+                       bool of_cloud, TimeNs start) {
   std::string html =
       "<div class=\"all-trees\"><h3>All trees</h3><div class=\"scroll\"><table "
       "class=\"sort\"><thead><tr>";
-  const std::vector<TableColumn> columns = columns_of(trees, stems, of_cloud);
+  const std::vector<TableColumn> columns = columns_of(trees, stems, of_cloud, start);
   for (const TableColumn& column : columns)
     html += fmt::format("<th class=\"n\">{}</th>", column.title);
   html += "</tr></thead><tbody>";
@@ -395,12 +400,12 @@ std::string fall_table(const std::vector<TreeFall>& falls, TimeNs start) {
 // Trees of a cloud that is not at hand: of a run that was moved.
 std::string section_of_moved(const ReportInput& input) {
   const std::vector<Tree>& trees = *input.trees;
+  const TimeNs start = input.scans.empty() ? 0 : input.scans.front().stamp;
   return "<section><h2>Trees</h2><p>These are the trees of the run that was moved. Its own report "
          "shows their cross sections. ± is one standard deviation of the diameter. A height is "
          "given only where the top was seen.</p><div class=\"two\">" +
-         diameters(trees) + "</div>" +
-         fall_table(input.falls, input.scans.empty() ? 0 : input.scans.front().stamp) +
-         tree_table(trees, nullptr, true) + "</section>\n";
+         diameters(trees) + "</div>" + fall_table(input.falls, start) +
+         tree_table(trees, nullptr, true, start) + "</section>\n";
 }
 
 std::string section_of_views(const ReportInput& input) {
@@ -410,7 +415,7 @@ std::string section_of_views(const ReportInput& input) {
          "a stem. Its place is the mean of these sights. ± is one standard deviation of the "
          "diameter. Heights are not measured.</p><div class=\"two\">" +
          diameters(trees) + "</div>" + fall_table(input.falls, start) +
-         tree_table(trees, nullptr, false) + "</section>\n";
+         tree_table(trees, nullptr, false, start) + "</section>\n";
 }
 
 }  // namespace
@@ -432,7 +437,7 @@ std::string stand_section(const ReportInput& input) {
   html += cross_sections(inventory);
   if (!inventory.trees.empty())
     html += single_trees(inventory) + sheets_part(inventory) +
-            tree_table(inventory.trees, &inventory.stems, true);
+            tree_table(inventory.trees, &inventory.stems, true, 0);
   return html + "</section>\n";
 }
 

@@ -14,8 +14,10 @@ ReportCorrection correction_of(const SelfCorrectionResult& self) {
   const MapSharpness& a = self.before;
   const MapSharpness& b = self.after;
   report.figures = {
-      {"distance of the sights of a tree from their mean, cm (e_C; small is sharp)",
-       100.0 * a.noise_m, 100.0 * b.noise_m, 1},
+      {"distance of the sights of a cluster from their mean, cm (e_C; small is sharp)",
+       100.0 * a.cluster_noise_m, 100.0 * b.cluster_noise_m, 1},
+      {"the same of single trees, cm (without clusters of several trees)", 100.0 * a.noise_m,
+       100.0 * b.noise_m, 1},
       {"blurred area of the map, per mille (beta; small is sharp)", 1e3 * a.beta, 1e3 * b.beta, 2},
       {"dimension of the map, 0 points to 2 areas (d; small is sharp)", a.dimension, b.dimension,
        2}};

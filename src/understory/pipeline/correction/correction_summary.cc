@@ -46,6 +46,8 @@ void add_sharpness(const std::string& when, const MapSharpness& map, RunSummary&
   summary.quality["beta_3d_" + when] = map.beta_3d;
   summary.quality["box_dimension_" + when] = map.dimension;
   summary.quality["box_dimension_3d_" + when] = map.dimension_3d;
+  summary.quality["cluster_noise_" + when + "_m"] = map.cluster_noise_m;
+  summary.quality["cluster_noise_mean_" + when + "_m"] = map.cluster_noise_mean_m;
   summary.quality["registration_noise_" + when + "_m"] = map.noise_m;
   summary.quality["registration_noise_mean_" + when + "_m"] = map.noise_mean_m;
 }

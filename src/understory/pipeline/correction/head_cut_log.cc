@@ -47,6 +47,9 @@ TimeNs stamp_in(const CsvReader& table) {
 }  // namespace
 
 void describe(ConfigTable& table, HeadCutLogConfig& config) {
+  table.add("fells", config.fells,
+            "a machine fells trees while it maps: trees that are gone are felled; else, without a "
+            "log of its head, they are only missing");
   table.add("head_log", config.head_log,
             "CSV of a harvester's felling cuts, timestamp,x,y,z of its head in the body frame; "
             "empty: none");
@@ -54,6 +57,10 @@ void describe(ConfigTable& table, HeadCutLogConfig& config) {
             "largest distance in the plane from the head to the tree that it cut");
   table.add("settle_s", config.cuts.settle_s, {0.0, 3600.0}, "s",
             "longest time for which a cut tree may still be seen at its place");
+}
+
+bool fells_trees(const HeadCutLogConfig& config) {
+  return config.fells || !config.head_log.empty();
 }
 
 std::vector<LoggedCut> read_head_log(const std::string& file) {
@@ -100,9 +107,11 @@ std::vector<HeadCut> place_cuts(const std::vector<LoggedCut>& cuts,
 
 std::vector<TreeFall> write_felled_trees(const std::filesystem::path& folder,
                                          const FelledStand& stand, const std::vector<HeadCut>& cuts,
-                                         const CutMatching& config, RunSummary& summary) {
+                                         const HeadCutLogConfig& config, RunSummary& summary) {
+  const bool fells = fells_trees(config);
   const std::vector<FelledTree> felled =
-      felled_trees(stand.views, stand.world_from_body, stand.stems, {});
+      felled_trees(stand.views, stand.world_from_body, stand.stems,
+                   fells ? FelledConfig() : FelledConfig::unattended());
   std::map<std::size_t, TreeFall> falls;  // by tree
   for (const FelledTree& fell : felled) {
     const Tree& tree = stand.trees[fell.tree];
@@ -114,7 +123,7 @@ std::vector<TreeFall> write_felled_trees(const std::filesystem::path& folder,
                         fell.missed};
   }
   if (!cuts.empty()) {
-    const auto matched = match_cuts(cuts, stand.stems, felled, stand.views, config);
+    const auto matched = match_cuts(cuts, stand.stems, felled, stand.views, config.cuts);
     std::vector<PlacedCut> rows;
     for (std::size_t i = 0; i < cuts.size(); ++i) {
       rows.push_back({cuts[i].stamp, cuts[i].head_in_world, 0, matched[i].distance_m});
@@ -131,8 +140,11 @@ std::vector<TreeFall> write_felled_trees(const std::filesystem::path& folder,
         matched.begin(), matched.end(), [](const CutTree& cut) { return cut.tree < 0; }));
   }
   std::vector<TreeFall> result;
-  for (const auto& [index, fall] : falls)
-    result.push_back(fall);
+  for (const auto& [index, fall] : falls) {
+    stand.trees[index].missing_since_s = to_seconds(fall.gone_since);
+    if (fells) result.push_back(fall);
+  }
+  summary.counts["trees_missing"] = static_cast<std::int64_t>(falls.size());
   write_tree_falls(folder / "felled.csv", result);
   summary.counts["trees_felled"] = static_cast<std::int64_t>(result.size());
   return result;

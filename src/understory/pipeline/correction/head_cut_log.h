@@ -14,12 +14,16 @@
 
 namespace understory {
 
-// What a harvester's computer noted of its head (P1 section 4): where and when it felled trees.
+// What a harvester does to the stand that it maps, and what its computer noted of its head (P1
+// section 4): where and when it felled trees.
 struct HeadCutLogConfig {
+  bool fells = false;    // a machine fells trees meanwhile
   std::string head_log;  // CSV (docs/reference/machine.md); empty: none
   CutMatching cuts;
 };
 void describe(ConfigTable& table, HeadCutLogConfig& config);
+// Whether trees that are gone were felled: a machine fells, or has a log. Else they are missing.
+[[nodiscard]] bool fells_trees(const HeadCutLogConfig& config);
 
 // A felling cut as it stands in the log.
 struct LoggedCut {
@@ -42,15 +46,16 @@ struct FelledStand {
   const std::vector<StemView>& views;
   const std::vector<Pose>& world_from_body;
   const std::vector<MappedStem>& stems;
-  const std::vector<Tree>& trees;
+  std::vector<Tree>& trees;
 };
 
-// Writes felled.csv: the trees that the views saw and then saw no more, and those that the head
-// cut, with its time; with cuts also cuts.csv (`timestamp,x,y,z,tree_id,distance_m`, world frame,
-// the last two empty where no tree of the list stood). Adds its counts to the summary.
+// Gives the trees that the views saw and then saw no more, and those that the head cut, the time
+// since when they are missing. Writes felled.csv: these trees where a machine fells, else none;
+// with cuts also cuts.csv (`timestamp,x,y,z,tree_id,distance_m`, world frame, the last two empty
+// where no tree of the list stood). Adds its counts to the summary. Returns what felled.csv holds.
 std::vector<TreeFall> write_felled_trees(const std::filesystem::path& folder,
                                          const FelledStand& stand, const std::vector<HeadCut>& cuts,
-                                         const CutMatching& config, RunSummary& summary);
+                                         const HeadCutLogConfig& config, RunSummary& summary);
 
 // cuts.csv of one run to that of another in which everything is moved; nothing where there is none.
 // Throws InputError or OutputError.

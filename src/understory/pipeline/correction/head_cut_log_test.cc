@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -77,7 +78,11 @@ TEST_F(HeadLog, TheHeadTellsWhatTheViewsCannot) {
   const std::vector<HeadCut> cuts = {{from_seconds(95.0), {5.2, 4.1, 1.0}},
                                      {from_seconds(150.0), {-7.0, 0.0, 1.0}}};
   RunSummary summary;
-  (void)write_felled_trees(folder.path(), {views, poses, stems, trees}, cuts, {}, summary);
+  HeadCutLogConfig config;
+  config.head_log = "head.csv";
+  (void)write_felled_trees(folder.path(), {views, poses, stems, trees}, cuts, config, summary);
+  EXPECT_TRUE(std::isnan(trees[0].missing_since_s));
+  EXPECT_EQ(trees[1].missing_since_s, 95.0);
   const auto falls = read_tree_falls(folder / "felled.csv");
   ASSERT_EQ(falls.size(), 1U);
   EXPECT_EQ(falls[0].tree_id, 2);
@@ -94,6 +99,53 @@ TEST_F(HeadLog, TheHeadTellsWhatTheViewsCannot) {
             "95.000000000,105.200,4.100,0.000,2,0.224\n"
             "150.000000000,93.000,0.000,0.000,,\n");
   EXPECT_EQ(std::get<std::int64_t>(summary.counts.at("head_cuts_without_tree")), 1);
+}
+
+// A tree that stands in the first 20 of 60 views from one place.
+struct GoneStand {
+  std::vector<StemView> views = std::vector<StemView>(60);
+  std::vector<Pose> poses = std::vector<Pose>(60);
+  std::vector<MappedStem> stems = std::vector<MappedStem>(20);
+  std::vector<Tree> trees = std::vector<Tree>(20);
+
+  GoneStand() {
+    for (std::size_t t = 0; t < stems.size(); ++t) {
+      const double angle = 0.3 * static_cast<double>(t);
+      stems[t].point_in_world = {8.0 * std::cos(angle), 8.0 * std::sin(angle), 0.0};
+      trees[t].id = static_cast<int>(t) + 1;
+    }
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      views[v].stamp = from_seconds(2.0 * static_cast<double>(v));
+      for (std::size_t t = 0; t < stems.size(); ++t) {
+        if (t == 7 && v >= 20) continue;
+        Stem stem;
+        stem.point = stems[t].point_in_world.cast<float>();
+        views[v].stems.push_back(stem);
+      }
+    }
+  }
+};
+
+TEST_F(HeadLog, OnlyAMachineFells) {
+  GoneStand stand;
+  const FelledStand felled{stand.views, stand.poses, stand.stems, stand.trees};
+  RunSummary summary;
+  HeadCutLogConfig config;
+  EXPECT_FALSE(fells_trees(config));
+  EXPECT_TRUE(write_felled_trees(folder.path(), felled, {}, config, summary).empty());
+  EXPECT_TRUE(read_tree_falls(folder / "felled.csv").empty());
+  EXPECT_EQ(std::get<std::int64_t>(summary.counts.at("trees_felled")), 0);
+  EXPECT_EQ(std::get<std::int64_t>(summary.counts.at("trees_missing")), 1);
+  for (const Tree& tree : stand.trees)
+    EXPECT_EQ(std::isfinite(tree.missing_since_s), tree.id == 8) << tree.id;
+  EXPECT_EQ(stand.trees[7].missing_since_s, 40.0);
+  config.fells = true;
+  EXPECT_TRUE(fells_trees(config));
+  const auto falls = write_felled_trees(folder.path(), felled, {}, config, summary);
+  ASSERT_EQ(falls.size(), 1U);
+  EXPECT_EQ(falls[0].tree_id, 8);
+  EXPECT_EQ(falls[0].gone_since, from_seconds(40.0));
+  EXPECT_EQ(stand.trees[7].missing_since_s, 40.0);
 }
 
 }  // namespace

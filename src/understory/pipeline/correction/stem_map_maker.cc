@@ -90,14 +90,17 @@ RunOutcome StemMapMaker::write() {
   {
     const ScopedTimer timer(place_.times, "writing");
     trajectory = write_correction_tables(folder, run_);
-    write_trees_csv(folder / "trees.csv", run_.trees);
     cuts = place_cuts(run_.head_cuts, trajectory, place_.log);
   }
   summarise_correction(config_, run_, documents_);
   documents_.judge_path();
   std::vector<TreeFall> falls =
       write_felled_trees(folder, {run_.seen, run_.seen_from, run_.stems, run_.trees}, cuts,
-                         config_.harvester.cuts, documents_.summary());
+                         config_.harvester, documents_.summary());
+  {
+    const ScopedTimer timer(place_.times, "writing");
+    write_trees_csv(folder / "trees.csv", run_.trees);
+  }
   const PlacedMap map = place_on_globe(trajectory);
   write_tree_layers(folder, run_.trees, trajectory, map.frames.layers);
   write_layer_project(folder, documents_.report().title, trajectory, map.frames.layers);

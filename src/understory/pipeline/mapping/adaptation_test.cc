@@ -3,6 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <string>
+#include <vector>
+
+#include "understory/pipeline/mapping/dense/dense_mapping_config.h"
+#include "understory/pipeline/mapping/sparse/sparse_mapping_config.h"
+#include "understory/pipeline/profiles.h"
+#include "understory/util/log.h"
 
 namespace understory {
 namespace {
@@ -189,6 +196,27 @@ TEST(Adaptation, ACheckpointGivesBackWhatItRestsOn) {
   EXPECT_EQ(get_traits(reader).scan_points, 29'000U);
   EXPECT_EQ(get_conditions(reader).imu_refused, "wrong");
   EXPECT_TRUE(reader.at_end());
+}
+
+TEST(Profiles, EveryKeyBelongsToOneOfTheFrontEnds) {
+  for (const ShippedProfile& profile : shipped_profiles()) {
+    DenseMappingConfig dense;
+    SparseMappingConfig sparse;
+    std::vector<std::string> not_dense;
+    std::vector<std::string> not_sparse;
+    dense_mapping_table(dense).read_yaml(std::string(profile.yaml), "profile", &not_dense);
+    sparse_mapping_table(sparse).read_yaml(std::string(profile.yaml), "profile", &not_sparse);
+    for (const std::string& key : not_dense)
+      EXPECT_EQ(std::count(not_sparse.begin(), not_sparse.end(), key), 0) << profile.name << key;
+  }
+}
+
+TEST(Profiles, AHarvesterFells) {
+  Log log;
+  EXPECT_FALSE(read_sparse_mapping_config("", "", {}, log).config.correction.harvester.fells);
+  EXPECT_TRUE(
+      read_sparse_mapping_config("harvester", "", {}, log).config.correction.harvester.fells);
+  EXPECT_EQ(read_dense_mapping_config("harvester", "", {}).config.odometry.voxel.range_min_m, 2.0);
 }
 
 }  // namespace

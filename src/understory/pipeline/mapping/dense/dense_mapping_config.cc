@@ -84,7 +84,9 @@ ReadConfig<DenseMappingConfig> read_dense_mapping_config(const std::string& prof
   ConfigOrigins origins;
   problems.gather([&] {
     if (profile.empty()) return;
-    table.read_yaml(profile_text(profile), "profile " + profile);
+    // A profile also says what maps by stems need.
+    std::vector<std::string> of_stems;
+    table.read_yaml(profile_text(profile), "profile " + profile, &of_stems);
     note_yaml(table, profile_text(profile), "profile " + profile, origins);
   });
   problems.gather([&] {
