@@ -110,6 +110,7 @@ wrong += [f"{page.relative_to(TOP)}: no page leads to it" for page in sorted(pag
 names = re.findall(r"^  ([a-z]+) ", printed("--help").split("Subcommands:")[1], re.M)
 helps = {name: printed(name, "--help") for name in names}
 helps["evaluate"] += printed("evaluate", "trees", "--help") + printed("evaluate", "map", "--help")
+helps["calibrate"] += printed("calibrate", "lidars", "--help")
 keys = {"map": keys_of("map"), "map by stems": keys_of("map", "--front-end", "sparse"),
         "correct": keys_of("correct"), "inventory": keys_of("inventory"), "register": keys_of("register")}
 guides = sorted((TOP / "docs" / "guides").glob("*.md"))

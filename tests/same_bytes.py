@@ -97,6 +97,7 @@ COMMANDS = {
     "simulate": ("simulate", "lieksa2", "-o", "walk.mcap", "--seed", 5, "--duration-s", 3),
     "map, dense": ("map", WALK, "-o", "run"),
     "map, sparse scans": ("map", SITE, "-o", "run"),
+    "map, two lidars": ("map", "sim:harvester2?seed=5&duration_s=5", "-o", "run", "--lidar-topic", "/lidar,/lidar_2"),
     "map, by stems": ("map", SITE, "-o", "run", "--front-end", "sparse"),
     "convert to clouds": ("convert", "../../walk.mcap", "clouds"),
     "convert to stems": ("convert", "../../walk.mcap", "stems.csv.gz"),

@@ -4,8 +4,9 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
-#include "understory/features/stem_segments.h"
+#include "understory/features/lidar_stems.h"
 #include "understory/forest/inventory.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/inventory/stand_cloud.h"
@@ -23,10 +24,16 @@ bool is_cloud(const std::string& input) {
   return has_map_name(input) && fs::is_regular_file(input);
 }
 
-void write(const StemSegments& found, const Pose& body_from_points, int frame, TimeNs stamp,
-           StemsWriter& writer) {
-  for (const StemSegment& segment : found.stems)
-    writer.add(frame, stamp, stem_of(segment, body_from_points, found.up));
+std::vector<Stem> stems_in_body(const std::vector<LidarStems>& lidars) {
+  std::vector<Stem> stems;
+  std::vector<std::size_t> first_of_lidar;
+  for (const LidarStems& lidar : lidars) {
+    first_of_lidar.push_back(stems.size());
+    for (const StemSegment& segment : lidar.found.stems)
+      stems.push_back(stem_of(segment, lidar.body_from_lidar, lidar.found.up));
+  }
+  drop_double_stems(first_of_lidar, stems);
+  return stems;
 }
 
 int convert_cloud_to_stems(const std::string& input, const std::string& output, StagedFile& staged,
@@ -86,12 +93,15 @@ int convert_to_stems(const std::string& input, const std::string& output, const 
     StemSegmentConfig config;
     config.up =
         up ? *up : Eigen::Vector3d(body_from_lidar.rotation().inverse() * Eigen::Vector3d::UnitZ());
-    const StemSegments found = find_stem_segments(**scan, config);
-    if (!found.stems.empty()) up = found.up;
-    write(found, body_from_lidar, frame++, last, writer);
-    stems += found.stems.size();
+    const std::vector<LidarStems> lidars = find_stems_of_lidars(**scan, recording->rig(), config);
+    const std::vector<Stem> in_scan = stems_in_body(lidars);
+    for (const Stem& stem : in_scan)
+      writer.add(frame, last, stem);
+    ++frame;
+    if (!in_scan.empty()) up = up_by_stems(lidars, config.up);
+    stems += in_scan.size();
     context.progress({"stems", 100.0 * recording->progress(), 100.0, "%",
-                      std::to_string(found.stems.size()) + " stems"});
+                      std::to_string(in_scan.size()) + " stems"});
   }
   if (stems == 0)
     throw InputError(input, "", fmt::format("no upright stems in any of its {} scans", frame));

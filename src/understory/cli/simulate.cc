@@ -83,6 +83,9 @@ void write_event(const Event& event, const Simulator& /*simulator*/, FieldLogWri
 
 // Where the second antenna gives positions, they are recorded and not the headings by them.
 void write_event(const Event& event, const Simulator& simulator, McapWriter& writer) {
+  const auto* scan = std::get_if<ScanPtr>(&event);
+  if (scan != nullptr && simulator.is_of_second_lidar())
+    return writer.write_second_scan(**scan, event_time(event));
   const auto* fix = std::get_if<GnssFix>(&event);
   if (fix == nullptr || !simulator.second_fix()) return writer.write(event);
   GnssFix bare = *fix;
@@ -178,6 +181,10 @@ int simulate(const SimulateOptions& options, CommandContext& context) {
   refuse_places(options, capture);
   Outputs outputs(options, capture);
   Simulator simulator(load_site(options.site, options.settings));
+  if (simulator.site().second_lidar.enabled) {
+    if (capture) throw ConfigError({"second_lidar: two lidars are written as .mcap only"});
+    simulator.give(SimulatedLidars::kBoth);
+  }
   std::unique_ptr<LasWriter> points;
   if (simulator.site().truth.points) points = write_points(outputs.truth_part(), simulator);
   bool whole = false;

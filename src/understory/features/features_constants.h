@@ -158,4 +158,9 @@ inline constexpr double kWorthGround = 0.3;
 inline constexpr double kSure = 0.8;
 }  // namespace stem_segments
 
+namespace lidar_stems {  // features/lidar_stems.cc
+// m between two stems that two lidars see: nearer ones are one tree [chosen: a thick stem's radius]
+inline constexpr double kSameStem = 0.3;
+}  // namespace lidar_stems
+
 }  // namespace understory::features_constants

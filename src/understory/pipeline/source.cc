@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "understory/recording/bags/ros2_bag.h"
+#include "understory/recording/lidars/merged_lidars.h"
 #include "understory/simulation/simulation_uri.h"
 #include "understory/simulation/simulator.h"
 #include "understory/util/error.h"
@@ -64,8 +65,11 @@ bool is_simulation(const std::string& name) {
 
 std::unique_ptr<Recording> open_source(const std::string& name, const OpenOptions& options,
                                        Log& log) {
-  if (is_simulation(name)) return open_simulation(name, log);
-  return open_recording(name, options, log);
+  if (!is_simulation(name)) return open_recording(name, options, log);
+  const auto open = [&](const OpenOptions& of_lidar, Log& own) {
+    return open_simulation(name, own, of_lidar.lidar_topic);
+  };
+  return open_lidars(name, options, open, log);
 }
 
 namespace {

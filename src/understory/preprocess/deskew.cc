@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "understory/sensor/lidar_parts.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
 
@@ -69,12 +70,13 @@ std::vector<std::uint32_t> kept_indices(std::size_t n, std::span<const std::uint
   return indices;
 }
 
-void place(const ScanPoint& point, const Motion& motion, std::size_t to, BodyCloud& cloud) {
+void place(const ScanPoint& point, const Motion& motion, const RayOrigins& origins, std::size_t to,
+           BodyCloud& cloud) {
   const float* r = motion.r;
   cloud.points[to] = {r[0] * point.x + r[1] * point.y + r[2] * point.z + motion.t[0],
                       r[3] * point.x + r[4] * point.y + r[5] * point.z + motion.t[1],
                       r[6] * point.x + r[7] * point.y + r[8] * point.z + motion.t[2]};
-  cloud.range[to] = std::sqrt(point.x * point.x + point.y * point.y + point.z * point.z);
+  cloud.range[to] = origins.range(point);
   cloud.intensity[to] = point.intensity;
   cloud.ring[to] = point.ring;
   cloud.t_ns[to] = point.t_ns;
@@ -124,6 +126,7 @@ DeskewResult deskew(const Scan& scan, const Rig& rig, std::span<const StampedPos
     for (const ScanPoint& point : scan.points)
       result.extrapolated += point.t_ns < first || point.t_ns > last ? 1 : 0;
   }
+  const RayOrigins origins(rig);
   const Motion still = motion_of(rig.body_from_lidar);
   const std::vector<std::uint32_t> indices = kept_indices(scan.points.size(), keep);
   result.cloud.resize(indices.size());
@@ -132,7 +135,7 @@ DeskewResult deskew(const Scan& scan, const Rig& rig, std::span<const StampedPos
     const std::size_t end = std::min(indices.size(), (b + 1) * kBlock);
     for (std::size_t i = b * kBlock; i < end; ++i) {
       const ScanPoint& point = scan.points[indices[i]];
-      place(point, result.deskewed ? motions[point.t_ns / step] : still, i, result.cloud);
+      place(point, result.deskewed ? motions[point.t_ns / step] : still, origins, i, result.cloud);
     }
   });
   return result;

@@ -30,6 +30,20 @@ class ExtrinsicsFile {
     std::optional<Pose> body_from_imu;
     std::optional<Pose> body_from_gnss;
     std::optional<Pose> body_from_second_gnss;
+    struct Lidar {
+      ListedLidar listed;
+      std::optional<std::string> model;
+      std::optional<Pose> body_from_lidar;
+    };
+    std::vector<Lidar> lidars;
+
+    // Of a list, the places are those of one entry.
+    void use_entry(int entry) {
+      const auto index = static_cast<std::size_t>(entry);
+      if (index >= lidars.size()) return;
+      body_from_lidar = lidars[index].body_from_lidar;
+      if (lidars[index].model) lidar_model = lidars[index].model;
+    }
   };
 
   Given read(const YAML::Node& root) {
@@ -53,12 +67,16 @@ class ExtrinsicsFile {
         given.body_from_gnss = read_pose(value, key);
       } else if (key == "body_from_second_gnss") {
         given.body_from_second_gnss = read_pose(value, key);
+      } else if (key == "lidars") {
+        read_lidars(value, given);
       } else {
         problem(key,
-                "unknown key; expected body_frame, lidar_model, body_from_lidar, body_from_imu, "
-                "body_from_gnss or body_from_second_gnss");
+                "unknown key; expected body_frame, lidar_model, body_from_lidar, lidars, "
+                "body_from_imu, body_from_gnss or body_from_second_gnss");
       }
     }
+    if (!given.lidars.empty() && (given.body_from_lidar || given.lidar_model))
+      problem("lidars", "expected no body_from_lidar or lidar_model beside the list");
     return given;
   }
 
@@ -67,6 +85,56 @@ class ExtrinsicsFile {
   }
 
  private:
+  void read_lidars(const YAML::Node& node, Given& given) {
+    if (!node.IsSequence() || node.size() == 0) {
+      problem("lidars", "expected a list of lidars, each with its topic");
+      return;
+    }
+    for (const YAML::Node& entry : node) {
+      Given::Lidar lidar = read_lidar(entry, "lidars[" + std::to_string(given.lidars.size()) + "]");
+      const std::string& topic = lidar.listed.topic;
+      for (const Given::Lidar& other : given.lidars) {
+        if (!topic.empty() && other.listed.topic == topic)
+          problem("lidars", topic + " is named twice");
+      }
+      given.lidars.push_back(std::move(lidar));
+    }
+  }
+
+  Given::Lidar read_lidar(const YAML::Node& node, const std::string& name) {
+    Given::Lidar lidar;
+    if (!node.IsMap()) {
+      problem(name, "expected topic, body_from_lidar, late_s");
+      return lidar;
+    }
+    for (const auto& entry : node) {
+      const auto key = entry.first.as<std::string>("");
+      const std::string full = name + "." + key;
+      if (key == "topic") {
+        lidar.listed.topic = entry.second.as<std::string>("");
+      } else if (key == "lidar_model") {
+        lidar.model = entry.second.as<std::string>("");
+      } else if (key == "body_from_lidar") {
+        lidar.body_from_lidar = read_pose(entry.second, full);
+      } else if (key == "late_s") {
+        lidar.listed.late_s = read_lateness(entry.second, full);
+      } else {
+        problem(full, "unknown key; expected topic, lidar_model, body_from_lidar or late_s");
+      }
+    }
+    if (lidar.listed.topic.empty() || lidar.listed.topic.find(',') != std::string::npos)
+      problem(name, "expected the topic of a lidar");
+    return lidar;
+  }
+
+  double read_lateness(const YAML::Node& node, const std::string& key) {
+    constexpr double kMostS = 10.0;  // a slip of unit is more
+    const auto late_s = node.as<double>(std::nan(""));
+    if (std::abs(late_s) <= kMostS) return late_s;
+    problem(key, "expected seconds from -10 to 10");
+    return 0.0;
+  }
+
   void problem(const std::string& key, const std::string& what) {
     problems_.push_back(path_ + ": " + (key.empty() ? "" : key + ": ") + what);
   }
@@ -142,6 +210,13 @@ class ExtrinsicsFile {
   std::string path_;
   std::vector<std::string> problems_;
 };
+
+ExtrinsicsFile::Given read_extrinsics(const std::string& path) {
+  ExtrinsicsFile file(path);
+  ExtrinsicsFile::Given given = file.read(load_yaml(read_text_file(path), path));
+  file.throw_problems();
+  return given;
+}
 
 // Headings in the frame of the fixes say nothing of where the second antenna sits.
 bool has_second_antenna(const SensorFrames& frames) {
@@ -315,11 +390,17 @@ bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& ri
   return imu || gnss || second;
 }
 
+std::vector<ListedLidar> lidars_of_file(const std::string& path) {
+  std::vector<ListedLidar> lidars;
+  for (const ExtrinsicsFile::Given::Lidar& lidar : read_extrinsics(path).lidars)
+    lidars.push_back(lidar.listed);
+  return lidars;
+}
+
 void apply_extrinsics_file(const std::string& path, const std::vector<std::string>& body_names,
-                           Rig& rig, Log& log) {
-  ExtrinsicsFile file(path);
-  const ExtrinsicsFile::Given given = file.read(load_yaml(read_text_file(path), path));
-  file.throw_problems();
+                           Rig& rig, Log& log, int lidar_entry) {
+  ExtrinsicsFile::Given given = read_extrinsics(path);
+  given.use_entry(lidar_entry);
   if (given.lidar_model) rig.lidar_model = *given.lidar_model;
   if (given.body_frame && *given.body_frame != rig.body_frame &&
       std::find(body_names.begin(), body_names.end(), *given.body_frame) == body_names.end()) {

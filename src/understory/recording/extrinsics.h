@@ -52,6 +52,10 @@ bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& ri
 //     body_from_imu: {translation_m: [0, 0, 0], rpy_deg: [0, 0, 90]}
 //     body_from_gnss: {translation_m: [0, 0, 2]}
 //     body_from_second_gnss: {translation_m: [1, 0, 2]}
+// Several lidars stand in a list instead of body_from_lidar; `lidar_entry` counts its entries:
+//     lidars:
+//       - {topic: /front, body_from_lidar: {translation_m: [1, 0, 2]}, late_s: 0.03}
+//       - {topic: /rear, body_from_lidar: {translation_m: [-1, 0, 2], rpy_deg: [0, 0, 180]}}
 // A rotation is given as rotation_xyzw, rpy_deg (fixed axes x, y, z) or matrix (nine numbers, row
 // by row); without one it is none.
 // Without `body_frame`, or where that is the recording's body (`body_names` are other names of it),
@@ -61,6 +65,14 @@ bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& ri
 // ("recording.extrinsics_body"). Throws ConfigError with all that is wrong, and where nothing tells
 // the lidar's place; InputError if the file cannot be read.
 void apply_extrinsics_file(const std::string& path, const std::vector<std::string>& body_names,
-                           Rig& rig, Log& log);
+                           Rig& rig, Log& log, int lidar_entry = 0);
+
+// A lidar as an extrinsics file lists it.
+struct ListedLidar {
+  std::string topic;    // as --lidar-topic names it
+  double late_s = 0.0;  // its stamps less those of the other sensors, for one moment
+};
+// The list of an extrinsics file, empty where it has none. Throws as `apply_extrinsics_file`.
+[[nodiscard]] std::vector<ListedLidar> lidars_of_file(const std::string& path);
 
 }  // namespace understory

@@ -20,6 +20,8 @@ const char* key_of(Finding finding) {
       return "recording.assumed_rate";
     case Finding::kNoPointTimes:
       return "recording.no_point_times";
+    case Finding::kSilentLidar:
+      return "recording.silent_lidar";
     case Finding::kMixedTimes:
       return "scan.mixed_times";
   }

@@ -17,6 +17,7 @@ enum class Finding {
   kLateSensor,     // met too late in a capture to be used
   kAssumedTimes,   // nothing tells when the clouds of a folder were taken
   kNoPointTimes,   // of a lidar that spins
+  kSilentLidar,    // one of several, for a while or until the end
   kMixedTimes,     // a scan whose points have times in no order
 };
 

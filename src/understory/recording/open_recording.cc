@@ -7,6 +7,7 @@
 #include "understory/recording/bags/rosbag_reader.h"
 #include "understory/recording/captures/pcap_recording.h"
 #include "understory/recording/clouds/cloud_folder.h"
+#include "understory/recording/lidars/merged_lidars.h"
 #include "understory/recording/messages/message_recording.h"
 #include "understory/recording/recording.h"
 #include "understory/util/error.h"
@@ -65,10 +66,8 @@ std::unique_ptr<Recording> open_folder_recording(const std::string& path,
   throw InputError(path, "", kKnownKinds);
 }
 
-}  // namespace
-
-std::unique_ptr<Recording> open_recording(const std::string& path, const OpenOptions& options,
-                                          Log& log) {
+std::unique_ptr<Recording> open_as_found(const std::string& path, const OpenOptions& options,
+                                         Log& log) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (status.type() == fs::file_type::not_found)
@@ -76,6 +75,16 @@ std::unique_ptr<Recording> open_recording(const std::string& path, const OpenOpt
   if (error) throw InputError(path, "", error.message());
   if (fs::is_directory(status)) return open_folder_recording(path, options, log);
   return open_file_recording(path, options, log);
+}
+
+}  // namespace
+
+std::unique_ptr<Recording> open_recording(const std::string& path, const OpenOptions& options,
+                                          Log& log) {
+  const auto open = [&](const OpenOptions& of_lidar, Log& own) {
+    return open_as_found(path, of_lidar, own);
+  };
+  return open_lidars(path, options, open, log);
 }
 
 }  // namespace understory

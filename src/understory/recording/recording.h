@@ -85,15 +85,19 @@ class Recording {
 struct OpenOptions {
   double rate_hz = 0.0;       // scans per second of a folder of clouds; 0 = not given
   std::string metadata_file;  // Ouster metadata JSON; empty = look beside the capture
-  std::string lidar_topic;    // empty = the first (only) one
+  // Empty = the first (only) one, or all that the extrinsics file lists. Several, separated by
+  // commas, are merged into one scan.
+  std::string lidar_topic;
   std::string imu_topic;
   std::string gnss_topic;
   std::string extrinsics_file;  // YAML with body_from_lidar etc.; overrides the recording
+  int lidar_entry = 0;          // of the file's list of lidars: that of the lidar that is read
 };
 
 // Opens a recording by what is in it, not by its name: MCAP, ROS 1 bag, ROS 2 .db3 (file or bag
-// folder), PCAP/PCAPNG, a folder of clouds, one cloud. Throws InputError (exit code 3) if the file
-// is missing, empty or of no known kind.
+// folder), PCAP/PCAPNG, a folder of clouds, one cloud. Several lidars are merged (lidars/
+// merged_lidars.h). Throws InputError (exit code 3) if the file is missing, empty or of no known
+// kind.
 [[nodiscard]] std::unique_ptr<Recording> open_recording(const std::string& path,
                                                         const OpenOptions& options, Log& log);
 

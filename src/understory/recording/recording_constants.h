@@ -88,4 +88,27 @@ inline constexpr double kBeforeEnd = 0.6;
 inline constexpr double kLate = 5.0;
 }  // namespace point_times
 
+namespace scan_merger {  // recording/lidars/scan_merger.cc
+// ns from one common scan to the next, where no lidar gives two scans [chosen: 10 scans a second]
+inline constexpr std::int64_t kUsualPeriod = 100'000'000;
+// ns: the same at least [chosen: 50 scans a second, more than any spinning lidar]
+inline constexpr std::int64_t kShortestPeriod = 20'000'000;
+// ns: the same at most [chosen: one scan a second, less than any spinning lidar]
+inline constexpr std::int64_t kLongestPeriod = 1'000'000'000;
+// Scans by which the period is told [chosen: the first may be a part of a turn]
+inline constexpr std::size_t kScansForPeriod = 3;
+}  // namespace scan_merger
+
+namespace merged_lidars {  // recording/lidars/merged_lidars.cc
+// ns without a scan after which a lidar is silent, and its scans are not waited for; as
+// judgement.max_unused_s [chosen]
+inline constexpr std::int64_t kSilence = 1'000'000'000;
+// ns between scans from which on a stamp has to be confirmed by the next one [chosen]
+inline constexpr std::int64_t kJump = 10'000'000'000;
+// Events of other sensors that wait for a scan at most [chosen: seconds of any IMU]
+inline constexpr std::size_t kMostWaiting = 5'000;
+// Lidars in one scan [bound: their rings are counted by 16 bits]
+inline constexpr std::size_t kMostLidars = 16;
+}  // namespace merged_lidars
+
 }  // namespace understory::recording_constants

@@ -40,6 +40,34 @@ void note(TopicReport& report, TimeNs stamp) {
 
 }  // namespace
 
+namespace {
+
+// The site as its second lidar is made from it. Its errors are others than those of the first one.
+SiteConfig site_of_second(const SiteConfig& site) {
+  constexpr int kOtherErrors = 0x2a5c96;
+  SiteConfig second = site;
+  second.seed ^= kOtherErrors;
+  const SecondLidarConfig& lidar = site.second_lidar;
+  second.lidar.mount_m = lidar.mount_m;
+  second.lidar.mount_rpy_deg = lidar.mount_rpy_deg;
+  second.lidar.rate_hz = lidar.rate_hz;
+  second.lidar.fov_deg = lidar.fov_deg;
+  second.lidar.time_offset_s = lidar.time_offset_s;
+  return second;
+}
+
+TopicReport lidar_report(const std::string& frame, const std::string& model) {
+  TopicReport report;
+  report.name = "/" + frame;
+  report.type = "simulated " + model;
+  report.frame = frame;
+  report.role = "lidar";
+  report.conventions = "t: ns since stamp; stamp = first firing";
+  return report;
+}
+
+}  // namespace
+
 class Simulator::Impl : public SimulatedWorld {
  public:
   explicit Impl(const SiteConfig& config)
@@ -51,6 +79,8 @@ class Simulator::Impl : public SimulatedWorld {
         mag(config, plan.path, start) {
     duration_s = config.duration_s > 0.0 ? config.duration_s : plan.path.duration_s() - 0.5;
     end = start + from_seconds(duration_s);
+    if (config.second_lidar.enabled)
+      second.emplace(site_of_second(config), scene, plan.path, machine, start);
     describe_rig();
     describe_topics();
     if (rig.body_from_second_gnss) {
@@ -70,8 +100,10 @@ class Simulator::Impl : public SimulatedWorld {
     const TimeNs imu_time = site.imu.enabled ? imu.next_stamp() : kNever;
     const TimeNs mag_time = site.mag.enabled ? mag.next_stamp() : kNever;
     const TimeNs fix_time = next_fix ? next_fix->stamp + from_seconds(site.gnss.latency_s) : kNever;
-    const TimeNs scan_time = site.scans ? scanner.end(number_of(scan_number)) : kNever;
-    const TimeNs first = std::min({imu_time, mag_time, fix_time, scan_time});
+    const bool scans = site.scans && lidars != SimulatedLidars::kSecond;
+    const TimeNs scan_time = scans ? scanner.end(number_of(scan_number)) : kNever;
+    const TimeNs second_time = next_of_second();
+    const TimeNs first = std::min({imu_time, mag_time, fix_time, scan_time, second_time});
     if (first >= end) return false;
     if (imu_time == first) {
       take_imu(wanted, event);
@@ -84,8 +116,12 @@ class Simulator::Impl : public SimulatedWorld {
       if (wanted) event = *next_fix;
       second_fix = next_second_fix;
       next_fix = find_fix();
-    } else {
+    } else if (scan_time == first) {
+      of_second = false;
       take_scan(wanted, event);
+    } else {
+      of_second = true;
+      take_second_scan(wanted, event);
     }
     now = first;
     return true;
@@ -123,7 +159,11 @@ class Simulator::Impl : public SimulatedWorld {
   std::optional<GnssFix> next_second_fix;
   std::optional<GnssFix> second_fix;  // of the last event that is a fix
   BaselineHeadings antennas;
+  std::optional<Scanner> second;  // lidar
+  SimulatedLidars lidars = SimulatedLidars::kFirst;
   std::int64_t scan_number = 0;
+  std::int64_t second_number = 0;
+  bool of_second = false;  // the last scan is
   TimeNs now = 0;
   Rig rig;
   std::vector<TopicReport> reports;
@@ -132,6 +172,18 @@ class Simulator::Impl : public SimulatedWorld {
   std::function<void(const std::vector<TruePoint>&)> point_sink;
   // Biases at the stamps of scans that are not finished yet.
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> biases;
+
+  void describe_rig() {
+    const Pose error = mount_pose(site.lidar.error_m, site.lidar.error_rpy_deg);
+    const Pose body_from_first = scanner.body_from_lidar() * error;
+    const bool second_alone = second && lidars == SimulatedLidars::kSecond;
+    rig.body_frame = site.carrier.body;
+    rig.body_from_lidar = second_alone ? second->body_from_lidar() : body_from_first;
+    rig.further_lidars.clear();
+    if (second && lidars == SimulatedLidars::kBoth)
+      rig.further_lidars.push_back({body_from_first.inverse() * second->body_from_lidar(), 0});
+    describe_other_places();
+  }
 
  private:
   static TimeNs from_start(double start_time_s) {
@@ -142,6 +194,29 @@ class Simulator::Impl : public SimulatedWorld {
   // The revolution that is recorded as the scan of that place in the recording.
   [[nodiscard]] std::int64_t number_of(std::int64_t scan) const {
     return scan * site.lidar.keep_every;
+  }
+
+  // When the next scan of the second lidar is complete; never once it is dead.
+  TimeNs next_of_second() {
+    constexpr TimeNs kNever = std::numeric_limits<TimeNs>::max();
+    if (!second || !site.scans || lidars == SimulatedLidars::kFirst) return kNever;
+    const SecondLidarConfig& lidar = site.second_lidar;
+    while (second->stamp(second_number) < start + from_seconds(lidar.begins_s))
+      ++second_number;
+    const TimeNs complete = second->end(second_number);
+    const bool dead = lidar.ends_s > 0.0 && complete > start + from_seconds(lidar.ends_s);
+    return dead ? kNever : complete;
+  }
+
+  void take_second_scan(bool wanted, std::optional<Event>& event) {
+    TopicReport& report = reports.back();
+    note(report, second->stamp(second_number) + from_seconds(site.second_lidar.time_offset_s));
+    if (wanted) {
+      ScanPtr scan = second->assemble(second_number, second->measure(second_number));
+      report.points += scan->points.size();
+      event = std::move(scan);
+    }
+    ++second_number;
   }
 
   // Keeps the biases of the scans that began before a sample.
@@ -168,6 +243,7 @@ class Simulator::Impl : public SimulatedWorld {
     const std::int64_t number = number_of(scan_number);
     truth.stamp = scanner.stamp(number);
     const CarrierState state = plan.path.state(to_seconds(truth.stamp - start));
+    const TimeNs on_carrier = truth.stamp;
     truth.stamp += from_seconds(site.lidar.time_offset_s);
     truth.world_from_body = state.world_from_body;
     truth.velocity = state.velocity;
@@ -177,6 +253,7 @@ class Simulator::Impl : public SimulatedWorld {
       truth.accel_bias = biases[at].second;
     }
     note(reports[0], truth.stamp);
+    if (second) truth.stamp = on_carrier;
     if (wanted) {
       ScanReadings readings = measure(number);
       ScanPtr scan = scanner.assemble(number, readings);
@@ -212,10 +289,7 @@ class Simulator::Impl : public SimulatedWorld {
     return std::nullopt;
   }
 
-  void describe_rig() {
-    rig.body_frame = site.carrier.body;
-    rig.body_from_lidar =
-        scanner.body_from_lidar() * mount_pose(site.lidar.error_m, site.lidar.error_rpy_deg);
+  void describe_other_places() {
     if (site.imu.enabled) rig.body_from_imu = imu.body_from_imu();
     rig.body_from_gnss =
         Pose(Eigen::Quaterniond::Identity(),
@@ -236,11 +310,7 @@ class Simulator::Impl : public SimulatedWorld {
 
   void describe_topics() {
     reports.resize(4);
-    reports[0].name = "/lidar";
-    reports[0].type = "simulated " + site.lidar.model;
-    reports[0].frame = "lidar";
-    reports[0].role = "lidar";
-    reports[0].conventions = "t: ns since stamp; stamp = first firing";
+    reports[0] = lidar_report("lidar", site.lidar.model);
     reports[1].name = "/imu";
     reports[1].type = "simulated IMU";
     reports[1].frame = "imu";
@@ -256,6 +326,7 @@ class Simulator::Impl : public SimulatedWorld {
     reports[3].frame = "imu";
     reports[3].role = "mag";
     reports[3].conventions = "tesla";
+    if (second) reports.push_back(lidar_report("lidar_2", site.lidar.model));
   }
 };
 
@@ -265,6 +336,16 @@ Simulator::Simulator(const SiteConfig& config, const std::string& cache_folder, 
   impl_->use_cache(cache_folder, log);
 }
 Simulator::~Simulator() = default;
+
+void Simulator::give(SimulatedLidars lidars) {
+  UNDERSTORY_CHECK(impl_->now == 0 && (lidars == SimulatedLidars::kFirst || impl_->second));
+  impl_->lidars = lidars;
+  impl_->describe_rig();
+}
+
+bool Simulator::is_of_second_lidar() const {
+  return impl_->of_second;
+}
 
 std::optional<Event> Simulator::next() {
   std::optional<Event> event;
@@ -285,7 +366,10 @@ const Rig& Simulator::rig() const {
 
 std::vector<TopicReport> Simulator::topics() const {
   const SiteConfig& site = impl_->site;
-  const bool present[] = {site.scans, site.imu.enabled, site.gnss.enabled, site.mag.enabled};
+  const SimulatedLidars lidars = impl_->lidars;
+  const bool present[] = {site.scans && lidars != SimulatedLidars::kSecond, site.imu.enabled,
+                          site.gnss.enabled, site.mag.enabled,
+                          site.scans && lidars != SimulatedLidars::kFirst};
   std::vector<TopicReport> reports;
   for (std::size_t i = 0; i < impl_->reports.size(); ++i) {
     if (present[i]) reports.push_back(impl_->reports[i]);
@@ -330,7 +414,8 @@ void Simulator::write_truth(const std::string& folder) const {
                      log_head_cuts(*impl_, impl_->start, until_s));
 }
 
-std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {
+std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log,
+                                           const std::string& lidar) {
   const SimulationUri parts = parse_simulation_uri(uri);
   std::string folder;
   if (const char* named = std::getenv("UNDERSTORY_SIMULATION_CACHE")) folder = named;
@@ -349,8 +434,12 @@ std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log) {
          "recording and map that"});
   }
   log.debug("simulating " + parts.site);
-  if (folder.empty()) return std::make_unique<Simulator>(site);
-  return std::make_unique<Simulator>(site, folder, log);
+  if (!lidar.empty() && lidar != "/lidar" && !(lidar == "/lidar_2" && site.second_lidar.enabled))
+    throw InputError(uri, "", "has no lidar " + lidar);
+  auto simulator = folder.empty() ? std::make_unique<Simulator>(site)
+                                  : std::make_unique<Simulator>(site, folder, log);
+  if (lidar == "/lidar_2") simulator->give(SimulatedLidars::kSecond);
+  return simulator;
 }
 
 std::vector<std::string> site_files(const std::string& name_or_path,

@@ -13,6 +13,10 @@
 
 namespace understory {
 
+// Which scans of a site with two lidars a simulator gives. Those of the first one are the same in
+// all cases.
+enum class SimulatedLidars { kFirst, kSecond, kBoth };
+
 // A forest that is scanned while one reads: events in the order of their time (a scan's is its
 // nominal end), made when they are asked for. The same site and seed give the same bytes, whatever
 // the number of threads. Not thread-safe; casting a scan uses the current task arena.
@@ -24,6 +28,13 @@ class Simulator : public Recording {
   // casts today, and forgotten with a warning ("simulation.cache") where it differs.
   Simulator(const SiteConfig& config, const std::string& cache_folder, Log& log);
   ~Simulator() override;
+
+  // Before the first event; usual is the first one alone. The rig is that of the lidars that are
+  // given, and each has a topic. The truth is noted at the scans of the first one, on the clock of
+  // the carrier where there are two.
+  void give(SimulatedLidars lidars);
+  // Whether the scan that `next` gave last is that of the second lidar.
+  [[nodiscard]] bool is_of_second_lidar() const;
 
   [[nodiscard]] std::optional<Event> next() override;
   // Skipped scans are not cast: cheap.
@@ -58,7 +69,9 @@ class Simulator : public Recording {
 // Opens "sim:SITE?key=value&..." (SITE: a shipped site or a YAML file). The key `cache` names a
 // folder for a ScanCache; without it the environment variable UNDERSTORY_SIMULATION_CACHE does,
 // without both nothing is kept. Throws InputError for an unknown site, ConfigError for wrong keys.
-[[nodiscard]] std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log);
+// `lidar`: the topic of one of its lidars, "/lidar" or "/lidar_2"; empty: the first one.
+[[nodiscard]] std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log,
+                                                         const std::string& lidar = "");
 
 // The files that a site is read from: its own, if it is no shipped one, the list of its trees and
 // their clouds. Throws as load_site does.

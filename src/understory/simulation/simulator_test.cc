@@ -55,6 +55,37 @@ std::size_t lines_of(const std::string& path) {
   return count;
 }
 
+TEST(Simulator, ASecondLidarHasItsOwnClockAndLifeAndLeavesTheFirstAlone) {
+  const std::vector<std::string> settings = {"duration_s=2",
+                                             "stand.size_x_m=40",
+                                             "stand.size_y_m=40",
+                                             "second_lidar.time_offset_s=0.03",
+                                             "second_lidar.begins_s=0.5",
+                                             "second_lidar.ends_s=1.5"};
+  Simulator alone(load_site("harvester2", settings));
+  Simulator both(load_site("harvester2", settings));
+  both.give(SimulatedLidars::kBoth);
+  ASSERT_EQ(both.rig().further_lidars.size(), 1U);
+  EXPECT_TRUE(alone.rig().further_lidars.empty());
+  const TimeNs start = from_seconds(1'700'000'000.0 + 0.03);
+  std::vector<ScanPtr> of_second;
+  while (const std::optional<Event> event = both.next()) {
+    if (std::holds_alternative<ScanPtr>(*event) && both.is_of_second_lidar()) {
+      of_second.push_back(std::get<ScanPtr>(*event));
+      continue;
+    }
+    const std::optional<Event> other = alone.next();
+    ASSERT_TRUE(other && same(*event, *other));
+  }
+  EXPECT_FALSE(alone.next());
+  ASSERT_GE(of_second.size(), 8U);
+  EXPECT_GE(of_second.front()->stamp, start + from_seconds(0.5));
+  EXPECT_LT(of_second.front()->stamp, start + from_seconds(0.6));
+  EXPECT_LE(of_second.back()->end(), start + from_seconds(1.5));
+  EXPECT_GT(of_second.back()->end(), start + from_seconds(1.4));
+  EXPECT_GT(of_second.front()->points.size(), 3000U);
+}
+
 TEST(Simulator, SameSeedSameEventsWithOneAndTwoThreads) {
   std::vector<Event> one;
   std::vector<Event> two;

@@ -193,6 +193,20 @@ void describe_lidar(ConfigTable& table, LidarConfig& c) {
   });
 }
 
+void describe_second_lidar(ConfigTable& table, SecondLidarConfig& c) {
+  table.section("second_lidar", [&] {
+    table.add("enabled", c.enabled,
+              "whether there is a second lidar, of the model and with the faults of the first one");
+    table.add("mount_m", c.mount_m, "m", "its place in the body frame");
+    table.add("mount_rpy_deg", c.mount_rpy_deg, "deg", "roll, pitch, yaw in the body frame");
+    table.add("rate_hz", c.rate_hz, {1.0, 40.0}, "Hz", "revolutions");
+    table.add("fov_deg", c.fov_deg, {1.0, 360.0}, "deg", "of azimuth, centred forward");
+    table.add("time_offset_s", c.time_offset_s, {-1.0, 1.0}, "s", "scan stamps are late by this");
+    table.add("begins_s", c.begins_s, {0.0, 1e6}, "s", "no scan begins before");
+    table.add("ends_s", c.ends_s, {0.0, 1e6}, "s", "when it dies, 0 = it lasts");
+  });
+}
+
 void describe_imu(ConfigTable& table, ImuConfig& c) {
   table.section("imu", [&] {
     table.add("rate_hz", c.rate_hz, {10.0, 2000.0}, "Hz", "samples");
@@ -342,6 +356,8 @@ void check_site(const SiteConfig& site) {
   check_triple("lidar.mount_rpy_deg", site.lidar.mount_rpy_deg, problems);
   check_triple("lidar.error_m", site.lidar.error_m, problems);
   check_triple("lidar.error_rpy_deg", site.lidar.error_rpy_deg, problems);
+  check_triple("second_lidar.mount_m", site.second_lidar.mount_m, problems);
+  check_triple("second_lidar.mount_rpy_deg", site.second_lidar.mount_rpy_deg, problems);
   check_triple("imu.mount_m", site.imu.mount_m, problems);
   check_triple("imu.mount_rpy_deg", site.imu.mount_rpy_deg, problems);
   check_triple("gnss.mount_m", site.gnss.mount_m, problems);
@@ -378,6 +394,7 @@ void describe_used(ConfigTable& table, SiteConfig& config) {
   if (!config.scans) describe_scans(table, config);
   if (config.objects.any()) describe_objects(table, config.objects);
   if (config.truth.points) describe_truth(table, config.truth);
+  if (config.second_lidar.enabled) describe_second_lidar(table, config.second_lidar);
 }
 
 void describe(ConfigTable& table, SiteConfig& config) {
@@ -385,6 +402,7 @@ void describe(ConfigTable& table, SiteConfig& config) {
   describe_scans(table, config);
   describe_objects(table, config.objects);
   describe_truth(table, config.truth);
+  describe_second_lidar(table, config.second_lidar);
   table.add("draw", config.draw,
             "whether the seed draws ground, stand, objects, carrier and scanner; what a setting "
             "names is not drawn");

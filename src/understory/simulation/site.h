@@ -161,6 +161,18 @@ struct LidarConfig {
   std::vector<double> error_rpy_deg = {0.0, 0.0, 0.0};
 };
 
+// A second lidar: of the model and with the faults of the first one, and with a clock of its own.
+struct SecondLidarConfig {
+  bool enabled = false;
+  std::vector<double> mount_m = {-1.2, 0.0, 2.4};  // in the body frame
+  std::vector<double> mount_rpy_deg = {0.0, 0.0, 180.0};
+  double rate_hz = 9.97;
+  double fov_deg = 360.0;
+  double time_offset_s = 0.0;  // of its clock: stamps are late by this much
+  double begins_s = 0.0;       // since the start of the recording: no scan begins before
+  double ends_s = 0.0;         // it dies then; 0: it lasts
+};
+
 // The IMU and its faults. Noise densities as data sheets give them.
 struct ImuConfig {
   bool enabled = true;
@@ -274,6 +286,7 @@ struct SiteConfig {
   StandConfig stand;
   CarrierConfig carrier;
   LidarConfig lidar;
+  SecondLidarConfig second_lidar;
   ImuConfig imu;
   GnssConfig gnss;
   MagnetometerConfig mag;

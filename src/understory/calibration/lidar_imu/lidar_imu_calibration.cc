@@ -197,6 +197,8 @@ LidarImuResult calibrate_lidar_imu(const std::vector<StampedPose>& world_from_li
   start.gravity = mean_gravity(runs, imu, start);
   given.state.gravity = start.gravity;
   Fit found = fit(runs, imu, start, given);
+  result.lateness_found =
+      std::sqrt(found.covariance(kLatenessParameter, kLatenessParameter)) <= kMostLatenessSdS;
   result.kept = keep_unknown(found, given);
   if (!result.kept.empty()) {
     const LidarImuState there = found.state;

@@ -21,7 +21,8 @@ struct LidarImuResult {
   Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
   // What the motion does not tell and was kept as given, a sentence each.
   std::vector<std::string> kept;
-  double duration_s = 0.0;  // of the path that was used
+  bool lateness_found = true;  // false: it is one of them
+  double duration_s = 0.0;     // of the path that was used
 };
 
 // Finds how an IMU sits on a lidar, and how late its clock is, from a path of the lidar that was

@@ -55,17 +55,21 @@ void describe(ConfigTable& table, StemFrontEndConfig& config) {
   table.section("odometry", [&] { describe(table, config.odometry); });
 }
 
-StemView StemFrontEnd::view_of(const Scan& scan, int frame, const Rig& rig,
-                               const StemSegments& found, const Vector6d& motion_per_s) const {
+StemView StemFrontEnd::view_of(const Scan& scan, int frame, const std::vector<LidarStems>& found,
+                               const Vector6d& motion_per_s) const {
   StemView view;
   view.frame = frame;
   view.stamp = scan.stamp;
-  view.stems.reserve(found.stems.size());
-  for (const StemSegment& segment : found.stems) {
-    const Pose stamp_from_lidar =
-        Pose::exp(1e-9 * segment.t_ns * motion_per_s) * rig.body_from_lidar;
-    view.stems.push_back(stem_of(segment, stamp_from_lidar, found.up));
+  std::vector<std::size_t> first_of_lidar;
+  for (const LidarStems& lidar : found) {
+    first_of_lidar.push_back(view.stems.size());
+    for (const StemSegment& segment : lidar.found.stems) {
+      const Pose stamp_from_lidar =
+          Pose::exp(1e-9 * segment.t_ns * motion_per_s) * lidar.body_from_lidar;
+      view.stems.push_back(stem_of(segment, stamp_from_lidar, lidar.found.up));
+    }
   }
+  drop_double_stems(first_of_lidar, view.stems);
   return view;
 }
 
@@ -107,8 +111,8 @@ void StemFrontEnd::watch_imu(const StemScan& result, const Rig& rig, const ImuBu
 }
 
 StemFrontEnd::Guess StemFrontEnd::guess(const Scan& scan, int frame, const Rig& rig,
-                                        const StemSegments& found, const ImuBuffer* samples,
-                                        double since) const {
+                                        const std::vector<LidarStems>& found,
+                                        const ImuBuffer* samples, double since) const {
   Guess guess;
   guess.motion_per_s = motion_per_s_;
   if (config_.predict_turn) guess.step = Pose::exp(since * motion_per_s_);
@@ -126,8 +130,7 @@ StemFrontEnd::Guess StemFrontEnd::guess(const Scan& scan, int frame, const Rig& 
   // taken out wrongly would come back larger by such an outlook, so there is none.
   const bool pauses = to_seconds(scan.end() - scan.stamp) < kPause * since;
   SparseOdometry trial = odometry_;
-  const SparseStep step =
-      trial.track(view_of(scan, frame, rig, found, guess.motion_per_s), guess.step);
+  const SparseStep step = trial.track(view_of(scan, frame, found, guess.motion_per_s), guess.step);
   const Vector6d latest = (last_->world_from_body.inverse() * step.world_from_body).log() / since;
   if (step.status != SparseStepStatus::kTracked && step.status != SparseStepStatus::kSearched)
     return guess;
@@ -147,8 +150,10 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const Im
           : Eigen::Vector3d(rig.body_from_lidar.rotation().inverse() * Eigen::Vector3d::UnitZ());
   std::vector<std::uint8_t> use;
   if (config_.machine_boxes) use = outside_machine(scan, rig, *config_.machine_boxes);
-  const StemSegments found = find_stem_segments(scan, segments, use);
-  if (!found.stems.empty()) up_in_lidar_ = found.up;
+  const std::vector<LidarStems> found = find_stems_of_lidars(scan, rig, segments, use);
+  const bool any = std::any_of(found.begin(), found.end(),
+                               [](const LidarStems& lidar) { return !lidar.found.stems.empty(); });
+  if (any) up_in_lidar_ = up_by_stems(found, segments.up);
 
   StemScan result;
   const double since = last_ ? to_seconds(scan.stamp - last_->stamp) : 0.0;
@@ -158,7 +163,7 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const Im
     result.expected = last_->world_from_body * Pose::exp(since * motion_per_s_);
     guess = this->guess(scan, frame, rig, found, samples, since);
   }
-  result.view = view_of(scan, frame, rig, found, guess.motion_per_s);
+  result.view = view_of(scan, frame, found, guess.motion_per_s);
   result.reach_m = reach_of(result.view);
   result.motion_rad_s = guess.motion_per_s.head<3>().norm();
   std::optional<StemUp> up;

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "understory/features/stem_segments.h"
+#include "understory/features/lidar_stems.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/odometry/imu/imu_watch.h"
 #include "understory/odometry/stems/sparse_odometry.h"
@@ -86,16 +86,17 @@ class StemFrontEnd {
  private:
   static constexpr double kGravity = 9.81;  // m/s^2, anywhere on earth to half a percent
 
-  [[nodiscard]] StemView view_of(const Scan& scan, int frame, const Rig& rig,
-                                 const StemSegments& found, const Vector6d& motion_per_s) const;
+  [[nodiscard]] StemView view_of(const Scan& scan, int frame, const std::vector<LidarStems>& found,
+                                 const Vector6d& motion_per_s) const;
   // What takes the scan from the one before to now: how the body moves within it, and where.
   struct Guess {
     Vector6d motion_per_s = Vector6d::Zero();
     std::optional<Pose> step;
     std::optional<StemImu::Motion> by_imu;
   };
-  [[nodiscard]] Guess guess(const Scan& scan, int frame, const Rig& rig, const StemSegments& found,
-                            const ImuBuffer* samples, double since) const;
+  [[nodiscard]] Guess guess(const Scan& scan, int frame, const Rig& rig,
+                            const std::vector<LidarStems>& found, const ImuBuffer* samples,
+                            double since) const;
   [[nodiscard]] bool to_be_kept(const StemScan& result);
   // Holds the turn to this scan by the stems against that by the gyroscope, and gravity.
   void watch_imu(const StemScan& result, const Rig& rig, const ImuBuffer* samples);

@@ -4,15 +4,12 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <utility>
 #include <vector>
 
-#include "understory/evaluation/trajectory.h"
-#include "understory/pipeline/mapping/mapping.h"
-#include "understory/pipeline/source.h"
+#include "understory/pipeline/calibration/lidar_path.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
 #include "understory/util/files/staged_output.h"
@@ -25,63 +22,10 @@ namespace fs = std::filesystem;
 constexpr const char* kExtrinsicsFile = "extrinsics.yaml";
 constexpr const char* kLidarImuFile = "calibration.json";
 constexpr const char* kLidarPathFile = "path.tum";
-constexpr const char* kMappedFolder = "mapped";  // removed in the end
 constexpr double kDegreesARad = 180.0 / std::numbers::pi;
 
 bool is_lidar_imu_file(const std::string& name) {
   return name == kExtrinsicsFile || name == kLidarImuFile || name == kLidarPathFile;
-}
-
-// The samples of the IMU, and the rig.
-struct InertialRecording {
-  ImuBuffer samples{ImuNoiseConfig(), nullptr};
-  Rig rig;
-};
-
-InertialRecording read_samples(const LidarImuRequest& request, Log& log,
-                               const ProgressSink& progress) {
-  InertialRecording read;
-  const std::unique_ptr<Recording> recording = open_source(request.recording, request.open, log);
-  std::uint64_t events = 0;
-  while (const auto event = recording->next()) {
-    if (++events % 256 == 0)
-      progress({"reading the IMU", 100.0 * recording->progress(), 100.0, "%", ""});
-    if (const auto* sample = std::get_if<ImuSample>(&*event)) read.samples.add(*sample);
-  }
-  read.rig = recording->rig();
-  if (read.samples.empty()) throw InputError(request.recording, "", "expected samples of an IMU");
-  return read;
-}
-
-// The path of the body as the lidar alone tells it.
-Trajectory mapped_path(const LidarImuRequest& request, const fs::path& folder,
-                       const ProgressSink& progress, std::vector<std::string>& doubts) {
-  Log unheard;  // that the IMU is not used, and the like
-  MappingRequest mapping;
-  mapping.recording = request.recording;
-  mapping.run_folder = folder;
-  mapping.open = request.open;
-  ReadConfig<FrontEndConfig> read =
-      read_front_end_config(kDenseFrontEnd, "", "",
-                            {"motion.imu_enabled=false", "loop_closure.enabled=false",
-                             "map.enabled=false", "georeference.online=false"},
-                            unheard);
-  mapping.config = std::move(read.config);
-  mapping.config_record.origins = std::move(read.origins);
-  mapping.config_record.asked_yaml = yaml_of(mapping.config);
-  const RunOutcome outcome =
-      run_mapping(begin_mapping(std::move(mapping)), unheard, progress, [] { return false; });
-  if (outcome.status == RunStatus::kUntrusted) doubts = outcome.reasons;
-  return read_trajectory(folder / "trajectory.tum");
-}
-
-std::string pose_yaml(const Pose& pose) {
-  const Eigen::Vector3d& t = pose.translation();
-  const Eigen::Quaterniond& q = pose.rotation();
-  return fmt::format(
-      "{{translation_m: [{:.6f}, {:.6f}, {:.6f}], rotation_xyzw: [{:.9f}, {:.9f}, {:.9f}, "
-      "{:.9f}]}}",
-      t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
 }
 
 std::string extrinsics_yaml(const Rig& rig) {
@@ -142,22 +86,6 @@ void write_path(const fs::path& path, const std::vector<StampedPose>& world_from
   file.commit();
 }
 
-// The path of the lidar: that of the file, or a mapped one.
-std::vector<StampedPose> lidar_path(const LidarImuRequest& request, const fs::path& scratch,
-                                    const Rig& rig, const ProgressSink& progress,
-                                    std::vector<std::string>& doubts) {
-  if (!request.path_file.empty()) {
-    const Trajectory path = read_trajectory(request.path_file);
-    return {path.begin(), path.end()};
-  }
-  std::vector<StampedPose> poses;
-  for (const StampedPose& pose : mapped_path(request, scratch, progress, doubts))
-    poses.push_back({pose.stamp, pose.world_from_body * rig.body_from_lidar});
-  std::error_code ignored;
-  fs::remove_all(scratch, ignored);
-  return poses;
-}
-
 void judge(LidarImuOutcome& outcome, const std::vector<std::string>& doubts) {
   outcome.reasons = outcome.result.kept;
   if (!outcome.reasons.empty()) outcome.status = RunStatus::kPartial;
@@ -173,10 +101,12 @@ LidarImuOutcome run_lidar_imu_calibration(const LidarImuRequest& request, Log& l
                                           const ProgressSink& progress) {
   StagedFolder folder(request.folder, request.overwrite ? StagedFolder::NameTest(is_lidar_imu_file)
                                                         : StagedFolder::NameTest());
-  InertialRecording read = read_samples(request, log, progress);
+  InertialRecording read = read_samples(request.recording, request.open, log, progress);
   std::vector<std::string> doubts;
   const std::vector<StampedPose> path =
-      lidar_path(request, folder.part() / kMappedFolder, read.rig, progress, doubts);
+      request.path_file.empty() ? mapped_lidar_path(request.recording, request.open, folder.part(),
+                                                    read.rig, progress, doubts)
+                                : lidar_path_of_file(request.path_file);
   const Rig given = read.rig;
   const Pose start =
       given.body_from_imu ? given.body_from_lidar.inverse() * *given.body_from_imu : Pose();

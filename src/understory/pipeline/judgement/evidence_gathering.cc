@@ -112,6 +112,7 @@ void gather_findings(const Log& log, RunEvidence& evidence) {
   take(Finding::kDamage, evidence.damaged_places, evidence.first_damage);
   take(Finding::kDamagedPacket, evidence.damaged_packets, evidence.first_damaged_packet);
   take(Finding::kOtherSensor, evidence.other_sensor_messages, evidence.first_other_sensor);
+  take(Finding::kSilentLidar, evidence.silent_lidars, evidence.first_silent_lidar);
   evidence.late_sensor = found(log, Finding::kLateSensor).first;
   evidence.where_cut_off = found(log, Finding::kCutOff).first;
   evidence.cut_off = found(log, Finding::kCutOff).count > 0;

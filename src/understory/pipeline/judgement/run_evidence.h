@@ -113,6 +113,8 @@ struct RunEvidence {
   std::string first_damaged_packet;
   std::uint64_t other_sensor_messages = 0;  // of a second lidar on the topic, left out
   std::string first_other_sensor;
+  std::uint64_t silent_lidars = 0;  // times that one of several lidars was silent
+  std::string first_silent_lidar;
   std::string late_sensor;  // one that a capture's reader met too late to use; empty: none
   bool cut_off = false;     // the recording ends in the middle of something
   std::string where_cut_off;

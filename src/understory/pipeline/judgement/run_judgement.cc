@@ -146,6 +146,10 @@ class Judge {
       missing(fmt::format("{} message(s) of a second sensor were not used: {}",
                           evidence_.other_sensor_messages, evidence_.first_other_sensor));
     }
+    if (evidence_.silent_lidars > 0) {
+      missing(fmt::format("one of several lidars was silent ({} time(s), the first: {})",
+                          evidence_.silent_lidars, evidence_.first_silent_lidar));
+    }
     if (!evidence_.late_sensor.empty()) missing("a sensor was not used: " + evidence_.late_sensor);
     if (evidence_.damaged_places > 0) {
       hurt(fmt::format("the recording is damaged ({} place(s), the first: {})",

@@ -46,6 +46,7 @@ enum TopicId : std::uint16_t {
   kGnssNmea,
   kGnssSecond,
   kLivox,
+  kSecondLidar,
   kTopicCount
 };
 
@@ -59,6 +60,7 @@ constexpr std::array<Topic, kTopicCount> kTopics = {{
     {"/gnss/nmea", "nmea_msgs/msg/Sentence"},
     {"/gnss/second", "sensor_msgs/msg/NavSatFix"},
     {"/livox/lidar", "livox_ros_driver2/msg/CustomMsg"},
+    {"/lidar_2", "sensor_msgs/msg/PointCloud2"},
 }};
 
 // One record: content is added between construction and `close`.
@@ -145,6 +147,9 @@ std::vector<NamedTransform> transforms_of(const Rig& rig) {
     if (rig.body_frame != frame) transforms.push_back({rig.body_frame, frame, body_from_sensor});
   };
   add("lidar", rig.body_from_lidar);
+  for (std::size_t i = 0; i < rig.further_lidars.size(); ++i)
+    add(further_lidar_frame(i).c_str(),
+        rig.body_from_lidar * rig.further_lidars[i].lidar_from_further);
   if (rig.body_from_imu) add("imu", *rig.body_from_imu);
   if (rig.body_from_gnss) add("gnss", *rig.body_from_gnss);
   if (rig.body_from_second_gnss) add(kSecondAntennaFrame, *rig.body_from_second_gnss);
@@ -185,9 +190,13 @@ class McapWriter::Impl {
     ByteBuffer out;
     RecordWriter record(out, mcap::kMetadata);
     out.put_text(mcap::kSensorMetadata);
-    record.put_map(TextMap{{"lidar_model", rig_.lidar_model},
-                           {"ring_count", std::to_string(ring_count)},
-                           {"body_frame", rig_.body_frame}});
+    TextMap known{{"lidar_model", rig_.lidar_model},
+                  {"ring_count", std::to_string(ring_count)},
+                  {"body_frame", rig_.body_frame}};
+    const auto merged = std::count_if(rig_.further_lidars.begin(), rig_.further_lidars.end(),
+                                      [](const FurtherLidar& each) { return each.first_ring > 0; });
+    if (merged > 0) known.emplace_back("merged_lidars", std::to_string(merged));
+    record.put_map(known);
     record.close();
     metadata_.push_back({mcap::kSensorMetadata, file_.size(), out.size()});
     file_.write(out.span());
@@ -447,6 +456,10 @@ void McapWriter::write(const Event& event, TimeNs log_time) {
   } else {
     impl_->add(kMag, log_time, encode_magnetic_field(std::get<MagSample>(event)));
   }
+}
+
+void McapWriter::write_second_scan(const Scan& scan, TimeNs log_time) {
+  impl_->add(kSecondLidar, log_time, encode_point_cloud2(scan, further_lidar_frame(0)));
 }
 
 void McapWriter::write_second_position(const GnssFix& fix, TimeNs log_time) {

@@ -46,6 +46,9 @@ class McapWriter {
   // tells how the clocks of the sensors run (preprocess/stream_offset.h).
   void write(const Event& event, TimeNs log_time);
 
+  // A scan of a second lidar, on /lidar_2 in the frame lidar_2; the rig has its place.
+  void write_second_scan(const Scan& scan, TimeNs log_time);
+
   // A position of the second antenna, on /gnss/second in the frame gnss_second. The fix of the
   // first one, without a heading, is to be written before it.
   void write_second_position(const GnssFix& fix, TimeNs log_time);

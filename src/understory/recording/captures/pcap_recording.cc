@@ -180,7 +180,7 @@ std::optional<UdpStream> choose(const PcapSurvey& survey, const OpenOptions& opt
   int streams = 0;
   for (const auto& [key, stream] : survey.streams) {
     const std::uint64_t packets = count(stream);
-    const bool named = options.lidar_topic.empty() || options.lidar_topic == key.name();
+    const bool named = options.lidar_topic.empty() || key.is_named(options.lidar_topic);
     streams += packets > 0 ? 1 : 0;
     if (named && packets > most) {
       most = packets;
@@ -189,12 +189,16 @@ std::optional<UdpStream> choose(const PcapSurvey& survey, const OpenOptions& opt
   }
   int same_name = 0;
   for (const auto& [key, stream] : survey.streams)
-    same_name += best && key.name() == best->name() && count(stream) > 0 ? 1 : 0;
+    same_name += best && options.lidar_topic != best->full_name() && key.name() == best->name() &&
+                         count(stream) > 0
+                     ? 1
+                     : 0;
   if (best && streams > 1 && (options.lidar_topic.empty() || same_name > 1)) {
     log.warn("recording.lidars",
              file + ": packets of " + std::to_string(streams) + " lidars; only those of " +
-                 best->name() + (same_name > 1 ? " from " + best->address() : "") + " are used" +
-                 (same_name > 1 ? ": several send to that port" : " (choose with --lidar-topic)"));
+                 (same_name > 1 ? best->full_name() : best->name()) + " are used" +
+                 (same_name > 1 ? ": several send to that port" : "") +
+                 " (choose with --lidar-topic, or merge them: --lidar-topic A,B)");
   }
   return best;
 }
@@ -303,7 +307,8 @@ std::unique_ptr<Recording> open_pcap(const std::string& path, const OpenOptions&
 std::unique_ptr<Recording> open_pcap(std::unique_ptr<ByteSource> source, const OpenOptions& options,
                                      Log& log) {
   auto recording = open(std::move(source), options, log);
-  if (!options.extrinsics_file.empty()) recording->apply_extrinsics(options.extrinsics_file);
+  if (!options.extrinsics_file.empty())
+    recording->apply_extrinsics(options.extrinsics_file, options.lidar_entry);
   return recording;
 }
 

@@ -31,11 +31,13 @@ class PcapRecording : public Recording, public ArrivalTimes {
  public:
   PcapRecording(std::unique_ptr<PcapFile> file, PcapSurvey survey, UdpStream lidar, Log& log)
       : log_(log), file_(std::move(file)), survey_(std::move(survey)), lidar_(lidar) {
-    lidar_statistics_.report().name = lidar.name();
+    lidar_statistics_.report().name = survey_.name_of(lidar);
     lidar_statistics_.report().role = "lidar";
   }
 
-  void apply_extrinsics(const std::string& path) { apply_extrinsics_file(path, {}, rig_, log_); }
+  void apply_extrinsics(const std::string& path, int lidar_entry) {
+    apply_extrinsics_file(path, {}, rig_, log_, lidar_entry);
+  }
 
   std::optional<Event> next() override {
     while (ready_.empty()) {
@@ -136,7 +138,7 @@ class PcapRecording : public Recording, public ArrivalTimes {
                          " begin late in the capture; they are not used");
     }
     TopicReport& report = ignored_[key].report();
-    report.name = key.name();
+    report.name = survey_.name_of(key);
     report.type = "UDP datagrams";
     report.role = "ignored";
     ignored_[key].add_stamp(datagram.stamp);

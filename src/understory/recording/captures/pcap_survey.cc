@@ -118,6 +118,13 @@ std::string PcapSurvey::list() const {
          (text.empty() ? "no UDP packets" : text);
 }
 
+std::string PcapSurvey::name_of(const UdpStream& key) const {
+  const bool shared = std::any_of(streams.begin(), streams.end(), [&](const auto& other) {
+    return other.first.port == key.port && other.first != key && other.second.has_lidar();
+  });
+  return shared ? key.full_name() : key.name();
+}
+
 std::string PcapSurvey::unread() const {
   std::string text;
   for (const auto& [key, stream] : streams) {
@@ -150,7 +157,7 @@ PcapSurvey survey_pcap(PcapFile& file, const PcapWanted& wanted) {
     const LidarKind kind(*datagram, wanted);
     const UdpStream key{datagram->source, datagram->port};
     const bool is_wanted =
-        kind.is_wanted(wanted) && (wanted.stream.empty() || wanted.stream == key.name());
+        kind.is_wanted(wanted) && (wanted.stream.empty() || key.is_named(wanted.stream));
     // Where the lidar starts late, as much is looked at from there on.
     if (is_wanted && !found && survey.frames > kFrames) enough = survey.frames + kFrames;
     found = found || is_wanted;

@@ -15,6 +15,11 @@ struct UdpStream {
   std::uint16_t port = 0;
   auto operator<=>(const UdpStream&) const = default;  // NOLINT(modernize-use-nullptr)
   [[nodiscard]] std::string name() const { return "udp " + std::to_string(port); }
+  // Where several sensors send to one port: "udp 2368 from 192.168.1.201".
+  [[nodiscard]] std::string full_name() const { return name() + " from " + address(); }
+  [[nodiscard]] bool is_named(const std::string& text) const {
+    return text == name() || text == full_name();
+  }
   // "192.168.1.201"; meaningless for IPv6.
   [[nodiscard]] std::string address() const {
     return std::to_string(source >> 24) + "." + std::to_string(source >> 16 & 255) + "." +
@@ -49,6 +54,8 @@ struct PcapSurvey {
   [[nodiscard]] bool trust_checksums() const { return good_checksums > 10 * bad_checksums; }
   // What lidars there are whose packets are not read; empty: none.
   [[nodiscard]] std::string unread() const;
+  // Of a stream: with its address where lidars at other addresses send to the same port.
+  [[nodiscard]] std::string name_of(const UdpStream& key) const;
   // For messages: "1500 frames: udp 7502: 192 x 8448 bytes, ..."
   [[nodiscard]] std::string list() const;
 };

@@ -312,6 +312,8 @@ class CloudFolder : public Recording {
   }
 
   void make_rig(const OpenOptions& options) {
+    if (options.lidar_entry > 0)
+      throw ConfigError({folder_.string() + ": a folder of clouds holds one lidar: expected one"});
     rig_.lidar_extrinsic_source = "is the body";
     if (imu_) {
       rig_.body_frame = "imu";
@@ -319,7 +321,7 @@ class CloudFolder : public Recording {
       rig_.lidar_extrinsic_source = rig_.imu_extrinsic_source = "assumed identity";
     }
     if (!options.extrinsics_file.empty()) {
-      apply_extrinsics_file(options.extrinsics_file, {}, rig_, log_);
+      apply_extrinsics_file(options.extrinsics_file, {}, rig_, log_, options.lidar_entry);
     }
     // The file may place the one on the other, or both on a body of its own.
     const bool lidar = rig_.lidar_extrinsic_source.rfind("extrinsics file", 0) == 0;

@@ -93,6 +93,11 @@ void put_rig(BinaryWriter& writer, const Rig& rig) {
        {rig.body_frame, rig.lidar_model, rig.lidar_extrinsic_source, rig.imu_extrinsic_source,
         rig.gnss_extrinsic_source, rig.second_gnss_extrinsic_source})
     writer.put(text);
+  writer.put(static_cast<std::uint64_t>(rig.further_lidars.size()));
+  for (const FurtherLidar& lidar : rig.further_lidars) {
+    put_pose(writer, lidar.lidar_from_further);
+    writer.put(lidar.first_ring);
+  }
 }
 
 Rig get_rig(BinaryReader& reader) {
@@ -105,6 +110,11 @@ Rig get_rig(BinaryReader& reader) {
        {&rig.body_frame, &rig.lidar_model, &rig.lidar_extrinsic_source, &rig.imu_extrinsic_source,
         &rig.gnss_extrinsic_source, &rig.second_gnss_extrinsic_source})
     *text = reader.get_string();
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    FurtherLidar& lidar = rig.further_lidars.emplace_back();
+    lidar.lidar_from_further = get_pose(reader);
+    lidar.first_ring = reader.get<std::uint16_t>();
+  }
   return rig;
 }
 

@@ -171,11 +171,11 @@ std::uint8_t* CdrWriter::put_space(std::size_t size) {
   return buffer_.data() + begin;
 }
 
-ByteBuffer encode_point_cloud2(const Scan& scan) {
+ByteBuffer encode_point_cloud2(const Scan& scan, const std::string& frame) {
   const auto count = static_cast<std::uint32_t>(scan.points.size());
 
   CdrWriter out;
-  out.put_header(scan.stamp, "lidar");
+  out.put_header(scan.stamp, frame);
   out.put(std::uint32_t{1});  // height
   out.put(count);             // width
   put_fields(out, CloudContent(scan));

@@ -37,6 +37,11 @@ class CdrWriter {
 // The frame of the antenna at the end of a heading's line.
 inline constexpr const char* kSecondAntennaFrame = "gnss_second";
 
+// The frame of a lidar besides the first one, counted from 0: lidar_2, lidar_3 and so on.
+[[nodiscard]] inline std::string further_lidar_frame(std::size_t number) {
+  return "lidar_" + std::to_string(number + 2);
+}
+
 // A fixed transform between two named frames.
 struct NamedTransform {
   std::string parent;
@@ -45,7 +50,7 @@ struct NamedTransform {
 };
 
 // The project's messages (design: formats), frames as named there. Pure functions.
-[[nodiscard]] ByteBuffer encode_point_cloud2(const Scan& scan);
+[[nodiscard]] ByteBuffer encode_point_cloud2(const Scan& scan, const std::string& frame = "lidar");
 // livox_ros_driver2/CustomMsg: the line of a point is its ring; its return is told by the tag
 // alone.
 [[nodiscard]] ByteBuffer encode_livox(const Scan& scan);

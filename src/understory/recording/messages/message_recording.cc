@@ -1,6 +1,8 @@
 #include "understory/recording/messages/message_recording.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <deque>
 #include <map>
 #include <utility>
@@ -26,6 +28,7 @@ namespace understory {
 namespace {
 
 constexpr std::size_t kSamplesToJudge = 20;  // of an IMU, by which its unit is told
+constexpr int kMostMerged = 15;              // lidars besides the first one in one scan
 constexpr double kSamePlaceM = 0.001;
 constexpr double kSameAngle = 0.001;
 
@@ -43,7 +46,7 @@ class MessageRecording : public Recording, public ArrivalTimes {
       : file_(std::move(file)),
         log_(log),
         clouds_(file_, log),
-        places_(survey_.transforms, options.extrinsics_file, log),
+        places_(survey_.transforms, options.extrinsics_file, options.lidar_entry, log),
         receivers_(file_, !options.gnss_topic.empty(), log) {
     Log quiet;  // the same damage will be met again when reading
     const auto ahead = open(quiet);
@@ -157,6 +160,10 @@ class MessageRecording : public Recording, public ArrivalTimes {
     if (model != metadata.end()) places_.rig().lidar_model = model->second;
     const auto rings = metadata.find("ring_count");
     if (rings != metadata.end()) clouds_.know_rings(std::atoi(rings->second.substr(0, 6).c_str()));
+    const auto merged = metadata.find("merged_lidars");
+    if (merged != metadata.end())
+      places_.set_merged_lidars(
+          static_cast<std::size_t>(std::clamp(std::atoi(merged->second.c_str()), 0, kMostMerged)));
     place_sensors();
   }
 

@@ -1,5 +1,6 @@
 #include "understory/recording/messages/sensor_places.h"
 
+#include "understory/recording/messages/message_encode.h"
 #include "understory/sensor/second_antenna_place.h"
 
 namespace understory {
@@ -15,6 +16,11 @@ bool SensorPlaces::place(bool body_stays) {
   const std::string model = rig_.lidar_model;
   rig_ = rig_from_transforms(transforms_, frames_);
   rig_.lidar_model = model;
+  for (std::size_t i = 0; i < merged_lidars_; ++i) {
+    const auto place = transforms_.find(frames_.lidar, further_lidar_frame(i));
+    if (!place) break;
+    rig_.further_lidars.push_back({*place, static_cast<std::uint16_t>((i + 1) * kRingsALidar)});
+  }
   apply_extrinsics();
   return !had_imu && rig_.body_from_imu;
 }
@@ -26,7 +32,8 @@ void SensorPlaces::apply_extrinsics() {
                           : rig_.body_frame == "lidar" ? frames_.lidar
                                                        : rig_.body_frame;
   Log quiet;
-  apply_extrinsics_file(extrinsics_file_, {own}, rig_, extrinsics_told_ ? quiet : log_);
+  apply_extrinsics_file(extrinsics_file_, {own}, rig_, extrinsics_told_ ? quiet : log_,
+                        lidar_entry_);
   extrinsics_told_ = true;
 }
 

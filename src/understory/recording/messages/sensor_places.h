@@ -15,8 +15,13 @@ namespace understory {
 class SensorPlaces {
  public:
   // `transforms` may grow; both it and `log` must outlive this. No file: an empty name.
-  SensorPlaces(const TransformTree& transforms, std::string extrinsics_file, Log& log)
-      : transforms_(transforms), extrinsics_file_(std::move(extrinsics_file)), log_(log) {}
+  // `lidar_entry`: of the file's list of lidars.
+  SensorPlaces(const TransformTree& transforms, std::string extrinsics_file, int lidar_entry,
+               Log& log)
+      : transforms_(transforms),
+        extrinsics_file_(std::move(extrinsics_file)),
+        lidar_entry_(lidar_entry),
+        log_(log) {}
 
   // The rig by what is known now. With `body_stays` the body is what it was, and only the places of
   // other sensors are added. True if one was added that matters to a run that goes on.
@@ -33,6 +38,10 @@ class SensorPlaces {
   // Why there is none, for a warning.
   [[nodiscard]] std::string why_no_second_antenna(bool first_is_named) const;
 
+  // The scans hold the points of so many lidars besides the first one, as the project writes them
+  // (further_lidar_frame); before `place`.
+  void set_merged_lidars(std::size_t count) { merged_lidars_ = count; }
+
   [[nodiscard]] SensorFrames& frames() { return frames_; }
   [[nodiscard]] const SensorFrames& frames() const { return frames_; }
   [[nodiscard]] Rig& rig() { return rig_; }
@@ -44,6 +53,8 @@ class SensorPlaces {
 
   const TransformTree& transforms_;
   std::string extrinsics_file_;
+  int lidar_entry_;
+  std::size_t merged_lidars_ = 0;  // besides the first one, in the same scans
   Log& log_;
   SensorFrames frames_;
   Rig rig_;

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "understory/features/scan_rings.h"
+#include "understory/features/lidar_stems.h"
 #include "understory/geometry/pose_io.h"
 #include "understory/sensor/scan_content.h"
 #include "understory/util/error.h"
@@ -42,7 +42,7 @@ void SparseFrontEnd::on_sample(const ImuSample& sample, const Rig& rig) {
 
 std::vector<PositionedScan> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig) {
   const ScopedTimer timer(times_, "scan");
-  if (scans_ == 0 && !has_level_rings(*scan)) {
+  if (scans_ == 0 && !all_have_level_rings(*scan, rig)) {
     throw InputError(rig.lidar_model.empty() ? "the lidar" : rig.lidar_model, "",
                      "its lines sweep over the whole field of view, so that no stem can be cut "
                      "from a single scan: stems need the rings of a spinning lidar. Use "

@@ -1,0 +1,102 @@
+#include "understory/features/lidar_stems.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+namespace understory {
+namespace {
+
+// A lidar with 16 level rings among walls at 12 m, with two stems of 0.3 m at `places` (frame of
+// the lidar).
+Scan scan_with_stems(const std::vector<Eigen::Vector2d>& places) {
+  Scan scan;
+  scan.ring_count = 16;
+  for (int column = 0; column < 1800; ++column) {
+    const double azimuth = 2.0 * EIGEN_PI * column / 1800.0;
+    const Eigen::Vector2d ahead(std::cos(azimuth), std::sin(azimuth));
+    double range = 12.0 + (column % 7);
+    for (const Eigen::Vector2d& place : places) {
+      const double along = place.dot(ahead);
+      const double across = place.x() * ahead.y() - place.y() * ahead.x();
+      if (along > 0.0 && std::abs(across) < 0.15)
+        range = along - std::sqrt(0.15 * 0.15 - across * across);
+    }
+    for (int ring = 0; ring < 16; ++ring) {
+      ScanPoint point;
+      point.x = static_cast<float>(range * ahead.x());
+      point.y = static_cast<float>(range * ahead.y());
+      point.z = static_cast<float>(range * std::tan((2.0 * ring - 15.0) * EIGEN_PI / 180.0));
+      point.ring = static_cast<std::uint16_t>(ring);
+      point.t_ns = static_cast<std::uint32_t>(column * 50'000);
+      scan.points.push_back(point);
+    }
+  }
+  return scan;
+}
+
+// Two lidars three metres apart that look opposite ways, and what they see of the same two stems.
+struct Machine {
+  Rig rig;
+  Scan merged;
+};
+
+Machine machine() {
+  Machine made;
+  const Eigen::Quaterniond back(Eigen::AngleAxisd(EIGEN_PI, Eigen::Vector3d::UnitZ()));
+  const Pose first_from_second(back, Eigen::Vector3d(-3.0, 0.0, 0.4));
+  made.rig.further_lidars.push_back({first_from_second, kRingsALidar});
+  const std::vector<Eigen::Vector2d> stems = {{4.0, 2.0}, {-6.0, -3.0}};
+  made.merged = scan_with_stems(stems);
+  std::vector<Eigen::Vector2d> from_second;
+  for (const Eigen::Vector2d& stem : stems)
+    from_second.emplace_back(
+        (first_from_second.inverse() * Eigen::Vector3d(stem.x(), stem.y(), 0.0)).head<2>());
+  for (ScanPoint point : scan_with_stems(from_second).points) {
+    const Eigen::Vector3d at = first_from_second * Eigen::Vector3d(point.x, point.y, point.z);
+    point.x = static_cast<float>(at.x());
+    point.y = static_cast<float>(at.y());
+    point.z = static_cast<float>(at.z());
+    point.ring = static_cast<std::uint16_t>(point.ring + kRingsALidar);
+    made.merged.points.push_back(point);
+  }
+  return made;
+}
+
+TEST(LidarStems, AreFoundLidarByLidarAndCountOnce) {
+  const Machine made = machine();
+  const std::vector<LidarStems> lidars =
+      find_stems_of_lidars(made.merged, made.rig, StemSegmentConfig());
+  ASSERT_EQ(lidars.size(), 2U);
+  std::vector<Stem> stems;
+  std::vector<std::size_t> from;
+  for (const LidarStems& lidar : lidars) {
+    EXPECT_EQ(lidar.found.stems.size(), 2U);
+    from.push_back(stems.size());
+    for (const StemSegment& segment : lidar.found.stems)
+      stems.push_back(stem_of(segment, lidar.body_from_lidar, lidar.found.up));
+  }
+  drop_double_stems(from, stems);
+  ASSERT_EQ(stems.size(), 2U);
+  for (const Stem& stem : stems) {
+    const double first = (stem.point.head<2>() - Eigen::Vector2f(4.0F, 2.0F)).norm();
+    const double second = (stem.point.head<2>() - Eigen::Vector2f(-6.0F, -3.0F)).norm();
+    EXPECT_LT(std::min(first, second), 0.1);
+  }
+}
+
+TEST(LidarStems, RingsOfTheSecondLidarAreLevelInItsOwnFrame) {
+  const Machine made = machine();
+  EXPECT_TRUE(all_have_level_rings(made.merged, made.rig));
+  EXPECT_FALSE(all_have_level_rings(made.merged, Rig()));  // taken for one lidar
+}
+
+TEST(LidarStems, OfOneLidarStayAsTheyAre) {
+  std::vector<Stem> stems(2);
+  drop_double_stems({0}, stems);
+  EXPECT_EQ(stems.size(), 2U);
+}
+
+}  // namespace
+}  // namespace understory
