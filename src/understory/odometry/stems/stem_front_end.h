@@ -86,6 +86,13 @@ class StemFrontEnd {
  private:
   static constexpr double kGravity = 9.81;  // m/s^2, anywhere on earth to half a percent
 
+  // The stems of a scan along up as it was last, or along that of the directions that may be up
+  // along which most stems stand.
+  [[nodiscard]] StemSegments find_stems(const Scan& scan, const Rig& rig, const ImuBuffer* samples);
+  // Up in the lidar as it was last. At first both ends of gravity, where there is an IMU, of the z
+  // axis of the lidar and of that of the body; an earlier one is the likelier.
+  [[nodiscard]] std::vector<Eigen::Vector3d> possible_ups(const Scan& scan, const Rig& rig,
+                                                          const ImuBuffer* samples) const;
   [[nodiscard]] StemView view_of(const Scan& scan, int frame, const Rig& rig,
                                  const StemSegments& found, const Vector6d& motion_per_s) const;
   // What takes the scan from the one before to now: how the body moves within it, and where.
