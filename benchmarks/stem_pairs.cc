@@ -64,8 +64,10 @@ Outcome measure(const std::vector<StemView>& views, const std::map<TimeNs, Pose>
   for (std::size_t i = 1; i < views.size(); i += options.stride) {
     const StemView a = best_of(views[i - 1]);
     const StemView b = best_of(views[i]);
-    const Pose level_a(level_from_body(stem_up(a)), Eigen::Vector3d::Zero());
-    const Pose level_b(level_from_body(stem_up(b)), Eigen::Vector3d::Zero());
+    const Pose level_a(level_from_body(stem_up(a, Eigen::Vector3d::UnitZ())),
+                       Eigen::Vector3d::Zero());
+    const Pose level_b(level_from_body(stem_up(b, Eigen::Vector3d::UnitZ())),
+                       Eigen::Vector3d::Zero());
     const Pose right =
         level_a * truth.at(a.stamp).inverse() * truth.at(b.stamp) * level_b.inverse();
     Pose guess;

@@ -19,9 +19,25 @@ namespace {
 
 using namespace features_constants::stem_segments;
 
-// The smallest turn that makes `up` the z axis.
+// Half a turn about the x axis.
+Eigen::Vector3d turned_over(const Eigen::Vector3d& v) {
+  return {v.x(), -v.y(), -v.z()};
+}
+
+Scan turned_over(Scan scan) {
+  for (ScanPoint& point : scan.points) {
+    point.y = -point.y;
+    point.z = -point.z;
+  }
+  return scan;
+}
+
+// The smallest turn that makes `up` the z axis; after half a turn about x where it points down.
 Eigen::Matrix3d level_from(const Eigen::Vector3d& up) {
-  return rotation_between(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  if (up.z() >= 0.0) return rotation_between(up, z).toRotationMatrix();
+  return rotation_between(turned_over(up), z).toRotationMatrix() *
+         Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
 }
 
 // Median and spread of the radii that the stems show by themselves.
@@ -202,7 +218,52 @@ Eigen::Vector3d up_of(const SectionView& view, const Chains& all) {
   return up;
 }
 
+// Of a lidar whose z axis points up, within 90 degrees.
+StemSegments find_upright(const Scan& scan, const StemSegmentConfig& config,
+                          const std::vector<std::uint8_t>& use) {
+  StemSegments result;
+  result.up = config.up.normalized();
+  for (int round = 0;; ++round) {
+    const Eigen::Matrix3d level = level_from(result.up);
+    const RingView view(scan, level, config.max_range_m, use);
+    result.levels = view.levels();
+    result.step = view.step_rad();
+    result.range_sd_m = view.range_sd_m();
+    if (view.sections().empty()) return result;
+    Chains all = chains_of(view, config.min_score);
+    const Eigen::Vector3d up = up_of(view, all);
+    result.up = level.transpose() * up;
+    // Stems look for each other along the upright: a wrong one loses some.
+    if (round == 0 && up.head<2>().norm() > kUpMatters) continue;
+    result.usual_radius_m = all.config.usual_radius_m;
+    result.stems = segments_of(view, all, view.points(), level, config.min_score);
+    return result;
+  }
+}
+
 }  // namespace
+
+StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config,
+                                const std::vector<std::uint8_t>& use) {
+  if (config.up.z() >= 0.0) return find_upright(scan, config, use);
+  StemSegmentConfig over = config;
+  over.up = turned_over(config.up);
+  StemSegments result = find_upright(turned_over(scan), over, use);
+  result.up = turned_over(result.up);
+  for (StemSegment& stem : result.stems) {
+    stem.foot = turned_over(stem.foot);
+    stem.axis = turned_over(stem.axis);
+  }
+  return result;
+}
+
+double standing_stems(const StemSegments& found) {
+  double sum = 0.0;
+  for (const StemSegment& stem : found.stems) {
+    if (stem.foot_on_ground) sum += stem.score / stem.foot_sd_m;
+  }
+  return sum;
+}
 
 Stem stem_of(const StemSegment& segment, const Pose& body_from_points,
              const Eigen::Vector3d& up_in_points) {
@@ -226,28 +287,6 @@ Stem stem_of(const StemSegment& segment, const Pose& body_from_points,
   stem.yy = covariance(1, 1);
   stem.zz = covariance(2, 2);
   return stem;
-}
-
-StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config,
-                                const std::vector<std::uint8_t>& use) {
-  StemSegments result;
-  result.up = config.up.normalized();
-  for (int round = 0;; ++round) {
-    const Eigen::Matrix3d level = level_from(result.up);
-    const RingView view(scan, level, config.max_range_m, use);
-    result.levels = view.levels();
-    result.step = view.step_rad();
-    result.range_sd_m = view.range_sd_m();
-    if (view.sections().empty()) return result;
-    Chains all = chains_of(view, config.min_score);
-    const Eigen::Vector3d up = up_of(view, all);
-    result.up = level.transpose() * up;
-    // Stems look for each other along the upright: a wrong one loses some.
-    if (round == 0 && up.head<2>().norm() > kUpMatters) continue;
-    result.usual_radius_m = all.config.usual_radius_m;
-    result.stems = segments_of(view, all, view.points(), level, config.min_score);
-    return result;
-  }
 }
 
 }  // namespace understory

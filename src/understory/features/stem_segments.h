@@ -15,7 +15,7 @@ namespace understory {
 // Which stems of a frame are given.
 struct StemSegmentConfig {
   // Which way is up in the frame of the points, within 25 degrees; what the stems themselves say
-  // replaces it.
+  // replaces it. The rings must be about level, the lidar may hang upside down.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   double max_range_m = 45.0;  // farther returns are passed over
   double min_score = 0.5;     // segments that are less probably stems are left out
@@ -43,7 +43,8 @@ struct StemSegment {
   int returns = 0;
   std::uint32_t t_ns = 0;  // mean time of its returns since the frame's stamp
   // Of the foot's x and y and of the axis' slope in x and y, in the level frame (z up, turned as
-  // little as possible against the frame of the points).
+  // little as possible against the frame of the points; of a lidar that hangs upside down, after
+  // half a turn about its x axis).
   // Not aligned to more than malloc gives: std::stable_sort's buffer is not either.
   Eigen::Matrix<double, 4, 4, Eigen::DontAlign> covariance = Eigen::Matrix4d::Zero();
   std::array<double, 15> traits{};  // what the score was made from (stem_score.h)
@@ -76,6 +77,11 @@ struct StemSegments {
 // Empty for a frame without rings. Deterministic; thread-safe. P1 section 2.3 and figure 11.
 [[nodiscard]] StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config,
                                               const std::vector<std::uint8_t>& use = {});
+
+// How many of the stems stand on ground that shows, each by its score and by how well the ground is
+// known at its foot. The same scan upside down has less than two thirds of it: crowns are no
+// ground.
+[[nodiscard]] double standing_stems(const StemSegments& found);
 
 // A segment as a row of a view, in the body's frame. Its covariance leaves out what the height has
 // in common with the place. Diameters with a greater error than 2.5 cm are left out.

@@ -257,5 +257,45 @@ TEST(StemSegments, BecomeRowsInTheBodysFrame) {
   EXPECT_NEAR(stem.zz, 0.09F, 1e-6F);
 }
 
+// A lidar that hangs upside down sees the same stems.
+TEST(StemSegments, RingsMayHangUpsideDown) {
+  const std::vector<Cylinder> cylinders = ring_of_cylinders();
+  const Scan upright = scan_cylinders(cylinders);
+  Scan hanging = upright;
+  const Eigen::Quaterniond over(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX()));
+  for (ScanPoint& point : hanging.points) {
+    point.y = -point.y;
+    point.z = -point.z;
+  }
+  StemSegmentConfig config;
+  config.up = -Eigen::Vector3d::UnitZ();
+  const StemSegments found = find_stem_segments(hanging, config);
+  const StemSegments known = find_stem_segments(upright, {});
+  ASSERT_EQ(found.stems.size(), known.stems.size());
+  EXPECT_LT((over * found.up - known.up).norm(), 1e-3);
+  for (const StemSegment& stem : found.stems) {
+    const StemSegment* same = nearest(known, over * stem.foot);
+    EXPECT_LT((over * stem.foot - same->foot).norm(), 1e-6);
+    EXPECT_GT((over * stem.axis).dot(same->axis), 0.9999);
+    EXPECT_NEAR(stem.score, same->score, 1e-6);
+    // The variances are those along the axes of the body.
+    const Pose body_from_lidar(over, Eigen::Vector3d::Zero());
+    const Stem seen = stem_of(stem, body_from_lidar, found.up);
+    const Stem other = stem_of(*same, Pose(), known.up);
+    EXPECT_NEAR(seen.xx, other.xx, 1e-3F * other.xx);
+    EXPECT_NEAR(seen.zz, other.zz, 1e-3F * other.zz);
+  }
+}
+
+// Stems look alike from below and from above. The ground at their feet tells which is which.
+TEST(StemSegments, GroundTellsWhichEndIsUp) {
+  TestFrames site(load_site("lieksa2", {"seed=5"}));
+  const SimulatedScan frame = site.scanner.cast(3);
+  StemSegmentConfig config;
+  const double right = standing_stems(find_stem_segments(*frame.scan, config));
+  config.up = -config.up;
+  EXPECT_GT(right, 2.0 * standing_stems(find_stem_segments(*frame.scan, config)));
+}
+
 }  // namespace
 }  // namespace understory

@@ -179,6 +179,16 @@ inline constexpr double kLongestStep = 2.0;
 inline constexpr double kShortestStep = 1e-3;
 // Of the time since the last scan: a shorter scan is followed by a pause [not recorded]
 inline constexpr double kPause = 0.4;
+// s before the first scan over which specific force is averaged: a stride of a walk [chosen]
+inline constexpr double kFirstForceS = 1.0;
+// Cosine between two directions that are tried as up: closer ones find the same stems
+// [bound: stems are found with up wrong by 25 degrees]
+inline constexpr double kSameUp = 0.99;
+// Times the stems that stand along a direction that was tried earlier [tuned: the right way up has
+// 2.0 to 5 times as many as upside down, demo with 16 and 128 rings, lieksa2, harvester and lohja1]
+inline constexpr double kMoreStanding = 1.5;
+// stems along a direction that is tried later: fewer may be chance [chosen]
+inline constexpr std::size_t kFewestStanding = 5;
 }  // namespace stem_front_end
 
 namespace stem_imu {  // odometry/stems/stem_imu.cc
@@ -191,6 +201,12 @@ inline constexpr double kStandLeans = 0.3 * kRadPerDegree;
 namespace stem_levelling {  // odometry/stems/stem_levelling.cc
 // degrees of freedom of Student's t, for stems that lean [chosen: heavy tails]
 inline constexpr double kFreedom = 3.0;
+// length of the mean of the axes from which on they say which end is the upper one [chosen: lines
+// whose ends are told at random, ten of them, seldom have 0.7]
+inline constexpr double kOneSided = 0.8;
+// z of up in the body below which the body hangs over: cosine of 120 degrees [chosen: no mount is
+// usual there, so that the heading of level frames seldom leaps]
+inline constexpr double kFarOver = -0.5;
 }  // namespace stem_levelling
 
 }  // namespace understory::odometry_constants

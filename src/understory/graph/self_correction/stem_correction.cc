@@ -29,7 +29,8 @@ LevelViews level(const std::vector<StemView>& views, const std::vector<SparseSte
   result.ups.resize(views.size());
   parallel_for(views.size(), 16, [&](std::size_t i) {
     // The front end may have known more of up than the stems.
-    result.ups[i] = steps[i].up.sd_rad > 0.0 ? steps[i].up : stem_up(views[i]);
+    result.ups[i] =
+        steps[i].up.sd_rad > 0.0 ? steps[i].up : stem_up(views[i], steps[i].up.up_in_body);
     const Eigen::Quaterniond turn = understory::level_from_body(result.ups[i]);
     result.points[i] = stem_points(views[i], turn);
     result.level_from_body[i] = Pose(turn, Eigen::Vector3d::Zero());

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "understory/graph/graph_constants.h"
+#include "understory/odometry/stems/stem_levelling.h"
 
 namespace understory {
 namespace {
@@ -16,10 +17,6 @@ double usual_value(std::vector<double> values, double of_none) {
   const auto at = static_cast<std::ptrdiff_t>(kShare * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + at, values.end());
   return values[static_cast<std::size_t>(at)];
-}
-
-double range_m(const Stem& stem) {
-  return static_cast<double>(stem.point.head<2>().norm());
 }
 
 }  // namespace
@@ -37,8 +34,9 @@ std::vector<StemView> map_sights(const std::vector<StemView>& views,
   std::vector<double> ranges;
   std::vector<double> scores;
   for (const StemView& view : views) {
+    const Eigen::Vector3d up = up_of_axes(view);
     for (const Stem& stem : view.stems) {
-      ranges.push_back(range_m(stem));
+      ranges.push_back(plane_range_m(stem, up));
       if (std::isfinite(stem.score)) scores.push_back(static_cast<double>(stem.score));
     }
   }
@@ -46,8 +44,9 @@ std::vector<StemView> map_sights(const std::vector<StemView>& views,
   const double lowest = config.score_share * usual_value(std::move(scores), 0.0);
   std::vector<StemView> result = views;
   for (StemView& view : result) {
+    const Eigen::Vector3d up = up_of_axes(view);
     std::erase_if(view.stems, [&](const Stem& stem) {
-      return range_m(stem) > farthest || static_cast<double>(stem.score) < lowest;
+      return plane_range_m(stem, up) > farthest || static_cast<double>(stem.score) < lowest;
     });
   }
   return result;

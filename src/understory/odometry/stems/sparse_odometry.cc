@@ -7,13 +7,17 @@
 #include "understory/geometry/pose_io.h"
 #include "understory/geometry/rotation_between.h"
 #include "understory/geometry/symmetric_solver.h"
+#include "understory/odometry/odometry_constants.h"
 
 namespace understory {
 namespace {
 
-// Takes out what is left of tilt in a level pose's rotation, keeping the heading of its x axis.
+// Takes out what is left of tilt in a pose's rotation, keeping the heading of its x axis; of its y
+// axis less a right angle, where x is upright.
 Pose upright(const Pose& pose) {
-  const Eigen::Vector3d x = pose.rotation() * Eigen::Vector3d::UnitX();
+  Eigen::Vector3d x = pose.rotation() * Eigen::Vector3d::UnitX();
+  if (x.head<2>().norm() < odometry_constants::initial_state::kUprightAxis)
+    x = (pose.rotation() * Eigen::Vector3d::UnitY()).cross(Eigen::Vector3d::UnitZ());
   return Pose(
       Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(x.y(), x.x()), Eigen::Vector3d::UnitZ())),
       pose.translation());
@@ -180,15 +184,20 @@ void SparseOdometry::take_up_last() {
   target_ = target();
 }
 
+Eigen::Vector3d SparseOdometry::about_up(const StemView& view) const {
+  if (count_ == 0) return up_of_axes(view);
+  return world_from_body_.rotation().conjugate() * Eigen::Vector3d::UnitZ();
+}
+
 SparseStep SparseOdometry::track(const StemView& view, const std::optional<Pose>& expected_step,
                                  const std::optional<StemUp>& known_up) {
-  const StemUp up = known_up ? *known_up : stem_up(view);
+  const StemUp up = known_up ? *known_up : stem_up(view, about_up(view));
   const Pose level_from_body(understory::level_from_body(up), Eigen::Vector3d::Zero());
-  Source source{stem_points(view, level_from_body.rotation()), height_sds(view)};
+  Source source{stem_points(view, level_from_body.rotation()), height_sds(view, up.up_in_body)};
   SparseStep step;
   step.up = up;
   if (count_ == 0) {
-    // The first body frame's x axis, laid level, is the world's.
+    // The first body frame's x axis, laid level, is the world's; y, where x is upright.
     world_from_body_ = upright(level_from_body).inverse() * level_from_body;
   } else {
     const Match found = match(source, guess(level_from_body, expected_step));

@@ -76,7 +76,8 @@ class SparseOdometry {
   // Positions a view against the local map and leaves the map as it is. Views that are close
   // together should not all enter the map: each adds the error of its own match to those after it.
   // `expected_step` is previous_from_body as it is expected; without one the last shift goes on.
-  // `up` is up as it is known from elsewhere too, in place of what the stems alone say.
+  // `up` is up as it is known from elsewhere too, in place of what the stems alone say. Without it
+  // up is about where it was in the view before.
   SparseStep track(const StemView& view, const std::optional<Pose>& expected_step = {},
                    const std::optional<StemUp>& up = {});
   // Takes up the stems of the view that was positioned last.
@@ -110,6 +111,7 @@ class SparseOdometry {
   [[nodiscard]] Match match(const Source& source, const Pose& guess) const;
   [[nodiscard]] Pose guess(const Pose& level_from_body,
                            const std::optional<Pose>& expected_step) const;
+  [[nodiscard]] Eigen::Vector3d about_up(const StemView& view) const;
   void take_up(const Source& source, const Pose& world_from_level);
 
   SparseOdometryConfig config_;

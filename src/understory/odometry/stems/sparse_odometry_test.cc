@@ -51,11 +51,59 @@ TEST(StemUp, LeansOfTreesAverageOut) {
   const Stand stand = make_stand(2);
   std::mt19937 random(3);
   const Pose pose(so3_exp({0.25, -0.1, 1.0}), {60.0, 0.0, 1.0});
-  const StemUp up = stem_up(look(stand, pose, 0, random));
+  const StemUp up = stem_up(look(stand, pose, 0, random), Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d truth = pose.rotation().conjugate() * Eigen::Vector3d::UnitZ();
   EXPECT_LT(std::acos(up.up_in_body.dot(truth)), 1.0 * M_PI / 180.0);
   EXPECT_NEAR(up.spread_rad, 0.06, 0.02);
-  EXPECT_EQ(stem_up(StemView()).stems, 0);
+  EXPECT_EQ(stem_up(StemView(), Eigen::Vector3d::UnitZ()).stems, 0);
+}
+
+// Each body axis up and down in turn: what is up comes from the axes, and the heights' variance
+// lies along it.
+TEST(StemUp, AnyAxisOfTheBodyMayBeUp) {
+  const Stand stand = make_stand(2);
+  for (int k = 0; k < 6; ++k) {
+    Eigen::Vector3d up_in_body = Eigen::Vector3d::Zero();
+    up_in_body[k / 2] = k % 2 == 0 ? 1.0 : -1.0;
+    std::mt19937 random(3);
+    const Pose pose(Eigen::Quaterniond::FromTwoVectors(up_in_body, Eigen::Vector3d::UnitZ()),
+                    {60.0, 0.0, 1.0});
+    StemView view = look(stand, pose, 0, random);
+    EXPECT_GT(up_of_axes(view).dot(up_in_body), std::cos(0.02)) << k;
+    EXPECT_GT(stem_up(view, up_of_axes(view)).up_in_body.dot(up_in_body), std::cos(0.02)) << k;
+    for (Stem& stem : view.stems)
+      stem.xx = 0.01F, stem.yy = 0.04F, stem.zz = 0.09F;
+    EXPECT_NEAR(height_sds(view, up_in_body).front(), 0.1 * (k / 2 + 1), 1e-6) << k;
+    EXPECT_NEAR(plane_range_m(view.stems.front(), up_in_body),
+                (pose.rotation() * view.stems.front().point.cast<double>()).head<2>().norm(), 1e-5)
+        << k;
+    EXPECT_EQ(stem_up(StemView(), up_in_body).up_in_body, up_in_body);
+    // Axes of both ends tell nothing.
+    for (std::size_t i = 0; i < view.stems.size(); i += 2)
+      view.stems[i].axis = -view.stems[i].axis;
+    EXPECT_EQ(up_of_axes(view), Eigen::Vector3d::UnitZ());
+  }
+}
+
+// A little tilt turns the heading of the level frame by as little, wherever up is; the smallest
+// turn from an axis that points down would turn it by up to half a turn.
+TEST(StemUp, HeadingOfTheLevelFrameIsSteady) {
+  for (const Eigen::Vector3d& about :
+       {Eigen::Vector3d(0.0, 0.0, 1.0), Eigen::Vector3d(0.0, 0.0, -1.0),
+        Eigen::Vector3d(1.0, 0.0, 0.0), Eigen::Vector3d(0.0, -1.0, 0.0)}) {
+    StemUp up;
+    up.up_in_body = about;
+    const Eigen::Quaterniond straight = level_from_body(up);
+    EXPECT_LT((straight * about - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+    for (int k = 0; k < 8; ++k) {
+      const double angle = k * M_PI / 4.0;
+      const Eigen::Vector3d tilt = 0.05 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0);
+      up.up_in_body = straight.conjugate() * so3_exp(tilt) * Eigen::Vector3d::UnitZ();
+      const Eigen::Quaterniond turn = level_from_body(up);
+      EXPECT_LT((turn * up.up_in_body - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+      EXPECT_LT(turn.angularDistance(straight), 0.08) << k;
+    }
+  }
 }
 
 // Steps of 2 m, each with a turn of any size: no constant velocity would guess them.

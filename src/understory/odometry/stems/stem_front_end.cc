@@ -12,10 +12,10 @@ namespace {
 
 using namespace odometry_constants::stem_front_end;
 
-double reach_of(const StemView& view) {
+double reach_of(const StemView& view, const StemUp& up) {
   std::vector<double> ranges;
   for (const Stem& stem : view.stems)
-    ranges.push_back(static_cast<double>(stem.point.head<2>().norm()));
+    ranges.push_back(plane_range_m(stem, up.up_in_body));
   if (ranges.empty()) return 0.0;
   const auto at = ranges.begin() + static_cast<std::ptrdiff_t>(9 * (ranges.size() - 1) / 10);
   std::nth_element(ranges.begin(), at, ranges.end());
@@ -55,13 +55,13 @@ void describe(ConfigTable& table, StemFrontEndConfig& config) {
   table.section("odometry", [&] { describe(table, config.odometry); });
 }
 
-StemView StemFrontEnd::view_of(const Scan& scan, int frame, const std::vector<LidarStems>& found,
+StemView StemFrontEnd::view_of(const Scan& scan, int frame, const FoundStems& found,
                                const Vector6d& motion_per_s) const {
   StemView view;
   view.frame = frame;
   view.stamp = scan.stamp;
   std::vector<std::size_t> first_of_lidar;
-  for (const LidarStems& lidar : found) {
+  for (const LidarStems& lidar : found.lidars) {
     first_of_lidar.push_back(view.stems.size());
     for (const StemSegment& segment : lidar.found.stems) {
       const Pose stamp_from_lidar =
@@ -111,8 +111,8 @@ void StemFrontEnd::watch_imu(const StemScan& result, const Rig& rig, const ImuBu
 }
 
 StemFrontEnd::Guess StemFrontEnd::guess(const Scan& scan, int frame, const Rig& rig,
-                                        const std::vector<LidarStems>& found,
-                                        const ImuBuffer* samples, double since) const {
+                                        const FoundStems& found, const ImuBuffer* samples,
+                                        double since) const {
   Guess guess;
   guess.motion_per_s = motion_per_s_;
   if (config_.predict_turn) guess.step = Pose::exp(since * motion_per_s_);
@@ -130,7 +130,9 @@ StemFrontEnd::Guess StemFrontEnd::guess(const Scan& scan, int frame, const Rig& 
   // taken out wrongly would come back larger by such an outlook, so there is none.
   const bool pauses = to_seconds(scan.end() - scan.stamp) < kPause * since;
   SparseOdometry trial = odometry_;
-  const SparseStep step = trial.track(view_of(scan, frame, found, guess.motion_per_s), guess.step);
+  const StemView view = view_of(scan, frame, found, guess.motion_per_s);
+  const SparseStep step =
+      trial.track(view, guess.step, stem_up(view, rig.body_from_lidar.rotation() * found.up));
   const Vector6d latest = (last_->world_from_body.inverse() * step.world_from_body).log() / since;
   if (step.status != SparseStepStatus::kTracked && step.status != SparseStepStatus::kSearched)
     return guess;
@@ -140,21 +142,66 @@ StemFrontEnd::Guess StemFrontEnd::guess(const Scan& scan, int frame, const Rig& 
   return guess;
 }
 
-StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const ImuBuffer* samples) {
-  StemSegmentConfig segments;
-  segments.min_score = config_.min_score;
-  segments.max_range_m = config_.max_range_m;
-  segments.up =
-      up_in_lidar_
-          ? *up_in_lidar_
-          : Eigen::Vector3d(rig.body_from_lidar.rotation().inverse() * Eigen::Vector3d::UnitZ());
+StemFrontEnd::FoundStems StemFrontEnd::find_stems(const Scan& scan, const Rig& rig,
+                                                  const ImuBuffer* samples) {
+  StemSegmentConfig config;
+  config.min_score = config_.min_score;
+  config.max_range_m = config_.max_range_m;
   std::vector<std::uint8_t> use;
   if (config_.machine_boxes) use = outside_machine(scan, rig, *config_.machine_boxes);
-  const std::vector<LidarStems> found = find_stems_of_lidars(scan, rig, segments, use);
-  const bool any = std::any_of(found.begin(), found.end(),
-                               [](const LidarStems& lidar) { return !lidar.found.stems.empty(); });
-  if (any) up_in_lidar_ = up_by_stems(found, segments.up);
+  FoundStems best;
+  double most = -1.0;
+  for (const Eigen::Vector3d& up : possible_ups(scan, rig, samples)) {
+    config.up = up;
+    std::vector<LidarStems> lidars = find_stems_of_lidars(scan, rig, config, use);
+    double standing = 0.0;
+    std::size_t stems = 0;
+    for (const LidarStems& lidar : lidars) {
+      standing += standing_stems(lidar.found);
+      stems += lidar.found.stems.size();
+    }
+    const bool surely = stems >= kFewestStanding && standing > kMoreStanding * most;
+    if (most >= 0.0 && !surely) continue;
+    most = standing;
+    best.up = up_by_stems(lidars, up);
+    best.lidars = std::move(lidars);
+    best.any = stems > 0;
+  }
+  if (best.any) up_in_lidar_ = best.up;
+  return best;
+}
 
+std::vector<Eigen::Vector3d> StemFrontEnd::possible_ups(const Scan& scan, const Rig& rig,
+                                                        const ImuBuffer* samples) const {
+  if (up_in_lidar_) return {*up_in_lidar_};
+  const Eigen::Quaterniond lidar_from_body = rig.body_from_lidar.rotation().inverse();
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  std::vector<Eigen::Vector3d> axes;
+  if (samples != nullptr && config_.imu.use && rig.body_from_imu) {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    for (const InertialSample& sample :
+         samples->samples(scan.stamp - from_seconds(kFirstForceS), scan.end()))
+      force += sample.specific_force();
+    if (force.norm() > 0.0)
+      axes.emplace_back((lidar_from_body * (rig.body_from_imu->rotation() * force)).normalized());
+  }
+  axes.push_back(z);
+  axes.emplace_back(lidar_from_body * z);
+  std::vector<Eigen::Vector3d> ups;
+  for (const Eigen::Vector3d& axis : axes) {
+    for (const double sign : {1.0, -1.0}) {
+      const Eigen::Vector3d up = sign * axis;
+      const bool known = std::any_of(ups.begin(), ups.end(), [&](const Eigen::Vector3d& other) {
+        return other.dot(up) > kSameUp;
+      });
+      if (!known) ups.push_back(up);
+    }
+  }
+  return ups;
+}
+
+StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const ImuBuffer* samples) {
+  const FoundStems found = find_stems(scan, rig, samples);
   StemScan result;
   const double since = last_ ? to_seconds(scan.stamp - last_->stamp) : 0.0;
   const bool follows = last_ && since > kShortestStep && since < kLongestStep;
@@ -164,10 +211,10 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const Im
     guess = this->guess(scan, frame, rig, found, samples, since);
   }
   result.view = view_of(scan, frame, found, guess.motion_per_s);
-  result.reach_m = reach_of(result.view);
   result.motion_rad_s = guess.motion_per_s.head<3>().norm();
-  std::optional<StemUp> up;
-  if (guess.by_imu) up = imu_.up(stem_up(result.view), *guess.by_imu);
+  StemUp up = stem_up(result.view, rig.body_from_lidar.rotation() * found.up);
+  if (guess.by_imu) up = imu_.up(up, *guess.by_imu);
+  result.reach_m = reach_of(result.view, up);
   result.step = odometry_.track(result.view, guess.step, up);
   motion_per_s_.setZero();
   std::optional<Eigen::Quaterniond> matched;

@@ -86,7 +86,20 @@ class StemFrontEnd {
  private:
   static constexpr double kGravity = 9.81;  // m/s^2, anywhere on earth to half a percent
 
-  [[nodiscard]] StemView view_of(const Scan& scan, int frame, const std::vector<LidarStems>& found,
+  // The stems of a scan, lidar by lidar. `up`: in the frame of the first lidar.
+  struct FoundStems {
+    std::vector<LidarStems> lidars;
+    Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+    bool any = false;
+  };
+  // The stems of a scan along up as it was last, or along that of the directions that may be up
+  // along which most stems stand.
+  [[nodiscard]] FoundStems find_stems(const Scan& scan, const Rig& rig, const ImuBuffer* samples);
+  // Up in the lidar as it was last. At first both ends of gravity, where there is an IMU, of the z
+  // axis of the lidar and of that of the body; an earlier one is the likelier.
+  [[nodiscard]] std::vector<Eigen::Vector3d> possible_ups(const Scan& scan, const Rig& rig,
+                                                          const ImuBuffer* samples) const;
+  [[nodiscard]] StemView view_of(const Scan& scan, int frame, const FoundStems& found,
                                  const Vector6d& motion_per_s) const;
   // What takes the scan from the one before to now: how the body moves within it, and where.
   struct Guess {
@@ -94,9 +107,8 @@ class StemFrontEnd {
     std::optional<Pose> step;
     std::optional<StemImu::Motion> by_imu;
   };
-  [[nodiscard]] Guess guess(const Scan& scan, int frame, const Rig& rig,
-                            const std::vector<LidarStems>& found, const ImuBuffer* samples,
-                            double since) const;
+  [[nodiscard]] Guess guess(const Scan& scan, int frame, const Rig& rig, const FoundStems& found,
+                            const ImuBuffer* samples, double since) const;
   [[nodiscard]] bool to_be_kept(const StemScan& result);
   // Holds the turn to this scan by the stems against that by the gyroscope, and gravity.
   void watch_imu(const StemScan& result, const Rig& rig, const ImuBuffer* samples);

@@ -38,9 +38,12 @@ bool StemPacer::even(const StemScan& last) const {
   const double limit = 4.0 * config_.tolerance;
   // Tilt and height follow from what each view shows of up and ground; they are noise, not motion.
   const Matrix6d& covariance = last.step.covariance;
-  return std::abs(off[2]) <= limit * std::sqrt(covariance(2, 2)) &&
-         off.segment<2>(3).squaredNorm() <=
-             limit * limit * 0.5 * covariance.block<2, 2>(3, 3).trace();
+  const Eigen::Index upright = upright_axis(last.step.up.up_in_body);
+  const Eigen::Index one = upright == 0 ? 4 : 3;
+  const Eigen::Index other = upright == 2 ? 4 : 5;
+  const double shift_variance = covariance(one, one) + covariance(other, other);
+  return std::abs(off[upright]) <= limit * std::sqrt(covariance(upright, upright)) &&
+         off[one] * off[one] + off[other] * off[other] <= limit * limit * 0.5 * shift_variance;
 }
 
 bool StemPacer::due(TimeNs stamp) const {

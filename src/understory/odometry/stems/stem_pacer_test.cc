@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/geometry/pose.h"
+#include "understory/sensor/rig.h"
 #include "understory/util/angles.h"
 #include "understory/util/random.h"
 
@@ -80,9 +82,9 @@ struct Outcome {
   std::size_t max_stems = 0;
 };
 
-Outcome run(const StemPaceConfig& pace, const StemFrontEndConfig& config, int frames) {
+Outcome run(const StemPaceConfig& pace, const StemFrontEndConfig& config, int frames,
+            const Rig& rig = {}) {
   const std::vector<Trunk> trunks = stand(2.5);
-  const Rig rig;
   StemPacer pacer(pace, config);
   Outcome outcome;
   const auto take = [&](std::vector<StemScan> scans) {
@@ -119,6 +121,31 @@ TEST(StemPacer, PositionsFewScansOfAStandingMachineAndAllOfAStart) {
   for (int frame = 41; frame <= 43; ++frame)
     EXPECT_TRUE(outcome.scans[static_cast<std::size_t>(frame)].positioned) << frame;
   EXPECT_LE(outcome.max_in_memory, 5U);
+}
+
+// A body whose z axis points down or sideways: the same scans are positioned, at the same places,
+// and the world stands upright. Up was once taken from the z axis of the body.
+TEST(StemPacer, AxesOfTheBodyMayPointAnywhere) {
+  constexpr int kFrames = 50;
+  const Outcome upright = run({}, {}, kFrames);
+  for (const Eigen::Vector3d& about :
+       {Eigen::Vector3d(M_PI, 0.0, 0.0), Eigen::Vector3d(0.0, 0.5 * M_PI, 0.0),
+        Eigen::Vector3d(-0.5 * M_PI, 0.0, 0.0)}) {
+    Rig rig;
+    rig.body_from_lidar = Pose(so3_exp(about), Eigen::Vector3d::Zero());
+    const Outcome turned = run({}, {}, kFrames, rig);
+    ASSERT_EQ(turned.scans.size(), upright.scans.size());
+    for (std::size_t i = 0; i < turned.scans.size(); ++i) {
+      const StemScan& scan = turned.scans[i];
+      const StemScan& other = upright.scans[i];
+      EXPECT_EQ(scan.positioned, other.positioned) << i;
+      EXPECT_NEAR(scan.step.world_from_body.translation().norm(),
+                  other.step.world_from_body.translation().norm(), 0.01)
+          << i;
+      const Pose world_from_lidar = scan.step.world_from_body * rig.body_from_lidar;
+      EXPECT_GT((world_from_lidar.rotation() * Eigen::Vector3d::UnitZ()).z(), std::cos(0.02)) << i;
+    }
+  }
 }
 
 TEST(StemPacer, WithoutAGapItIsTheFrontEnd) {

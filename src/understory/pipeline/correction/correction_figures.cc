@@ -30,7 +30,8 @@ Placed place(const CorrectionRun& run) {
   placed.before.resize(n);
   placed.after.resize(n);
   parallel_for(n, 16, [&](std::size_t i) {
-    const Eigen::Quaterniond level = level_from_body(stem_up(run.views[i]));
+    const Eigen::Quaterniond level =
+        level_from_body(stem_up(run.views[i], run.steps[i].up.up_in_body));
     const Pose body_from_level(level.inverse(), Eigen::Vector3d::Zero());
     placed.points[i] = stem_points(run.views[i], level);
     placed.before[i] = run.steps[i].world_from_body * body_from_level;

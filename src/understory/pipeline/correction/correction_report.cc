@@ -74,8 +74,10 @@ void report_correction(const StemCorrectionConfig& config, const CorrectionRun& 
   }
   if (run.truth) documents.compare_with_truth(compare_with_truth(trajectory, *run.truth));
   report.remarks.push_back(
-      "The vertical is known from the stems alone. Over a long path the map may tilt by degrees. "
-      "Distances in the plane are right, heights far apart may not be.");
+      run.evidence.imu_used
+          ? "The vertical is known from gravity, by the IMU, and from the stems."
+          : "The vertical is known from the stems alone. Over a long path the map may tilt by "
+            "degrees. Distances in the plane are right, heights far apart may not be.");
   report.scans = scans_of(run);
   add_loops(run, report);
   report.loop_closure_enabled = config.close_loops;

@@ -72,7 +72,8 @@ CorrectionInput correction_input(SparseFrontEnd& front_end, const ReadRecording&
 std::string SparseFrontEnd::why_no_map(const Recording& source) const {
   if (!path_.empty())
     return fmt::format(
-        "no stems in any of its {} scans: expected upright stems in scans with ring numbers",
+        "no stems in any of its {} scans: expected upright stems in scans with ring numbers, and a "
+        "lidar whose rings are level within 25 degrees, upright or upside down",
         path_.size());
   std::string topics;
   for (const TopicReport& topic : source.topics())
