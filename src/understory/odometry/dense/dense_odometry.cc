@@ -73,6 +73,7 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
                                      const ScanKnowledge& known) {
   DenseEstimate estimate;
   const double cpu_start = process_cpu_seconds();
+  if (!rig_.further_lidars.empty()) note_lidars(scan);
   {
     const ScopedTimer timer(times_, "odometry");
     estimate.scan_end = scan.end();
@@ -106,6 +107,14 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
   }
   estimate.cpu_ms = 1e3 * (process_cpu_seconds() - cpu_start);
   return estimate;
+}
+
+void DenseOdometry::note_lidars(const Scan& scan) {
+  std::uint64_t lidars = 0;
+  for (const ScanPoint& point : scan.points)
+    lidars |= std::uint64_t{1} << (point.ring / kRingsALidar);
+  if ((lidars & ~lidars_) != 0) usual_inliers_ = 0.0;
+  lidars_ |= lidars;
 }
 
 void DenseOdometry::preprocess(const Scan& scan, const std::vector<StampedPose>& path,
@@ -262,6 +271,7 @@ void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
 void DenseOdometry::save(BinaryWriter& writer) const {
   writer.put(last_matched_);
   writer.put(usual_inliers_);
+  writer.put(lidars_);
   writer.put(last_scan_);
   scan_motion_.save(writer);
   motion_->save(writer);
@@ -270,6 +280,7 @@ void DenseOdometry::save(BinaryWriter& writer) const {
 void DenseOdometry::load(BinaryReader& reader) {
   last_matched_ = reader.get<bool>();
   usual_inliers_ = reader.get<double>();
+  lidars_ = reader.get<std::uint64_t>();
   last_scan_ = reader.get<TimeNs>();
   scan_motion_.load(reader);
   motion_->load(reader);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -138,6 +139,8 @@ class DenseOdometry {
                          const std::vector<StampedPose>& guess, DenseEstimate& estimate);
   void watch_scan_motion(const Scan& scan, const MatchTargetPtr& local_map,
                          const std::vector<StampedPose>& guess, const DenseEstimate& estimate);
+  // A lidar that joins sees what is not in the map yet: what was found before says nothing then.
+  void note_lidars(const Scan& scan);
   void match(const MatchTarget& local_map, const NavState& predicted, const PoseTerms& known,
              DenseEstimate& estimate);
 
@@ -155,6 +158,7 @@ class DenseOdometry {
   std::vector<std::uint8_t> keep_;  // workspace: points of the scan outside the machine
   ScanMotionWatch scan_motion_;
   double usual_inliers_ = 0.0;  // running mean of the inlier ratio of matches; 0: none yet
+  std::uint64_t lidars_ = 0;    // that have given points, a bit each
 };
 
 }  // namespace understory

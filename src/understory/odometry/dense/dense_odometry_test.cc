@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "understory/odometry/test_carrier.h"
 #include "understory/registration/ndt/ndt_matcher.h"
@@ -110,6 +113,39 @@ TEST_F(LookingAround, ScansWithoutAnImuAreMatchedElastically) {
   EXPECT_TRUE(timed(times, "matching_elastic"));
   EXPECT_LT(elastic, 0.022);
   EXPECT_LT(elastic, 0.8 * rigid);
+}
+
+// Three points of a second lidar for each of the first one, where nothing is mapped.
+Scan with_another_lidar(Scan scan, std::uint16_t first_ring) {
+  const std::vector<ScanPoint> own = scan.points;
+  for (int copy = 1; copy <= 3; ++copy) {
+    for (ScanPoint point : own) {
+      point.z += 40.0F * static_cast<float>(copy);
+      point.ring = first_ring;
+      scan.points.push_back(point);
+    }
+  }
+  return scan;
+}
+
+TEST_F(LookingAround, ALidarThatJoinsIsNoReasonToDoubtTheMatch) {
+  Rig rig;
+  rig.further_lidars.push_back({Pose(), kRingsALidar});
+  const auto last_of = [&](std::uint16_t first_ring) {
+    StageTimes times;
+    Log log;
+    DenseOdometry odometry({}, rig, nullptr, times, log);
+    odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+    const MatchTargetPtr local_map = map();
+    for (int i = 0; i < 3; ++i)
+      EXPECT_TRUE(odometry.process(scan(kPeriod * i), local_map).matched);
+    return odometry.process(with_another_lidar(scan(kPeriod * 3), first_ring), local_map);
+  };
+  EXPECT_TRUE(last_of(kRingsALidar).matched);
+  // The same points by the lidar that was there before are a reason.
+  const DenseEstimate doubted = last_of(0);
+  EXPECT_FALSE(doubted.matched);
+  EXPECT_EQ(doubted.match.reason, "suddenly much less than before");
 }
 
 }  // namespace
