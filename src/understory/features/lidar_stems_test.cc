@@ -11,8 +11,8 @@
 namespace understory {
 namespace {
 
-// A lidar with 16 level rings within a round wall at 12 m, with two stems of 0.3 m at `places` (frame of
-// the lidar).
+// A lidar with 16 level rings within a round wall at 12 m, with two stems of 0.3 m at `places`
+// (frame of the lidar).
 Scan scan_with_stems(const std::vector<Eigen::Vector2d>& places) {
   Scan scan;
   scan.ring_count = 16;
