@@ -27,6 +27,7 @@ class ExtrinsicsFile {
     std::optional<std::string> body_frame;
     std::optional<std::string> lidar_model;
     std::optional<Pose> body_from_lidar;
+    std::optional<double> late_s;  // of the only lidar
     std::optional<Pose> body_from_imu;
     std::optional<Pose> body_from_gnss;
     std::optional<Pose> body_from_second_gnss;
@@ -67,16 +68,18 @@ class ExtrinsicsFile {
         given.body_from_gnss = read_pose(value, key);
       } else if (key == "body_from_second_gnss") {
         given.body_from_second_gnss = read_pose(value, key);
+      } else if (key == "late_s") {
+        given.late_s = read_lateness(value, key);
       } else if (key == "lidars") {
         read_lidars(value, given);
       } else {
         problem(key,
-                "unknown key; expected body_frame, lidar_model, body_from_lidar, lidars, "
+                "unknown key; expected body_frame, lidar_model, body_from_lidar, late_s, lidars, "
                 "body_from_imu, body_from_gnss or body_from_second_gnss");
       }
     }
-    if (!given.lidars.empty() && (given.body_from_lidar || given.lidar_model))
-      problem("lidars", "expected no body_from_lidar or lidar_model beside the list");
+    if (!given.lidars.empty() && (given.body_from_lidar || given.lidar_model || given.late_s))
+      problem("lidars", "expected no body_from_lidar, lidar_model or late_s beside the list");
     return given;
   }
 
@@ -395,6 +398,10 @@ std::vector<ListedLidar> lidars_of_file(const std::string& path) {
   for (const ExtrinsicsFile::Given::Lidar& lidar : read_extrinsics(path).lidars)
     lidars.push_back(lidar.listed);
   return lidars;
+}
+
+double lateness_of_file(const std::string& path) {
+  return read_extrinsics(path).late_s.value_or(0.0);
 }
 
 void apply_extrinsics_file(const std::string& path, const std::vector<std::string>& body_names,

@@ -49,10 +49,12 @@ bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& ri
 //     body_frame: base_link
 //     lidar_model: VLP-16
 //     body_from_lidar: {translation_m: [0, 0, 1.2], rotation_xyzw: [0, 0, 0, 1]}
+//     late_s: 0.02
 //     body_from_imu: {translation_m: [0, 0, 0], rpy_deg: [0, 0, 90]}
 //     body_from_gnss: {translation_m: [0, 0, 2]}
 //     body_from_second_gnss: {translation_m: [1, 0, 2]}
-// Several lidars stand in a list instead of body_from_lidar; `lidar_entry` counts its entries:
+// Several lidars stand in a list instead of body_from_lidar and late_s; `lidar_entry` counts its
+// entries:
 //     lidars:
 //       - {topic: /front, body_from_lidar: {translation_m: [1, 0, 2]}, late_s: 0.03}
 //       - {topic: /rear, body_from_lidar: {translation_m: [-1, 0, 2], rpy_deg: [0, 0, 180]}}
@@ -74,5 +76,7 @@ struct ListedLidar {
 };
 // The list of an extrinsics file, empty where it has none. Throws as `apply_extrinsics_file`.
 [[nodiscard]] std::vector<ListedLidar> lidars_of_file(const std::string& path);
+// `late_s` of the only lidar of such a file, 0 where it says nothing. Throws as the others.
+[[nodiscard]] double lateness_of_file(const std::string& path);
 
 }  // namespace understory

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "understory/pipeline/calibration/lidar_path.h"
+#include "understory/recording/lidars/merged_lidars.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
 #include "understory/util/files/staged_output.h"
@@ -28,9 +30,19 @@ bool is_lidar_imu_file(const std::string& name) {
   return name == kExtrinsicsFile || name == kLidarImuFile || name == kLidarPathFile;
 }
 
-std::string extrinsics_yaml(const Rig& rig) {
-  return fmt::format("body_frame: {}\nbody_from_lidar: {}\nbody_from_imu: {}\n", rig.body_frame,
-                     pose_yaml(rig.body_from_lidar), pose_yaml(*rig.body_from_imu));
+std::string extrinsics_yaml(const Rig& rig, const std::optional<double>& lidar_late_s) {
+  std::string text = fmt::format("body_frame: {}\nbody_from_lidar: {}\n", rig.body_frame,
+                                 pose_yaml(rig.body_from_lidar));
+  if (lidar_late_s) text += fmt::format("late_s: {:.6f}\n", *lidar_late_s);
+  return text + fmt::format("body_from_imu: {}\n", pose_yaml(*rig.body_from_imu));
+}
+
+// What `map` is to take from the stamps of the lidar: what the recording was read with, and what
+// was found on top of it. Nothing where the clock was not found.
+std::optional<double> lidar_lateness(const LidarImuRequest& request, const LidarImuResult& result) {
+  if (!result.lateness_found) return std::nullopt;
+  const double read_with = request.path_file.empty() ? lateness_of(request.open) : 0.0;
+  return read_with - result.imu_late_s;
 }
 
 std::string calibration_json(const LidarImuOutcome& outcome) {
@@ -127,7 +139,7 @@ LidarImuOutcome run_lidar_imu_calibration(const LidarImuRequest& request, Log& l
     file.write(text);
     file.commit();
   };
-  write(kExtrinsicsFile, extrinsics_yaml(outcome.rig));
+  write(kExtrinsicsFile, extrinsics_yaml(outcome.rig, lidar_lateness(request, outcome.result)));
   write(kLidarImuFile, calibration_json(outcome));
   write_path(folder.part() / kLidarPathFile, path);
   folder.commit();

@@ -36,6 +36,9 @@ struct NamedLidar {
 // Those of --lidar-topic A,B, else all that the extrinsics file lists; none where the options name
 // none. Throws ConfigError where options and file contradict each other.
 [[nodiscard]] std::vector<NamedLidar> named_lidars(const OpenOptions& options);
+// How late the stamps of the first lidar are by the extrinsics file; seconds, 0 where it says
+// nothing. Throws as `named_lidars`.
+[[nodiscard]] double lateness_of(const OpenOptions& options);
 // To open that one alone.
 [[nodiscard]] OpenOptions options_for(const NamedLidar& lidar, const OpenOptions& options);
 

@@ -304,6 +304,22 @@ TEST(OpenLidars, TakesAllThatTheFileListsOrThoseThatAreNamed) {
   EXPECT_EQ(read.scans.front()->stamp, test::kStart - 500 * kMs);
 }
 
+TEST(OpenLidars, TheOnlyLidarHasALatenessToo) {
+  OpenOptions options;
+  options.extrinsics_file =
+      write_file("late_lidar.yaml", "body_from_lidar: {translation_m: [0, 0, 1]}\nlate_s: 0.25\n");
+  Log log;
+  const OpenOneLidar open = [](const OpenOptions& /*own*/, Log& /*log*/) {
+    return std::make_unique<FakeRecording>(two_plans()[0]);
+  };
+  for (const char* topic : {"", "/front"}) {
+    options.lidar_topic = topic;
+    EXPECT_EQ(lateness_of(options), 0.25);
+    const auto read = read_all(*open_lidars("r", options, open, log));
+    EXPECT_EQ(read.scans.front()->stamp, test::kStart - 250 * kMs);
+  }
+}
+
 TEST(OpenLidars, RefusesWhatContradictsItself) {
   const OpenOneLidar open = [](const OpenOptions& /*own*/, Log& /*log*/) {
     return std::make_unique<FakeRecording>(two_plans()[0]);
@@ -317,6 +333,8 @@ TEST(OpenLidars, RefusesWhatContradictsItself) {
   };
   refused("/a,/a", "");
   refused("/a,", "");
+  refused("", "late_s: 0.1\nlidars:\n- {topic: /a}\n");
+  refused("", "late_s: soon\n");
   refused("/a,/b", "body_from_lidar: {translation_m: [0, 0, 1]}\n");
   refused("/a,/b", "lidars: [{topic: /a}]\n");
   refused("", "lidars: []\n");

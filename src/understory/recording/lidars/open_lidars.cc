@@ -27,7 +27,16 @@ std::vector<std::string> names_in(const std::string& list) {
   return names;
 }
 
+double lateness_by_file(const OpenOptions& options) {
+  return options.extrinsics_file.empty() ? 0.0 : lateness_of_file(options.extrinsics_file);
+}
+
 }  // namespace
+
+double lateness_of(const OpenOptions& options) {
+  const std::vector<NamedLidar> named = named_lidars(options);
+  return named.empty() ? lateness_by_file(options) : named.front().late_s;
+}
 
 std::vector<NamedLidar> named_lidars(const OpenOptions& options) {
   std::vector<NamedLidar> listed;
@@ -44,7 +53,7 @@ std::vector<NamedLidar> named_lidars(const OpenOptions& options) {
     if (entry != listed.end()) {
       named.push_back(*entry);
     } else if (listed.empty()) {
-      named.push_back({name, 0.0, static_cast<int>(named.size())});
+      named.push_back({name, lateness_by_file(options), static_cast<int>(named.size())});
     } else {
       throw ConfigError(
           {options.extrinsics_file + ": lidars: expected an entry with topic " + name});
@@ -67,7 +76,7 @@ OpenOptions options_for(const NamedLidar& lidar, const OpenOptions& options) {
 std::unique_ptr<Recording> open_lidars(const std::string& file, const OpenOptions& options,
                                        const OpenOneLidar& open, Log& log) {
   const std::vector<NamedLidar> chosen = named_lidars(options);
-  if (chosen.empty()) return open(options, log);
+  if (chosen.empty()) return without_lateness(open(options, log), lateness_by_file(options));
   if (chosen.size() > recording_constants::merged_lidars::kMostLidars)
     throw ConfigError({"expected 16 lidars at most"});
   std::vector<LidarReader> readers;
