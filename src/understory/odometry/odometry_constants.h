@@ -184,8 +184,8 @@ inline constexpr double kFirstForceS = 1.0;
 // Cosine between two directions that are tried as up: closer ones find the same stems
 // [bound: stems are found with up wrong by 25 degrees]
 inline constexpr double kSameUp = 0.99;
-// Times the stems that stand along a direction that was tried earlier [tuned: the right way up has
-// 1.35 to 5 times as many as upside down, demo with 16 and 128 rings, lieksa2, harvester, lohja1
+// Times the stems that stand along a direction that was tried earlier. The right way up has 1.35 to
+// 5 times as many as upside down. [tuned on demo with 16 and 128 rings, lieksa2, harvester, lohja1
 // and the walk of tests/bad_input, whose accelerometer may be reversed]
 inline constexpr double kMoreStanding = 1.2;
 // stems along a direction that is tried later: fewer may be chance [chosen]
