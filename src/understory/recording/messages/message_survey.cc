@@ -191,7 +191,8 @@ std::string choose(const MessageSurvey& survey, const std::string& named, const 
                      "no such " + what + " topic" + (known.empty() ? "" : "; there are " + known));
   if (count > 1)
     log.warn("recording.several_" + what + "_topics",
-             file + ": several " + what + " topics (" + known + "); using " + best->topic);
+             file + ": several " + what + " topics (" + known + "); using " + best->topic +
+                 (what == "lidar" ? "; --lidar-topic A,B merges lidars of one machine" : ""));
   return best == nullptr ? "" : best->topic;
 }
 
