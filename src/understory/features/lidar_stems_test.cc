@@ -99,6 +99,25 @@ TEST(LidarStems, RingsOfTheSecondLidarAreLevelInItsOwnFrame) {
   EXPECT_FALSE(all_have_level_rings(made.merged, Rig()));  // taken for the first lidar
 }
 
+TEST(LidarStems, UpIsThatOfTheLidarThatSeesMostInTheFrameOfTheFirst) {
+  const Eigen::Vector3d given(0.0, 0.6, 0.8);
+  std::vector<LidarStems> lidars(2);
+  EXPECT_EQ(up_by_stems(lidars, given), given);
+  lidars[0].found.stems.resize(1);
+  lidars[0].found.up = Eigen::Vector3d::UnitZ();
+  lidars[0].body_from_lidar =
+      Pose(Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * EIGEN_PI, Eigen::Vector3d::UnitZ())),
+           Eigen::Vector3d::Zero());
+  EXPECT_EQ(up_by_stems(lidars, given), Eigen::Vector3d::UnitZ());
+  // The second one lies on its side: its x axis is up in the body, and in the first one.
+  lidars[1].found.stems.resize(2);
+  lidars[1].found.up = Eigen::Vector3d::UnitX();
+  lidars[1].body_from_lidar =
+      Pose(Eigen::Quaterniond(Eigen::AngleAxisd(-0.5 * EIGEN_PI, Eigen::Vector3d::UnitY())),
+           Eigen::Vector3d::Zero());
+  EXPECT_TRUE(up_by_stems(lidars, given).isApprox(Eigen::Vector3d::UnitZ(), 1e-12));
+}
+
 TEST(LidarStems, OfOneLidarStayAsTheyAre) {
   std::vector<Stem> stems(2);
   drop_double_stems({0}, stems);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 namespace understory {
@@ -22,7 +23,7 @@ Walk walk(const Lift& lift_m, int feet = 6) {
                     {1.0 * i, 0.0, 0.1 * i + 1.5});
     StemView view;
     for (int k = 0; k < feet; ++k) {
-      const double angle = 2.0 * M_PI * k / 6.0;
+      const double angle = 0.5 * M_PI + 0.2 * (k - 2.5);  // all on the side that the tilt lifts
       Eigen::Vector3d foot =
           pose.translation() + Eigen::Vector3d(3.0 * std::cos(angle), 3.0 * std::sin(angle), 0.0);
       foot.z() = 0.1 * foot.x() - lift_m(i);

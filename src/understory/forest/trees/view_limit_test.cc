@@ -55,6 +55,19 @@ TEST(ViewLimit, AFlatViewCutsTheTreesBesideThePath) {
   EXPECT_LT(right_and_told, 0.4 * right);
 }
 
+TEST(ViewLimit, TreesThatEndFarBelowTheViewAreComplete) {
+  Stand stand(0.4);
+  // 10 m from the path the view ends at 5 m.
+  const std::size_t first = stand.trees.size();
+  for (int i = 0; i < 5; ++i)
+    stand.trees.push_back({1.5, 0.06, 10.0 + 0.1 * i});
+  stand.trees.push_back({4.8, 0.2, 10.0});
+  const std::vector<char> ends = ends_with_the_view(stand.trees);
+  for (std::size_t i = first; i + 1 < ends.size(); ++i)
+    EXPECT_EQ(ends[i], 0) << i;
+  EXPECT_EQ(ends.back(), 1);
+}
+
 TEST(ViewLimit, FewTreesAndUnknownOnesTellNothing) {
   Stand stand(0.4);
   const double unknown = std::numeric_limits<double>::quiet_NaN();

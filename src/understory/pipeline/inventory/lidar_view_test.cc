@@ -2,8 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
 #include "understory/output/run_tables.h"
 #include "understory/util/files/folder_test_support.h"
+#include "understory/util/random.h"
 
 namespace understory {
 namespace {
@@ -38,6 +46,33 @@ TEST(LidarView, KnowsHowHighAndWhereTheLidarLooks) {
   EXPECT_TRUE(view.covers(front(-40.0)));  // below is no matter of tops
   EXPECT_FALSE(view.covers(front(15.5)));
   EXPECT_FALSE(view.covers({-30.0, 0.0, 1.0}));
+}
+
+// Most points are left out by their slope: the highest of each direction are found all the same.
+TEST(LidarView, IsThatOfTheHighestPointsAmongMany) {
+  LidarView view;
+  std::array<double, LidarView::kSectors> highest{};
+  highest.fill(-90.0);
+  std::vector<KeyframePoint> points;
+  Random random(3);
+  for (int i = 0; i < 20'000; ++i) {
+    const double azimuth = random.uniform(-180.0, 180.0);
+    const double most = 20.0 + 0.1 * azimuth;  // the view is higher to one side
+    const double elevation = random.uniform(-20.0, most);
+    const double a = azimuth * M_PI / 180.0;
+    const double range = random.uniform(2.0, 40.0);
+    const Eigen::Vector3f p(static_cast<float>(range * std::cos(a)),
+                            static_cast<float>(range * std::sin(a)),
+                            static_cast<float>(range * std::tan(elevation * M_PI / 180.0)));
+    points.push_back({p.x(), p.y(), p.z(), 0, 0});
+    const auto sector = static_cast<std::size_t>((azimuth + 180.0) / 10.0);
+    const Eigen::Vector3d exact = p.cast<double>();
+    highest[sector] =
+        std::max(highest[sector], std::atan2(exact.z(), exact.head<2>().norm()) * 180.0 / M_PI);
+  }
+  view.add(points);
+  for (std::size_t i = 0; i < highest.size(); ++i)
+    EXPECT_NEAR(view.highest_deg[i], highest[i], 1e-9) << "sector " << i;
 }
 
 TEST(LidarView, ATopIsSeenFromFarEnoughAndNotFromTooFar) {
