@@ -14,6 +14,20 @@ namespace {
 
 constexpr std::size_t kKeysAhead = 64;
 
+// Keys of up to kKeysAhead points. Loops of their own, so that the compiler makes vectors of them.
+void find_keys(const Eigen::Vector3f* points, std::size_t count, float scale,
+               std::array<std::uint64_t, kKeysAhead>& keys) {
+  std::array<std::array<int, kKeysAhead>, 3> cells;
+  const float* coordinates = points->data();
+  for (std::size_t i = 0; i < count; ++i) {
+    cells[0][i] = voxel_floor(coordinates[3 * i] * scale);
+    cells[1][i] = voxel_floor(coordinates[3 * i + 1] * scale);
+    cells[2][i] = voxel_floor(coordinates[3 * i + 2] * scale);
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    keys[i] = voxel_key(cells[0][i], cells[1][i], cells[2][i]);
+}
+
 constexpr auto take_all = [](std::uint32_t) { return true; };
 constexpr auto take_no_note = [](const auto&, std::uint32_t) {};
 
@@ -71,9 +85,9 @@ void VoxelFilter::grow() {
   }
 }
 
-inline std::uint32_t VoxelFilter::find_or_add(std::uint64_t key, std::uint32_t index,
-                                              const Eigen::Vector3f& point) {
-  std::uint64_t at = voxel_hash(key) & mask_;
+inline std::uint32_t VoxelFilter::find_or_add(std::uint64_t key, std::uint64_t hash,
+                                              std::uint32_t index, const Eigen::Vector3f& point) {
+  std::uint64_t at = hash & mask_;
   while (slots_[at].epoch == epoch_) {
     if (slots_[at].key == key) return slots_[at].voxel;
     at = (at + 1) & mask_;
@@ -96,19 +110,19 @@ void VoxelFilter::sort_into_voxels(const Points& points, double voxel_size_m,
   const auto scale = static_cast<float>(1.0 / voxel_size_m);
   // Keys a block ahead, so that the memory of the slots is asked for before it is needed.
   std::array<std::uint64_t, kKeysAhead> keys;
+  std::array<std::uint64_t, kKeysAhead> hashes;
   for (std::size_t begin = 0; begin < points.size(); begin += kKeysAhead) {
     const std::size_t end = std::min(points.size(), begin + kKeysAhead);
+    find_keys(points.data() + begin, end - begin, scale, keys);
     for (std::size_t i = begin; i < end; ++i) {
-      const Eigen::Vector3f& p = points[i];
-      keys[i - begin] = voxel_key(voxel_floor(p.x() * scale), voxel_floor(p.y() * scale),
-                                  voxel_floor(p.z() * scale));
-      __builtin_prefetch(slots_.data() + (voxel_hash(keys[i - begin]) & mask_));
+      hashes[i - begin] = voxel_hash(keys[i - begin]);
+      __builtin_prefetch(slots_.data() + (hashes[i - begin] & mask_));
     }
     // Found first and added to then: the memory of the voxels is asked for in between.
     for (std::size_t i = begin; i < end; ++i) {
       const auto index = static_cast<std::uint32_t>(i);
       if (!in_range(index)) continue;
-      voxel_of_point_[i] = find_or_add(keys[i - begin], index, points[i]);
+      voxel_of_point_[i] = find_or_add(keys[i - begin], hashes[i - begin], index, points[i]);
       __builtin_prefetch(voxels_.data() + voxel_of_point_[i]);
     }
     for (std::size_t i = begin; i < end; ++i) {

@@ -60,7 +60,8 @@ class VoxelFilter {
   };
   static constexpr std::uint32_t kNone = 0xffffffffU;
   void start(std::size_t points);
-  std::uint32_t find_or_add(std::uint64_t key, std::uint32_t index, const Eigen::Vector3f& point);
+  std::uint32_t find_or_add(std::uint64_t key, std::uint64_t hash, std::uint32_t index,
+                            const Eigen::Vector3f& point);
   void grow();
   template <typename InRange, typename Note>
   void sort_into_voxels(const Points& points, double voxel_size_m, const InRange& in_range,

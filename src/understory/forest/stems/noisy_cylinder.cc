@@ -23,7 +23,9 @@ double quick_exp(double x) {
   constexpr double kLog2e = 1.4426950408889634;
   constexpr double kLn2 = 0.6931471805599453;
   constexpr double kToBits = 0x1.8p52;  // its last bits count ones
-  const double whole = std::floor(x * kLog2e + 0.5);
+  constexpr double kLeast = -60.0;      // a chance of 1e-26 counts as none
+  // Rounded by an addition: the compiler makes no vectors of std::floor, which may trap.
+  const double whole = (x * kLog2e + kToBits) - kToBits;
   const double r = x - whole * kLn2;  // at most 0.35
   double sum = 1.0 / 40320.0;
   for (const double term :
@@ -31,8 +33,13 @@ double quick_exp(double x) {
     sum = sum * r + term;
   const std::uint64_t exponent = std::bit_cast<std::uint64_t>(whole + kToBits) + 1023;
   const double power = sum * std::bit_cast<double>(exponent << 52);
-  return x < -60.0 ? 0.0 : power;
+  // A mask and no branch, which would keep the compiler from making vectors.
+  const std::uint64_t kept = -static_cast<std::uint64_t>(x >= kLeast);
+  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(power) & kept);
 }
+
+// Numbers that the loops over places take at once, at most.
+constexpr int kVector = 4;
 
 // A point seen along the stem: place in the plane across it, relative to the start's centre line.
 struct FlatPoint {
@@ -132,8 +139,13 @@ class Estimator {
     }
     for (std::size_t b = 0; b < count; ++b)
       outward_.push_back(outward_[b]);
-    shares_.resize(outward_.size());
-    squares_.resize(outward_.size());
+    for (const Eigen::Vector2d& outward : outward_) {
+      outward_x_.push_back(outward.x());
+      outward_y_.push_back(outward.y());
+    }
+    const std::size_t padded = outward_.size() + kVector;
+    for (std::vector<double>* all : {&outward_x_, &outward_y_, &shares_, &squares_})
+      all->resize(padded);
     for (int k = 0; k < kViews; ++k) {
       const double turn = 2.0 * M_PI * k / kViews;
       const Eigen::Vector2d towards(std::cos(turn), std::sin(turn));
@@ -156,22 +168,31 @@ class Estimator {
   };
 
   // Squared distances of a point from the places [begin, end), and the chances that it came from
-  // them. Loops of their own, so that the compiler makes vectors of the exponentials.
+  // them. Loops of their own over separate coordinates, so that the compiler makes vectors of them.
+  // The loops end at a whole vector: what lies between is not used.
   void find_shares(int begin, int end, const Eigen::Vector2d& q, double r, double inverse) {
     const auto count = static_cast<int>(visible_.size());
-    for (int b = begin; b < end; ++b) {
-      const auto i = static_cast<std::size_t>(b);
-      squares_[i] = (q - r * outward_[i]).squaredNorm();
-    }
-    double* shares = shares_.data();
-    const double* squares = squares_.data();
-    for (int b = begin; b < end; ++b)
+    const int whole = (end - begin + kVector - 1) / kVector * kVector;
+    const double* x = outward_x_.data() + begin;
+    const double* y = outward_y_.data() + begin;
+    double* squares = squares_.data() + begin;
+    double* shares = shares_.data() + begin;
+    const double qx = q.x();
+    const double qy = q.y();
+    for (int b = 0; b < whole; ++b)
+      shares[b] = (qx - r * x[b]) * (qx - r * x[b]);
+    for (int b = 0; b < whole; ++b)
+      squares[b] = (qy - r * y[b]) * (qy - r * y[b]);
+    for (int b = 0; b < whole; ++b)
+      squares[b] += shares[b];
+    for (int b = 0; b < whole; ++b)
       shares[b] = quick_exp(-0.5 * squares[b] * inverse);
-    const int turn = std::min(end, count);
-    for (int b = begin; b < turn; ++b)
-      shares[b] *= visible_[static_cast<std::size_t>(b)];
-    for (int b = turn; b < end; ++b)
-      shares[b] *= visible_[static_cast<std::size_t>(b - count)];
+    const double* visible = visible_.data();
+    const int turn = std::min(end, count) - begin;
+    for (int b = 0; b < turn; ++b)
+      shares[b] *= visible[begin + b];
+    for (int b = std::max(0, turn); b < end - begin; ++b)
+      shares[b] *= visible[begin + b - count];
   }
 
   void add_point(const FlatPoint& point, Sums& sums, std::vector<double>& seen) {
@@ -300,8 +321,10 @@ class Estimator {
   double scatter_ = 0.0;
   double strays_ = kFirstStrays;
   double stray_density_ = 1.0;
-  std::vector<double> visible_;             // share of the returns that come from each place
-  std::vector<Eigen::Vector2d> outward_;    // of the places, twice round
+  std::vector<double> visible_;           // share of the returns that come from each place
+  std::vector<Eigen::Vector2d> outward_;  // of the places, twice round
+  std::vector<double> outward_x_;         // the same, for vectors
+  std::vector<double> outward_y_;
   std::vector<double> views_;               // share of the returns from each direction
   std::vector<std::vector<double>> lobes_;  // what each direction sees of each place
   // Of a point, along `outward_`: chance that it came from there, and squared distance.
