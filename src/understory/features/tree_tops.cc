@@ -150,16 +150,23 @@ std::vector<TreeTop> find_tree_tops(std::span<const Eigen::Vector3f> points,
   return tops;
 }
 
-std::vector<Eigen::Vector3f> top_points(std::span<const Eigen::Vector3f> points,
-                                        const std::vector<TreeTop>& tops) {
-  std::vector<char> taken(points.size(), 0);
+std::vector<std::size_t> top_indices(std::size_t points, const std::vector<TreeTop>& tops) {
+  std::vector<char> taken(points, 0);
   for (const TreeTop& top : tops) {
     for (const std::size_t i : top.neighbours)
       taken[i] = 1;
   }
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < points; ++i)
+    if (taken[i] != 0) indices.push_back(i);
+  return indices;
+}
+
+std::vector<Eigen::Vector3f> top_points(std::span<const Eigen::Vector3f> points,
+                                        const std::vector<TreeTop>& tops) {
   std::vector<Eigen::Vector3f> result;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    if (taken[i] != 0) result.push_back(points[i]);
+  for (const std::size_t i : top_indices(points.size(), tops))
+    result.push_back(points[i]);
   return result;
 }
 

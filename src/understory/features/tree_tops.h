@@ -37,6 +37,10 @@ struct TreeTop {
 [[nodiscard]] std::vector<TreeTop> find_tree_tops(std::span<const Eigen::Vector3f> points,
                                                   const TreeTopConfig& config);
 
+// Indices of the tops and of the points around them, ascending, each once, of `points` points.
+[[nodiscard]] std::vector<std::size_t> top_indices(std::size_t points,
+                                                   const std::vector<TreeTop>& tops);
+
 // The cloud that P2 registers: the tops and the points around them, each once, in the order given.
 [[nodiscard]] std::vector<Eigen::Vector3f> top_points(std::span<const Eigen::Vector3f> points,
                                                       const std::vector<TreeTop>& tops);

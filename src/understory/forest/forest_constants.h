@@ -15,6 +15,11 @@
 // or real clouds and measurements by their page.
 namespace understory::forest_constants {
 
+namespace obstacles {  // forest/obstacles.cc
+// cells of the free height, or they are made wider [bound: 160 MB]
+inline constexpr double kMostCells = 4e7;
+}  // namespace obstacles
+
 namespace cloud_shape {  // forest/cloud_shape.cc
 // points of a cloud that are looked at [bound: time]
 inline constexpr std::size_t kMostPoints = 400'000;

@@ -107,6 +107,12 @@ std::vector<Layer> layers_of(const std::vector<std::string>& vectors,
     layers.push_back({"dsm", "height of the surface", "./dsm.tif", "gdal", "type=\"raster\"", ""});
   if (there("dtm.tif"))
     layers.push_back({"dtm", "height of the ground", "./dtm.tif", "gdal", "type=\"raster\"", ""});
+  if (there("free_height.tif"))
+    layers.push_back({"free_height", "free height below obstacles", "./free_height.tif", "gdal",
+                      "type=\"raster\"", "", false});
+  if (there("obstacles.laz"))
+    layers.push_back({"obstacles", "obstacles along the path", "./obstacles.laz", "pdal",
+                      "type=\"point-cloud\"", "", false});
   if (there("map.laz"))
     layers.push_back({"cloud", "points", "./map.laz", "pdal", "type=\"point-cloud\"", "", false});
   return layers;
@@ -176,7 +182,8 @@ std::string qgis_project_xml(const QgisProject& project, const std::vector<std::
 
 void write_qgis_project(const std::filesystem::path& folder, const QgisProject& project) {
   std::vector<std::string> files;
-  for (const char* name : {"trees.gpkg", "chm.tif", "dsm.tif", "dtm.tif", "map.laz"}) {
+  for (const char* name : {"trees.gpkg", "chm.tif", "dsm.tif", "dtm.tif", "free_height.tif",
+                           "obstacles.laz", "map.laz"}) {
     if (std::filesystem::exists(folder / name)) files.emplace_back(name);
   }
   AtomicFile file(folder / "map.qgs");

@@ -40,6 +40,7 @@ void describe(ConfigTable& table, DenseOdometryConfig& config) {
   table.section("preprocess", [&] {
     table.section("voxel", [&] { describe(table, config.voxel); });
     table.section("isolated", [&] { describe(table, config.isolated); });
+    describe(table, config.tops);
     table.add("machine_boxes_file", config.machine_boxes_file,
               "YAML of boxes around the machine whose points are dropped; empty: none");
   });
@@ -131,7 +132,9 @@ void DenseOdometry::clean(const Scan& scan, const std::vector<StampedPose>& path
   estimate.cloud = deskew(scan, rig_, path, keep_, config_.deskew).cloud;
   BodyCloud& cloud = estimate.cloud;
   if (features_ == nullptr) {
-    estimate.thinned = filter_.filter(cloud, config_.voxel);
+    const Pose start = path.empty() ? Pose() : path.front().world_from_body;
+    estimate.tops = keep_tree_tops(cloud, start, config_.tops);
+    estimate.thinned = filter_.filter(estimate.tops ? *estimate.tops : cloud, config_.voxel);
     return;
   }
   cloud.feature = features_->find({&cloud.points, &cloud.ring});

@@ -9,6 +9,7 @@
 
 #include "understory/odometry/dense/scan_motion.h"
 #include "understory/odometry/dense/scan_path.h"
+#include "understory/odometry/dense/scan_tops.h"
 #include "understory/odometry/motion/motion_model.h"
 #include "understory/preprocess/body_cloud.h"
 #include "understory/preprocess/deskew.h"
@@ -47,6 +48,7 @@ void describe(ConfigTable& table, ScanMatchConfig& config);
 struct DenseOdometryConfig {
   VoxelFilterConfig voxel;  // thins a scan before matching
   IsolatedPointsConfig isolated;
+  ScanTopsConfig tops;
   ScanMatchConfig match;
   DeskewConfig deskew;
   MotionConfig motion;
@@ -67,8 +69,9 @@ struct DenseEstimate {
   RegistrationResult match;  // status kTooFewPoints where there was no map to match to
   bool matched = false;      // the match was usable and was offered to the motion model
   BodyCloud cloud;           // every return outside the machine, deskewed, body frame at the stamp
-  BodyCloud thinned;         // what was matched, of the cloud
-  TimeNs scan_end = 0;       // time of the scan's last point
+  std::optional<BodyCloud> tops;  // of the cloud, where tree tops alone count
+  BodyCloud thinned;              // what was matched, of the tops or of the cloud
+  TimeNs scan_end = 0;            // time of the scan's last point
   double wall_ms = 0.0;
   double cpu_ms = 0.0;
 };

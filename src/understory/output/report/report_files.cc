@@ -16,7 +16,7 @@ struct ResultFile {
 };
 
 // In the order in which a user wants them; docs/reference/outputs.md has their columns.
-constexpr std::array<ResultFile, 26> kResultFiles = {
+constexpr std::array<ResultFile, 28> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
      {"stem_curves.csv", "diameters along each stem", "a spreadsheet"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
@@ -28,6 +28,8 @@ constexpr std::array<ResultFile, 26> kResultFiles = {
      {"dtm.tif", "height of the ground", "QGIS"},
      {"chm.tif", "height of the canopy above the ground", "QGIS"},
      {"dsm.tif", "height of the surface, treetops included", "QGIS"},
+     {"obstacles.laz", "points that stand in the way along the path", "CloudCompare, QGIS"},
+     {"free_height.tif", "free height above the ground along the path", "QGIS"},
      {"trajectory.tum", "the path of the scanner: time, place, attitude", "a text editor, evo"},
      {"trajectory_imu.tum", "the path predicted at each sample of the IMU", "a text editor, evo"},
      {"trajectory_partial.tum", "poses from parts of scans, sooner than the path",

@@ -6,6 +6,7 @@
 
 #include "understory/georeference/terrain_file.h"
 #include "understory/output/layer_files.h"
+#include "understory/output/obstacle_files.h"
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/clouds/las.h"
 
@@ -45,8 +46,14 @@ struct Move {
   }
 };
 
+// The picture that a cloud is drawn into, and its frame; null: none.
+struct Drawing {
+  const LayerFrame& frame;
+  MapPicture* picture;
+};
+
 void move_cloud(const fs::path& from, const fs::path& to, const Move& move, const Raster& ground,
-                const LayerFrame& drawing, MapPicture& picture, Log& log) {
+                const Drawing& drawing, Log& log) {
   const auto file = open_file(from.string());
   const LasHeader header = read_las_header(*file);
   LasOptions options = las_options(move.to);
@@ -65,12 +72,13 @@ void move_cloud(const fs::path& from, const fs::path& to, const Move& move, cons
         static_cast<std::uint16_t>(std::clamp(std::lround(point.intensity), 0L, 65535L));
     record.classification = point.classification;
     writer.add(record);
-    const Vector3d drawn = drawing.from_world(in_world);
+    if (drawing.picture == nullptr) return;
+    const Vector3d drawn = drawing.frame.from_world(in_world);
     const double height =
         ground.empty()
             ? std::numeric_limits<double>::quiet_NaN()
             : point.position.z() - ground.interpolate(point.position.x(), point.position.y());
-    picture.add(drawn.x(), drawn.y(), drawn.z(), height);
+    drawing.picture->add(drawn.x(), drawn.y(), drawn.z(), height);
   });
   writer.commit();
 }
@@ -81,11 +89,17 @@ void write_moved_layers(const RunLayers& from, const Pose& target_from_world, co
                         const LayerFrame& drawing, MapPicture& picture, Log& log) {
   const Move move{from.frame, target_from_world, to.frame, from.progress};
   const Raster ground = read_layer(from.folder / "dtm.tif");
-  if (fs::exists(from.folder / "map.laz"))
-    move_cloud(from.folder / "map.laz", to.folder / "map.laz", move, ground, drawing, picture, log);
+  const auto move_one = [&](const char* name, MapPicture* drawn) {
+    if (fs::exists(from.folder / name))
+      move_cloud(from.folder / name, to.folder / name, move, ground, {drawing, drawn}, log);
+  };
+  move_one("map.laz", &picture);
+  move_one("obstacles.laz", nullptr);
   if (ground.empty()) return;
   write_raster_layers(to.folder, ground, read_layer(from.folder / "chm.tif"), move.change(),
                       to.frame);
+  write_free_height(to.folder, read_layer(from.folder / "free_height.tif"), ground, move.change(),
+                    to.frame);
 }
 
 }  // namespace understory

@@ -31,6 +31,8 @@ const std::vector<std::string>& result_names() {
                                                  "dtm.tif",
                                                  "dsm.tif",
                                                  "chm.tif",
+                                                 "obstacles.laz",
+                                                 "free_height.tif",
                                                  "map.qgs",
                                                  "deformation.csv",
                                                  "plots.csv",

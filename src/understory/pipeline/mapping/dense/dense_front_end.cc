@@ -250,6 +250,7 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
     }
   }
   recovery_.note_scan(scan.stamp);
+  if (estimate.tops) ++received_.counts.by_tree_tops;
   const std::uint64_t content = content_of(scan);
   received_.counts.repeated += is_repetition(content, received_.counts.last_content) ? 1 : 0;
   received_.counts.last_content = content;
@@ -354,7 +355,8 @@ void DenseFrontEnd::move_world(const Pose& new_world_from_old_world) {
 FeaturePoints DenseFrontEnd::map_points(const DenseEstimate& estimate) {
   VoxelFilterConfig voxel = config_.odometry.voxel;
   const double edge = config_.keyframe_map.keyframe.voxel_size_m;
-  if (edge == 0.0) return points_in_range(estimate.cloud, voxel);
+  const BodyCloud& cloud = estimate.tops ? *estimate.tops : estimate.cloud;
+  if (edge == 0.0) return points_in_range(cloud, voxel);
   voxel.voxel_size_m = std::min(voxel.voxel_size_m, edge);
   if (!estimate.cloud.feature.empty()) {
     BodyCloud thinned = cloud_filter_.filter_features(estimate.cloud, voxel, true);
@@ -362,7 +364,7 @@ FeaturePoints DenseFrontEnd::map_points(const DenseEstimate& estimate) {
   }
   if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m)
     return {estimate.thinned.points, {}};
-  return {cloud_filter_.filter(estimate.cloud, voxel).points, {}};
+  return {cloud_filter_.filter(cloud, voxel).points, {}};
 }
 
 ScanCloudsConfig DenseFrontEnd::clouds_config() const {

@@ -52,6 +52,7 @@ struct DenseCounts {
   std::uint64_t cut_scans = 0;
   TimeNs parts_span = 0;
   TimeNs cut_scans_span = 0;
+  std::uint64_t by_tree_tops = 0;  // scans matched by their tree tops alone
 };
 
 // The front end that matches all points of a scan to a local map: keeps positioning (first graph),

@@ -107,6 +107,12 @@ std::unique_ptr<MapMaker> DenseFrontEnd::map_maker(const ReadRecording& recordin
                   ": no scan in the first messages shows what lidar this is: no setting was "
                   "adapted to it");
   }
+  if (config_.odometry.tops.points == ScanPoints::kTreeTops && received_.counts.by_tree_tops == 0) {
+    log_.warn("tree_tops.none",
+              fmt::format("preprocess.points=tree_tops: no scan has {} points around tree tops, so "
+                          "all points were matched",
+                          config_.odometry.tops.least_points));
+  }
   if (!recording.facts.stopped) {
     remark_on_input({last_imu(), last_scan_end()}, recording.source, recording.facts.time_repair,
                     recording.request.recording, log_);

@@ -36,6 +36,7 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
     table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
   });
   table.section("inventory", [&] { describe(table, config.inventory); });
+  table.section("obstacles", [&] { describe(table, config.obstacles); });
   table.section("georeference", [&] { describe(table, config.georeference); });
   table.section("gnss", [&] {
     describe(table, config.gnss);
@@ -102,6 +103,14 @@ ReadConfig<DenseMappingConfig> read_dense_mapping_config(const std::string& prof
       throw ConfigError(
           {"imu_rate: predictions for each sample of the IMU need "
            "motion.imu_enabled=true"});
+  });
+  problems.gather([&] {
+    const auto matcher = make_matcher(config.keyframe_map.local_map.matcher);
+    if (config.odometry.tops.points == ScanPoints::kTreeTops &&
+        matcher->feature_finder() != nullptr)
+      throw ConfigError(
+          {"preprocess.points: tree_tops does not go with registration.method loam or loam_ground, "
+           "which choose points of their own"});
   });
   problems.throw_if_any();
   return {config, origins};

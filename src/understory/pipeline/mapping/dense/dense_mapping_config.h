@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "understory/forest/inventory.h"
+#include "understory/forest/obstacles.h"
 #include "understory/georeference/satellites/satellite_belief.h"
 #include "understory/map/keyframe_map.h"
 #include "understory/map/map_tiles.h"
@@ -33,6 +34,7 @@ struct DenseMappingConfig {
   double map_range_max_m = 60.0;  // farther returns do not enter the finished map
   bool map_enabled = true;        // write map.laz and what is made from it
   InventoryConfig inventory = basic_inventory();
+  ObstacleConfig obstacles;
   GeoreferenceConfig georeference;
   GnssUseConfig gnss;
   SatelliteBeliefConfig satellites;

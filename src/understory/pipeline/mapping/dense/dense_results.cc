@@ -11,6 +11,7 @@
 #include "understory/output/inventory_files.h"
 #include "understory/output/las_writer.h"
 #include "understory/output/layer_files.h"
+#include "understory/output/obstacle_files.h"
 #include "understory/output/plot_files.h"
 #include "understory/output/report/map_picture.h"
 #include "understory/output/run_tables.h"
@@ -173,9 +174,11 @@ std::string title_of(const ReadRecording& recording) {
   return std::filesystem::path(recording.request.recording).filename().string();
 }
 
+// `obstacles`: written beside the map where they are wanted; may be null.
 std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
                           const InventoryResult& inventory, const ResultFrames& frames,
-                          MapPicture& picture, const ProgressSink& progress) {
+                          MapPicture& picture, ObstacleFiles* obstacles,
+                          const ProgressSink& progress) {
   LasOptions options = las_options(frames.layers);
   options.trees = inventory.owners.has_value();
   LasWriter writer(file, options);
@@ -196,6 +199,7 @@ std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
       record.tree_id = tree_at(inventory, in_world, height);
       record.height_above_ground = static_cast<float>(height);
       writer.add(record);
+      if (obstacles != nullptr) obstacles->add(in_world, height, record);
       const Eigen::Vector3d drawn = frames.local ? frames.local->from_world(in_world) : at;
       picture.add(drawn.x(), drawn.y(), drawn.z(), height);
     }
@@ -206,14 +210,22 @@ std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
   return writer.points();
 }
 
-// map.laz, trees.csv, trees.gpkg, dtm.tif, chm.tif and map.qgs. Returns the number of points.
-std::uint64_t write_map(const ReadRecording& recording, DenseProducts& made,
-                        const Trajectory& trajectory, const ResultFrames& frames,
-                        MapPicture& picture) {
+// map.laz, trees.csv, trees.gpkg, dtm.tif, chm.tif, map.qgs, and obstacles where they are wanted.
+// Returns the number of points of the map.
+std::uint64_t write_map(const ReadRecording& recording, const DenseMappingConfig& config,
+                        DenseProducts& made, const Trajectory& trajectory,
+                        const ResultFrames& frames, MapPicture& picture) {
   const std::filesystem::path& folder = recording.results;
   const InventoryResult& inventory = made.inventory;
+  std::optional<ObstacleFiles> obstacles;
+  if (config.obstacles.enabled) {
+    obstacles.emplace(folder, config.obstacles, trajectory, frames.layers,
+                      inventory.owners.has_value());
+  }
   const std::uint64_t points =
-      write_cloud(folder / "map.laz", *made.tiles, inventory, frames, picture, recording.progress);
+      write_cloud(folder / "map.laz", *made.tiles, inventory, frames, picture,
+                  obstacles ? &*obstacles : nullptr, recording.progress);
+  if (obstacles) obstacles->commit(inventory.ground.terrain, frames.layers);
   write_tree_tables(folder, inventory);
   write_tree_layers(folder, inventory.trees, trajectory, frames.layers, inventory.look_again,
                     made.figures.table.plots);
@@ -260,6 +272,8 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
   documents.count("imu_samples", counts.imu_samples);
   documents.count("gnss_fixes", front_end.fixes().size());
   documents.count("lidar_points", counts.points);
+  if (front_end.config().odometry.tops.points == ScanPoints::kTreeTops)
+    documents.count("scans_by_tree_tops", counts.by_tree_tops);
   if (front_end.satellites() != nullptr)
     documents.count("scans_by_satellites", counts.by_satellites);
 }
@@ -402,7 +416,7 @@ void take_figures(const StandTableConfig& config, const LayerFrame& layers, Dens
 }
 
 // The files of the map, if one was made.
-void add_map(const ReadRecording& recording, const StandTableConfig& stand, DenseProducts& made,
+void add_map(const ReadRecording& recording, const DenseMappingConfig& config, DenseProducts& made,
              const Trajectory& trajectory, const ResultFrames& frames, MapPicture& picture,
              RunDocuments& documents) {
   documents.count("trees", made.inventory.trees.size());
@@ -410,8 +424,8 @@ void add_map(const ReadRecording& recording, const StandTableConfig& stand, Dens
   if (!made.tiles) return;
   note_doubts(made.inventory, documents.summary());
   documents.summary().quality["area_m2"] = made.inventory.area_m2;
-  take_figures(stand, frames.layers, made, documents);
-  documents.count("map_points", write_map(recording, made, trajectory, frames, picture));
+  take_figures(config.inventory.stand, frames.layers, made, documents);
+  documents.count("map_points", write_map(recording, config, made, trajectory, frames, picture));
   if (!picture.empty()) documents.report().picture = &picture;
   documents.report().inventory = &made.inventory;
   for (const std::string& remark : made.inventory.remarks)
@@ -468,8 +482,8 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   MapPicture picture;
   {
     const ScopedTimer timer(front_end.times(), "finish_write_map");
-    add_map(recording, front_end.config().inventory.stand, made, trajectory.trajectory, map.frames,
-            picture, documents);
+    add_map(recording, front_end.config(), made, trajectory.trajectory, map.frames, picture,
+            documents);
   }
   fill_report(recording, front_end, trajectory, documents.summary().scans, documents.report());
   documents.write(folder);
