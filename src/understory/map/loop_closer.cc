@@ -23,6 +23,7 @@ struct Search {
   LoopCloserConfig config;
   LocalMapConfig local_map;
   SearchedMap map;
+  LoopAgreement* agreement = nullptr;  // no other search uses it at the time
 };
 
 Eigen::Vector3d up_at(const SearchedMap& map, std::size_t keyframe) {
@@ -54,7 +55,7 @@ UnplacedCloud unplaced_around(const Search& search, std::size_t keyframe) {
 }
 
 // Whether two places of pieces that are apart are one.
-LoopAttempt try_places(const Search& search, const PlacePair& pair) {
+LoopAttempt try_places(const Search& search, const PiecePlaces& pair) {
   const auto& poses = search.map.problem.world_from_keyframe;
   return attempt_of(
       pair.older, pair.newer, poses[pair.older].inverse() * poses[pair.newer],
@@ -148,7 +149,8 @@ void apply_loops(Search& search, LoopOutcome& outcome) {
     found = true;
   }
   if (!found) return;
-  PoseGraphResult result = optimise_pose_graph(search.map.problem, search.config.graph);
+  PoseGraphResult result =
+      optimise_pose_graph(search.map.problem, search.config.graph, search.agreement);
   if (result.converged && (joined || worth_applying(search, result.world_from_keyframe)))
     outcome.world_from_keyframe = std::move(result.world_from_keyframe);
 }
@@ -165,8 +167,8 @@ LoopOutcome run_search(Search search, const std::atomic<bool>& abandoned) {
     outcome.attempts.push_back(try_loop(search, query, candidate));
   }
   if (search.config.pieces.enabled && map.pieces.groups() > 1) {
-    for (const PlacePair& pair : places_to_try(map.problem.world_from_keyframe, map.pieces,
-                                               map.attempts, query, search.config.pieces)) {
+    for (const PiecePlaces& pair : places_to_try(map.problem.world_from_keyframe, map.pieces,
+                                                 map.attempts, query, search.config.pieces)) {
       if (abandoned) return outcome;
       outcome.attempts.push_back(try_places(search, pair));
     }
@@ -199,7 +201,9 @@ void describe(ConfigTable& table, LoopCloserConfig& config) {
 }
 
 LoopCloser::LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map)
-    : config_(config), local_map_config_(local_map) {}
+    : config_(config),
+      local_map_config_(local_map),
+      agreement_(std::make_unique<LoopAgreement>(config.graph)) {}
 
 LoopCloser::~LoopCloser() {
   abandoned_ = true;
@@ -257,7 +261,8 @@ std::optional<LoopOutcome> LoopCloser::close_in_present(
     KeyframePoints& points, const PresentMap& present) {
   if (config_.search.method != LoopSearchConfig::Method::kPaper || !due(keyframes))
     return std::nullopt;
-  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points)};
+  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
+                agreement_.get()};
   LoopOutcome outcome;
   outcome.keyframes = keyframes.size();
   const std::size_t query = keyframes.size() - 1;
@@ -273,12 +278,13 @@ bool LoopCloser::join_left(std::vector<Keyframe>& keyframes,
                            const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points,
                            const ProgressSink& progress) {
   if (!config_.enabled || !config_.pieces.enabled) return false;
-  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points)};
+  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
+                agreement_.get()};
   bool any = false;
   int left = config_.pieces.max_at_end;
   for (std::size_t piece = search.map.pieces.count(); piece-- > 1 && left > 0;) {
-    for (const PlacePair& pair : all_places_to_try(search.map.problem.world_from_keyframe,
-                                                   search.map.pieces, piece, config_.pieces)) {
+    for (const PiecePlaces& pair : all_places_to_try(search.map.problem.world_from_keyframe,
+                                                     search.map.pieces, piece, config_.pieces)) {
       if (search.map.pieces.connected(pair.older, pair.newer)) continue;
       if (left-- <= 0) break;
       progress.poll();
@@ -295,7 +301,8 @@ bool LoopCloser::join_left(std::vector<Keyframe>& keyframes,
 
 void LoopCloser::begin(const std::vector<Keyframe>& keyframes,
                        const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points) {
-  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points)};
+  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
+                agreement_.get()};
   running_.emplace();
   running_->keyframes = keyframes.size();
   running_->outcome = std::async(std::launch::async, [this, search = std::move(search)]() mutable {
@@ -326,7 +333,7 @@ PoseGraphResult LoopCloser::optimise(const std::vector<Keyframe>& keyframes,
                                      const std::vector<std::uint64_t>& piece_starts) const {
   const PoseGraphProblem problem = problem_of(keyframes, piece_starts);
   if (problem.loops.empty()) return {};
-  return optimise_pose_graph(problem, config_.graph);
+  return optimise_pose_graph(problem, config_.graph, agreement_.get());
 }
 
 void LoopCloser::save(BinaryWriter& writer) const {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "understory/graph/loops/loop_agreement.h"
 #include "understory/graph/loops/loop_closure.h"
 #include "understory/graph/loops/loop_search.h"
 #include "understory/graph/pose_graph.h"
@@ -129,6 +130,8 @@ class LoopCloser {
   LoopCloserConfig config_;
   LocalMapConfig local_map_config_;
   std::vector<LoopAttempt> attempts_;
+  // Of the running search while there is one; kept from one to the next.
+  std::unique_ptr<LoopAgreement> agreement_;
   SideWork work_;
   TimeNs last_search_ = kNoSearchYet;
   std::atomic<bool> abandoned_ = false;  // nobody waits for what the running search finds

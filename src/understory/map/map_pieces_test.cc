@@ -27,8 +27,7 @@ struct TwoWalks {
 
   TwoWalks() {
     for (std::size_t k = 0; k < 2 * kLong; ++k) {
-      const Pose step(Eigen::Quaterniond::Identity(),
-                      {static_cast<double>(k % kLong), 0.0, 0.0});
+      const Pose step(Eigen::Quaterniond::Identity(), {static_cast<double>(k % kLong), 0.0, 0.0});
       poses.push_back(k < kLong ? step : kGuess * step);
       truth.push_back(k < kLong ? step : kTrueStart * step);
     }
@@ -91,8 +90,7 @@ TEST(JoinPieces, LoopsThatContradictEachOtherDoNot) {
   const TwoWalks walks;
   EXPECT_EQ(walks.joined({walks.loop(8, 22), walks.loop(5, 27, 1.5)}).pieces.groups(), 2U);
   // A third one decides.
-  const auto joined =
-      walks.joined({walks.loop(8, 22), walks.loop(5, 27, 1.5), walks.loop(6, 33)});
+  const auto joined = walks.joined({walks.loop(8, 22), walks.loop(5, 27, 1.5), walks.loop(6, 33)});
   EXPECT_EQ(joined.pieces.groups(), 1U);
 }
 

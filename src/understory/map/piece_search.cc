@@ -32,7 +32,7 @@ std::vector<std::size_t> places_of(const std::vector<double>& way, const MapPiec
   return places;
 }
 
-PlacePair in_order(std::size_t a, std::size_t b) {
+PiecePlaces in_order(std::size_t a, std::size_t b) {
   return {std::min(a, b), std::max(a, b)};
 }
 
@@ -69,9 +69,9 @@ void describe(ConfigTable& table, PieceSearchConfig& config) {
             "path length between two places that have to be found again before pieces are joined");
 }
 
-std::vector<PlacePair> places_to_try(const std::vector<Pose>& poses, const MapPieces& pieces,
-                                     const std::vector<LoopAttempt>& attempts, std::size_t query,
-                                     const PieceSearchConfig& config) {
+std::vector<PiecePlaces> places_to_try(const std::vector<Pose>& poses, const MapPieces& pieces,
+                                       const std::vector<LoopAttempt>& attempts, std::size_t query,
+                                       const PieceSearchConfig& config) {
   const std::vector<double> way = ways_in_pieces(poses, pieces);
   const std::size_t own = pieces.piece_of(query);
   if (way[query] < config.min_apart_m) return {};
@@ -92,16 +92,16 @@ std::vector<PlacePair> places_to_try(const std::vector<Pose>& poses, const MapPi
     return a.tries != b.tries ? a.tries < b.tries : a.distance_m < b.distance_m;
   });
   choices.resize(std::min(choices.size(), static_cast<std::size_t>(config.max_candidates)));
-  std::vector<PlacePair> pairs;
+  std::vector<PiecePlaces> pairs;
   for (const Choice& choice : choices)
     pairs.push_back(in_order(choice.place, query));
   return pairs;
 }
 
-std::vector<PlacePair> all_places_to_try(const std::vector<Pose>& poses, const MapPieces& pieces,
-                                         std::size_t piece, const PieceSearchConfig& config) {
+std::vector<PiecePlaces> all_places_to_try(const std::vector<Pose>& poses, const MapPieces& pieces,
+                                           std::size_t piece, const PieceSearchConfig& config) {
   const std::vector<double> way = ways_in_pieces(poses, pieces);
-  std::vector<PlacePair> pairs;
+  std::vector<PiecePlaces> pairs;
   for (const std::size_t here : places_of(way, pieces, piece, config.spacing_m)) {
     for (std::size_t p = 0; p < pieces.count(); ++p) {
       if (pieces.together(p, piece)) continue;
@@ -109,7 +109,7 @@ std::vector<PlacePair> all_places_to_try(const std::vector<Pose>& poses, const M
         pairs.push_back(in_order(here, there));
     }
   }
-  std::stable_sort(pairs.begin(), pairs.end(), [&](const PlacePair& a, const PlacePair& b) {
+  std::stable_sort(pairs.begin(), pairs.end(), [&](const PiecePlaces& a, const PiecePlaces& b) {
     return distance(poses, a.older, a.newer) < distance(poses, b.older, b.newer);
   });
   return pairs;

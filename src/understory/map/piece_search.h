@@ -22,7 +22,7 @@ struct PieceSearchConfig {
 void describe(ConfigTable& table, PieceSearchConfig& config);
 
 // A place of a piece and one of an earlier piece that is not together with it. Keyframes.
-struct PlacePair {
+struct PiecePlaces {
   std::size_t older = 0;
   std::size_t newer = 0;
 };
@@ -31,15 +31,15 @@ struct PlacePair {
 // together with its own. Those that its own pieces were compared with least often come first, and
 // among them the nearest by the poses. None while its piece is shorter than `min_apart_m`.
 // `world_from_keyframe`: of all keyframes.
-[[nodiscard]] std::vector<PlacePair> places_to_try(const std::vector<Pose>& world_from_keyframe,
-                                                   const MapPieces& pieces,
-                                                   const std::vector<LoopAttempt>& attempts,
-                                                   std::size_t query,
-                                                   const PieceSearchConfig& config);
+[[nodiscard]] std::vector<PiecePlaces> places_to_try(const std::vector<Pose>& world_from_keyframe,
+                                                     const MapPieces& pieces,
+                                                     const std::vector<LoopAttempt>& attempts,
+                                                     std::size_t query,
+                                                     const PieceSearchConfig& config);
 
 // The same of a whole piece, from each of its places: the nearest by the poses first.
-[[nodiscard]] std::vector<PlacePair> all_places_to_try(const std::vector<Pose>& world_from_keyframe,
-                                                       const MapPieces& pieces, std::size_t piece,
-                                                       const PieceSearchConfig& config);
+[[nodiscard]] std::vector<PiecePlaces> all_places_to_try(
+    const std::vector<Pose>& world_from_keyframe, const MapPieces& pieces, std::size_t piece,
+    const PieceSearchConfig& config);
 
 }  // namespace understory

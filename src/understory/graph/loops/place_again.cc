@@ -31,8 +31,8 @@ LoopVerification verify_place_again(const UnplacedCloud& target, const UnplacedC
                                     const LoopClosureConfig& config) {
   const GlobalRegistration found = register_globally(target.ready, source.ready);
   LoopInput input;
-  input.target_from_source = level_from_body(target).inverse() * found.result.target_from_source *
-                             level_from_body(source);
+  input.target_from_source =
+      level_from_body(target).inverse() * found.result.target_from_source * level_from_body(source);
   if (!found.verdict.trusted) {
     LoopVerification report;
     report.reason = "without a guess: " + found.verdict.reason;

@@ -57,9 +57,9 @@ TEST(PlaceAgain, AnotherStandIsRefused) {
 }
 
 TEST(PlaceAgain, TooFewPointsAreRefusedWithTheReason) {
-  const LoopVerification found = verify_place_again(
-      make_unplaced({{1.0F, 2.0F, 0.0F}}, Eigen::Vector3d::UnitZ()),
-      seen_from(stand(1), pose_at(0, 0, 0), 1), {});
+  const LoopVerification found =
+      verify_place_again(make_unplaced({{1.0F, 2.0F, 0.0F}}, Eigen::Vector3d::UnitZ()),
+                         seen_from(stand(1), pose_at(0, 0, 0), 1), {});
   EXPECT_FALSE(found.accepted);
   EXPECT_NE(found.reason.find("target cannot be judged"), std::string::npos) << found.reason;
 }
