@@ -317,14 +317,20 @@ def error_of_part(outcome, folder, first, last, truth=truth):
 
 @cases.case("ten seconds without lidar and IMU")
 def outage_of_both(folder):
-    """Nothing tells of the way: a new piece of map begins, and each piece is good by itself."""
-    _, outcome = mapped(folder, [m for m in messages
-                                 if not start + 8e9 < m.time < start + 18e9])
+    """Nothing tells of the way: a new piece of map begins. It sees trees of the old one, and is joined to it."""
+    spoilt = [m for m in messages if not start + 8e9 < m.time < start + 18e9]
+    _, outcome = mapped(folder, spoilt)
+    assert outcome.run["status"] == "partial" and outcome.run["counts"]["segments"] == 1, outcome.said
+    assert outcome.run["counts"]["segments_joined"] == 1 and "map.joined" in outcome.warnings, outcome.run["counts"]
+    error, _ = error_m(outcome, truth)
+    assert "lost at 17000000" in outcome.said and error < 0.1, (error, outcome.said)
+    (folder / "apart").mkdir()
+    _, outcome = mapped(folder / "apart", spoilt, "--set", "loop_closure.pieces.enabled=false")
     assert outcome.code == 4 and outcome.run["counts"]["segments"] == 2, outcome.said
-    assert "lost at 17000000" in outcome.said and "2 pieces" in outcome.said, outcome.said
+    assert "2 pieces" in outcome.said, outcome.said
     errors = [error_of_part(outcome, folder, 0, 8), error_of_part(outcome, folder, 18, 30)]
     assert max(errors) < 0.1, errors
-    return f"exit 4, two pieces of {100 * errors[0]:.1f} and {100 * errors[1]:.1f} cm"
+    return f"joined: {100 * error:.1f} cm; apart: two pieces of {100 * errors[0]:.1f} and {100 * errors[1]:.1f} cm"
 
 
 @cases.case("sensors that are suddenly elsewhere")
@@ -334,6 +340,7 @@ def elsewhere(folder):
     _, outcome = mapped(folder, [m for m in short if m.time < start + 6e9] + [
         m for m in other if m.time >= start + 6e9 and m.topic != "/tf_static"])
     assert outcome.code == 4 and outcome.run["counts"]["segments"] == 2, outcome.said
+    assert outcome.run["counts"]["segments_joined"] == 0, outcome.run["counts"]
     assert "could not be matched" in outcome.said and "lost at 17000000" in outcome.said
     errors = [error_of_part(outcome, folder, 0, 6),
               error_of_part(outcome, folder, 9, 12, folder / "first.truth")]

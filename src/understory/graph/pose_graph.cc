@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "understory/graph/loops/loop_agreement.h"
 #include "understory/graph/pose_graph_factors.h"
 #include "understory/util/error.h"
 
@@ -85,8 +86,8 @@ void reject_by_gnc(const PoseGraphProblem& problem, const gtsam::Values& first,
 
 }  // namespace
 
-PoseGraphResult optimise_pose_graph(const PoseGraphProblem& problem,
-                                    const PoseGraphConfig& config) {
+PoseGraphResult optimise_pose_graph(const PoseGraphProblem& problem, const PoseGraphConfig& config,
+                                    LoopAgreement* agreement) {
   check(problem);
   PoseGraphResult result;
   result.world_from_keyframe = problem.world_from_keyframe;
@@ -100,7 +101,12 @@ PoseGraphResult optimise_pose_graph(const PoseGraphProblem& problem,
     first.insert(k, to_gtsam(problem.world_from_keyframe[k]));
 
   try {
-    if (config.check_consistency) result.loop_used = consistent_loops(problem, config);
+    if (config.check_consistency) {
+      LoopAgreement own(config);
+      LoopAgreement& loops = agreement != nullptr ? *agreement : own;
+      loops.update(problem);
+      result.loop_used = loops.used();
+    }
     if (config.robust_loops && !problem.loops.empty())
       reject_by_gnc(problem, first, config, result.loop_used);
     const Solved solved = solve_plain(build_graph(problem, result.loop_used), first, config);

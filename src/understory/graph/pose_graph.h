@@ -8,6 +8,8 @@
 
 namespace understory {
 
+class LoopAgreement;
+
 // A relative pose between two keyframes.
 struct PoseEdge {
   int from = 0;
@@ -62,8 +64,10 @@ struct [[nodiscard]] PoseGraphResult {
 };
 
 // Batch optimisation. Deterministic; thread-safe. The graph must be connected by its odometry;
-// keyframes that are not reached are an error of the caller.
-PoseGraphResult optimise_pose_graph(const PoseGraphProblem& problem, const PoseGraphConfig& config);
+// keyframes that are not reached are an error of the caller. `agreement`: of the same settings and
+// of an earlier state of this graph, which it is brought up from; the result is the same without.
+PoseGraphResult optimise_pose_graph(const PoseGraphProblem& problem, const PoseGraphConfig& config,
+                                    LoopAgreement* agreement = nullptr);
 
 // For each loop whether it belongs to the largest set of loops that agree in pairs over the
 // odometry between them (Mangelson et al. 2018); one loop alone agrees with itself. Deterministic.

@@ -11,6 +11,7 @@ struct Keyframe {
   Pose world_from_body;                    // best estimate so far
   Pose previous_from_this;                 // as the odometry measured it; identity for the first
   Matrix6d covariance = Matrix6d::Zero();  // of previous_from_this, right perturbation
+  bool begins_piece = false;               // previous_from_this is a guess: the position was lost
 };
 
 }  // namespace understory

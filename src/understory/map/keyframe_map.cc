@@ -69,6 +69,7 @@ constexpr const char* kPointsFile = "keyframe_points.bin";
 void KeyframeMap::start() {
   keyframes_.clear();
   segment_starts_ = {0};
+  joined_ = 0;
   inserted_.clear();
   insert_all();
   moved_ = false;
@@ -97,11 +98,12 @@ std::optional<Pose> KeyframeMap::add(TimeNs stamp, const Pose& world_from_body,
         keyframes_.back().world_from_body.inverse() * keyframe.world_from_body;
   }
   keyframe.covariance = edge_covariance(keyframe.previous_from_this);
+  keyframe.begins_piece = !keyframes_.empty() && keyframes_.size() == segment_start();
   keyframes_.push_back(keyframe);
   points_->append(stamp, points_in_body);
   if (const auto again = close_in_present()) return moved ? *again * *moved : *again;
   update_local_map(keyframes_.size() - 1);
-  loops_.consider(keyframes_, segment_start(), *points_);
+  loops_.consider(keyframes_, segment_starts_, *points_);
   return moved;
 }
 
@@ -112,7 +114,7 @@ std::optional<Pose> KeyframeMap::close_in_present() {
   PresentMap present{*snapshot_, {}};
   for (const LocalMapInsertion& insertion : inserted_)
     present.keyframes.push_back(insertion.keyframe);
-  auto outcome = loops_.close_in_present(keyframes_, segment_start(), *points_, present);
+  auto outcome = loops_.close_in_present(keyframes_, segment_starts_, *points_, present);
   return outcome ? take_over(std::move(*outcome)) : std::nullopt;
 }
 
@@ -143,6 +145,7 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
                                : attempt.reason));
   }
   if (outcome.world_from_keyframe.empty()) return std::nullopt;
+  tell_of_joined_pieces();
   moved_ = true;
   const std::size_t known = outcome.keyframes;
   const Pose moved =
@@ -151,7 +154,8 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
     keyframes_[i].world_from_body =
         i < known ? outcome.world_from_keyframe[i] : moved * keyframes_[i].world_from_body;
   }
-  if (!outcome.local_map) {
+  // A search that began in the piece before has made a map of that.
+  if (!outcome.local_map || known <= segment_start()) {
     rebuild_local_map();
     return moved;
   }
@@ -164,16 +168,29 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
   return moved;
 }
 
+void KeyframeMap::tell_of_joined_pieces() {
+  const MapPieces now = pieces();
+  const std::size_t joined = now.count() - now.groups();
+  if (joined == joined_) return;
+  joined_ = joined;
+  log_.warn("map.joined",
+            fmt::format("{} of {} pieces of the map were found again in others and are joined to "
+                        "them: places in them are the same",
+                        joined, now.count()));
+}
+
 void KeyframeMap::finish(const ProgressSink& progress) {
   if (keyframes_.empty()) return;
   if (auto outcome = loops_.take(keyframes_.size(), true, true, progress)) {
     static_cast<void>(take_over(std::move(*outcome)));
   }
-  const PoseGraphResult result = loops_.optimise(keyframes_);
+  if (loops_.join_left(keyframes_, segment_starts_, *points_, progress)) tell_of_joined_pieces();
+  const PoseGraphResult result = loops_.optimise(keyframes_, segment_starts_);
   loops_used_.assign(loops_.attempts().size(), 0);
+  const std::vector<char> counted = loops_.counted(pieces());
   std::size_t k = 0;
   for (std::size_t i = 0; i < loops_used_.size(); ++i) {
-    if (loops_.attempts()[i].verified) loops_used_[i] = result.loop_used[k++];
+    if (counted[i] != 0) loops_used_[i] = result.loop_used[k++];
   }
   for (std::size_t i = 0; i < result.world_from_keyframe.size(); ++i) {
     keyframes_[i].world_from_body = result.world_from_keyframe[i];
@@ -228,19 +245,26 @@ void KeyframeMap::insert(std::size_t keyframe) {
   local_map_.insert({points_->get(keyframe).get(), keyframes_[keyframe].world_from_body}, forget);
 }
 
+// The pieces that are together with the last one, as far as they follow each other.
+std::size_t KeyframeMap::local_map_start() const {
+  if (segment_start() == keyframes_.size()) return segment_start();
+  return pieces().last_group_start();
+}
+
 // Chooses the keyframes of the local map anew, e.g. after a loop closure has moved them.
 void KeyframeMap::rebuild_local_map() {
+  const std::size_t first = local_map_start();
   std::vector<Eigen::Vector3d> positions;
-  for (std::size_t i = segment_start(); i < keyframes_.size(); ++i) {
+  for (std::size_t i = first; i < keyframes_.size(); ++i) {
     positions.push_back(keyframes_[i].world_from_body.translation());
   }
   inserted_.clear();
   if (config_.local_map.method == LocalMapConfig::Method::kRecent) {
     for (const std::size_t i : recent_keyframes(positions, config_.local_map)) {
-      inserted_.push_back({segment_start() + i, 0});
+      inserted_.push_back({first + i, 0});
     }
   } else {
-    inserted_ = keyframes_within_reach(positions, segment_start(), config_.local_map);
+    inserted_ = keyframes_within_reach(positions, first, config_.local_map);
   }
   insert_all();
 }
@@ -277,10 +301,26 @@ RangeCheck KeyframeMap::check_ranges(const Eigen::Vector3d& lidar_in_body,
 
 std::vector<char> KeyframeMap::graph_loops_used() const {
   std::vector<char> used;
+  const std::vector<char> counted = loops_.counted(pieces());
   for (std::size_t i = 0; i < loops_used_.size(); ++i) {
-    if (loops_.attempts()[i].verified) used.push_back(loops_used_[i]);
+    if (counted[i] != 0) used.push_back(loops_used_[i]);
   }
   return used;
+}
+
+MapPieces KeyframeMap::pieces() const {
+  return loops_.pieces_of(keyframes_, segment_starts_);
+}
+
+MapPieces KeyframeMap::finished_pieces() const {
+  MapPieces joined = pieces_among(segment_starts_, keyframes_.size());
+  for (std::size_t i = 0; i < loops_used_.size(); ++i) {
+    const LoopAttempt& attempt = loops_.attempts()[i];
+    if (loops_used_[i] == 0) continue;
+    joined.join(joined.piece_of(static_cast<std::size_t>(attempt.from)),
+                joined.piece_of(static_cast<std::size_t>(attempt.to)));
+  }
+  return joined;
 }
 
 void KeyframeMap::set_poses(const std::vector<Pose>& world_from_keyframe) {
@@ -323,13 +363,18 @@ void KeyframeMap::load(BinaryReader& reader) {
   history_ = std::make_unique<KeyframeHistory>(folder_, reader, growth);
   keyframes_ = std::move(growth.keyframes);
   segment_starts_ = std::move(growth.segment_starts);
+  for (const std::uint64_t start : segment_starts_) {
+    if (start > 0 && start < keyframes_.size()) keyframes_[start].begins_piece = true;
+  }
   points_ = std::make_unique<KeyframePoints>(folder_ / kPointsFile, reader.get<RecordCount>(),
                                              kCachedKeyframes);
   if (points_->count().records != keyframes_.size())
     throw InputError((folder_ / kPointsFile).string(), "", "expected the points of each keyframe");
   inserted_ = get_insertions(reader, keyframes_.size());
   insert_all();
-  loops_.load(reader, std::move(growth.loops), keyframes_, *points_);
+  loops_.load(reader, std::move(growth.loops), keyframes_, segment_starts_, *points_);
+  const MapPieces known = pieces();
+  joined_ = known.count() - known.groups();
 }
 
 }  // namespace understory

@@ -86,7 +86,9 @@ class KeyframeMap {
   [[nodiscard]] RangeCheck check_ranges(const Eigen::Vector3d& lidar_in_body,
                                         const ProgressSink& progress = {}) const;
   // Of the finished map: its graph at its poses, and which of the graph's loops it accepted.
-  [[nodiscard]] PoseGraphProblem graph() const { return loops_.problem_of(keyframes_); }
+  [[nodiscard]] PoseGraphProblem graph() const {
+    return loops_.problem_of(keyframes_, segment_starts_);
+  }
   [[nodiscard]] std::vector<char> graph_loops_used() const;
   // Of the finished map: new poses of all keyframes.
   void set_poses(const std::vector<Pose>& world_from_keyframe);
@@ -97,6 +99,10 @@ class KeyframeMap {
   [[nodiscard]] const MatchTargetPtr& local_map() const { return snapshot_; }
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
   [[nodiscard]] const std::vector<LoopAttempt>& loops() const { return loops_.attempts(); }
+  // The pieces of the map, and which are together by the loops found so far.
+  [[nodiscard]] MapPieces pieces() const;
+  // Of the finished map: which are together by the loops that the graph accepts.
+  [[nodiscard]] MapPieces finished_pieces() const;
   // Which of the verified loops the graph accepts; of the size of loops().
   [[nodiscard]] const std::vector<char>& loops_used() const { return loops_used_; }
   // CPU time of the searches for loops, which run beside the scan loop.
@@ -113,12 +119,14 @@ class KeyframeMap {
  private:
   void refine_first_keyframes_of_segments(const ProgressSink& progress);
   [[nodiscard]] std::size_t segment_start() const { return segment_starts_.back(); }
+  [[nodiscard]] std::size_t local_map_start() const;
   void update_local_map(std::size_t keyframe);
   void insert(std::size_t keyframe);
   void take_snapshot();
   void rebuild_local_map();
   [[nodiscard]] Matrix6d edge_covariance(const Pose& previous_from_this) const;
   [[nodiscard]] std::optional<Pose> close_in_present();
+  void tell_of_joined_pieces();
   [[nodiscard]] std::optional<Pose> take_over(LoopOutcome outcome);
   void insert_all();
 
@@ -128,7 +136,8 @@ class KeyframeMap {
   Log& log_;
   std::unique_ptr<KeyframePoints> points_;
   std::unique_ptr<KeyframeHistory> history_;
-  bool moved_ = false;  // poses that are in the history already
+  std::size_t joined_ = 0;  // pieces of which it was said that they are joined to others
+  bool moved_ = false;      // poses that are in the history already
   std::vector<Keyframe> keyframes_;
   std::vector<std::uint64_t> segment_starts_ = {0};  // first keyframe of each segment
   LocalMap local_map_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "understory/graph/loops/local_map_loop.h"
+#include "understory/graph/loops/place_again.h"
 #include "understory/map/map_constants.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/util/error.h"
@@ -21,64 +22,59 @@ using namespace map_constants::loop_closer;
 struct Search {
   LoopCloserConfig config;
   LocalMapConfig local_map;
-  PoseGraphProblem problem;
-  std::size_t segment_start = 0;
-  KeyframePoints* points = nullptr;
+  SearchedMap map;
+  LoopAgreement* agreement = nullptr;  // no other search uses it at the time
 };
 
-// Points of a keyframe in the body frame of another.
-void add_points_seen_from(const Search& search, std::size_t keyframe, std::size_t from,
-                          Points& all) {
-  const auto& poses = search.problem.world_from_keyframe;
-  const Pose here_from_there = poses[from].inverse() * poses[keyframe];
-  const Eigen::Matrix3f rotation = here_from_there.rotation_matrix().cast<float>();
-  const Eigen::Vector3f translation = here_from_there.translation().cast<float>();
-  for (const Eigen::Vector3f& p : search.points->get(keyframe)->points)
-    all.push_back(rotation * p + translation);
-}
-
-// The clouds of the keyframes around one, along the path, in its frame.
-Points points_around(const Search& search, std::size_t keyframe, int reach) {
-  const auto& poses = search.problem.world_from_keyframe;
-  const auto r = static_cast<std::size_t>(reach);
-  const std::size_t first = std::max(search.segment_start, keyframe > r ? keyframe - r : 0);
-  const std::size_t last = std::min(poses.size() - 1, keyframe + r);
-  Points all;
-  for (std::size_t i = first; i <= last; ++i)
-    add_points_seen_from(search, i, keyframe, all);
-  return VoxelFilter().filter(all, search.config.voxel_size_m);
-}
-
-LoopAttempt attempt_of(std::size_t query, const LoopCandidate& candidate,
-                       const Pose& candidate_from_query, const LoopVerification& verified) {
-  LoopAttempt attempt;
-  attempt.from = candidate.keyframe;
-  attempt.to = static_cast<int>(query);
-  attempt.verified = verified.accepted;
-  attempt.reason = verified.reason;
-  attempt.correction_m =
-      (candidate_from_query.inverse() * verified.target_from_source).translation().norm();
-  attempt.edge = {attempt.from, attempt.to, verified.target_from_source, verified.covariance};
-  return attempt;
+Eigen::Vector3d up_at(const SearchedMap& map, std::size_t keyframe) {
+  return map.problem.world_from_keyframe[keyframe].rotation().conjugate() *
+         Eigen::Vector3d::UnitZ();
 }
 
 LoopAttempt try_loop(const Search& search, std::size_t query, const LoopCandidate& candidate) {
-  const auto& poses = search.problem.world_from_keyframe;
+  const SearchedMap& map = search.map;
+  const auto& poses = map.problem.world_from_keyframe;
+  const LoopCloserConfig& config = search.config;
   const auto from = static_cast<std::size_t>(candidate.keyframe);
   LoopInput input;
-  input.target_points = points_around(search, from, search.config.submap_keyframes);
-  input.source_points = points_around(search, query, search.config.source_keyframes);
+  input.target_points = points_around(map, from, config.submap_keyframes, config.voxel_size_m);
+  input.source_points = points_around(map, query, config.source_keyframes, config.voxel_size_m);
   input.target_from_source = poses[from].inverse() * poses[query];
   input.sigma_translation_m = candidate.sigma_translation_m;
   input.sigma_rotation_rad = candidate.sigma_rotation_rad;
-  input.up_in_target = poses[from].rotation().conjugate() * Eigen::Vector3d::UnitZ();
-  input.up_in_source = poses[query].rotation().conjugate() * Eigen::Vector3d::UnitZ();
-  return attempt_of(query, candidate, input.target_from_source,
-                    verify_loop(input, search.config.verification));
+  input.up_in_target = up_at(map, from);
+  input.up_in_source = up_at(map, query);
+  return attempt_of(from, query, input.target_from_source, verify_loop(input, config.verification));
+}
+
+UnplacedCloud unplaced_around(const Search& search, std::size_t keyframe) {
+  const LoopCloserConfig& config = search.config;
+  return make_unplaced(
+      points_around(search.map, keyframe, config.pieces.keyframes, config.voxel_size_m),
+      up_at(search.map, keyframe));
+}
+
+// Whether two places of pieces that are apart are one.
+LoopAttempt try_places(const Search& search, const PiecePlaces& pair) {
+  const auto& poses = search.map.problem.world_from_keyframe;
+  return attempt_of(
+      pair.older, pair.newer, poses[pair.older].inverse() * poses[pair.newer],
+      verify_place_again(unplaced_around(search, pair.older), unplaced_around(search, pair.newer),
+                         search.config.verification));
+}
+
+// Which keyframes a loop with `query` may lead to: those whose pose against it is known. Empty:
+// all.
+std::vector<char> known_against(const MapPieces& pieces, std::size_t query) {
+  if (pieces.groups() == 1) return {};
+  std::vector<char> known(pieces.end(pieces.count() - 1), 0);
+  for (std::size_t k = 0; k < known.size(); ++k)
+    known[k] = pieces.connected(k, query) ? 1 : 0;
+  return known;
 }
 
 bool worth_applying(const Search& search, const std::vector<Pose>& solved) {
-  const auto& poses = search.problem.world_from_keyframe;
+  const auto& poses = search.map.problem.world_from_keyframe;
   for (std::size_t i = 0; i < solved.size(); ++i) {
     const Pose change = poses[i].inverse() * solved[i];
     if (change.translation().norm() > search.config.min_correction_m ||
@@ -91,14 +87,15 @@ bool worth_applying(const Search& search, const std::vector<Pose>& solved) {
 
 void make_local_map(const Search& search, LoopOutcome& outcome) {
   if (search.local_map.method != LocalMapConfig::Method::kAccumulate) return;
+  const std::size_t first = search.map.pieces.last_group_start();
   std::vector<Eigen::Vector3d> positions;
-  for (std::size_t i = search.segment_start; i < outcome.world_from_keyframe.size(); ++i) {
+  for (std::size_t i = first; i < outcome.world_from_keyframe.size(); ++i) {
     positions.push_back(outcome.world_from_keyframe[i].translation());
   }
   outcome.local_map.emplace(search.local_map);
-  outcome.inserted = keyframes_within_reach(positions, search.segment_start, search.local_map);
+  outcome.inserted = keyframes_within_reach(positions, first, search.local_map);
   for (const LocalMapInsertion& insertion : outcome.inserted) {
-    const auto points = search.points->get(insertion.keyframe);
+    const auto points = search.map.points->get(insertion.keyframe);
     outcome.local_map->insert({points.get(), outcome.world_from_keyframe[insertion.keyframe]},
                               insertion.forget != 0);
   }
@@ -109,44 +106,72 @@ void make_local_map(const Search& search, LoopOutcome& outcome) {
 // Steps 2 and 3 of P4 (38).
 LoopAttempt try_in_present(const Search& search, std::size_t query, const LoopCandidate& candidate,
                            const PresentMap& present) {
-  const auto& poses = search.problem.world_from_keyframe;
+  const auto& poses = search.map.problem.world_from_keyframe;
   const auto from = static_cast<std::size_t>(candidate.keyframe);
   LocalMapLoopInput input;
   input.local_map = &present.target;
   for (const std::size_t i : present.keyframes)
-    add_points_seen_from(search, i, query, input.map_points_in_query);
+    add_points_seen_from(search.map, i, query, input.map_points_in_query);
   input.candidate_points =
-      VoxelFilter().filter(search.points->get(from)->points, search.config.voxel_size_m);
+      VoxelFilter().filter(search.map.points->get(from)->points, search.config.voxel_size_m);
   input.world_from_candidate = poses[from];
   input.world_from_query = poses[query];
   const Pose estimated = poses[from].inverse() * poses[query];
-  return attempt_of(query, candidate, estimated,
+  return attempt_of(from, query, estimated,
                     register_to_local_map(input, search.config.verification));
 }
 
-// Optimises with the loops of the outcome, if there are any.
+JoinConfig join_config(const LoopCloserConfig& config) {
+  return {config.pieces.min_apart_m, config.graph};
+}
+
+// Lays pieces together that the loops of the outcome join. Whether there were any.
+bool join_by_outcome(Search& search, const LoopOutcome& outcome) {
+  SearchedMap& map = search.map;
+  if (map.pieces.groups() == 1) return false;
+  map.attempts.insert(map.attempts.end(), outcome.attempts.begin(), outcome.attempts.end());
+  JoinedPieces now =
+      join_pieces(map.pieces, map.problem.odometry, map.attempts, join_config(search.config));
+  if (now.joins.empty()) return false;
+  lay_together(map.pieces, now, map.attempts, map.problem.world_from_keyframe);
+  map.problem = graph_problem(std::move(map.problem), now.pieces, map.attempts);
+  map.pieces = std::move(now.pieces);
+  return true;
+}
+
+// Optimises with the loops of the outcome, if there are any that count.
 void apply_loops(Search& search, LoopOutcome& outcome) {
+  const bool joined = join_by_outcome(search, outcome);
+  bool found = joined;
   for (const LoopAttempt& attempt : outcome.attempts) {
-    if (attempt.verified) search.problem.loops.push_back(attempt.edge);
+    if (joined || !attempt.verified || !counts(attempt, search.map.pieces)) continue;
+    search.map.problem.loops.push_back(attempt.edge);
+    found = true;
   }
-  const bool found = std::any_of(outcome.attempts.begin(), outcome.attempts.end(),
-                                 [](const LoopAttempt& attempt) { return attempt.verified; });
   if (!found) return;
-  PoseGraphResult result = optimise_pose_graph(search.problem, search.config.graph);
-  if (result.converged && worth_applying(search, result.world_from_keyframe))
+  PoseGraphResult result =
+      optimise_pose_graph(search.map.problem, search.config.graph, search.agreement);
+  if (result.converged && (joined || worth_applying(search, result.world_from_keyframe)))
     outcome.world_from_keyframe = std::move(result.world_from_keyframe);
 }
 
 // `abandoned` ends it at the next candidate, with whatever it has.
 LoopOutcome run_search(Search search, const std::atomic<bool>& abandoned) {
   LoopOutcome outcome;
-  outcome.keyframes = search.problem.world_from_keyframe.size();
+  const SearchedMap& map = search.map;
+  outcome.keyframes = map.problem.world_from_keyframe.size();
   const std::size_t query = outcome.keyframes - 1;
-  for (const LoopCandidate& candidate :
-       find_loop_candidates(search.problem, query, search.config.search)) {
+  for (const LoopCandidate& candidate : find_loop_candidates(
+           map.problem, query, search.config.search, known_against(map.pieces, query))) {
     if (abandoned) return outcome;
-    if (static_cast<std::size_t>(candidate.keyframe) < search.segment_start) continue;
     outcome.attempts.push_back(try_loop(search, query, candidate));
+  }
+  if (search.config.pieces.enabled && map.pieces.groups() > 1) {
+    for (const PiecePlaces& pair : places_to_try(map.problem.world_from_keyframe, map.pieces,
+                                                 map.attempts, query, search.config.pieces)) {
+      if (abandoned) return outcome;
+      outcome.attempts.push_back(try_places(search, pair));
+    }
   }
   apply_loops(search, outcome);
   if (!outcome.world_from_keyframe.empty()) make_local_map(search, outcome);
@@ -160,6 +185,7 @@ void describe(ConfigTable& table, LoopCloserConfig& config) {
   table.section("search", [&] { describe(table, config.search); });
   table.section("verification", [&] { describe(table, config.verification); });
   table.section("graph", [&] { describe(table, config.graph); });
+  table.section("pieces", [&] { describe(table, config.pieces); });
   table.add("submap_keyframes", config.submap_keyframes, {0, 1000}, "",
             "keyframes on each side of a candidate that make the target");
   table.add("source_keyframes", config.source_keyframes, {0, 100}, "",
@@ -175,31 +201,52 @@ void describe(ConfigTable& table, LoopCloserConfig& config) {
 }
 
 LoopCloser::LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map)
-    : config_(config), local_map_config_(local_map) {}
+    : config_(config),
+      local_map_config_(local_map),
+      agreement_(std::make_unique<LoopAgreement>(config.graph)) {}
 
 LoopCloser::~LoopCloser() {
   abandoned_ = true;
   if (running_) running_->outcome.wait();  // it uses the caller's points and work_
 }
 
-PoseGraphProblem LoopCloser::problem_of(const std::vector<Keyframe>& keyframes) const {
-  PoseGraphProblem problem;
-  for (std::size_t i = 0; i < keyframes.size(); ++i) {
-    problem.world_from_keyframe.push_back(keyframes[i].world_from_body);
-    if (i == 0) continue;
-    problem.odometry.push_back({static_cast<int>(i) - 1, static_cast<int>(i),
-                                keyframes[i].previous_from_this, keyframes[i].covariance});
-  }
-  for (const LoopAttempt& attempt : attempts_) {
-    if (attempt.verified) problem.loops.push_back(attempt.edge);
-  }
-  return problem;
+MapPieces LoopCloser::pieces_of(const std::vector<Keyframe>& keyframes,
+                                const std::vector<std::uint64_t>& piece_starts) const {
+  MapPieces apart = pieces_among(piece_starts, keyframes.size());
+  if (apart.count() == 1) return apart;
+  return join_pieces(std::move(apart), odometry_of(keyframes), attempts_, join_config(config_))
+      .pieces;
 }
 
-void LoopCloser::consider(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
-                          KeyframePoints& points) {
+PoseGraphProblem LoopCloser::problem_of(const std::vector<Keyframe>& keyframes,
+                                        const std::vector<std::uint64_t>& piece_starts) const {
+  PoseGraphProblem problem;
+  for (const Keyframe& keyframe : keyframes)
+    problem.world_from_keyframe.push_back(keyframe.world_from_body);
+  problem.odometry = odometry_of(keyframes);
+  return graph_problem(std::move(problem), pieces_of(keyframes, piece_starts), attempts_);
+}
+
+std::vector<char> LoopCloser::counted(const MapPieces& pieces) const {
+  std::vector<char> counted;
+  for (const LoopAttempt& attempt : attempts_)
+    counted.push_back(attempt.verified && counts(attempt, pieces) ? 1 : 0);
+  return counted;
+}
+
+void LoopCloser::consider(const std::vector<Keyframe>& keyframes,
+                          const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points) {
   if (config_.search.method == LoopSearchConfig::Method::kPaper || !due(keyframes)) return;
-  begin(keyframes, segment_start, points);
+  begin(keyframes, piece_starts, points);
+}
+
+SearchedMap LoopCloser::searched(const std::vector<Keyframe>& keyframes,
+                                 const std::vector<std::uint64_t>& piece_starts,
+                                 KeyframePoints& points) const {
+  SearchedMap map{
+      problem_of(keyframes, piece_starts), pieces_of(keyframes, piece_starts), {}, &points};
+  if (map.pieces.count() > 1) map.attempts = attempts_;
+  return map;
 }
 
 bool LoopCloser::due(const std::vector<Keyframe>& keyframes) {
@@ -209,32 +256,55 @@ bool LoopCloser::due(const std::vector<Keyframe>& keyframes) {
   return true;
 }
 
-std::optional<LoopOutcome> LoopCloser::close_in_present(const std::vector<Keyframe>& keyframes,
-                                                        std::size_t segment_start,
-                                                        KeyframePoints& points,
-                                                        const PresentMap& present) {
+std::optional<LoopOutcome> LoopCloser::close_in_present(
+    const std::vector<Keyframe>& keyframes, const std::vector<std::uint64_t>& piece_starts,
+    KeyframePoints& points, const PresentMap& present) {
   if (config_.search.method != LoopSearchConfig::Method::kPaper || !due(keyframes))
     return std::nullopt;
-  Search search{config_, local_map_config_, problem_of(keyframes), segment_start, &points};
+  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
+                agreement_.get()};
   LoopOutcome outcome;
   outcome.keyframes = keyframes.size();
   const std::size_t query = keyframes.size() - 1;
-  for (const LoopCandidate& candidate :
-       find_loop_candidates(search.problem, query, config_.search)) {
-    if (static_cast<std::size_t>(candidate.keyframe) < segment_start) continue;
+  for (const LoopCandidate& candidate : find_loop_candidates(
+           search.map.problem, query, config_.search, known_against(search.map.pieces, query)))
     outcome.attempts.push_back(try_in_present(search, query, candidate, present));
-  }
   apply_loops(search, outcome);
   attempts_.insert(attempts_.end(), outcome.attempts.begin(), outcome.attempts.end());
   return outcome;
 }
 
-void LoopCloser::begin(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
-                       KeyframePoints& points) {
-  Search search{config_, local_map_config_, problem_of(keyframes), segment_start, &points};
+bool LoopCloser::join_left(std::vector<Keyframe>& keyframes,
+                           const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points,
+                           const ProgressSink& progress) {
+  if (!config_.enabled || !config_.pieces.enabled) return false;
+  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
+                agreement_.get()};
+  bool any = false;
+  int left = config_.pieces.max_at_end;
+  for (std::size_t piece = search.map.pieces.count(); piece-- > 1 && left > 0;) {
+    for (const PiecePlaces& pair : all_places_to_try(search.map.problem.world_from_keyframe,
+                                                     search.map.pieces, piece, config_.pieces)) {
+      if (search.map.pieces.connected(pair.older, pair.newer)) continue;
+      if (left-- <= 0) break;
+      progress.poll();
+      LoopOutcome outcome;
+      outcome.attempts.push_back(try_places(search, pair));
+      attempts_.push_back(outcome.attempts.front());
+      any = join_by_outcome(search, outcome) || any;
+    }
+  }
+  for (std::size_t i = 0; any && i < keyframes.size(); ++i)
+    keyframes[i].world_from_body = search.map.problem.world_from_keyframe[i];
+  return any;
+}
+
+void LoopCloser::begin(const std::vector<Keyframe>& keyframes,
+                       const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points) {
+  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
+                agreement_.get()};
   running_.emplace();
   running_->keyframes = keyframes.size();
-  running_->segment_start = segment_start;
   running_->outcome = std::async(std::launch::async, [this, search = std::move(search)]() mutable {
     const SideWork::Scope working(work_);
     LoopOutcome outcome;
@@ -259,10 +329,11 @@ std::optional<LoopOutcome> LoopCloser::take(std::size_t keyframes, bool wait, bo
   return outcome;
 }
 
-PoseGraphResult LoopCloser::optimise(const std::vector<Keyframe>& keyframes) const {
-  const PoseGraphProblem problem = problem_of(keyframes);
+PoseGraphResult LoopCloser::optimise(const std::vector<Keyframe>& keyframes,
+                                     const std::vector<std::uint64_t>& piece_starts) const {
+  const PoseGraphProblem problem = problem_of(keyframes, piece_starts);
   if (problem.loops.empty()) return {};
-  return optimise_pose_graph(problem, config_.graph);
+  return optimise_pose_graph(problem, config_.graph, agreement_.get());
 }
 
 void LoopCloser::save(BinaryWriter& writer) const {
@@ -270,21 +341,20 @@ void LoopCloser::save(BinaryWriter& writer) const {
   writer.put(running_.has_value());
   if (!running_) return;
   writer.put(running_->keyframes);
-  writer.put(running_->segment_start);
 }
 
 void LoopCloser::load(BinaryReader& reader, std::vector<LoopAttempt> attempts,
-                      const std::vector<Keyframe>& keyframes, KeyframePoints& points) {
+                      const std::vector<Keyframe>& keyframes,
+                      const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points) {
   attempts_ = std::move(attempts);
   last_search_ = reader.get<TimeNs>();
   if (!reader.get<bool>()) return;
   const auto known = reader.get<std::uint64_t>();
-  const auto segment_start = reader.get<std::uint64_t>();
-  if (known == 0 || known > keyframes.size() || segment_start >= known)
+  if (known == 0 || known > keyframes.size())
     throw InputError("checkpoint", "", "expected a search among keyframes that are there");
   // Keyframes do not move while a search runs (a levelling of the world waits for it), so the first
   // ones are what it began with.
-  begin({keyframes.begin(), keyframes.begin() + static_cast<std::ptrdiff_t>(known)}, segment_start,
+  begin({keyframes.begin(), keyframes.begin() + static_cast<std::ptrdiff_t>(known)}, piece_starts,
         points);
 }
 

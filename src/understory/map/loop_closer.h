@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "understory/graph/loops/loop_agreement.h"
 #include "understory/graph/loops/loop_closure.h"
 #include "understory/graph/loops/loop_search.h"
 #include "understory/graph/pose_graph.h"
@@ -14,6 +15,9 @@
 #include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
 #include "understory/map/loop_attempt.h"
+#include "understory/map/map_pieces.h"
+#include "understory/map/piece_search.h"
+#include "understory/map/searched_map.h"
 #include "understory/registration/matcher.h"
 #include "understory/util/config/config.h"
 #include "understory/util/files/binary_io.h"
@@ -29,6 +33,7 @@ struct LoopCloserConfig {
   LoopSearchConfig search;
   LoopClosureConfig verification;
   PoseGraphConfig graph;
+  PieceSearchConfig pieces;
   int submap_keyframes = 22;    // on each side of a candidate, that make the map it is matched to
   int source_keyframes = 4;     // on each side of the query, that are matched
   double voxel_size_m = 0.2;    // thins both
@@ -65,49 +70,68 @@ class LoopCloser {
   LoopCloser& operator=(const LoopCloser&) = delete;
 
   // Begins a search for the newest keyframe if one is due and none is running. `points` must stay
-  // alive until its outcome has been taken.
-  void consider(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
-                KeyframePoints& points);
+  // alive until its outcome has been taken. `piece_starts`, here and below: the first keyframe of
+  // each piece of the map. Loops are looked for among the pieces that are together with the newest
+  // keyframe's, and its place anew in those that are not (map_pieces.h).
+  void consider(const std::vector<Keyframe>& keyframes,
+                const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points);
   // `search.method` paper: all three steps of P4 (38) for the newest keyframe if they are due, at
   // once, so that there is never one running. `present` does without that keyframe. Nothing if not
   // due, or by another method.
-  [[nodiscard]] std::optional<LoopOutcome> close_in_present(const std::vector<Keyframe>& keyframes,
-                                                            std::size_t segment_start,
-                                                            KeyframePoints& points,
-                                                            const PresentMap& present);
+  [[nodiscard]] std::optional<LoopOutcome> close_in_present(
+      const std::vector<Keyframe>& keyframes, const std::vector<std::uint64_t>& piece_starts,
+      KeyframePoints& points, const PresentMap& present);
   // The outcome of the running search, nothing if none is running or due. It is due at a fixed
   // number of keyframes, and then waited for; `wait`: due now; `when_found`: due when it is there.
   // Waiting polls `progress`.
   [[nodiscard]] std::optional<LoopOutcome> take(std::size_t keyframes, bool wait, bool when_found,
                                                 const ProgressSink& progress = {});
 
+  // Looks from all places of each piece that is still apart, while no search is running, and lays
+  // pieces that are found together. Whether any were. Polls `progress`.
+  [[nodiscard]] bool join_left(std::vector<Keyframe>& keyframes,
+                               const std::vector<std::uint64_t>& piece_starts,
+                               KeyframePoints& points, const ProgressSink& progress = {});
+
   [[nodiscard]] const std::vector<LoopAttempt>& attempts() const { return attempts_; }
   // CPU time of all searches so far, that which is running included.
   [[nodiscard]] double search_cpu_seconds() const { return work_.cpu_seconds(); }
-  // The graph of the keyframes, with all verified loops.
-  [[nodiscard]] PoseGraphProblem problem_of(const std::vector<Keyframe>& keyframes) const;
+  // Which pieces are together by the attempts so far.
+  [[nodiscard]] MapPieces pieces_of(const std::vector<Keyframe>& keyframes,
+                                    const std::vector<std::uint64_t>& piece_starts) const;
+  // Which of the attempts are loops of the graph: verified, and within pieces that are together.
+  [[nodiscard]] std::vector<char> counted(const MapPieces& pieces) const;
+  // The graph of the keyframes, with those loops.
+  [[nodiscard]] PoseGraphProblem problem_of(const std::vector<Keyframe>& keyframes,
+                                            const std::vector<std::uint64_t>& piece_starts) const;
   // That graph optimised; without any loop, no poses.
-  [[nodiscard]] PoseGraphResult optimise(const std::vector<Keyframe>& keyframes) const;
+  [[nodiscard]] PoseGraphResult optimise(const std::vector<Keyframe>& keyframes,
+                                         const std::vector<std::uint64_t>& piece_starts) const;
 
   // Without the attempts, which only grow.
   void save(BinaryWriter& writer) const;
   // Begins the search again that was running when the state was saved.
   void load(BinaryReader& reader, std::vector<LoopAttempt> attempts,
-            const std::vector<Keyframe>& keyframes, KeyframePoints& points);
+            const std::vector<Keyframe>& keyframes, const std::vector<std::uint64_t>& piece_starts,
+            KeyframePoints& points);
 
  private:
   struct Running {
     std::uint64_t keyframes;  // known to it
-    std::uint64_t segment_start;
     std::future<LoopOutcome> outcome;
   };
-  void begin(const std::vector<Keyframe>& keyframes, std::size_t segment_start,
+  void begin(const std::vector<Keyframe>& keyframes, const std::vector<std::uint64_t>& piece_starts,
              KeyframePoints& points);
+  [[nodiscard]] SearchedMap searched(const std::vector<Keyframe>& keyframes,
+                                     const std::vector<std::uint64_t>& piece_starts,
+                                     KeyframePoints& points) const;
   [[nodiscard]] bool due(const std::vector<Keyframe>& keyframes);
 
   LoopCloserConfig config_;
   LocalMapConfig local_map_config_;
   std::vector<LoopAttempt> attempts_;
+  // Of the running search while there is one; kept from one to the next.
+  std::unique_ptr<LoopAgreement> agreement_;
   SideWork work_;
   TimeNs last_search_ = kNoSearchYet;
   std::atomic<bool> abandoned_ = false;  // nobody waits for what the running search finds

@@ -54,6 +54,12 @@ namespace loop_closer {  // map/loop_closer.cc
 inline constexpr std::chrono::milliseconds kPollInterval{50};
 }  // namespace loop_closer
 
+namespace searched_map {  // map/searched_map.cc
+// Factor of the covariance of a guess that a match has replaced: with it the guess pulls on no pose
+// by a micrometre [bound: loops have centimetres, guesses tens of metres]
+inline constexpr double kGuessIsWorthless = 1e4;
+}  // namespace searched_map
+
 namespace keyframe_map {  // map/keyframe_map.cc
 // Keyframes whose points stay in memory, about 60 MB [bound: memory]
 inline constexpr std::size_t kCachedKeyframes = 150;

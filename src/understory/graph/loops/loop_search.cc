@@ -81,13 +81,19 @@ double disc_overlap(double distance, double radius) {
   return (2.0 / std::numbers::pi) * (std::acos(h) - h * std::sqrt(1.0 - h * h));
 }
 
+bool is_eligible(const std::vector<char>& eligible, std::size_t keyframe) {
+  return eligible.empty() || eligible[keyframe] != 0;
+}
+
 std::vector<LoopCandidate> paper_candidates(const PoseGraphProblem& problem, std::size_t query,
-                                            const LoopSearchConfig& config) {
+                                            const LoopSearchConfig& config,
+                                            const std::vector<char>& eligible) {
   const Eigen::Vector3d& here = problem.world_from_keyframe[query].translation();
   const auto excluded = static_cast<std::size_t>(config.exclude_recent);
   LoopCandidate best;
   best.distance_m = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k + excluded <= query; ++k) {
+    if (!is_eligible(eligible, k)) continue;
     const double distance = (problem.world_from_keyframe[k].translation() - here).norm();
     if (distance < best.distance_m) {
       best.keyframe = static_cast<int>(k);
@@ -118,7 +124,8 @@ std::vector<LoopCandidate> spread(std::vector<LoopCandidate> all, const std::vec
 }
 
 std::vector<LoopCandidate> uncertain_candidates(const PoseGraphProblem& problem, std::size_t query,
-                                                const LoopSearchConfig& config) {
+                                                const LoopSearchConfig& config,
+                                                const std::vector<char>& eligible) {
   const auto& poses = problem.world_from_keyframe;
   const std::vector<Drift> drift = drift_from(problem, query);
   std::vector<double> way(query + 1, 0.0);
@@ -128,6 +135,7 @@ std::vector<LoopCandidate> uncertain_candidates(const PoseGraphProblem& problem,
   std::vector<LoopCandidate> all;
   for (std::size_t k = 0; k < query; ++k) {
     if (way[query] - way[k] < config.exclude_path_m || !drift[k].reached) continue;
+    if (!is_eligible(eligible, k)) continue;
     LoopCandidate candidate;
     candidate.keyframe = static_cast<int>(k);
     candidate.distance_m = (poses[k].translation() - poses[query].translation()).norm();
@@ -147,11 +155,13 @@ std::vector<LoopCandidate> uncertain_candidates(const PoseGraphProblem& problem,
 }  // namespace
 
 std::vector<LoopCandidate> find_loop_candidates(const PoseGraphProblem& problem, std::size_t query,
-                                                const LoopSearchConfig& config) {
+                                                const LoopSearchConfig& config,
+                                                const std::vector<char>& eligible) {
+  UNDERSTORY_CHECK(eligible.empty() || eligible.size() == problem.world_from_keyframe.size());
   UNDERSTORY_CHECK(query < problem.world_from_keyframe.size());
   return config.method == LoopSearchConfig::Method::kPaper
-             ? paper_candidates(problem, query, config)
-             : uncertain_candidates(problem, query, config);
+             ? paper_candidates(problem, query, config, eligible)
+             : uncertain_candidates(problem, query, config, eligible);
 }
 
 bool loop_search_due(TimeNs last, TimeNs now, const LoopSearchConfig& config) {

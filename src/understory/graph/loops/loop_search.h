@@ -45,10 +45,11 @@ struct LoopCandidate {
 
 // Candidates for the keyframe `query`, best first; possibly none. `problem` holds the keyframes,
 // the odometry and the loops closed so far (which shorten the way over which drift has built up).
+// `eligible`: which keyframes may be candidates; empty: all.
 // Deterministic; thread-safe. Linear in the number of keyframes, with a logarithm for the way.
-[[nodiscard]] std::vector<LoopCandidate> find_loop_candidates(const PoseGraphProblem& problem,
-                                                              std::size_t query,
-                                                              const LoopSearchConfig& config);
+[[nodiscard]] std::vector<LoopCandidate> find_loop_candidates(
+    const PoseGraphProblem& problem, std::size_t query, const LoopSearchConfig& config,
+    const std::vector<char>& eligible = {});
 
 // Whether a search is due at `now`, the last one having been at `last` (lowest value: none yet).
 inline constexpr TimeNs kNoSearchYet = std::numeric_limits<TimeNs>::min();

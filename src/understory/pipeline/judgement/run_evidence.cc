@@ -43,6 +43,7 @@ void put_match(Figures& figures, const MatchEvidence& match) {
   put(figures, "scans_empty", match.empty);
   put(figures, "scans_repeated", match.repeated);
   put(figures, "segments", match.segments);
+  put(figures, "segments_joined", match.joined);
   figures["inliers_mean"] = match.inliers_mean;
   figures["inliers_low"] = match.inliers_low;
   figures["fitness_rms_m"] = match.fitness_rms_m;

@@ -57,6 +57,8 @@ struct MatchEvidence {
   std::uint64_t repeated = 0;   // hold the same points as the scan before
   std::uint64_t cut = 0;        // one where the recording ends within a turn: empty, unmatched
   std::uint64_t segments = 1;   // pieces of map that hang together by predictions only
+  std::uint64_t joined = 0;     // pieces that were joined to others where a place was seen again
+  bool gap_joined = false;      // one of them begins where the longest gap of the lidar ends
   std::string first_lost;       // stamp of the first scan of the second piece, seconds
   double inliers_mean = 0.0;    // share of a scan's points near the map, 0 to 1
   double inliers_low = 0.0;     // the same of the tenth of the scans that have least

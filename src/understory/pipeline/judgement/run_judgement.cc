@@ -315,7 +315,7 @@ class Judge {
       hurt(
           fmt::format("the position was lost {} time(s), first at {} s; the map consists of {} "
                       "pieces that do not fit together",
-                      match.segments - 1, match.first_lost, match.segments));
+                      match.segments - 1 + match.joined, match.first_lost, match.segments));
     }
   }
 
@@ -349,7 +349,12 @@ class Judge {
                          evidence_.imu.longest_gap_s <= config_.longest_lidar_gap_s &&
                          evidence_.match.segments == 1;
     const char* way = carried ? "measured by the IMU alone" : "guessed";
-    if (lidar.longest_gap_s > config_.longest_lidar_gap_s) {
+    if (lidar.longest_gap_s > config_.longest_lidar_gap_s && evidence_.match.gap_joined) {
+      missing(fmt::format(
+          "the lidar was silent for {:.1f} s before {} s. The maps before and after were joined "
+          "where places were seen again; of the way in between nothing is known",
+          lidar.longest_gap_s, lidar.after_longest_gap));
+    } else if (lidar.longest_gap_s > config_.longest_lidar_gap_s) {
       hurt(fmt::format(
           "the lidar was silent for {:.1f} s before {} s. The motion in between was {}, so the map "
           "before and after may be offset",

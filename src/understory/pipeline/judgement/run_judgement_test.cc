@@ -218,6 +218,16 @@ TEST(RunJudgement, Matches) {
   pieces.match.segments = 2;
   pieces.match.first_lost = "17.5";
   expect(kUntrusted, "lost 1 time(s), first at 17.5 s", pieces);
+  pieces.match.joined = 1;
+  expect(kUntrusted, "lost 2 time(s), first at 17.5 s; the map consists of 2 pieces", pieces);
+  RunEvidence gap = good_run();
+  gap.lidar.longest_gap_s = 30.0;
+  gap.lidar.after_longest_gap = "17.5";
+  expect(kUntrusted, "silent for 30.0 s before 17.5 s. The motion in between was", gap);
+  gap.match.joined = 1;
+  expect(kUntrusted, "silent for 30.0 s", gap);
+  gap.match.gap_joined = true;
+  expect(RunStatus::kPartial, "joined where places were seen again", gap);
 }
 
 TEST(RunJudgement, APathThatShakesWithoutAnImuIsPartial) {

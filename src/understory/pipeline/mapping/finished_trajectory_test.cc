@@ -70,6 +70,29 @@ TEST(FinishedTrajectory, SpreadsACorrectionByPowersAndCarriesItOn) {  // P0 (19,
   }
 }
 
+// A piece that was laid elsewhere: scans before it stay, its own go with it.
+TEST(FinishedTrajectory, APieceTakesItsFirstScanAlongAndNoneBefore) {
+  ShortRun run;
+  run.keyframes[1].begins_piece = true;
+  const Pose elsewhere(so3_exp({0, 0, 1.5707963267948966}), {40.0, -7.0, 1.0});
+  run.keyframes[1].world_from_body = elsewhere;
+  std::vector<FinishedScan> scans;
+  for_each_finished_scan(run.journal, run.keyframes,
+                         [&](const FinishedScan& scan) { scans.push_back(scan); });
+  for (std::size_t i = 0; i < 10; ++i) {
+    EXPECT_NEAR(
+        (scans[i].world_from_body.translation() - Eigen::Vector3d(static_cast<double>(i), 0.0, 0.0))
+            .norm(),
+        0.0, 1e-12)
+        << i;
+  }
+  for (std::size_t i = 10; i < scans.size(); ++i) {
+    const Pose expected = elsewhere * along_x(static_cast<double>(i) - 10.0);
+    EXPECT_LT((scans[i].world_from_body.matrix() - expected.matrix()).norm(), 1e-12) << i;
+    EXPECT_LT((scans[i].velocity_in_world - Eigen::Vector3d(0, 1, 0)).norm(), 1e-12) << i;
+  }
+}
+
 TEST(FinishedTrajectory, VelocityTurnsWithItsKeyframe) {
   ShortRun run;
   run.keyframes[1].world_from_body =

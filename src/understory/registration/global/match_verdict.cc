@@ -135,10 +135,12 @@ MatchVerdict judge_match(const Points& target, const Points& source,
 }
 
 GlobalRegistration register_globally(const Points& target, const Points& source) {
+  return register_globally(prepare_search(target), prepare_search(source));
+}
+
+GlobalRegistration register_globally(const SearchCloud& a, const SearchCloud& b) {
   GlobalRegistration done;
   done.result.status = RegistrationStatus::kTooFewPoints;
-  const SearchCloud a = prepare_search(target);
-  const SearchCloud b = prepare_search(source);
   done.result.reason = refusal_of(a, b);
   done.verdict.reason = done.result.reason;
   if (!done.result.reason.empty()) return done;

@@ -59,5 +59,8 @@ struct GlobalRegistration {
 // Finds the pose of the source on the target anywhere and at any heading. Both clouds: metres, z
 // within 40 degrees of up, each in its own frame. Thread-safe; same bits for any number of threads.
 [[nodiscard]] GlobalRegistration register_globally(const Points& target, const Points& source);
+// The same for clouds that are ready, between the frames of their points.
+[[nodiscard]] GlobalRegistration register_globally(const SearchCloud& target,
+                                                   const SearchCloud& source);
 
 }  // namespace understory

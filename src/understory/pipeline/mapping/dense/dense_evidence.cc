@@ -44,8 +44,16 @@ void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const R
   match.unmatched = counts.unmatched + counts.gated;
   match.empty = counts.empty_scans;
   match.repeated = counts.repeated;
-  match.segments = counts.segments;
+  const MapPieces pieces = front_end.map().finished_pieces();
+  match.segments = pieces.groups() + (counts.segments - pieces.count());
+  match.joined = counts.segments - match.segments;
   if (counts.segments > 1) match.first_lost = format_seconds(counts.first_lost);
+  for (std::size_t piece = 1; piece < pieces.count(); ++piece) {
+    const TimeNs start = front_end.map().keyframes()[pieces.begin(piece)].stamp;
+    if (pieces.together(piece - 1, piece) &&
+        format_seconds(start) == evidence.lidar.after_longest_gap)
+      match.gap_joined = true;
+  }
 }
 
 }  // namespace understory

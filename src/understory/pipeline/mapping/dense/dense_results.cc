@@ -256,6 +256,12 @@ void fill_streams(const EventOrderer::Report& time_repair, RunDocuments& documen
   documents.count("scans_without_imu", time_repair.scans_without_imu);
 }
 
+// Pieces of the map that were found again in others.
+std::uint64_t joined_segments(const DenseFrontEnd& front_end) {
+  const MapPieces pieces = front_end.map().finished_pieces();
+  return pieces.count() - pieces.groups();
+}
+
 void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
   const DenseCounts& counts = front_end.counts();
   documents.summary().scans = counts.scans;
@@ -264,7 +270,9 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
   documents.count("scans_unmatched", counts.unmatched);
   documents.count("scans_velocity_gated", counts.gated);
   documents.count("scans_with_few_points", counts.empty_scans);
-  documents.count("segments", counts.segments);
+  const std::uint64_t apart = counts.segments - joined_segments(front_end);
+  documents.count("segments", apart);
+  documents.count("segments_joined", counts.segments - apart);
   const auto& used = front_end.map().loops_used();
   documents.count("loops_tried", used.size());
   documents.count("loops_closed",
