@@ -15,6 +15,7 @@
 #include "understory/preprocess/isolated_points.h"
 #include "understory/preprocess/machine_boxes.h"
 #include "understory/preprocess/voxel_filter.h"
+#include "understory/preprocess/weather_filter.h"
 #include "understory/registration/matcher.h"
 #include "understory/registration/penalties.h"
 #include "understory/sensor/rig.h"
@@ -47,6 +48,7 @@ void describe(ConfigTable& table, ScanMatchConfig& config);
 struct DenseOdometryConfig {
   VoxelFilterConfig voxel;  // thins a scan before matching
   IsolatedPointsConfig isolated;
+  WeatherFilterConfig weather;
   ScanMatchConfig match;
   DeskewConfig deskew;
   MotionConfig motion;
@@ -68,6 +70,7 @@ struct DenseEstimate {
   bool matched = false;      // the match was usable and was offered to the motion model
   BodyCloud cloud;           // every return outside the machine, deskewed, body frame at the stamp
   BodyCloud thinned;         // what was matched, of the cloud
+  std::size_t weather = 0;   // returns that the weather filter dropped
   TimeNs scan_end = 0;       // time of the scan's last point
   double wall_ms = 0.0;
   double cpu_ms = 0.0;
@@ -153,6 +156,7 @@ class DenseOdometry {
   std::unique_ptr<MotionModel> motion_;
   std::vector<MachineBox> boxes_;
   VoxelFilter filter_;
+  WeatherFilter weather_;
   bool last_matched_ = false;
   TimeNs last_scan_ = 0;            // stamp
   std::vector<std::uint8_t> keep_;  // workspace: points of the scan outside the machine

@@ -252,6 +252,7 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
   documents.count("scans_unmatched", counts.unmatched);
   documents.count("scans_velocity_gated", counts.gated);
   documents.count("scans_with_few_points", counts.empty_scans);
+  if (counts.weather_points > 0) documents.count("weather_points", counts.weather_points);
   documents.count("segments", counts.segments);
   const auto& used = front_end.map().loops_used();
   documents.count("loops_tried", used.size());
