@@ -80,12 +80,12 @@ def definition(folder):
     assert len(points) > 1000, len(points)
     piece = written(folder / "piece.las", points)
     for radius in (0.3, 0.5):
-        told = answer("evaluate", "map", folder / "piece.las", "--radius-m", radius)
+        told = answer("evaluate", "map", folder / "piece.las", "--radius-m", radius, "--thin-m", 0)
         mean, used = by_definition(piece, radius)
         assert told["points"] == len(piece) and abs(told["points_used"] - used) <= 2, (told, used)
         assert abs(told["mean_entropy_nats"] - mean) < 0.002, (radius, told, mean)
     assert answer("evaluate", "map", folder / "piece.las")["mean_entropy_nats"] == answer(
-        "evaluate", "map", folder / "piece.las", "--radius-m", 0.3)["mean_entropy_nats"]
+        "evaluate", "map", folder / "piece.las", "--radius-m", 0.3, "--thin-m", 0.05)["mean_entropy_nats"]
     # Two passes that lie 7 cm apart are seen.
     doubled = numpy.vstack((piece, piece + [0.04, 0.04, 0.04]))
     written(folder / "doubled.las", numpy.vstack((piece, piece)))

@@ -41,19 +41,18 @@ MapEntropy entropy_of(const std::filesystem::path& cloud, const MapEntropyConfig
 
 }  // namespace
 
-int evaluate_crispness(const std::string& run_or_cloud, double radius_m, bool json,
+int evaluate_crispness(const std::string& run_or_cloud, const MapEntropyConfig& config, bool json,
                        CommandContext& context) {
-  MapEntropyConfig config;
-  config.radius_m = radius_m;
   const MapEntropy map = entropy_of(file_in_folder(run_or_cloud, "map.laz"), config, context.log);
   if (map.points_used == 0)
     throw InputError(run_or_cloud, "",
                      fmt::format("expected points with {} neighbours within {} m",
-                                 config.fewest_neighbours, radius_m));
+                                 config.fewest_neighbours, config.radius_m));
   const double thickness_m = std::sqrt(map.mean_plane_variance_m2);
   const nlohmann::ordered_json object = {{"points", map.points},
                                          {"points_used", map.points_used},
-                                         {"radius_m", radius_m},
+                                         {"radius_m", config.radius_m},
+                                         {"thin_m", config.thin_m},
                                          {"mean_entropy_nats", map.mean_entropy_nats},
                                          {"thickness_rms_m", thickness_m}};
   const std::string text =
@@ -62,7 +61,7 @@ int evaluate_crispness(const std::string& run_or_cloud, double radius_m, bool js
                  "points              {}, {} with neighbours enough within {} m\n"
                  "mean map entropy    {:.4f} nats\n"
                  "thickness           {:.4f} m, root mean square over the points\n",
-                 map.points, map.points_used, radius_m, map.mean_entropy_nats, thickness_m);
+                 map.points, map.points_used, config.radius_m, map.mean_entropy_nats, thickness_m);
   std::fputs(text.c_str(), stdout);
   return kExitDone;
 }

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "understory/cli/evaluate_crispness.h"
+#include "understory/evaluation/map_entropy.h"
 #include "understory/evaluation/strip_roads.h"
 #include "understory/evaluation/trajectory.h"
 #include "understory/graph/self_correction/stem_correction.h"
@@ -24,7 +25,7 @@ struct EvaluateMapOptions {
   std::string stems;
   std::string trajectory;
   double tolerance_s = 0.01;
-  double radius_m = 0.3;
+  MapEntropyConfig entropy{.thin_m = 0.05};
   bool json = false;
 };
 
@@ -166,7 +167,13 @@ void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
       ->required();
   command->add_option("TRAJECTORY", options->trajectory, "Run folder or trajectory (TUM)");
   command
-      ->add_option("--radius-m", options->radius_m,
+      ->add_option("--thin-m", options->entropy.thin_m,
+                   "Of a cloud: one point counts in each cube of this edge, so that maps of other "
+                   "densities compare; 0: all count")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command
+      ->add_option("--radius-m", options->entropy.radius_m,
                    "Of a cloud: neighbours of a point lie within it")
       ->check(CLI::Range(0.01, 5.0));
   command->add_option("--tolerance-s", options->tolerance_s, "Largest difference of times")
@@ -182,7 +189,7 @@ void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
     chosen = [options](CommandContext& context) {
       context.stop_at_once();
       return options->trajectory.empty()
-                 ? evaluate_crispness(options->stems, options->radius_m, options->json, context)
+                 ? evaluate_crispness(options->stems, options->entropy, options->json, context)
                  : evaluate_map(*options, context);
     };
   });

@@ -16,6 +16,9 @@ struct MapEntropyConfig {
   // Standard deviation that is added to each axis, metres: the logarithm of a flat surface's
   // covariance stays finite, and steps of the file's coordinates do not count [chosen: 1 mm].
   double least_sd_m = 0.001;
+  // One point (the first) is left in each cube of this edge, so that maps of other densities
+  // compare; 0: all count.
+  double thin_m = 0.0;
   double tile_m = 10.0;  // points are sorted into tiles on disk
 };
 

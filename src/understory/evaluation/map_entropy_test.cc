@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <vector>
 
 #include "understory/util/parallel.h"
@@ -78,6 +80,29 @@ TEST(MapEntropy, GrowsWithTheLogarithmOfTheThickness) {
   const MapEntropy thick = measured(wall(0.02, 20'000, 4));
   EXPECT_NEAR(thick.mean_entropy_nats - thin.mean_entropy_nats, std::log(2.0), 0.02);
   EXPECT_NEAR(std::sqrt(thin.mean_plane_variance_m2), 0.01, 5e-4);
+}
+
+// The first point of each cube, by hand; and the entropy of these.
+TEST(MapEntropy, ThinnedItIsThatOfTheFirstPointOfEachCube) {
+  const std::vector<Vector3d> points = wall(0.02, 6'000, 6);
+  MapEntropyConfig config;
+  config.thin_m = 0.05;
+  std::set<std::array<long, 3>> taken;
+  std::vector<Vector3d> first;
+  for (const Vector3d& point : points) {
+    const Eigen::Array3d cube = (point / config.thin_m).array().floor();
+    if (taken.insert({std::lround(cube.x()), std::lround(cube.y()), std::lround(cube.z())}).second)
+      first.push_back(point);
+  }
+  MapEntropyMeter meter(folder(), config);
+  for (const Vector3d& point : points)
+    meter.add(point);
+  const MapEntropy found = meter.measure();
+  const MapEntropy expected = by_definition(first, config);
+  EXPECT_LT(first.size(), points.size() - 1000);
+  EXPECT_EQ(found.points, points.size());
+  EXPECT_EQ(found.points_used, expected.points_used);
+  EXPECT_NEAR(found.mean_entropy_nats, expected.mean_entropy_nats, 1e-4);
 }
 
 TEST(MapEntropy, IsTheSameForAnyNumberOfThreadsAndOfNothingIsUnknown) {

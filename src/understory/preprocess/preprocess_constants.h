@@ -45,4 +45,17 @@ inline constexpr std::size_t kFollowing = 4;
 inline constexpr double kOrderedShare = 0.5;
 }  // namespace point_order
 
+namespace weather_filter {  // preprocess/weather_filter.cc
+// Share of the returns that are darker than the bright ones [tuned: skidoo, lake, tuusniemi1,
+// harvester, seed 3: snow and bare ground have one scale then]
+inline constexpr double kBrightShare = 0.9;
+// Added to brightness: a black return needs some distance too [tuned: as above]
+inline constexpr float kDarkest = 0.02F;
+// How far the lidar may have moved between a scan and those before it, metres; a return that is
+// nearer than some times that is then looked for in vain [chosen: 5 m/s at 10 Hz]
+inline constexpr double kMovedM = 0.5;
+// Returns that a thread judges at a time [bound: time]
+inline constexpr std::size_t kGrain = 512;
+}  // namespace weather_filter
+
 }  // namespace understory::preprocess_constants

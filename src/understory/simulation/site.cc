@@ -186,6 +186,14 @@ void describe_lidar(ConfigTable& table, LidarConfig& c) {
               "snow flakes that a beam meets in a metre");
     table.add("snow_drop_interval_s", c.snow_drop_interval_s, {0.0, 1e9}, "s",
               "mean time between loads of snow off a branch, 0 = none");
+    table.add("cold_noise", c.cold_noise, {0.0, 0.3}, "",
+              "share of beams that a cold lidar gives a spurious range, in spells laser by laser");
+    table.add("sun_noise", c.sun_noise, {0.0, 1.0}, "",
+              "share of beams towards the sun that report a spurious range");
+    table.add("sun_azimuth_deg", c.sun_azimuth_deg, {0.0, 360.0}, "deg",
+              "of the sun, clockwise from north");
+    table.add("sun_elevation_deg", c.sun_elevation_deg, {-5.0, 90.0}, "deg",
+              "of the sun above the horizon");
     table.add("time_offset_s", c.time_offset_s, {-1.0, 1.0}, "s", "scan stamps are late by this");
     table.add("error_m", c.error_m, "m",
               "by which the claimed place is wrong, in the lidar's frame");

@@ -156,6 +156,10 @@ struct LidarConfig {
   double crosstalk = 0.0;             // share of beams that report a range out of nothing
   double snow_fall_per_m = 0.0;       // snow flakes that a beam meets in a metre
   double snow_drop_interval_s = 0.0;  // mean time between loads of snow off a branch, 0 = none
+  double cold_noise = 0.0;            // share of spurious ranges of a lidar too cold for its rating
+  double sun_noise = 0.0;             // share of spurious ranges of beams that look into the sun
+  double sun_azimuth_deg = 180.0;     // of the sun, clockwise from north
+  double sun_elevation_deg = 8.0;     // above the horizon
   double time_offset_s = 0.0;         // of the lidar's clock: stamps are late by this much
   std::vector<double> error_m = {0.0, 0.0, 0.0};  // of the extrinsics that the recording claims
   std::vector<double> error_rpy_deg = {0.0, 0.0, 0.0};

@@ -41,6 +41,7 @@ void describe(ConfigTable& table, DenseOdometryConfig& config) {
     table.section("voxel", [&] { describe(table, config.voxel); });
     table.section("isolated", [&] { describe(table, config.isolated); });
     describe(table, config.tops);
+    table.section("weather", [&] { describe(table, config.weather); });
     table.add("machine_boxes_file", config.machine_boxes_file,
               "YAML of boxes around the machine whose points are dropped; empty: none");
   });
@@ -60,7 +61,8 @@ DenseOdometry::DenseOdometry(const DenseOdometryConfig& config, const Rig& rig,
       features_(std::move(features)),
       times_(times),
       log_(log),
-      uses_imu_(config.imu_enabled && rig.body_from_imu.has_value()) {
+      uses_imu_(config.imu_enabled && rig.body_from_imu.has_value()),
+      weather_(config.weather) {
   motion_ = uses_imu_ ? make_imu_smoother(config.motion, rig, &log)
                       : make_constant_velocity_model(config.motion, &log);
   if (!config.machine_boxes_file.empty()) boxes_ = read_machine_boxes(config.machine_boxes_file);
@@ -102,6 +104,7 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
       estimate.update = motion_->add_scan(scan.stamp, factor);
     }
     estimate.state = estimate.update.state;
+    weather_.remember(estimate.state.world_from_body);
     if (estimate.update.status != MotionStatus::kIgnored) last_scan_ = scan.stamp;
     last_matched_ = estimate.matched;
     estimate.wall_ms = timer.wall_ms();
@@ -131,6 +134,9 @@ void DenseOdometry::clean(const Scan& scan, const std::vector<StampedPose>& path
   drop_isolated(scan, config_.isolated, keep_);
   estimate.cloud = deskew(scan, rig_, path, keep_, config_.deskew).cloud;
   BodyCloud& cloud = estimate.cloud;
+  estimate.weather =
+      weather_.drop(cloud, path.empty() ? motion_->predict(scan.stamp).world_from_body
+                                        : path.front().world_from_body);
   if (features_ == nullptr) {
     const Pose start = path.empty() ? Pose() : path.front().world_from_body;
     estimate.tops = keep_tree_tops(cloud, start, config_.tops);
@@ -268,6 +274,7 @@ void DenseOdometry::take_imu(const Pose& body_from_imu, std::span<const ImuSampl
 
 void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
   motion_->move_world(new_world_from_old_world);
+  weather_.move_world(new_world_from_old_world);
   scan_motion_.move_world(new_world_from_old_world);
 }
 
@@ -278,6 +285,7 @@ void DenseOdometry::save(BinaryWriter& writer) const {
   writer.put(last_scan_);
   scan_motion_.save(writer);
   motion_->save(writer);
+  weather_.save(writer);
 }
 
 void DenseOdometry::load(BinaryReader& reader) {
@@ -287,6 +295,7 @@ void DenseOdometry::load(BinaryReader& reader) {
   last_scan_ = reader.get<TimeNs>();
   scan_motion_.load(reader);
   motion_->load(reader);
+  weather_.load(reader);
 }
 
 }  // namespace understory

@@ -16,6 +16,7 @@
 #include "understory/preprocess/isolated_points.h"
 #include "understory/preprocess/machine_boxes.h"
 #include "understory/preprocess/voxel_filter.h"
+#include "understory/preprocess/weather_filter.h"
 #include "understory/registration/matcher.h"
 #include "understory/registration/penalties.h"
 #include "understory/sensor/rig.h"
@@ -49,6 +50,7 @@ struct DenseOdometryConfig {
   VoxelFilterConfig voxel;  // thins a scan before matching
   IsolatedPointsConfig isolated;
   ScanTopsConfig tops;
+  WeatherFilterConfig weather;
   ScanMatchConfig match;
   DeskewConfig deskew;
   MotionConfig motion;
@@ -71,6 +73,7 @@ struct DenseEstimate {
   BodyCloud cloud;           // every return outside the machine, deskewed, body frame at the stamp
   std::optional<BodyCloud> tops;  // of the cloud, where tree tops alone count
   BodyCloud thinned;              // what was matched, of the tops or of the cloud
+  std::size_t weather = 0;        // returns that the weather filter dropped
   TimeNs scan_end = 0;            // time of the scan's last point
   double wall_ms = 0.0;
   double cpu_ms = 0.0;
@@ -156,6 +159,7 @@ class DenseOdometry {
   std::unique_ptr<MotionModel> motion_;
   std::vector<MachineBox> boxes_;
   VoxelFilter filter_;
+  WeatherFilter weather_;
   bool last_matched_ = false;
   TimeNs last_scan_ = 0;            // stamp
   std::vector<std::uint8_t> keep_;  // workspace: points of the scan outside the machine

@@ -18,9 +18,6 @@ namespace {
 constexpr std::int64_t kGroupFirings = 16;  // the stand changes between groups only
 constexpr std::size_t kMostBeams = 128;
 constexpr std::int64_t kBlockFirings = 64;  // at most, cast together
-constexpr double kSnowDrop = 3.0;           // seconds that a load of snow takes to come down
-constexpr double kSnowDropPerM = 0.03;      // flakes in a metre of beam then
-constexpr float kFlakeEnergy = 0.06F;       // of a large flake, as reflectivity x share of the beam
 constexpr float kGlaring = 130.0F;          // intensity from which an echo blooms
 
 using Turn = HeadTurn;
@@ -119,6 +116,7 @@ Scanner::Scanner(const SiteConfig& config, ForestScene& scene, const CarrierPath
       start_(start),
       seed_(hash_numbers(static_cast<std::uint64_t>(config.seed), stream_of(NoiseStream::kLidar))),
       model_(make_lidar_model(config.lidar)),
+      weather_(config.lidar, seed_),
       body_from_lidar_(mount_pose(config.lidar.mount_m, config.lidar.mount_rpy_deg)),
       beams_(model_, 0.0),
       order_(trace_order()) {
@@ -286,10 +284,10 @@ void Scanner::cast_block(double moment_s, Block& block) const {
     BeamEcho echo =
         strongest_echo(std::span(block.hits).subspan(block.slots[i] * rays_per_beam, rays_per_beam),
                        config_.pulse_m, two ? &second : nullptr);
-    if (config_.snow_fall_per_m > 0.0 || config_.snow_drop_interval_s > 0.0) {
-      const double time = to_seconds(model_.firing_time(static_cast<std::int64_t>(firing)));
+    if (weather_.has_snow()) {
+      const auto number = static_cast<std::int64_t>(firing);
       const BeamEcho behind = echo;
-      meet_snow(CounterNoise(seed_ + 6, firing, i % beams), snow_per_m(time), echo);
+      weather_.meet_snow(number, i % beams, to_seconds(model_.firing_time(number)), echo);
       if (two && echo.surface == Surface::kSnow) second = behind;
     }
     if (keeps_sources_) {
@@ -307,35 +305,8 @@ void Scanner::cast_block(double moment_s, Block& block) const {
     }
   }
   if (config_.blooming > 0.0 || config_.crosstalk > 0.0) add_ghosts(block);
+  if (weather_.has_spurious()) add_spurious(block);
   block.let_go_of_rays();
-}
-
-// Flakes in a metre of beam at a time: the fall of snow, and for a few seconds what a branch lets
-// go nearby.
-double Scanner::snow_per_m(double time_s) const {
-  if (config_.snow_drop_interval_s <= 0.0) return config_.snow_fall_per_m;
-  const double share = time_s / config_.snow_drop_interval_s;
-  CounterNoise noise(seed_ + 7, static_cast<std::uint64_t>(std::max(0.0, share)), 0);
-  const double begin = std::floor(share) * config_.snow_drop_interval_s +
-                       noise.uniform() * std::max(0.0, config_.snow_drop_interval_s - kSnowDrop);
-  const bool drops = time_s >= begin && time_s < begin + kSnowDrop;
-  return config_.snow_fall_per_m + (drops ? kSnowDropPerM : 0.0);
-}
-
-// A flake in front of what the beam would have met gives the first echo; whether it is strong
-// enough is settled as for any other.
-void Scanner::meet_snow(CounterNoise noise, double per_m, BeamEcho& echo) const {
-  if (per_m <= 0.0) return;
-  const double range = config_.min_range_m - std::log(1.0 - noise.uniform()) / per_m;
-  const double reach = echo.surface == Surface::kNone ? config_.max_range_m : echo.range_m;
-  if (range >= reach) return;
-  BeamEcho flake;
-  flake.range_m = static_cast<float>(range);
-  flake.energy = kFlakeEnergy * noise.uniform();
-  flake.surface = Surface::kSnow;
-  // Too weak a flake lets the beam pass.
-  const double signal = 10.0 * flake.energy * std::pow(config_.range_10_percent_m / range, 2.0);
-  if (signal > 1.0) echo = flake;
 }
 
 // Readings that nothing stands for: glaring echoes repeat in the beam's neighbours of the firings
@@ -365,6 +336,22 @@ void Scanner::add_ghosts(Block& block) const {
       block.readings[i] = {real[other].range_m, std::round(0.3F * real[other].intensity)};
       if (keeps_sources_) block.sources[i] = {};
     }
+  }
+}
+
+// Of a cold lidar and of the sun. A beam that has one tells nothing else, so its weaker echo goes.
+void Scanner::add_spurious(Block& block) const {
+  const std::size_t beams = model_.beams.size();
+  const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
+  for (std::size_t i = 0; i < block.readings.size(); ++i) {
+    const std::int64_t firing = block.first + static_cast<std::int64_t>(i / beams);
+    const LookingBeam look{firing, i % beams, to_seconds(model_.firing_time(firing)),
+                           block.rays[block.slots[i] * rays_per_beam].direction};
+    const std::optional<BeamReading> reading = weather_.spurious(look);
+    if (!reading) continue;
+    block.readings[i] = *reading;
+    if (!block.seconds.empty()) block.seconds[i] = {};
+    if (keeps_sources_) block.sources[i] = {};
   }
 }
 

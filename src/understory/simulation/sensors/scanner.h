@@ -12,6 +12,7 @@
 #include "understory/simulation/sensors/beam_echo.h"
 #include "understory/simulation/sensors/counter_noise.h"
 #include "understory/simulation/sensors/lidar_model.h"
+#include "understory/simulation/sensors/weather.h"
 
 namespace understory {
 
@@ -93,9 +94,8 @@ class Scanner {
   [[nodiscard]] std::vector<std::uint32_t> trace_order() const;
   void find_slots(std::size_t firings, Block& block) const;
   void meet_machine(Block& block) const;
-  [[nodiscard]] double snow_per_m(double time_s) const;
-  void meet_snow(CounterNoise noise, double per_m, BeamEcho& echo) const;
   void add_ghosts(Block& block) const;
+  void add_spurious(Block& block) const;
 
   const LidarConfig config_;
   ForestScene& scene_;
@@ -105,6 +105,7 @@ class Scanner {
   bool keeps_sources_ = false;
   std::uint64_t seed_;
   LidarModel model_;
+  LidarWeather weather_;
   Pose body_from_lidar_;
   BeamDirections beams_;  // of a lidar whose beams keep their elevations
   // The beams of a full block (firing by firing, beam by beam), those together that look in nearly

@@ -271,6 +271,7 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
 void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& record) {
   ++received_.counts.scans;
   received_.counts.points += record.points;
+  received_.counts.weather_points += estimate.weather;
   record.fitness_m2 = static_cast<float>(estimate.match.fitness_m2);
   record.inlier_ratio = static_cast<float>(estimate.match.inlier_ratio);
   record.iterations = static_cast<std::uint16_t>(estimate.match.iterations);

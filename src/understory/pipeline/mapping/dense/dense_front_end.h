@@ -40,11 +40,12 @@ struct DenseCounts {
   TimeNs first_lost = 0;    // when the second piece began
   std::uint64_t imu_samples = 0;
   std::uint64_t points = 0;
-  std::uint64_t by_satellites = 0;  // scans whose match or place satellites told something of
-  std::uint64_t repeated = 0;       // scans that hold the same points as the one before
-  std::uint64_t last_content = 0;   // of the last scan, see content_of
-  std::uint64_t predictions = 0;    // of trajectory_imu.tum
-  std::uint64_t coasted = 0;        // those without the IMU, by constant velocity
+  std::uint64_t weather_points = 0;  // that the weather filter dropped
+  std::uint64_t by_satellites = 0;   // scans whose match or place satellites told something of
+  std::uint64_t repeated = 0;        // scans that hold the same points as the one before
+  std::uint64_t last_content = 0;    // of the last scan, see content_of
+  std::uint64_t predictions = 0;     // of trajectory_imu.tum
+  std::uint64_t coasted = 0;         // those without the IMU, by constant velocity
   // Of trajectory_partial.tum: parts of scans, those with a match, and the sums of the times from
   // first to last point, of parts and of the scans that they are of.
   std::uint64_t scan_parts = 0;

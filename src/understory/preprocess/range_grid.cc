@@ -1,0 +1,72 @@
+#include "understory/preprocess/range_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr int kNearestLevel = 3;  // cells of level 0 are those of ranges up to 2^-3 m
+
+// Cells in the order in which they are looked at: the place's own first.
+int step_of(int cell) {
+  constexpr std::array<int, 3> kSteps = {0, -1, 1};
+  return kSteps[static_cast<std::size_t>(cell)];
+}
+
+}  // namespace
+
+int RangeGrid::level_of(float range) {
+  return std::clamp(std::ilogb(unit(std::max(range, 0.0F))) + kNearestLevel + 1, 0, kLevels - 1);
+}
+
+RangeGrid::RangeGrid(const Points& points, const std::vector<float>& range, double reach,
+                     double moved_m)
+    : reach_(static_cast<float>(reach)) {
+  for (int level = 0; level < kLevels; ++level) {
+    levels_[static_cast<std::size_t>(level)].side_m =
+        reach_ * std::ldexp(1.0F, level - kNearestLevel);
+  }
+  entries_.reserve(points.size() + points.size() / 2);
+  const auto moved = static_cast<float>(moved_m);
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const float slack = reach_ * unit(range[i]) + moved;
+    const int last = level_of(range[i] + slack);
+    for (int level = level_of(range[i] - slack); level <= last; ++level)
+      add(level, points[i], i);
+  }
+}
+
+void RangeGrid::add(int level, const Eigen::Vector3f& place, std::uint32_t point) {
+  Level& cells = levels_[static_cast<std::size_t>(level)];
+  const std::uint64_t key =
+      voxel_key(voxel_floor(place.x() / cells.side_m), voxel_floor(place.y() / cells.side_m),
+                voxel_floor(place.z() / cells.side_m));
+  const auto entry = static_cast<std::uint32_t>(entries_.size());
+  entries_.push_back({place, point, cells.first.find(key)});
+  cells.first.set(key, entry);
+}
+
+float RangeGrid::nearest(const Eigen::Vector3f& place, float range, float enough,
+                         std::uint32_t but) const {
+  static_assert(VoxelIndex::kNone == kNoPoint);
+  const Level& cells = levels_[static_cast<std::size_t>(level_of(range))];
+  const float metres = unit(range);
+  const float stop = enough * metres;
+  float best2 = reach_ * reach_ * metres * metres;
+  const int x = voxel_floor(place.x() / cells.side_m);
+  const int y = voxel_floor(place.y() / cells.side_m);
+  const int z = voxel_floor(place.z() / cells.side_m);
+  for (int cell = 0; cell < 27; ++cell) {
+    std::uint32_t at = cells.first.find(
+        voxel_key(x + step_of(cell % 3), y + step_of(cell / 3 % 3), z + step_of(cell / 9)));
+    for (; at != kNoPoint; at = entries_[at].next) {
+      if (entries_[at].point == but) continue;
+      best2 = std::min(best2, (entries_[at].place - place).squaredNorm());
+    }
+    if (best2 <= stop * stop) break;
+  }
+  return std::sqrt(best2) / metres;
+}
+
+}  // namespace understory

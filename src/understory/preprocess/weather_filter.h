@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <vector>
+
+#include "understory/geometry/pose.h"
+#include "understory/preprocess/body_cloud.h"
+#include "understory/preprocess/range_grid.h"
+#include "understory/util/config/config.h"
+#include "understory/util/files/binary_io.h"
+
+namespace understory {
+
+// What is weather: flakes, snow off branches, spurious ranges of a cold lidar and of the low sun
+// (P3, figure 6 II and the lessons below it).
+struct WeatherFilterConfig {
+  bool enabled = false;
+  // A return is weather where its distance from others, as a share of its range, is above this
+  // times its brightness.
+  double apart = 0.125;
+  double reach = 0.05;  // share of its range beyond which a return is alone
+  int scans = 2;        // before this one, in which what stands still must have been seen
+};
+void describe(ConfigTable& table, WeatherFilterConfig& config);
+
+// Takes returns out of a scan that are dark and stand alone, in their scan and in those before it.
+// A wall, a stem or the ground is in the scan before too; a flake is not. With s and b the
+// distances to the nearest return in the same scan and in the scans before, both over 0.1 m + range
+// and at most `reach`, and i the intensity over that of the bright returns (nine of ten are
+// darker), a return goes where sqrt(s b) > apart (i + 0.02). Bright returns thus never go. Without
+// intensities (all the same) nothing goes. One scan after another; not thread-safe, parallel
+// inside, the same result for any number of threads.
+class WeatherFilter {
+ public:
+  explicit WeatherFilter(const WeatherFilterConfig& config) : config_(config) {}
+
+  // `world_from_body`: at the cloud's stamp, as predicted. Returns how many went. Nothing without
+  // `enabled`. Before the first scan only the scan itself tells.
+  std::size_t drop(BodyCloud& cloud, const Pose& world_from_body);
+  // The cloud that `drop` saw last has this pose: it is one of the scans before from now on.
+  void remember(const Pose& world_from_body);
+  // The world was moved (loop closure).
+  void move_world(const Pose& new_world_from_old_world);
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  struct Seen {
+    Pose world_from_body;
+    Points points;  // all that the scan had
+    std::vector<float> range;
+    RangeGrid grid;
+  };
+  void look(const BodyCloud& cloud);
+  [[nodiscard]] std::vector<std::uint8_t> judge(const BodyCloud& cloud,
+                                                const Pose& world_from_body) const;
+
+  WeatherFilterConfig config_;
+  Seen now_;  // of the last `drop`
+  std::deque<Seen> before_;
+};
+
+}  // namespace understory

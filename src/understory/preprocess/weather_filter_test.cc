@@ -1,0 +1,166 @@
+#include "understory/preprocess/weather_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "understory/util/parallel.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+using Eigen::Vector3f;
+
+WeatherFilterConfig switched_on() {
+  WeatherFilterConfig config;
+  config.enabled = true;
+  return config;
+}
+
+void add(BodyCloud& cloud, const Vector3f& point, float intensity) {
+  cloud.points.push_back(point);
+  cloud.intensity.push_back(intensity);
+  cloud.range.push_back(point.norm());
+  cloud.ring.push_back(static_cast<std::uint16_t>(cloud.ring.size() % 16));
+  cloud.t_ns.push_back(static_cast<std::uint32_t>(cloud.t_ns.size()));
+}
+
+// A wall 10 m ahead with a return each 10 cm, and dark spots on it.
+BodyCloud wall() {
+  BodyCloud cloud;
+  for (int row = 0; row < 20; ++row) {
+    for (int column = 0; column < 40; ++column)
+      add(cloud,
+          {10.0F, -2.0F + 0.1F * static_cast<float>(column), -1.0F + 0.1F * static_cast<float>(row)},
+          (row + column) % 5 == 0 ? 20.0F : 100.0F);
+  }
+  return cloud;
+}
+
+BodyCloud moved(BodyCloud cloud, const Pose& pose) {
+  for (Vector3f& point : cloud.points)
+    point = (pose * point.cast<double>()).cast<float>();
+  return cloud;
+}
+
+TEST(WeatherFilter, DarkReturnsThatStandAloneGoAndNothingElse) {
+  BodyCloud cloud = wall();
+  const std::size_t of_wall = cloud.size();
+  add(cloud, {5.0F, 0.0F, 0.0F}, 8.0F);    // a flake
+  add(cloud, {5.0F, 2.0F, 0.0F}, 100.0F);  // as bright as the wall
+  add(cloud, {30.0F, 9.0F, 3.0F}, 2.0F);
+  WeatherFilter filter(switched_on());
+  EXPECT_EQ(filter.drop(cloud, Pose()), 2U);
+  ASSERT_EQ(cloud.size(), of_wall + 1);
+  EXPECT_EQ(cloud.points.back(), Vector3f(5.0F, 2.0F, 0.0F));
+  EXPECT_EQ(cloud.intensity.back(), 100.0F);
+  EXPECT_EQ(cloud.t_ns.back(), of_wall + 1);
+  EXPECT_EQ(cloud.ring.size(), cloud.size());
+}
+
+// A dark twig alone in its scan, seen from another place in the scan before.
+TEST(WeatherFilter, WhatWasThereBeforeStays) {
+  const Vector3f twig(5.0F, 0.0F, 0.0F);
+  const Pose before(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ())),
+                    Eigen::Vector3d(-0.3, 0.1, 0.0));
+  for (const bool was_there : {true, false}) {
+    WeatherFilter filter(switched_on());
+    BodyCloud first = moved(wall(), before.inverse());
+    if (was_there) add(first, (before.inverse() * twig.cast<double>()).cast<float>(), 8.0F);
+    filter.drop(first, before);
+    filter.remember(before);
+    BodyCloud second = wall();
+    add(second, twig, 8.0F);
+    EXPECT_EQ(filter.drop(second, Pose()), was_there ? 0U : 1U);
+  }
+}
+
+TEST(WeatherFilter, WithoutIntensitiesOrSwitchedOffNothingGoes) {
+  BodyCloud cloud = wall();
+  add(cloud, {5.0F, 0.0F, 0.0F}, 8.0F);
+  EXPECT_EQ(WeatherFilter(WeatherFilterConfig{}).drop(cloud, Pose()), 0U);
+  std::fill(cloud.intensity.begin(), cloud.intensity.end(), 7.0F);
+  EXPECT_EQ(WeatherFilter(switched_on()).drop(cloud, Pose()), 0U);
+  BodyCloud empty;
+  EXPECT_EQ(WeatherFilter(switched_on()).drop(empty, Pose()), 0U);
+}
+
+BodyCloud random_cloud(std::uint64_t seed) {
+  Random random(seed);
+  BodyCloud cloud;
+  for (int i = 0; i < 3000; ++i) {
+    const Vector3f towards(static_cast<float>(random.normal()),
+                           static_cast<float>(random.normal()),
+                           static_cast<float>(0.3 * random.normal()));
+    const double range = std::exp(random.uniform(-0.5, 4.0));
+    add(cloud, static_cast<float>(range) * towards.normalized(),
+        static_cast<float>(random.uniform(0.0, 100.0)));
+  }
+  return cloud;
+}
+
+// Distance to the nearest by trying all, over 0.1 m + range, at most the reach.
+double share(const BodyCloud& among, const Vector3f& place, double range, std::size_t but) {
+  double nearest = 0.05;
+  for (std::size_t i = 0; i < among.size(); ++i) {
+    if (i == but) continue;
+    nearest = std::min(nearest, double((among.points[i] - place).norm()) / (0.1 + range));
+  }
+  return nearest;
+}
+
+TEST(WeatherFilter, IsTheRuleOverAllPoints) {
+  const BodyCloud before = random_cloud(3);
+  const BodyCloud now = random_cloud(4);
+  std::vector<float> sorted = now.intensity;
+  std::sort(sorted.begin(), sorted.end());
+  const double bright = sorted[static_cast<std::size_t>(0.9 * 2999.0)];
+  std::vector<std::uint32_t> expected;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    const double s = share(now, now.points[i], now.range[i], i);
+    const double b = share(before, now.points[i], now.range[i], before.size());
+    if (std::sqrt(s * b) <= 0.125 * (now.intensity[i] / bright + 0.02))
+      expected.push_back(now.t_ns[i]);
+  }
+  for (const int threads : {1, 4}) {
+    WeatherFilter filter(switched_on());
+    BodyCloud first = before;
+    BodyCloud cloud = now;
+    with_threads(threads, [&] {
+      filter.drop(first, Pose());
+      filter.remember(Pose());
+      filter.drop(cloud, Pose());
+    });
+    EXPECT_EQ(cloud.t_ns, expected);
+    EXPECT_GT(cloud.size(), 500U);
+    EXPECT_LT(cloud.size(), 2900U);
+  }
+}
+
+// A run that goes on has the same scans before.
+TEST(WeatherFilter, IsTheSameAfterItWasSavedAndWithTheWorldMoved) {
+  const Pose place(Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitX())),
+                   Eigen::Vector3d(3.0, -2.0, 1.0));
+  WeatherFilter filter(switched_on());
+  BodyCloud first = random_cloud(5);
+  filter.drop(first, Pose());
+  filter.remember(Pose());
+  BinaryWriter writer;
+  filter.save(writer);
+  BinaryReader reader(writer.bytes(), "test");
+  WeatherFilter again(switched_on());
+  again.load(reader);
+  again.move_world(place);
+  BodyCloud one = random_cloud(6);
+  BodyCloud two = one;
+  filter.drop(one, Pose());
+  again.drop(two, place);
+  EXPECT_EQ(one.t_ns, two.t_ns);
+  EXPECT_LT(one.size(), 3000U);
+}
+
+}  // namespace
+}  // namespace understory
