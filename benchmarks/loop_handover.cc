@@ -1,7 +1,7 @@
 // How long a loop takes that joins many: loop_handover [LOOPS] [ROUND_M]. A walk of rounds on
 // one circle, a loop from each metre after the first round to the round before, made by hand (no
-// lidar). Prints the CPU time in which one more loop is compared with all, and that in which the graph
-// is optimised with it.
+// lidar). Prints the CPU time in which one more loop is compared with all, and that in which the
+// graph is optimised with it.
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
@@ -73,8 +73,9 @@ int main(int argc, char** argv) {
   problem.loops.push_back(edge(loops + 1, round + loops + 1, round, 0.02, random));
   double before = cpu_ms();
   agreement.update(problem);
-  std::printf("%d loops: one more compared in %.1f ms, the last hundred in %.0f ms, all in %.1f s\n",
-              loops, cpu_ms() - before, last_ms, all_s);
+  std::printf(
+      "%d loops: one more compared in %.1f ms, the last hundred in %.0f ms, all in %.1f s\n", loops,
+      cpu_ms() - before, last_ms, all_s);
   before = cpu_ms();
   const PoseGraphResult result = optimise_pose_graph(problem, config, &agreement);
   std::printf("graph of %zu keyframes optimised in %.2f s%s\n", problem.world_from_keyframe.size(),

@@ -28,8 +28,7 @@ ObstacleFiles::ObstacleFiles(const std::filesystem::path& folder, const Obstacle
       map_(config, places_of(path)),
       writer_(folder / "obstacles.laz", options_of(layers, trees)) {}
 
-void ObstacleFiles::add(const Eigen::Vector3d& in_world, double height_m,
-                        const LasRecord& record) {
+void ObstacleFiles::add(const Eigen::Vector3d& in_world, double height_m, const LasRecord& record) {
   if (map_.add(in_world, height_m)) writer_.add(record);
 }
 
@@ -39,8 +38,7 @@ void ObstacleFiles::commit(const Raster& terrain, const LayerFrame& layers) {
 }
 
 void write_free_height(const std::filesystem::path& folder, const Raster& free_height,
-                       const Raster& terrain, const FrameChange& change,
-                       const LayerFrame& layers) {
+                       const Raster& terrain, const FrameChange& change, const LayerFrame& layers) {
   if (free_height.empty() || terrain.empty()) return;
   const Raster moved = moved_raster(free_height, terrain, change, CellHeights::kAboveGround);
   write_geotiff(folder / "free_height.tif", moved, layers.wkt(),

@@ -31,8 +31,9 @@ void describe(ConfigTable& table, ScanTopsConfig& config) {
               "points within this radius in space count as neighbours of a top");
     table.add("least_neighbours", config.top.least_neighbours, {3, 10000}, "",
               "tops with fewer neighbours are left out");
-    table.add("least_eigenvalue_m2", config.top.least_eigenvalue_m2, {0.0, 10.0}, "m²",
-              "least eigenvalue of the scatter matrix of the neighbours: wires and walls have less");
+    table.add(
+        "least_eigenvalue_m2", config.top.least_eigenvalue_m2, {0.0, 10.0}, "m²",
+        "least eigenvalue of the scatter matrix of the neighbours: wires and walls have less");
     table.add("least_points", config.least_points, {1, 1000000}, "",
               "a scan with fewer points around its tops is matched with all its points");
   });
