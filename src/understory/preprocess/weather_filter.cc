@@ -89,8 +89,8 @@ std::vector<std::uint8_t> WeatherFilter::judge(const BodyCloud& cloud,
     const float product = least * least;
     if (product >= reach * reach) return;
     const float range = cloud.range[i];
-    const float here = now_.grid.nearest(cloud.points[i], range, product / reach,
-                                         static_cast<std::uint32_t>(i));
+    const float here =
+        now_.grid.nearest(cloud.points[i], range, product / reach, static_cast<std::uint32_t>(i));
     if (here * reach <= product) return;
     float then = before_.empty() ? here : reach;
     for (std::size_t k = 0; k < before_.size(); ++k) {

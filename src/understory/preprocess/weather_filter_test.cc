@@ -34,7 +34,8 @@ BodyCloud wall() {
   for (int row = 0; row < 20; ++row) {
     for (int column = 0; column < 40; ++column)
       add(cloud,
-          {10.0F, -2.0F + 0.1F * static_cast<float>(column), -1.0F + 0.1F * static_cast<float>(row)},
+          {10.0F, -2.0F + 0.1F * static_cast<float>(column),
+           -1.0F + 0.1F * static_cast<float>(row)},
           (row + column) % 5 == 0 ? 20.0F : 100.0F);
   }
   return cloud;
@@ -92,8 +93,7 @@ BodyCloud random_cloud(std::uint64_t seed) {
   Random random(seed);
   BodyCloud cloud;
   for (int i = 0; i < 3000; ++i) {
-    const Vector3f towards(static_cast<float>(random.normal()),
-                           static_cast<float>(random.normal()),
+    const Vector3f towards(static_cast<float>(random.normal()), static_cast<float>(random.normal()),
                            static_cast<float>(0.3 * random.normal()));
     const double range = std::exp(random.uniform(-0.5, 4.0));
     add(cloud, static_cast<float>(range) * towards.normalized(),

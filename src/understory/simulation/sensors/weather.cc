@@ -8,13 +8,13 @@
 namespace understory {
 namespace {
 
-constexpr double kSnowDrop = 3.0;      // seconds that a load of snow takes to come down
+constexpr double kSnowDrop = 3.0;       // seconds that a load of snow takes to come down
 constexpr double kSnowDropPerM = 0.03;  // flakes in a metre of beam then
-constexpr float kFlakeEnergy = 0.06F;  // of a large flake, as reflectivity x share of the beam
-constexpr double kColdSpell = 0.25;    // seconds that a laser malfunctions at a time
-constexpr double kColdShare = 0.4;     // of its beams that give a spurious range in that time
-constexpr double kSunSpread = 0.12;    // radians off the sun at which the glare has fallen to 0.6
-constexpr double kSunReach = 4.0;      // of these, beyond which there is no glare
+constexpr float kFlakeEnergy = 0.06F;   // of a large flake, as reflectivity x share of the beam
+constexpr double kColdSpell = 0.25;     // seconds that a laser malfunctions at a time
+constexpr double kColdShare = 0.4;      // of its beams that give a spurious range in that time
+constexpr double kSunSpread = 0.12;     // radians off the sun at which the glare has fallen to 0.6
+constexpr double kSunReach = 4.0;       // of these, beyond which there is no glare
 constexpr double kSpuriousReach = 0.6;  // share of the longest range up to which ranges are given
 
 }  // namespace
