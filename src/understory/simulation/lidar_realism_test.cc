@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "understory/simulation/simulator.h"
@@ -80,6 +81,32 @@ TEST(LidarRealism, SnowFlakesFillTheAirNearTheSensor) {
   const std::size_t heavy = above("lidar.snow_fall_per_m=0.008");
   EXPECT_GT(light, 500U);
   EXPECT_NEAR(static_cast<double>(heavy) / static_cast<double>(light), 4.0, 0.5);
+}
+
+// On level ground h below, a beam of elevation e that looks higher by b has the range
+// h / sin(-(e + b)), and says that it looks along e.
+TEST(LidarRealism, AnElevationBiasMovesRangesAndNotTheDirectionsThatAreTold) {
+  const auto ranges = [](double bias_deg) {
+    std::vector<double> found;
+    double told = 0.0;
+    const auto all =
+        scans({"stand.trees_per_ha=0", "stand.seedlings_per_ha=0", "stand.shrubs_per_ha=0",
+               "stand.ground_plants_per_ha=0", "stand.logs_per_ha=0", "stand.stumps_per_ha=0",
+               "terrain.relief_m=0", "terrain.hummock_m=0", "terrain.slope_deg=0",
+               "lidar.elevation_bias_deg=" + std::to_string(bias_deg)});
+    for (const ScanPoint& point : all.front()->points) {
+      if (point.ring != 20) continue;
+      found.push_back(range_of(point));
+      told += std::asin(point.z / range_of(point));
+    }
+    std::sort(found.begin(), found.end());
+    return std::pair(found[found.size() / 2], told / static_cast<double>(found.size()));
+  };
+  const auto [plain, elevation] = ranges(0.0);
+  const auto [biased, still_told] = ranges(0.6);
+  EXPECT_NEAR(still_told, elevation, 1e-3);
+  const double bias = 0.6 * 3.14159265358979 / 180.0;
+  EXPECT_NEAR(biased / plain, std::sin(-elevation) / std::sin(-(elevation + bias)), 0.002);
 }
 
 TEST(LidarRealism, CrosstalkHasItsShareAndBloomingItsRanges) {

@@ -165,8 +165,7 @@ void describe_lidar(ConfigTable& table, LidarConfig& c) {
     table.add("pulse_m", c.pulse_m, {0.0, 3.0}, "m", "returns closer than this merge into one");
     table.add("range_sd_m", c.range_sd_m, {0.0, 1.0}, "m", "range noise at close range");
     table.add("range_sd_per_m", c.range_sd_per_m, {0.0, 0.1}, "", "its growth with range");
-    table.add("bark_sd_m", c.bark_sd_m, {0.0, 0.1}, "m",
-              "roughness of bark finer than the stand's relief");
+    table.add("bark_sd_m", c.bark_sd_m, {0.0, 0.1}, "m", "bark finer than the stand's relief");
     table.add("incidence_gain", c.incidence_gain, {0.0, 5.0}, "",
               "growth of the noise with the tangent of incidence");
     table.add("range_step_m", c.range_step_m, {0.0, 0.1}, "m", "resolution of ranges, 0 = none");
@@ -178,22 +177,17 @@ void describe_lidar(ConfigTable& table, LidarConfig& c) {
     table.add("azimuth_jitter_deg", c.azimuth_jitter_deg, {0.0, 1.0}, "deg", "of the encoder");
     table.add("keep_every", c.keep_every, {1, 100}, "", "only each so-manieth scan is recorded");
     table.add("returns", c.returns, {1, 2}, "", "of a beam: the strongest, or the two strongest");
-    table.add("blooming", c.blooming, {0.0, 1.0}, "",
-              "chance that a beam beside a glaring echo repeats its range");
-    table.add("crosstalk", c.crosstalk, {0.0, 0.5}, "",
-              "share of beams that report a range out of nothing");
-    table.add("snow_fall_per_m", c.snow_fall_per_m, {0.0, 1.0}, "1/m",
-              "snow flakes that a beam meets in a metre");
+    table.add("blooming", c.blooming, {0.0, 1.0}, "", "chance that glaring neighbours repeat");
+    table.add("crosstalk", c.crosstalk, {0.0, 0.5}, "", "share of ranges out of nothing");
+    table.add("snow_fall_per_m", c.snow_fall_per_m, {0.0, 1.0}, "1/m", "flakes in a metre of beam");
     table.add("snow_drop_interval_s", c.snow_drop_interval_s, {0.0, 1e9}, "s",
               "mean time between loads of snow off a branch, 0 = none");
-    table.add("cold_noise", c.cold_noise, {0.0, 0.3}, "",
-              "share of beams that a cold lidar gives a spurious range, in spells laser by laser");
-    table.add("sun_noise", c.sun_noise, {0.0, 1.0}, "",
-              "share of beams towards the sun that report a spurious range");
-    table.add("sun_azimuth_deg", c.sun_azimuth_deg, {0.0, 360.0}, "deg",
-              "of the sun, clockwise from north");
-    table.add("sun_elevation_deg", c.sun_elevation_deg, {-5.0, 90.0}, "deg",
-              "of the sun above the horizon");
+    table.add("cold_noise", c.cold_noise, {0.0, 0.3}, "", "spurious share of a cold lidar");
+    table.add("sun_noise", c.sun_noise, {0.0, 1.0}, "", "spurious share of beams into the sun");
+    table.add("sun_azimuth_deg", c.sun_azimuth_deg, {0.0, 360.0}, "deg", "clockwise from north");
+    table.add("sun_elevation_deg", c.sun_elevation_deg, {-5.0, 90.0}, "deg", "above horizon");
+    table.add("elevation_bias_deg", c.elevation_bias_deg, {-5.0, 5.0}, "deg",
+              "beams look higher by this than the lidar says");
     table.add("time_offset_s", c.time_offset_s, {-1.0, 1.0}, "s", "scan stamps are late by this");
     table.add("error_m", c.error_m, "m",
               "by which the claimed place is wrong, in the lidar's frame");

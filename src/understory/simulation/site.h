@@ -160,6 +160,7 @@ struct LidarConfig {
   double sun_noise = 0.0;             // share of spurious ranges of beams that look into the sun
   double sun_azimuth_deg = 180.0;     // of the sun, clockwise from north
   double sun_elevation_deg = 8.0;     // above the horizon
+  double elevation_bias_deg = 0.0;    // beams look higher by this than the lidar says
   double time_offset_s = 0.0;         // of the lidar's clock: stamps are late by this much
   std::vector<double> error_m = {0.0, 0.0, 0.0};  // of the extrinsics that the recording claims
   std::vector<double> error_rpy_deg = {0.0, 0.0, 0.0};

@@ -18,6 +18,9 @@ namespace understory {
 struct IcpMapConfig {
   // One point per cube of this edge: the mean of all that fell into it.
   double cube_m = 0.25;
+  // Above 0: instead of that, a point enters as it is if it is farther than this from all others,
+  // P3 section 3.3; at most cube_m. Cubes only help to find it then.
+  double epsilon_m = 0.0;
   // A cube's mean is taken anew once its points have grown by this share; 0: always.
   double growth = 0.5;
   // The surfaces around a point are worked out again once its mean has moved by this; 0: always.
@@ -63,7 +66,8 @@ class IcpMap {
   struct Spot {
     Eigen::Vector3f from_centre;  // of its cube, so that precision is the same everywhere
     SurfacePatch patch;
-    std::array<int, 3> at{};  // cube
+    std::array<int, 3> at{};                 // cube
+    std::uint32_t next = VoxelIndex::kNone;  // another one of the cube (epsilon_m)
   };
   [[nodiscard]] Eigen::Vector3d centre_of(const std::array<int, 3>& cube) const {
     return cube_m_ * (Eigen::Vector3d(cube[0], cube[1], cube[2]) + Eigen::Vector3d::Constant(0.5));
@@ -92,7 +96,8 @@ class IcpMapBuilder {
 
   // Adds points given in a source frame (a keyframe's body).
   void insert(const Points& points_in_source, const Pose& map_from_source);
-  // Forgets the cubes farther than that from the centre (map frame).
+  // Forgets the cubes farther than that from the centre (map frame); with epsilon_m only once
+  // a tenth of the points is.
   void remove_beyond(const Eigen::Vector3d& center, double radius_m);
   void clear();
   // The map as it is now; only the surfaces near what changed are worked out again. If nobody holds
@@ -106,8 +111,12 @@ class IcpMapBuilder {
     float count = 0.0F;
     float due = 1.0F;  // its mean is taken at so many points
     Place at{};
+    std::uint32_t next = VoxelIndex::kNone;  // another one of the same place (epsilon_m)
   };
   void add(const Place& at, const Eigen::Vector3f& from_centre);
+  void add_apart(const Place& at, const Eigen::Vector3f& from_centre);
+  [[nodiscard]] bool is_apart(const Place& at, const Eigen::Vector3f& from_centre) const;
+  void keep_within(const Eigen::Vector3d& center, double radius_m);
   void own_map();
   void settle_due();
   void remove(std::uint32_t cube);
@@ -117,7 +126,7 @@ class IcpMapBuilder {
   IcpMapConfig config_;
   std::vector<Cube> cubes_;  // those in the map first, in its order
   VoxelIndex index_;
-  std::vector<std::uint32_t> due_;  // cubes whose mean is to be taken
+  std::vector<std::uint32_t> due_;  // cubes whose mean is to be taken; of epsilon_m new points
   std::shared_ptr<IcpMap> map_;
 };
 

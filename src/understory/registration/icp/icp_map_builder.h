@@ -45,6 +45,8 @@ inline void check_reach(const IcpReach& reach, const IcpMapConfig& map) {
     throw ConfigError({std::string(reach.method) + ": " + reach.near_key +
                        " and far_distance_m: expected at most " +
                        std::to_string(IcpMap::kMaxReach) + " times map_cube_m"});
+  if (map.epsilon_m > map.cube_m)
+    throw ConfigError({std::string(reach.method) + ": map_epsilon_m: expected at most map_cube_m"});
 }
 
 // The settings of both that name the first steps and the map. `cube_meaning` says what has a point
@@ -55,6 +57,10 @@ inline void describe_far_distance(ConfigTable& table, double& far_distance_m) {
 }
 inline void describe_map(ConfigTable& table, const char* cube_meaning, IcpMapConfig& map) {
   table.add("map_cube_m", map.cube_m, {0.05, 5.0}, "m", cube_meaning);
+  table.add(
+      "map_epsilon_m", map.epsilon_m, {0.0, 1.0}, "m",
+      "above 0: instead, points enter as they are that are farther than this from all others, "
+      "at most map_cube_m");
   table.add("map_growth", map.growth, {0.0, 10.0}, "",
             "share of new points at which that point is computed again");
 }

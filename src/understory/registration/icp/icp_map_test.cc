@@ -167,5 +167,84 @@ TEST(IcpMap, IsTheSameMadeInStepsOrAtOnce) {
   EXPECT_EQ(same, expected.size());
 }
 
+// Those of the points, in their order, that are farther than epsilon from all taken before.
+std::vector<Eigen::Vector3d> apart(const Points& points, const Pose& pose, double epsilon_m,
+                                   std::vector<Eigen::Vector3d> taken) {
+  for (const Eigen::Vector3f& point : points) {
+    const Eigen::Vector3d p = pose * point.cast<double>();
+    bool alone = true;
+    for (const Eigen::Vector3d& other : taken)
+      alone = alone && (p - other).norm() > epsilon_m;
+    if (alone) taken.push_back(p);
+  }
+  return taken;
+}
+
+std::vector<Eigen::Vector3d> points_of(const IcpMap& map) {
+  std::vector<Eigen::Vector3d> points;
+  map.for_each([&](const Eigen::Vector3d& point, const SurfacePatch&) { points.push_back(point); });
+  return points;
+}
+
+double farthest_from(const std::vector<Eigen::Vector3d>& some,
+                     const std::vector<Eigen::Vector3d>& others) {
+  double farthest = 0.0;
+  for (const Eigen::Vector3d& point : some) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector3d& other : others)
+      nearest = std::min(nearest, (point - other).norm());
+    farthest = std::max(farthest, nearest);
+  }
+  return farthest;
+}
+
+// P3 section 3.3.
+TEST(IcpMap, WithEpsilonPointsEnterThatAreFartherFromAllOthers) {
+  Random random(8);
+  const Pose pose(Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY())),
+                  {40.0, -3.0, 2.0});
+  IcpMapBuilder builder({.cube_m = kCube, .epsilon_m = 0.1});
+  std::vector<Eigen::Vector3d> expected;
+  for (int cloud = 0; cloud < 3; ++cloud) {
+    const Points points = random_points(random, 1500, 0.8);
+    builder.insert(points, pose);
+    expected = apart(points, pose, 0.1, expected);
+    const IcpMapPtr map = builder.snapshot();
+    EXPECT_EQ(map->size(), expected.size());
+    EXPECT_LT(farthest_from(expected, points_of(*map)), 1e-5);
+  }
+  EXPECT_LT(expected.size(), 3500U);
+  const IcpMapPtr map = builder.snapshot();
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector3d at =
+        pose * Eigen::Vector3d(random.uniform(-1.5, 1.5), random.uniform(-1.5, 1.5),
+                               random.uniform(-1.5, 1.5));
+    IcpPair pair;
+    IcpMap::Known known;
+    const double nearest = farthest_from({at}, expected);
+    ASSERT_EQ(map->nearest(at, 0.8, pair, known), nearest <= 0.8) << nearest;
+    if (nearest <= 0.8) {
+      EXPECT_NEAR(pair.offset.norm(), nearest, 1e-5);
+    }
+  }
+}
+
+TEST(IcpMap, WithEpsilonWhatIsFarIsForgottenAndMayComeAgain) {
+  Random random(9);
+  IcpMapBuilder builder({.cube_m = kCube, .epsilon_m = 0.1});
+  const Points points = random_points(random, 2000, 2.0);
+  builder.insert(points, Pose());
+  const std::size_t all = builder.snapshot()->size();
+  const Eigen::Vector3d corner(2.0, 2.0, 2.0);
+  builder.remove_beyond(corner, 2.0);
+  const IcpMapPtr cut = builder.snapshot();
+  EXPECT_GT(cut->size(), 100U);
+  EXPECT_LT(cut->size(), all / 2);
+  for (const Eigen::Vector3d& point : points_of(*cut))
+    EXPECT_LT((point - corner).norm(), 2.0 + kCube);
+  builder.insert(points, Pose());
+  EXPECT_EQ(builder.snapshot()->size(), all);
+}
+
 }  // namespace
 }  // namespace understory

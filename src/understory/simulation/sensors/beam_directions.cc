@@ -12,10 +12,10 @@ Eigen::Matrix3d HeadTurn::matrix() const {
   return m;
 }
 
-BeamDirections::BeamDirections(const LidarModel& model, double time_ns) {
+BeamDirections::BeamDirections(const LidarModel& model, double time_ns, double higher_rad) {
   for (std::size_t i = 0; i < model.beams.size(); ++i) {
     const HeadTurn turn(model.beams[i].azimuth_offset_rad);
-    const double elevation = model.elevation(i, time_ns);
+    const double elevation = model.elevation(i, time_ns) + higher_rad;
     const Eigen::Vector3d direction =
         turn * Eigen::Vector3d(std::cos(elevation), 0.0, std::sin(elevation));
     const Eigen::Vector3d side = turn * Eigen::Vector3d::UnitY();

@@ -12,8 +12,8 @@ namespace understory {
 // each; unit vectors in the lidar's frame.
 struct BeamDirections {
   BeamDirections() = default;
-  // `time_ns`: of the firing, since the first revolution.
-  BeamDirections(const LidarModel& model, double time_ns);
+  // `time_ns`: of the firing, since the first revolution. `higher_rad`: by which all look higher.
+  BeamDirections(const LidarModel& model, double time_ns, double higher_rad = 0.0);
   [[nodiscard]] Eigen::Vector3d direction(std::size_t beam) const {
     return {x[beam], y[beam], z[beam]};
   }

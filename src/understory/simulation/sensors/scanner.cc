@@ -118,7 +118,9 @@ Scanner::Scanner(const SiteConfig& config, ForestScene& scene, const CarrierPath
       model_(make_lidar_model(config.lidar)),
       weather_(config.lidar, seed_),
       body_from_lidar_(mount_pose(config.lidar.mount_m, config.lidar.mount_rpy_deg)),
-      beams_(model_, 0.0),
+      bias_rad_(config.lidar.elevation_bias_deg * kDegree),
+      beams_(model_, 0.0, bias_rad_),
+      told_(model_, 0.0),
       order_(trace_order()) {
   UNDERSTORY_CHECK(model_.beams.size() <= kMostBeams);
 }
@@ -165,6 +167,13 @@ void Scanner::find_slots(std::size_t firings, Block& block) const {
 // Those of all firings, or of this one, for which `swung` is the room.
 const BeamDirections& Scanner::directions(std::int64_t firing, BeamDirections& swung) const {
   if (!model_.swings()) return beams_;
+  swung = BeamDirections(model_, static_cast<double>(model_.firing_time(firing)), bias_rad_);
+  return swung;
+}
+
+// What the lidar says of them.
+const BeamDirections& Scanner::told_directions(std::int64_t firing, BeamDirections& swung) const {
+  if (!model_.swings()) return told_;
   swung = BeamDirections(model_, static_cast<double>(model_.firing_time(firing)));
   return swung;
 }
@@ -235,7 +244,7 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
   BeamDirections swung;
   for (std::int64_t firing = firings.first; firing < firings.end; ++firing) {
     const TimeNs firing_time = model_.firing_time(firing);
-    const BeamDirections& looks = directions(firing, swung);
+    const BeamDirections& looks = told_directions(firing, swung);
     Turn head(0.0);
     Eigen::Vector3f origin = Eigen::Vector3f::Zero();
     for (std::size_t b = 0; b < beams; ++b, ++i) {

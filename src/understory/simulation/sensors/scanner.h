@@ -91,6 +91,8 @@ class Scanner {
   void look_out(const Look& look, std::int64_t firing, std::pair<std::size_t, std::size_t> range,
                 const std::uint32_t* slots, std::vector<Ray>& rays) const;
   [[nodiscard]] const BeamDirections& directions(std::int64_t firing, BeamDirections& swung) const;
+  [[nodiscard]] const BeamDirections& told_directions(std::int64_t firing,
+                                                      BeamDirections& swung) const;
   [[nodiscard]] std::vector<std::uint32_t> trace_order() const;
   void find_slots(std::size_t firings, Block& block) const;
   void meet_machine(Block& block) const;
@@ -107,7 +109,9 @@ class Scanner {
   LidarModel model_;
   LidarWeather weather_;
   Pose body_from_lidar_;
+  double bias_rad_;       // elevation_bias_deg
   BeamDirections beams_;  // of a lidar whose beams keep their elevations
+  BeamDirections told_;   // as it says that they look
   // The beams of a full block (firing by firing, beam by beam), those together that look in nearly
   // the same direction.
   std::vector<std::uint32_t> order_;
