@@ -98,6 +98,8 @@ const std::vector<PlotColumn>& plot_columns() {
        [](const StandPlot& p) { return static_cast<double>(p.figures.heights_filled_in); }, 0},
       {"volumes_filled_in",
        [](const StandPlot& p) { return static_cast<double>(p.figures.volumes_filled_in); }, 0},
+      {"heights_lower_bounds",
+       [](const StandPlot& p) { return static_cast<double>(p.figures.heights_lower_bounds); }, 0},
   };
   return columns;
 }

@@ -44,8 +44,23 @@ int HeightColumn::clearest_drop(int first, int end) const {
   return clearest;
 }
 
+// Where a tip begins that holds less than a crown, as few beams came there. It hangs together with
+// the metre `top` without any gap, and ends as suddenly. Ghosts do not: they thin out.
+int HeightColumn::thin_tip(int top) const {
+  int last = top;
+  while (last + 1 < kMetres && at(last + 1) > 0.0)
+    ++last;
+  for (int metre = last; metre > top; --metre) {
+    if (at(metre) >= kLeastTip && at(metre) >= kDrop * (1.0 + most(metre + 2, metre + 2 + kSky)))
+      return metre;
+  }
+  return top;
+}
+
 int HeightColumn::top(int first, int end) const {
-  int top = clearest_drop(first, end);
+  const int clear = clearest_drop(first, end);
+  int top = thin_tip(clear);
+  if (top > clear) end = kMetres;
   for (; top + 1 < end; ++top) {
     const double ghosts = most(top + 3, top + 3 + kSky);
     if (at(top + 1) <= ghosts + kSigmas * std::sqrt(ghosts)) break;

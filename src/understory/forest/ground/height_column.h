@@ -24,6 +24,7 @@ struct HeightColumn {
 
  private:
   [[nodiscard]] int clearest_drop(int first, int end) const;
+  [[nodiscard]] int thin_tip(int top) const;
   [[nodiscard]] double at(int metre) const {
     return static_cast<double>(points[static_cast<std::size_t>(metre)]);
   }

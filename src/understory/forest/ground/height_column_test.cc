@@ -30,6 +30,22 @@ TEST(HeightColumn, AThinTipBelongsToTheTree) {
   EXPECT_EQ(column.top(0, HeightColumn::kMetres), 21);
 }
 
+// A sparse lidar sees the stem beside it a hundred times as often as the tip far above.
+TEST(HeightColumn, ATipOfFewPointsBelongsToTheTreeWhereItEndsSuddenly) {
+  HeightColumn column;
+  column.points = {4385, 4372, 3647, 3028, 2162, 1334, 1126, 731, 362,
+                   440,  304,  138,  76,   36,   32,   18,   7};
+  EXPECT_EQ(column.connected_end(0, 3), 13) << "the rest is under a hundredth of the fullest metre";
+  EXPECT_EQ(column.top(0, 13), 16);
+}
+
+TEST(HeightColumn, GhostsThatThinOutAreNoTip) {
+  HeightColumn column;
+  column.points = {14026, 4148, 3411, 2412, 1611, 1418, 1135, 586, 561, 349, 249, 123, 21,
+                   6,     4,    3,    2,    4,    3,    2,    1,   1,   1,   0,   1};
+  EXPECT_EQ(column.top(0, column.connected_end(0, 3)), 12);
+}
+
 TEST(HeightColumn, WhatHangsTogetherEndsAtAWideGap) {
   HeightColumn column = tree();
   EXPECT_EQ(column.connected_end(3, 3), 20);

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <vector>
 
 #include "understory/util/random.h"
 
@@ -30,7 +33,7 @@ TEST(HeightCurve, FindsTheCurveThatHeightsLieOn) {
   ASSERT_TRUE(curve);
   EXPECT_EQ(curve->trees, 12U);
   EXPECT_NEAR(curve->at(0.25), true_height(0.25), 1e-9);
-  EXPECT_NEAR(curve->sd_m, 0.0, 1e-9);
+  EXPECT_NEAR(curve->sd_m, 0.3, 1e-9) << "no stand is without scatter";
 }
 
 TEST(HeightCurve, ItsDeviationIsThatOfTheTrees) {
@@ -44,6 +47,95 @@ TEST(HeightCurve, ItsDeviationIsThatOfTheTrees) {
   ASSERT_TRUE(curve);
   EXPECT_NEAR(curve->sd_m, 1.1, 0.12);
   EXPECT_NEAR(curve->at(0.3), true_height(0.3), 0.25);
+}
+
+TEST(HeightCurve, SingleHeightsThatAreFarOffDoNotMoveIt) {
+  Random random(6);
+  std::vector<Tree> trees;
+  for (int i = 0; i < 60; ++i) {
+    const double dbh = random.uniform(0.1, 0.4);
+    const double cut = i % 6 == 0 ? random.uniform(6.0, 10.0) : 0.0;  // tops that were not seen
+    trees.push_back(tree_of(dbh, std::max(2.0, true_height(dbh) - cut + random.normal(0.0, 0.5))));
+  }
+  const auto curve = fit_height_curve(trees);
+  ASSERT_TRUE(curve);
+  EXPECT_NEAR(curve->at(0.15), true_height(0.15), 0.4);
+  EXPECT_NEAR(curve->at(0.3), true_height(0.3), 0.4);
+  EXPECT_NEAR(curve->sd_m, 0.6, 0.2);
+}
+
+// Lower bounds of which many are right: they tell where the curve is, those far below do not.
+TEST(HeightCurve, LowerBoundsCountWhereTheyEndNearTheCurve) {
+  Random random(7);
+  std::vector<Tree> trees;
+  std::vector<Tree> right;
+  for (int i = 0; i < 300; ++i) {
+    const double dbh = random.uniform(0.1, 0.4);
+    const double height = true_height(dbh) + random.normal(0.0, 1.0);
+    const bool hidden = random.uniform(0.0, 1.0) < 0.4;
+    trees.push_back(tree_of(dbh, hidden ? height * random.uniform(0.2, 1.0) : height));
+    const bool flagged = random.uniform(0.0, 1.0) < (hidden ? 0.8 : 0.5);
+    trees.back().height_is_lower_bound = flagged ? 1.0 : 0.0;
+    if (!hidden) right.push_back(tree_of(dbh, height));
+  }
+  const auto curve = fit_height_curve(trees);
+  ASSERT_TRUE(curve);
+  EXPECT_EQ(curve->trees + curve->lower_bounds, trees.size());
+  EXPECT_NEAR(curve->at(0.15), true_height(0.15), 0.4);
+  EXPECT_NEAR(curve->at(0.35), true_height(0.35), 0.4);
+  EXPECT_NEAR(curve->sd_m, 1.0, 0.3);
+}
+
+TEST(HeightCurve, ItsOwnDeviationIsThatOfManyCurves) {
+  std::vector<double> found;
+  double stated = 0.0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    Random random(seed);
+    std::vector<Tree> trees;
+    for (int i = 0; i < 30; ++i) {
+      const double dbh = random.uniform(0.1, 0.3);
+      trees.push_back(tree_of(dbh, true_height(dbh) + random.normal(0.0, 1.0)));
+    }
+    const auto curve = fit_height_curve(trees);
+    ASSERT_TRUE(curve);
+    found.push_back(curve->at(0.35) - true_height(0.35));
+    stated += curve->own_sd_at(0.35) / 100.0;
+  }
+  double squares = 0.0;
+  for (const double error : found)
+    squares += error * error / 100.0;
+  EXPECT_NEAR(std::sqrt(squares) / stated, 1.0, 0.3);
+}
+
+TEST(HeightCurve, TheHeightOfALowerBoundIsTheMeanOfBothKinds) {
+  std::vector<Tree> trees;
+  for (int i = 0; i < 30; ++i)
+    trees.push_back(tree_of(0.1 + 0.01 * i, true_height(0.1 + 0.01 * i) + (i % 2 == 0 ? 1 : -1)));
+  const auto curve = fit_height_curve(trees);
+  ASSERT_TRUE(curve);
+  const double mean = curve->at(0.2);
+  for (const double bound : {mean - 4.0, mean - 2.5, mean + 1.0}) {
+    double chance = 0.0;
+    double first = 0.0;
+    double second = 0.0;
+    const auto density = [&](double h) {
+      const double z = (h - mean) / curve->sd_m;
+      return std::exp(-0.5 * z * z) / std::sqrt(2.0 * M_PI) / curve->sd_m;
+    };
+    for (double h = bound + 5e-4; h < mean + 20.0; h += 1e-3) {
+      chance += 1e-3 * density(h) / mean;  // the view may end anywhere below the curve
+      first += 1e-3 * h * density(h) / mean;
+      second += 1e-3 * h * h * density(h) / mean;
+    }
+    const double all = density(bound) + chance;  // half of the bounds end there
+    first = (first + density(bound) * bound) / all;
+    second = (second + density(bound) * bound * bound) / all;
+    const HeightAbove height = curve->above(0.2, bound);
+    EXPECT_NEAR(height.height_m, first, 1e-3);
+    EXPECT_NEAR(height.sd_m, std::sqrt(second - first * first), 2e-3);
+  }
+  EXPECT_NEAR(curve->above(0.2, 2.0).height_m, mean, 1e-6) << "a bound that tells nothing";
+  EXPECT_GE(curve->above(0.2, 60.0).height_m, 60.0);
 }
 
 TEST(HeightCurve, IsNotGuessedFromFewOrEqualTrees) {

@@ -236,11 +236,24 @@ void widen(double shared_sd, Measured& figure) {
   figure.sd = std::hypot(figure.sd, shared_sd);
 }
 
-void share_errors_of_heights(StandFigures& figures) {
-  using forest_constants::stand_errors::kSharedHeightSd;
-  const double relative = kSharedHeightSd / figures.weighted_height_m.value;
-  widen(kSharedHeightSd, figures.weighted_height_m);
-  widen(kSharedHeightSd, figures.dominant_height_m);
+// The error of all heights, and that of the curve, which those share that it stands for.
+double shared_height_sd(const PlotSums& sums) {
+  using namespace forest_constants::stand_errors;
+  const double weight = sums.sum(basal_area_m2);
+  const double filled = sums.sum(
+      [](const StandTree& tree) { return tree.height_filled_in ? basal_area_m2(tree) : 0.0; });
+  const double bias_share = weight > 0.0 ? kCurveBias * filled / weight : 0.0;
+  const double curve = sums.sum([&](const StandTree& tree) {
+    const double bias = tree.height_filled_in ? bias_share * tree.height_m.value : 0.0;
+    return basal_area_m2(tree) * std::hypot(tree.height_shared_sd_m, bias);
+  });
+  return weight > 0.0 ? std::hypot(kSharedHeightSd, curve / weight) : kSharedHeightSd;
+}
+
+void share_errors_of_heights(double shared_sd, StandFigures& figures) {
+  const double relative = shared_sd / figures.weighted_height_m.value;
+  widen(shared_sd, figures.weighted_height_m);
+  widen(shared_sd, figures.dominant_height_m);
   if (!std::isfinite(relative)) return;
   widen(relative * figures.volume_m3_per_ha.value, figures.volume_m3_per_ha);
   widen(relative * figures.national_m3_per_ha.value, figures.national_m3_per_ha);
@@ -271,6 +284,7 @@ StandFigures stand_figures(const StandTrees& stand, const VisibleArea& seen, con
   for (const StandTree* tree : sums.trees()) {
     ++figures.trees;
     figures.heights_filled_in += tree->height_filled_in ? 1 : 0;
+    figures.heights_lower_bounds += tree->height_is_lower_bound ? 1 : 0;
     figures.volumes_filled_in += tree->volume_filled_in ? 1 : 0;
   }
   if (!(figures.seen_share >= config.least_seen) || !(figures.seen_m2 > 0.0)) return figures;
@@ -288,7 +302,7 @@ StandFigures stand_figures(const StandTrees& stand, const VisibleArea& seen, con
         sums, figures.seen_m2, [](const StandTree& tree) { return tree.national_volume_m3.value; },
         [](const StandTree& tree) { return tree.national_volume_m3.sd; });
   fill_means(sums, figures);
-  share_errors_of_heights(figures);
+  share_errors_of_heights(shared_height_sd(sums), figures);
   figures.classes = classes_of(sums, figures.seen_m2, config);
   return figures;
 }

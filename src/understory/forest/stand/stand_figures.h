@@ -27,6 +27,8 @@ struct StandFigures {
   double seen_share = 0.0;  // the latter over the former
   std::size_t trees = 0;    // that count
   std::size_t heights_filled_in = 0;
+  // Trees whose lower bound counts as their height: then heights and volumes are lower bounds.
+  std::size_t heights_lower_bounds = 0;
   std::size_t volumes_filled_in = 0;
   Measured stems_per_ha;
   Measured basal_area_m2_per_ha;

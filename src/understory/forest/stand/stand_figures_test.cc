@@ -83,6 +83,35 @@ TEST(StandFigures, OfAPlotByHand) {
   EXPECT_NEAR(figures.classes[8].stems_per_ha.value, 1.0 / ha, 1e-6);
 }
 
+TEST(StandFigures, WithoutACurveHeightsAndVolumesAreLowerBounds) {
+  std::vector<Tree> trees = {tree_at(20, 20, 0.10, 10), tree_at(22, 20, 0.20, 16),
+                             tree_at(20, 25, 0.30, 22)};
+  trees[2].height_is_lower_bound = 1.0;
+  const PlotShape plot = circle_plot("a", {20, 20}, 10.0);
+  const StandFigures figures =
+      stand_figures(stand_trees(trees, {}), square_of(40.0, 40.0), plot, {});
+  EXPECT_EQ(figures.heights_lower_bounds, 1U);
+  EXPECT_EQ(figures.heights_filled_in, 0U);
+  EXPECT_NEAR(figures.weighted_height_m.value, (0.1 + 16 * 0.04 + 22 * 0.09) / 0.14, 1e-9);
+  EXPECT_TRUE(std::isfinite(figures.volume_m3_per_ha.value));
+}
+
+// Trees by the curve are all off by its error: more of them do not make their mean surer.
+TEST(StandFigures, TheErrorOfTheCurveIsShared) {
+  Random random(12);
+  std::vector<Tree> trees = stand_of(random, 40.0, 900.0);
+  const PlotShape plot = circle_plot("a", {20, 20}, 18.0);
+  for (std::size_t i = 12; i < trees.size(); ++i)
+    trees[i].height_m = NAN;
+  for (std::size_t i = 0; i < 12; ++i)
+    trees[i].height_m += random.normal(0.0, 2.0);
+  const StandTrees stand = stand_trees(trees, {});
+  ASSERT_TRUE(stand.curve);
+  const StandFigures figures = stand_figures(stand, square_of(40.0, 40.0), plot, {});
+  EXPECT_GT(figures.weighted_height_m.sd,
+            0.9 * stand.curve->own_sd_at(figures.weighted_dbh_m.value));
+}
+
 TEST(StandFigures, DominantHeightIsThatOfTheThickestOfTheHectare) {
   Random random(9);
   const std::vector<Tree> trees = stand_of(random, 40.0, 900.0);

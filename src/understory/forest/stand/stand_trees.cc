@@ -36,7 +36,7 @@ FormFactor form_factor_of(const std::vector<StandTree>& trees) {
   std::size_t count = 0;
   const auto knows = [](const StandTree& tree) {
     return std::isfinite(tree.volume_m3.value) && !tree.height_filled_in &&
-           std::isfinite(tree.height_m.value);
+           !tree.height_is_lower_bound && std::isfinite(tree.height_m.value);
   };
   for (const StandTree& tree : trees) {
     if (!knows(tree)) continue;
@@ -53,10 +53,21 @@ FormFactor form_factor_of(const std::vector<StandTree>& trees) {
   return factor;
 }
 
-void fill_in_height(const std::optional<HeightCurve>& curve, StandTree& tree) {
-  if (std::isfinite(tree.height_m.value) || !curve) return;
-  tree.height_m = {curve->at(tree.dbh_m.value), curve->sd_m};
-  tree.height_filled_in = true;
+// What is known of a height that was not seen to its top.
+void fill_in_height(const std::optional<HeightCurve>& curve, const Tree& listed, StandTree& tree) {
+  if (std::isfinite(tree.height_m.value)) return;
+  const bool bound = is_lower_bound(listed) && std::isfinite(listed.height_m);
+  if (curve) {
+    const HeightAbove height = bound ? curve->above(listed.dbh_m, listed.height_m)
+                                     : HeightAbove{curve->at(listed.dbh_m), curve->sd_m};
+    tree.height_m = {height.height_m, height.sd_m};
+    tree.height_shared_sd_m = curve->own_sd_at(listed.dbh_m);
+    tree.height_filled_in = true;
+  } else if (bound) {
+    tree.height_m = {listed.height_m, positive_or_zero(listed.height_sd_m)};
+    tree.volume_m3 = {listed.stem_volume_m3, positive_or_zero(listed.stem_volume_sd_m3)};
+    tree.height_is_lower_bound = true;
+  }
 }
 
 void fill_in_volume(const FormFactor& factor, StandTree& tree) {
@@ -112,7 +123,7 @@ StandTrees stand_trees(const std::vector<Tree>& trees, const StandTableConfig& c
       counted.height_m = {tree.height_m, known ? tree.height_sd_m : kHeightSd};
       counted.volume_m3 = {tree.stem_volume_m3, positive_or_zero(tree.stem_volume_sd_m3)};
     }
-    fill_in_height(stand.curve, counted);
+    fill_in_height(stand.curve, tree, counted);
     stand.trees.push_back(counted);
   }
   const FormFactor factor = form_factor_of(stand.trees);

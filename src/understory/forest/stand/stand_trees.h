@@ -25,7 +25,9 @@ struct StandTree {
   double place_sd_m = 0.0;  // in any one direction
   Measured dbh_m;
   Measured height_m;
-  bool height_filled_in = false;  // by the height curve
+  bool height_filled_in = false;       // by the height curve
+  double height_shared_sd_m = 0.0;     // error of the curve itself, which all these trees share
+  bool height_is_lower_bound = false;  // there is no curve
   Measured volume_m3;
   bool volume_filled_in = false;  // by the form factor of the other trees
   Measured national_volume_m3;    // of a known species
@@ -40,9 +42,11 @@ struct StandTrees {
   double form_factor = std::numeric_limits<double>::quiet_NaN();
 };
 
-// A height that was not seen, or is a lower bound, is that of the height curve. A stem without a
-// volume has basal area times height times the form factor: the sum of the known volumes over that
-// of the products. Where neither is known, the value stays NaN.
+// A height that was not seen is that of the height curve. That of a lower bound is the expected one
+// about the curve above the bound. Without a curve the bound itself counts, and the volume up to
+// it: figures of such trees are lower bounds. A stem without a volume has basal area times height
+// times the form factor: the sum of the known volumes over that of the products. Where neither is
+// known, the value stays NaN.
 [[nodiscard]] StandTrees stand_trees(const std::vector<Tree>& trees,
                                      const StandTableConfig& config);
 

@@ -84,6 +84,11 @@ std::string filled_in(const StandTable& stand) {
         " {} of {} heights were not seen. The height curve of the other {} trees stands for them "
         "(single trees are ± {:.1f} m about it).",
         seen.heights_filled_in, seen.trees, stand.curve->trees, stand.curve->sd_m);
+  if (seen.heights_lower_bounds > 0)
+    html += fmt::format(
+        " Heights and volumes are <b>lower bounds</b>: the tops of {} of {} trees were not seen, "
+        "and too few others show theirs for a height curve.",
+        seen.heights_lower_bounds, seen.trees);
   if (seen.volumes_filled_in > 0)
     html += fmt::format(
         " {} volumes are basal area times height times {:.2f}, the form factor of the others.",

@@ -27,6 +27,13 @@ void describe_stand(const StandResult& stand, RunDocuments& documents) {
   documents.count("trees_in_seen_area", seen.trees);
   documents.count("heights_filled_in", seen.heights_filled_in);
   documents.count("volumes_filled_in", seen.volumes_filled_in);
+  documents.count("heights_lower_bounds", seen.heights_lower_bounds);
+  if (seen.heights_lower_bounds > 0)
+    documents.remark(
+        "plots",
+        fmt::format("Heights and volumes of the stand are lower bounds: the tops of {} of {} trees "
+                    "were not seen, and too few others show theirs for a height curve.",
+                    seen.heights_lower_bounds, seen.trees));
   documents.count("plots", stand.table.plots.size());
   for (const std::string& remark : stand.remarks)
     documents.remark("plots", remark);
