@@ -17,7 +17,7 @@ WAYS = {
 }
 # In the order of the table.
 SITES = ["evo1", "evo2", "evo3", "tuusniemi1", "tuusniemi3", "lieksa1", "lieksa2", "lieksa3",
-         "lohja1", "lohja2", "lake", "forest", "skidoo", "mid360",
+         "lohja1", "lohja2", "hover", "swing", "lake", "forest", "skidoo", "mid360",
          "demo"]
 OTHER_WAYS = {"lieksa1": "by stems", "lieksa2": "by stems", "lieksa3": "by stems",
               "tuusniemi1": "machine boxes", "tuusniemi3": "machine boxes"}

@@ -23,6 +23,9 @@ void describe(ConfigTable& table, KeyframeConfig& config) {
             "rotation that counts as one metre of this distance");
   table.add("voxel_size_m", config.voxel_size_m, {0.0, 5.0}, "m",
             "edge of the voxels that thin a keyframe's points; 0: it keeps all of them");
+  table.add("below_found_share", config.below_found_share, {0.0, 1.0}, "",
+            "a scan that finds less than this share of what is usual in the map becomes a "
+            "keyframe, too; of sparse scans 0.75, 0: none");
 }
 
 double keyframe_distance(const Pose& world_from_last, const Pose& world_from_current,

@@ -34,6 +34,9 @@ struct KeyframeConfig {
   // the local map's cells have to tell a stem's near side from its flanks. 0: all points, as in the
   // paper.
   double voxel_size_m = 0.1;
+  // A scan becomes a keyframe, too, when it finds less than this share of what scans usually find
+  // again in the map: it sees what the rings of the others left out. 0: never.
+  double below_found_share = 0.0;
 };
 void describe(ConfigTable& table, KeyframeConfig& config);
 

@@ -61,6 +61,12 @@ inline constexpr double kSuspectSpread = 5.0 * kRadPerDegree;
 inline constexpr double kLengthTolerance = 0.15;
 }  // namespace trust_monitor
 
+namespace imu_watch {  // odometry/imu/imu_watch.cc
+// rad, standard deviation of a turn by two matches: beyond, it says nothing of the gyroscope.
+// Matches with some uprights have 0.02 [chosen: a scan turns by up to 0.1 in a tenth of a second]
+inline constexpr double kUncertainTurn = 0.08;
+}  // namespace imu_watch
+
 namespace recovery {  // odometry/dense/recovery.cc
 // s without a scan that are an outage [chosen]
 inline constexpr double kOutageS = 1.0;

@@ -89,6 +89,12 @@ namespace adaptation {  // pipeline/mapping/adaptation.cc
 inline constexpr double kSparseVoxelM = 0.1;
 // m: keyframe.distance_m of a sparse lidar [chosen]
 inline constexpr double kSparseKeyframeM = 0.3;
+// keyframe.below_found_share of a sparse lidar [chosen: in good runs no scan finds less than 0.8 of
+// what is usual, docs/method/odometry.md]
+inline constexpr double kSparseFoundShare = 0.75;
+// registration.few_found_residual of a sparse lidar [tuned: slow turns over even ground have up to
+// 1.5, two recordings joined 1.9 to 3]
+inline constexpr double kSparseFewFound = 1.5;
 // m between scans of the finished map [chosen]
 inline constexpr double kSparseCloudM = 0.1;
 // Registration.min_inlier_ratio: few of the map's small cells have enough points at first

@@ -118,6 +118,12 @@ void describe_carrier(ConfigTable& table, CarrierConfig& c) {
     table.add("length_m", c.length_m, {1.0, 5000.0}, "m", "of the route");
     table.add("speed_m_s", c.speed_m_s, {0.05, 15.0}, "m/s", "mean while moving");
     table.add("still_s", c.still_s, {0.0, 600.0}, "s", "standing still at the start");
+    table.add("first_turn_deg", c.first_turn_deg, {-360.0, 360.0}, "deg",
+              "turn on the spot into the route's heading, left positive; it ends 0.5 s before "
+              "still_s does, 0 = none");
+    table.add("first_turn_rate_deg_s", c.first_turn_rate_deg_s, {1.0, 360.0}, "deg/s",
+              "rate of that turn");
+    table.add("begins_aloft", c.begins_aloft, "a UAV hovers at the start instead of standing");
     table.add("height_m", c.height_m, {0.0, 100.0}, "m", "of the body above the ground");
     table.add("gait_m", c.gait_m, {0.0, 0.5}, "m", "bob of a step");
     table.add("gait_deg", c.gait_deg, {0.0, 20.0}, "deg", "pitch and roll of a step");

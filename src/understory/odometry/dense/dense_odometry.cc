@@ -22,6 +22,9 @@ void describe(ConfigTable& table, ScanMatchConfig& config) {
       "least share of a scan's points near the map for a match to count; of sparse scans 0.05");
   table.add("min_inlier_share", config.min_inlier_share, {0.0, 1.0}, "",
             "a match counts if it finds this share of what the matches before it found, or more");
+  table.add("few_found_residual", config.few_found_residual, {0.0, 100.0}, "",
+            "a match that finds less counts all the same if its distance from the map's surfaces "
+            "is at most so many times the usual one; of sparse scans 1.5, 0: it does not");
   table.add(
       "coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "reaches",
       "standard deviation of the prediction above which a match begins with its widest steps. A "
@@ -245,14 +248,25 @@ void DenseOdometry::match(const MatchTarget& local_map, const NavState& predicte
                                      predicted.world_from_body, terms, start);
   const double found = estimate.match.inlier_ratio;
   estimate.matched = estimate.match.usable() && found >= config.min_inlier_ratio;
-  if (!estimate.matched) return;
-  if (found < config.min_inlier_share * usual_inliers_) {
+  if (estimate.matched) compare_with_usual(estimate);
+}
+
+void DenseOdometry::compare_with_usual(DenseEstimate& estimate) {
+  const double found = estimate.match.inlier_ratio;
+  const double residual = std::sqrt(estimate.match.surface_residual_m2);
+  const bool fits =
+      residual > 0.0 && residual <= config_.match.few_found_residual * usual_residual_;
+  if (found < config_.match.min_inlier_share * usual_inliers_ && !fits) {
     estimate.matched = false;
     estimate.match.reason = "suddenly much less than before";
     return;
   }
-  usual_inliers_ =
-      usual_inliers_ > 0.0 ? (1.0 - kFollow) * usual_inliers_ + kFollow * found : found;
+  const auto follow = [](double value, double& usual) {
+    usual = usual > 0.0 ? (1.0 - kFollow) * usual + kFollow * value : value;
+  };
+  if (usual_inliers_ > 0.0) estimate.found_share = found / usual_inliers_;
+  follow(found, usual_inliers_);
+  follow(residual, usual_residual_);
 }
 
 void DenseOdometry::set_initial_motion(const Eigen::Vector3d& velocity_m_s,
@@ -281,6 +295,7 @@ void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
 void DenseOdometry::save(BinaryWriter& writer) const {
   writer.put(last_matched_);
   writer.put(usual_inliers_);
+  writer.put(usual_residual_);
   writer.put(lidars_);
   writer.put(last_scan_);
   scan_motion_.save(writer);
@@ -291,6 +306,7 @@ void DenseOdometry::save(BinaryWriter& writer) const {
 void DenseOdometry::load(BinaryReader& reader) {
   last_matched_ = reader.get<bool>();
   usual_inliers_ = reader.get<double>();
+  usual_residual_ = reader.get<double>();
   lidars_ = reader.get<std::uint64_t>();
   last_scan_ = reader.get<TimeNs>();
   scan_motion_.load(reader);

@@ -35,6 +35,11 @@ struct ScanMatchConfig {
   // of the position, or something before the lidar. (In good runs no scan finds less than 0.8 of
   // it.)
   double min_inlier_share = 0.5;
+  // But a scan with few rings that turns over even ground lies between the rings of the map, and
+  // finds little of what is there: such a match counts if what it finds lies on the map's surfaces
+  // within this many times the usual distance. (Scans of another place have 1.9 times and more.)
+  // 0: it does not count.
+  double few_found_residual = 0.0;
   // The match begins from far (MatchStart) where the prediction may be off by more than this share
   // of the local map's reach (one sigma), or the last scan found no match.
   double coarse_above_sigma = 0.25;
@@ -70,6 +75,7 @@ struct DenseEstimate {
   MotionUpdate update;
   RegistrationResult match;  // status kTooFewPoints where there was no map to match to
   bool matched = false;      // the match was usable and was offered to the motion model
+  double found_share = 1.0;  // its inlier ratio over the usual one, if it was usable
   BodyCloud cloud;           // every return outside the machine, deskewed, body frame at the stamp
   std::optional<BodyCloud> tops;  // of the cloud, where tree tops alone count
   BodyCloud thinned;              // what was matched, of the tops or of the cloud
@@ -149,6 +155,8 @@ class DenseOdometry {
   void note_lidars(const Scan& scan);
   void match(const MatchTarget& local_map, const NavState& predicted, const PoseTerms& known,
              DenseEstimate& estimate);
+  // Whether a usable match counts, by what those before it found.
+  void compare_with_usual(DenseEstimate& estimate);
 
   DenseOdometryConfig config_;
   Rig rig_;
@@ -164,8 +172,9 @@ class DenseOdometry {
   TimeNs last_scan_ = 0;            // stamp
   std::vector<std::uint8_t> keep_;  // workspace: points of the scan outside the machine
   ScanMotionWatch scan_motion_;
-  double usual_inliers_ = 0.0;  // running mean of the inlier ratio of matches; 0: none yet
-  std::uint64_t lidars_ = 0;    // that have given points, a bit each
+  double usual_inliers_ = 0.0;   // running mean of the inlier ratio of matches; 0: none yet
+  double usual_residual_ = 0.0;  // the same of their distance from the map's surfaces, m
+  std::uint64_t lidars_ = 0;     // that have given points, a bit each
 };
 
 }  // namespace understory

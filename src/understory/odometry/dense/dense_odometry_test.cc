@@ -148,5 +148,38 @@ TEST_F(LookingAround, ALidarThatJoinsIsNoReasonToDoubtTheMatch) {
   EXPECT_EQ(doubted.match.reason, "suddenly much less than before");
 }
 
+// A scan of another place: its points lie beside the surfaces of the map.
+Scan scattered(Scan scan) {
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const auto at = static_cast<float>(i);
+    scan.points[i].x += 0.35F * std::sin(1.3F * at);
+    scan.points[i].y += 0.35F * std::sin(1.7F * at);
+    scan.points[i].z += 0.35F * std::sin(2.3F * at);
+  }
+  return scan;
+}
+
+TEST_F(LookingAround, FewPointsCountIfTheyLieOnTheMapsSurfaces) {
+  const auto last_of = [&](double few_found_residual, const Scan& last) {
+    StageTimes times;
+    Log log;
+    DenseOdometryConfig config;
+    config.match.few_found_residual = few_found_residual;
+    DenseOdometry odometry(config, Rig(), nullptr, times, log);
+    odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+    const MatchTargetPtr local_map = map();
+    for (int i = 0; i < 3; ++i)
+      EXPECT_GT(odometry.process(scan(kPeriod * i), local_map).found_share, 0.9);
+    return odometry.process(last, local_map);
+  };
+  // Most of what it sees is not in the map, as where a scan's rings lie between those of the map.
+  const Scan mostly_new = with_another_lidar(scan(kPeriod * 3), 0);
+  EXPECT_FALSE(last_of(0.0, mostly_new).matched);
+  const DenseEstimate counted = last_of(1.5, mostly_new);
+  EXPECT_TRUE(counted.matched);
+  EXPECT_LT(counted.found_share, 0.5);
+  EXPECT_FALSE(last_of(1.5, scattered(mostly_new)).matched);
+}
+
 }  // namespace
 }  // namespace understory

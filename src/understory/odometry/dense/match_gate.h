@@ -13,9 +13,11 @@ struct [[nodiscard]] GateVerdict {
 };
 
 // `before`: the state at the scan before; `predicted`: at this scan, without the match;
-// `with_match`: with it; `match`: the pose of the IMU that matching gave. Thread-safe.
+// `with_match`: with it; `match`: the pose of the IMU that matching gave, with the covariance of a
+// right perturbation (rotation first). What match or prediction do not know opens the gate.
+// Thread-safe.
 GateVerdict judge_match(const MotionConfig& config, const ImuState& before,
                         const MotionPrediction& predicted, const ImuState& with_match,
-                        const Pose& match);
+                        const Pose& match, const Matrix6d& match_covariance);
 
 }  // namespace understory

@@ -30,12 +30,13 @@ class MatchGateTest : public ::testing::Test {
     const Eigen::Vector3d turn(0.0, 0.0, turn_deg * std::numbers::pi / 180.0);
     const Pose match =
         predicted_.state.world_from_imu * Pose(so3_exp(turn), Eigen::Vector3d(0.0, way_m, 0.0));
-    return judge_match(config_, before_, predicted_, with_match, match);
+    return judge_match(config_, before_, predicted_, with_match, match, match_covariance_);
   }
 
   MotionConfig config_;
   ImuState before_;
   MotionPrediction predicted_;
+  Matrix6d match_covariance_ = Matrix6d::Zero();
 };
 
 TEST_F(MatchGateTest, LetsThroughWhatFits) {
@@ -68,6 +69,16 @@ TEST_F(MatchGateTest, WhatThePredictionDoesNotKnowOpensTheGate) {
   predicted_.covariance.diagonal().segment<3>(3).setConstant(0.05 * 0.05);
   EXPECT_EQ(judge(0.0, 0.179, 0.0).reason, "");
   EXPECT_NE(judge(0.0, 0.182, 0.0).reason, "");
+}
+
+// A match that knows little of the heading does not contradict the prediction.
+TEST_F(MatchGateTest, WhatTheMatchDoesNotKnowOpensTheGate) {
+  match_covariance_(4, 4) = 0.05 * 0.05;
+  EXPECT_EQ(judge(0.0, 0.179, 0.0).reason, "");
+  EXPECT_NE(judge(0.0, 0.182, 0.0).reason, "");
+  match_covariance_(2, 2) = 0.02 * 0.02;
+  EXPECT_EQ(judge(0.0, 0.0, 4.5).reason, "");
+  EXPECT_NE(judge(0.0, 0.0, 4.7).reason, "");
 }
 
 // P2-8 itself looks at the velocity against the state before, and at nothing else.

@@ -25,6 +25,8 @@ class TrustMonitor {
   // lidar would hide what is looked for). `gyro_turning`: all that it turned, to and fro, radians.
   void add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
                 double gyro_turning, double duration_s);
+  // The same where matching knows the turn too badly to say anything.
+  void leave_out_turn() { join_anew(); }
   // Mean specific force between two scans with the attitude by matching in its middle.
   void add_force(const Eigen::Quaterniond& world_from_imu, const Eigen::Vector3d& force_in_imu,
                  double duration_s);

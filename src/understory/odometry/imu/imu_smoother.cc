@@ -159,9 +159,11 @@ void ImuSmoother::watch_imu(TimeNs stamp, const MotionInterval& interval,
     std::vector<InertialSample> apart;
     if (watch_.on_probation()) apart = buffer_.slice(latest().stamp, stamp);
     const std::vector<InertialSample>& samples = apart.empty() ? interval.samples : apart;
+    const double sigma = std::sqrt(lidar->covariance.diagonal().head<3>().maxCoeff());
+    const ImuMatch match{stamp, lidar->world_from_imu, sigma};
     if (last_match_ && last_match_->stamp == latest().stamp && !samples.empty())
-      watch_.compare(*last_match_, {stamp, lidar->world_from_imu}, samples);
-    last_match_ = ImuMatch{stamp, lidar->world_from_imu};
+      watch_.compare(*last_match_, match, samples);
+    last_match_ = match;
   }
   if (buffer_.ever_filled()) watch_.note_samples(!interval.samples.empty(), latest().stamp, stamp);
 }
@@ -208,7 +210,7 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
   const bool previous = config_.velocity_gate_reference == VelocityGateReference::kPreviousState;
   if (!interval.samples.empty() || previous) {
     const GateVerdict verdict =
-        judge_match(config_, before, predicted, latest(), lidar.world_from_imu);
+        judge_match(config_, before, predicted, latest(), lidar.world_from_imu, lidar.covariance);
     update.reason = verdict.reason;
     update.velocity_jump_m_s = verdict.velocity_jump_m_s;
   }
@@ -352,6 +354,7 @@ void ImuSmoother::save(BinaryWriter& writer) const {
   writer.put(last_match_.has_value());
   writer.put(last_match_ ? last_match_->stamp : TimeNs{0});
   put_pose(writer, last_match_ ? last_match_->world_from_imu : Pose());
+  writer.put(last_match_ ? last_match_->rotation_sigma_rad : 0.0);
   residual_scale_.save(writer);
 }
 
@@ -374,7 +377,8 @@ void ImuSmoother::load(BinaryReader& reader) {
   const bool matched = reader.get<bool>();
   const auto stamp = reader.get<TimeNs>();
   const Pose pose = get_pose(reader);
-  if (matched) last_match_ = ImuMatch{stamp, pose};
+  const auto sigma = reader.get<double>();
+  if (matched) last_match_ = ImuMatch{stamp, pose, sigma};
   residual_scale_.load(reader);
 }
 

@@ -1,6 +1,9 @@
 #include "understory/odometry/imu/imu_watch.h"
 
+#include <cmath>
+
 #include "understory/odometry/imu/imu_sums.h"
+#include "understory/odometry/odometry_constants.h"
 
 namespace understory {
 
@@ -65,9 +68,16 @@ void ImuWatch::compare(const ImuMatch& from, const ImuMatch& to,
   const Eigen::Vector3d force = mean_force(samples);
   scale_.add(to.world_from_imu.translation() - from.world_from_imu.translation(),
              drive_of(samples, first), duration);
+  // Rings on even ground say nothing of the heading: a match that hardly has anything else is no
+  // word against the gyroscope.
+  const double sigma = std::hypot(from.rotation_sigma_rad, to.rotation_sigma_rad);
   change_standing(to.stamp, [&] {
-    monitor_.add_turn(so3_log(first.conjugate() * second), raw_turn(samples), turning(samples),
-                      duration);
+    if (sigma > odometry_constants::imu_watch::kUncertainTurn) {
+      monitor_.leave_out_turn();
+    } else {
+      monitor_.add_turn(so3_log(first.conjugate() * second), raw_turn(samples), turning(samples),
+                        duration);
+    }
     monitor_.add_force(first.slerp(0.5, second), force, duration);
   });
 }

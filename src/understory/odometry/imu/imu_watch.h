@@ -12,6 +12,7 @@ namespace understory {
 struct ImuMatch {
   TimeNs stamp = 0;
   Pose world_from_imu;
+  double rotation_sigma_rad = 0.0;  // standard deviation about the least certain axis
 };
 
 // Watches the IMU during a run (whether it agrees with the lidar, whether it is silent) and says in

@@ -19,9 +19,9 @@ class ImuWatchTest : public ::testing::Test {
       : log_([this](LogLevel, const std::string& message) { said_.push_back(message); }),
         watch_(9.81, &log_) {}
 
-  static ImuMatch match_at(TimeNs stamp) {
-    const Eigen::Vector3d turn(0.0, 0.0, to_seconds(stamp));
-    return {stamp, Pose(so3_exp(turn), Eigen::Vector3d::Zero())};
+  [[nodiscard]] ImuMatch match_at(TimeNs stamp) const {
+    const Eigen::Vector3d turn(0.0, 0.0, match_rate_ * to_seconds(stamp));
+    return {stamp, Pose(so3_exp(turn), Eigen::Vector3d::Zero()), match_sigma_};
   }
 
   // Turns until `to`, or until the IMU is used again; says when that was.
@@ -44,6 +44,8 @@ class ImuWatchTest : public ::testing::Test {
     return 0;
   }
 
+  double match_rate_ = 1.0;   // as matching sees it, rad/s
+  double match_sigma_ = 0.0;  // rad
   std::vector<std::string> said_;
   Log log_;
   ImuWatch watch_;
@@ -107,6 +109,20 @@ TEST_F(ImuWatchTest, AWrongScaleIsSaidOnceAndStays) {
   EXPECT_EQ(warned("imu.untrusted"), 1U);
   turn(20 * kNsPerSecond, 30 * kNsPerSecond, 1.0);
   EXPECT_FALSE(watch_.trust().trusted);
+}
+
+// Bug: rings of 16 beams on even ground matched as if the carrier stood still, and the gyroscope
+// was doubted.
+TEST_F(ImuWatchTest, MatchesThatDoNotKnowTheHeadingSayNothingOfTheGyroscope) {
+  match_rate_ = 0.0;
+  match_sigma_ = 0.1;
+  turn(0, 20 * kNsPerSecond, 0.3);
+  EXPECT_TRUE(watch_.usable());
+  EXPECT_TRUE(watch_.trust().trusted);
+  EXPECT_FALSE(watch_.trust().proven);
+  match_sigma_ = 0.01;
+  turn(20 * kNsPerSecond, 30 * kNsPerSecond, 0.3);
+  EXPECT_FALSE(watch_.usable());
 }
 
 TEST_F(ImuWatchTest, SavedInAStretchOfSilenceItDoesNotSayItAgain) {

@@ -62,6 +62,10 @@ void suit_sparse_scans(const DenseMappingConfig& config, const SensorTraits& tra
                   kSparseInlierRatio, why);
   changes.at_most("keyframe.distance_m", config.keyframe_map.keyframe.distance_m, kSparseKeyframeM,
                   why);
+  if (config.keyframe_map.keyframe.below_found_share < kSparseFoundShare)
+    changes.set("keyframe.below_found_share", fmt::format("{}", kSparseFoundShare), why);
+  if (config.odometry.match.few_found_residual < kSparseFewFound)
+    changes.set("registration.few_found_residual", fmt::format("{}", kSparseFewFound), why);
   suit_matcher(config, {.sparse = true}, why, changes);
   changes.at_most("map.cloud_distance_m", config.cloud_distance_m, kSparseCloudM, why);
 }

@@ -71,7 +71,8 @@ TEST(Adaptation, SparseScansAreThinnedLessAndEachChangeIsTold) {
   EXPECT_EQ(adapted.config.cloud_distance_m, 0.1);
   EXPECT_EQ(keys_of(adapted.changes),
             (std::vector<std::string>{
-                "keyframe.distance_m", "map.cloud_distance_m", "preprocess.voxel.voxel_size_m",
+                "keyframe.below_found_share", "keyframe.distance_m", "map.cloud_distance_m",
+                "preprocess.voxel.voxel_size_m", "registration.few_found_residual",
                 "registration.min_inlier_ratio", "registration.ndt.few_rings",
                 "registration.ndt.min_points", "registration.ndt.volume_weight"}));
   // Nothing else changed than what is told.
@@ -100,7 +101,8 @@ TEST(Adaptation, WhatTheUserSetStays) {
   EXPECT_EQ(ndt_of(adapted).cells.volume_weight, 0.03);
   EXPECT_EQ(ndt_of(adapted).cell_sizes_m, (std::vector<double>{2.0, 0.5}));
   EXPECT_EQ(keys_of(adapted.changes),
-            (std::vector<std::string>{"keyframe.distance_m", "map.cloud_distance_m",
+            (std::vector<std::string>{"keyframe.below_found_share", "keyframe.distance_m",
+                                      "map.cloud_distance_m", "registration.few_found_residual",
                                       "registration.min_inlier_ratio", "registration.ndt.few_rings",
                                       "registration.ndt.min_points"}));
 }

@@ -43,19 +43,22 @@ void add_row(NdtCell& cell, const Eigen::Vector3d& direction, double information
       (direction * std::sqrt(information)).cast<float>();
 }
 
-// A line that is no stem: what surrounds it may show the surface on which it lies.
-void add_row_of_surroundings(NdtCell& cell, const Eigen::Matrix3d& covariance, double floor,
-                             bool few_rings, const MomentsAround& around) {
+// The surface on which the trace of a ring lies, as its surroundings show it: a row that holds
+// across the surface alone. False if they show none.
+bool add_row_of_surroundings(NdtCell& cell, const Eigen::Matrix3d& covariance,
+                             const NdtMapConfig& config, const MomentsAround& around) {
+  const double floor = config.sigma_floor_m * config.sigma_floor_m;
   for (int reach = 1; reach <= kSurroundings; ++reach) {
     const CellMoments moments = around(reach);
     const Shape shape = shape_of(moments.covariance());
     if (is_line(shape, floor)) continue;
     const Eigen::Vector3d normal = shape.axes.col(0);
-    if (!is_plane(shape, floor) || (few_rings && is_edge_on(moments, normal))) return;
+    if (!is_plane(shape, floor) || (config.few_rings && is_edge_on(moments, normal))) return false;
     const double own = normal.dot(covariance * normal);
     add_row(cell, normal, 1.0 / (std::max(own, shape.variance[0]) + floor));
-    return;
+    return true;
   }
+  return false;
 }
 
 }  // namespace
@@ -101,14 +104,15 @@ NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
   const bool line = is_line(shape, floor);
   if (line) {
     if (std::abs(shape.axes.col(2).z()) < kPoleCosine) {
-      add_row_of_surroundings(cell, covariance, floor, config.few_rings, around);
+      add_row_of_surroundings(cell, covariance, config, around);
       return cell;
     }
   } else if (is_plane(shape, floor)) {
-    if (config.few_rings && is_edge_on(moments, shape.axes.col(0))) {
-      add_row_of_surroundings(cell, covariance, floor, config.few_rings, around);
+    const bool strip = config.few_rings && shape.variance[1] < kStripShare * box;
+    const bool edge_on = config.few_rings && is_edge_on(moments, shape.axes.col(0));
+    if ((strip || edge_on) && add_row_of_surroundings(cell, covariance, config, around))
       return cell;
-    }
+    if (edge_on) return cell;
     add_row(cell, shape.axes.col(0), 1.0 / (shape.variance[0] + floor) - 1.0 / box);
     return cell;
   }

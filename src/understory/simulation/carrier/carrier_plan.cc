@@ -108,7 +108,7 @@ CarrierPlan plan_walk(const SiteConfig& config, const Route& route, const Terrai
     control[4] = kDegree * (0.7 * c.gait_deg * pace * std::sin(step + 1.1) +
                             c.tilt_sd_deg * sway * pitch.at(t));
     control[5] =
-        heading + turns.at(t) +
+        heading + turns.at(t) + first_turn(c, t) +
         kDegree * (c.yaw_wander_deg * sway * yaw.at(t) + c.gait_deg * pace * std::sin(0.5 * step));
     controls.push_back(control);
   }
@@ -205,7 +205,7 @@ CarrierPlan plan_harvester(const SiteConfig& config, const Route& route, const T
     const double left = ground(place + 1.1 * across);
     const double right = ground(place - 1.1 * across);
     const double rock = rocking(work.jolts_s, t);
-    const double swing = work.swing.at(t);
+    const double swing = work.swing.at(t) + first_turn(c, t);
     // The chassis lies on the ground; the cabin turns on it, so pitch and roll turn with the swing.
     const double chassis_pitch = -std::atan2(front - back, 3.6) + kDegree * rock_pitch * rock +
                                  kDegree * 0.4 * moving * shake.at(t);

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "understory/simulation/sensors/inertial.h"
 #include "understory/simulation/stand/stand.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
@@ -93,6 +96,48 @@ TEST(CarrierPath, WalkStandsStillThenTurnsQuicklyAndComesBack) {
   EXPECT_LT(gap.norm(), 0.3);
   EXPECT_GT(path.duration_s(), 190.0);
   EXPECT_LT(path.duration_s(), 270.0);
+}
+
+// Seconds at which the body turns at the even rate, and its heading against the end of the turn at
+// the start, degrees.
+struct FirstTurn {
+  double even_s = 0.0;
+  double heading_deg = 0.0;
+  double farthest_m = 0.0;  // from where it stood
+};
+
+FirstTurn first_turn_of(const std::string& kind, double turn_deg) {
+  SiteConfig config;
+  config.carrier.kind = kind;
+  config.carrier.still_s = 6.0;
+  config.carrier.first_turn_deg = turn_deg;
+  config.carrier.first_turn_rate_deg_s = 20.0;
+  config.carrier.begins_aloft = kind == "uav";
+  config.duration_s = 12.0;
+  const Walk walk(config);
+  const CarrierPath& path = walk.plan.path;
+  FirstTurn found;
+  const Pose start = path.pose(0.0);
+  for (double t = 0.0; t < 5.9; t += 0.01) {
+    const double rate = path.state(t).angular_rate.z() / kDegree;
+    if (std::abs(rate - std::copysign(20.0, turn_deg)) < 0.3) found.even_s += 0.01;
+    found.farthest_m =
+        std::max(found.farthest_m, (path.pose(t).translation() - start.translation()).norm());
+  }
+  found.heading_deg =
+      so3_log(start.rotation().conjugate() * path.pose(5.9).rotation()).z() / kDegree;
+  return found;
+}
+
+TEST(CarrierPath, TurnsOnTheSpotBeforeItLeaves) {
+  for (const std::string kind : {"walk", "harvester", "uav"}) {
+    for (const double turn_deg : {60.0, -60.0}) {
+      const FirstTurn found = first_turn_of(kind, turn_deg);
+      EXPECT_NEAR(found.heading_deg, turn_deg, 0.6) << kind;
+      EXPECT_NEAR(found.even_s, 60.0 / 20.0 - 0.5, 0.3) << kind;
+      EXPECT_LT(found.farthest_m, 0.03) << kind;
+    }
+  }
 }
 
 TEST(CarrierPath, KeepsClearOfStems) {

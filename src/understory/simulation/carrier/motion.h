@@ -72,6 +72,21 @@ inline double turn_time(double angle_rad, double peak_rate_deg_s) {
   return std::max(0.5, 1.875 * std::abs(angle_rad) / (peak_rate_deg_s * kDegree));
 }
 
+// Heading against that of the route at the start, radians: `first_turn_deg` to go, at an even rate
+// but for half a second at both ends, until half a second before the carrier leaves.
+inline double first_turn(const CarrierConfig& c, double t) {
+  constexpr double kRampS = 0.5;
+  const double angle = c.first_turn_deg * kDegree;
+  const double turning = std::max(kRampS, std::abs(c.first_turn_deg) / c.first_turn_rate_deg_s);
+  const double left = std::clamp(c.still_s - kRampS - t, 0.0, turning + kRampS);
+  // The way that is left at rate 1: a ramp, an even part, a ramp.
+  const double last = std::min(left, kRampS);
+  const double first = std::max(0.0, left - turning);
+  const double way =
+      0.5 * last * last / kRampS + std::max(0.0, left - kRampS) - 0.5 * first * first / kRampS;
+  return -angle * way / turning;
+}
+
 // Steps of a path of that duration.
 inline std::size_t steps_of(double duration_s) {
   return static_cast<std::size_t>(std::ceil(duration_s / kStep)) + 4;

@@ -164,10 +164,11 @@ Flight fly(const SiteConfig& config, const Route& route, const Terrain& terrain,
     const double ground = terrain.smooth_height(place.x(), place.y(), 2.0);
     height = t == 0.0 ? ground : height + 0.03 * (ground - height);  // follows the ground smoothly
     const double air = ease((t - c.still_s) / climb);
-    const double above = 0.35 + (c.height_m - 0.35 + 0.2 * up.at(t)) * air;
+    const double above = c.begins_aloft ? c.height_m + 0.2 * up.at(t) * air
+                                        : 0.35 + (c.height_m - 0.35 + 0.2 * up.at(t)) * air;
     flight.places.emplace_back(place.x() + 0.12 * air * east.at(t),
                                place.y() + 0.12 * air * north.at(t), height + above);
-    flight.headings.push_back(route.heading(distance));
+    flight.headings.push_back(route.heading(distance) + first_turn(c, t));
   }
   return flight;
 }

@@ -319,7 +319,8 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
   received_.counts.lost_in_a_row = good ? 0 : received_.counts.lost_in_a_row + 1;
   if (good) recovery_.note_good(estimate);
-  const bool wanted = good && map_->wants(state.world_from_body);
+  const bool unseen = estimate.found_share < config_.keyframe_map.keyframe.below_found_share;
+  const bool wanted = good && (unseen || map_->wants(state.world_from_body));
   // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop
   // closure, levelling) moves the scans with them.
   const bool first = map_->keyframes().empty();
