@@ -8,6 +8,7 @@
 #include "understory/geometry/raster.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/georeference/systems/layer_frame.h"
+#include "understory/georeference/systems/moved_raster.h"
 #include "understory/output/las_writer.h"
 
 namespace understory {
