@@ -16,8 +16,6 @@
 namespace understory {
 namespace {
 
-const ConfigTable::Range kPositive{1e-9, 1e9};
-const ConfigTable::Range kNotNegative{0.0, 1e9};
 void describe_ground(ConfigTable& table, SiteConfig& c) {
   table.section("origin", [&] {
     table.add("latitude_deg", c.origin.latitude_deg, {-89.0, 89.0}, "deg", "of the truth's origin");
