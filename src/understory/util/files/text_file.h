@@ -4,7 +4,7 @@
 #include <istream>
 #include <string>
 
-namespace YAML {
+namespace YAML {  // NOLINT(readability-identifier-naming): as yaml-cpp names it
 class Node;
 }
 
