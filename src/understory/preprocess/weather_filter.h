@@ -26,10 +26,11 @@ struct WeatherFilterConfig {
 void describe(ConfigTable& table, WeatherFilterConfig& config);
 
 // Takes returns out of a scan that are dark and stand alone, in their scan and in those before it.
-// A wall, a stem or the ground is in the scan before too; a flake is not. With s and b the
-// distances to the nearest return in the same scan and in the scans before, both over 0.1 m + range
-// and at most `reach`, and i the intensity over that of the bright returns (nine of ten are
-// darker), a return goes where sqrt(s b) > apart (i + 0.02). Bright returns thus never go. Without
+// A wall, a stem or the ground is in the scan before too; a flake is not.
+//   s  distance to the nearest return of the same scan, over 0.1 m + range, at most `reach`
+//   b  the same to the nearest return of the scans before
+//   i  intensity over that of the bright returns: nine of ten are darker
+// A return goes where sqrt(s b) > apart (i + 0.02). Bright returns thus never go. Without
 // intensities (all the same) nothing goes. One scan after another; not thread-safe, parallel
 // inside, the same result for any number of threads.
 class WeatherFilter {

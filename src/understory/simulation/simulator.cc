@@ -209,6 +209,12 @@ class Simulator::Impl : public SimulatedWorld {
   }
 
   void take_second_scan(bool wanted, std::optional<Event>& event) {
+    ScanTruth truth;
+    truth.stamp = second->stamp(second_number);
+    const CarrierState state = plan.path.state(to_seconds(truth.stamp - start));
+    truth.world_from_body = state.world_from_body;
+    truth.velocity = state.velocity;
+    truths.add_pose(truth);
     TopicReport& report = reports.back();
     note(report, second->stamp(second_number) + from_seconds(site.second_lidar.time_offset_s));
     if (wanted) {

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 
 #include "understory/sensor/tree.h"
@@ -266,6 +267,15 @@ void TruthLog::add(const ScanTruth& scan, const std::vector<StemReturns>& stems)
   stems_end_.push_back((stems_end_.empty() ? 0 : stems_end_.back()) + stems.size());
 }
 
+std::vector<ScanTruth> TruthLog::poses() const {
+  std::vector<ScanTruth> all;
+  all.reserve(scans_.size() + further_.size());
+  std::merge(scans_.begin(), scans_.end(), further_.begin(), further_.end(),
+             std::back_inserter(all),
+             [](const ScanTruth& a, const ScanTruth& b) { return a.stamp < b.stamp; });
+  return all;
+}
+
 std::vector<StemReturns> TruthLog::stems(std::size_t i) const {
   std::vector<StemReturns> result;
   for (std::size_t k = i == 0 ? 0 : stems_end_[i - 1]; k < stems_end_[i]; ++k) {
@@ -289,8 +299,9 @@ void write_truth_folder(const std::string& folder, const SimulatedWorld& world, 
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw OutputError(folder, "cannot be made: " + error.message());
-  write_text(folder + "/trajectory.tum", trajectory_text(log.scans()));
-  write_text(folder + "/velocity.csv", velocity_text(log.scans()));
+  const std::vector<ScanTruth> poses = log.poses();
+  write_text(folder + "/trajectory.tum", trajectory_text(poses));
+  write_text(folder + "/velocity.csv", velocity_text(poses));
   write_text(folder + "/imu_bias.csv", bias_text(log.scans()));
   write_returns(folder + "/returns.csv.gz", log);
   write_text(folder + "/trees.csv", trees_text(world, start, log));

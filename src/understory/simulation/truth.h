@@ -27,7 +27,11 @@ struct ScanTruth {
 class TruthLog {
  public:
   void add(const ScanTruth& scan, const std::vector<StemReturns>& stems);
+  // A scan of the second lidar, of which only the pose is known.
+  void add_pose(const ScanTruth& scan) { further_.push_back(scan); }
   [[nodiscard]] const std::vector<ScanTruth>& scans() const { return scans_; }
+  // Of the scans of all lidars, in order of time.
+  [[nodiscard]] std::vector<ScanTruth> poses() const;
   // Returns of stems in the i-th scan.
   [[nodiscard]] std::vector<StemReturns> stems(std::size_t i) const;
 
@@ -41,6 +45,7 @@ class TruthLog {
   static constexpr std::size_t kBlock = 1 << 16;
 
   std::vector<ScanTruth> scans_;
+  std::vector<ScanTruth> further_;  // of the second lidar
   // Of all scans, one after another, in blocks. A small vector a scan, kept among large ones that
   // come and go, made the heap of a long run grow by 60 kB a scan; a single vector takes up to
   // three times its size while it grows: a strip road by stems had 28 MB more at its peak.

@@ -38,5 +38,27 @@ TEST(TruthLog, GivesBackEachScansStems) {
   }
 }
 
+TEST(TruthLog, PosesOfBothLidarsComeInOrderOfTime) {
+  TruthLog log;
+  const auto at = [](TimeNs stamp) {
+    ScanTruth scan;
+    scan.stamp = stamp;
+    scan.velocity.x() = static_cast<double>(stamp);
+    return scan;
+  };
+  log.add(at(10), {});
+  log.add_pose(at(7));
+  log.add_pose(at(14));
+  log.add(at(20), {});
+  const std::vector<ScanTruth> poses = log.poses();
+  ASSERT_EQ(poses.size(), 4U);
+  const TimeNs expected[] = {7, 10, 14, 20};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(poses[i].stamp, expected[i]);
+    EXPECT_EQ(poses[i].velocity.x(), static_cast<double>(expected[i]));
+  }
+  EXPECT_EQ(log.scans().size(), 2U) << "returns and biases are of the first lidar's scans";
+}
+
 }  // namespace
 }  // namespace understory
