@@ -39,6 +39,13 @@ TEST(HeightColumn, ATipOfFewPointsBelongsToTheTreeWhereItEndsSuddenly) {
   EXPECT_EQ(column.top(0, 13), 16);
 }
 
+TEST(HeightColumn, WhatHangsAboveAGapIsNoTip) {
+  HeightColumn column;
+  column.points = {4385, 4372, 3647, 3028, 2162, 1334, 1126, 731, 362, 440, 304, 138, 76, 36};
+  column.points[25] = 30;
+  EXPECT_EQ(column.top(0, 13), 13);
+}
+
 TEST(HeightColumn, GhostsThatThinOutAreNoTip) {
   HeightColumn column;
   column.points = {14026, 4148, 3411, 2412, 1611, 1418, 1135, 586, 561, 349, 249, 123, 21,

@@ -64,6 +64,22 @@ TEST(HeightCurve, SingleHeightsThatAreFarOffDoNotMoveIt) {
   EXPECT_NEAR(curve->sd_m, 0.6, 0.2);
 }
 
+// A tree that took the top of its neighbour.
+TEST(HeightCurve, AHeightFarAboveItHasNoSay) {
+  Random random(8);
+  std::vector<Tree> trees;
+  for (int i = 0; i < 40; ++i) {
+    const double dbh = random.uniform(0.1, 0.4);
+    trees.push_back(tree_of(dbh, true_height(dbh) + random.normal(0.0, 0.5)));
+  }
+  const auto without = fit_height_curve(trees);
+  trees.push_back(tree_of(0.12, true_height(0.12) + 9.0));
+  const auto curve = fit_height_curve(trees);
+  ASSERT_TRUE(without && curve);
+  EXPECT_NEAR(curve->at(0.12), without->at(0.12), 0.02);
+  EXPECT_NEAR(curve->sd_m, without->sd_m, 0.05);
+}
+
 // Lower bounds of which many are right: they tell where the curve is, those far below do not.
 TEST(HeightCurve, LowerBoundsCountWhereTheyEndNearTheCurve) {
   Random random(7);
