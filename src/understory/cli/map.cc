@@ -1,3 +1,6 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <cstdio>
 #include <functional>
 #include <memory>
@@ -7,6 +10,7 @@
 #include "understory/cli/outcome.h"
 #include "understory/cli/plot_options.h"
 #include "understory/cli/suggestion.h"
+#include "understory/pipeline/mapping/dense/dense_mapping_config.h"
 #include "understory/pipeline/mapping/front_end_config.h"
 #include "understory/pipeline/mapping/mapping.h"
 #include "understory/pipeline/run_folder/run_folder.h"
@@ -148,7 +152,8 @@ void add_map_command(CLI::App& app, Command& chosen) {
                       "Recording (file, folder or sim:SITE?seed=N)");
   command->add_option("-o,--output", options->run_folder, "Run folder to write");
   command->add_option("--resume", options->resume, "Go on where a killed run stopped");
-  command->add_option("--profile", options->profile, "Shipped settings: handheld, harvester, ...");
+  command->add_option("--profile", options->profile,
+                      fmt::format("Shipped settings: {}", fmt::join(profile_names(), ", ")));
   command->add_option("--config", options->config_file, "YAML file of settings");
   add_settings_option(*command, options->settings);
   command
