@@ -260,8 +260,10 @@ TEST(Matchers, NdtSuitsSparseScansAndScansAlone) {
   const MatcherConfig config;
   EXPECT_TRUE(suited_settings(config, {}).empty());
   const auto sparse = suited_settings(config, {.sparse = true, .alone = false});
-  ASSERT_EQ(sparse.size(), 3U);
+  ASSERT_EQ(sparse.size(), 4U);
   EXPECT_EQ(sparse[0].key, "ndt.min_points");
+  EXPECT_EQ(sparse[3].key, "ndt.sparse_cell_m");
+  EXPECT_EQ(sparse[3].value, "1");
   const auto alone = suited_settings(config, {.sparse = false, .alone = true});
   ASSERT_EQ(alone.size(), 1U);
   EXPECT_EQ(alone[0].value, "[2, 1, 0.5]");

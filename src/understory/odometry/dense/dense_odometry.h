@@ -130,6 +130,8 @@ class DenseOdometry {
 
   // The position was lost; see MotionModel.
   void suspect_imu(TimeNs now) { motion_->suspect_imu(now); }
+  // A run before this one found the IMU right; see MotionModel.
+  void vouch_for_imu(TimeNs until) { motion_->vouch_for_imu(until); }
 
   [[nodiscard]] const MotionModel& motion() const { return *motion_; }
   [[nodiscard]] bool uses_imu() const { return uses_imu_; }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "understory/geometry/best_rotation.h"
 #include "understory/odometry/odometry_constants.h"
@@ -106,7 +107,15 @@ void TrustMonitor::begin_anew() {
   turns_ = seconds_ = 0;
 }
 
+void TrustMonitor::vouch_until(TimeNs until) {
+  vouched_until_ = until;
+  was_on_probation_ = true;
+  standing_ = Standing::kProven;
+  trust_.proven = true;
+}
+
 void TrustMonitor::suspect(TimeNs now) {
+  if (vouched_for(now)) return;
   if (was_on_probation_) {
     return distrust(
         "the gyroscope agrees with the lidar, and the accelerometer does not: its axes look "
@@ -120,8 +129,10 @@ void TrustMonitor::suspect(TimeNs now) {
 }
 
 void TrustMonitor::pass_time(TimeNs now) {
-  now_ = now;
-  if (on_probation() && to_seconds(now - probation_since_) > kLongestProbationS) {
+  const TimeNs before = std::exchange(now_, now);
+  if (!on_probation()) return;
+  trust_.doubted_s += to_seconds(now - before);
+  if (to_seconds(now - probation_since_) > kLongestProbationS) {
     standing_ = Standing::kUnproven;
     begin_anew();
   }
@@ -129,6 +140,7 @@ void TrustMonitor::pass_time(TimeNs now) {
 
 void TrustMonitor::add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
                             double gyro_turning, double duration_s) {
+  if (vouched_for(now_)) return;
   if (!on_probation()) return take_turn(by_lidar, by_gyro, duration_s);
   lidar_turning_ += by_lidar.norm();
   gyro_turning_ += gyro_turning;
@@ -213,6 +225,7 @@ void TrustMonitor::judge_turns() {
 
 void TrustMonitor::add_force(const Eigen::Quaterniond& world_from_imu,
                              const Eigen::Vector3d& force_in_imu, double duration_s) {
+  if (vouched_for(now_)) return;
   force_world_ += world_from_imu * force_in_imu * duration_s;
   force_imu_ += force_in_imu * duration_s;
   force_time_ += duration_s;
@@ -254,6 +267,8 @@ void TrustMonitor::save(BinaryWriter& writer) const {
   writer.put(trust_.reason);
   writer.put(trust_.usable);
   writer.put(trust_.proven);
+  writer.put(trust_.doubted_s);
+  writer.put(vouched_until_);
   writer.put(standing_);
   writer.put(was_on_probation_);
   writer.put_doubles(joined_lidar_.coeffs().data(), 4);
@@ -278,6 +293,8 @@ void TrustMonitor::load(BinaryReader& reader) {
   trust_.reason = reader.get_string();
   trust_.usable = reader.get<bool>();
   trust_.proven = reader.get<bool>();
+  trust_.doubted_s = reader.get<double>();
+  vouched_until_ = reader.get<TimeNs>();
   standing_ = reader.get_enum(Standing::kProven);
   was_on_probation_ = reader.get<bool>();
   reader.get_doubles(joined_lidar_.coeffs().data(), 4);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <limits>
 #include <vector>
 
 #include "understory/odometry/motion/motion_model.h"
@@ -15,7 +16,8 @@ namespace understory {
 //
 // An IMU that is contradicted before it has ever agreed is put on probation: the motion model goes
 // on without it, so that a wrong IMU no longer bends the lidar's turns that it is measured by,
-// until there has been enough turning for a verdict. Not thread-safe.
+// until there has been enough turning for a verdict. Where a run before this one found that it was
+// right, it is vouched for: until then contradictions are the lidar's fault. Not thread-safe.
 class TrustMonitor {
  public:
   explicit TrustMonitor(double gravity_m_s2) : gravity_(gravity_m_s2) {}
@@ -35,6 +37,10 @@ class TrustMonitor {
   void suspect(TimeNs now);
   // Time goes on: a probation that comes to no verdict ends, for the IMU.
   void pass_time(TimeNs now);
+  // A run before this one doubted the IMU up to `until` and found it right: up to then nothing is
+  // held against it, and it counts as proven. To be called before the first turn.
+  void vouch_until(TimeNs until);
+  [[nodiscard]] bool vouched_for(TimeNs now) const { return now <= vouched_until_; }
   [[nodiscard]] bool on_probation() const { return standing_ == Standing::kOnProbation; }
 
   // The judgement so far; stays untrusted once it is.
@@ -66,6 +72,7 @@ class TrustMonitor {
   bool was_on_probation_ = false;  // and passed
   TimeNs now_ = 0;
   TimeNs probation_since_ = 0;
+  TimeNs vouched_until_ = std::numeric_limits<TimeNs>::min();
   // Sums over turns: outer product of gyro and lidar, squares, vectors, and the total angle,
   // radians.
   Eigen::Matrix3d product_ = Eigen::Matrix3d::Zero();

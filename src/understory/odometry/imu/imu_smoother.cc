@@ -219,7 +219,7 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
     if (!interval.samples.empty()) note_residual(predicted, lidar);
     return update;
   }
-  if (dropped_in_a_row_ >= config_.velocity_gate_patience) {
+  if (dropped_in_a_row_ >= config_.velocity_gate_patience && !watch_.vouched_for(stamp)) {
     dropped_in_a_row_ = 0;
     watch_.suspect(stamp);
     restart_at(stamp, lidar, match_velocity);

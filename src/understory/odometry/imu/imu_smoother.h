@@ -31,6 +31,7 @@ class ImuSmoother : public MotionModel {
   void move_world(const Pose& new_world_from_old_world) override;
   [[nodiscard]] ImuTrust imu_trust() const override { return watch_.trust(); }
   void suspect_imu(TimeNs now) override { watch_.suspect(now); }
+  void vouch_for_imu(TimeNs until) override { watch_.vouch_until(until); }
   [[nodiscard]] Eigen::Quaterniond level_from_world() const override;
   void save(BinaryWriter& writer) const override;
   void load(BinaryReader& reader) override;

@@ -29,6 +29,9 @@ class ImuWatch {
 
   // The scan matches keep contradicting what the IMU predicts, now.
   void suspect(TimeNs now);
+  // See MotionModel::vouch_for_imu.
+  void vouch_until(TimeNs until) { monitor_.vouch_until(until); }
+  [[nodiscard]] bool vouched_for(TimeNs now) const { return monitor_.vouched_for(now); }
   // Time goes on to the scan at `now`; to be called before compare() and note_samples().
   void pass_time(TimeNs now);
   // Two matches in a row and the samples between them (not empty), with ends at the two stamps.

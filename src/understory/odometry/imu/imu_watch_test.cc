@@ -136,5 +136,37 @@ TEST_F(ImuWatchTest, SavedInAStretchOfSilenceItDoesNotSayItAgain) {
   EXPECT_EQ(warned("imu.silent"), 1U);
 }
 
+// Matches that say nothing of a turn contradicted it, and a run before this one found it right.
+TEST_F(ImuWatchTest, NothingIsHeldAgainstAnImuThatIsVouchedFor) {
+  watch_.vouch_until(10 * kNsPerSecond);
+  EXPECT_TRUE(watch_.trust().proven);
+  match_rate_ = 0.0;
+  turn(0, 9 * kNsPerSecond, 1.0);
+  watch_.suspect(9 * kNsPerSecond);
+  EXPECT_TRUE(watch_.usable());
+  EXPECT_TRUE(watch_.trust().trusted);
+  EXPECT_TRUE(watch_.vouched_for(10 * kNsPerSecond));
+  EXPECT_FALSE(watch_.vouched_for(10 * kNsPerSecond + 1));
+  match_rate_ = 1.0;  // what was said before does not count now
+  turn(11 * kNsPerSecond, 20 * kNsPerSecond, 1.0);
+  EXPECT_TRUE(watch_.trust().trusted);
+}
+
+TEST_F(ImuWatchTest, AnImuThatWasVouchedForIsJudgedAfterThat) {
+  watch_.vouch_until(10 * kNsPerSecond);
+  watch_.pass_time(11 * kNsPerSecond);
+  watch_.suspect(11 * kNsPerSecond);
+  EXPECT_FALSE(watch_.trust().trusted);  // its turns were right, so its accelerations are not
+}
+
+TEST_F(ImuWatchTest, TheTimeInDoubtIsSummedUp) {
+  EXPECT_EQ(watch_.trust().doubted_s, 0.0);
+  watch_.suspect(0);
+  const TimeNs used_again = turn(0, 20 * kNsPerSecond, 1.0, true);
+  EXPECT_NEAR(watch_.trust().doubted_s, to_seconds(used_again), 0.15);
+  turn(used_again, used_again + 5 * kNsPerSecond, 1.0);
+  EXPECT_NEAR(watch_.trust().doubted_s, to_seconds(used_again), 0.15);
+}
+
 }  // namespace
 }  // namespace understory

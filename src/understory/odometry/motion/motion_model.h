@@ -65,6 +65,7 @@ struct ImuTrust {
   bool usable = true;         // false: sure to do harm; the model goes on without it
   bool on_probation = false;  // contradicted; left out until it is clear whether it is right
   bool proven = false;        // agreed with the lidar over enough turning
+  double doubted_s = 0.0;     // time in which it was left out, on probation
   std::string reason;         // one sentence for run.json if not trusted
   // Acceleration by matching over that by the accelerometer, and how much there was to compare; see
   // MotionScale.
@@ -121,6 +122,9 @@ class MotionModel {
   // The position was lost with it: unless it has agreed with the lidar before, the IMU is left out
   // until it is clear whether it is right.
   virtual void suspect_imu(TimeNs now) = 0;
+  // A run before this one left the IMU out up to `until` and found it right: up to then it is not
+  // doubted again, and matches that contradict it are dropped. To be called before the first scan.
+  virtual void vouch_for_imu(TimeNs until) = 0;
 
   // The estimated tilt of the world frame: the rotation about a horizontal axis that would bring
   // the world's z axis onto the true vertical. Identity without an IMU.

@@ -155,6 +155,7 @@ void gather_imu_trust(const ImuTrust& trust, RunEvidence& evidence) {
     evidence.imu.unused_why = "it was silent, or its samples lie too far apart to be integrated";
   }
   evidence.imu_on_probation = trust.on_probation;
+  evidence.imu_doubted_s = trust.doubted_s;
   evidence.imu_motion_scale = trust.motion_scale;
   evidence.imu_motion_correlation = trust.motion_correlation;
   evidence.imu_motion_spread_m_s2 = trust.motion_spread_m_s2;

@@ -87,6 +87,7 @@ Figures figures_of(const RunEvidence& evidence) {
   figures["accelerometer_bias_m_s2"] = evidence.accelerometer_bias_m_s2;
   figures["imu_used"] = evidence.imu_used;
   figures["imu_on_probation"] = evidence.imu_on_probation;
+  figures["imu_doubted_s"] = evidence.imu_doubted_s;
   figures["imu_trusted"] = evidence.imu_distrust.empty();
   figures["imu_motion_scale"] = evidence.imu_motion_scale;
   figures["imu_motion_correlation"] = evidence.imu_motion_correlation;

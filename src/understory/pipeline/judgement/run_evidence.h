@@ -126,6 +126,7 @@ struct RunEvidence {
   std::uint64_t mixed_times = 0;  // scans whose points have times in no order
   bool imu_used = false;          // at the end
   bool imu_on_probation = false;  // at the end: left out until it is clear whether it is right
+  double imu_doubted_s = 0.0;     // left out for so long, and used again
   // Acceleration by matching over that by the accelerometer, how well they go together, and how
   // much there was to compare; see MotionScale.
   double imu_motion_scale = 0.0;

@@ -379,6 +379,11 @@ class Judge {
       missing(
           "at the end the IMU was left out: the matches contradict it, and the recording ends "
           "before it is clear which of them is right");
+    } else if (evidence_.imu_doubted_s > config_.max_unused_s) {
+      missing(
+          fmt::format("the IMU was left out for {:.1f} s, as the matches contradicted it, and "
+                      "was used again after that. The path of that time may be wrong",
+                      evidence_.imu_doubted_s));
     }
   }
 

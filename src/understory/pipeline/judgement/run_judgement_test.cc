@@ -138,6 +138,14 @@ TEST(RunJudgement, AnImuThatWasLeftOutAtTheEnd) {
   expect(RunStatus::kUntrusted, "its axes look swapped", evidence);
 }
 
+TEST(RunJudgement, AnImuThatWasLeftOutForATime) {
+  RunEvidence evidence = good_run();
+  evidence.imu_doubted_s = 0.9;
+  expect_complete(evidence);
+  evidence.imu_doubted_s = 6.2;
+  expect(RunStatus::kPartial, "the IMU was left out for 6.2 s", evidence);
+}
+
 TEST(RunJudgement, AMapThatIsNoGroundForAListOfTrees) {
   RunEvidence evidence = good_run();
   evidence.stand.trees = 20;

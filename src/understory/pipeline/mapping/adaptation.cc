@@ -175,6 +175,7 @@ ConfigOrigins get_origins(BinaryReader& reader) {
 void put_conditions(BinaryWriter& writer, const RunConditions& conditions) {
   writer.put(conditions.realtime);
   writer.put(conditions.imu_doubted);
+  writer.put(conditions.imu_cleared);
   writer.put(conditions.imu_refused);
   writer.put(conditions.imu_judged_s);
 }
@@ -183,6 +184,7 @@ RunConditions get_conditions(BinaryReader& reader) {
   RunConditions conditions;
   conditions.realtime = reader.get<bool>();
   conditions.imu_doubted = reader.get<bool>();
+  conditions.imu_cleared = reader.get<bool>();
   conditions.imu_refused = reader.get_string();
   conditions.imu_judged_s = reader.get<double>();
   return conditions;

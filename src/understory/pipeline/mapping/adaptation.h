@@ -15,8 +15,9 @@ namespace understory {
 struct RunConditions {
   bool realtime = false;      // at the speed of the sensors
   bool imu_doubted = false;   // left out until it is clear whether it is right
+  bool imu_cleared = false;   // it was doubted, and it was right: it counts as proven
   std::string imu_refused;    // why it is left out for good; empty: it is not
-  double imu_judged_s = 0.0;  // when one of the two was found, seconds since the first scan
+  double imu_judged_s = 0.0;  // when the last of these was found, seconds since the first scan
 };
 void put_origins(BinaryWriter& writer, const ConfigOrigins& origins);
 [[nodiscard]] ConfigOrigins get_origins(BinaryReader& reader);

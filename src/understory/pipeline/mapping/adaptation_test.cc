@@ -189,7 +189,7 @@ TEST(Adaptation, DefaultsArePrintedAsTheyAre) {
 
 TEST(Adaptation, ACheckpointGivesBackWhatItRestsOn) {
   BinaryWriter writer;
-  RunConditions conditions{true, false, "wrong", 3.5};
+  RunConditions conditions{.realtime = true, .imu_refused = "wrong", .imu_judged_s = 3.5};
   put_origins(writer, {{"a.b", "profile x"}, {"c", "--set"}});
   put_traits(writer, sixteen_rings());
   put_conditions(writer, conditions);

@@ -12,6 +12,21 @@
 #include "understory/util/timing.h"
 
 namespace understory {
+namespace {
+
+// Why the recording is begun anew, for the log.
+const char* again_because(ImuFinding::Verdict found) {
+  switch (found) {
+    case ImuFinding::Verdict::kWrong:
+      return "the recording is mapped again from its beginning, without the IMU";
+    case ImuFinding::Verdict::kCleared:
+      return "the IMU is right: the recording is mapped again from its beginning, with it";
+    default:
+      return "the recording is started again without the IMU, to find out which is wrong";
+  }
+}
+
+}  // namespace
 
 EventLoop::EventLoop(const MappingRequest& request, RunState& state, Log& log,
                      const ProgressSink& progress, const StopRequested& stop_requested,
@@ -184,20 +199,22 @@ void EventLoop::save_state_if_due() {
 
 // An IMU that contradicts the scans bends what is positioned with it, the map included, and by that
 // the scans' word against it. So the recording is begun anew: once to find out who is right, with
-// scans alone, and if the IMU is wrong, without it. True if it was; a run at the speed of its
-// sensors cannot, and goes on.
+// scans alone, and then without the IMU if it is wrong. If it is right, the scans were wrong, and
+// what they were mapped to alone is mapped again with it. True if the recording was begun anew; a
+// run at the speed of its sensors cannot, and goes on.
 bool EventLoop::start_over_for_imu() {
   if (player_ != nullptr) return false;
   const ImuFinding found = front_end_->imu_finding();
   if (found.verdict == ImuFinding::Verdict::kTrusted) return false;
-  if (start_over_for_stamps()) return true;
+  const bool cleared = found.verdict == ImuFinding::Verdict::kCleared;
+  if (!cleared && start_over_for_stamps()) return true;
   const bool wrong = found.verdict == ImuFinding::Verdict::kWrong;
   log_.forget_all_but(wrong ? "imu.untrusted" : "imu.probation");
-  log_.info(wrong ? "the recording is mapped again from its beginning, without the IMU"
-                  : "the recording is started again without the IMU, to find out which is wrong");
+  log_.info(again_because(found.verdict));
   RunConditions& conditions = request_.conditions;
   conditions.imu_judged_s = to_seconds(front_end_->last_scan_end() - front_end_->first_scan());
-  conditions.imu_doubted = !wrong;
+  conditions.imu_doubted = found.verdict == ImuFinding::Verdict::kSuspected;
+  conditions.imu_cleared = cleared;
   if (wrong) conditions.imu_refused = found.reason;
   start_over();
   return true;

@@ -78,12 +78,14 @@ struct Script {
   TimeNs throws_at = 0;                       // at a scan of this stamp or later; 0: never
   std::pair<TimeNs, TimeNs> unsettled{0, 0};  // between scans of these stamps
   TimeNs imu_wrong_at = 0;                    // unless it was made without the IMU; 0: never
+  TimeNs imu_suspected_at = 0;                // by a front end that was told nothing; 0: never
+  TimeNs imu_cleared_at = 0;                  // by one that doubts it; 0: never
 };
 
 class MadeUpFrontEnd : public FrontEnd {
  public:
-  MadeUpFrontEnd(const Script& script, bool without_imu, Course& course)
-      : script_(script), without_imu_(without_imu), course_(course) {}
+  MadeUpFrontEnd(const Script& script, const RunConditions& conditions, Course& course)
+      : script_(script), conditions_(conditions), course_(course) {}
 
   std::vector<PositionedScan> handle(const Event& event, const Rig& /*rig*/) override {
     const TimeNs time = event_time(event);
@@ -107,10 +109,14 @@ class MadeUpFrontEnd : public FrontEnd {
   }
   [[nodiscard]] TimeNs first_scan() const override { return kStart; }
   [[nodiscard]] ImuFinding imu_finding() const override {
-    const bool wrong =
-        !without_imu_ && script_.imu_wrong_at != 0 && last_scan_ >= script_.imu_wrong_at;
-    if (!wrong) return {};
-    return {ImuFinding::Verdict::kWrong, "it points down"};
+    const auto reached = [&](TimeNs time) { return time != 0 && last_scan_ >= time; };
+    if (!conditions_.imu_refused.empty()) return {};
+    if (reached(script_.imu_wrong_at)) return {ImuFinding::Verdict::kWrong, "it points down"};
+    if (conditions_.imu_doubted && reached(script_.imu_cleared_at))
+      return {ImuFinding::Verdict::kCleared, ""};
+    if (!conditions_.imu_doubted && !conditions_.imu_cleared && reached(script_.imu_suspected_at))
+      return {ImuFinding::Verdict::kSuspected, ""};
+    return {};
   }
   [[nodiscard]] FrontEndProgress progress() const override { return {"made up", scans_, ""}; }
   [[nodiscard]] bool has_map() const override { return scans_ > 0; }
@@ -135,7 +141,7 @@ class MadeUpFrontEnd : public FrontEnd {
 
  private:
   Script script_;
-  bool without_imu_;
+  RunConditions conditions_;
   Course& course_;
   TimeNs last_scan_ = 0;
   std::uint64_t events_ = 0;
@@ -167,7 +173,7 @@ class EventLoopTest : public ::testing::Test {
                              const RunConditions& conditions, const std::filesystem::path& /*work*/,
                              Log& /*log*/) {
       course_.made_for.push_back(conditions);
-      return std::make_unique<MadeUpFrontEnd>(script_, !conditions.imu_refused.empty(), course_);
+      return std::make_unique<MadeUpFrontEnd>(script_, conditions, course_);
     };
     return parts;
   }
@@ -279,6 +285,21 @@ TEST_F(EventLoopTest, AWrongImuHasTheRecordingBegunAnew) {
   ASSERT_NE(anew, course_.saved.end());
   EXPECT_EQ(std::vector<TimeNs>(anew, course_.saved.end()),
             (std::vector<TimeNs>{0, 0, at(0.0), at(2.0), at(4.0), at(6.0), at(8.0)}));
+}
+
+// What was mapped while the IMU was doubted is mapped again with it, and it is not doubted again.
+TEST_F(EventLoopTest, AnImuThatWasDoubtedAndIsRightHasTheRecordingBegunAnew) {
+  script_.imu_suspected_at = at(2.0);
+  script_.imu_cleared_at = at(5.0);
+  (void)run();
+  EXPECT_EQ(course_.opened, 3);
+  ASSERT_EQ(course_.made_for.size(), 3U);
+  EXPECT_TRUE(course_.made_for[1].imu_doubted);
+  EXPECT_FALSE(course_.made_for[1].imu_cleared);
+  EXPECT_FALSE(course_.made_for[2].imu_doubted);
+  EXPECT_TRUE(course_.made_for[2].imu_cleared);
+  EXPECT_NEAR(course_.made_for[2].imu_judged_s, 5.0, 1e-9);
+  EXPECT_EQ(events_handled_, events_.size());
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ struct ImuFinding {
   enum class Verdict {
     kTrusted,    // or there is none
     kSuspected,  // contradicted before it ever agreed: who is right is found out without it
+    kCleared,    // it was suspected, and it is right
     kWrong,
   };
   Verdict verdict = Verdict::kTrusted;

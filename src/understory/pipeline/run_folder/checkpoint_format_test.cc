@@ -27,13 +27,13 @@ std::size_t size_of(const Put& put) {
 // was begun before would have been read as another one. Where this fails, kCheckpointFormat grows
 // by one, and the sizes here become the new ones.
 TEST(CheckpointFormat, GrowsWithWhatIsKept) {
-  EXPECT_EQ(kCheckpointFormat, 10);
+  EXPECT_EQ(kCheckpointFormat, 11);
   Log log;
   const auto saved = [](const auto& part) {
     return size_of([&](BinaryWriter& writer) { part.save(writer); });
   };
   EXPECT_EQ(saved(EventOrderer(EventOrderer::Config(), log)), 1142U);
-  EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 597U);
+  EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 613U);
   EXPECT_EQ(saved(ImuUsage()), 25U);
   EXPECT_EQ(saved(OnlineGeoreference(OnlineGeoreferenceConfig())), 221632U);
   EXPECT_EQ(saved(TopicStatistics()), 136U);

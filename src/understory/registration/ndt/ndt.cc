@@ -32,7 +32,8 @@ void describe(ConfigTable& table, NdtConfig& config) {
 }
 
 RegistrationResult register_ndt(const NdtMap& target, const Points& source, const Pose& guess,
-                                const PoseTerms& terms, const NdtConfig& config) {
+                                const PoseTerms& terms, const NdtConfig& config,
+                                const NdtMap* coarser) {
   if (target.empty())
     return internal::refused(RegistrationStatus::kTooFewPoints, "empty target", guess);
   if (source.size() < static_cast<std::size_t>(config.min_matches)) {
@@ -45,7 +46,7 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
   Pose summed_at;
   const Points few = thin_evenly(source, kEnoughForWideSteps, kWideEvery);
   const auto evaluate = [&](const Pose& pose) {
-    sums = ndt_cost(target, widening > 1.0 ? few : source, pose, config, widening);
+    sums = ndt_cost(target, widening > 1.0 ? few : source, pose, config, widening, coarser);
     summed_at = pose;
     const double share = config.independent_share;
     PoseCost sum{share * sums.cost, share * sums.gradient, share * sums.hessian};
@@ -75,20 +76,21 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
   if (exact || summed_at.matrix() != minimum.pose.matrix()) {
     NdtConfig plain = config;  // information has to be positive
     plain.hessian = NdtConfig::Hessian::kGaussNewton;
-    sums = ndt_cost(target, source, minimum.pose, plain);
+    sums = ndt_cost(target, source, minimum.pose, plain, 1.0, coarser);
   }
   return internal::judged_match(minimum, sums, source, range, guess, internal::Judgement(config));
 }
 
 RegistrationResult register_ndt(std::span<const NdtMapPtr> targets, const Points& source,
-                                const Pose& guess, const PoseTerms& terms,
-                                const NdtConfig& config) {
+                                const Pose& guess, const PoseTerms& terms, const NdtConfig& config,
+                                const NdtMap* coarser) {
   UNDERSTORY_CHECK(!targets.empty());
   RegistrationResult result;
   Pose start = guess;
   int iterations = 0;
   for (const NdtMapPtr& target : targets) {
-    result = register_ndt(*target, source, start, terms, config);
+    const bool last = &target == &targets.back();
+    result = register_ndt(*target, source, start, terms, config, last ? coarser : nullptr);
     iterations += result.iterations;
     if (!result.usable()) {
       result.target_from_source = guess;

@@ -44,20 +44,25 @@ void describe(ConfigTable& table, NdtConfig& config);
 // Matches a source cloud to the target, P4 (41): minimises the sum over points of
 // -log(mixture of the cell's normal and a uniform distribution), plus the terms, by Newton steps to
 // where the gradient vanishes. Source points should be thinned by a voxel filter first. Parallel;
-// same bits for any number of threads. Thread-safe.
+// same bits for any number of threads. Thread-safe. `coarser`: of the same cloud, with larger
+// cells; points whose cell in `target` has too few points for a distribution are matched to these.
+// Null: such points match nothing.
 [[nodiscard]] RegistrationResult register_ndt(const NdtMap& target, const Points& source,
                                               const Pose& guess, const PoseTerms& terms,
-                                              const NdtConfig& config);
+                                              const NdtConfig& config,
+                                              const NdtMap* coarser = nullptr);
 
-// Coarse to fine: each map in turn, the result of one is the guess of the next.
+// Coarse to fine: each map in turn, the result of one is the guess of the next. `coarser` goes with
+// the last.
 [[nodiscard]] RegistrationResult register_ndt(std::span<const NdtMapPtr> targets,
                                               const Points& source, const Pose& guess,
-                                              const PoseTerms& terms, const NdtConfig& config);
+                                              const PoseTerms& terms, const NdtConfig& config,
+                                              const NdtMap* coarser = nullptr);
 
 // The cost that register_ndt minimises (terms left out), with its gradient and Hessian with respect
 // to a right perturbation. For tests and for those who optimise it with other terms.
 [[nodiscard]] MatchSums ndt_cost(const NdtMap& target, const Points& source,
                                  const Pose& target_from_source, const NdtConfig& config,
-                                 double widening = 1.0);
+                                 double widening = 1.0, const NdtMap* coarser = nullptr);
 
 }  // namespace understory

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "understory/registration/ndt/ndt_batch.h"
@@ -133,6 +134,11 @@ void add_exact_terms(const NdtCell& cell, const Eigen::Vector3f& offset,
   }
 }
 
+struct PointIndices {
+  std::array<std::size_t, kBlock> index;
+  std::size_t count = 0;
+};
+
 class Accumulator {
  public:
   Accumulator(const NdtMap& target, const Points& source, const Pose& pose, const NdtConfig& config,
@@ -149,26 +155,27 @@ class Accumulator {
     if (!trilinear_) fixed_count_ = fixed_neighbours(config.search, fixed_);
   }
 
-  // Sums over the points from `begin` to `end`, at most kBlock. Goes over them step by step, so
-  // that the memory of the cells is asked for well before it is needed.
-  [[nodiscard]] NdtSums block(std::size_t begin, std::size_t end) const {
+  // Adds the points of `which` (indices into the source, at most kBlock) to the sums, and leaves in
+  // it those without a cell. Goes over them step by step, so that the memory of the cells is asked
+  // for well before it is needed.
+  void add(PointIndices& which, NdtSums& sums) const {
     std::array<Placed, kBlock> placed;
-    const std::size_t n = end - begin;
+    const std::size_t n = which.count;
     for (std::size_t i = 0; i < n; ++i) {
-      placed[i] = place(source_[begin + i]);
+      placed[i] = place(source_[which.index[i]]);
       target_.prefetch(placed[i].at[0], placed[i].at[1], placed[i].at[2]);
     }
     for (std::size_t i = 0; i < n; ++i) {
       placed[i].own = target_.find(placed[i].at[0], placed[i].at[1], placed[i].at[2]);
       if (placed[i].own != nullptr) __builtin_prefetch(placed[i].own);
     }
-    NdtSums sums;
     NdtBatch batch;
     Neighbours moving;
-    for (std::size_t i = 0; i < n; ++i)
-      add_point(placed[i], moving, batch, sums);
+    which.count = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!add_point(placed[i], moving, batch, sums)) which.index[which.count++] = which.index[i];
+    }
     batch.flush(d2_, pull_, sums);
-    return sums;
   }
 
  private:
@@ -191,7 +198,8 @@ class Accumulator {
     return placed;
   }
 
-  void add_point(const Placed& placed, Neighbours& moving, NdtBatch& batch, NdtSums& sums) const {
+  // False if there is no cell.
+  bool add_point(const Placed& placed, Neighbours& moving, NdtBatch& batch, NdtSums& sums) const {
     const int count = trilinear_ ? surrounding_cells(placed.fraction, moving) : fixed_count_;
     const Neighbours& neighbours = trilinear_ ? moving : fixed_;
     float nearest = std::numeric_limits<float>::infinity();
@@ -217,10 +225,10 @@ class Accumulator {
       batch.add(*cell, offset, placed.lever, step.weight);
       if (exact_) add_exact_terms(*cell, offset, placed.lever, d2_, pull_ * step.weight, sums);
     }
-    if (nearest < std::numeric_limits<float>::infinity()) {
-      sums.nearest_squared += static_cast<double>(nearest);
-      ++sums.matched;
-    }
+    if (nearest == std::numeric_limits<float>::infinity()) return false;
+    sums.nearest_squared += static_cast<double>(nearest);
+    ++sums.matched;
+    return true;
   }
 
   const NdtMap& target_;
@@ -254,12 +262,25 @@ void add_block(const NdtSums& block, MatchSums& to) {
 }  // namespace
 
 MatchSums ndt_cost(const NdtMap& target, const Points& source, const Pose& target_from_source,
-                   const NdtConfig& config, double widening) {
+                   const NdtConfig& config, double widening, const NdtMap* coarser) {
   const Accumulator accumulator(target, source, target_from_source, config, widening);
+  std::optional<Accumulator> fallback;
+  if (coarser != nullptr) fallback.emplace(*coarser, source, target_from_source, config, widening);
   const std::size_t blocks = (source.size() + kBlock - 1) / kBlock;
   std::vector<NdtSums> sums(blocks);
   parallel_for(blocks, 2, [&](std::size_t b) {
-    sums[b] = accumulator.block(b * kBlock, std::min(source.size(), (b + 1) * kBlock));
+    PointIndices which;
+    const std::size_t end = std::min(source.size(), (b + 1) * kBlock);
+    for (std::size_t i = b * kBlock; i < end; ++i)
+      which.index[which.count++] = i;
+    accumulator.add(which, sums[b]);
+    if (!fallback || which.count == 0) return;
+    // They pull, and are not counted as matched: shares and fitness are those of the finest cells.
+    const std::size_t matched = sums[b].matched;
+    const double nearest = sums[b].nearest_squared;
+    fallback->add(which, sums[b]);
+    sums[b].matched = matched;
+    sums[b].nearest_squared = nearest;
   });
   MatchSums total;
   for (const NdtSums& block : sums)

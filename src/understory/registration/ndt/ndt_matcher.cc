@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 #include <utility>
@@ -17,12 +18,12 @@ using namespace registration_constants::ndt_matcher;
 
 class NdtCost : public MatchCost {
  public:
-  NdtCost(const NdtMap& map, const Points& source, const NdtConfig& config)
-      : map_(map), source_(source), config_(config) {
+  NdtCost(const NdtMap& map, const NdtMap* coarser, const Points& source, const NdtConfig& config)
+      : map_(map), coarser_(coarser), source_(source), config_(config) {
     config_.hessian = NdtConfig::Hessian::kGaussNewton;  // the curvature has to be positive
   }
   [[nodiscard]] PoseCost at(const Pose& target_from_source) const override {
-    const MatchSums sums = ndt_cost(map_, source_, target_from_source, config_);
+    const MatchSums sums = ndt_cost(map_, source_, target_from_source, config_, 1.0, coarser_);
     const double share = config_.independent_share;
     return {share * sums.cost, share * sums.gradient, share * sums.hessian};
   }
@@ -31,37 +32,60 @@ class NdtCost : public MatchCost {
 
  private:
   const NdtMap& map_;
+  const NdtMap* coarser_;
   const Points& source_;
   NdtConfig config_;
 };
 
 class NdtTarget : public MatchTarget {
  public:
-  NdtTarget(std::vector<NdtMapPtr> maps, const NdtConfig& config)
-      : maps_(std::move(maps)), config_(config) {}
+  // `coarser`: see register_ndt.
+  NdtTarget(std::vector<NdtMapPtr> maps, NdtMapPtr coarser, const NdtConfig& config)
+      : maps_(std::move(maps)), coarser_(std::move(coarser)), config_(config) {}
 
   [[nodiscard]] RegistrationResult match(const Points& source, const Pose& guess,
                                          const PoseTerms& terms, MatchStart start) const override {
     const std::span<const NdtMapPtr> maps(maps_);
     return register_ndt(start == MatchStart::kFar ? maps : maps.last(1), source, guess, terms,
-                        config_);
+                        config_, coarser_.get());
   }
   [[nodiscard]] double reach_m() const override { return maps_.back()->cell_size(); }
   [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
                                                       MatchStart start) const override {
-    const NdtMapPtr& map = start == MatchStart::kFar ? maps_.front() : maps_.back();
-    return std::make_unique<NdtCost>(*map, source, config_);
+    const bool far = start == MatchStart::kFar;
+    return std::make_unique<NdtCost>(far ? *maps_.front() : *maps_.back(),
+                                     far ? nullptr : coarser_.get(), source, config_);
   }
 
  private:
   std::vector<NdtMapPtr> maps_;
+  NdtMapPtr coarser_;
   NdtConfig config_;
 };
+
+// The maps of a target: coarse to fine, then that for sparse places, unless it is one of them.
+std::vector<double> sizes_of_maps(const NdtMatcherConfig& config) {
+  std::vector<double> sizes = config.cell_sizes_m;
+  if (config.sparse_cell_m > 0.0 &&
+      std::find(sizes.begin(), sizes.end(), config.sparse_cell_m) == sizes.end()) {
+    sizes.push_back(config.sparse_cell_m);
+  }
+  return sizes;
+}
+
+MatchTargetPtr target_of(std::vector<NdtMapPtr> maps, const NdtMatcherConfig& config) {
+  NdtMapPtr coarser;
+  for (const NdtMapPtr& map : maps) {
+    if (map->cell_size() == config.sparse_cell_m) coarser = map;
+  }
+  maps.resize(config.cell_sizes_m.size());
+  return std::make_shared<NdtTarget>(std::move(maps), std::move(coarser), config.steps);
+}
 
 class NdtTargetBuilder : public TargetBuilder {
  public:
   NdtTargetBuilder(const NdtMatcherConfig& config, const Viewpoint& viewpoint) : config_(config) {
-    for (const double size : config.cell_sizes_m) {
+    for (const double size : sizes_of_maps(config)) {
       NdtMapConfig cells = config.cells;
       cells.cell_size_m = size;
       cells.viewpoint_in_source = viewpoint.lidar_in_source;
@@ -75,7 +99,9 @@ class NdtTargetBuilder : public TargetBuilder {
     const double finest = config_.cell_sizes_m.back();
     parallel_for(builders_.size(), 1, [&](std::size_t i) {
       NdtMapBuilder& builder = builders_[i];
-      const bool coarse = config_.cell_sizes_m[i] >= 2.0 * finest;
+      // That for sparse places has all points, too.
+      const bool coarse =
+          i < config_.cell_sizes_m.size() && config_.cell_sizes_m[i] >= 2.0 * finest;
       builder.insert(coarse ? part : points_in_source, target_from_source);
       if (forget_beyond_m)
         builder.remove_beyond(target_from_source.translation(), *forget_beyond_m);
@@ -90,7 +116,7 @@ class NdtTargetBuilder : public TargetBuilder {
   [[nodiscard]] MatchTargetPtr snapshot() override {
     std::vector<NdtMapPtr> maps(builders_.size());
     parallel_for(builders_.size(), 1, [&](std::size_t i) { maps[i] = builders_[i].snapshot(); });
-    return std::make_shared<NdtTarget>(std::move(maps), config_.steps);
+    return target_of(std::move(maps), config_);
   }
 
  private:
@@ -116,12 +142,12 @@ class NdtMatcher : public Matcher {
   [[nodiscard]] MatchTargetPtr make_target(const Points& points) const override {
     const PlacedCloud cloud{&points, Pose()};
     std::vector<NdtMapPtr> maps;
-    for (const double size : config_.cell_sizes_m) {
+    for (const double size : sizes_of_maps(config_)) {
       NdtMapConfig cells = config_.cells;
       cells.cell_size_m = size;
       maps.push_back(build_ndt_map(std::span(&cloud, 1), cells));
     }
-    return std::make_shared<NdtTarget>(std::move(maps), config_.steps);
+    return target_of(std::move(maps), config_);
   }
   [[nodiscard]] double reach_m() const override { return config_.cell_sizes_m.back(); }
   [[nodiscard]] bool sums_up_points() const override { return true; }
@@ -154,6 +180,9 @@ void describe_cells(ConfigTable& table, NdtMapConfig& cells) {
 
 void describe(ConfigTable& table, NdtMatcherConfig& config) {
   table.add("cell_sizes_m", config.cell_sizes_m, "m", "cells of the maps, coarse to fine");
+  table.add("sparse_cell_m", config.sparse_cell_m, {0.0, 20.0}, "m",
+            "cells for points whose finest cell has too few points; 0: such points match nothing; "
+            "of sparse scans twice the finest");
   describe_cells(table, config.cells);
   describe(table, config.steps);
 }
@@ -174,6 +203,8 @@ std::vector<SuitedSetting> suited_settings(const NdtMatcherConfig& config,
     if (config.cells.volume_weight < kSparseVolumeWeight)
       suited.push_back({"volume_weight", fmt::format("{}", kSparseVolumeWeight)});
     suited.push_back({"few_rings", "true"});
+    if (config.sparse_cell_m == 0.0)
+      suited.push_back({"sparse_cell_m", fmt::format("{}", 2.0 * config.cell_sizes_m.back())});
   }
   const std::vector<double>& cells = config.cell_sizes_m;
   if (traits.alone && cells.size() == 2) {

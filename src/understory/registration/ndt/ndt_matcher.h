@@ -16,6 +16,9 @@ struct NdtMatcherConfig {
   static constexpr const char* kSummary = "normal distributions in cells";
 
   std::vector<double> cell_sizes_m = {2.0, 0.5};  // edges, coarse to fine
+  // Edge of the cells for points whose finest cell has too few points for a distribution; 0: such
+  // points match nothing.
+  double sparse_cell_m = 0.0;
   // cell_size_m is taken from the list above. Many keyframes lie in a cell: what they agree on is
   // sharper than one scan.
   NdtMapConfig cells = {.sigma_floor_m = 0.01};

@@ -38,6 +38,8 @@ DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTrait
       map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)),
       recovery_(config.lost_after_scans),
       imu_doubted_(conditions.imu_doubted),
+      imu_cleared_s_(conditions.imu_cleared ? std::optional(conditions.imu_judged_s)
+                                            : std::nullopt),
       opening_(std::make_unique<Opening>()) {
   const LoopClosureConfig& loops = config.keyframe_map.loop_closure.verification;
   for (const std::string& method : {loops.matcher.method, loops.refine}) {
@@ -61,6 +63,7 @@ ImuFinding DenseFrontEnd::imu_finding() const {
   if (!trust.usable) return {ImuFinding::Verdict::kWrong, trust.reason};
   // A run that has doubted it from the start finds out who is right.
   if (!imu_doubted_ && trust.on_probation) return {ImuFinding::Verdict::kSuspected, trust.reason};
+  if (imu_doubted_ && trust.proven && trust.trusted) return {ImuFinding::Verdict::kCleared, ""};
   return {};
 }
 
@@ -133,7 +136,13 @@ void DenseFrontEnd::complete_rig(const Rig& rig) {
   rig_.imu_extrinsic_source = rig.imu_extrinsic_source;
   const std::vector<ImuSample> recent(received_.imu.begin(), received_.imu.end());
   odometry_->take_imu(*rig_.body_from_imu, recent);
-  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(recovery_.last_scan());
+  if (odometry_->uses_imu()) tell_of_imu(recovery_.last_scan());
+}
+
+// What runs before this one found of the IMU, to an odometry that is to use it.
+void DenseFrontEnd::tell_of_imu(TimeNs now) {
+  if (imu_doubted_) odometry_->suspect_imu(now);
+  if (imu_cleared_s_) odometry_->vouch_for_imu(first_scan() + from_seconds(*imu_cleared_s_));
 }
 
 void DenseFrontEnd::make_odometry(const Rig& rig) {
@@ -161,7 +170,7 @@ void DenseFrontEnd::start_anew() {
   for (const ImuSample& waiting : received_.imu)
     odometry_->add_imu(waiting);
   const Scan& first = *std::get<ScanPtr>(opening_->events.front());
-  if (imu_doubted_ && odometry_->uses_imu()) odometry_->suspect_imu(first.stamp);
+  if (odometry_->uses_imu()) tell_of_imu(first.stamp);
 }
 
 // Whether the first scan was a smear or a part: then the recording's first scans are done again.
@@ -221,7 +230,10 @@ DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_t
   make_odometry(rig_);
   for (const ImuSample& sample : received_.imu)
     odometry_->add_imu(sample);
-  if (odometry_->uses_imu() && !proven) odometry_->suspect_imu(scan.stamp);
+  if (odometry_->uses_imu()) {
+    tell_of_imu(scan.stamp);
+    if (!proven) odometry_->suspect_imu(scan.stamp);
+  }
   // A better guess than standing still.
   odometry_->set_initial_motion(recovery_.last_velocity_in_body(), Eigen::Vector3d::Zero());
   if (satellites_) satellites_->begin_piece();

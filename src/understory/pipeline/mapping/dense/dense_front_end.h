@@ -145,6 +145,7 @@ class DenseFrontEnd : public FrontEnd {
   void take(const Event& event, const Rig& rig);
   void load_fixes(const RecordCount& known);
   void make_odometry(const Rig& rig);
+  void tell_of_imu(TimeNs now);
   void make_satellites();
   void take_fix(const GnssFix& fix);
   [[nodiscard]] ScanKnowledge knowledge_of(const Scan& scan);
@@ -190,7 +191,8 @@ class DenseFrontEnd : public FrontEnd {
   Recovery recovery_;
   std::string imu_refused_;
   bool imu_doubted_ = false;
-  std::unique_ptr<Opening> opening_;  // until the first scans are settled
+  std::optional<double> imu_cleared_s_;  // seconds since the first scan, of the verdict
+  std::unique_ptr<Opening> opening_;     // until the first scans are settled
 };
 
 }  // namespace understory

@@ -47,6 +47,8 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   UNDERSTORY_CHECK(settled() || !started());
   writer.put(imu_refused_);
   writer.put(imu_doubted_);
+  writer.put(imu_cleared_s_.has_value());
+  if (imu_cleared_s_) writer.put(*imu_cleared_s_);
   writer.put(fixes_file_ ? fixes_file_->count() : RecordCount());
   writer.put(received_.counts);
   received_.imu_usage.save(writer);
@@ -84,6 +86,7 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);
   imu_doubted_ = reader.get<bool>();
+  if (reader.get<bool>()) imu_cleared_s_ = reader.get<double>();
   const auto fixes = reader.get<RecordCount>();
   if (fixes.records > 0) load_fixes(fixes);
   received_.counts = reader.get<DenseCounts>();
