@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "understory/calibration/lidar_imu/clock_check.h"
 #include "understory/georeference/satellites/online_georeference.h"
 #include "understory/odometry/imu/imu_watch.h"
 #include "understory/pipeline/judgement/imu_usage.h"
@@ -27,7 +28,7 @@ std::size_t size_of(const Put& put) {
 // was begun before would have been read as another one. Where this fails, kCheckpointFormat grows
 // by one, and the sizes here become the new ones.
 TEST(CheckpointFormat, GrowsWithWhatIsKept) {
-  EXPECT_EQ(kCheckpointFormat, 10);
+  EXPECT_EQ(kCheckpointFormat, 11);
   Log log;
   const auto saved = [](const auto& part) {
     return size_of([&](BinaryWriter& writer) { part.save(writer); });
@@ -35,6 +36,7 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(EventOrderer(EventOrderer::Config(), log)), 1142U);
   EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 597U);
   EXPECT_EQ(saved(ImuUsage()), 25U);
+  EXPECT_EQ(saved(LidarImuClockCheck()), 41U);
   EXPECT_EQ(saved(OnlineGeoreference(OnlineGeoreferenceConfig())), 221632U);
   EXPECT_EQ(saved(TopicStatistics()), 136U);
   EXPECT_EQ(saved(FixJoiner()), 55U);
