@@ -1,7 +1,5 @@
 #include "understory/evaluation/world_frame.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
