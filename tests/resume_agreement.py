@@ -14,7 +14,7 @@ STEMS = ["stems.csv.gz", "trajectory.tum", "odometry.tum", "steps.csv", "gnss.cs
          "trees.csv", "felled.csv"]
 # Recording, a file that shows how far the run is, its least size then, options, files to compare.
 CASES = {
-    "harvester": ("sim:harvester?seed=21&duration_s=16", "journal.bin", 40_000, ["--imu-rate", "--set", "scan_fraction=0.25"],
+    "harvester": ("sim:harvester?seed=21&duration_s=16", "journal.bin", 40_000, ["--imu-rate", "--set", "scan_fraction=0.25", "--set", "output.world_frame=ned"],
                   [*DENSE, "trajectory_imu.tum", "trajectory_partial.tum"]),
     # What is adapted to sparse scans and what the user set of it are the same after the kill.
     "sparse_scans": ("sim:lieksa2?seed=21&duration_s=60", "journal.bin", 60_000,

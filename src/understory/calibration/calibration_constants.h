@@ -135,4 +135,31 @@ inline constexpr double kPathsAreWorse = 1.7;
 inline constexpr double kKept = 1e14;
 }  // namespace lidar_imu_calibration
 
+namespace clock_check {  // calibration/lidar_imu/clock_check.cc
+// Steps from scan to scan of a stretch at most [bound: time of the fit, which grows with the
+// square; 25 s at 10 Hz]
+inline constexpr std::size_t kStretchSteps = 250;
+// Steps of a stretch at least [bound: statistics of its frequencies]
+inline constexpr std::size_t kFewestSteps = 60;
+// Stretches that are kept [bound: 140 kB in a checkpoint; more hardly change the errors]
+inline constexpr std::size_t kStretches = 4;
+// s between two scans of a stretch at most [chosen: as for calibrations]
+inline constexpr double kLongestCheckedStepS = 0.5;
+// s to each side of the middle of a scan over which its turn rate is averaged [bound: some samples
+// at 100 Hz]
+inline constexpr double kRateWindowS = 0.015;
+// s for which samples are kept at most [chosen: far above two steps]
+inline constexpr double kMemoryS = 3.0;
+// s of stretches at least [chosen: as for calibrations]
+inline constexpr double kShortestCheckedS = 10.0;
+// s: lateness above which a run tells it [chosen: below, results hardly change]
+inline constexpr double kTellLatenessS = 0.005;
+// rad: turn of the axes above which a run tells it [chosen: 1 degree]
+inline constexpr double kTellTurnRad = 0.01745;
+// Standard deviations from none at which they are told [chosen: a false alarm costs trust]
+inline constexpr double kTellSigmas = 4.0;
+// s: standard deviation of a lateness beyond which nothing is said of it [chosen]
+inline constexpr double kMostToldSdS = 0.01;
+}  // namespace clock_check
+
 }  // namespace understory::calibration_constants

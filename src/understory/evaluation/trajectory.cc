@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "understory/evaluation/world_frame.h"
 #include "understory/util/error.h"
 #include "understory/util/files/csv.h"
 
@@ -56,7 +57,7 @@ void sort_by_time(std::vector<Stamped>& items) {
 }  // namespace
 
 Trajectory read_trajectory(const std::filesystem::path& path) {
-  LineReader lines(path);
+  LineReader lines(path, turned_back(path));
   Trajectory poses;
   std::string line;
   while (lines.next(line)) {
@@ -72,7 +73,7 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
 }
 
 std::vector<StampedVelocity> read_velocities(const std::filesystem::path& path) {
-  CsvReader table(path, {"timestamp", "vx", "vy", "vz"});
+  CsvReader table(path, {"timestamp", "vx", "vy", "vz"}, {.edit = turned_back(path)});
   std::vector<StampedVelocity> rows;
   while (table.next()) {
     StampedVelocity row;

@@ -12,9 +12,10 @@ namespace understory {
 using Trajectory = std::vector<StampedPose>;
 
 // Reads a TUM trajectory, `timestamp_s x y z qx qy qz qw`: separated by blanks, tabs or commas,
-// comments (#, %) and empty lines passed over, plain or gzip. Times keep every nanosecond that is
-// written. Poses out of order are sorted by time. Throws InputError with the line where one is not
-// eight finite numbers or the quaternion is zero, and if there is no pose at all.
+// comments (#, %) and empty lines passed over, plain or gzip. That of a run in north, east,
+// down is turned back (world_frame.h). Times keep every nanosecond that is written. Poses out of
+// order are sorted by time. Throws InputError with the line where one is not eight finite numbers
+// or the quaternion is zero, and if there is no pose at all.
 [[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& path);
 
 // The velocity of the body at one time, in the world frame.
@@ -24,8 +25,8 @@ struct StampedVelocity {
 };
 
 // Reads the columns `timestamp,vx,vy,vz` of a CSV table (states.csv.gz, velocity.csv), plain or
-// gzip, sorted by time. Rows with an empty or non-finite velocity are passed over. Throws
-// InputError where a column is missing or a cell is no number.
+// gzip, sorted by time, turned back as by `read_trajectory`. Rows with an empty or non-finite
+// velocity are passed over. Throws InputError where a column is missing or a cell is no number.
 [[nodiscard]] std::vector<StampedVelocity> read_velocities(const std::filesystem::path& path);
 
 // Where a reference instrument saw a prism on the carrier.

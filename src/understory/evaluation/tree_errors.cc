@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "understory/evaluation/plane_cells.h"
+#include "understory/evaluation/world_frame.h"
 #include "understory/util/error.h"
 #include "understory/util/files/csv.h"
 
@@ -64,7 +65,7 @@ class NearPath {
 }  // namespace
 
 std::vector<Tree> read_trees(const std::filesystem::path& path) {
-  CsvReader table(path, {"x", "y"});
+  CsvReader table(path, {"x", "y"}, {.edit = turned_back(path)});
   std::vector<Tree> trees;
   while (table.next()) {
     Tree tree;

@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 
+#include "understory/evaluation/world_frame.h"
 #include "understory/util/error.h"
 #include "understory/util/files/csv.h"
 
@@ -27,7 +28,7 @@ std::map<int, TreeFall> by_tree(const std::vector<TreeFall>& falls) {
 }  // namespace
 
 std::vector<TreeFall> read_tree_falls(const std::filesystem::path& path) {
-  CsvReader table(path, {"id", "x", "y", "seen_until", "gone_since"});
+  CsvReader table(path, {"id", "x", "y", "seen_until", "gone_since"}, {.edit = turned_back(path)});
   std::vector<TreeFall> falls;
   while (table.next()) {
     TreeFall fall;

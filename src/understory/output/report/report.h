@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "understory/evaluation/world_frame.h"
 #include "understory/forest/inventory.h"
 #include "understory/forest/stand/stand_table.h"
 #include "understory/forest/trees/tree_fall.h"
@@ -120,8 +121,9 @@ struct ReportInput {
   bool loop_closure_enabled = true;
   std::optional<ReportCorrection> correction;
   std::optional<ReportTruth> truth;
-  std::vector<std::string> remarks;  // what to distrust in results of this kind
-  bool north_is_up = false;          // the frame that the map is drawn in has its north up
+  std::vector<std::string> remarks;           // what to distrust in results of this kind
+  WorldFrame world_frame = WorldFrame::kEnu;  // the axes of the lists of trees, as in the files
+  bool north_is_up = false;                   // the frame that the map is drawn in has its north up
   // The frame that the map is drawn in, and `picture` with it; null: the world frame.
   const LayerFrame* drawing = nullptr;  // not owned
   bool has_fixes = false;               // of a GNSS receiver

@@ -105,8 +105,11 @@ std::string place_section(const ReportInput& input) {
   return html +
          "<p>map.laz, the rasters and trees.gpkg are in the coordinate system. trajectory.tum and "
          "trees.csv are in the frame of the run" +
-         (fused ? ": metres east, north and up of the place below" : "") + ".</p>" + rows.html() +
-         "</section>\n";
+         (fused ? fmt::format(": metres {} of the place below",
+                              input.world_frame == WorldFrame::kNed ? "north, east and down"
+                                                                    : "east, north and up")
+                : std::string()) +
+         ".</p>" + rows.html() + "</section>\n";
 }
 
 }  // namespace understory

@@ -294,10 +294,17 @@ struct TableColumn {
   std::function<std::string(std::size_t)> cell;
 };
 
+// What times and places in the tables count from.
+struct ReportTimeAndAxes {
+  TimeNs start = 0;  // of the recording
+  WorldFrame world_frame = WorldFrame::kEnu;
+  [[nodiscard]] bool ned() const { return world_frame == WorldFrame::kNed; }
+};
+
 // The columns that hold anything: trees by their crowns alone have no figures of a stem.
 std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
                                     const std::vector<StemFit>* stems, bool of_cloud,
-                                    TimeNs start) {
+                                    const ReportTimeAndAxes& told) {
   const auto number = [&](double Tree::*member, int decimals) {
     return [&trees, member, decimals](std::size_t i) { return metres(trees[i].*member, decimals); };
   };
@@ -313,9 +320,10 @@ std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
   };
   std::vector<TableColumn> columns = {
       {"no.", [&trees](std::size_t i) { return std::to_string(trees[i].id); }},
-      {"x, m", number(&Tree::x, 2)},
-      {"y, m", number(&Tree::y, 2)},
-      {"ground, m", number(&Tree::z, 2)}};
+      {"x, m", number(told.ned() ? &Tree::y : &Tree::x, 2)},
+      {"y, m", number(told.ned() ? &Tree::x : &Tree::y, 2)},
+      {told.ned() ? "ground (z, down), m" : "ground, m",
+       [&trees, told](std::size_t i) { return metres(told.ned() ? -trees[i].z : trees[i].z, 2); }}};
   const bool measured = any(&Tree::dbh_m) || trees.empty();
   if (measured) {
     columns.push_back({"diameter, cm", in_cm(&Tree::dbh_m)});
@@ -334,14 +342,15 @@ std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
     columns.push_back({"crown from, m", number(&Tree::crown_base_m, 1)});
   if (any(&Tree::crown_area_m2)) columns.push_back({"crown, m²", number(&Tree::crown_area_m2, 1)});
   if (any(&Tree::missing_since_s))
-    columns.push_back({"missing since, s", [&trees, start](std::size_t i) {
-                         return metres(trees[i].missing_since_s - to_seconds(start), 0);
+    columns.push_back({"missing since, s", [&trees, told](std::size_t i) {
+                         return metres(trees[i].missing_since_s - to_seconds(told.start), 0);
                        }});
   return columns;
 }
 
-std::string about_columns(const std::vector<StemFit>* stems, bool of_cloud) {
-  std::string html = "<p class=\"so\">x, y and the height of the ground are as in trees.csv. ";
+std::string about_columns(const std::vector<StemFit>* stems, bool of_cloud, bool ned) {
+  std::string html = "<p class=\"so\">x, y and the height of the ground are as in trees.csv";
+  html += ned ? ": north, east and down. " : ". ";
   const bool with_stems = stems == nullptr || !stems->empty();
   if (with_stems) html += "They are those of the stem's foot. ";
   if (!of_cloud) html += "Views are the scans that show the stem.";
@@ -352,13 +361,13 @@ std::string about_columns(const std::vector<StemFit>* stems, bool of_cloud) {
 }
 
 // `stems`: their fits in the same order, or null. `of_cloud`: else trees come from sights of single
-// views, which have no heights. `start`: of the recording.
+// views, which have no heights.
 std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit>* stems,
-                       bool of_cloud, TimeNs start) {
+                       bool of_cloud, const ReportTimeAndAxes& told) {
   std::string html =
       "<div class=\"all-trees\"><h3>All trees</h3><div class=\"scroll\"><table "
       "class=\"sort\"><thead><tr>";
-  const std::vector<TableColumn> columns = columns_of(trees, stems, of_cloud, start);
+  const std::vector<TableColumn> columns = columns_of(trees, stems, of_cloud, told);
   for (const TableColumn& column : columns)
     html += fmt::format("<th class=\"n\">{}</th>", column.title);
   html += "</tr></thead><tbody>";
@@ -373,11 +382,10 @@ std::string tree_table(const std::vector<Tree>& trees, const std::vector<StemFit
     html += fmt::format("<p class=\"sub\">The first {} of {}; all are in trees.csv.</p>",
                         kLongestTable, trees.size());
   }
-  return html + about_columns(stems, of_cloud) + "</div>";
+  return html + about_columns(stems, of_cloud, told.ned()) + "</div>";
 }
 
-// `start`: of the recording.
-std::string fall_table(const std::vector<TreeFall>& falls, TimeNs start) {
+std::string fall_table(const std::vector<TreeFall>& falls, const ReportTimeAndAxes& told) {
   if (falls.empty()) return "";
   std::string html =
       "<h3>Felled trees</h3><p>Trees that stood at first and were gone later, though they would "
@@ -388,9 +396,10 @@ std::string fall_table(const std::vector<TreeFall>& falls, TimeNs start) {
   for (const TreeFall& fall : falls) {
     html += "<tr>";
     for (const std::string& cell :
-         {std::to_string(fall.tree_id), metres(fall.x, 2), metres(fall.y, 2),
-          metres(to_seconds(fall.seen_until - start), 0),
-          metres(to_seconds(fall.gone_since - start), 0), std::to_string(fall.missed)})
+         {std::to_string(fall.tree_id), metres(told.ned() ? fall.y : fall.x, 2),
+          metres(told.ned() ? fall.x : fall.y, 2),
+          metres(to_seconds(fall.seen_until - told.start), 0),
+          metres(to_seconds(fall.gone_since - told.start), 0), std::to_string(fall.missed)})
       html += fmt::format("<td class=\"n\">{}</td>", cell);
     html += "</tr>";
   }
@@ -400,22 +409,24 @@ std::string fall_table(const std::vector<TreeFall>& falls, TimeNs start) {
 // Trees of a cloud that is not at hand: of a run that was moved.
 std::string section_of_moved(const ReportInput& input) {
   const std::vector<Tree>& trees = *input.trees;
-  const TimeNs start = input.scans.empty() ? 0 : input.scans.front().stamp;
+  const ReportTimeAndAxes told{input.scans.empty() ? 0 : input.scans.front().stamp,
+                               input.world_frame};
   return "<section><h2>Trees</h2><p>These are the trees of the run that was moved. Its own report "
          "shows their cross sections. ± is one standard deviation of the diameter. A height is "
          "given only where the top was seen.</p><div class=\"two\">" +
-         diameters(trees) + "</div>" + fall_table(input.falls, start) +
-         tree_table(trees, nullptr, true, start) + "</section>\n";
+         diameters(trees) + "</div>" + fall_table(input.falls, told) +
+         tree_table(trees, nullptr, true, told) + "</section>\n";
 }
 
 std::string section_of_views(const ReportInput& input) {
   const std::vector<Tree>& trees = *input.trees;
-  const TimeNs start = input.scans.empty() ? 0 : input.scans.front().stamp;
+  const ReportTimeAndAxes told{input.scans.empty() ? 0 : input.scans.front().stamp,
+                               input.world_frame};
   return "<section><h2>Trees</h2><p>A tree is listed where many of the views that could see it saw "
          "a stem. Its place is the mean of these sights. ± is one standard deviation of the "
          "diameter. Heights are not measured.</p><div class=\"two\">" +
-         diameters(trees) + "</div>" + fall_table(input.falls, start) +
-         tree_table(trees, nullptr, false, start) + "</section>\n";
+         diameters(trees) + "</div>" + fall_table(input.falls, told) +
+         tree_table(trees, nullptr, false, told) + "</section>\n";
 }
 
 }  // namespace
@@ -437,7 +448,7 @@ std::string stand_section(const ReportInput& input) {
   html += cross_sections(inventory);
   if (!inventory.trees.empty())
     html += single_trees(inventory) + sheets_part(inventory) +
-            tree_table(inventory.trees, &inventory.stems, true, 0);
+            tree_table(inventory.trees, &inventory.stems, true, {0, input.world_frame});
   return html + "</section>\n";
 }
 

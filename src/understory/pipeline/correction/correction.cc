@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "understory/evaluation/trajectory.h"
+#include "understory/evaluation/world_frame.h"
 #include "understory/pipeline/correction/correction_run.h"
 #include "understory/pipeline/correction/stem_map_maker.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
@@ -78,6 +79,9 @@ CorrectionInput read_stems(const CorrectionRequest& request, Log& log, StageTime
   input.views = read_stem_views(stems, log);
   documents.add_input(stems);
   documents.inherit(trust_of_run(request.stems));
+  // Beside a path in north, east, down its correction has the same axes.
+  if (std::filesystem::is_directory(request.stems))
+    documents.tell_world_in(world_frame_of_run(request.stems));
   documents.report().title = request.stems.filename().string();
   const std::string& head_log = request.config.harvester.head_log;
   input.head_cuts = read_head_log(head_log);

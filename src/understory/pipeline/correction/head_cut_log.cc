@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "understory/evaluation/world_frame.h"
 #include "understory/output/run_tables.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
@@ -153,7 +154,8 @@ std::vector<TreeFall> write_felled_trees(const std::filesystem::path& folder,
 void write_moved_cuts(const std::filesystem::path& from, const std::filesystem::path& to,
                       const Pose& to_world_from_world) {
   if (!std::filesystem::exists(from)) return;
-  CsvReader table(from, {"timestamp", "x", "y", "z", "tree_id", "distance_m"});
+  CsvReader table(from, {"timestamp", "x", "y", "z", "tree_id", "distance_m"},
+                  {.edit = turned_back(from)});
   std::vector<PlacedCut> cuts;
   while (table.next()) {
     PlacedCut cut;

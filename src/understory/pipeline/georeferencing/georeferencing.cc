@@ -83,6 +83,7 @@ void describe(const GeoreferenceRequest& request, const MovedRun& moved, RunDocu
   for (const std::string& doubt : placement.doubts)
     documents.lower(RunStatus::kUntrusted, doubt);
   documents.inherit(run.trust);
+  documents.tell_world_in(run.world_frame);
   ReportInput& report = documents.report();
   report.title = request.run.filename().string();
   report.made_from = fmt::format("a run of {} poses, moved by one motion", run.trajectory.size());

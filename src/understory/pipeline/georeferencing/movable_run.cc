@@ -41,6 +41,7 @@ MovableRun read_movable_run(const fs::path& folder) {
   if (!fs::is_directory(folder) || !fs::exists(folder / "trajectory.tum"))
     throw InputError(folder.string(), "", "expected a run folder that holds trajectory.tum");
   MovableRun run;
+  run.world_frame = world_frame_of_run(folder);
   run.trajectory = read_trajectory(folder / "trajectory.tum");
   run.has_trees = fs::exists(folder / "trees.csv");
   if (run.has_trees) run.trees = read_trees(folder / "trees.csv");

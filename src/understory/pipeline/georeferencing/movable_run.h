@@ -8,6 +8,7 @@
 
 #include "understory/evaluation/trajectory.h"
 #include "understory/evaluation/tree_falls.h"
+#include "understory/evaluation/world_frame.h"
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/georeference/systems/layer_frame.h"
 #include "understory/output/report/map_picture.h"
@@ -21,8 +22,9 @@
 
 namespace understory {
 
-// What a run folder holds that a motion can move. Frame: the run's world frame, metres.
+// What a run folder holds that a motion can move. Frame: the run's world frame, metres, z up.
 struct MovableRun {
+  WorldFrame world_frame = WorldFrame::kEnu;  // of its files, and of those of the result
   Trajectory trajectory;
   std::vector<Tree> trees;
   bool has_trees = false;

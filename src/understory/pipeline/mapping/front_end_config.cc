@@ -52,6 +52,10 @@ const GeoreferenceConfig& georeference_of(const FrontEndConfig& config) {
                     config);
 }
 
+WorldFrame world_frame_of(const FrontEndConfig& config) {
+  return std::visit([](const auto& one) { return one.output.world_frame; }, config);
+}
+
 std::vector<std::string> files_named_in(const FrontEndConfig& config) {
   return std::visit([](const auto& one) { return named_files(one); }, config);
 }

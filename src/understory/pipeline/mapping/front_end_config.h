@@ -5,6 +5,7 @@
 #include <variant>
 #include <vector>
 
+#include "understory/evaluation/world_frame.h"
 #include "understory/pipeline/mapping/adaptation.h"
 #include "understory/pipeline/mapping/dense/dense_mapping_config.h"
 #include "understory/pipeline/mapping/sparse/sparse_mapping_config.h"
@@ -28,6 +29,8 @@ using FrontEndConfig = std::variant<DenseMappingConfig, SparseMappingConfig>;
 [[nodiscard]] const EventLoopConfig& loop_of(const FrontEndConfig& config);
 // How the run lies on the globe.
 [[nodiscard]] const GeoreferenceConfig& georeference_of(const FrontEndConfig& config);
+// The axes of its files.
+[[nodiscard]] WorldFrame world_frame_of(const FrontEndConfig& config);
 // Other files that it names; empty names for none: the machine's boxes, the log of the head.
 [[nodiscard]] std::vector<std::string> files_named_in(const FrontEndConfig& config);
 // Throws InputError where one of them cannot be used that is read only at the end.

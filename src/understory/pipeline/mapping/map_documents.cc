@@ -10,6 +10,7 @@ RunDocuments map_documents(const ReadRecording& recording, const StageTimes& tim
   const RunFacts& facts = recording.facts;
   RunDocuments documents("map", request.config_record, times, recording.log, facts.elapsed_s);
   documents.add_inputs(hash_inputs(request.recording, recording.log, recording.progress));
+  documents.tell_world_in(world_frame_of(request.config));
   documents.report().title = std::filesystem::path(request.recording).filename().string();
   if (facts.online != nullptr) {
     const GeoreferenceConfig& config = georeference_of(request.config);

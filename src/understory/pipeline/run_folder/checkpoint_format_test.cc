@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "understory/calibration/lidar_imu/clock_check.h"
 #include "understory/georeference/satellites/online_georeference.h"
 #include "understory/odometry/imu/imu_watch.h"
 #include "understory/pipeline/judgement/imu_usage.h"
@@ -35,6 +36,7 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(EventOrderer(EventOrderer::Config(), log)), 1142U);
   EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 613U);
   EXPECT_EQ(saved(ImuUsage()), 25U);
+  EXPECT_EQ(saved(LidarImuClockCheck()), 41U);
   EXPECT_EQ(saved(OnlineGeoreference(OnlineGeoreferenceConfig())), 221632U);
   EXPECT_EQ(saved(TopicStatistics()), 136U);
   EXPECT_EQ(saved(FixJoiner()), 55U);

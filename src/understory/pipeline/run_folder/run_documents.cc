@@ -18,13 +18,11 @@ std::function<double()> seconds_from_now() {
 
 // The frame of each file of the folder that has one. Views, graphs and figures have none.
 std::map<std::string, std::string> frames_of(const std::filesystem::path& folder,
-                                             const RunPlace& place) {
+                                             const RunPlace& place, WorldFrame world) {
   const std::string layers = place.on_globe ? place.coordinate_system : "world";
   std::map<std::string, std::string> frames;
-  for (const char* name : {"trajectory.tum", "odometry.tum", "keyframes.tum", "trajectory_imu.tum",
-                           "trajectory_partial.tum", "states.csv.gz", "graph.g2o", "gnss.csv",
-                           "trees.csv", "felled.csv", "cuts.csv"}) {
-    if (std::filesystem::exists(folder / name)) frames[name] = "world";
+  for (const std::string& name : world_files()) {
+    if (std::filesystem::exists(folder / name)) frames[name] = frame_name(world);
   }
   for (const char* name : {"map.laz", "dtm.tif", "dsm.tif", "chm.tif", "obstacles.laz",
                            "free_height.tif", "trees.gpkg", "map.qgs"}) {
@@ -59,6 +57,11 @@ void RunDocuments::count(const std::string& name, std::uint64_t value) {
 
 void RunDocuments::remark(const std::string& key, const std::string& message) {
   remarks_.push_back({key, message, 1});
+}
+
+void RunDocuments::tell_world_in(WorldFrame frame) {
+  world_frame_ = frame;
+  report_.world_frame = frame;
 }
 
 void RunDocuments::compare_with_truth(const std::optional<ReportTruth>& truth) {
@@ -114,7 +117,10 @@ void RunDocuments::write(const std::filesystem::path& results) {
   all.wall_s = elapsed_s_();
   all.cpu_s = process_cpu_seconds();
   all.peak_memory_mb = peak_memory_mb();
-  if (all.place) all.frames = frames_of(results, *all.place);
+  const bool ned = world_frame_ == WorldFrame::kNed;
+  if (ned) turn_to_ned(results);
+  if (ned || all.place)
+    all.frames = frames_of(results, all.place.value_or(RunPlace()), world_frame_);
   write_report(results / "report.html", report_);
   all.wall_s = elapsed_s_();  // all of it, the report too
   write_run_json(results / "run.json", all);

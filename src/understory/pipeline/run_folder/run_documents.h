@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/evaluation/world_frame.h"
 #include "understory/output/report/report.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/georeferencing/run_place.h"
@@ -50,6 +51,9 @@ class RunDocuments {
   // Where the run lies on the globe, and the frame that its map is drawn in. `frames` must live
   // until `write`.
   void place(RunPlace place, const ResultFrames& frames);
+  // The axes that `write` turns the files of `world_files` to, and the lists of the report. Until
+  // then all of them are written east, north, up.
+  void tell_world_in(WorldFrame frame);
   // Errors against a known truth, if there is one: in the report and under "quality".
   void compare_with_truth(const std::optional<ReportTruth>& truth);
 
@@ -63,8 +67,9 @@ class RunDocuments {
   // and those of a run that is named later before those of a run that is named earlier.
   void inherit(const InheritedTrust& trust);
 
-  // Writes report.html and then run.json to the folder: once, when all else is written. Throws
-  // OutputError.
+  // Turns the files that hold world coordinates, where another frame than east, north, up is
+  // wanted, and writes report.html and then run.json to the folder: once, when all else is written.
+  // Throws OutputError.
   void write(const std::filesystem::path& results);
   // After `write`: status, reasons, and a few lines for the terminal.
   [[nodiscard]] RunOutcome outcome(std::string text) const;
@@ -72,6 +77,7 @@ class RunDocuments {
  private:
   void take_status();
 
+  WorldFrame world_frame_ = WorldFrame::kEnu;
   ReportInput report_;
   RunJudgement own_;
   std::vector<InheritedTrust> inherited_;

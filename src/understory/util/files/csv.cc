@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "understory/util/error.h"
 #include "understory/util/files/read_error.h"
@@ -112,8 +113,8 @@ struct LineReader::Stream {
   }
 };
 
-LineReader::LineReader(const std::filesystem::path& path)
-    : path_(path), stream_(std::make_unique<Stream>()) {
+LineReader::LineReader(const std::filesystem::path& path, LineEdit edit)
+    : path_(path), edit_(std::move(edit)), stream_(std::make_unique<Stream>()) {
   if (!std::filesystem::exists(path)) throw InputError(path.string(), "", "no such file or folder");
   if (!std::filesystem::is_regular_file(path))
     throw InputError(path.string(), "", "expected a file that can be read");
@@ -176,6 +177,7 @@ bool LineReader::next(std::string& line) {
   ++line_number_;
   while (!line.empty() && line.back() == '\r')
     line.pop_back();
+  if (edit_) edit_(line);
   return true;
 }
 
@@ -197,7 +199,7 @@ void LineReader::load(BinaryReader& reader) {
 
 CsvReader::CsvReader(const std::filesystem::path& path, const std::vector<std::string>& required,
                      CsvFormat format)
-    : lines_(path), format_(std::move(format)) {
+    : lines_(path, format.edit), format_(std::move(format)) {
   if (format_.on_short_row) lines_.cut_long_lines();
   read_header();
   for (const std::string& name : required) {

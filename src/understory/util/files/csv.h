@@ -32,14 +32,18 @@ void split_csv(std::string_view line, std::vector<std::string_view>& cells,
 // A number with `decimals` decimals for a CSV file, empty where it is not finite; never "-0.000".
 [[nodiscard]] std::string csv_cell(double value, int decimals);
 
+// Changes a line as it is read.
+using LineEdit = std::function<void(std::string& line)>;
+
 // Reads a text file line by line, plain or gzip by its content. Line ends are \n or \r\n. Not
 // thread-safe.
 class LineReader {
  public:
   static constexpr std::size_t kMaxLineBytes = std::size_t{1} << 20;
 
-  // Throws InputError if the file cannot be opened.
-  explicit LineReader(const std::filesystem::path& path);
+  // Every line goes through `edit`, if there is one. Throws InputError if the file cannot be
+  // opened.
+  explicit LineReader(const std::filesystem::path& path, LineEdit edit = {});
   ~LineReader();
   LineReader(const LineReader&) = delete;
   LineReader& operator=(const LineReader&) = delete;
@@ -66,6 +70,7 @@ class LineReader {
   [[noreturn]] void fail_next(const std::string& expected) const;
 
   std::filesystem::path path_;
+  LineEdit edit_;
   std::unique_ptr<Stream> stream_;
   std::size_t line_number_ = 0;
   bool cut_long_lines_ = false;
@@ -78,6 +83,7 @@ struct CsvFormat {
   bool exact_width = false;        // a row with more cells than names is refused, too
   // Told of a row that has too few cells, which is then passed over; empty: InputError.
   std::function<void(const std::string& problem)> on_short_row = {};
+  LineEdit edit = {};  // of every line, the header too; empty: none
 };
 
 // A CSV table with a header line, read row by row, columns found by name. Empty lines and comments

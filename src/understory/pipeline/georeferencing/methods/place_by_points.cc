@@ -30,12 +30,12 @@ struct SurveyedRow {
   Vector3d place_in_world = Vector3d::Zero();
 };
 
-// Where the run was at a time, or the place that the row names. `--antenna-m` is what stood on the
-// point.
+// Where the run was at a time, or the place that the row names, in the axes of the run's files.
+// `--antenna-m` is what stood on the point.
 Vector3d place_in_run(const CsvReader& table, const GeoreferenceRequest& request,
                       const MovableRun& run, const std::string& name) {
   const Vector3d named(table.number("x"), table.number("y"), table.number("z"));
-  if (named.allFinite()) return named;
+  if (named.allFinite()) return run.world_frame == WorldFrame::kNed ? turned_axes(named) : named;
   const double stamp_s = table.number("timestamp_s");
   if (!std::isfinite(stamp_s)) table.fail("expected x, y, z or timestamp_s of point " + name);
   TimeNs stamp = 0;

@@ -41,6 +41,7 @@ DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTrait
       imu_cleared_s_(conditions.imu_cleared ? std::optional(conditions.imu_judged_s)
                                             : std::nullopt),
       opening_(std::make_unique<Opening>()) {
+  received_.clock = LidarImuClockCheck(config.odometry.motion.imu);
   const LoopClosureConfig& loops = config.keyframe_map.loop_closure.verification;
   for (const std::string& method : {loops.matcher.method, loops.refine}) {
     if (method == LoopClosureConfig::kNoRefinement) continue;
@@ -107,6 +108,7 @@ void DenseFrontEnd::take_sample(const ImuSample& sample) {
   ++received_.counts.imu_samples;
   if (started())
     received_.imu_usage.add(sample, rig_.body_from_imu.has_value(), config_.odometry.motion.imu);
+  received_.clock.add_sample(sample);
   received_.imu.push_back(sample);
   const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
   while (received_.imu.size() > most)
@@ -226,6 +228,7 @@ DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_t
             fmt::format("position lost at {} s: a new piece of map begins there. Its place "
                         "relative to the old one is a guess",
                         format_seconds(scan.stamp)));
+  received_.clock.break_off();
   const bool proven = odometry_->motion().imu_trust().proven;
   make_odometry(rig_);
   for (const ImuSample& sample : received_.imu)
@@ -271,6 +274,7 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
   record.points = static_cast<std::uint32_t>(scan.points.size());
   record.matched_points = static_cast<std::uint32_t>(estimate.thinned.size());
   note_outcome(estimate, record);
+  check_clock(estimate, record);
   update_map(estimate, record);
   record.wall_ms = static_cast<float>(timer.wall_ms());
   record.cpu_ms =
@@ -313,6 +317,25 @@ void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& reco
                           format_seconds(record.stamp), 100.0 * estimate.match.inlier_ratio,
                           estimate.match.reason.empty() ? "" : ": " + estimate.match.reason));
   }
+}
+
+// Nothing of the run depends on it.
+void DenseFrontEnd::check_clock(const DenseEstimate& estimate, const ScanRecord& record) {
+  if (!odometry_->uses_imu() || !rig_.body_from_imu) return;
+  if (!estimate.matched || record.outcome != ScanOutcome::kMatched) {
+    received_.clock.break_off();
+    return;
+  }
+  received_.clock.add_scan(record.stamp, estimate.scan_end,
+                           estimate.match.target_from_source.rotation(),
+                           rig_.body_from_imu->rotation());
+  if (const auto& levelled = estimate.update.new_world_from_old_world)
+    received_.clock.turn_world(levelled->rotation());
+}
+
+std::optional<ClockCheckResult> DenseFrontEnd::clock_check() const {
+  if (!started() || !odometry_->uses_imu()) return std::nullopt;
+  return received_.clock.result();
 }
 
 void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record) {
@@ -359,6 +382,7 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
 // Loops have moved the present, too.
 void DenseFrontEnd::move_world(const Pose& new_world_from_old_world) {
   odometry_->move_world(new_world_from_old_world);
+  received_.clock.turn_world(new_world_from_old_world.rotation());
   if (satellites_) satellites_->move_present(new_world_from_old_world);
   std::optional<Pose>& so_far = positioned_.new_world_from_old_world;
   so_far = so_far ? new_world_from_old_world * *so_far : new_world_from_old_world;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "understory/calibration/lidar_imu/clock_check.h"
 #include "understory/georeference/satellites/satellite_belief.h"
 #include "understory/map/keyframe_map.h"
 #include "understory/map/scan_clouds.h"
@@ -98,6 +99,8 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] const DenseCounts& counts() const { return received_.counts; }
   // For how long the IMU's samples could not be used.
   [[nodiscard]] const ImuUsage& imu_usage() const { return received_.imu_usage; }
+  // How far the IMU's clock and axes seem to be off; nothing where it is not used or not told.
+  [[nodiscard]] std::optional<ClockCheckResult> clock_check() const;
   [[nodiscard]] const KeyframeMap& map() const { return *map_; }
   [[nodiscard]] KeyframeMap& map() { return *map_; }
   // Whether the configuration of this run has it use an IMU.
@@ -128,6 +131,7 @@ class DenseFrontEnd : public FrontEnd {
   struct Received {
     DenseCounts counts;
     ImuUsage imu_usage;
+    LidarImuClockCheck clock;
     std::deque<ImuSample> imu;  // all before the first scan, then the last ones
     std::vector<GnssFix> fixes;
   };
@@ -169,6 +173,7 @@ class DenseFrontEnd : public FrontEnd {
   void offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
                    const Pose& keyframe_from_body);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
+  void check_clock(const DenseEstimate& estimate, const ScanRecord& record);
 
   DenseMappingConfig config_;
   SensorTraits traits_;

@@ -52,6 +52,7 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   writer.put(fixes_file_ ? fixes_file_->count() : RecordCount());
   writer.put(received_.counts);
   received_.imu_usage.save(writer);
+  received_.clock.save(writer);
   writer.put(last_scan_end_);
   const ScanClouds::Last last_cloud = clouds_ ? clouds_->last() : ScanClouds::Last();
   writer.put(last_cloud.keyframe);
@@ -91,6 +92,7 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   if (fixes.records > 0) load_fixes(fixes);
   received_.counts = reader.get<DenseCounts>();
   received_.imu_usage.load(reader);
+  received_.clock.load(reader);
   last_scan_end_ = reader.get<TimeNs>();
   ScanClouds::Last last_cloud;
   last_cloud.keyframe = reader.get<std::uint64_t>();

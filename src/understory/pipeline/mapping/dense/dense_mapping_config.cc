@@ -38,6 +38,7 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   table.section("inventory", [&] { describe(table, config.inventory); });
   table.section("obstacles", [&] { describe(table, config.obstacles); });
   table.section("georeference", [&] { describe(table, config.georeference); });
+  table.section("output", [&] { describe(table, config.output); });
   table.section("gnss", [&] {
     describe(table, config.gnss);
     table.section("match", [&] { describe(table, config.satellites); });

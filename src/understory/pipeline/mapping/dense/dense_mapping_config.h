@@ -15,6 +15,7 @@
 #include "understory/pipeline/judgement/path_evidence.h"
 #include "understory/pipeline/judgement/run_judgement.h"
 #include "understory/pipeline/mapping/event_loop_config.h"
+#include "understory/pipeline/run_folder/output_config.h"
 #include "understory/util/config/config.h"
 #include "understory/util/config/config_origins.h"
 
@@ -36,6 +37,7 @@ struct DenseMappingConfig {
   InventoryConfig inventory = basic_inventory();
   ObstacleConfig obstacles;
   GeoreferenceConfig georeference;
+  OutputConfig output;
   GnssUseConfig gnss;
   SatelliteBeliefConfig satellites;
   JudgementConfig judgement;

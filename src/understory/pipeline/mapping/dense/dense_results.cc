@@ -218,6 +218,33 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
     documents.count("scans_by_satellites", counts.by_satellites);
 }
 
+// Warns where the IMU's clock or axes do not seem to be what the run takes them for.
+void tell_clock(const ReadRecording& recording, DenseFrontEnd& front_end, RunSummary& summary) {
+  const ScopedTimer timer(front_end.times(), "finish_imu_clock");
+  const std::optional<ClockCheckResult> check = front_end.clock_check();
+  if (!check) return;
+  const double turned_deg = check->turned_rad * 180.0 / M_PI;
+  const double turned_sd_deg = check->turned_sd_rad * 180.0 / M_PI;
+  summary.quality["imu_late_ms"] = 1e3 * check->late_s;
+  summary.quality["imu_late_sd_ms"] = 1e3 * check->late_sd_s;
+  summary.quality["imu_turned_deg"] = turned_deg;
+  summary.quality["imu_turned_sd_deg"] = turned_sd_deg;
+  constexpr const char* kRemedy =
+      "`understory calibrate lidar-imu` finds it, and `map --extrinsics` takes it out";
+  if (check->clock_is_off())
+    recording.log.warn(
+        "imu.clock",
+        fmt::format("the clock of the IMU seems to be {:.0f} ± {:.0f} ms {} by that of the lidar: "
+                    "{}",
+                    1e3 * std::abs(check->late_s), 1e3 * check->late_sd_s,
+                    check->late_s > 0.0 ? "late" : "early", kRemedy));
+  if (check->axes_are_off())
+    recording.log.warn("imu.axes",
+                       fmt::format("the axes of the IMU seem to be turned by {:.1f} ± {:.1f} "
+                                   "degrees from where they are given: {}",
+                                   turned_deg, turned_sd_deg, kRemedy));
+}
+
 // trajectory_partial.tum. A pose is there when the last point of its part is, and the part is
 // matched: latency counts from its first point.
 void write_partial_path(const ReadRecording& recording, DenseFrontEnd& front_end,
@@ -414,6 +441,7 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   write_imu_path(recording, front_end, trajectory.trajectory, documents);
   write_partial_path(recording, front_end, trajectory.trajectory, documents);
   fill_quality(front_end, trajectory, facts, documents.summary());
+  tell_clock(recording, front_end, documents.summary());
   if (const auto truth = write_truth(recording.request.run_folder, recording.source))
     documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
   const PlacedMap map =

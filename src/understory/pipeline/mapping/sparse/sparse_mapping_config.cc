@@ -36,6 +36,7 @@ ConfigTable sparse_mapping_table(SparseMappingConfig& config) {
   });
   describe(table, config.correction);
   table.section("georeference", [&] { describe(table, config.georeference); });
+  table.section("output", [&] { describe(table, config.output); });
   table.section("run", [&] {
     table.add("checkpoint_interval_s", config.loop.checkpoint_interval_s, {0.1, 60.0}, "s",
               "of recording between checkpoints");

@@ -9,6 +9,7 @@
 #include "understory/pipeline/correction/correction_config.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/mapping/event_loop_config.h"
+#include "understory/pipeline/run_folder/output_config.h"
 #include "understory/util/config/config.h"
 #include "understory/util/config/config_origins.h"
 #include "understory/util/log.h"
@@ -23,6 +24,7 @@ struct SparseMappingConfig {
   StemPaceConfig pace;
   CorrectionConfig correction;
   GeoreferenceConfig georeference;
+  OutputConfig output;
 };
 
 // The table of all keys, bound to `config`.
