@@ -34,8 +34,9 @@ if(UNDERSTORY_PACKAGE)
   # Coordinate systems come from its database, which no library names.
   set(CPACK_DEBIAN_PACKAGE_DEPENDS proj-data)
   set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
-  set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "lidar SLAM and tree mapping under the forest canopy
-Understory reads the raw recording of a handheld, backpack or machine-borne scanner. It writes a trajectory, a map,
-a list of trees, and a report that says what to trust.")
+  set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
+"Understory reads the raw recording of a handheld, backpack or machine-borne
+scanner. It writes a trajectory, a map, a list of trees, and a report that
+says what to trust.")
   include(CPack)
 endif()

@@ -63,8 +63,12 @@ if [[ $(uname -m) == x86_64 ]]; then
   esac
 fi
 if [[ $file == *.deb ]]; then
-  [[ -s /usr/share/doc/understory/copyright ]] || wrong "the package has no copyright file"
+  for name in doc/understory/copyright man/man1/understory.1.gz man/man1/understory-map.1.gz; do
+    [[ -s /usr/share/$name ]] || wrong "the package has no /usr/share/$name"
+  done
   quietly apt-get -qy purge understory
-  if command -v understory >/dev/null || [[ -e /usr/share/understory ]]; then wrong "purging it leaves files"; fi
+  for left in /usr/bin/understory /usr/share/understory /usr/share/doc/understory; do
+    if [[ -e $left ]]; then wrong "purging it leaves $left"; fi
+  done
 fi
 echo "trial: all in order"

@@ -13,7 +13,8 @@ export PATH=$work:$PATH
 
 page() { # name of the page, the command that it describes, what it does
   help2man --no-info --no-discard-stderr --version-string="$version" --source="Understory $version" \
-    --manual="Understory" --name="$3" "$2" | sed "s/^\.TH [A-Z-]*/.TH ${1^^}/" >"$work/$1.1"
+    --manual="Understory" --name="$3" "$2" |
+    sed -e "s/^\.TH [A-Z-]*/.TH ${1^^}/" -e "/^\.SH NAME/ {n; s/^[a-z ]*/$1 /}" >"$work/$1.1"
   gzip -9n -c "$work/$1.1" >"$folder/$1.1.gz"
 }
 
