@@ -35,7 +35,7 @@ def source_packages(paths):
 def archives_linked():
     """Names of archives of others: from the cache as libNAME.a, from packages as their source package."""
     command = output_of("ninja", "-C", str(BUILD), "-t", "commands", "understory").splitlines()[-1]
-    archives = {path for path in re.findall(r"(/\S+\.a)\b", command) if not path.startswith(f"{BUILD}/")}
+    archives = {path for path in re.findall(r"(?<!\S)(/\S+\.a)\b", command) if not path.startswith(f"{BUILD}/")}
     cached = {path for path in archives if not path.startswith(("/usr/", "/lib/"))}
     return {Path(path).stem.removeprefix("lib") for path in cached} | source_packages(archives - cached)
 
@@ -64,6 +64,7 @@ def loaded():
 text = (TOP / "packaging" / "copyright").read_text()
 named = {name for line in re.findall(r"source package (.*)\.$", text, re.M) for name in line.split(" or ")}
 linked, headers, shared = archives_linked(), source_packages(headers_used()), loaded()
+assert {"gdal", "onetbb"} <= shared, shared
 compiled_in = linked | {name for name in headers - shared if not COMPILER.match(name)}
 assert {"eigen3", "nanoflann", "cli11", "nlohmann-json3"} <= compiled_in, compiled_in
 assert compiled_in <= named, f"packaging/copyright does not name {sorted(compiled_in - named)}"

@@ -1,6 +1,7 @@
-// Packages and the usual build need a processor of the level x86-64-v3. On an older one the program would end
-// with "illegal instruction". This file alone is compiled for every processor (CMakeLists.txt), and its check
-// comes before all other code of the program. It uses nothing that is compiled for newer processors.
+// Packages and the usual build need a processor of the level x86-64-v3. On an older one the program
+// would end with "illegal instruction". This file alone is compiled for every processor
+// (CMakeLists.txt), and its check comes before all other code of the program. It uses nothing that
+// is compiled for newer processors.
 #if defined(__x86_64__) && defined(UNDERSTORY_LEVEL)
 #include <cpuid.h>
 #include <unistd.h>
@@ -44,8 +45,9 @@ void check_processor() {
       {4, __builtin_cpu_supports("avx512bw") != 0, "AVX512BW"},
       {4, __builtin_cpu_supports("avx512dq") != 0, "AVX512DQ"},
   };
-  const char* separator = "error: this program is built for processors of the level " UNDERSTORY_LEVEL
-                          ", and this one lacks ";
+  const char* separator =
+      "error: this program is built for processors of the level " UNDERSTORY_LEVEL
+      ", and this one lacks ";
   bool lacks = false;
   for (const Feature& feature : features) {
     if (feature.level > UNDERSTORY_LEVEL_NUMBER || feature.present) continue;
@@ -55,7 +57,8 @@ void check_processor() {
     lacks = true;
   }
   if (!lacks) return;
-  say("; build it on this machine (./run build), or for all processors (./run package --march none)\n");
+  say("; build it on this machine (./run build), or for all processors (./run package --march "
+      "none)\n");
   _exit(kExitCannotRun);
 }
 

@@ -2,7 +2,7 @@
 
 namespace understory {
 
-// Version of the program, as in CHANGELOG.md; tests/packaging/installed_tree.py keeps it in step with CMakeLists.txt.
+// Version of the program, as in CMakeLists.txt; tests/packaging/installed_tree.py compares them.
 inline constexpr const char* kVersion = "0.1.0";
 
 }  // namespace understory
