@@ -57,11 +57,13 @@ build_here() {
   if [[ $flags == none ]]; then flags=; fi
   say "building the program (instruction set: $UNDERSTORY_MARCH)"
   UNDERSTORY_CMAKE_ARGUMENTS="-DUNDERSTORY_MARCH=$flags" build_preset package
+  # Messages of defects name source files; ccache makes their paths relative (CCACHE_BASEDIR).
+  if grep -qaF "$top/" build-package/understory; then fail "the program names the folder $top: build it with ccache"; fi
   say "packing"
   rm -rf build-package/packed
   (cd build-package && cpack -B packed >packed.log 2>&1) || { tail -n 20 build-package/packed.log >&2; fail "cpack failed"; }
   mkdir -p out
-  made=(out/"$(cd build-package/packed && ls ./*.deb)")
+  made=(out/"$(basename build-package/packed/*.deb)")
   mv build-package/packed/*.deb out/
   made+=("$(tools/self-contained.sh build-package out)")
 }
