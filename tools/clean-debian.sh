@@ -74,7 +74,7 @@ clean_room() {
 in_room() {
   local keep
   mapfile -t keep < <(env | grep -E '^(https?_proxy|HTTPS?_PROXY|no_proxy|NO_PROXY)=' || true)
-  unshare --mount --pid --fork --kill-child bash -c '
+  setpriv --pdeathsig KILL unshare --mount --pid --fork --kill-child bash -c '
     set -e
     root=$1 command=$2 kept=$3
     shift 3

@@ -11,31 +11,6 @@ set -euo pipefail
 cd "$top"
 usage() { sed -n '2,7p' "${BASH_SOURCE[0]}" | sed 's/^# \{0,1\}//' >&2; exit 2; }
 
-release=$(own_release)
-march=
-trial=1
-while (($#)); do
-  case $1 in
-    --debian | --march)
-      (($# > 1)) || usage
-      if [[ $1 == --debian ]]; then release=$2; else march=$2; fi
-      shift 2
-      ;;
-    --no-trial) trial=0; shift ;;
-    *) usage ;;
-  esac
-done
-[[ -n $release ]] || fail "packages are made on Debian; this is another system"
-codename_of "$release" >/dev/null
-if ((EUID != 0)) && { ((trial)) || [[ $release != "$(own_release)" ]]; }; then
-  fail "trying packages in a clean system needs root (--no-trial makes them for this release without)"
-fi
-
-case $march in
-  "" | none | x86-64-v[234]) ;;
-  *) fail "--march $march: known are none, x86-64-v2, x86-64-v3 and x86-64-v4" ;;
-esac
-
 # Haswell (2013), Zen (2017) and newer. The usual build takes the same on these, so results are the same bytes.
 level() {
   if [[ -n $march ]]; then echo "$march"; elif [[ $(uname -m) == x86_64 ]]; then echo x86-64-v3; else echo none; fi
@@ -58,7 +33,7 @@ build_here() {
   say "building the program (instruction set: $UNDERSTORY_MARCH)"
   UNDERSTORY_CMAKE_ARGUMENTS="-DUNDERSTORY_MARCH=$flags" build_preset package
   # Messages of defects name source files; ccache makes their paths relative (CCACHE_BASEDIR).
-  if grep -qaF "$top/" build-package/understory; then fail "the program names the folder $top: build it with ccache"; fi
+  if LC_ALL=C grep -qaP "(?<![\w./-])\Q$top\E/" build-package/understory; then fail "the program names the folder $top: build it with ccache"; fi
   say "packing"
   rm -rf build-package/packed
   (cd build-package && cpack -B packed >packed.log 2>&1) || { tail -n 20 build-package/packed.log >&2; fail "cpack failed"; }
@@ -90,10 +65,42 @@ build_in_room() {
   say "building for Debian $release in $room"
   touch "$room/begun"
   in_room "$room" "cd /project && ${words[*]}" "$cache/debian/$codename.cache:/root/.cache" "$top/out:/project/out"
-  mapfile -t made < <(find out -newer "$room/begun" -type f -name 'understory*')
+  mapfile -t made < <(find out -newer "$room/begun" -type f -name 'understory*' | sort)
+  remove_rooms
 }
 
-if [[ $release == "$(own_release)" ]]; then build_here; else build_in_room; fi
-((${#made[@]} == 2)) || fail "made ${#made[@]} files and not 2: ${made[*]}"
-if ((trial)); then tools/try-package.sh --debian "$release" "${made[@]}"; fi
-say "made: $(du -h "${made[@]}" | awk '{printf "%s%s (%s)", sep, $2, $1; sep = ", "}')"
+read_arguments() {
+  release=$(own_release)
+  march=
+  trial=1
+  while (($#)); do
+    case $1 in
+      --debian | --march)
+        (($# > 1)) || usage
+        if [[ $1 == --debian ]]; then release=$2; else march=$2; fi
+        shift 2
+        ;;
+      --no-trial) trial=0; shift ;;
+      *) usage ;;
+    esac
+  done
+  [[ -n $release ]] || fail "packages are made on Debian; this is another system"
+  codename_of "$release" >/dev/null
+  case $march in
+    "" | none | x86-64-v[234]) ;;
+    *) fail "--march $march: known are none, x86-64-v2, x86-64-v3 and x86-64-v4" ;;
+  esac
+  if ((EUID != 0)) && { ((trial)) || [[ $release != "$(own_release)" ]]; }; then
+    fail "trying packages in a clean system needs root (--no-trial makes them for this release without)"
+  fi
+}
+
+main() {
+  read_arguments "$@"
+  if [[ $release == "$(own_release)" ]]; then build_here; else build_in_room; fi
+  ((${#made[@]} == 2)) || fail "made ${#made[@]} files and not 2: ${made[*]}"
+  if ((trial)); then tools/try-package.sh --debian "$release" "${made[@]}"; fi
+  say "made: $(du -h "${made[@]}" | awk '{printf "%s%s (%s)", sep, $2, $1; sep = ", "}')"
+}
+
+main "$@"
