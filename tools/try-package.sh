@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # try-package.sh [--debian 12|13] FILE...: installs each package (.deb) or tarball in a clean, minimal Debian and maps
 # a simulated recording there (packaging/trial.sh). Fails if anything does, and leaves nothing behind but the clean
-# base system in the cache. A .deb is tried on the release that its name tells, a tarball on this machine's.
+# base system in the cache. A package is tried on the release that its name tells, by +deb12 or the version of the C
+# library. --debian 13 tries a tarball of Debian 12 on the newer release.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 . "$top/tools/clean-debian.sh"
@@ -11,7 +12,7 @@ if [[ ${1:-} == --debian ]]; then
   release=$2
   shift 2
 fi
-(($#)) || { sed -n '2,4p' "${BASH_SOURCE[0]}" | sed 's/^# \{0,1\}//' >&2; exit 2; }
+(($#)) || { sed -n '2,5p' "${BASH_SOURCE[0]}" | sed 's/^# \{0,1\}//' >&2; exit 2; }
 for file; do
   [[ -f $file ]] || fail "$file is not there"
   [[ $(basename "$file") =~ ^understory[-_][0-9]+\.[0-9]+\.[0-9]+.*\.(deb|tar\.gz)$ ]] ||
@@ -22,7 +23,8 @@ trap remove_rooms EXIT
 for file; do
   on=$release
   if [[ -z $on && $file =~ \+deb([0-9]+)_ ]]; then on=${BASH_REMATCH[1]}; fi
-  on=${on:-$(own_release)}
+  if [[ -z $on && $file == *glibc2.41.tar.gz ]]; then on=13; fi
+  on=${on:-12}
   codename=$(codename_of "$on")
   version=$(basename "$file" | sed -E 's/^understory[-_]([0-9.]+).*/\1/')
   clean_room "$codename"

@@ -14,6 +14,10 @@ namespace {
 // As shells answer for a program that is there and cannot be run.
 constexpr int kExitCannotRun = 126;
 
+// What compilers have no name for in common: bits of ECX by CPUID 1 and CPUID 80000001h.
+constexpr unsigned kMovbe = 1u << 22;
+constexpr unsigned kLzcnt = 1u << 5;
+
 struct Feature {
   int level;  // of the x86-64 psABI, from which on processors have it
   bool present;
@@ -38,8 +42,8 @@ void check_processor() {
       {3, __builtin_cpu_supports("avx2") != 0, "AVX2"},
       {3, __builtin_cpu_supports("fma") != 0, "FMA"},
       {3, __builtin_cpu_supports("bmi2") != 0, "BMI2"},
-      {3, (basic & bit_MOVBE) != 0, "MOVBE"},
-      {3, (extended & bit_LZCNT) != 0, "LZCNT"},
+      {3, (basic & kMovbe) != 0, "MOVBE"},
+      {3, (extended & kLzcnt) != 0, "LZCNT"},
       {4, __builtin_cpu_supports("avx512f") != 0, "AVX512F"},
       {4, __builtin_cpu_supports("avx512vl") != 0, "AVX512VL"},
       {4, __builtin_cpu_supports("avx512bw") != 0, "AVX512BW"},
