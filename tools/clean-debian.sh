@@ -18,7 +18,27 @@ codename_of() { # 12 or 13
 # The release of this machine, or nothing if it is not Debian.
 own_release() { (. /etc/os-release; if [[ $ID == debian ]]; then echo "${VERSION_ID:-}"; fi); }
 
-remove_rooms() { rm -rf --one-file-system "$rooms_folder"/room.$$.*; }
+# What still runs in a copy ends first: when this process is told to end, its command goes on for a moment.
+remove_rooms() {
+  local copy
+  for copy in "$rooms_folder"/room.$$.*; do
+    [[ -d $copy ]] || continue
+    while stop_processes_in "$copy"; do sleep 0.1; done
+    rm -rf --one-file-system "$copy"
+  done
+}
+
+stop_processes_in() { # a folder that is their root; succeeds if there was one
+  local root process found=1
+  root=$(realpath "$1")
+  for process in /proc/[0-9]*; do
+    if [[ $(readlink "$process/root" 2>/dev/null) == "$root" ]]; then
+      kill -KILL "${process#/proc/}" 2>/dev/null || true
+      found=0
+    fi
+  done
+  return "$found"
+}
 
 # Copies that were left by processes which were killed.
 remove_stale_rooms() {
