@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# setup.sh [build|test|check]: installs the packages that are missing, and builds once into a cache
+# setup.sh [build|test|check|package]: installs the packages that are missing, and builds once into a cache
 # what this release does not package. Does nothing, in a second, where all is there.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -9,6 +9,7 @@ listed() { # names in the lists that a purpose needs
   case $1 in
     test) lists+=(test) ;;
     check) lists+=(test check) ;;
+    package) lists+=(package) ;;
   esac
   if available libgtsam-dev; then lists+=(with-libgtsam); fi
   local list

@@ -27,22 +27,7 @@ trap 'rm -rf "$private"' EXIT
 mkdir -p "$private/lists/partial" "$private/cache/archives/partial" "$private/parts"
 in_private=(-o "Dir::State::Lists=$private/lists" -o "Dir::Cache=$private/cache" -o "APT::Sandbox::User=")
 
-# The mirror in the machine's configuration, whichever form (.sources or .list) that has. apt tells
-# it only for lists that it holds; a machine that holds none gets them in the private folder.
-mirror() {
-  apt-get "$@" indextargets --format '$(ORIGIN)|$(LABEL)|$(COMPONENT)|$(REPO_URI)' 2>/dev/null |
-    awk -F'|' '$1 == "Debian" && $2 == "Debian" && $3 == "main" {print $4; exit}'
-}
-uri=$(mirror)
-if [[ -z $uri ]]; then
-  apt-get -q "${in_private[@]}" update >/dev/null
-  uri=$(mirror "${in_private[@]}")
-fi
-if [[ -z $uri ]]; then
-  echo "fetch.sh: apt on this machine knows no Debian mirror (tried: apt-get indextargets)" >&2
-  exit 1
-fi
-
+uri=$("$(dirname "$sums")/../mirror.sh" | awk '$1 !~ /-/ && !n++ {print $2}')
 keyring=/usr/share/keyrings/debian-archive-keyring.gpg
 {
   printf 'Types: deb-src\nURIs: %s\nSuites: %s\nComponents: main\n' "$uri" "$suite"

@@ -2,7 +2,7 @@
 
 namespace understory {
 
-// Version of the program, as in CHANGELOG.md; kept in step with CMakeLists.txt by a test.
+// Version of the program, as in CMakeLists.txt; tests/packaging/installed_tree.py compares them.
 inline constexpr const char* kVersion = "0.1.0";
 
 }  // namespace understory
