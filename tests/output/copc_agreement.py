@@ -8,7 +8,6 @@ search through all points finds. The same bytes for any number of threads: same_
 import json
 import os
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -61,7 +60,6 @@ def check(folder, trees):
         everything = reader.query()
         assert len(everything) == len(laz.points) == reader.header.point_count
         assert np.array_equal(rows(everything, trees), expected), folder
-        assert (reader.header.parse_crs() or "") == (laz.header.parse_crs() or "") if sys.modules.get("pyproj") else True
         wkts = [[v.string for v in h.vlrs if v.record_id == 2112] for h in (reader.header, laz.header)]
         assert wkts[0] == wkts[1], wkts
         info = reader.copc_info
@@ -69,11 +67,17 @@ def check(folder, trees):
         low, high = laz.xyz.min(axis=0), laz.xyz.max(axis=0)
         assert np.allclose(reader.header.mins, low, atol=1e-6) and np.allclose(reader.header.maxs, high, atol=1e-6)
         random = np.random.default_rng(3)
-        for _ in range(6):
+        found = 0
+        for _ in range(12):
             corner = random.uniform(low, high)
             box = Bounds(corner, corner + random.uniform(0.05, 0.5, 3) * (high - low))
-            inside = np.all((laz.xyz >= box.mins) & (laz.xyz <= box.maxs), axis=1)
+            # laspy rounds a box to whole steps.
+            first, last = (np.round((end - laz.header.offsets) / laz.header.scales) for end in (box.mins, box.maxs))
+            steps = np.column_stack([laz.X, laz.Y, laz.Z])
+            inside = np.all((steps >= first) & (steps <= last), axis=1)
             assert len(reader.query(bounds=box)) == inside.sum(), (box, inside.sum())
+            found += inside.sum()
+        assert found > 100, found
         levels = sorted({key.level for key in reader.root_page.entries})
         assert levels == list(range(len(levels))), levels
         assert sum(len(reader.query(level=level)) for level in levels) == len(laz.points)

@@ -61,7 +61,8 @@ class CopcOctreeTest : public ::testing::Test {
     for (const auto& [key, points] : nodes) {
       const auto [level, x, y, z] = key;
       EXPECT_FALSE(points.empty());
-      if (level > 0) EXPECT_EQ(nodes.count({level - 1, x / 2, y / 2, z / 2}), 1U) << "no way to it";
+      EXPECT_TRUE(level == 0 || nodes.count({level - 1, x / 2, y / 2, z / 2}) == 1)
+          << "no way to it";
       const std::array<int, 3> at{x, y, z};
       for (const LasPointSteps& point : points) {
         const CopcCube::Place place = cube.place({point.x, point.y, point.z});
@@ -80,7 +81,7 @@ TEST_F(CopcOctreeTest, EveryPointLiesOnceInTheCubeOfItsNode) {
   const std::vector<LasPointSteps> points = cloud(30'000);
   for (const std::uint64_t in_memory : {700ULL, 5'000ULL, 1'000'000ULL}) {
     const auto nodes = built(points, cube_, {in_memory, 300, 20}, 1'000);
-    EXPECT_GT(nodes.size(), 30U);
+    EXPECT_GT(nodes.size(), 20U);
     expect_whole(nodes, points.size(), cube_);
   }
 }

@@ -38,9 +38,11 @@ class CopcWriterTest : public ::testing::Test {
  protected:
   static LasPointSteps point(std::mt19937& random) {
     LasPointSteps steps;
-    steps.x = static_cast<std::int32_t>(random() % 70'000);
-    steps.y = static_cast<std::int32_t>(random() % 70'000) - 5'000;
-    steps.z = static_cast<std::int32_t>(random() % 20'000);
+    // Clumps, so that there are many levels.
+    const auto clump = static_cast<std::int32_t>(random() % 20);
+    steps.x = clump * 3'517 + static_cast<std::int32_t>(random() % 900);
+    steps.y = clump * 7'919 % 70'000 - 5'000 + static_cast<std::int32_t>(random() % 900);
+    steps.z = clump * 1'013 % 20'000 + static_cast<std::int32_t>(random() % 900);
     steps.gps_time = 100.0 + 1e-3 * static_cast<double>(random() % 1000);
     steps.intensity = static_cast<std::uint16_t>(random());
     steps.classification = static_cast<std::uint8_t>(random() % 7);
@@ -66,7 +68,7 @@ class CopcWriterTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-// LASzip needs the table of chunks to read these, over two hundred of them.
+// LASzip needs the table of chunks to read these, some sixty of them.
 TEST_F(CopcWriterTest, OurReaderFindsTheSamePointsAsInTheLaz) {
   LasOptions options;
   options.copc = true;
@@ -131,7 +133,7 @@ TEST_F(CopcWriterTest, TheHeaderAndTheHierarchySayWhereThingsAre) {
   EXPECT_EQ(points, 40'000U);
   EXPECT_EQ(points, number_at<std::uint64_t>(file, 247));
   std::sort(chunks.begin(), chunks.end());
-  EXPECT_GT(chunks.size(), 100U);
+  EXPECT_GT(chunks.size(), 50U);
   for (const auto& [at, bytes] : chunks) {
     EXPECT_EQ(at, next);
     next = at + bytes;
