@@ -68,7 +68,6 @@ class CopcWriterTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-// LASzip needs the table of chunks to read these, some sixty of them.
 TEST_F(CopcWriterTest, OurReaderFindsTheSamePointsAsInTheLaz) {
   LasOptions options;
   options.copc = true;
@@ -108,7 +107,8 @@ TEST_F(CopcWriterTest, OurReaderFindsTheSamePointsAsInTheLaz) {
 }
 
 TEST_F(CopcWriterTest, TheHeaderAndTheHierarchySayWhereThingsAre) {
-  const std::string file = bytes_of(written("map.copc.laz", 40'000, {}, kSmall));
+  const std::filesystem::path path = written("map.copc.laz", 40'000, {}, kSmall);
+  const std::string file = bytes_of(path);
   EXPECT_EQ(file.substr(377, 4), "copc");
   EXPECT_EQ(number_at<std::uint16_t>(file, 393), 1);
   EXPECT_EQ(number_at<std::uint16_t>(file, 395), 160);
@@ -134,6 +134,7 @@ TEST_F(CopcWriterTest, TheHeaderAndTheHierarchySayWhereThingsAre) {
   EXPECT_EQ(points, number_at<std::uint64_t>(file, 247));
   std::sort(chunks.begin(), chunks.end());
   EXPECT_GT(chunks.size(), 50U);
+  EXPECT_EQ(read(path).points.size(), 40'000U) << "by the table of chunks";
   for (const auto& [at, bytes] : chunks) {
     EXPECT_EQ(at, next);
     next = at + bytes;
