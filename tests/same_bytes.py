@@ -95,7 +95,7 @@ sparse_pair = ("../../a.ply", "../../b.ply")
 
 COMMANDS = {
     "simulate": ("simulate", "lieksa2", "-o", "walk.mcap", "--seed", 5, "--duration-s", 3),
-    "map, dense": ("map", WALK, "-o", "run"),
+    "map, dense": ("map", WALK, "-o", "run", "--copc"),
     "map, sparse scans": ("map", SITE, "-o", "run"),
     "map, two lidars": ("map", "sim:harvester2?seed=5&duration_s=5", "-o", "run", "--lidar-topic", "/lidar,/lidar_2"),
     "map, by stems": ("map", SITE, "-o", "run", "--front-end", "sparse"),
@@ -106,7 +106,7 @@ COMMANDS = {
     "correct stems": ("correct", "../../stems/stems.csv.gz", "-o", "run"),
     "correct a run": ("correct", "../../stems", "-o", "run"),
     "inventory of a run": ("inventory", "../../dense", "-o", "stand"),
-    "inventory of a cloud": ("inventory", "../../dense/map.laz", "-o", "stand"),
+    "inventory of a cloud": ("inventory", "../../dense/map.laz", "-o", "stand", "--copc"),
     "register": ("register", clouds[0], clouds[1], "--json"),
     "register, Go-ICP": ("register", *sparse_pair, "--method", "go-icp", "--json"),
     "register by stems": ("register", *sparse_pair, "--method", "stem-icp", "--json"),

@@ -11,7 +11,7 @@ cases = Cases()
 good, messages, truth = good_recording(cases.folder, seconds=10, more=("stand.size_x_m=40", "stand.size_y_m=40"))
 RUN, STEMS, FIXES = two_runs(cases.folder, good)
 COMMANDS = {
-    "inventory": ["inventory", RUN / "map.laz"],
+    "inventory": ["inventory", RUN / "map.laz", "--copc"],
     "inventory of a run": ["inventory", RUN],
     "georeference": ["georeference", RUN, "--method", "auto", "--gnss", FIXES],
     "merge": ["merge", RUN, truth / "trees.csv"],

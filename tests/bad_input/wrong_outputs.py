@@ -11,7 +11,7 @@ import shutil
 from program import Cases, program, unfinished_run
 
 RESULTS = ["trajectory.tum", "odometry.tum", "keyframes.tum", "states.csv.gz", "stems.csv.gz", "graph.g2o", "gnss.csv",
-           "global.csv.gz", "steps.csv", "loops.csv", "corrections.csv", "map.laz", "trees.csv", "felled.csv", "cuts.csv", "trees.gpkg",
+           "global.csv.gz", "steps.csv", "loops.csv", "corrections.csv", "map.laz", "map.copc.laz", "trees.csv", "felled.csv", "cuts.csv", "trees.gpkg",
            "dtm.tif", "dsm.tif", "chm.tif", "obstacles.laz", "free_height.tif", "map.qgs", "deformation.csv", "trajectory_imu.tum", "trajectory_partial.tum",
            "run.json", "report.html"]
 OWN_RUN = {"status": "complete", "command": "map", "version": "0"}

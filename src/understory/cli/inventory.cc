@@ -18,6 +18,7 @@ struct InventoryOptions {
   InventoryRequest request;
   std::vector<std::string> settings;
   PlotOptions plots;
+  bool copc = false;
   bool print_config = false;
 };
 
@@ -42,9 +43,14 @@ int run(const InventoryOptions& options, CommandContext& context) {
   ConfigTable table;
   describe(table, request.config);
   table.section("tiles", [&] { describe(table, request.tiles); });
+  table.section("map", [&] {
+    table.add("copc", request.copc,
+              "write map.copc.laz as well: the points of map.laz in an octree, for viewers");
+  });
   std::vector<std::string> settings = options.settings;
   for (std::string& setting : plot_settings(options.plots, "stand."))
     settings.push_back(std::move(setting));
+  if (options.copc) settings.emplace_back("map.copc=true");
   request.config_record.origins = read_settings(table, request.config_file, settings);
   if (options.print_config) {
     std::printf("%s", table.to_yaml(true).c_str());
@@ -54,6 +60,10 @@ int run(const InventoryOptions& options, CommandContext& context) {
     throw ConfigError({"inventory needs a cloud (or run folder) and -o DIR; see --help"});
   }
   refuse_recording(request.cloud);
+  if (request.copc && (request.slice || request.config.extent == InventoryExtent::kBasic))
+    throw ConfigError(
+        {"--copc writes the points of map.laz, which a cut (--slice) and extent=basic do not make: "
+         "leave it out, or measure the whole cloud with extent=full"});
   request.config_record.asked_yaml = table.to_yaml(false);
   return report_outcome(run_inventory(request, context.log, context.until_stopped()));
 }
@@ -75,6 +85,9 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
                     "The cloud is one thin cut near breast height: only diameters and places are "
                     "measured, at whatever z it lies");
   add_plot_options(*command, options->plots);
+  command->add_flag("--copc", options->copc,
+                    "Write map.copc.laz as well: the points of map.laz as Cloud Optimized Point "
+                    "Cloud, which QGIS and web viewers show at once");
   command->add_option("--crs", options->request.coordinate_system,
                       "Coordinate system of a cloud that names none, for instance EPSG:3067 (a "
                       "cloud that names its own keeps it)");
@@ -93,7 +106,8 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->footer(
       "Writes trees.csv, stem_curves.csv, trees.gpkg, map.laz, dtm.tif, chm.tif, dsm.tif, "
       "map.qgs,\n"
-      "report.html and run.json; with plots also plots.csv and plot_classes.csv.\n"
+      "report.html and run.json; with plots also plots.csv and plot_classes.csv, with --copc "
+      "map.copc.laz.\n"
       "Examples:\n  understory inventory plot.laz -o plot-inventory\n"
       "  understory inventory plot.laz --plots 512.5,847.0,9 -o plot-inventory\n"
       "  understory inventory cut.laz --slice -o cut-inventory");

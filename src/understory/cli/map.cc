@@ -34,6 +34,7 @@ struct MapOptions {
   std::string front_end = kDenseFrontEnd;
   bool imu_rate = false;
   bool realtime = false;
+  bool copc = false;
   bool overwrite = false;
   bool print_config = false;
   OpenOptions open;
@@ -116,6 +117,13 @@ int run_map(const MapOptions& options, CommandContext& context) {
            "have: leave it out, or map with --front-end dense"});
     settings.emplace_back("imu_rate=true");
   }
+  if (options.copc) {
+    if (options.front_end != kDenseFrontEnd)
+      throw ConfigError(
+          {"--copc writes the cloud of a map, which a run by stems does not make: leave it out, or "
+           "map with --front-end dense"});
+    settings.emplace_back("map.copc=true");
+  }
   const std::vector<std::string> plots = plot_settings(options.plots, "inventory.stand.");
   if (!plots.empty() && options.front_end != kDenseFrontEnd)
     throw ConfigError(
@@ -170,6 +178,9 @@ void add_map_command(CLI::App& app, Command& chosen) {
                    "stem curves, volumes, crowns and the tree of each point as well (full)")
       ->check(CLI::IsMember({"basic", "full"}));
   add_plot_options(*command, options->plots);
+  command->add_flag("--copc", options->copc,
+                    "Write map.copc.laz as well: the points of map.laz as Cloud Optimized Point "
+                    "Cloud, which QGIS and web viewers show at once");
   command->add_flag("--imu-rate", options->imu_rate,
                     "Write trajectory_imu.tum as well: a predicted pose for each sample of the "
                     "IMU");

@@ -68,7 +68,8 @@ void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3
     place.z() = result.ground.terrain.interpolate(place.x(), place.y()) + kBreastHeight;
     const double range = mean_range_to(scanner, place);
     stem.beam = footprint_at(config, range);
-    stem.radius_m -= excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
+    stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
+    stem.radius_m -= stem.beam_excess_m;
     const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam.sd_m > 0.0);
     stem.covariance(2, 2) = 0.25 * sd * sd;
   }

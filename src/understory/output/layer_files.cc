@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "understory/georeference/systems/coordinate_system.h"
+#include "understory/output/copc/copc_writer.h"
 #include "understory/output/qgis_project.h"
 
 namespace understory {
@@ -98,6 +99,14 @@ LasOptions las_options(const LayerFrame& layers) {
   options.scale = layers.resolution();
   options.crs_wkt = layers.wkt();
   return options;
+}
+
+void ask_for_copc(LasOptions& options, Log& log) {
+  options.copc = suits_copc(options);
+  if (options.copc) return;
+  log.warn("copc.degrees",
+           "map.copc.laz is not written: the cubes of its octree need the same unit along all "
+           "axes, and the coordinate system has degrees. Choose one in metres by --crs");
 }
 
 void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,

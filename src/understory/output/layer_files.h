@@ -13,6 +13,7 @@
 #include "understory/output/geo_files.h"
 #include "understory/output/las_writer.h"
 #include "understory/sensor/tree.h"
+#include "understory/util/log.h"
 
 namespace understory {
 
@@ -26,6 +27,10 @@ namespace understory {
 
 // How map.laz is written: coordinate system, offset, steps.
 [[nodiscard]] LasOptions las_options(const LayerFrame& layers);
+
+// Asks for map.copc.laz beside the map.laz of these options. Where an octree does not suit the
+// coordinate system it is left out, with a warning ("copc.degrees").
+void ask_for_copc(LasOptions& options, Log& log);
 
 // Places to look from again, in the frame of the layers.
 [[nodiscard]] std::vector<LookPoint> looks_in(const LayerFrame& layers,

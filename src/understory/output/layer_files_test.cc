@@ -113,6 +113,26 @@ TEST(LayerFiles, ACloudInDegreesKeepsMillimetres) {
   EXPECT_EQ(las_options(LayerFrame()).offset, Vector3d(0.0, 0.0, 0.0));
 }
 
+TEST(LayerFiles, AnOctreeIsLeftOutInDegrees) {
+  Log log;
+  LasOptions metres = las_options(LayerFrame(Pose(), kEvo, "EPSG:3067"));
+  ask_for_copc(metres, log);
+  EXPECT_TRUE(metres.copc);
+  EXPECT_TRUE(log.warnings().empty());
+  LasOptions degrees = las_options(LayerFrame(Pose(), kEvo, "EPSG:4326"));
+  ask_for_copc(degrees, log);
+  EXPECT_FALSE(degrees.copc);
+  ASSERT_EQ(log.warnings().size(), 1U);
+  EXPECT_EQ(log.warnings()[0].key, "copc.degrees");
+}
+
+TEST(QgisProject, ShowsTheOctreeInPlaceOfTheCloud) {
+  const std::string text = qgis_project_xml({}, {}, {"map.laz", "map.copc.laz"});
+  EXPECT_NE(text.find("<datasource>./map.copc.laz</datasource>"), std::string::npos);
+  EXPECT_NE(text.find("<provider encoding=\"UTF-8\">copc</provider>"), std::string::npos);
+  EXPECT_EQ(text.find("./map.laz"), std::string::npos);
+}
+
 TEST(QgisProject, OpensWhatIsThereByRelativePaths) {
   const std::string text =
       qgis_project_xml({"plot <7>", "PROJCS[\"x\"]", "EPSG:3067", {0, 0, 5, 5}},

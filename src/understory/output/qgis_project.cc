@@ -113,8 +113,13 @@ std::vector<Layer> layers_of(const std::vector<std::string>& vectors,
   if (there("obstacles.laz"))
     layers.push_back({"obstacles", "obstacles along the path", "./obstacles.laz", "pdal",
                       "type=\"point-cloud\"", "", false});
-  if (there("map.laz"))
+  // QGIS builds an index beside map.laz before it shows it.
+  if (there("map.copc.laz")) {
+    layers.push_back(
+        {"cloud", "points", "./map.copc.laz", "copc", "type=\"point-cloud\"", "", false});
+  } else if (there("map.laz")) {
     layers.push_back({"cloud", "points", "./map.laz", "pdal", "type=\"point-cloud\"", "", false});
+  }
   return layers;
 }
 
@@ -183,7 +188,7 @@ std::string qgis_project_xml(const QgisProject& project, const std::vector<std::
 void write_qgis_project(const std::filesystem::path& folder, const QgisProject& project) {
   std::vector<std::string> files;
   for (const char* name : {"trees.gpkg", "chm.tif", "dsm.tif", "dtm.tif", "free_height.tif",
-                           "obstacles.laz", "map.laz"}) {
+                           "obstacles.laz", "map.laz", "map.copc.laz"}) {
     if (std::filesystem::exists(folder / name)) files.emplace_back(name);
   }
   AtomicFile file(folder / "map.qgs");

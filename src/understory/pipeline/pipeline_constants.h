@@ -127,6 +127,8 @@ inline constexpr double kBaseBytes = 300e6;
 inline constexpr double kBytesPerPointWhole = 100.0;
 // Bytes on disk for each point: itself, what is thinned, map.laz [measured on simulated clouds]
 inline constexpr double kDiskBytesPerPoint = 45.0;
+// The same of map.copc.laz and of the points that wait for it [32 and measured]
+inline constexpr double kCopcDiskBytesPerPoint = 40.0;
 // Points whose shape is looked at [as kMostPoints of cloud_shape]
 inline constexpr std::uint64_t kSample = 400'000;
 }  // namespace cloud_tiles

@@ -25,15 +25,29 @@ struct FittedSection {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   double radius_m = 0.0;
   double sd_m = 0.0;
-  double arc_deg = 360.0;
+  double seen_deg = 360.0;  // how far around it was seen
 };
 
 // What speaks for a fitted section: points of the window about its surface.
 struct SectionEvidence {
   int on = 0;
   int inside = 0;
-  double arc_deg = 0.0;
+  double arc_deg = 0.0;   // that holds points
+  double seen_deg = 0.0;  // that was seen: all but the widest gap
 };
+
+// All of the circumference but the widest gap between the directions (rad), in degrees. A scanner
+// sees one side of a stem, and of n points over an arc the outermost leave 2 / (n + 1) of it out.
+double seen_arc_deg(std::vector<double>& turns) {
+  if (turns.size() < 2) return 0.0;
+  std::sort(turns.begin(), turns.end());
+  double gap = turns.front() + 2.0 * M_PI - turns.back();
+  for (std::size_t i = 1; i < turns.size(); ++i)
+    gap = std::max(gap, turns[i] - turns[i - 1]);
+  const auto count = static_cast<double>(turns.size());
+  const double seen = (2.0 * M_PI - gap) * (count + 1.0) / (count - 1.0);
+  return std::min(360.0, seen * 180.0 / M_PI);
+}
 
 SectionEvidence section_evidence(const std::vector<SlicePoint>& points, const StemFit& fit,
                                  double scatter_m) {
@@ -41,6 +55,7 @@ SectionEvidence section_evidence(const std::vector<SlicePoint>& points, const St
   const double within = -std::max(kInsideBands * band, kInsideShare * fit.radius_m);
   SectionEvidence evidence;
   ArcBins arc;
+  std::vector<double> turns;
   const StemAxis axis(fit);
   for (const SlicePoint& point : points) {
     const AxisPlace place = axis.place(point);
@@ -49,7 +64,9 @@ SectionEvidence section_evidence(const std::vector<SlicePoint>& points, const St
     if (std::abs(e) > band) continue;
     ++evidence.on;
     arc.add(place.outward.x(), place.outward.y());
+    turns.push_back(std::atan2(place.outward.y(), place.outward.x()));
   }
+  evidence.seen_deg = seen_arc_deg(turns);
   evidence.arc_deg = arc.covered_deg();
   return evidence;
 }
@@ -144,7 +161,10 @@ class Tracker {
     if (seen.on < kFewestPoints || seen.arc_deg < kLeastArcDeg ||
         seen.inside > kMostInside * seen.on)
       return std::nullopt;
-    return FittedSection{guess.height_m, found.centre, found.radius_m, sd, seen.arc_deg};
+    // The fewer points, the more the section is taken to be seen like the whole stem.
+    const double own = seen.on / (seen.on + kArcPoints);
+    const double seen_deg = stem_.arc_deg + own * (seen.seen_deg - stem_.arc_deg);
+    return FittedSection{guess.height_m, found.centre, found.radius_m, sd, seen_deg};
   }
 
   static constexpr NoisyCylinderConfig kForm{};
@@ -281,18 +301,21 @@ void add_volume(StemCurve& curve) {
   curve.volume_sd_m3 = sd;
 }
 
-// All sections upwards, without the part of their radii that wide beams add.
+// All sections upwards, without the part of their radii that wide beams add. They are followed as
+// the points show them: from the radius at breast height with that part.
 std::vector<FittedSection> sections_of(const std::vector<SlicePoint>& points, const StemFit& stem,
                                        double top_m) {
   std::vector<FittedSection> rings;
-  Tracker tracker(points, stem);
+  StemFit shown = stem;
+  shown.radius_m += stem.beam_excess_m;
+  Tracker tracker(points, shown);
   tracker.follow(-kStep, kLowest, rings);
   std::reverse(rings.begin(), rings.end());
   std::vector<FittedSection> above;
   tracker.follow(kStep, top_m - kStep, above);
   for (std::vector<FittedSection>* part : {&rings, &above}) {
     for (FittedSection& ring : *part)
-      ring.radius_m -= excess_radius_m(stem.beam, ring.radius_m, ring.arc_deg);
+      ring.radius_m -= excess_radius_m(stem.beam, ring.radius_m, ring.seen_deg);
   }
   rings.push_back({kBreastHeight, stem.centre, stem.radius_m,
                    std::sqrt(std::max(0.0, stem.covariance(2, 2))) + kMapError});

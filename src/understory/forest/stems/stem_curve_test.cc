@@ -95,6 +95,42 @@ TEST(StemCurve, TheVolumeIsThatOfTheStem) {
   EXPECT_LT(std::abs(curve.volume_m3 - volume), 2.0 * curve.volume_sd_m3);
 }
 
+// A wide beam shows a stem from one side, and thicker by the same at all heights. Before, sections
+// were followed from the corrected radius, so that thicker ones did not count, and the few points
+// of a section made it seem seen from one side alone.
+TEST(StemCurve, WhatWideBeamsAddIsTakenAwayAlongTheStem) {
+  Random random(7);
+  TestStem stem;
+  stem.dbh_m = 0.14;
+  StemFit fit = stem.fit();
+  fit.arc_deg = 180.0;
+  fit.beam = footprint_at({LidarSensor::kVlp16}, 13.0);
+  const auto added = [&](double radius) {
+    double sum = 0.0;
+    for (int i = 0; i < 20; ++i)
+      sum = excess_radius_m(fit.beam, radius + sum, fit.arc_deg);
+    return sum;
+  };
+  fit.beam_excess_m = added(fit.radius_m);
+  EXPECT_GT(fit.beam_excess_m, 0.01);
+  std::vector<SlicePoint> points;
+  for (int i = 0; i < 480; ++i) {
+    const double h = random.uniform(0.05, 8.0);
+    const double turn = random.uniform(-0.5 * M_PI, 0.5 * M_PI);
+    const double r =
+        0.5 * stem.diameter(h) + added(0.5 * stem.diameter(h)) + random.normal(0.0, stem.noise_m);
+    const Eigen::Vector2d c = stem.centre(h);
+    points.push_back({static_cast<float>(c.x() + r * std::cos(turn)),
+                      static_cast<float>(c.y() + r * std::sin(turn)), static_cast<float>(h), 1});
+  }
+  const StemCurve curve = measure_stem_curve(points, fit, kTop, {});
+  EXPECT_GT(curve.measured_to_m, 7.0);
+  double mean = 0.0;
+  for (int decimetre = 5; decimetre < 75; ++decimetre)
+    mean += error_at(curve, stem, 0.1 * decimetre) / 70.0;
+  EXPECT_LT(std::abs(mean), 0.004);
+}
+
 // Whorls make no thicker stem: their points lie around it in some heights only.
 TEST(StemCurve, BranchesDoNotMakeItThicker) {
   Random random(4);

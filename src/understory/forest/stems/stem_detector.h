@@ -61,7 +61,8 @@ struct StemFit {
   int returns = 0;        // of the cloud
   double lowest_m = 0.0;  // first and last height with points on the surface
   double highest_m = 0.0;
-  BeamFootprint beam;  // of the beams that met it, where they are known
+  BeamFootprint beam;          // of the beams that met it, where they are known
+  double beam_excess_m = 0.0;  // what these added to the radius, and was taken away from it
   std::vector<StemSlice> slices;
 };
 

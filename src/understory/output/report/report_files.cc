@@ -16,7 +16,7 @@ struct ResultFile {
 };
 
 // In the order in which a user wants them; docs/reference/outputs.md has their columns.
-constexpr std::array<ResultFile, 28> kResultFiles = {
+constexpr std::array<ResultFile, 29> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
      {"stem_curves.csv", "diameters along each stem", "a spreadsheet"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
@@ -25,6 +25,7 @@ constexpr std::array<ResultFile, 28> kResultFiles = {
      {"felled.csv", "trees that were felled meanwhile", "a spreadsheet"},
      {"map.laz", "all points; ground and vegetation have classes of their own",
       "CloudCompare, QGIS"},
+     {"map.copc.laz", "the same points in an octree: shown at once", "QGIS: drag it in"},
      {"dtm.tif", "height of the ground", "QGIS"},
      {"chm.tif", "height of the canopy above the ground", "QGIS"},
      {"dsm.tif", "height of the surface, treetops included", "QGIS"},

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "understory/georeference/terrain_file.h"
+#include "understory/output/copc/copc_writer.h"
 #include "understory/output/layer_files.h"
 #include "understory/output/obstacle_files.h"
 #include "understory/recording/bags/byte_source.h"
@@ -57,6 +58,7 @@ void move_cloud(const fs::path& from, const fs::path& to, const Move& move, cons
   const auto file = open_file(from.string());
   const LasHeader header = read_las_header(*file);
   LasOptions options = las_options(move.to);
+  if (fs::exists(copc_path(from))) ask_for_copc(options, log);
   options.gps_week_time = header.gps_week_time;
   LasWriter writer(to, options);
   read_las_points(*file, header, log, [&](const LasPoint& point) {
@@ -80,7 +82,7 @@ void move_cloud(const fs::path& from, const fs::path& to, const Move& move, cons
             : point.position.z() - ground.interpolate(point.position.x(), point.position.y());
     drawing.picture->add(drawn.x(), drawn.y(), drawn.z(), height);
   });
-  writer.commit();
+  writer.commit(move.progress);
 }
 
 }  // namespace

@@ -197,11 +197,16 @@ Stock stock_of(const InventoryRequest& request) {
 
 // How the cloud is written again: in its own system, or that of the layers of its run.
 LasOptions las_options_of(const Stock& stock) {
-  if (stock.of_run) return las_options(stock.frames.layers);
   LasOptions options;
-  options.offset = stock.inventory.origin.array().round();  // near most of the points
-  if (const auto system = CoordinateSystem::find(stock.stand.cloud.coordinate_system))
-    options.crs_wkt = system->wkt();
+  if (stock.of_run) {
+    options = las_options(stock.frames.layers);
+  } else {
+    options.offset = stock.inventory.origin.array().round();  // near most of the points
+    if (const auto system = CoordinateSystem::find(stock.stand.cloud.coordinate_system))
+      options.crs_wkt = system->wkt();
+  }
+  options.trees = true;
+  options.gps_week_time = stock.stand.cloud.gps_week_time;
   return options;
 }
 
@@ -222,9 +227,9 @@ std::uint16_t las_intensity(float intensity) {
 // map.laz: the cloud with classes, the tree of each point and heights above the ground.
 class LabelledCloud {
  public:
-  LabelledCloud(const Stock& stock, const fs::path& file)
+  LabelledCloud(const Stock& stock, LasOptions options, const fs::path& file)
       : stock_(stock),
-        options_(options_of(stock)),
+        options_(std::move(options)),
         scale_(intensity_scale(stock.stand)),
         writer_(file, options_) {}
 
@@ -264,20 +269,13 @@ class LabelledCloud {
   }
 
   // Returns how many points lie too far from the others.
-  std::uint64_t commit() {
-    writer_.commit();
+  std::uint64_t commit(const ProgressSink& progress) {
+    writer_.commit(progress);
     return too_far_;
   }
 
  private:
   static constexpr std::size_t kAtOnce = 65'536;
-
-  static LasOptions options_of(const Stock& stock) {
-    LasOptions options = las_options_of(stock);
-    options.trees = true;
-    options.gps_week_time = stock.stand.cloud.gps_week_time;
-    return options;
-  }
 
   void write(const std::vector<TilePoint>& points, const Eigen::Vector3d& origin, bool times,
              const TreeOwners& owners) {
@@ -320,15 +318,15 @@ class LabelledCloud {
 };
 
 // Returns how many points lie too far from the others for it.
-std::uint64_t write_labelled_cloud(const Stock& stock, const fs::path& file,
-                                   const ProgressSink& progress) {
-  LabelledCloud cloud(stock, file);
+std::uint64_t write_labelled_cloud(const Stock& stock, const LasOptions& options,
+                                   const fs::path& file, const ProgressSink& progress) {
+  LabelledCloud cloud(stock, options, file);
   if (stock.stand.streamed) {
     cloud.write_tiles(progress);
   } else {
     cloud.write_whole(progress);
   }
-  return cloud.commit();
+  return cloud.commit(progress);
 }
 
 // Where the scanner was: by the file that the user names, else by the run.
@@ -379,7 +377,7 @@ PointBlocks points_of(const StandCloud& stand) {
 
 void read_cloud_of(const InventoryRequest& request, const fs::path& work, Log& log,
                    const ProgressSink& progress, Stock& stock) {
-  const CloudTiling tiling{request.tiles, work, available_threads()};
+  const CloudTiling tiling{request.tiles, work, available_threads(), request.copc};
   // A cut is small, and looked at as a whole.
   const CloudTiling* tiles = request.slice ? nullptr : &tiling;
   stock.stand = stock.of_run ? read_run_map(stock.path, stock.frames.layers, request.frame, log,
@@ -420,7 +418,10 @@ void take_stock(const InventoryRequest& request, const RunFolder& place, const f
   });
   write_tables(request, results, stock);
   if (stock.inventory.owners || stock.inventory.owner_tiles) {
-    const std::uint64_t too_far = write_labelled_cloud(stock, results / "map.laz", progress);
+    LasOptions options = las_options_of(stock);
+    if (request.copc) ask_for_copc(options, log);
+    const std::uint64_t too_far =
+        write_labelled_cloud(stock, options, results / "map.laz", progress);
     if (too_far > 0)
       stock.inventory.remarks.push_back(fmt::format(
           "{} points lie over 2,147 km from the others and are not in map.laz.", too_far));

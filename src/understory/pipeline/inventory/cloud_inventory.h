@@ -25,6 +25,7 @@ struct InventoryRequest {
   std::string coordinate_system;  // of a cloud that names none: "EPSG:3067" or WKT; empty: unknown
   InventoryConfig config;
   CloudTilesConfig tiles;
+  bool copc = false;           // map.copc.laz beside map.laz; of a full inventory
   ConfigRecord config_record;  // for run.json
   std::string config_file;     // that the user named; not to be overwritten
 };

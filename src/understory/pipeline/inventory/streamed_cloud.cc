@@ -49,7 +49,8 @@ bool in_memory(const Stated& stated, const CloudTilesConfig& config) {
 void check_space(const CloudTiling& tiling, const Stated& stated) {
   std::error_code unknown;
   const std::filesystem::space_info space = std::filesystem::space(tiling.folder, unknown);
-  const double needed = kDiskBytesPerPoint * static_cast<double>(stated.points);
+  const double bytes = kDiskBytesPerPoint + (tiling.copc ? kCopcDiskBytesPerPoint : 0.0);
+  const double needed = bytes * static_cast<double>(stated.points);
   if (unknown || static_cast<double>(space.available) >= needed) return;
   throw OutputError(tiling.folder.string(),
                     fmt::format("about {:.1f} GB are needed for the tiles of a cloud of {} million "

@@ -27,6 +27,7 @@ struct CloudTiling {
   CloudTilesConfig config;
   std::filesystem::path folder;  // for temporary files
   int threads = 1;
+  bool copc = false;  // its points are written as map.copc.laz, too
 };
 
 // A cloud that lies on disk in tiles.

@@ -24,8 +24,8 @@ std::map<std::string, std::string> frames_of(const std::filesystem::path& folder
   for (const std::string& name : world_files()) {
     if (std::filesystem::exists(folder / name)) frames[name] = frame_name(world);
   }
-  for (const char* name : {"map.laz", "dtm.tif", "dsm.tif", "chm.tif", "obstacles.laz",
-                           "free_height.tif", "trees.gpkg", "map.qgs"}) {
+  for (const char* name : {"map.laz", "map.copc.laz", "dtm.tif", "dsm.tif", "chm.tif",
+                           "obstacles.laz", "free_height.tif", "trees.gpkg", "map.qgs"}) {
     if (std::filesystem::exists(folder / name)) frames[name] = layers;
   }
   // Latitude, longitude and height on WGS 84, whether or not the layers are on the globe.

@@ -23,6 +23,7 @@ const std::vector<std::string>& result_names() {
                                                  "loops.csv",
                                                  "corrections.csv",
                                                  "map.laz",
+                                                 "map.copc.laz",
                                                  "trees.csv",
                                                  "stem_curves.csv",
                                                  "felled.csv",

@@ -24,6 +24,8 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   KeyframeMap::describe(table, config.keyframe_map);
   table.section("map", [&] {
     table.add("enabled", config.map_enabled, "write map.laz and what is made from it");
+    table.add("copc", config.copc,
+              "write map.copc.laz as well: the points of map.laz in an octree, for viewers");
     table.add("range_max_m", config.map_range_max_m, {1.0, 1000.0}, "m",
               "farther returns do not enter the finished map");
     table.add("keyframe_thin_m", config.keyframe_thin_m, {0.0, 1.0}, "m",
@@ -104,6 +106,10 @@ ReadConfig<DenseMappingConfig> read_dense_mapping_config(const std::string& prof
       throw ConfigError(
           {"imu_rate: predictions for each sample of the IMU need "
            "motion.imu_enabled=true"});
+  });
+  problems.gather([&] {
+    if (config.copc && !config.map_enabled)
+      throw ConfigError({"map.copc: map.copc.laz needs the map, and map.enabled is false"});
   });
   problems.gather([&] {
     const auto matcher = make_matcher(config.keyframe_map.local_map.matcher);

@@ -34,6 +34,7 @@ struct DenseMappingConfig {
   double keyframe_thin_m = 0.02;  // thins a scan's cloud before it is stored for the map
   double map_range_max_m = 60.0;  // farther returns do not enter the finished map
   bool map_enabled = true;        // write map.laz and what is made from it
+  bool copc = false;              // the same points as map.copc.laz beside it
   InventoryConfig inventory = basic_inventory();
   ObstacleConfig obstacles;
   GeoreferenceConfig georeference;

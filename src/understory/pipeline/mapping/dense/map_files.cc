@@ -19,14 +19,16 @@ std::string title_of(const ReadRecording& recording) {
   return std::filesystem::path(recording.request.recording).filename().string();
 }
 
+struct CloudFile {
+  LasOptions options;
+  std::filesystem::path path;
+};
+
 // `obstacles`: written beside the map where they are wanted; may be null.
-std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
-                          const InventoryResult& inventory, const ResultFrames& frames,
-                          MapPicture& picture, ObstacleFiles* obstacles,
+std::uint64_t write_cloud(const CloudFile& to, MapTiles& tiles, const InventoryResult& inventory,
+                          const ResultFrames& frames, MapPicture& picture, ObstacleFiles* obstacles,
                           const ProgressSink& progress) {
-  LasOptions options = las_options(frames.layers);
-  options.trees = inventory.owners.has_value();
-  LasWriter writer(file, options);
+  LasWriter writer(to.path, to.options);
   double done = 0.0;
   tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
     for (const MapPoint& p : points) {
@@ -51,7 +53,7 @@ std::uint64_t write_cloud(const std::filesystem::path& file, MapTiles& tiles,
     done += static_cast<double>(points.size());
     progress({"writing map.laz", done / 1e3, 0.0, "thousand points", ""});
   });
-  writer.commit();
+  writer.commit(progress);
   return writer.points();
 }
 
@@ -67,8 +69,11 @@ std::uint64_t write_map(const ReadRecording& recording, const DenseMappingConfig
     obstacles.emplace(folder, config.obstacles, trajectory, frames.layers,
                       inventory.owners.has_value());
   }
+  LasOptions options = las_options(frames.layers);
+  options.trees = inventory.owners.has_value();
+  if (config.copc) ask_for_copc(options, recording.log);
   const std::uint64_t points =
-      write_cloud(folder / "map.laz", *made.tiles, inventory, frames, picture,
+      write_cloud({options, folder / "map.laz"}, *made.tiles, inventory, frames, picture,
                   obstacles ? &*obstacles : nullptr, recording.progress);
   if (obstacles) obstacles->commit(inventory.ground.terrain, frames.layers);
   write_tree_tables(folder, inventory);
