@@ -47,6 +47,7 @@ class NdtTarget : public MatchTarget {
                         config_);
   }
   [[nodiscard]] double reach_m() const override { return maps_.back()->cell_size(); }
+  [[nodiscard]] std::size_t size() const override { return maps_.back()->size(); }
   [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
                                                       MatchStart start) const override {
     const NdtMapPtr& map = start == MatchStart::kFar ? maps_.front() : maps_.back();
