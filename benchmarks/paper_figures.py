@@ -43,6 +43,13 @@ def positive(text):
     return value
 
 
+def setting(text):
+    key, equals, value = text.partition("=")
+    if not key or not equals or not value:
+        raise argparse.ArgumentTypeError("expected KEY=VALUE")
+    return key, value
+
+
 def arguments(words):
     parser = argparse.ArgumentParser(prog="./run accuracy --figures", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -52,6 +59,8 @@ def arguments(words):
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--short", action="store_true", help=f"the first {SHORT_S:g} s of each recording")
     length.add_argument("--seconds", type=positive, metavar="S", help="the first S seconds of each recording")
+    parser.add_argument("--set", action="append", default=[], type=setting, metavar="KEY=VALUE",
+                        help="a setting of all sites, e.g. lidar.columns=512")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--list", action="store_true", help="which figures there are")
     parser.add_argument("--write", action="store_true", help=f"put page and pictures into {PAGE.parent}")
@@ -70,7 +79,7 @@ def draw(figure, plan, runs, folder):
     """Draws a figure into the folder; returns why not, if it could not."""
     jobs = figure.jobs(plan)
     made = {name: runs.get(job) for name, job in jobs.items()}
-    if all(run.failed for run in made.values()):
+    if made and all(run.failed for run in made.values()):
         return "none of its runs gave a result: " + next(iter(made.values())).failed
     try:
         drawn = figure.draw(plan, f"{figure.key}: {figure.title}", made)
@@ -79,7 +88,8 @@ def draw(figure, plan, runs, folder):
     if drawn.sheet.is_empty():
         return "nothing to draw"
     picture, table = drawn.sheet.save(folder, figure.key)
-    save_entry(folder, Entry(figure.key, figure.title, says_of(jobs), drawn.paper, drawn.ours, drawn.number,
+    recordings = says_of(jobs) or drawn.sheet.title.splitlines()[-1]
+    save_entry(folder, Entry(figure.key, figure.title, recordings, drawn.paper, drawn.ours, drawn.numbers,
                              picture.name, table.name))
     return ""
 
@@ -94,10 +104,11 @@ def write_docs(folder, entries):
 
 def main(words=None):
     options = arguments(words)
-    plan = Plan(options.seed, SHORT_S if options.short else options.seconds)
+    plan = Plan(options.seed, SHORT_S if options.short else options.seconds, options.output,
+                tuple(options.set))
     if options.list:
         for figure in options.only:
-            print(f"{figure.key:8} {figure.title}: {says_of(figure.jobs(plan))}")
+            print(f"{figure.key:8} {figure.title}: {says_of(figure.jobs(plan)) or 'a run of its own'}")
         return 0
     try:
         options.output.mkdir(parents=True, exist_ok=True)

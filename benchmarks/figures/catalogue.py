@@ -1,6 +1,7 @@
 """Which figures there are. A figure names the runs that it needs and draws itself from them."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Callable
 
 from figures.runs import Recording
@@ -12,11 +13,12 @@ class Plan:
 
     seed: int
     seconds: float | None = None
+    folder: Path = Path("figures")
+    keys: tuple = ()  # ((key, value), ...) of every site, e.g. a lidar with fewer columns
 
-    def recording(self, site, keys=(), short="", most=None):
-        """`most`: what the figure needs of a whole recording, seconds."""
-        limits = [limit for limit in (self.seconds, most) if limit is not None]
-        return Recording(site, self.seed, min(limits) if limits else None, tuple(keys), short)
+    def recording(self, site, keys=(), short=""):
+        """`short`: a word for `keys`, which are this figure's own."""
+        return Recording(site, self.seed, self.seconds, (*keys, *self.keys), short)
 
 
 @dataclass(frozen=True)

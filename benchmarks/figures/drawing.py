@@ -22,12 +22,12 @@ plt.rcParams.update({"font.size": 9, "axes.titlesize": 9, "axes.grid": True, "gr
 
 @dataclass
 class Drawn:
-    """A figure with its words: what the paper's shows, what ours shows, the number behind it."""
+    """A figure with its words: what the paper's shows, what ours shows, and the numbers behind it."""
 
     sheet: "Sheet"
     paper: str
     ours: str
-    number: str
+    numbers: list  # (quantity, ours, the paper's or "")
 
 
 @dataclass

@@ -11,8 +11,13 @@ from figures.runs import Job, settings
 REALTIME = settings("loop_closure.enabled=false")
 NO_GNSS = (("gnss.enabled", "false"),)
 PAPER_APE_M = {"lohja1": 0.2471, "lohja2": 0.3123}
+PAPER_RPE_M = {"lohja1": 0.1521, "lohja2": 0.2646}
 PAPER_VELOCITY = {"lohja1": (0.0945, 0.0794, 0.0706), "lohja2": (0.1310, 0.1180, 0.0556)}
 NUMBER = {"lohja1": 1, "lohja2": 2}
+
+
+def centimetres(metres):
+    return "not known" if metres is None else f"{100 * metres:.2f} cm"
 
 
 def flight(site):
@@ -45,8 +50,9 @@ def draw_map(plan, title, runs):
                  "A map of the young stand along trajectory 1, put together of the local maps of the real-time run.",
                  "The map of the same flight's run without loops and without GNSS: small pines, taller trees at the "
                  "edge, and the path between.",
-                 f"{run.told['counts'].get('map_points', len(points)):,} points over {area:,} m²; "
-                 f"path of {run.told['quality']['length_m']:.0f} m.")
+                 [("points of the map", f"{run.told['counts'].get('map_points', len(points)):,}", ""),
+                  ("area with points", f"{area:,} m²", ""),
+                  ("path", f"{run.told['quality']['length_m']:.0f} m", "")])
 
 
 def draw_path(plan, title, runs):
@@ -73,11 +79,12 @@ def draw_path(plan, title, runs):
     _, distances = off_by(path, truth)
     return Drawn(sheet,
                  f"The estimated trajectory {NUMBER[site]} by lidar and IMU beside a reference by low-cost RTK.",
-                 "The estimate as it was made (no loops, no GNSS) beside the simulator's truth, on which it is laid by "
-                 "one rigid motion, as evo does. The right side shows what the eye cannot see on the left.",
-                 f"APE {100 * rms(distances):.1f} cm and RPE over {rpe['delta_m']:g} m "
-                 f"{100 * rpe['translation_rmse_m']:.1f} cm, over {truth.length_m():.0f} m of flight "
-                 f"(paper: APE {100 * PAPER_APE_M[site]:.0f} cm).")
+                 "The estimate as it was made (no loops, no GNSS) beside the simulator's truth. One rigid motion lays it "
+                 "on the truth, as evo does. The right side shows what the eye cannot see on the left.",
+                 [("APE, RMS", f"{100 * rms(distances):.2f} cm", f"{100 * PAPER_APE_M[site]:.0f} cm"),
+                  (f"RPE over {rpe['delta_m']:g} m, RMS", centimetres(rpe["translation_rmse_m"]),
+                   f"{100 * PAPER_RPE_M[site]:.0f} cm"),
+                  ("flight", f"{truth.length_m():.0f} m", "")])
 
 
 def draw_velocity(plan, title, runs):
@@ -98,12 +105,11 @@ def draw_velocity(plan, title, runs):
         sheet.name(axes, f"{axis}: RMS error {100 * errors[k]:.2f} cm/s", "time (s)" if k == 2 else "",
                    f"v{axis} (m/s)")
     sheet.legend(sheet.axes[0, 0], loc="upper right")
-    paper = ", ".join(f"{100 * value:.1f}" for value in PAPER_VELOCITY[site])
     return Drawn(sheet,
                  f"The estimated velocity in x, y and z along trajectory {NUMBER[site]}, beside that of an RTK receiver.",
                  "The velocity of each scan's state, turned into the axes of the truth, beside the true velocity.",
-                 "RMS error in x, y, z: " + ", ".join(f"{100 * value:.2f}" for value in errors)
-                 + f" cm/s (paper: {paper} cm/s).")
+                 [(f"RMS error in {axis}", f"{100 * ours:.2f} cm/s", f"{100 * paper:.1f} cm/s")
+                  for axis, ours, paper in zip("xyz", errors, PAPER_VELOCITY[site])])
 
 
 FIGURES = [

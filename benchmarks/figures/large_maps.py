@@ -71,7 +71,6 @@ def draw_maps(plan, title, runs):
     sheet = Sheet(f"{title}\nlake, forest, skidoo, seed {plan.seed}, {part}", 3, 3, (11.0, 11.0))
     numbers, words = [], ""
     for row, site in zip(sheet.axes, SITES):
-        of_site = []
         for axes, name in zip(row, CONFIGURATIONS):
             run = runs[f"{site} {name}"]
             if run.failed or not (run.folder / "map.laz").exists():
@@ -81,19 +80,20 @@ def draw_maps(plan, title, runs):
             draw_one_map(sheet, axes, run, f"{site}, {name}")
             ape = run.errors("yaw")["ape_rmse_m"]
             entropy = entropy_of(run)
-            of_site.append(f"{name} {100 * ape:.0f} cm" + (f", {entropy:.2f} nats" if entropy is not None else "")
-                           + ("" if run.told["status"] == "complete" else f" ({run.told['status']})"))
+            status = "" if run.told["status"] == "complete" else f" ({run.told['status']})"
+            numbers.append((f"{site}, {name}: path off the truth, and mean map entropy",
+                            f"{100 * ape:.1f} cm, " + ("not known" if entropy is None else f"{entropy:.3f} nats") + status,
+                            ""))
             used = run.told["counts"].get("scans_by_satellites", 0)
             if name != "baseline" and not used:
                 words += f" {site} {name}: no scan was placed by satellites, so it equals the baseline."
-        numbers.append(f"{site}: " + "; ".join(of_site))
     return Drawn(sheet,
-                 "Maps of lake, forest and skidoo from above, made by GNSS and IMU alone (prior), by ICP with penalties "
-                 "and by ICP alone (baseline). Insets show how crisp they are. The prior blurs, the baseline bends.",
+                 "Maps of lake, forest and skidoo from above: by GNSS and IMU alone (prior), by ICP with penalties, and "
+                 "by ICP alone (baseline). Insets show how crisp they are. The prior blurs, the baseline bends.",
                  "The same three of our program, without loop closure, with the receivers of the sites. The insets show "
-                 f"a slab 3 m thick and {INSET_M:g} m wide from the side, near the start.{words}",
-                 "RMS distance of the path from the truth (heading and place aligned) and mean map entropy, which is "
-                 "lower for a crisper map. " + ". ".join(numbers) + ".")
+                 f"a slab 3 m thick and {INSET_M:g} m wide from the side, near the start. Paths are laid on the truth by "
+                 f"heading and place (RMS). A crisper map has a lower entropy.{words}",
+                 numbers)
 
 
 def radius_jobs(plan):
@@ -117,8 +117,8 @@ def draw_radius(plan, title, runs):
         # The first tenth stands still or has hardly a map, so the second is what growth is told from.
         early, late = (float(np.mean(blocks["cpu_ms"][part]))
                        for part in (slice(tenth, 2 * tenth), slice(-tenth, None)))
-        numbers.append(f"{name} {blocks['map_size'][-1] / 1e6:.2f} million points at the end, CPU a scan "
-                       f"{early:.0f} ms in the second tenth and {late:.0f} ms in the last")
+        numbers += [(f"{name}: points at the end", f"{blocks['map_size'][-1] / 1e6:.3f} million", ""),
+                    (f"{name}: CPU a scan, second tenth and last tenth", f"{early:.0f} ms, {late:.0f} ms", "")]
     sheet.name(sizes, "points that scans are matched to", "time (s)", "points (million)")
     sheet.name(times, "time a scan", "time (s)", "CPU time a scan (ms)")
     for axes in (sizes, times):
@@ -129,7 +129,7 @@ def draw_radius(plan, title, runs):
                  "of 100 m. Without it both grow over the run.",
                  "ICP to points that enter only if farther than 5 cm from all others, with the local map cut at 100 m, "
                  f"and at 1,000 m, which is all of this loop. No loops are closed.{words}",
-                 "; ".join(numbers) + ".")
+                 numbers)
 
 
 FIGURES = [

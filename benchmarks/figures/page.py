@@ -29,7 +29,7 @@ class Entry:
     recordings: str
     paper: str
     ours: str
-    number: str
+    numbers: list
     picture: str
     table: str
 
@@ -52,12 +52,14 @@ def write_html(folder, entries):
     parts.append("</ul><p>" + " ".join(f"<a href=\"#{e.key}\">{e.key}</a>" for e in entries) + "</p>")
     for e in entries:
         picture = base64.b64encode((folder / e.picture).read_bytes()).decode()
-        words = {"The paper": e.paper, "Ours": e.ours, "Number": e.number, "Recordings": e.recordings,
-                 "Values": e.table}
+        words = {"The paper": e.paper, "Ours": e.ours, "Recordings": e.recordings, "Values": e.table}
         rows = "".join(f"<tr><th>{name}</th><td>{html.escape(text)}</td></tr>" for name, text in words.items())
+        numbers = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
+                          for row in e.numbers)
         parts.append(f"<h2 id=\"{e.key}\">{e.key}: {html.escape(e.title)}</h2>"
                      f"<img alt=\"{html.escape(e.title)}\" src=\"data:image/png;base64,{picture}\">"
-                     f"<table>{rows}</table>")
+                     f"<table>{rows}</table><table><tr><th>Number</th><th>ours</th><th>the paper's</th></tr>"
+                     f"{numbers}</table>")
     (folder / "index.html").write_text("\n".join(parts) + "</body></html>\n")
 
 
@@ -71,6 +73,7 @@ def markdown(entries, pictures):
              "are there are not made again.", "", f"{version()}. P1 to P4 are the papers of [this list](papers.md).", ""]
     for e in entries:
         lines += [f"## {e.key}: {e.title}", f"![{e.key}: {e.title}]({pictures}/{e.picture})", "",
-                  f"- **The paper**: {e.paper}", f"- **Ours**: {e.ours}", f"- **Number**: {e.number}",
-                  f"- **Recordings**: {e.recordings}", ""]
+                  f"- **The paper**: {e.paper}", f"- **Ours**: {e.ours}", f"- **Recordings**: {e.recordings}", "",
+                  "| number | ours | the paper's |", "|---|---|---|"]
+        lines += ["| " + " | ".join(row) + " |" for row in e.numbers] + [""]
     return "\n".join(lines).rstrip() + "\n"

@@ -31,7 +31,8 @@ class Recording:
     @property
     def says(self):
         part = "whole" if self.seconds is None else f"first {self.seconds:g} s"
-        return f"{self.site}, seed {self.seed}, {part}"
+        changed = "".join(f", {key} {value}" for key, value in self.keys)
+        return f"{self.site}, seed {self.seed}, {part}{changed}"
 
 
 @dataclass(frozen=True)

@@ -75,16 +75,15 @@ def draw_roads(plan, title, runs):
     sheet.name(axes, "from above, each path laid on its fixes", "east (m)", "north (m)")
     axes.set_aspect("equal", "datalim")
     sheet.legend(axes)
-    several = lambda values: ", ".join(f"{value:.2f}" for value in values) or "not known"
+    several = lambda values: ", ".join(f"{value:.2f} m" for value in values) or "not known"
     return Drawn(sheet,
                  "The paths by GNSS, by stems (sSLAM) and by LeGO-LOAM (LLOAM) along the strip roads, both laid on the "
                  "fixes by (6).",
-                 "The same by our front end by stems and by our LOAM with ground, and the simulator's truth. Fixes have "
-                 f"bursts of metres, and the paths do not follow them.{remarks}",
-                 "Mean distance of the fixes from the path, roads 1 to 3: "
-                 + "; ".join(f"{WAYS[way][0]} {several(found[way])} m" for way in WAYS) + " (paper: 0.8 m). "
-                 "RMS distance of the paths from the truth in the plane: "
-                 + "; ".join(f"{WAYS[way][0]} {several(errors[way])} m" for way in WAYS) + ".")
+                 "The same by our front end by stems and by our LOAM with ground, beside the simulator's truth. Fixes "
+                 f"have bursts of metres, and the paths do not follow them.{remarks}",
+                 [(f"fixes off the path, mean: {WAYS[way][0]}, roads 1 to 3", several(found[way]), "0.8 m")
+                  for way in WAYS]
+                 + [(f"path off the truth in the plane, RMS: {WAYS[way][0]}", several(errors[way]), "") for way in WAYS])
 
 
 def axis_table(run):
@@ -145,17 +144,18 @@ def draw_orientations(plan, title, runs):
     sheet.legend(scatter)
     sheet.legend(histogram)
     noise = run.told["quality"].get("axis_noise_deg")
-    of_truth = f" The true leans have an RMS of {rms(true[np.isfinite(true)]):.1f}°." if true.size else ""
     return Drawn(sheet,
                  "The orientations of the stem segments along strip road 2, some 580 trees, as deviations from the "
                  "vertical. Their standard deviation is 2.5°, and their noise over views 2.0°.",
                  "The mean axis of each listed tree that at least five views show, in the frame of the map. The right "
                  "side shows how far the stems of single views are from it. Wind has no say here: the simulator leans "
                  "trees in all directions alike.",
-                 f"Standard deviation {spread[0]:.1f}° and {spread[1]:.1f}° over {len(lean)} trees, RMS lean "
-                 f"{rms(np.linalg.norm(lean - centre, axis=1)):.1f}°.{of_truth} Noise of the axes over the views: "
-                 f"{rms(angles) / np.sqrt(2):.1f}° an axis"
-                 + (f" (by the run itself: {noise:.1f}°)." if noise is not None else "."))
+                 [("trees", str(len(lean)), "580"),
+                  ("standard deviation towards x, y", f"{spread[0]:.1f}°, {spread[1]:.1f}°", "2.5°"),
+                  ("lean, RMS", f"{rms(np.linalg.norm(lean - centre, axis=1)):.1f}°", ""),
+                  ("true lean of the stand, RMS", f"{rms(true[np.isfinite(true)]):.1f}°" if true.size else "", ""),
+                  ("noise over the views, of each of two directions", f"{rms(angles) / np.sqrt(2):.1f}°", "2.0°"),
+                  ("the same by the run itself", "not known" if noise is None else f"{noise:.1f}°", "2.0°")])
 
 
 FIGURES = [

@@ -15,6 +15,13 @@ WAYS = {"ndt-lc": ("NDT with loops", "ours", NO_MAP),
         "gicp": ("GICP", "second", NO_MAP + NO_LOOPS + settings("registration.method=gicp")),
         "loam": ("LOAM", "fourth", NO_MAP + NO_LOOPS + settings("registration.method=loam"))}
 FUSED = ("NDT, fixes in the graph", "second", NO_MAP + NO_LOOPS + settings("gnss.use=fuse"))
+PAPER_DRIFT_M = {  # Table 3, without loops; LIO-SAM stands beside our LOAM
+    "ndt": {"evo1": 17.242, "evo2": 0.579, "evo3": 20.320, "tuusniemi1": 0.713, "tuusniemi3": 2.333},
+    "gicp": {"evo1": 5906.576, "evo2": 8.537, "evo3": 144.153, "tuusniemi1": 1.204, "tuusniemi3": 39.680},
+    "loam": {"evo1": 6.895, "evo2": 0.039, "evo3": 1.917, "tuusniemi1": 0.008, "tuusniemi3": 0.252}}
+PAPER_WIDTH_M = {("tuusniemi1", "gicp"): "1.7 m", ("tuusniemi1", "ndt"): "1.2 m", ("tuusniemi1", "ndt-lc"): "0.9 m",
+                 ("tuusniemi1", "loam"): "0.9 m", ("tuusniemi3", "ndt-lc"): "0.5 m", ("tuusniemi3", "loam"): "0.6 m",
+                 ("tuusniemi3", "ndt"): "0.7 m"}
 BATCH_SCANS = 300  # of F21: means over so many scans
 
 
@@ -33,6 +40,14 @@ def site_title(title, run):
     return f"{title}\n{run.job.recording.says}"
 
 
+def paper_drift(run, way):
+    """What Table 3 of the paper says of a whole site."""
+    if run.job.recording.seconds is not None:
+        return ""
+    metres = PAPER_DRIFT_M.get(way, {}).get(run.job.recording.site)
+    return "" if metres is None else f"{metres:g} m"
+
+
 def draw_trajectories(plan, title, runs):
     good, failures = good_runs(runs)
     reference = good["ndt-lc"]
@@ -49,20 +64,21 @@ def draw_trajectories(plan, title, runs):
         times, off = off_by(path, truth)
         sheet.line(errors, name, times - truth.times[0], 100 * off, colour, linewidth=1.0)
         end = run.errors("first")
-        numbers.append(f"{name} {100 * rms(off):.1f} cm and {end['drift_end_m']:.2f} m")
+        drift = f"{100 * end['drift_end_m']:.1f} cm ({end['drift_percent']:.3f} %)"
+        numbers += [(f"{name}: off the truth, RMS", f"{100 * rms(off):.1f} cm", ""),
+                    (f"{name}: drift at the end", drift, paper_drift(run, way))]
     sheet.name(plan_view, "paths, fitted on NDT with loops", "x (m)", "y (m)")
     sheet.name(errors, "distance from the truth, fitted alike", "time (s)", "distance (cm)")
     errors.set_yscale("log")
     plan_view.set_aspect("equal", "datalim")
     sheet.legend(plan_view)
-    length = truth.length_m()
+    numbers.append(("way", f"{truth.length_m():.0f} m", ""))
     return Drawn(sheet,
                  "The paths of NDT, NDT with loops, GICP and LIO-SAM, each fitted on that of NDT with loops. Some end "
-                 "metres away from where they began, and no truth tells which is right.",
-                 "The same configurations of our program, with LOAM in place of LIO-SAM, and the simulator's truth. "
-                 f"The right side shows how far each is off.{failures}",
-                 f"RMS distance from the truth over {length:.0f} m, and drift at the end with the start aligned: "
-                 + "; ".join(numbers) + ".")
+                 "metres away from where they began. No truth tells which is right.",
+                 "The same configurations of our program, with LOAM in place of LIO-SAM, and the simulator's truth. The "
+                 f"right side shows how far each is off. Drift is the error of the end with the start aligned.{failures}",
+                 numbers)
 
 
 def link_distances(run, onto):
@@ -92,16 +108,17 @@ def draw_distances(plan, title, sites):
             share, _ = np.histogram(distances, edges)
             sheet.line(axes, name, edges[:-1] + step / 2, share / len(distances), colour, drawstyle="steps-mid")
             spread = np.quantile(distances, 0.995) - np.quantile(distances, 0.005)
-            numbers.append(f"{site} {name} {100 * spread:.1f} cm")
+            numbers.append((f"{site}, {name}: width that holds 99 % of D", f"{100 * spread:.1f} cm",
+                            PAPER_WIDTH_M.get((site, way), "")))
         sheet.name(axes, good["ndt-lc"].job.recording.says, "distance of the two links D (m)",
                    f"share, bins of {100 * step:g} cm")
         sheet.legend(axes)
     return Drawn(sheet,
                  "How the distance D between the scanner and a reference on another link of the harvester is "
                  "distributed, in bins of 10 cm. A good path keeps it within half a metre.",
-                 "The distance from our path to a prism on the cabin, which a simulated total station follows. "
-                 f"Both are rigidly joined here, so a perfect path gives one value and its noise.{words}",
-                 "Width that holds 99 % of the distances: " + "; ".join(numbers) + " (paper: 0.5 to 1.7 m).")
+                 "The distance from our path to a prism on the cabin, which a simulated total station follows. The two "
+                 f"are rigidly joined here. So a perfect path gives one value and the station's noise.{words}",
+                 numbers)
 
 
 def jobs_of_sites(sites, ways):
@@ -148,7 +165,8 @@ def draw_times(plan, title, runs):
             ticks.append(f"{site}\n{name}")
             place += 1
             cpu = run.told["stages"]["scan"]["cpu_ms"]["mean"]
-            numbers.append(f"{site} {name} {mean:.0f} ms ({cpu:.0f} ms of CPU)")
+            numbers.append((f"{site}, {name}: mean of a scan", f"{mean:.0f} ms ({cpu:.0f} ms of CPU)",
+                            "60 ms" if way == "ndt-lc" else ""))
     whole.set_xticks(range(place), ticks, fontsize=7, rotation=45, ha="right")
     sheet.name(course, f"means over {BATCH_SCANS} scans, or a tenth of a short run", "time (s)",
                "wall time a scan (ms)")
@@ -160,7 +178,7 @@ def draw_times(plan, title, runs):
                  "60 ms, and LIO-SAM grows with the map, beyond the 100 ms until the next scan.",
                  "The time from a scan to its pose and its place in the map, with NDT and with LOAM. The machine did "
                  f"other work beside it, so CPU times are the steadier figure.{words}",
-                 "Mean a scan: " + "; ".join(numbers) + ".")
+                 numbers)
 
 
 def antenna_path(run):
@@ -201,7 +219,8 @@ def draw_fused(plan, title, runs):
     sheet.dots(plan_view, "fixes", *fixes[:, :2].T, "fixes", 7)
     sheet.line(heights, "truth", truth.times - truth.times[0], truth.places[:, 2], "truth", linewidth=3.0, alpha=0.35)
     sheet.dots(heights, "fixes", times - truth.times[0], fixes[:, 2], "fixes", 7)
-    numbers = [f"the fixes span {np.ptp(fixes[:, 2]):.1f} m of height, the truth {np.ptp(truth.places[:, 2]):.1f} m"]
+    numbers = [("heights span: fixes, truth", f"{np.ptp(fixes[:, 2]):.1f} m, {np.ptp(truth.places[:, 2]):.1f} m",
+                "73 m, 10 m" if some.job.recording.site == "evo1" else "")]
     for way, run in good.items():
         name, colour, _ = FUSED if way == "fused" else ("NDT, laid on the fixes", "ours", None)
         path = on_globe(run)
@@ -212,8 +231,8 @@ def draw_fused(plan, title, runs):
         sheet.line(heights, name, path.times - truth.times[0], path.places[:, 2], colour)
         i, j = paired(path.times, truth.times)
         off = path.places[i] - truth.places[j]
-        numbers.append(f"{name} {rms(np.linalg.norm(off[:, :2], axis=1)):.2f} m in the plane, "
-                       f"{rms(off[:, 2]):.2f} m in height")
+        numbers.append((f"{name}: off the truth in the plane and in height, RMS",
+                        f"{rms(np.linalg.norm(off[:, :2], axis=1)):.2f} m, {rms(off[:, 2]):.2f} m", ""))
     sheet.name(plan_view, "from above", "east (m)", "north (m)")
     sheet.name(heights, "height", "time (s)", "up (m)")
     plan_view.set_aspect("equal", "datalim")
@@ -223,7 +242,7 @@ def draw_fused(plan, title, runs):
                  "wrong heading over its first 20 m, and fixes under trees span 73 m of height.",
                  "The same, with the simulator's truth. NDT alone is laid on the fixes as a whole by the run itself; "
                  f"the fused one is bent by them. No loops are closed.{failures}",
-                 "RMS distance from the truth: " + "; ".join(numbers) + ".")
+                 numbers)
 
 
 def fused_jobs(site):

@@ -1,0 +1,142 @@
+"""`./run accuracy --figures` (benchmarks/paper_figures.py): figures of tiny runs are drawn, with values that are those of
+the runs; a second call makes no run again; what is asked for wrongly is refused; and the geometry behind the figures."""
+
+import contextlib
+import csv
+import io
+import json
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+TOP = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(TOP / "benchmarks"))
+
+import paper_figures  # noqa: E402
+from figures import walks  # noqa: E402
+from figures.catalogue import Plan, all_figures  # noqa: E402
+from figures.data import Path3, enu, laid_on, moved, off_by, paired, read_path, rigid_fit  # noqa: E402
+from figures.runs import Run, Runs  # noqa: E402
+from program import understory_json  # noqa: E402
+
+# A figure of each kind that a few seconds can show.
+TINY = ["P1-F10", "P2-F3", "P2-F4", "P2-F6", "P3-F7", "P4-F15"]
+LIGHT = ["--set", "lidar.keep_every=2", "--set", "stand.trees_per_ha=300"]
+
+
+def check(condition, what):
+    if not condition:
+        sys.exit(f"paper_figures: {what}")
+
+
+def called(*words):
+    """Exit status of the command, and what it said on standard error."""
+    said = io.StringIO()
+    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
+        try:
+            code = paper_figures.main(list(map(str, words)))
+        except SystemExit as end:
+            code = end.code
+    return code, said.getvalue()
+
+
+def geometry():
+    random = np.random.default_rng(1)
+    places = random.normal(size=(50, 3)) * [20, 20, 2]
+    turns = random.normal(size=(50, 4))
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    path = Path3(np.arange(50) * 0.1, places, turns)
+    angle = 0.7
+    rotation = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    other = moved(path, rotation, np.array([3.0, -1.0, 2.0]))
+    check(np.allclose(other.rotations(), rotation @ path.rotations()), "attitudes turn along with their path")
+    for upright in (False, True):
+        back, _, _ = laid_on(path, other, upright)
+        check(off_by(back, other)[1].max() < 1e-9, "a path that was moved is laid on where it was")
+    tilted = rigid_fit(places, places @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]).T, upright=True)[0]
+    check(np.allclose(tilted[2], [0, 0, 1]), "an upright fit does not tilt")
+    i, j = paired(np.array([0.0, 0.1, 0.25]), np.array([0.001, 0.098, 0.3]))
+    check(list(i) == [0, 1] and list(j) == [0, 1], "poses are paired with the nearest within the tolerance")
+    # A second of latitude and of longitude on the GRS 80 ellipsoid at 60 degrees north.
+    away = enu(60 + 1 / 3600, 25.0, 10.0, (60.0, 25.0, 10.0))
+    check(abs(away[1] - 30.948) < 2e-3 and abs(away[0]) < 1e-6, f"a second of latitude is {away}")
+    away = enu(60.0, 25 + 1 / 3600, 12.0, (60.0, 25.0, 10.0))
+    check(abs(away[0] - 15.500) < 2e-3 and abs(away[2] - 2.0) < 1e-3, f"a second of longitude is {away}")
+
+
+def means_of_batches():
+    run = Run.__new__(Run)
+    run.told = {"scan_blocks": {"from_s": [0, 1, 2, 3], "scans": [10, 10, 10, 5], "wall_ms": [1, 3, 5, 8],
+                                "cpu_ms": [2, 6, 10, 16], "map_size": [0, 1, 2, 3]}}
+    _, wall, cpu = walks.batches(run, 20)
+    check(np.allclose(wall, [2, 6]) and np.allclose(cpu, [4, 12]), f"means over batches of scans: {wall} {cpu}")
+
+
+def rows_of(folder, key):
+    with open(folder / f"{key}.csv", encoding="utf-8") as text:
+        return list(csv.DictReader(text))
+
+
+def values_are_those_of_the_runs(folder):
+    plan = Plan(3, 4.0, folder, (("lidar.keep_every", "2"), ("stand.trees_per_ha", "300")))
+    run = Runs(folder).get(all_figures()["P2-F4"].jobs(plan)["run"])
+    told = understory_json("evaluate", run.folder, run.truth, "--align", "se3")
+    error = [row for row in rows_of(folder, "P2-F4") if row["axes"] == "estimate minus reference"]
+    square = sum((0.01 * float(row["y"])) ** 2 for row in error) / (len(error) / 3)
+    check(abs(square ** 0.5 - told["ape_rmse_m"]) < 1e-4, f"errors of F4: {square ** 0.5}, by evaluate {told['ape_rmse_m']}")
+    numbers = [row[1] for row in json.loads((folder / "P2-F6.json").read_text())["numbers"]]
+    wanted = [f"{100 * value:.2f} cm/s" for value in told["velocity_rmse_m_s"]]
+    check(numbers == wanted, f"F6 says {numbers}, evaluate {wanted}")
+    poses = len(read_path(run.folder / "trajectory.tum").times)
+    shown = [row for row in rows_of(folder, "P2-F4") if row["series"].startswith("estimate")]
+    check(len(shown) == poses, f"F4 shows {len(shown)} of {poses} poses")
+
+
+def tiny_figures(folder):
+    words = ["-o", folder, "--seconds", 4, *LIGHT, "--only", ",".join(TINY)]
+    code, said = called(*words)
+    check(code == 0, f"exit status {code}: {said}")
+    page = (folder / "index.html").read_text()
+    check(page.count("data:image/png;base64,") == len(TINY), "the page holds all pictures")
+    for key in TINY:
+        check((folder / f"{key}.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n", f"{key}.png is a picture")
+        table = folder / f"{key}.csv"
+        check(table.exists() or table.with_suffix(".csv.gz").exists(), f"{key} has its values")
+        if table.exists():
+            check(len(rows_of(folder, key)) > 10, f"{key} shows more than a few values")
+        told = json.loads((folder / f"{key}.json").read_text())
+        check("seed 3, first 4 s" in told["recordings"] and "nan" not in str(told["numbers"]),
+              f"{key} says {told}")
+    values_are_those_of_the_runs(folder)
+    made = {file: file.stat().st_mtime_ns for file in folder.glob("runs/*/run.json")}
+    check(not list(folder.glob("recordings/*.mcap")), "recordings are removed")
+    code, said = called(*words)
+    check(code == 0 and "recording" not in said, f"runs that are there are not made again: {said}")
+    check(made == {file: file.stat().st_mtime_ns for file in folder.glob("runs/*/run.json")}, "runs stay as they are")
+
+
+def wrong_use(folder):
+    for words, wanted in ((["--only", "P9-F1"], "unknown figure"), (["--seconds", "0"], "1 to"),
+                          (["--set", "lidar"], "KEY=VALUE"), (["--seed", "0"], "1 or more")):
+        code, said = called("-o", folder / "none", *words)
+        check(code == 2 and wanted in said and not (folder / "none").exists(), f"{words}: {code} {said}")
+    (folder / "file").write_text("")
+    code, said = called("-o", folder / "file", "--only", "P2-F4")
+    check(code == 3 and "cannot be made" in said, f"a file in place of the folder: {code} {said}")
+
+
+def main():
+    os.environ["MPLCONFIGDIR"] = tempfile.mkdtemp()
+    geometry()
+    means_of_batches()
+    with tempfile.TemporaryDirectory() as scratch:
+        wrong_use(Path(scratch))
+        tiny_figures(Path(scratch) / "figures")
+    print("figures are drawn")
+
+
+if __name__ == "__main__":
+    main()
