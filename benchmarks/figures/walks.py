@@ -1,6 +1,7 @@
 """P4, Robotics Approach in Mobile Laser Scanning: figures 14 to 19 and 21 to 23."""
 
 import numpy as np
+from matplotlib import ticker
 
 from figures.catalogue import PaperFigure
 from figures.data import enu, laid_on, list_in_site, off_by, origin_of, paired, read_path, read_table, rms
@@ -60,9 +61,10 @@ def draw_trajectories(plan, title, runs):
     for way, run in good.items():
         name, colour, _ = WAYS[way]
         path = onto if way == "ndt-lc" else laid_on(read_path(run.folder / "trajectory.tum"), onto)[0]
-        sheet.line(plan_view, name, *path.places[:, :2].T, colour, linewidth=1.0)
+        width = 2.6 if way == "ndt-lc" else 1.0  # NDT is the same where no loop was closed
+        sheet.line(plan_view, name, *path.places[:, :2].T, colour, linewidth=width)
         times, off = off_by(path, truth)
-        sheet.line(errors, name, times - truth.times[0], 100 * off, colour, linewidth=1.0)
+        sheet.line(errors, name, times - truth.times[0], 100 * off, colour, linewidth=width)
         end = run.errors("first")
         drift = f"{100 * end['drift_end_m']:.1f} cm ({end['drift_percent']:.3f} %)"
         numbers += [(f"{name}: off the truth, RMS", f"{100 * rms(off):.1f} cm", ""),
@@ -70,6 +72,8 @@ def draw_trajectories(plan, title, runs):
     sheet.name(plan_view, "paths, fitted on NDT with loops", "x (m)", "y (m)")
     sheet.name(errors, "distance from the truth, fitted alike", "time (s)", "distance (cm)")
     errors.set_yscale("log")
+    for ticks in (errors.yaxis.set_major_formatter, errors.yaxis.set_minor_formatter):
+        ticks(ticker.FormatStrFormatter("%g"))
     plan_view.set_aspect("equal", "datalim")
     sheet.legend(plan_view)
     numbers.append(("way", f"{truth.length_m():.0f} m", ""))

@@ -125,6 +125,19 @@ Json to_json(const std::vector<ScanBlock>& blocks) {
   return json;
 }
 
+Json to_json(const std::map<std::string, StageSummary>& stages) {
+  Json json = Json::object();
+  for (const auto& [name, stage] : stages) {
+    json[name] = {{"wall_ms", to_json(stage.wall_ms)},
+                  {"cpu_ms", to_json(stage.cpu_ms)},
+                  {"runs", stage.wall_ms.count},
+                  {"total_wall_s", number(stage.total_wall_s)}};
+    if (!stage.cpu_ms_by_tenth.empty())
+      json[name]["cpu_ms_by_tenth"] = numbers(stage.cpu_ms_by_tenth);
+  }
+  return json;
+}
+
 std::vector<double> means_by_tenth(const std::vector<double>& values) {
   const std::size_t share = values.size() / 10;
   if (share < 10) return {};
@@ -208,16 +221,7 @@ std::string run_json(const RunSummary& summary) {
   json["wall_s"] = number(summary.wall_s);
   json["cpu_s"] = number(summary.cpu_s);
   json["peak_memory_mb"] = number(summary.peak_memory_mb);
-  json["stages"] = Json::object();
-  for (const auto& [name, stage] : summary.stages) {
-    json["stages"][name] = {{"wall_ms", to_json(stage.wall_ms)},
-                            {"cpu_ms", to_json(stage.cpu_ms)},
-                            {"runs", stage.wall_ms.count},
-                            {"total_wall_s", number(stage.total_wall_s)}};
-    if (!stage.cpu_ms_by_tenth.empty()) {
-      json["stages"][name]["cpu_ms_by_tenth"] = numbers(stage.cpu_ms_by_tenth);
-    }
-  }
+  json["stages"] = to_json(summary.stages);
   if (!summary.scan_blocks.empty()) json["scan_blocks"] = to_json(summary.scan_blocks);
   json["counts"] = to_json(summary.counts);
   json["quality"] = to_json(summary.quality);
