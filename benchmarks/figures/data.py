@@ -142,11 +142,12 @@ def rms(values):
 
 
 def layer_path(geopackage):
-    """Positions (n, 3) of the layer `path` of a trees.gpkg, in the coordinate system of the run's layers."""
+    """Positions (n, 3) of the layer `path` of a trees.gpkg, in the coordinate system of the run's layers. A run that
+    hardly moved has no such layer and none of them."""
     with sqlite3.connect(f"file:{geopackage}?mode=ro", uri=True) as base:
-        (column,) = base.execute("select column_name from gpkg_geometry_columns where table_name='path'").fetchone()
-        blobs = [row[0] for row in base.execute(f'select "{column}" from path')]
-    parts = []
+        found = base.execute("select column_name from gpkg_geometry_columns where table_name='path'").fetchone()
+        blobs = [row[0] for row in base.execute(f'select "{found[0]}" from path')] if found else []
+    parts = [np.empty((0, 3))]
     for blob in blobs:
         envelope = (0, 32, 48, 48, 64)[(blob[3] >> 1) & 7]
         start = 8 + envelope

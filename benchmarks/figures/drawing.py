@@ -44,6 +44,7 @@ class Sheet:
     def __post_init__(self):
         self.figure, self.axes = plt.subplots(self.rows, self.columns, figsize=self.size, squeeze=False,
                                               layout="constrained", **self.layout)
+        self.figure.get_layout_engine().set(w_pad=0.12, h_pad=0.06)
         self.figure.suptitle(self.title)
 
     def name(self, axes, title="", x="", y=""):

@@ -35,7 +35,7 @@ def draw_map(plan, title, runs):
     image = sheet.raster(above, "highest point", cells_of(points, extent, 0.25), extent, cmap="viridis")
     sheet.figure.colorbar(image, ax=above, label="height (m)", shrink=0.8)
     sheet.line(above, "path", *path[:, :2].T, "second")
-    middle = float(np.median(path[:, 1]))
+    middle = float(np.median(path[:, 1] if len(path) else points[:, 1]))
     slab = points[np.abs(points[:, 1] - middle) < 2.0]
     heights = [extent[0], extent[1], float(points[:, 2].min()) - 0.5, float(np.quantile(points[:, 2], 0.9999)) + 0.5]
     sheet.raster(side, "points of a slab of 4 m", cells_of(slab[:, [0, 2, 1]], heights, 0.15, "count"), heights,

@@ -44,7 +44,9 @@ def draw_one_map(sheet, axes, run, title):
     """A map from above with its path, and a window of it at full sharpness."""
     points = read_cloud(run.folder / "map.laz")
     path = layer_path(run.folder / "trees.gpkg")
-    corner = path[0] * [1, 1, 1]
+    if not len(path):
+        raise ValueError(f"{title}: the carrier hardly moved")
+    corner = path[0]
     points, path = points - corner, path - corner
     extent = shown_part(points, margin=2.0)
     cell = max(0.25, (extent[1] - extent[0]) / 500)

@@ -17,7 +17,8 @@ PAPERS = {"P1": "Nevalainen et al., Navigation and Mapping in Forest Environment
           "P4": "Faitli, Robotics Approach in Mobile Laser Scanning"}
 INTRODUCTION = ("These pages show the figures of the papers, drawn from runs of this program on simulated recordings. "
                 "Sites, lidars and receivers follow the papers; the trees and the errors are simulated. "
-                "So curves compare in kind, not point by point.")
+                "So curves compare in kind, not point by point. A figure of a short stretch hardly shows drift or "
+                "closed loops; only whole recordings compare with the numbers of the papers.")
 
 
 @dataclass

@@ -63,7 +63,7 @@ def draw_penalties(plan, title, _):
         sheet.line(error, name, rows[:, 0], rows[:, 2] - rows[:, 4], colour)
         drifts[kind] = drift_deg(rows)
     sheet.name(side, "from the side", "", "height above the start (m)")
-    sheet.name(pitch, "pitch, nose down is positive", "", "pitch (degrees)")
+    sheet.name(pitch, "pitch of the lidar, which is mounted at -27°", "", "pitch (degrees)")
     sheet.name(error, "error of the pitch", "way (m)", "error (degrees)")
     sheet.legend(side)
     ratio = abs(drifts["one point"]) / max(1e-6, abs(drifts["three points"]))

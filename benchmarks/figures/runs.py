@@ -4,6 +4,7 @@ A recording is simulated once for all runs that need it, and removed when they a
 and the same seed gives the same bytes again. Its truth stays."""
 
 import json
+import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,6 +47,11 @@ class Job:
     @property
     def name(self):
         return f"{self.recording.name}_{self.way}"
+
+
+def reason_of(error):
+    """The last line of a failure, without the folders of this machine."""
+    return re.sub(r"/\S*/", "", str(error).splitlines()[-1].split("error: ")[-1]).strip()
 
 
 def settings(*pairs):
@@ -125,7 +131,7 @@ class Runs:
             understory("map", file, "-o", run, "--threads", self.threads, *job.arguments, accept=(DONE, UNTRUSTED))
         except Failed as error:
             say(f"    {error}")
-            run.with_suffix(".failed").write_text(str(error).splitlines()[-1])
+            run.with_suffix(".failed").write_text(reason_of(error))
         run.with_suffix(".order.json").write_text(json.dumps(self._order(job)))
 
     def get(self, job):

@@ -10,7 +10,7 @@ from figures.catalogue import PaperFigure
 from figures.data import (Path3, enu, laid_on, list_in_site, moved, off_by, opened, origin_of, paired, read_path,
                           read_table, rms)
 from figures.drawing import COLOURS, Drawn, Sheet
-from figures.runs import Job, settings
+from figures.runs import Job, reason_of, settings
 from program import DONE, UNTRUSTED, Failed, understory
 
 ROADS = ("lieksa1", "lieksa2", "lieksa3")
@@ -46,17 +46,15 @@ def fixes_of(run):
 def draw_roads(plan, title, runs):
     some = runs["lieksa1 stems"].job.recording
     part = "whole roads" if some.seconds is None else f"first {some.seconds:g} s of each"
-    sheet = Sheet(f"{title}\nlieksa1 to lieksa3, seed {plan.seed}, {part}", 1, 1, (9.5, 5.6))
-    axes = sheet.axes[0, 0]
-    found, errors, remarks = {way: [] for way in WAYS}, {way: [] for way in WAYS}, ""
-    for site in ROADS:
+    sheet = Sheet(f"{title}\nlieksa1 to lieksa3, seed {plan.seed}, {part}", 3, 1, (9.0, 9.0))
+    found, errors, shapes, remarks = *({way: [] for way in WAYS} for _ in range(3)), ""
+    for site, axes in zip(ROADS, sheet.axes[:, 0]):
         stems = runs[f"{site} stems"]
         truth = read_path(stems.truth / "trajectory.tum")
-        label = lambda text: text if site == ROADS[0] else "_" + text
-        sheet.line(axes, label("truth"), *truth.places[:, :2].T, "truth", linewidth=4.0, alpha=0.3)
+        sheet.line(axes, "truth", *truth.places[:, :2].T, "truth", linewidth=4.0, alpha=0.3)
         fixed = next((run for way in WAYS if not (run := runs[f"{site} {way}"]).failed), None)
         if fixed is not None:
-            sheet.dots(axes, label("fixes"), *fixes_of(fixed)[:, :2].T, "fixes", 4)
+            sheet.dots(axes, "fixes", *fixes_of(fixed)[:, :2].T, "fixes", 7)
         antenna = list_in_site(stems.truth, "gnss", "mount_m")
         for way, (name, colour, _) in WAYS.items():
             run = runs[f"{site} {way}"]
@@ -68,22 +66,24 @@ def draw_roads(plan, title, runs):
                 found[way].append(figures["gnss_fixes_mean_m"])
             except Failed as error:
                 path, _, _ = laid_on(read_path(run.folder / "trajectory.tum"), truth, upright=True)
-                remarks += f" {site} {name} is laid on the truth: {str(error).splitlines()[-1].split(': ', 1)[-1]}."
-            sheet.line(axes, label(name), *path.places[:, :2].T, colour)
-            flat = Path3(path.times, path.places * [1, 1, 0], path.turns)
-            errors[way].append(rms(off_by(flat, Path3(truth.times, truth.places * [1, 1, 0], truth.turns))[1]))
-    sheet.name(axes, "from above, each path laid on its fixes", "east (m)", "north (m)")
-    axes.set_aspect("equal", "datalim")
-    sheet.legend(axes)
+                remarks += f" {site} {name} is laid on the truth: {reason_of(error).split(';')[0]}."
+            sheet.line(axes, name, *path.places[:, :2].T, colour)
+            flat, ground = (Path3(p.times, p.places * [1, 1, 0], p.turns) for p in (path, truth))
+            errors[way].append(rms(off_by(flat, ground)[1]))
+            shapes[way].append(rms(off_by(laid_on(flat, ground, upright=True)[0], ground)[1]))
+        sheet.name(axes, site, "east (m)", "north (m)")
+        axes.set_aspect("equal", "datalim")
+    sheet.legend(sheet.axes[0, 0])
     several = lambda values: ", ".join(f"{value:.2f} m" for value in values) or "not known"
     return Drawn(sheet,
                  "The paths by GNSS, by stems (sSLAM) and by LeGO-LOAM (LLOAM) along the strip roads, both laid on the "
                  "fixes by (6).",
-                 "The same by our front end by stems and by our LOAM with ground, beside the simulator's truth. Fixes "
-                 f"have bursts of metres, and the paths do not follow them.{remarks}",
+                 "The same by our front end by stems and by our LOAM with ground, beside the simulator's truth, from above. "
+                 f"Fixes are off by metres for minutes, and so is what is laid on them.{remarks}",
                  [(f"fixes off the path, mean: {WAYS[way][0]}, roads 1 to 3", several(found[way]), "0.8 m")
                   for way in WAYS]
-                 + [(f"path off the truth in the plane, RMS: {WAYS[way][0]}", several(errors[way]), "") for way in WAYS])
+                 + [(f"path off the truth in the plane, RMS: {WAYS[way][0]}", several(errors[way]), "") for way in WAYS]
+                 + [(f"the same, laid on the truth instead: {WAYS[way][0]}", several(shapes[way]), "") for way in WAYS])
 
 
 def axis_table(run):
@@ -122,6 +122,8 @@ def mean_axes(run):
 def draw_orientations(plan, title, runs):
     run = runs["run"]
     means, angles = mean_axes(run)
+    if not len(means):
+        raise ValueError(f"no tree is seen in {FEWEST_VIEWS} views")
     lean = leans(means)
     centre, spread = lean.mean(axis=0), lean.std(axis=0)
     with opened(run.truth / "trees.csv") as text:

@@ -72,8 +72,8 @@ def draw_trajectories(plan, title, runs):
     sheet.name(plan_view, "paths, fitted on NDT with loops", "x (m)", "y (m)")
     sheet.name(errors, "distance from the truth, fitted alike", "time (s)", "distance (cm)")
     errors.set_yscale("log")
-    for ticks in (errors.yaxis.set_major_formatter, errors.yaxis.set_minor_formatter):
-        ticks(ticker.FormatStrFormatter("%g"))
+    errors.yaxis.set_major_formatter(ticker.FormatStrFormatter("%g"))
+    errors.yaxis.set_minor_formatter(ticker.NullFormatter())
     plan_view.set_aspect("equal", "datalim")
     sheet.legend(plan_view)
     numbers.append(("way", f"{truth.length_m():.0f} m", ""))
@@ -229,8 +229,8 @@ def draw_fused(plan, title, runs):
         name, colour, _ = FUSED if way == "fused" else ("NDT, laid on the fixes", "ours", None)
         path = on_globe(run)
         if path is None:
-            failures += f" {name}: no place on the globe ({run.told['georeference']['reason']})."
-            continue
+            failures += f" {name} found no place on the globe and is laid on the truth."
+            path, _, _ = laid_on(read_path(run.folder / "trajectory.tum"), truth, upright=True)
         sheet.line(plan_view, name, *path.places[:, :2].T, colour)
         sheet.line(heights, name, path.times - truth.times[0], path.places[:, 2], colour)
         i, j = paired(path.times, truth.times)

@@ -3,6 +3,7 @@ the runs; a second call makes no run again; what is asked for wrongly is refused
 
 import contextlib
 import csv
+import gzip
 import io
 import json
 import os
@@ -16,14 +17,15 @@ TOP = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(TOP / "benchmarks"))
 
 import paper_figures  # noqa: E402
-from figures import walks  # noqa: E402
+from figures import strip_roads, walks  # noqa: E402
 from figures.catalogue import Plan, all_figures  # noqa: E402
 from figures.data import Path3, enu, laid_on, moved, off_by, paired, read_path, rigid_fit  # noqa: E402
-from figures.runs import Run, Runs  # noqa: E402
+from figures.runs import Job, Recording, Run, Runs  # noqa: E402
 from program import understory_json  # noqa: E402
 
 # A figure of each kind that a few seconds can show.
-TINY = ["P1-F10", "P2-F3", "P2-F4", "P2-F6", "P3-F7", "P4-F15"]
+TINY = ["P2-F3", "P2-F4", "P2-F6", "P3-F7", "P4-F15"]
+SECONDS = 8.0  # a path that turns: else velocities have no axes
 LIGHT = ["--set", "lidar.keep_every=2", "--set", "stand.trees_per_ha=300"]
 
 
@@ -75,13 +77,48 @@ def means_of_batches():
     check(np.allclose(wall, [2, 6]) and np.allclose(cpu, [4, 12]), f"means over batches of scans: {wall} {cpu}")
 
 
+def orientations(folder):
+    """F10 of P1 of a made-up run: 40 trees that lean by known angles, seen from ten places by a body that turns."""
+    random = np.random.default_rng(2)
+    leans = np.radians(random.normal(size=(40, 2)) * [1.0, 3.0] + [0.5, 0.0])
+    axes = np.column_stack([np.tan(leans), np.ones(40)])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    feet = np.column_stack([np.arange(40) % 8 * 4.0, np.arange(40) // 8 * 4.0, np.zeros(40)])
+    run, truth = folder / "run", folder / "truth"
+    run.mkdir()
+    truth.mkdir()
+    poses, stems = [], ["frame,timestamp,x,y,z,axis_x,axis_y,axis_z"]
+    for view in range(10):
+        angle, place = 0.3 * view, np.array([2.0 * view, 1.0, 1.5])
+        body = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        poses.append(f"{view} {place[0]} {place[1]} {place[2]} 0 0 {np.sin(angle / 2)} {np.cos(angle / 2)}")
+        for k in range(40):
+            sign = -1 if (view + k) % 2 else 1  # an axis has no direction
+            cells = [*((feet[k] - place) @ body), *(sign * axes[k] @ body)]
+            stems.append(f"{view},{view}," + ",".join(f"{cell:.9f}" for cell in cells))
+    (run / "trajectory.tum").write_text("\n".join(poses) + "\n")
+    with gzip.open(run / "stems.csv.gz", "wt") as file:
+        file.write("\n".join(stems) + "\n")
+    (run / "trees.csv").write_text("x,y\n" + "".join(f"{x},{y}\n" for x, y, _ in feet))
+    (run / "run.json").write_text(json.dumps({"quality": {"axis_noise_deg": 0.5}}))
+    (truth / "trees.csv").write_text("x,lean_deg\n" + "".join("0,2.0\n" for _ in feet))
+    job = Job(Recording("lieksa2", 3), "stems")
+    drawn = strip_roads.draw_orientations(None, "t", {"run": Run(job, run, truth)})
+    told = {row[0]: row[1] for row in drawn.numbers}
+    sd = np.degrees(np.arctan(np.tan(leans))).std(axis=0)
+    check(told["trees"] == "40" and told["standard deviation towards x, y"] == f"{sd[0]:.1f}°, {sd[1]:.1f}°", f"F10: {told}")
+    check(told["noise over the views, of each of two directions"] == "0.0°", f"F10 of stems without noise: {told}")
+    drawn.sheet.save(folder, "P1-F10")
+    check(len(rows_of(folder, "P1-F10")) == 40 + 48, "F10 has all trees and all bars")
+
+
 def rows_of(folder, key):
     with open(folder / f"{key}.csv", encoding="utf-8") as text:
         return list(csv.DictReader(text))
 
 
 def values_are_those_of_the_runs(folder):
-    plan = Plan(3, 4.0, folder, (("lidar.keep_every", "2"), ("stand.trees_per_ha", "300")))
+    plan = Plan(3, SECONDS, folder, (("lidar.keep_every", "2"), ("stand.trees_per_ha", "300")))
     run = Runs(folder).get(all_figures()["P2-F4"].jobs(plan)["run"])
     told = understory_json("evaluate", run.folder, run.truth, "--align", "se3")
     error = [row for row in rows_of(folder, "P2-F4") if row["axes"] == "estimate minus reference"]
@@ -96,7 +133,7 @@ def values_are_those_of_the_runs(folder):
 
 
 def tiny_figures(folder):
-    words = ["-o", folder, "--seconds", 4, *LIGHT, "--only", ",".join(TINY)]
+    words = ["-o", folder, "--seconds", SECONDS, *LIGHT, "--only", ",".join(TINY)]
     code, said = called(*words)
     check(code == 0, f"exit status {code}: {said}")
     page = (folder / "index.html").read_text()
@@ -108,7 +145,7 @@ def tiny_figures(folder):
         if table.exists():
             check(len(rows_of(folder, key)) > 10, f"{key} shows more than a few values")
         told = json.loads((folder / f"{key}.json").read_text())
-        check("seed 3, first 4 s" in told["recordings"] and "nan" not in str(told["numbers"]),
+        check("seed 3, first 8 s" in told["recordings"] and "nan" not in str(told["numbers"]),
               f"{key} says {told}")
     values_are_those_of_the_runs(folder)
     made = {file: file.stat().st_mtime_ns for file in folder.glob("runs/*/run.json")}
@@ -133,6 +170,7 @@ def main():
     geometry()
     means_of_batches()
     with tempfile.TemporaryDirectory() as scratch:
+        orientations(Path(scratch))
         wrong_use(Path(scratch))
         tiny_figures(Path(scratch) / "figures")
     print("figures are drawn")
