@@ -53,6 +53,9 @@ def geometry():
     path = Path3(np.arange(50) * 0.1, places, turns)
     angle = 0.7
     rotation = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    about_x = np.array([[1, 0, 0], [0, np.cos(0.4), -np.sin(0.4)], [0, np.sin(0.4), np.cos(0.4)]])
+    tilted = moved(path, rotation @ about_x, np.zeros(3))
+    check(np.allclose(tilted.rotations(), rotation @ about_x @ path.rotations()), "attitudes tilt along, too")
     other = moved(path, rotation, np.array([3.0, -1.0, 2.0]))
     check(np.allclose(other.rotations(), rotation @ path.rotations()), "attitudes turn along with their path")
     for upright in (False, True):
@@ -148,6 +151,8 @@ def tiny_figures(folder):
         check("seed 3, first 8 s" in told["recordings"] and "nan" not in str(told["numbers"]),
               f"{key} says {told}")
     values_are_those_of_the_runs(folder)
+    sizes = [float(row["y"]) for row in rows_of(folder, "P3-F7") if row["y_is"] == "points (million)"]
+    check(sizes[0] == 0.0 and 1e-3 < max(sizes) < 10.0, f"the local map grows: {sizes}")
     made = {file: file.stat().st_mtime_ns for file in folder.glob("runs/*/run.json")}
     check(not list(folder.glob("recordings/*.mcap")), "recordings are removed")
     code, said = called(*words)
