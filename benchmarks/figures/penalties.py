@@ -78,8 +78,8 @@ def draw_penalties(plan, title, _):
                  "A straight stretch from the side and its pitch. With one penalty point the path keeps to GNSS, and the "
                  "pitch rises slowly. With three points it does not.",
                  "A mapper as in section 3.3 of the paper, outside our pipeline: no IMU factor, no graph, points by ε. "
-                 f"The points of a scan weigh s = {SCALE:g}. One point leaves the pitch off by more than three do, "
-                 "without a steady rise. The lidar's wrong angles stand for what made the paper's pitch drift.", numbers)
+                 f"The points of a scan weigh s = {SCALE:g}. With one point the pitch drifts off for half of the "
+                 "way and back. With three it stays, within the noise of the IMU. The lidar's wrong angles stand for what made the paper's pitch drift.", numbers)
 
 
 FIGURES = [PaperFigure("P3-F4", "What penalty points do to the pitch", lambda plan: {}, draw_penalties)]
