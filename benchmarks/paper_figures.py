@@ -113,12 +113,14 @@ def main(words=None):
             print(f"{figure.key:8} {figure.title}: {says_of(figure.jobs(plan)) or 'a run of its own'}")
         return 0
     try:
-        options.output.mkdir(parents=True, exist_ok=True)
+        runs = Runs(options.output, options.threads)
+        runs.make(job for figure in options.only for job in figure.jobs(plan).values())
     except OSError as error:
-        say(f"{options.output}: cannot be made: {error.strerror}")
+        say(f"{options.output}: cannot be written: {error.strerror}")
         return 3
-    runs = Runs(options.output, options.threads)
-    runs.make(job for figure in options.only for job in figure.jobs(plan).values())
+    except Failed as error:  # a recording could not be simulated: a wrong key of --set, or a full disk
+        say(str(error))
+        return 3
     missing = {}
     for figure in options.only:
         say(figure.key)

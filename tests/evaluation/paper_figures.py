@@ -167,7 +167,9 @@ def wrong_use(folder):
         check(code == 2 and wanted in said and not (folder / "none").exists(), f"{words}: {code} {said}")
     (folder / "file").write_text("")
     code, said = called("-o", folder / "file", "--only", "P2-F4")
-    check(code == 3 and "cannot be made" in said, f"a file in place of the folder: {code} {said}")
+    check(code == 3 and "cannot be written" in said, f"a file in place of the folder: {code} {said}")
+    code, said = called("-o", folder / "key", "--only", "P2-F4", "--set", "lidar.nonsense=1")
+    check(code == 3 and "lidar.nonsense" in said, f"a key that no site has: {code} {said}")
 
 
 def main():
