@@ -105,7 +105,7 @@ def draw_distances(plan, title, sites):
         found = {way: link_distances(run, onto) for way, run in good.items()}
         every = np.concatenate(list(found.values()))
         low, high = np.floor(every.min() * 100) / 100, np.ceil(every.max() * 100) / 100
-        step = 0.1 if high - low > 1.0 else 0.01 if high - low > 0.1 else 0.005
+        step = 0.1 if high - low > 2.0 else 0.01 if high - low > 0.2 else 0.001
         edges = np.arange(low - step, high + 2 * step, step)
         for way, distances in found.items():
             name, colour, _ = WAYS[way]
@@ -229,7 +229,8 @@ def draw_fused(plan, title, runs):
         name, colour, _ = FUSED if way == "fused" else ("NDT, laid on the fixes", "ours", None)
         path = on_globe(run)
         if path is None:
-            failures += f" {name} found no place on the globe and is laid on the truth."
+            failures += f" The run \"{name}\" found no place on the globe and is laid on the truth."
+            name = ("NDT" if way == "ndt" else "NDT with fixes, not fused") + ", laid on the truth"
             path, _, _ = laid_on(read_path(run.folder / "trajectory.tum"), truth, upright=True)
         sheet.line(plan_view, name, *path.places[:, :2].T, colour)
         sheet.line(heights, name, path.times - truth.times[0], path.places[:, 2], colour)
