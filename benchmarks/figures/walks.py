@@ -110,7 +110,8 @@ def draw_distances(plan, title, sites):
         for way, distances in found.items():
             name, colour, _ = WAYS[way]
             share, _ = np.histogram(distances, edges)
-            sheet.line(axes, name, edges[:-1] + step / 2, share / len(distances), colour, drawstyle="steps-mid")
+            sheet.line(axes, name, edges[:-1] + step / 2, share / len(distances), colour, drawstyle="steps-mid",
+                       linewidth=3.0 if way == "ndt-lc" else 1.0)
             spread = np.quantile(distances, 0.995) - np.quantile(distances, 0.005)
             numbers.append((f"{site}, {name}: width that holds 99 % of D", f"{100 * spread:.1f} cm",
                             PAPER_WIDTH_M.get((site, way), "")))
