@@ -119,6 +119,8 @@ def draw_radius(plan, title, runs):
         # The first tenth stands still or has hardly a map, so the second is what growth is told from.
         early, late = (float(np.mean(blocks["cpu_ms"][part]))
                        for part in (slice(tenth, 2 * tenth), slice(-tenth, None)))
+        if name != "no limit" and run.told["quality"]["length_m"] < 100:
+            words += " This stretch is shorter than r_max, so nothing is cut yet and the curves coincide."
         numbers += [(f"{name}: points at the end", f"{blocks['map_size'][-1] / 1e6:.3f} million", ""),
                     (f"{name}: CPU a scan, second tenth and last tenth", f"{early:.0f} ms, {late:.0f} ms", "")]
     sheet.name(sizes, "points that scans are matched to", "time (s)", "points (million)")
