@@ -131,8 +131,8 @@ def draw_radius(plan, title, runs):
     return Drawn(sheet,
                  "The size of the reference cloud and the time per scan along lake, with and without the cut-map radius "
                  "of 100 m. Without it both grow over the run.",
-                 "ICP to points that enter only if farther than 5 cm from all others, with the local map cut at 100 m, "
-                 f"and at 1,000 m, which is all of this loop. No loops are closed.{words}",
+                 "ICP to points that enter only if farther than 5 cm from all others. The local map is cut at 100 m, and "
+                 f"at 1,000 m, which is all of this loop. No loops are closed.{words}",
                  numbers)
 
 
