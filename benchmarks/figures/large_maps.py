@@ -51,9 +51,11 @@ def draw_one_map(sheet, axes, run, title):
     extent = shown_part(points, margin=2.0)
     cell = max(0.25, (extent[1] - extent[0]) / 500)
     low, high = np.quantile(points[:, 2], [0.01, 0.995])
-    sheet.raster(axes, "highest point (m)", cells_of(points, extent, cell), extent, cmap="viridis", vmin=low,
-                 vmax=high)
+    image = sheet.raster(axes, "highest point (m)", cells_of(points, extent, cell), extent, cmap="viridis", vmin=low,
+                         vmax=high)
+    sheet.figure.colorbar(image, ax=axes, shrink=0.6, label="height above the start (m)")
     sheet.line(axes, "path", *path[:, :2].T, "second", linewidth=0.8)
+    sheet.legend(axes, loc="lower left", fontsize=7)
     sheet.name(axes, title, "east (m)", "north (m)")
     axes.grid(False)
     middle = path[min(len(path) - 1, len(path) // 20), :2]
