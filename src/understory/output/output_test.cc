@@ -389,6 +389,30 @@ TEST_F(OutputTest, RunJsonHasTheKeysThatOthersRead) {
   EXPECT_EQ(json["counts"]["trees"], 12);
 }
 
+TEST_F(OutputTest, BlocksOfScansAreMeansOfTheirScans) {
+  std::vector<ScanBlock> scans;
+  for (int i = 0; i < 7; ++i)
+    scans.push_back({0.1 * i, 1, 1.0 * i, 2.0 * i, 100.0 + i});
+  EXPECT_EQ(joined(scans, 7).size(), 7U);
+  const std::vector<ScanBlock> three = joined(scans, 3);
+  ASSERT_EQ(three.size(), 3U);
+  EXPECT_DOUBLE_EQ(three[1].from_s, 0.1 * 3);
+  EXPECT_EQ(three[1].scans, 3U);
+  EXPECT_DOUBLE_EQ(three[1].wall_ms, 4.0);
+  EXPECT_DOUBLE_EQ(three[1].cpu_ms, 8.0);
+  EXPECT_DOUBLE_EQ(three[1].map_size, 104.0);
+  EXPECT_EQ(three[2].scans, 1U);
+  EXPECT_DOUBLE_EQ(joined(three, 1)[0].map_size, 103.0);
+  EXPECT_TRUE(joined({}, 3).empty());
+
+  RunSummary summary;
+  EXPECT_FALSE(nlohmann::json::parse(run_json(summary)).contains("scan_blocks"));
+  summary.scan_blocks = three;
+  const auto json = nlohmann::json::parse(run_json(summary))["scan_blocks"];
+  EXPECT_EQ(json["scans"], nlohmann::json({3, 3, 1}));
+  EXPECT_EQ(json["map_size"], nlohmann::json({101, 104, 106}));
+}
+
 TEST_F(OutputTest, HashIsSha256) {
   const fs::path path = folder_ / "input.bin";
   std::ofstream(path, std::ios::binary) << "abc";  // FIPS 180-4, appendix B.1

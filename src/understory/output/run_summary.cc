@@ -113,6 +113,31 @@ Json to_json(const RunPlace& place) {
   return json;
 }
 
+Json to_json(const std::vector<ScanBlock>& blocks) {
+  Json json;
+  for (const ScanBlock& block : blocks) {
+    json["from_s"].push_back(number(block.from_s));
+    json["scans"].push_back(block.scans);
+    json["wall_ms"].push_back(number(block.wall_ms));
+    json["cpu_ms"].push_back(number(block.cpu_ms));
+    json["map_size"].push_back(number(block.map_size));
+  }
+  return json;
+}
+
+Json to_json(const std::map<std::string, StageSummary>& stages) {
+  Json json = Json::object();
+  for (const auto& [name, stage] : stages) {
+    json[name] = {{"wall_ms", to_json(stage.wall_ms)},
+                  {"cpu_ms", to_json(stage.cpu_ms)},
+                  {"runs", stage.wall_ms.count},
+                  {"total_wall_s", number(stage.total_wall_s)}};
+    if (!stage.cpu_ms_by_tenth.empty())
+      json[name]["cpu_ms_by_tenth"] = numbers(stage.cpu_ms_by_tenth);
+  }
+  return json;
+}
+
 std::vector<double> means_by_tenth(const std::vector<double>& values) {
   const std::size_t share = values.size() / 10;
   if (share < 10) return {};
@@ -155,6 +180,22 @@ std::map<std::string, StageSummary> summarise(const StageTimes& times) {
   return result;
 }
 
+std::vector<ScanBlock> joined(const std::vector<ScanBlock>& blocks, std::size_t most) {
+  std::vector<ScanBlock> result;
+  const std::size_t together = most == 0 ? blocks.size() : (blocks.size() + most - 1) / most;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const ScanBlock& block = blocks[i];
+    if (i % together == 0) result.emplace_back().from_s = block.from_s;
+    ScanBlock& into = result.back();
+    into.scans += block.scans;
+    const double share = static_cast<double>(block.scans) / static_cast<double>(into.scans);
+    into.wall_ms += share * (block.wall_ms - into.wall_ms);
+    into.cpu_ms += share * (block.cpu_ms - into.cpu_ms);
+    into.map_size += share * (block.map_size - into.map_size);
+  }
+  return result;
+}
+
 void add_latency(const Distribution& latency_ms, RunSummary& summary) {
   summary.quality["latency_ms_mean"] = latency_ms.mean;
   summary.quality["latency_ms_p50"] = latency_ms.p50;
@@ -180,16 +221,8 @@ std::string run_json(const RunSummary& summary) {
   json["wall_s"] = number(summary.wall_s);
   json["cpu_s"] = number(summary.cpu_s);
   json["peak_memory_mb"] = number(summary.peak_memory_mb);
-  json["stages"] = Json::object();
-  for (const auto& [name, stage] : summary.stages) {
-    json["stages"][name] = {{"wall_ms", to_json(stage.wall_ms)},
-                            {"cpu_ms", to_json(stage.cpu_ms)},
-                            {"runs", stage.wall_ms.count},
-                            {"total_wall_s", number(stage.total_wall_s)}};
-    if (!stage.cpu_ms_by_tenth.empty()) {
-      json["stages"][name]["cpu_ms_by_tenth"] = numbers(stage.cpu_ms_by_tenth);
-    }
-  }
+  json["stages"] = to_json(summary.stages);
+  if (!summary.scan_blocks.empty()) json["scan_blocks"] = to_json(summary.scan_blocks);
   json["counts"] = to_json(summary.counts);
   json["quality"] = to_json(summary.quality);
   if (!summary.evidence.empty()) json["evidence"] = to_json(summary.evidence);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -51,6 +52,18 @@ struct StageSummary {
 };
 [[nodiscard]] std::map<std::string, StageSummary> summarise(const StageTimes& times);
 
+// Means over so many scans one after another: how the work on a scan goes on over a run.
+struct ScanBlock {
+  double from_s = 0.0;  // since the first scan
+  std::size_t scans = 0;
+  double wall_ms = 0.0;
+  double cpu_ms = 0.0;
+  double map_size = 0.0;  // points or cells of the local map
+};
+// Means of neighbouring blocks, as few of them together as give `most` blocks at most. The last one
+// may hold fewer. Each block holds a scan at least.
+[[nodiscard]] std::vector<ScanBlock> joined(const std::vector<ScanBlock>& blocks, std::size_t most);
+
 using Figure = std::variant<std::int64_t, double, std::string, bool>;
 
 // How high the lidar looked: what tells which tops of trees it cannot have seen.
@@ -97,6 +110,7 @@ struct RunSummary {
   double cpu_s = 0.0;
   double peak_memory_mb = 0.0;
   std::map<std::string, StageSummary> stages;
+  std::vector<ScanBlock> scan_blocks;      // in order of time; empty: not known
   std::map<std::string, Figure> counts;    // keyframes, loops_accepted, map_points, trees ...
   std::map<std::string, Figure> quality;   // inlier_ratio_mean, ape_rmse_m ...
   std::map<std::string, Figure> evidence;  // what the status rests on

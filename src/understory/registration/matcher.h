@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -58,6 +59,8 @@ class MatchTarget {
   // A point farther than about this from all that the target shows matches nothing, metres. If
   // points lay there by chance, they would be half of it (RMS) from what they match.
   [[nodiscard]] virtual double reach_m() const = 0;
+  // Points, or cells of a method that sums up points, that the finest steps match to.
+  [[nodiscard]] virtual std::size_t size() const = 0;
   // The cost of a source in the coarsest (kFar) or in the last (kNear) steps; null if the method
   // makes no cost small that can be told at a pose.
   [[nodiscard]] virtual std::unique_ptr<const MatchCost> cost(const Points& source,

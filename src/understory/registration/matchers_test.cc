@@ -153,10 +153,14 @@ TEST_P(AnyMatcher, SnapshotsDoNotDependOnWhoHoldsTheLastOne) {
 
 TEST_P(AnyMatcher, ForgetsWhatIsFar) {
   const auto builder = make_matcher(config_)->make_builder({});
+  EXPECT_EQ(builder->snapshot()->size(), 0U);
   insert_path(*builder);
+  const std::size_t along_path = builder->snapshot()->size();
   const Pose far = upright(500.0, 0.0, 1.6);
   builder->insert(scan(upright(0.0, 0.0, 1.6), 7), far, 100.0);
   const MatchTargetPtr target = builder->snapshot();
+  EXPECT_GT(target->size(), 0U);
+  EXPECT_LT(target->size(), along_path);
   const RegistrationResult here = target->match(source_, truth_, {}, MatchStart::kNear);
   EXPECT_EQ(here.status, RegistrationStatus::kTooFewMatches) << here.reason;
   EXPECT_EQ(here.target_from_source.matrix(), truth_.matrix());

@@ -103,6 +103,7 @@ class WithoutCost : public MatchTarget {
     return {};
   }
   [[nodiscard]] double reach_m() const override { return 1.0; }
+  [[nodiscard]] std::size_t size() const override { return 0; }
 };
 
 TEST_F(ScanPath, AMatcherWithoutACostGivesNoCorrection) {

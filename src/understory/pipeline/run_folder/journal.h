@@ -39,6 +39,7 @@ struct ScanRecord {
   float cpu_ms = 0.0F;       // of all threads, without what looks for loops beside the scan loop
   std::uint32_t points = 0;  // of the scan as read
   std::uint32_t matched_points = 0;  // after the voxel filter
+  std::uint64_t map_size = 0;        // of the local map it was matched to: MatchTarget::size
 
   [[nodiscard]] Pose keyframe_from_body() const;
   void set_pose(const Pose& keyframe_from_body);

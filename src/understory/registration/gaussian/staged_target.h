@@ -67,6 +67,7 @@ class StagedTarget : public MatchTarget {
     return result;
   }
   [[nodiscard]] double reach_m() const override { return reach_m_; }
+  [[nodiscard]] std::size_t size() const override { return stages_.back().target->size(); }
   [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
                                                       MatchStart start) const override {
     return std::make_unique<GaussianMatchCost<Target>>(

@@ -53,6 +53,7 @@ class GicpTarget : public MatchTarget {
     return result;
   }
   [[nodiscard]] double reach_m() const override { return near_.max_distance_m; }
+  [[nodiscard]] std::size_t size() const override { return map_->size(); }
   [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
                                                       MatchStart start) const override {
     return std::make_unique<GicpMatchCost>(*map_, source, start == MatchStart::kFar ? far_ : near_);

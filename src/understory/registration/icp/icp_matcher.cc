@@ -71,6 +71,7 @@ class IcpMatchTarget : public MatchTarget {
     return result;
   }
   [[nodiscard]] double reach_m() const override { return near_steps_.max_distance_m; }
+  [[nodiscard]] std::size_t size() const override { return target_->size(); }
   [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
                                                       MatchStart start) const override {
     return std::make_unique<IcpCost<Target>>(*target_, source,

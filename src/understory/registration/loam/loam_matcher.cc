@@ -95,6 +95,7 @@ class LoamMatchTarget : public MatchTarget {
     return result;
   }
   [[nodiscard]] double reach_m() const override { return config_.max_distance_m; }
+  [[nodiscard]] std::size_t size() const override { return stages_.back().target->size(); }
   [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
                                                       MatchStart start) const override {
     return cost_of_features({source, {}}, start);

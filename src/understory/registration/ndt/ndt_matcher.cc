@@ -50,6 +50,7 @@ class NdtTarget : public MatchTarget {
                         config_, coarser_.get());
   }
   [[nodiscard]] double reach_m() const override { return maps_.back()->cell_size(); }
+  [[nodiscard]] std::size_t size() const override { return maps_.back()->size(); }
   [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
                                                       MatchStart start) const override {
     const bool far = start == MatchStart::kFar;

@@ -253,6 +253,7 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
   const ScopedTimer timer(times_, "scan");
   const double cpu_start = process_cpu_seconds() - map_->search_cpu_seconds();
   positioned_ = {};
+  const std::size_t local_map_size = map_->local_map() ? map_->local_map()->size() : 0;
   const NavState predicted =
       recovery_.is_outage(scan.stamp) ? odometry_->motion().predict(scan.stamp) : NavState();
   DenseEstimate estimate = odometry_->process(scan, map_->local_map(), knowledge_of(scan));
@@ -273,6 +274,7 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
   record.stamp = scan.stamp;
   record.points = static_cast<std::uint32_t>(scan.points.size());
   record.matched_points = static_cast<std::uint32_t>(estimate.thinned.size());
+  record.map_size = local_map_size;
   note_outcome(estimate, record);
   check_clock(estimate, record);
   update_map(estimate, record);

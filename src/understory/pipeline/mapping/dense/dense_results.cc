@@ -28,12 +28,15 @@
 namespace understory {
 namespace {
 
+constexpr std::size_t kScanBlocks = 200;  // of run.json: enough for a curve, little to read
+
 // What walking through the finished trajectory yields for report and run.json.
 struct TrajectoryFacts {
   Trajectory trajectory;  // as a reader of trajectory.tum gets it
   std::vector<ReportScan> scans;
   std::vector<float> cpu_ms;  // of each scan, see ScanRecord
   std::vector<float> wall_ms;
+  std::vector<ScanBlock> costs;  // of each scan
   double length_m = 0.0;
   double duration_s = 0.0;
   double period_ms = 0.0;  // median time between scans
@@ -54,6 +57,11 @@ ReportScan report_scan(const FinishedScan& scan) {
   }
   row.weak = record.outcome != ScanOutcome::kMatched || record.degenerate_directions > 0;
   return row;
+}
+
+ScanBlock cost_of(const ScanRecord& record, TimeNs first) {
+  return {to_seconds(record.stamp - first), 1, static_cast<double>(record.wall_ms),
+          static_cast<double>(record.cpu_ms), static_cast<double>(record.map_size)};
 }
 
 double median_period_ms(const std::vector<ReportScan>& scans) {
@@ -91,6 +99,7 @@ TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
                    static_cast<double>(record.fitness_m2));
         facts.cpu_ms.push_back(record.cpu_ms);
         facts.wall_ms.push_back(record.wall_ms);
+        facts.costs.push_back(cost_of(record, facts.trajectory.front().stamp));
         empty_in_a_row = record.matched_points < kFewPoints ? empty_in_a_row + 1 : 0;
         const Pose step = last.inverse() * scan.world_from_body;
         if (facts.scans.size() > 1) {
@@ -299,6 +308,7 @@ void fill_constancy(RunSummary& summary, const TrajectoryFacts& trajectory) {
 void fill_quality(const DenseFrontEnd& front_end, const TrajectoryFacts& trajectory,
                   const RunFacts& facts, RunSummary& summary) {
   fill_constancy(summary, trajectory);
+  summary.scan_blocks = joined(trajectory.costs, kScanBlocks);
   if (facts.memory_mb.size() > 1) {
     summary.quality["memory_mb_half"] = facts.memory_mb[facts.memory_mb.size() / 2];
     summary.quality["memory_mb_end"] = facts.memory_mb.back();
