@@ -133,6 +133,8 @@ class NdtMatcher : public Matcher {
       if (!(size >= 0.05 && size <= 20.0))
         throw ConfigError({"ndt.cell_sizes_m: expected values within 0.05..20 m"});
     }
+    if (config.sparse_cell_m != 0.0 && !(config.sparse_cell_m > config.cell_sizes_m.back()))
+      throw ConfigError({"ndt.sparse_cell_m: expected 0 or more than the finest cell"});
   }
 
   [[nodiscard]] std::unique_ptr<TargetBuilder> make_builder(
