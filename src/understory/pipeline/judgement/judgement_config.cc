@@ -50,13 +50,15 @@ void describe(ConfigTable& table, JudgementConfig& config) {
   table.add("max_imu_scale", config.max_imu_scale, ratios, "",
             "untrusted: accelerations by matching are more than this share of the accelerometer's");
   table.add("min_imu_windows", config.min_imu_windows, {1, 1000000}, "windows",
-            "with fewer windows of a third of a second the accelerations are not judged");
+            "with fewer windows of a third of a second the scale of accelerations is not judged");
   table.add("min_imu_spread_m_s2", config.min_imu_spread_m_s2, {0.0, 100.0}, "m/s^2",
             "below this standard deviation the accelerations are not judged");
   table.add("min_imu_correlation", config.min_imu_correlation, {-1.0, 1.0}, "",
             "untrusted, with the next: accelerations by matching and IMU correlate by less");
   table.add("max_imu_scatter_m_s2", config.max_imu_scatter_m_s2, {0.0, 1000.0}, "m/s^2",
             "untrusted, with min_imu_correlation: they differ by a larger standard deviation");
+  table.add("min_imu_scatter_windows", config.min_imu_scatter_windows, {1, 1000000}, "windows",
+            "with fewer windows their correlation is not judged");
   table.add("max_range_offset_m", config.max_range_offset_m, {0.0, 1000.0}, "m",
             "untrusted: all ranges seem to be too long or too short by more");
   table.add("min_range_pairs", config.min_range_pairs, {1, 1000000}, "pairs",

@@ -43,6 +43,7 @@ struct JudgementConfig {
   // differ by more than matching is uncertain (2 cm of a scan make 0.4 m/s^2).
   double min_imu_correlation = 0.7;
   double max_imu_scatter_m_s2 = 0.8;
+  int min_imu_scatter_windows = 30;  // fewer tell nothing: 10 s
   // All ranges too long or too short, see RangeCheck. Tall grass that hides the ground from afar
   // looks like ranges that are too long by its height.
   double max_range_offset_m = 0.4;

@@ -220,23 +220,30 @@ class Judge {
            std::sqrt(1.0 - std::min(1.0, correlation * correlation));
   }
 
+  [[nodiscard]] bool scale_is_off() const {
+    if (evidence_.imu_motion_windows < config_.min_imu_windows) return false;
+    const double slack = 3.0 * scale_deviation();
+    return evidence_.imu_motion_scale + slack < config_.min_imu_scale ||
+           evidence_.imu_motion_scale - slack > config_.max_imu_scale;
+  }
+
+  // Steps by stems err by centimetres: their accelerations correlate by 0.2 in good runs.
+  [[nodiscard]] bool accelerations_differ() const {
+    return !evidence_.by_stems && evidence_.imu_motion_windows >= config_.min_imu_scatter_windows &&
+           evidence_.imu_motion_correlation < config_.min_imu_correlation &&
+           scatter_m_s2() > config_.max_imu_scatter_m_s2;
+  }
+
   void judge_scale() {
     if (!evidence_.imu_distrust.empty()) return;  // then the IMU cannot be compared with
-    if (evidence_.imu_motion_windows < config_.min_imu_windows ||
-        evidence_.imu_motion_spread_m_s2 < config_.min_imu_spread_m_s2) {
-      return;
-    }
-    const double scale = evidence_.imu_motion_scale;
-    const double slack = 3.0 * scale_deviation();
-    if (scale + slack < config_.min_imu_scale || scale - slack > config_.max_imu_scale) {
+    if (evidence_.imu_motion_spread_m_s2 < config_.min_imu_spread_m_s2) return;
+    if (scale_is_off()) {
       hurt(fmt::format(
           "the accelerations of the path are {:.2f} times those of the accelerometer. One of these "
           "is wrong: the scale of the clouds (unit), the stamps of the scans, or the IMU's unit, "
           "clock or lever arm",
-          scale));
-    } else if (!evidence_.by_stems &&  // whose steps err by centimetres: 0.2 in good runs
-               evidence_.imu_motion_correlation < config_.min_imu_correlation &&
-               scatter_m_s2() > config_.max_imu_scatter_m_s2) {
+          evidence_.imu_motion_scale));
+    } else if (accelerations_differ()) {
       hurt(fmt::format(
           "the accelerations of the path are not those of the accelerometer (correlation {:.2f}). "
           "Scans are matched wrongly, or their stamps, the IMU's clock or its lever arm are wrong",

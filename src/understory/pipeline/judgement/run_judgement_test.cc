@@ -408,6 +408,12 @@ TEST(RunJudgement, APathThatIsNotTheAccelerometers) {
   evidence.imu_motion_scale = 0.82;
   evidence.imu_motion_correlation = 0.25;
   expect(RunStatus::kUntrusted, "lever arm", evidence);
+  // A recording of 12 s whose slow turn was matched as if the carrier stood still.
+  evidence.imu_motion_windows = JudgementConfig().min_imu_scatter_windows;
+  expect(RunStatus::kUntrusted, "matched wrongly", evidence);
+  --evidence.imu_motion_windows;
+  expect_complete(evidence);
+  evidence.imu_motion_windows = 300;
   // Steps by stems err by more than the motion of a good run.
   evidence.by_stems = true;
   evidence.stems.trees = 5;
