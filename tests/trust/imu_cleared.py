@@ -2,11 +2,12 @@
 then again from its beginning with the IMU. A path that is not the accelerometer's is not called complete."""
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program
+from program import PROGRAM, Cases, program
 
 cases = Cases()
 
@@ -25,8 +26,8 @@ def turned(folder):
 
 
 def mapped(recording, folder, *settings):
-    words = (word for setting in ("map.enabled=false", *settings) for word in ("--set", setting))
-    done = program("map", recording, "-o", folder, *words)
+    words = [word for setting in ("map.enabled=false", *settings) for word in ("--set", setting)]
+    done = subprocess.run([PROGRAM, "map", recording, "-o", folder, *words], capture_output=True, text=True, timeout=300)
     return done, json.loads((folder / "run.json").read_text())
 
 
