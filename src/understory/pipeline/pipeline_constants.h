@@ -54,6 +54,9 @@ namespace run_judgement {  // pipeline/judgement/run_judgement.cc
 inline constexpr double kSureErrors = 5.0;
 // m at which a turn counts as a shift [chosen]
 inline constexpr double kRangeM = 10.0;
+// Of JudgementConfig::max_imu_scatter_m_s2, where matches contradicted an IMU that was right [tuned
+// on swing: 0.76 m/s^2 at 21 cm, good runs at most 0.41]
+inline constexpr double kShareOfScatterWhenCleared = 0.5;
 // Share of the scans whose points have times in no order [chosen: no lidar gives one]
 inline constexpr double kMostMixedTimes = 0.05;
 // degrees that a map leans at most, with kLargeBiasM_s2: 1.7 m over 50 m [chosen]

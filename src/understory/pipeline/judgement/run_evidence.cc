@@ -88,6 +88,7 @@ Figures figures_of(const RunEvidence& evidence) {
   figures["imu_used"] = evidence.imu_used;
   figures["imu_on_probation"] = evidence.imu_on_probation;
   figures["imu_doubted_s"] = evidence.imu_doubted_s;
+  figures["imu_cleared"] = evidence.imu_cleared;
   figures["imu_trusted"] = evidence.imu_distrust.empty();
   figures["imu_motion_scale"] = evidence.imu_motion_scale;
   figures["imu_motion_correlation"] = evidence.imu_motion_correlation;

@@ -127,6 +127,7 @@ struct RunEvidence {
   bool imu_used = false;          // at the end
   bool imu_on_probation = false;  // at the end: left out until it is clear whether it is right
   double imu_doubted_s = 0.0;     // left out for so long, and used again
+  bool imu_cleared = false;       // a run before this one found it right, and matches wrong
   // Acceleration by matching over that by the accelerometer, how well they go together, and how
   // much there was to compare; see MotionScale.
   double imu_motion_scale = 0.0;

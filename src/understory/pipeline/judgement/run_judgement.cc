@@ -227,11 +227,13 @@ class Judge {
            evidence_.imu_motion_scale - slack > config_.max_imu_scale;
   }
 
-  // Steps by stems err by centimetres: their accelerations correlate by 0.2 in good runs.
+  // Steps by stems err by centimetres: their accelerations correlate by 0.2 in good runs. Matches
+  // that were wrong before have to fit better now.
   [[nodiscard]] bool accelerations_differ() const {
+    const double share = evidence_.imu_cleared ? kShareOfScatterWhenCleared : 1.0;
     return !evidence_.by_stems && evidence_.imu_motion_windows >= config_.min_imu_scatter_windows &&
            evidence_.imu_motion_correlation < config_.min_imu_correlation &&
-           scatter_m_s2() > config_.max_imu_scatter_m_s2;
+           scatter_m_s2() > share * config_.max_imu_scatter_m_s2;
   }
 
   void judge_scale() {

@@ -424,6 +424,12 @@ TEST(RunJudgement, APathThatIsNotTheAccelerometers) {
   evidence.imu_motion_scale = 1.0;
   evidence.imu_motion_correlation = 0.5;
   expect_complete(evidence);
+  // Where matches contradicted an IMU that was right, they have to fit better.
+  evidence.imu_cleared = true;
+  evidence.imu_motion_correlation = 0.4;  // they differ by 0.48 m/s^2
+  expect(RunStatus::kUntrusted, "matched wrongly", evidence);
+  evidence.imu_cleared = false;
+  expect_complete(evidence);
   // Vibrations: large, and of both.
   evidence.imu_motion_spread_m_s2 = 5.0;
   evidence.imu_motion_correlation = 0.97;

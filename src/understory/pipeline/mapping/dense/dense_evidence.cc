@@ -30,6 +30,7 @@ void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const R
     evidence.imu_distrust = trust.reason;
   }
   gather_imu_trust(trust, evidence);
+  evidence.imu_cleared = front_end.imu_cleared();
   const Eigen::Quaterniond level = front_end.odometry().motion().level_from_world();
   const double up = (level * Eigen::Vector3d::UnitZ()).z();
   evidence.tilt_at_end_deg = std::acos(std::clamp(up, -1.0, 1.0)) * 180.0 / M_PI;

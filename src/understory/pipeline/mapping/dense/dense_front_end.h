@@ -95,6 +95,7 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] const SensorTraits& traits() const { return traits_; }
   // Why this run does without the IMU; empty if it does not.
   [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
+  [[nodiscard]] bool imu_cleared() const { return imu_cleared_s_.has_value(); }
   [[nodiscard]] const Rig& rig() const { return rig_; }
   [[nodiscard]] const DenseCounts& counts() const { return received_.counts; }
   // For how long the IMU's samples could not be used.
