@@ -2,6 +2,29 @@
 
 namespace understory {
 
+namespace {
+
+// The path's against the accelerometer's.
+void describe_accelerations(ConfigTable& table, JudgementConfig& config) {
+  const ConfigTable::Range ratios{-1e6, 1e6};
+  table.add("min_imu_scale", config.min_imu_scale, ratios, "",
+            "untrusted: accelerations by matching are less than this share of the accelerometer's");
+  table.add("max_imu_scale", config.max_imu_scale, ratios, "",
+            "untrusted: accelerations by matching are more than this share of the accelerometer's");
+  table.add("min_imu_windows", config.min_imu_windows, {1, 1000000}, "windows",
+            "with fewer windows of a third of a second the scale of accelerations is not judged");
+  table.add("min_imu_spread_m_s2", config.min_imu_spread_m_s2, {0.0, 100.0}, "m/s^2",
+            "below this standard deviation the accelerations are not judged");
+  table.add("min_imu_correlation", config.min_imu_correlation, {-1.0, 1.0}, "",
+            "untrusted, with the next: accelerations by matching and IMU correlate by less");
+  table.add("max_imu_scatter_m_s2", config.max_imu_scatter_m_s2, {0.0, 1000.0}, "m/s^2",
+            "untrusted, with min_imu_correlation: they differ by a larger standard deviation");
+  table.add("min_imu_scatter_windows", config.min_imu_scatter_windows, {1, 1000000}, "windows",
+            "with fewer windows their correlation is not judged");
+}
+
+}  // namespace
+
 void describe(ConfigTable& table, JudgementConfig& config) {
   const ConfigTable::Range shares{0.0, 1.0};
   const ConfigTable::Range seconds{0.0, 1e6};
@@ -45,20 +68,7 @@ void describe(ConfigTable& table, JudgementConfig& config) {
             "untrusted: within scans the sensor moves more than this share of that motion");
   table.add("min_scan_motion_probes", config.min_scan_motion_probes, {1, 1000000}, "scans",
             "with fewer scans the motion within scans is not judged");
-  table.add("min_imu_scale", config.min_imu_scale, ratios, "",
-            "untrusted: accelerations by matching are less than this share of the accelerometer's");
-  table.add("max_imu_scale", config.max_imu_scale, ratios, "",
-            "untrusted: accelerations by matching are more than this share of the accelerometer's");
-  table.add("min_imu_windows", config.min_imu_windows, {1, 1000000}, "windows",
-            "with fewer windows of a third of a second the scale of accelerations is not judged");
-  table.add("min_imu_spread_m_s2", config.min_imu_spread_m_s2, {0.0, 100.0}, "m/s^2",
-            "below this standard deviation the accelerations are not judged");
-  table.add("min_imu_correlation", config.min_imu_correlation, {-1.0, 1.0}, "",
-            "untrusted, with the next: accelerations by matching and IMU correlate by less");
-  table.add("max_imu_scatter_m_s2", config.max_imu_scatter_m_s2, {0.0, 1000.0}, "m/s^2",
-            "untrusted, with min_imu_correlation: they differ by a larger standard deviation");
-  table.add("min_imu_scatter_windows", config.min_imu_scatter_windows, {1, 1000000}, "windows",
-            "with fewer windows their correlation is not judged");
+  describe_accelerations(table, config);
   table.add("max_range_offset_m", config.max_range_offset_m, {0.0, 1000.0}, "m",
             "untrusted: all ranges seem to be too long or too short by more");
   table.add("min_range_pairs", config.min_range_pairs, {1, 1000000}, "pairs",

@@ -68,13 +68,15 @@ TEST(Adaptation, SparseScansAreThinnedLessAndEachChangeIsTold) {
   EXPECT_EQ(ndt_of(adapted).cells.min_points, 4);
   EXPECT_EQ(ndt_of(adapted).cells.volume_weight, 1.0);
   EXPECT_TRUE(ndt_of(adapted).cells.few_rings);
+  EXPECT_EQ(ndt_of(adapted).sparse_cell_m, 1.0);
   EXPECT_EQ(adapted.config.cloud_distance_m, 0.1);
   EXPECT_EQ(keys_of(adapted.changes),
             (std::vector<std::string>{
                 "keyframe.below_found_share", "keyframe.distance_m", "map.cloud_distance_m",
                 "preprocess.voxel.voxel_size_m", "registration.few_found_residual",
                 "registration.min_inlier_ratio", "registration.ndt.few_rings",
-                "registration.ndt.min_points", "registration.ndt.volume_weight"}));
+                "registration.ndt.min_points", "registration.ndt.sparse_cell_m",
+                "registration.ndt.volume_weight"}));
   // Nothing else changed than what is told.
   DenseMappingConfig back = adapted.config;
   const ConfigTable table = dense_mapping_table(back);
@@ -100,11 +102,12 @@ TEST(Adaptation, WhatTheUserSetStays) {
   EXPECT_EQ(adapted.config.odometry.voxel.voxel_size_m, 0.4);
   EXPECT_EQ(ndt_of(adapted).cells.volume_weight, 0.03);
   EXPECT_EQ(ndt_of(adapted).cell_sizes_m, (std::vector<double>{2.0, 0.5}));
-  EXPECT_EQ(keys_of(adapted.changes),
-            (std::vector<std::string>{"keyframe.below_found_share", "keyframe.distance_m",
-                                      "map.cloud_distance_m", "registration.few_found_residual",
-                                      "registration.min_inlier_ratio", "registration.ndt.few_rings",
-                                      "registration.ndt.min_points"}));
+  EXPECT_EQ(
+      keys_of(adapted.changes),
+      (std::vector<std::string>{"keyframe.below_found_share", "keyframe.distance_m",
+                                "map.cloud_distance_m", "registration.few_found_residual",
+                                "registration.min_inlier_ratio", "registration.ndt.few_rings",
+                                "registration.ndt.min_points", "registration.ndt.sparse_cell_m"}));
 }
 
 TEST(Adaptation, WhatAProfileSetStays) {
