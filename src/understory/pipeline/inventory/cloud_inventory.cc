@@ -282,7 +282,14 @@ class LabelledCloud {
     records_.resize(points.size());
     parallel_for(points.size(), 4096,
                  [&](std::size_t i) { records_[i] = record_of(points[i], origin, times, owners); });
-    for (const LasRecord& record : records_) {
+    // By one thread: a frame on the globe keeps what it looked up last.
+    for (LasRecord& record : records_) {
+      const Eigen::Vector3d in_world(record.x, record.y, record.z);
+      const Eigen::Vector3d at =
+          stock_.of_run ? stock_.frames.layers.from_world(in_world) : in_world;
+      record.x = at.x();
+      record.y = at.y();
+      record.z = at.z();
       if (has_room(options_, {record.x, record.y, record.z})) {
         writer_.add(record);
       } else {
@@ -291,16 +298,16 @@ class LabelledCloud {
     }
   }
 
+  // With its place in the world frame. Thread-safe.
   [[nodiscard]] LasRecord record_of(const TilePoint& point, const Eigen::Vector3d& origin,
                                     bool times, const TreeOwners& owners) const {
     const InventoryResult& inventory = stock_.inventory;
     const Eigen::Vector3d in_world = origin + point.place.cast<double>();
     const double height = inventory.ground.height_above(in_world);
-    const Eigen::Vector3d at = stock_.of_run ? stock_.frames.layers.from_world(in_world) : in_world;
     LasRecord record;
-    record.x = at.x();
-    record.y = at.y();
-    record.z = at.z();
+    record.x = in_world.x();
+    record.y = in_world.y();
+    record.z = in_world.z();
     if (times) record.gps_time = point.gps_time;
     record.intensity = las_intensity(scale_ * point.intensity);
     record.classification = inventory.ground.las_class(height);
