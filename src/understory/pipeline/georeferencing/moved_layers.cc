@@ -60,6 +60,7 @@ void move_cloud(const fs::path& from, const fs::path& to, const Move& move, cons
   LasOptions options = las_options(move.to);
   if (fs::exists(copc_path(from))) ask_for_copc(options, log);
   options.gps_week_time = header.gps_week_time;
+  options.trees = header.has_trees;
   LasWriter writer(to, options);
   read_las_points(*file, header, log, [&](const LasPoint& point) {
     move.progress.poll();
@@ -73,6 +74,8 @@ void move_cloud(const fs::path& from, const fs::path& to, const Move& move, cons
     record.intensity =
         static_cast<std::uint16_t>(std::clamp(std::lround(point.intensity), 0L, 65535L));
     record.classification = point.classification;
+    record.tree_id = point.tree_id;
+    record.height_above_ground = point.height_above_ground;
     writer.add(record);
     if (drawing.picture == nullptr) return;
     const Vector3d drawn = drawing.frame.from_world(in_world);

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <numbers>
 
 #include "understory/georeference/terrain_file.h"
@@ -112,6 +114,52 @@ TEST(MovedLayers, CloudAndRastersGoWithThePath) {
   // Nothing is known beyond the edges.
   const Vector3d beyond = motion * Vector3d(0.0, 14.0, 0.0);
   EXPECT_TRUE(std::isnan(ground.cell_value(beyond.x(), beyond.y())));
+}
+
+void write_points_of_trees(const fs::path& path) {
+  LasOptions options;
+  options.trees = true;
+  LasWriter writer(path, options);
+  for (std::uint32_t k = 0; k < 3000; ++k) {
+    LasRecord record;
+    record.x = 0.01 * k;
+    record.tree_id = k % 7;
+    record.height_above_ground =
+        k % 5 == 0 ? std::numeric_limits<float>::quiet_NaN() : 0.1F * static_cast<float>(k);
+    writer.add(record);
+  }
+  writer.commit();
+}
+
+void expect_points_of_trees(const fs::path& path) {
+  Log log;
+  const auto file = open_file(path.string());
+  const LasHeader header = read_las_header(*file);
+  ASSERT_TRUE(header.has_trees);
+  std::uint32_t k = 0;
+  read_las_points(*file, header, log, [&](const LasPoint& point) {
+    EXPECT_EQ(point.tree_id, k % 7);
+    if (k % 5 == 0) {
+      EXPECT_TRUE(std::isnan(point.height_above_ground));
+    } else {
+      EXPECT_EQ(point.height_above_ground, 0.1F * static_cast<float>(k));
+    }
+    ++k;
+  });
+  EXPECT_EQ(k, 3000U);
+}
+
+// A regression: the points of a full inventory lost the tree that they belong to.
+TEST(MovedLayers, PointsKeepTheirTreesAndHeights) {
+  const Folders folders;
+  write_points_of_trees(folders.run / "map.laz");
+  Log log;
+  const LayerFrame local;
+  MapPicture picture;
+  write_moved_layers({folders.run, local}, Pose(), {folders.result, local}, local, picture, log);
+  expect_points_of_trees(folders.result / "map.laz");
+  write_points_of_trees(folders.run / "plain.las");
+  expect_points_of_trees(folders.run / "plain.las");
 }
 
 // A run on the globe is read back from its own system, whatever that is.

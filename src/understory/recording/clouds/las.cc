@@ -16,8 +16,10 @@
 #include <memory>
 #include <streambuf>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
+#include "understory/recording/clouds/las_vlrs.h"
 #include "understory/recording/finding.h"
 #include "understory/util/error.h"
 #include "understory/util/files/read_error.h"
@@ -25,68 +27,19 @@
 namespace understory {
 namespace {
 
+using namespace las_bytes;
+
 constexpr std::size_t kSmallestHeader = 227;
-constexpr std::uint32_t kMostVlrs = 4096;
-constexpr std::size_t kVlrHeader = 54;
 constexpr std::size_t kLargestPoint = 4096;
 constexpr std::array<std::uint32_t, 11> kRecordLengths{20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+constexpr std::size_t kTreeColumns = sizeof(std::uint32_t) + sizeof(float);
 
-template <typename T>
-T get(const std::vector<std::uint8_t>& bytes, std::size_t at) {
-  T value{};
-  if (at + sizeof(T) <= bytes.size()) std::memcpy(&value, bytes.data() + at, sizeof(T));
-  return value;
+std::uint32_t plain_length(const LasHeader& header) {
+  return kRecordLengths[static_cast<std::size_t>(header.point_format)];
 }
 
 [[noreturn]] void fail(const ByteSource& file, std::uint64_t at, const std::string& expected) {
   throw InputError(file.name(), "byte " + std::to_string(at), expected);
-}
-
-std::string text_of(const std::vector<std::uint8_t>& bytes, std::size_t at, std::size_t size) {
-  std::string text;
-  for (std::size_t i = at; i < std::min(at + size, bytes.size()) && bytes[i] != 0; ++i)
-    text.push_back(static_cast<char>(bytes[i]));
-  return text;
-}
-
-// The EPSG number of a GeoTIFF key directory: projected, else geographic; 0 if it has neither.
-int epsg_of_keys(const std::vector<std::uint8_t>& keys) {
-  constexpr std::uint16_t kProjected = 3072;
-  constexpr std::uint16_t kGeographic = 2048;
-  constexpr std::uint16_t kUserDefined = 32767;
-  int projected = 0;
-  int geographic = 0;
-  for (std::size_t at = 8; at + 8 <= keys.size(); at += 8) {
-    const auto key = get<std::uint16_t>(keys, at);
-    const auto location = get<std::uint16_t>(keys, at + 2);
-    const auto value = get<std::uint16_t>(keys, at + 6);
-    if (location != 0 || value == 0 || value >= kUserDefined) continue;
-    if (key == kProjected) projected = value;
-    if (key == kGeographic) geographic = value;
-  }
-  return projected != 0 ? projected : geographic;
-}
-
-std::string coordinate_system(ByteSource& file, std::uint64_t at, std::uint32_t vlrs) {
-  constexpr std::size_t kLongestWkt = 65'535;
-  std::string wkt;
-  int epsg = 0;
-  std::vector<std::uint8_t> vlr;
-  for (std::uint32_t i = 0; i < std::min(vlrs, kMostVlrs); ++i) {
-    file.read(at, kVlrHeader, vlr);
-    if (vlr.size() < kVlrHeader) break;
-    const auto id = get<std::uint16_t>(vlr, 18);
-    const auto size = get<std::uint16_t>(vlr, 20);
-    const bool projection = text_of(vlr, 2, 16) == "LASF_Projection";
-    if (projection && (id == 2112 || id == 34735)) {
-      file.read(at + kVlrHeader, size, vlr);
-      if (id == 2112) wkt = text_of(vlr, 0, kLongestWkt);
-      if (id == 34735) epsg = epsg_of_keys(vlr);
-    }
-    at += kVlrHeader + size;
-  }
-  if (!wkt.empty()) return wkt;
-  return epsg == 0 ? "" : "EPSG:" + std::to_string(epsg);
 }
 
 bool has_time(int format) {
@@ -117,6 +70,7 @@ class PointDecoder {
     const bool modern = header_.point_format >= 6;
     point.classification = modern ? raw[16] : static_cast<std::uint8_t>(raw[15] & 0x1F);
     if (header_.has_gps_time) std::memcpy(&point.gps_time, raw + (modern ? 22 : 20), 8);
+    if (header_.has_trees) take_columns(raw + plain_length(header_), point);
     return point;
   }
   [[nodiscard]] LasPoint from_laszip(const laszip_point& raw) const {
@@ -126,10 +80,17 @@ class PointDecoder {
     point.classification =
         header_.point_format >= 6 ? raw.extended_classification : raw.classification;
     point.gps_time = header_.has_gps_time ? raw.gps_time : 0.0;
+    if (header_.has_trees && raw.num_extra_bytes >= static_cast<laszip_I32>(kTreeColumns))
+      take_columns(raw.extra_bytes, point);
     return point;
   }
 
  private:
+  static void take_columns(const std::uint8_t* raw, LasPoint& point) {
+    std::memcpy(&point.tree_id, raw, sizeof(point.tree_id));
+    std::memcpy(&point.height_above_ground, raw + sizeof(point.tree_id),
+                sizeof(point.height_above_ground));
+  }
   [[nodiscard]] Eigen::Vector3d position(double x, double y, double z) const {
     return header_.offset + header_.scale.cwiseProduct(Eigen::Vector3d(x, y, z));
   }
@@ -463,8 +424,7 @@ LasHeader read_las_header(ByteSource& file) {
   const auto header_size = get<std::uint16_t>(raw, 94);
   if (header.point_format >= static_cast<int>(kRecordLengths.size()))
     fail(file, 104, "expected a point format from 0 to 10");
-  if (header.record_length < kRecordLengths[static_cast<std::size_t>(header.point_format)] ||
-      header.record_length > kLargestPoint)
+  if (header.record_length < plain_length(header) || header.record_length > kLargestPoint)
     fail(file, 105, "expected a record length that goes with the point format");
   if (!header.scale.allFinite() || !header.offset.allFinite() || header.scale.minCoeff() <= 0.0 ||
       header.scale.maxCoeff() > 1e6 || header.offset.cwiseAbs().maxCoeff() > 1e12)
@@ -472,7 +432,9 @@ LasHeader read_las_header(ByteSource& file) {
   if (header_size < kSmallestHeader || header.point_position < header_size ||
       header.point_position > file.size())
     fail(file, 94, "expected the points behind the header");
-  header.coordinate_system = coordinate_system(file, header_size, get<std::uint32_t>(raw, 100));
+  LasVlrs vlrs = read_las_vlrs(file, header_size, get<std::uint32_t>(raw, 100));
+  header.coordinate_system = std::move(vlrs.coordinate_system);
+  header.has_trees = vlrs.trees && header.record_length >= plain_length(header) + kTreeColumns;
   return header;
 }
 

@@ -17,6 +17,7 @@ struct LasHeader {
   bool compressed = false;
   bool has_gps_time = false;
   bool gps_week_time = false;  // times count from the beginning of a week
+  bool has_trees = false;      // points have tree_id and HeightAboveGround, see LasWriter
   std::uint64_t points = 0;
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
@@ -33,6 +34,9 @@ struct LasPoint {
   float intensity = 0.0F;
   std::uint8_t classification = 0;
   double gps_time = 0.0;
+  // With LasHeader::has_trees only.
+  std::uint32_t tree_id = 0;         // 0: of no tree
+  float height_above_ground = 0.0F;  // metres; NaN where the ground is not known
 };
 
 // LAS 1.0 to 1.4, point formats 0 to 10. Throws InputError if the header cannot be used.
