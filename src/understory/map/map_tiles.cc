@@ -15,7 +15,17 @@ constexpr std::uint64_t kBufferedPoints = 2'000'000;  // 48 MB over all tiles
 constexpr std::size_t kBlock = 1 << 16;  // points; 1.5 MB, so that they stay in the cache
 constexpr std::size_t kKeysAhead = 32;
 
+constexpr double kGridStepsPerMetre = 4096.0;
+
 }  // namespace
+
+double on_map_grid(double metres) {
+  return std::nearbyint(metres * kGridStepsPerMetre) / kGridStepsPerMetre;
+}
+
+Eigen::Vector3d on_map_grid(const Eigen::Vector3d& place) {
+  return {on_map_grid(place.x()), on_map_grid(place.y()), on_map_grid(place.z())};
+}
 
 struct MapTiles::Record {
   float x, y, z;
@@ -29,8 +39,8 @@ struct MapTiles::Tile {
   std::uint64_t written = 0;  // records in its file
 };
 
-MapTiles::MapTiles(std::filesystem::path folder, const Config& config)
-    : folder_(std::move(folder)), config_(config) {
+MapTiles::MapTiles(std::filesystem::path folder, const Config& config, StoredPlace stored_place)
+    : folder_(std::move(folder)), config_(config), stored_place_(std::move(stored_place)) {
   std::error_code error;
   std::filesystem::remove_all(folder_, error);
   std::filesystem::create_directories(folder_, error);
@@ -69,11 +79,16 @@ void MapTiles::add(const MapPoint& point) {
 }
 
 void MapTiles::add_to(TileIndex index, const MapPoint& point, bool of_neighbour) {
-  tiles_[index].buffer.push_back({static_cast<float>(point.x - index.first * config_.tile_m),
-                                  static_cast<float>(point.y - index.second * config_.tile_m),
+  tiles_[index].buffer.push_back({static_cast<float>(point.x - corner(index.first)),
+                                  static_cast<float>(point.y - corner(index.second)),
                                   static_cast<float>(point.z), point.intensity, of_neighbour,
                                   point.stamp});
   ++buffered_;
+}
+
+// Of the tile of this number along an axis.
+double MapTiles::corner(std::int32_t tiles) const {
+  return on_map_grid(tiles * config_.tile_m);
 }
 
 std::filesystem::path MapTiles::file_of(TileIndex index) const {
@@ -128,12 +143,26 @@ std::vector<MapTiles::Record> MapTiles::thinned(std::span<const Record> records)
   return kept;
 }
 
+void MapTiles::move_to_stored(TileIndex index, std::vector<Record>& records) const {
+  const Eigen::Vector3d from(corner(index.first), corner(index.second), 0.0);
+  for (Record& r : records) {
+    const Eigen::Vector3d place = from + Eigen::Vector3f(r.x, r.y, r.z).cast<double>();
+    const Eigen::Vector3f stored = (stored_place_(place) - from).cast<float>();
+    r.x = stored.x();
+    r.y = stored.y();
+    r.z = stored.z();
+  }
+}
+
 void MapTiles::thin_all() {
   thinned_ = true;
-  if (config_.thin_m <= 0.0) return;
+  if (config_.thin_m <= 0.0 && !stored_place_) return;
   std::vector<Record> loaded;
   for (auto& [index, tile] : tiles_) {
-    std::vector<Record> kept = thinned(records_of(index, tile, loaded));
+    const std::span<const Record> all = records_of(index, tile, loaded);
+    std::vector<Record> kept =
+        config_.thin_m > 0.0 ? thinned(all) : std::vector<Record>(all.begin(), all.end());
+    if (stored_place_) move_to_stored(index, kept);
     const bool on_disk = tile.written > 0;
     if (on_disk) {
       std::filesystem::remove(file_of(index));
@@ -162,9 +191,9 @@ void MapTiles::for_each(const std::function<void(TileIndex, const std::vector<Ma
   for (const auto& [index, tile] : tiles_in_order()) {
     points.clear();
     for (const Record& r : records_of(index, *tile, loaded)) {
-      points.push_back({index.first * config_.tile_m + static_cast<double>(r.x),
-                        index.second * config_.tile_m + static_cast<double>(r.y),
-                        static_cast<double>(r.z), r.stamp, r.intensity, r.of_neighbour});
+      points.push_back({corner(index.first) + static_cast<double>(r.x),
+                        corner(index.second) + static_cast<double>(r.y), static_cast<double>(r.z),
+                        r.stamp, r.intensity, r.of_neighbour});
     }
     visit(index, points);
   }
@@ -175,8 +204,8 @@ void MapTiles::for_each_place(const std::function<void(std::span<const Eigen::Ve
   std::vector<Eigen::Vector3d> places;
   std::vector<Record> loaded;
   for (const auto& [index, tile] : tiles_in_order()) {
-    const double x0 = index.first * config_.tile_m;
-    const double y0 = index.second * config_.tile_m;
+    const double x0 = corner(index.first);
+    const double y0 = corner(index.second);
     const std::span<const Record> records = records_of(index, *tile, loaded);
     for (std::size_t begin = 0; begin < records.size(); begin += kBlock) {
       places.clear();

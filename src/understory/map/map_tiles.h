@@ -24,6 +24,11 @@ struct MapPoint {
   bool of_neighbour = false;  // lies in another tile, within `border_m` of this one
 };
 
+// Places of a finished map lie on a grid of 2^-12 m, 0.24 mm. Single precision holds them exactly
+// up to 4 km from a place of the grid, so each reader of the map works with the same numbers.
+[[nodiscard]] double on_map_grid(double metres);
+[[nodiscard]] Eigen::Vector3d on_map_grid(const Eigen::Vector3d& place);
+
 // Sorts the points of a map of any size into square tiles, on disk where they are many, and hands
 // the tiles back one by one, thinned: at most one point (the first that was measured) in each cube
 // of `thin_m`. Memory is that of one tile and of the write buffers.
@@ -37,8 +42,13 @@ class MapTiles {
   };
   using TileIndex = std::pair<std::int32_t, std::int32_t>;  // x, y in tiles
 
-  // `folder` is made, and removed again by the destructor.
-  MapTiles(std::filesystem::path folder, const Config& config);
+  // A place of the world frame, metres, as the files of the map give it back: on the grid of
+  // on_map_grid(), and the same again for the place that it returned.
+  using StoredPlace = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
+
+  // `folder` is made, and removed again by the destructor. `stored_place`, if any, is applied to
+  // the points that are handed back.
+  MapTiles(std::filesystem::path folder, const Config& config, StoredPlace stored_place = {});
   ~MapTiles();
   MapTiles(const MapTiles&) = delete;
   MapTiles& operator=(const MapTiles&) = delete;
@@ -62,10 +72,13 @@ class MapTiles {
   [[nodiscard]] std::span<const Record> records_of(TileIndex index, const Tile& tile,
                                                    std::vector<Record>& loaded) const;
   [[nodiscard]] std::vector<Record> thinned(std::span<const Record> records) const;
+  [[nodiscard]] double corner(std::int32_t tiles) const;
+  void move_to_stored(TileIndex index, std::vector<Record>& records) const;
   [[nodiscard]] std::vector<std::pair<TileIndex, const Tile*>> tiles_in_order() const;
 
   std::filesystem::path folder_;
   Config config_;
+  StoredPlace stored_place_;
   std::map<TileIndex, Tile> tiles_;
   std::uint64_t points_added_ = 0;
   std::uint64_t buffered_ = 0;

@@ -12,6 +12,7 @@
 #include "understory/forest/cloud_shape.h"
 #include "understory/geometry/rotation_between.h"
 #include "understory/georeference/systems/coordinate_system.h"
+#include "understory/pipeline/georeferencing/stored_places.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/error.h"
 
@@ -62,15 +63,12 @@ std::optional<CloudMove> upright_move(const CloudFrame& frame) {
       }};
 }
 
-// From the frame of the layers to the world.
-std::optional<CloudMove> world_move(const LayerFrame& layers) {
-  if (layers.is_world()) return std::nullopt;
-  return CloudMove{
-      [&layers](const Eigen::Vector3d& origin) { return layers.to_world(origin); },
-      [&layers](const Eigen::Vector3d& origin, const Eigen::Vector3f& point) -> Eigen::Vector3f {
-        return (layers.to_world(origin + point.cast<double>()) - layers.to_world(origin))
-            .cast<float>();
-      }};
+// From the frame of the layers of a run to its world frame; none for another cloud.
+PlaceChange into_world(const LayerFrame* layers) {
+  if (layers == nullptr) return {};
+  return [stored = StoredPlaces(*layers)](const Eigen::Vector3d& place) {
+    return stored.from_layers(place);
+  };
 }
 
 void move_cloud(const CloudMove& move, PointCloudFile& cloud) {
@@ -178,20 +176,18 @@ void warn_of_lost(const PointCloudFile& cloud, std::uint64_t kept, const std::st
 // Reads the cloud in one piece or into tiles, moved. `layers`: of a run, null for another cloud.
 StandCloud moved_stand(const std::string& name, const CloudFrame& frame, const LayerFrame* layers,
                        Log& log, const ProgressSink& progress, const CloudTiling* tiling) {
+  const PlaceChange change = into_world(layers);
   std::vector<CloudMove> moves;
-  if (layers != nullptr) {
-    if (auto move = world_move(*layers)) moves.push_back(*std::move(move));
-  }
   if (auto move = upright_move(frame)) moves.push_back(*std::move(move));
   StandCloud stand;
-  if (tiling != nullptr) stand.streamed = stream_cloud(name, *tiling, moves, log, progress);
+  if (tiling != nullptr) stand.streamed = stream_cloud(name, *tiling, change, moves, log, progress);
   if (stand.streamed) {
     stand.cloud = stand.streamed->about;
     refuse_rounded(stand.cloud, name, frame);
     warn_of_lost(stand.cloud, stand.streamed->tiles->points(), name, log);
     return stand;
   }
-  stand.cloud = read_cloud(name, log, progress);
+  stand.cloud = read_cloud(name, log, progress, change);
   refuse_rounded(stand.cloud, name, frame);
   warn_of_lost(stand.cloud, stand.cloud.points.size(), name, log);
   for (const CloudMove& move : moves)

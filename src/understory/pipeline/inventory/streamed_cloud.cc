@@ -59,20 +59,27 @@ void check_space(const CloudTiling& tiling, const Stated& stated) {
                                 static_cast<double>(space.available) / 1e9));
 }
 
+// What is done to each point of a file.
+struct PlaceChanges {
+  const PlaceChange& first;  // may be empty
+  const std::vector<CloudMove>& moves;
+};
+
 // Takes the points of a file one after another.
 class Sorter {
  public:
-  Sorter(StreamedCloud& cloud, const std::vector<CloudMove>& moves)
-      : cloud_(cloud), moves_(moves) {}
+  Sorter(StreamedCloud& cloud, const PlaceChanges& changes)
+      : cloud_(cloud), change_(changes.first), moves_(changes.moves) {}
 
   void add(const Eigen::Vector3d& position, float intensity, double gps_time) {
     if (!position.allFinite()) {
       ++cloud_.about.not_finite;
       return;
     }
-    if (count_ == 0) begin(position);
+    const Eigen::Vector3d place = change_ ? change_(position) : position;
+    if (count_ == 0) begin(place);
     TilePoint point;
-    point.place = (position - origins_.front()).cast<float>();
+    point.place = (place - origins_.front()).cast<float>();
     for (std::size_t i = 0; i < moves_.size(); ++i)
       point.place = moves_[i].point(origins_[i], point.place);
     point.intensity = intensity;
@@ -93,6 +100,7 @@ class Sorter {
   }
 
   StreamedCloud& cloud_;
+  const PlaceChange& change_;
   const std::vector<CloudMove>& moves_;
   std::vector<Eigen::Vector3d> origins_;  // before each move, and at the end
   Eigen::Vector3d first_ = Eigen::Vector3d::Zero();
@@ -115,7 +123,7 @@ StreamedCloud end_cloud(StreamedCloud cloud, const std::string& path, int thread
 }
 
 std::optional<StreamedCloud> stream_las(ByteSource& file, const CloudTiling& tiling,
-                                        const std::vector<CloudMove>& moves, Log& log,
+                                        const PlaceChanges& changes, Log& log,
                                         const ProgressSink& progress) {
   const LasHeader header = read_las_header(file);
   const Stated stated = stated_by(header, file);
@@ -123,7 +131,7 @@ std::optional<StreamedCloud> stream_las(ByteSource& file, const CloudTiling& til
   StreamedCloud cloud = begin_cloud(described_by(header), stated, tiling);
   cloud.has_times = header.has_gps_time;
   cloud.has_intensity = true;
-  Sorter sorter(cloud, moves);
+  Sorter sorter(cloud, changes);
   read_las_points(file, header, log, [&](const LasPoint& point) {
     progress.poll();
     sorter.add(point.position, point.intensity, point.gps_time);
@@ -132,14 +140,14 @@ std::optional<StreamedCloud> stream_las(ByteSource& file, const CloudTiling& til
 }
 
 std::optional<StreamedCloud> stream_e57(ByteSource& file, const CloudTiling& tiling,
-                                        const std::vector<CloudMove>& moves, Log& log,
+                                        const PlaceChanges& changes, Log& log,
                                         const ProgressSink& progress) {
   const E57Header header = read_e57_header(file);
   const Stated stated = stated_by(header, file);
   if (in_memory(stated, tiling.config)) return std::nullopt;
   StreamedCloud cloud = begin_cloud(described_by(header), stated, tiling);
   cloud.has_intensity = header.has_intensity();
-  Sorter sorter(cloud, moves);
+  Sorter sorter(cloud, changes);
   bool first = true;
   read_e57_points(file, header, log, [&](const E57Point& point) {
     progress.poll();
@@ -155,15 +163,17 @@ std::optional<StreamedCloud> stream_e57(ByteSource& file, const CloudTiling& til
 }  // namespace
 
 std::optional<StreamedCloud> stream_cloud(const std::string& path, const CloudTiling& tiling,
+                                          const PlaceChange& change,
                                           const std::vector<CloudMove>& moves, Log& log,
                                           const ProgressSink& progress) {
+  const PlaceChanges changes{change, moves};
   const auto file = open_file(path);
   if (file->size() == 0) throw InputError(path, "", "the file is empty");
   switch (cloud_format(*file)) {
     case CloudFormat::kLas:
-      return stream_las(*file, tiling, moves, log, progress);
+      return stream_las(*file, tiling, changes, log, progress);
     case CloudFormat::kE57:
-      return stream_e57(*file, tiling, moves, log, progress);
+      return stream_e57(*file, tiling, changes, log, progress);
     default:
       return std::nullopt;
   }

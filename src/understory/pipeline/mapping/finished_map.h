@@ -11,11 +11,13 @@
 
 namespace understory {
 
-// All clouds at their keyframes' finished poses, sorted into tiles in `folder`.
+// All clouds at their keyframes' finished poses, sorted into tiles in `folder`. `stored_place`: see
+// MapTiles.
 [[nodiscard]] std::unique_ptr<MapTiles> make_finished_map(const KeyframeClouds& clouds,
                                                           const std::vector<Keyframe>& keyframes,
                                                           const MapTiles::Config& config,
                                                           const std::filesystem::path& folder,
-                                                          const ProgressSink& progress);
+                                                          const ProgressSink& progress,
+                                                          MapTiles::StoredPlace stored_place = {});
 
 }  // namespace understory

@@ -22,7 +22,7 @@ constexpr double kFarFromOrigin = 1000.0;
 // Appends points and settles the origin with the first one.
 class Collector {
  public:
-  explicit Collector(PointCloudFile& cloud) : cloud_(cloud) {}
+  Collector(PointCloudFile& cloud, const PlaceChange& change) : cloud_(cloud), change_(change) {}
 
   // False if the point is NaN or infinite.
   bool add(const Eigen::Vector3d& position) {
@@ -30,19 +30,22 @@ class Collector {
       ++cloud_.not_finite;
       return false;
     }
-    if (cloud_.points.empty()) cloud_.origin = cloud_origin(position);
-    cloud_.points.push_back((position - cloud_.origin).cast<float>());
+    const Eigen::Vector3d place = change_ ? change_(position) : position;
+    if (cloud_.points.empty()) cloud_.origin = cloud_origin(place);
+    cloud_.points.push_back((place - cloud_.origin).cast<float>());
     return true;
   }
 
  private:
   PointCloudFile& cloud_;
+  const PlaceChange& change_;
 };
 
-PointCloudFile read_las_cloud(ByteSource& file, Log& log, const ProgressSink& progress) {
+PointCloudFile read_las_cloud(ByteSource& file, Log& log, const ProgressSink& progress,
+                              const PlaceChange& change) {
   const LasHeader header = read_las_header(file);
   PointCloudFile cloud = described_by(header);
-  Collector collector(cloud);
+  Collector collector(cloud, change);
   read_las_points(file, header, log, [&](const LasPoint& point) {
     progress.poll();
     if (!collector.add(point.position)) return;
@@ -53,11 +56,12 @@ PointCloudFile read_las_cloud(ByteSource& file, Log& log, const ProgressSink& pr
   return cloud;
 }
 
-PointCloudFile read_e57_cloud(ByteSource& file, Log& log, const ProgressSink& progress) {
+PointCloudFile read_e57_cloud(ByteSource& file, Log& log, const ProgressSink& progress,
+                              const PlaceChange& change) {
   const E57Header header = read_e57_header(file);
   PointCloudFile cloud = described_by(header);
   const bool intensity = header.has_intensity();
-  Collector collector(cloud);
+  Collector collector(cloud, change);
   read_e57_points(file, header, log, [&](const E57Point& point) {
     progress.poll();
     if (collector.add(point.position) && intensity) cloud.intensity.push_back(point.intensity);
@@ -72,13 +76,14 @@ std::uint16_t ring_number(double value) {
   return value >= 0.0 && value <= kMost ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
 }
 
-PointCloudFile from_table(const CloudTable& table, const std::string& name) {
+PointCloudFile from_table(const CloudTable& table, const std::string& name,
+                          const PlaceChange& change) {
   const PointCloud2Message message = table.message(0);
   const auto layout = CloudLayout::find(message);
   if (!layout) throw InputError(name, "header", "expected the fields x, y and z");
   PointCloudFile cloud;
   cloud.format = table.format;
-  Collector collector(cloud);
+  Collector collector(cloud, change);
   for (std::size_t i = 0; i < table.size(); ++i) {
     const std::uint8_t* raw = table.data.data() + i * table.point_step;
     const Eigen::Vector3d position(layout->x().read(raw), layout->y().read(raw),
@@ -120,23 +125,24 @@ PointCloudFile described_by(const E57Header& header) {
   return cloud;
 }
 
-PointCloudFile read_cloud(ByteSource& file, Log& log, const ProgressSink& progress) {
+PointCloudFile read_cloud(ByteSource& file, Log& log, const ProgressSink& progress,
+                          const PlaceChange& change) {
   PointCloudFile cloud;
   switch (cloud_format(file)) {
     case CloudFormat::kLas:
-      cloud = read_las_cloud(file, log, progress);
+      cloud = read_las_cloud(file, log, progress, change);
       break;
     case CloudFormat::kE57:
-      cloud = read_e57_cloud(file, log, progress);
+      cloud = read_e57_cloud(file, log, progress, change);
       break;
     case CloudFormat::kPcd:
-      cloud = from_table(read_pcd(file, log), file.name());
+      cloud = from_table(read_pcd(file, log), file.name(), change);
       break;
     case CloudFormat::kPly:
-      cloud = from_table(read_ply(file, log), file.name());
+      cloud = from_table(read_ply(file, log), file.name(), change);
       break;
     case CloudFormat::kKitti:
-      cloud = from_table(read_kitti(file, log), file.name());
+      cloud = from_table(read_kitti(file, log), file.name(), change);
       break;
     case CloudFormat::kUnknown:
       throw InputError(file.name(), "byte 0",
@@ -154,10 +160,11 @@ bool has_map_name(const std::filesystem::path& path) {
   return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
 
-PointCloudFile read_cloud(const std::string& path, Log& log, const ProgressSink& progress) {
+PointCloudFile read_cloud(const std::string& path, Log& log, const ProgressSink& progress,
+                          const PlaceChange& change) {
   const auto file = open_file(path);
   if (file->size() == 0) throw InputError(path, "", "the file is empty");
-  return read_cloud(*file, log, progress);
+  return read_cloud(*file, log, progress, change);
 }
 
 }  // namespace understory

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -45,13 +46,18 @@ struct E57Header;
 // capital letters, too. (.bin is one scan.)
 [[nodiscard]] bool has_map_name(const std::filesystem::path& path);
 
+// From the frame of a file into another, in double precision.
+using PlaceChange = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
+
 // Reads .las, .laz, .e57, .pcd, .ply or KITTI .bin (told by content, .bin by name). Points that are
 // NaN or infinite are left out. A file that breaks off gives the points up to there and a warning
 // ("recording.damaged"); throws InputError if no point can be had from it. Of LAS, LAZ and E57
-// each point polls `progress`.
+// each point polls `progress`. With `change`, points and origin are in the frame that it leads to.
 [[nodiscard]] PointCloudFile read_cloud(const std::string& path, Log& log,
-                                        const ProgressSink& progress = {});
+                                        const ProgressSink& progress = {},
+                                        const PlaceChange& change = {});
 [[nodiscard]] PointCloudFile read_cloud(ByteSource& file, Log& log,
-                                        const ProgressSink& progress = {});
+                                        const ProgressSink& progress = {},
+                                        const PlaceChange& change = {});
 
 }  // namespace understory

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "understory/forest/cloud_shape.h"
+#include "understory/pipeline/georeferencing/stored_places.h"
 #include "understory/pipeline/inventory/lidar_view.h"
 #include "understory/pipeline/judgement/input_remarks.h"
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
@@ -42,11 +43,15 @@ class DenseMap : public MapMaker {
     made_.placement = std::move(with_positions.found);
   }
   void finish_map() override {
+    made_.trajectory = write_dense_trajectory(recording_.results, front_end_);
+    place_on_globe();
     if (!front_end_.config().map_enabled) return;
     const ScopedTimer timer(front_end_.times(), "finish_gather_map");
-    made_.tiles =
-        make_finished_map(front_end_.clouds(), front_end_.map().keyframes(),
-                          front_end_.config().map, recording_.work / "tiles", recording_.progress);
+    const auto stored = [places = StoredPlaces(made_.placed.frames.layers)](
+                            const Eigen::Vector3d& place) { return places.from_world(place); };
+    made_.tiles = make_finished_map(front_end_.clouds(), front_end_.map().keyframes(),
+                                    front_end_.config().map, recording_.work / "tiles",
+                                    recording_.progress, stored);
   }
 
   void list_trees() override {
@@ -65,6 +70,14 @@ class DenseMap : public MapMaker {
   RunOutcome write() override { return write_dense_results(recording_, front_end_, made_); }
 
  private:
+  // By the run's own fixes; gnss.csv. Trees are found in the places that map.laz will hold.
+  void place_on_globe() {
+    const ScopedTimer timer(front_end_.times(), "finish_georeference");
+    const MappedPath path = mapped_path(recording_, front_end_, made_.trajectory.trajectory);
+    const GeoreferenceConfig& config = front_end_.config().georeference;
+    made_.placed = made_.placement ? place_map(path, *made_.placement, config, recording_.log)
+                                   : place_map(path, config, recording_.log);
+  }
   [[nodiscard]] SolvedRun solved_run() const {
     const KeyframeMap& map = front_end_.map();
     SolvedRun run{map.graph(), map.graph_loops_used(), {}, {}};

@@ -30,109 +30,6 @@ namespace {
 
 constexpr std::size_t kScanBlocks = 200;  // of run.json: enough for a curve, little to read
 
-// What walking through the finished trajectory yields for report and run.json.
-struct TrajectoryFacts {
-  Trajectory trajectory;  // as a reader of trajectory.tum gets it
-  std::vector<ReportScan> scans;
-  std::vector<float> cpu_ms;  // of each scan, see ScanRecord
-  std::vector<float> wall_ms;
-  std::vector<ScanBlock> costs;  // of each scan
-  double length_m = 0.0;
-  double duration_s = 0.0;
-  double period_ms = 0.0;  // median time between scans
-  MotionEvidence motion;
-  MatchEvidence match;  // what the path and the matches say of it
-  std::uint64_t weak = 0;
-};
-
-ReportScan report_scan(const FinishedScan& scan) {
-  const ScanRecord& record = *scan.record;
-  ReportScan row;
-  row.stamp = record.stamp;
-  row.position = scan.world_from_body.translation().cast<float>();
-  row.wall_ms = record.wall_ms;
-  if (record.iterations > 0) {
-    row.inlier_ratio = record.inlier_ratio;
-    row.fitness_m2 = record.fitness_m2;
-  }
-  row.weak = record.outcome != ScanOutcome::kMatched || record.degenerate_directions > 0;
-  return row;
-}
-
-ScanBlock cost_of(const ScanRecord& record, TimeNs first) {
-  return {to_seconds(record.stamp - first), 1, static_cast<double>(record.wall_ms),
-          static_cast<double>(record.cpu_ms), static_cast<double>(record.map_size)};
-}
-
-double median_period_ms(const std::vector<ReportScan>& scans) {
-  std::vector<TimeNs> steps;
-  for (std::size_t i = 1; i < scans.size(); ++i) {
-    steps.push_back(scans[i].stamp - scans[i - 1].stamp);
-  }
-  return 1e3 * to_seconds(upper_median(std::move(steps)));
-}
-
-// trajectory.tum and states.csv.gz.
-TrajectoryFacts write_trajectory(const std::filesystem::path& folder,
-                                 const DenseFrontEnd& front_end, const DenseMappingConfig& config) {
-  TumWriter trajectory(folder / "trajectory.tum");
-  StatesWriter states(folder / "states.csv.gz");
-  TrajectoryFacts facts;
-  double inliers = 0.0;
-  double squares = 0.0;
-  std::vector<float> inlier_ratios;
-  PathEvidence path(config.motion_limits);
-  MatchCourse course(make_matcher(config.keyframe_map.local_map.matcher)->reach_m());
-  Pose last;
-  std::uint64_t empty_in_a_row = 0;
-  for_each_finished_scan(
-      front_end.journal(), front_end.map().keyframes(), [&](const FinishedScan& scan) {
-        const ScanRecord& record = *scan.record;
-        facts.trajectory.push_back(trajectory.add({record.stamp, scan.world_from_body}));
-        states.add({record.stamp, scan.velocity_in_world,
-                    Eigen::Vector3d::Map(record.gyro_bias.data()),
-                    Eigen::Vector3d::Map(record.accel_bias.data()), record.pose_covariance()});
-        facts.scans.push_back(report_scan(scan));
-        path.add({record.stamp, scan.world_from_body});
-        course.add(record.stamp, record.outcome == ScanOutcome::kMatched,
-                   static_cast<double>(record.inlier_ratio),
-                   static_cast<double>(record.fitness_m2));
-        facts.cpu_ms.push_back(record.cpu_ms);
-        facts.wall_ms.push_back(record.wall_ms);
-        facts.costs.push_back(cost_of(record, facts.trajectory.front().stamp));
-        empty_in_a_row = record.matched_points < kFewPoints ? empty_in_a_row + 1 : 0;
-        const Pose step = last.inverse() * scan.world_from_body;
-        if (facts.scans.size() > 1) {
-          facts.length_m += step.translation().norm();
-          facts.match.smear_m += smear_of(step);
-        }
-        last = scan.world_from_body;
-        if (record.iterations > 0) {
-          inlier_ratios.push_back(record.inlier_ratio);
-          inliers += static_cast<double>(record.inlier_ratio);
-          squares += static_cast<double>(record.fitness_m2);
-        }
-        if (facts.scans.back().weak) ++facts.weak;
-      });
-  trajectory.commit();
-  states.commit();
-  if (!inlier_ratios.empty()) {
-    const auto matched = static_cast<double>(inlier_ratios.size());
-    facts.match.inliers_mean = inliers / matched;
-    facts.match.fitness_rms_m = std::sqrt(squares / matched);
-    const auto low = inlier_ratios.begin() + static_cast<std::ptrdiff_t>(inlier_ratios.size() / 10);
-    std::nth_element(inlier_ratios.begin(), low, inlier_ratios.end());
-    facts.match.inliers_low = static_cast<double>(*low);
-  }
-  facts.motion = path.evidence();
-  course.put(facts.match);
-  facts.match.cut = empty_in_a_row == 1 ? 1 : 0;
-  if (facts.scans.size() > 1) facts.match.smear_m /= static_cast<double>(facts.scans.size() - 1);
-  facts.period_ms = median_period_ms(facts.scans);
-  facts.duration_s = to_seconds(facts.scans.back().stamp - facts.scans.front().stamp);
-  return facts;
-}
-
 void write_graph(const std::filesystem::path& folder, const KeyframeMap& map) {
   TumWriter poses(folder / "keyframes.tum");
   std::vector<GraphVertex> vertices;
@@ -394,34 +291,27 @@ void take_figures(const StandTableConfig& config, const LayerFrame& layers, Dens
 
 // The files of the map, if one was made.
 void add_map(const ReadRecording& recording, const DenseMappingConfig& config, DenseProducts& made,
-             const Trajectory& trajectory, const ResultFrames& frames, MapPicture& picture,
-             RunDocuments& documents) {
+             MapPicture& picture, RunDocuments& documents) {
+  const ResultFrames& frames = made.placed.frames;
   documents.count("trees", made.inventory.trees.size());
   documents.summary().lidar_view = made.lidar_view;
   if (!made.tiles) return;
   note_doubts(made.inventory, documents.summary());
   documents.summary().quality["area_m2"] = made.inventory.area_m2;
   take_figures(config.inventory.stand, frames.layers, made, documents);
-  documents.count("map_points", write_map(recording, config, made, trajectory, frames, picture));
+  documents.count("map_points", write_map(recording, config, made, picture));
   if (!picture.empty()) documents.report().picture = &picture;
   documents.report().inventory = &made.inventory;
   for (const std::string& remark : made.inventory.remarks)
     documents.remark("inventory", remark);
 }
 
-// Where the run lies on the globe, by its own fixes; gnss.csv.
-PlacedMap place_on_globe(const ReadRecording& recording, DenseFrontEnd& front_end,
-                         const DenseProducts& made, const Trajectory& trajectory,
-                         RunDocuments& documents) {
-  const ScopedTimer timer(front_end.times(), "finish_georeference");
-  const MappedPath path = mapped_path(recording, front_end, trajectory);
-  const GeoreferenceConfig& config = front_end.config().georeference;
-  PlacedMap map = made.placement ? place_map(path, *made.placement, config, recording.log)
-                                 : place_map(path, config, recording.log);
-  documents.summary().quality.merge(map.figures);
-  documents.report().fixes = std::move(map.fixes);
+// Where the run lies on the globe.
+void tell_place(const DenseFrontEnd& front_end, PlacedMap& placed, RunDocuments& documents) {
+  documents.summary().quality.merge(placed.figures);
+  documents.report().fixes = std::move(placed.fixes);
   documents.report().has_fixes = !front_end.fixes().empty();
-  return map;
+  documents.place(placed.place, placed.frames);
 }
 
 }  // namespace
@@ -440,7 +330,7 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
                                DenseProducts& made) {
   const std::filesystem::path& folder = recording.results;
   const RunFacts& facts = recording.facts;
-  const TrajectoryFacts trajectory = write_trajectory(folder, front_end, front_end.config());
+  const TrajectoryFacts& trajectory = made.trajectory;
   write_graph(folder, front_end.map());
   RunDocuments documents = map_documents(recording, front_end.times());
   documents.judge(evidence_of(recording, front_end, trajectory, made),
@@ -454,14 +344,11 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   tell_clock(recording, front_end, documents.summary());
   if (const auto truth = write_truth(recording.request.run_folder, recording.source))
     documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
-  const PlacedMap map =
-      place_on_globe(recording, front_end, made, trajectory.trajectory, documents);
-  documents.place(map.place, map.frames);
+  tell_place(front_end, made.placed, documents);
   MapPicture picture;
   {
     const ScopedTimer timer(front_end.times(), "finish_write_map");
-    add_map(recording, front_end.config(), made, trajectory.trajectory, map.frames, picture,
-            documents);
+    add_map(recording, front_end.config(), made, picture, documents);
   }
   fill_report(recording, front_end, trajectory, documents.summary().scans, documents.report());
   documents.write(folder);

@@ -60,8 +60,9 @@ std::uint64_t write_cloud(const CloudFile& to, MapTiles& tiles, const InventoryR
 }  // namespace
 
 std::uint64_t write_map(const ReadRecording& recording, const DenseMappingConfig& config,
-                        DenseProducts& made, const Trajectory& trajectory,
-                        const ResultFrames& frames, MapPicture& picture) {
+                        DenseProducts& made, MapPicture& picture) {
+  const Trajectory& trajectory = made.trajectory.trajectory;
+  const ResultFrames& frames = made.placed.frames;
   const std::filesystem::path& folder = recording.results;
   const InventoryResult& inventory = made.inventory;
   std::optional<ObstacleFiles> obstacles;

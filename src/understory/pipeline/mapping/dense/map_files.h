@@ -3,7 +3,6 @@
 #include <cstdint>
 
 #include "understory/output/report/map_picture.h"
-#include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/mapping/dense/dense_mapping_config.h"
 #include "understory/pipeline/mapping/dense/dense_results.h"
 #include "understory/pipeline/mapping/front_end.h"
@@ -15,7 +14,6 @@ namespace understory {
 // `picture`. Returns the number of points of the map. Throws OutputError.
 [[nodiscard]] std::uint64_t write_map(const ReadRecording& recording,
                                       const DenseMappingConfig& config, DenseProducts& made,
-                                      const Trajectory& trajectory, const ResultFrames& frames,
                                       MapPicture& picture);
 
 }  // namespace understory

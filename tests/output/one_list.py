@@ -1,0 +1,56 @@
+"""`map` and `inventory RUN` list the same trees, whatever frame the layers are in.
+
+Walks are mapped with layers in the world frame, in a national grid and in degrees. The map of each
+run is taken stock of twice: from memory and in tiles.
+"""
+
+import csv
+import os
+import subprocess
+import tempfile
+from pathlib import Path
+
+PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
+
+
+def run(*words):
+    done = subprocess.run([PROGRAM, "--quiet", *map(str, words)], capture_output=True, text=True)
+    assert done.returncode == 0, (words, done.returncode, done.stderr)
+
+
+def measured(folder):
+    """The trees as both commands measure them; volumes and crowns are of the full inventory."""
+    columns = ("id", "x", "y", "z", "dbh_m", "dbh_sd_m", "height_m", "height_sd_m",
+               "height_is_lower_bound", "lean_deg", "x_sd_m", "y_sd_m")
+    with open(folder / "trees.csv", newline="") as file:
+        return [tuple(row[column] for column in columns) for row in csv.DictReader(file)]
+
+
+def check(folder, recording, name, *options):
+    walked = folder / f"{name}-run"
+    run("map", recording, "-o", walked, *options)
+    listed = measured(walked)
+    assert len(listed) > 50, (name, len(listed))
+    for way, tiles in (("memory", ()), ("tiles", ("--set", "tiles.size_m=30"))):
+        stock = folder / f"{name}-{way}"
+        run("inventory", walked, "-o", stock, *tiles)
+        again = measured(stock)
+        assert len(again) == len(listed), (name, way, len(listed), len(again))
+        for mine, theirs in zip(listed, again):
+            assert mine == theirs, (name, way, mine, theirs)
+
+
+def main():
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        handheld, harvester = folder / "walk.mcap", folder / "ride.mcap"
+        run("simulate", "handheld", "-o", handheld, "--seed", "19", "--duration-s", "8")
+        run("simulate", "harvester", "-o", harvester, "--seed", "6", "--duration-s", "8")
+        check(folder, handheld, "world", "--set", "georeference.enabled=false")
+        check(folder, handheld, "grid")
+        check(folder, handheld, "degrees", "--crs", "EPSG:4979")
+        check(folder, harvester, "harvester")
+
+
+if __name__ == "__main__":
+    main()
