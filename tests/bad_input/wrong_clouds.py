@@ -2,6 +2,7 @@
 `evaluate trees`: a list that is wrong is never called complete."""
 
 import csv
+import json
 import math
 import random
 
@@ -98,6 +99,29 @@ def named_system(folder):
     done = inventory(cloud, folder, "--crs", "EPSG:2276", "--unit-m", 0.3048)
     assert done.returncode == 2 and "--crs does not hold" in done.stderr, done
     return done.stderr.strip()
+
+
+# `evaluate map` said that its surfaces were 0.2 mm thick, and `register` that a cloud matched itself 0.8 m away.
+@cases.case("a map in degrees or feet")
+def map_in_degrees(folder):
+    figures = {}
+    for name, options in (("metres", ()), ("degrees", ("--crs", "EPSG:4979")), ("feet", ("--crs", "EPSG:6885"))):
+        run = folder / name
+        done = program("map", "sim:handheld?seed=5&duration_s=15", "-o", run, *options)
+        assert done.returncode == 0, (name, done)
+        done = program("evaluate", "map", run, "--json")
+        assert done.returncode == 0, (name, done)
+        figures[name] = json.loads(done.stdout)["mean_entropy_nats"]
+        cloud = run / "map.laz"
+        for words in (("evaluate", "map", cloud), ("register", cloud, cloud), ("inventory", cloud, "-o", folder / "x")):
+            done = program(*words, *(("--overwrite",) if words[0] == "inventory" else ()))
+            if name == "metres":
+                assert done.returncode in (0, 4), (name, words, done)
+            else:
+                wanted = "is in degrees" if name == "degrees" else "counts in units of 0.3048 m"
+                assert done.returncode == 3 and wanted in done.stderr, (name, words, done)
+    assert max(figures.values()) - min(figures.values()) < 0.02, figures
+    return str(figures)
 
 
 def write_list(path, trees, unit=1.0):

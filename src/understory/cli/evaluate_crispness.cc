@@ -6,11 +6,16 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "understory/evaluation/map_entropy.h"
+#include "understory/georeference/systems/coordinate_system.h"
+#include "understory/georeference/systems/layer_frame.h"
+#include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/recording/bags/byte_source.h"
+#include "understory/recording/clouds/cloud_file.h"
 #include "understory/recording/clouds/las.h"
 #include "understory/util/error.h"
 #include "understory/util/files/file_in_folder.h"
@@ -27,14 +32,28 @@ std::filesystem::path new_folder() {
   return name;
 }
 
-MapEntropy entropy_of(const std::filesystem::path& cloud, const MapEntropyConfig& config,
-                      Log& log) {
-  const std::unique_ptr<ByteSource> file = open_file(cloud.string());
+// Into metres: the layers of a run may be in degrees or feet, another cloud may not.
+PlaceChange into_metres(const std::string& run_or_cloud, const LasHeader& header) {
+  if (!std::filesystem::is_directory(run_or_cloud)) {
+    require_metres(header.coordinate_system, run_or_cloud);
+    return {};
+  }
+  const auto layers = std::make_shared<LayerFrame>(read_layer_frame(run_or_cloud));
+  if (layers->is_world()) return {};
+  return [layers](const Eigen::Vector3d& place) { return layers->to_world(place); };
+}
+
+MapEntropy entropy_of(const std::string& run_or_cloud, const MapEntropyConfig& config, Log& log) {
+  const std::unique_ptr<ByteSource> file =
+      open_file(file_in_folder(run_or_cloud, "map.laz").string());
+  const LasHeader header = read_las_header(*file);
+  const PlaceChange change = into_metres(run_or_cloud, header);
   MapEntropyMeter meter(new_folder(), config);
   std::optional<Eigen::Vector3d> near;  // coordinates of millions of metres need doubles
-  read_las_points(*file, read_las_header(*file), log, [&](const LasPoint& point) {
-    if (!near) near = point.position.array().round();
-    meter.add(point.position - *near);
+  read_las_points(*file, header, log, [&](const LasPoint& point) {
+    const Eigen::Vector3d place = change ? change(point.position) : point.position;
+    if (!near) near = place.array().round();
+    meter.add(place - *near);
   });
   return meter.measure();
 }
@@ -43,7 +62,7 @@ MapEntropy entropy_of(const std::filesystem::path& cloud, const MapEntropyConfig
 
 int evaluate_crispness(const std::string& run_or_cloud, const MapEntropyConfig& config, bool json,
                        CommandContext& context) {
-  const MapEntropy map = entropy_of(file_in_folder(run_or_cloud, "map.laz"), config, context.log);
+  const MapEntropy map = entropy_of(run_or_cloud, config, context.log);
   if (map.points_used == 0)
     throw InputError(run_or_cloud, "",
                      fmt::format("expected points with {} neighbours within {} m",

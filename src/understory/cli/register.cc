@@ -9,6 +9,7 @@
 #include "understory/cli/register_features.h"
 #include "understory/cli/register_output.h"
 #include "understory/cli/register_stems.h"
+#include "understory/georeference/systems/coordinate_system.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/recording/finding.h"
@@ -95,6 +96,7 @@ struct Loaded {
 
 Loaded load(const std::string& path, Log& log) {
   PointCloudFile file = read_cloud(path, log);
+  require_metres(file.coordinate_system, path);
   return {std::move(file.points), std::move(file.ring),
           Pose(Eigen::Quaterniond::Identity(), file.origin)};
 }

@@ -173,6 +173,16 @@ double metres_per_unit(const std::string& definition) {
   return system.IsGeographic() != 0 ? 0.0 : system.GetLinearUnits();
 }
 
+void require_metres(const std::string& definition, const std::string& file) {
+  const double unit_m = metres_per_unit(definition);
+  if (!std::isfinite(unit_m) || std::abs(unit_m - 1.0) < 1e-9) return;
+  throw InputError(file, "",
+                   fmt::format("expected metres: its coordinate system {}. Project it first, for "
+                               "instance to UTM",
+                               unit_m == 0.0 ? std::string("is in degrees")
+                                             : fmt::format("counts in units of {:.7g} m", unit_m)));
+}
+
 std::string utm_zone(const GeodeticPlace& place) {
   const int zone =
       std::clamp(static_cast<int>(std::floor((place.longitude_deg + 180.0) / 6.0)) + 1, 1, 60);

@@ -58,6 +58,9 @@ class CoordinateSystem {
 // feet. 0 for one in degrees, NaN where nothing is known (an empty or strange definition).
 [[nodiscard]] double metres_per_unit(const std::string& definition);
 
+// Throws InputError where the system of a file says that its coordinates are not in metres.
+void require_metres(const std::string& definition, const std::string& file);
+
 // "EPSG:32635": the UTM zone of a place, WGS 84.
 [[nodiscard]] std::string utm_zone(const GeodeticPlace& place);
 

@@ -10,10 +10,8 @@ StoredPlaces::StoredPlaces(const LayerFrame& layers)
 
 Eigen::Vector3d StoredPlaces::from_world(const Eigen::Vector3d& place) const {
   // As LasWriter rounds and read_las_points reads.
-  const Eigen::Vector3d steps = (layers_.from_world(place) - options_.offset)
-                                    .cwiseQuotient(options_.scale)
-                                    .array()
-                                    .round();
+  const Eigen::Vector3d steps =
+      (layers_.from_world(place) - options_.offset).cwiseQuotient(options_.scale).array().round();
   return from_layers(options_.offset + options_.scale.cwiseProduct(steps));
 }
 

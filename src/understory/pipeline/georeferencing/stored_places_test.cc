@@ -18,9 +18,9 @@ LayerFrame frame_of(const std::string& system) {
                             {3.0, -2.0, 0.5});
   const GeodeticPlace in_finland{61.2, 25.1, 140.0};
   const GeodeticPlace in_california{40.5, -122.1, 140.0};
-  return system.empty() ? LayerFrame()
-                        : LayerFrame(enu_from_world,
-                                     system == kInFeet ? in_california : in_finland, system);
+  return system.empty()
+             ? LayerFrame()
+             : LayerFrame(enu_from_world, system == kInFeet ? in_california : in_finland, system);
 }
 
 class StoredPlaces : public testing::TestWithParam<std::string> {};
@@ -37,7 +37,8 @@ TEST_P(StoredPlaces, TheReaderOfTheFileGetsThePlacesThatTheWriterWorkedWith) {
     ASSERT_LT((mine - measured).norm(), 0.0015);
     // Written, read, and moved to the world.
     const Eigen::Vector3d at = layers.from_world(mine);
-    const Eigen::Vector3d steps = (at - options.offset).cwiseQuotient(options.scale).array().round();
+    const Eigen::Vector3d steps =
+        (at - options.offset).cwiseQuotient(options.scale).array().round();
     const Eigen::Vector3d read = options.offset + options.scale.cwiseProduct(steps);
     ASSERT_EQ(mine, stored.from_layers(read)) << measured.transpose();
     ASSERT_EQ(mine, on_map_grid(mine));
