@@ -9,6 +9,11 @@
 
 namespace understory::internal {
 
+// Of arrays that grow by doubling: what they take over what they hold, in the mean.
+inline constexpr double kArraySlack = 1.5;
+// Bytes of a VoxelIndex for each of its keys: slots of 16, a quarter to half of them in use.
+inline constexpr double kIndexBytes = 48.0;
+
 // Which cells of a block are near one along an axis, as bits x + 4 y + 16 z of the block.
 struct NearAlongAxis {
   static constexpr int kFarthest = 4;        // a neighbourhood ends in the blocks beside its own
@@ -51,6 +56,10 @@ class CellBlocks {
   // Until forget_changes().
   void mark_changed(const Place& at);
   void forget_changes();
+  // About; by the blocks that there are.
+  [[nodiscard]] double bytes() const {
+    return static_cast<double>(blocks_.size()) * (kArraySlack * sizeof(Block) + kIndexBytes);
+  }
 
   // Calls act(cell, x, y, z) for each cell near a place, x to z being its steps from it. Quickest
   // where there are cells in the place's own block.

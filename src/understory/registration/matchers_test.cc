@@ -168,6 +168,22 @@ TEST_P(AnyMatcher, ForgetsWhatIsFar) {
       target->match(thin(scan(upright(0.0, 0.0, 1.6), 8)), far, {}, MatchStart::kNear).usable());
 }
 
+TEST_P(AnyMatcher, SaysWhatItTakesAndForgetsAroundAPlace) {
+  const auto builder = make_matcher(config_)->make_builder({});
+  const double empty = builder->bytes();
+  insert_path(*builder);
+  const std::size_t cells = builder->snapshot()->size();
+  const double along_path = builder->bytes();
+  EXPECT_GT(along_path, empty + 100.0 * static_cast<double>(cells));
+  builder->forget_beyond({1.0, 0.2, 1.6}, 4.0);
+  const std::size_t left = builder->snapshot()->size();
+  EXPECT_GT(left, 0U);
+  EXPECT_LT(left, cells / 2);
+  EXPECT_LT(builder->bytes(), empty + 0.7 * (along_path - empty));
+  builder->clear();
+  EXPECT_NEAR(builder->bytes(), empty, 1.0);
+}
+
 TEST_P(AnyMatcher, SaysThatAnEmptyTargetAndAFewPointsAreTooLittle) {
   const auto builder = make_matcher(config_)->make_builder({});
   const auto status = [&](const Points& source) {

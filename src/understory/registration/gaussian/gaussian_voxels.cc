@@ -7,6 +7,7 @@
 
 #include "understory/geometry/symmetric_eigen.h"
 #include "understory/geometry/voxel_key.h"
+#include "understory/registration/cell_blocks.h"
 #include "understory/registration/icp/surface.h"
 #include "understory/registration/registration_constants.h"
 #include "understory/util/error.h"
@@ -74,6 +75,12 @@ void GaussianVoxelsBuilder::clear() {
   changed_.clear();
   grid_ = std::make_shared<GaussianVoxels>();
   grid_->voxel_m_ = config_.voxel_m;
+}
+
+double GaussianVoxelsBuilder::bytes() const {
+  constexpr double kVoxel = sizeof(Sums) + sizeof(GaussianVoxel) + sizeof(GaussianVoxels::Place);
+  return static_cast<double>(sums_.size()) *
+         (internal::kArraySlack * kVoxel + internal::kIndexBytes);
 }
 
 // Makes the grid one that nobody else holds.

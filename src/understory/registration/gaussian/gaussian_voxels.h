@@ -75,6 +75,8 @@ class GaussianVoxelsBuilder {
   // Forgets the voxels farther than that from the centre (map frame).
   void remove_beyond(const Eigen::Vector3d& center, double radius_m);
   void clear();
+  // See TargetBuilder::bytes.
+  [[nodiscard]] double bytes() const;
   // The grid as it is now. If nobody holds the last snapshot any more, its memory is written on.
   [[nodiscard]] GaussianVoxelsPtr snapshot();
 

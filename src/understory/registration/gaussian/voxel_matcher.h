@@ -35,9 +35,19 @@ class VoxelTargetBuilder : public TargetBuilder {
       if (forget_beyond_m) grid.remove_beyond(target_from_source.translation(), *forget_beyond_m);
     }
   }
+  void forget_beyond(const Eigen::Vector3d& centre, double radius_m) override {
+    for (GaussianVoxelsBuilder& grid : grids_)
+      grid.remove_beyond(centre, radius_m);
+  }
   void clear() override {
     for (GaussianVoxelsBuilder& grid : grids_)
       grid.clear();
+  }
+  [[nodiscard]] double bytes() const override {
+    double sum = 0.0;
+    for (const GaussianVoxelsBuilder& grid : grids_)
+      sum += grid.bytes();
+    return sum;
   }
   [[nodiscard]] MatchTargetPtr snapshot() override {
     std::vector<GaussianStage<Target>> stages;

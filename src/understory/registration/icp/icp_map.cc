@@ -240,6 +240,13 @@ void IcpMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m
   }
 }
 
+double IcpMapBuilder::bytes() const {
+  const auto cubes = static_cast<double>(cubes_.size());
+  double spot = sizeof(Cube) + sizeof(IcpMap::Spot);
+  if (config_.covariances) spot += sizeof(Eigen::Matrix3f);
+  return cubes * (internal::kArraySlack * spot + internal::kIndexBytes) + map_->blocks_.bytes();
+}
+
 SurfaceSums IcpMapBuilder::sums_around(std::uint32_t cube) const {
   const auto edge = static_cast<float>(config_.cube_m);
   SurfaceSums sums;

@@ -100,6 +100,8 @@ class IcpMapBuilder {
   // a tenth of the points is.
   void remove_beyond(const Eigen::Vector3d& center, double radius_m);
   void clear();
+  // See TargetBuilder::bytes.
+  [[nodiscard]] double bytes() const;
   // The map as it is now; only the surfaces near what changed are worked out again. If nobody holds
   // the last snapshot any more, its memory is written on; else it is copied first.
   [[nodiscard]] IcpMapPtr snapshot();

@@ -22,7 +22,11 @@ class IcpMapTargetBuilder : public TargetBuilder {
     builder_.insert(points_in_source, target_from_source);
     if (forget_beyond_m) builder_.remove_beyond(target_from_source.translation(), *forget_beyond_m);
   }
+  void forget_beyond(const Eigen::Vector3d& centre, double radius_m) override {
+    builder_.remove_beyond(centre, radius_m);
+  }
   void clear() override { builder_.clear(); }
+  [[nodiscard]] double bytes() const override { return builder_.bytes(); }
 
  protected:
   [[nodiscard]] IcpMapPtr map() { return builder_.snapshot(); }

@@ -199,10 +199,15 @@ class LoamTargetBuilder : public TargetBuilder {
     edges_.remove_beyond(target_from_source.translation(), *forget_beyond_m);
     planes_.remove_beyond(target_from_source.translation(), *forget_beyond_m);
   }
+  void forget_beyond(const Eigen::Vector3d& centre, double radius_m) override {
+    edges_.remove_beyond(centre, radius_m);
+    planes_.remove_beyond(centre, radius_m);
+  }
   void clear() override {
     edges_.clear();
     planes_.clear();
   }
+  [[nodiscard]] double bytes() const override { return edges_.bytes() + planes_.bytes(); }
   [[nodiscard]] MatchTargetPtr snapshot() override {
     const IcpMapPtr edges = edges_.snapshot();
     const IcpMapPtr planes = planes_.snapshot();

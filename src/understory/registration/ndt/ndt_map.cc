@@ -252,6 +252,16 @@ void NdtMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m
   }
 }
 
+double NdtMapBuilder::bytes() const {
+  const State& s = *state_;
+  const auto cells = static_cast<double>(s.gathered.size());
+  const auto in_map = static_cast<double>(s.owner.size());
+  constexpr double kCell = sizeof(State::Gathered) + sizeof(State::Settled) + 2;
+  constexpr double kInMap = sizeof(NdtCell) + sizeof(std::array<int, 3>) + sizeof(std::uint32_t);
+  return internal::kArraySlack * (cells * kCell + in_map * kInMap) +
+         internal::kIndexBytes * (cells + in_map) + s.blocks.bytes();
+}
+
 NdtMapPtr NdtMapBuilder::snapshot() {
   State& s = *state_;
   s.own_map();

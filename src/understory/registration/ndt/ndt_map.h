@@ -103,6 +103,8 @@ class NdtMapBuilder {
   // Forgets the cells farther than that from the centre (map frame).
   void remove_beyond(const Eigen::Vector3d& center, double radius_m);
   void clear();
+  // See TargetBuilder::bytes.
+  [[nodiscard]] double bytes() const;
   // The map as it is now. Only what changed since the last snapshot is worked out again; the
   // outcome is the same as if all were. If nobody holds the last snapshot any more, its memory is
   // written on, and the work does not grow with the map; else it is copied first.

@@ -109,9 +109,19 @@ class NdtTargetBuilder : public TargetBuilder {
     });
   }
 
+  void forget_beyond(const Eigen::Vector3d& centre, double radius_m) override {
+    for (NdtMapBuilder& builder : builders_)
+      builder.remove_beyond(centre, radius_m);
+  }
   void clear() override {
     for (NdtMapBuilder& builder : builders_)
       builder.clear();
+  }
+  [[nodiscard]] double bytes() const override {
+    double sum = 0.0;
+    for (const NdtMapBuilder& builder : builders_)
+      sum += builder.bytes();
+    return sum;
   }
 
   [[nodiscard]] MatchTargetPtr snapshot() override {
