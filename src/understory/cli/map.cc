@@ -35,6 +35,7 @@ struct MapOptions {
   bool imu_rate = false;
   bool realtime = false;
   bool copc = false;
+  std::string max_memory_mb;
   bool overwrite = false;
   bool print_config = false;
   OpenOptions open;
@@ -92,6 +93,43 @@ void refuse_beside_resume(const CLI::App& command) {
                      given + " (to change it, map the recording anew)"});
 }
 
+// What the options set, of maps of all points alone: one that a run by stems has no use for is
+// refused.
+void set_of_dense(const MapOptions& options, std::vector<std::string>& settings) {
+  const auto set = [&](bool given, const char* why_not, const std::string& setting) {
+    if (!given) return;
+    if (options.front_end != kDenseFrontEnd)
+      throw ConfigError({std::string(why_not) + ": leave it out, or map with --front-end dense"});
+    settings.push_back(setting);
+  };
+  set(!options.inventory.empty(),
+      "--inventory measures the cloud of a map, which a run by stems does not make",
+      "inventory.extent=" + options.inventory);
+  set(options.imu_rate,
+      "--imu-rate predicts from positioned scans, which a run by stems does not have",
+      "imu_rate=true");
+  set(options.copc, "--copc writes the cloud of a map, which a run by stems does not make",
+      "map.copc=true");
+  set(!options.max_memory_mb.empty(),
+      "--max-memory-mb bounds a map of all points; a run by stems takes some 300 MB of any "
+      "recording",
+      "run.max_memory_mb=" + options.max_memory_mb);
+}
+
+std::vector<std::string> settings_of(const MapOptions& options) {
+  std::vector<std::string> settings = options.settings;
+  if (!options.coordinate_system.empty())
+    settings.push_back("georeference.crs=" + options.coordinate_system);
+  set_of_dense(options, settings);
+  const std::vector<std::string> plots = plot_settings(options.plots, "inventory.stand.");
+  if (!plots.empty() && options.front_end != kDenseFrontEnd)
+    throw ConfigError(
+        {"--plots and --plot-grid take their figures from the cloud of a map, which a run by stems "
+         "does not make: leave them out, or map with --front-end dense"});
+  settings.insert(settings.end(), plots.begin(), plots.end());
+  return settings;
+}
+
 int run_map(const MapOptions& options, CommandContext& context) {
   const auto run = [&](MappingRun begun) {
     return report_outcome(
@@ -100,36 +138,7 @@ int run_map(const MapOptions& options, CommandContext& context) {
   if (!options.resume.empty())
     return with_advice(options.resume, [&] { return run(reopen_mapping(options.resume)); });
   refuse_cloud(options.recording);
-  std::vector<std::string> settings = options.settings;
-  if (!options.coordinate_system.empty())
-    settings.push_back("georeference.crs=" + options.coordinate_system);
-  if (!options.inventory.empty()) {
-    if (options.front_end != kDenseFrontEnd)
-      throw ConfigError(
-          {"--inventory measures the cloud of a map, which a run by stems does not "
-           "make: leave it out, or map with --front-end dense"});
-    settings.push_back("inventory.extent=" + options.inventory);
-  }
-  if (options.imu_rate) {
-    if (options.front_end != kDenseFrontEnd)
-      throw ConfigError(
-          {"--imu-rate predicts from positioned scans, which a run by stems does not "
-           "have: leave it out, or map with --front-end dense"});
-    settings.emplace_back("imu_rate=true");
-  }
-  if (options.copc) {
-    if (options.front_end != kDenseFrontEnd)
-      throw ConfigError(
-          {"--copc writes the cloud of a map, which a run by stems does not make: leave it out, or "
-           "map with --front-end dense"});
-    settings.emplace_back("map.copc=true");
-  }
-  const std::vector<std::string> plots = plot_settings(options.plots, "inventory.stand.");
-  if (!plots.empty() && options.front_end != kDenseFrontEnd)
-    throw ConfigError(
-        {"--plots and --plot-grid take their figures from the cloud of a map, which a run by stems "
-         "does not make: leave them out, or map with --front-end dense"});
-  settings.insert(settings.end(), plots.begin(), plots.end());
+  const std::vector<std::string> settings = settings_of(options);
   ReadConfig<FrontEndConfig> read = read_front_end_config(
       options.front_end, options.profile, options.config_file, settings, context.log);
   if (options.print_config) return print_config(options, read, context);
@@ -181,6 +190,9 @@ void add_map_command(CLI::App& app, Command& chosen) {
   command->add_flag("--copc", options->copc,
                     "Write map.copc.laz as well: the points of map.laz as Cloud Optimized Point "
                     "Cloud, which QGIS and web viewers show at once");
+  command->add_option("--max-memory-mb", options->max_memory_mb,
+                      "Most memory that the run may have resident, MB of 10^6 bytes (if not given "
+                      "as much as it likes): what does not fit is held on disk");
   command->add_flag("--imu-rate", options->imu_rate,
                     "Write trajectory_imu.tum as well: a predicted pose for each sample of the "
                     "IMU");

@@ -60,11 +60,9 @@ KeyframeMap::KeyframeMap(const Config& config, const std::filesystem::path& fold
       times_(times),
       log_(log),
       local_map_(config.local_map),
-      loops_(config.loop_closure, config.local_map) {}
+      loops_(config.loop_closure, config.local_map, config.one_local_map) {}
 
 namespace {
-
-using namespace map_constants::keyframe_map;
 
 constexpr const char* kPointsFile = "keyframe_points.bin";
 }  // namespace
@@ -76,7 +74,7 @@ void KeyframeMap::start() {
   inserted_.clear();
   insert_all();
   moved_ = false;
-  points_ = std::make_unique<KeyframePoints>(folder_ / kPointsFile, kCachedKeyframes);
+  points_ = std::make_unique<KeyframePoints>(folder_ / kPointsFile, config_.cached_keyframes);
   history_ = std::make_unique<KeyframeHistory>(folder_);
 }
 
@@ -158,17 +156,30 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
         i < known ? outcome.world_from_keyframe[i] : moved * keyframes_[i].world_from_body;
   }
   // A search that began in the piece before has made a map of that.
-  if (!outcome.local_map || known <= segment_start()) {
+  if (!(outcome.local_map || outcome.map_begins_at) || known <= segment_start()) {
     rebuild_local_map();
     return moved;
   }
-  local_map_ = std::move(*outcome.local_map);
-  inserted_ = std::move(outcome.inserted);
+  take_local_map(outcome);
   for (std::size_t i = std::max(known, segment_start()); i < keyframes_.size(); ++i) {
     insert(i);
   }
   take_snapshot();
   return moved;
+}
+
+// The map that the search made, or the same one, made in the place of the present one.
+void KeyframeMap::take_local_map(LoopOutcome& outcome) {
+  if (outcome.local_map) {
+    local_map_ = std::move(*outcome.local_map);
+    inserted_ = std::move(outcome.inserted);
+    return;
+  }
+  std::vector<Eigen::Vector3d> positions;
+  for (std::size_t i = *outcome.map_begins_at; i < outcome.keyframes; ++i)
+    positions.push_back(keyframes_[i].world_from_body.translation());
+  inserted_ = keyframes_within_reach(positions, *outcome.map_begins_at, local_map_.radius_m());
+  insert_all();
 }
 
 void KeyframeMap::tell_of_joined_pieces() {
@@ -243,15 +254,28 @@ void KeyframeMap::take_snapshot() {
 }
 
 void KeyframeMap::insert(std::size_t keyframe) {
+  snapshot_.reset();  // so that the map need not copy what it forgets of
   const bool forget = keyframe % kForgetEvery == 0;
   inserted_.push_back({keyframe, forget ? 1U : 0U});
   local_map_.insert({points_->get(keyframe).get(), keyframes_[keyframe].world_from_body}, forget);
+  tell_of_radius();
 }
 
 // The pieces that are together with the last one, as far as they follow each other.
 std::size_t KeyframeMap::local_map_start() const {
   if (segment_start() == keyframes_.size()) return segment_start();
   return pieces().last_group_start();
+}
+
+void KeyframeMap::tell_of_radius() {
+  const double radius_m = local_map_.radius_m();
+  if (told_of_radius_ || radius_m >= config_.local_map.radius_m) return;
+  told_of_radius_ = true;
+  log_.warn("memory.radius",
+            fmt::format("the map that scans are matched to does not fit into run.max_memory_mb: it "
+                        "ends {:.0f} m from the lidar, not {:.0f} m (local_map.radius_m), from "
+                        "keyframe {} on. Poses may differ from those without a limit",
+                        radius_m, config_.local_map.radius_m, keyframes_.size()));
 }
 
 // Chooses the keyframes of the local map anew, e.g. after a loop closure has moved them.
@@ -267,19 +291,19 @@ void KeyframeMap::rebuild_local_map() {
       inserted_.push_back({first + i, 0});
     }
   } else {
-    inserted_ = keyframes_within_reach(positions, first, config_.local_map);
+    inserted_ = keyframes_within_reach(positions, first, local_map_.radius_m());
   }
   insert_all();
 }
 
 void KeyframeMap::insert_all() {
+  snapshot_.reset();
   local_map_.clear();
   for (const LocalMapInsertion& insertion : inserted_) {
     const auto points = points_->get(insertion.keyframe);
     local_map_.insert({points.get(), keyframes_[insertion.keyframe].world_from_body},
                       insertion.forget != 0);
   }
-  snapshot_.reset();
   if (!inserted_.empty()) take_snapshot();
 }
 
@@ -357,6 +381,7 @@ std::vector<CountedFile> KeyframeMap::files() const {
 void KeyframeMap::save(BinaryWriter& writer) const {
   history_->save(writer);
   writer.put(points_->count());
+  writer.put(local_map_.first_radius_m());
   put_insertions(writer, inserted_);
   loops_.save(writer);
 }
@@ -370,9 +395,11 @@ void KeyframeMap::load(BinaryReader& reader) {
     if (start > 0 && start < keyframes_.size()) keyframes_[start].begins_piece = true;
   }
   points_ = std::make_unique<KeyframePoints>(folder_ / kPointsFile, reader.get<RecordCount>(),
-                                             kCachedKeyframes);
+                                             config_.cached_keyframes);
+  const auto first_radius_m = reader.get<double>();
   if (points_->count().records != keyframes_.size())
     throw InputError((folder_ / kPointsFile).string(), "", "expected the points of each keyframe");
+  local_map_.set_radius(first_radius_m);
   inserted_ = get_insertions(reader, keyframes_.size());
   insert_all();
   loops_.load(reader, std::move(growth.loops), keyframes_, segment_starts_, *points_);

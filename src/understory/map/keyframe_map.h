@@ -14,6 +14,7 @@
 #include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
 #include "understory/map/loop_closer.h"
+#include "understory/map/map_constants.h"
 #include "understory/map/range_check.h"
 #include "understory/util/config/config.h"
 #include "understory/util/files/binary_io.h"
@@ -61,6 +62,11 @@ class KeyframeMap {
     double edge_translation_m = 0.0;
     double edge_rotation_deg_per_sqrt_m = 0.02;
     double edge_translation_m_per_sqrt_m = 0.01;
+    // By the limit of the memory of the run, no settings of their own: keyframes whose points stay
+    // in memory, and whether the local map of a found loop is made only when the present one is
+    // gone.
+    std::size_t cached_keyframes = map_constants::keyframe_map::kCachedKeyframes;
+    bool one_local_map = false;
   };
   static void describe(ConfigTable& table, Config& config);
 
@@ -100,6 +106,10 @@ class KeyframeMap {
 
   // Null while it is empty.
   [[nodiscard]] const MatchTargetPtr& local_map() const { return snapshot_; }
+  // Of the local map, metres; smaller than `local_map.radius_m` where that takes too much memory.
+  [[nodiscard]] double local_map_radius_m() const { return local_map_.radius_m(); }
+  // Frees what can be read again from the disk. No result depends on it.
+  void free_cache() { points_->forget(); }
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
   [[nodiscard]] const std::vector<LoopAttempt>& loops() const { return loops_.attempts(); }
   // The pieces of the map, and which are together by the loops found so far.
@@ -125,6 +135,8 @@ class KeyframeMap {
   [[nodiscard]] std::size_t local_map_start() const;
   void update_local_map(std::size_t keyframe);
   void insert(std::size_t keyframe);
+  void take_local_map(LoopOutcome& outcome);
+  void tell_of_radius();
   void take_snapshot();
   void rebuild_local_map();
   [[nodiscard]] Matrix6d edge_covariance(const Pose& previous_from_this) const;
@@ -148,6 +160,7 @@ class KeyframeMap {
       inserted_;  // since the local map was empty, in order: builds it again
   MatchTargetPtr snapshot_;
   bool takes_loops_when_found_ = false;
+  bool told_of_radius_ = false;
   std::vector<char> loops_used_;
   LoopCloser loops_;
 };

@@ -6,7 +6,11 @@
 #include <map>
 #include <optional>
 
+#include "understory/map/map_constants.h"
+
 namespace understory {
+
+using namespace map_constants::local_map;
 
 void describe(ConfigTable& table, LocalMapConfig& config) {
   using Method = LocalMapConfig::Method;
@@ -23,15 +27,29 @@ void describe(ConfigTable& table, LocalMapConfig& config) {
 }
 
 LocalMap::LocalMap(const LocalMapConfig& config)
-    : radius_m_(config.radius_m),
+    : most_radius_m_(config.radius_m),
+      most_bytes_(config.most_bytes),
+      radius_m_(config.radius_m),
+      first_radius_m_(config.radius_m),
       builder_(make_matcher(config.matcher)->make_builder(config.viewpoint)) {}
 
 void LocalMap::insert(const PlacedPoints& keyframe, bool forget) {
   builder_->insert_features(*keyframe.points_in_body, keyframe.world_from_body,
                             forget ? std::optional(radius_m_) : std::nullopt);
+  if (forget && most_bytes_ > 0.0) fit(keyframe.world_from_body.translation());
+}
+
+void LocalMap::fit(const Eigen::Vector3d& place) {
+  if (builder_->bytes() < kRoomToGrow * most_bytes_)
+    radius_m_ = std::min(most_radius_m_, radius_m_ / kSmaller);
+  while (builder_->bytes() > most_bytes_ && radius_m_ > kLeastRadiusM) {
+    radius_m_ *= kSmaller;
+    builder_->forget_beyond(place, radius_m_);
+  }
 }
 
 void LocalMap::clear() {
+  first_radius_m_ = radius_m_;
   builder_->clear();
 }
 
@@ -71,11 +89,10 @@ std::vector<std::size_t> recent_keyframes(const std::vector<Eigen::Vector3d>& po
 }
 
 std::vector<LocalMapInsertion> keyframes_within_reach(const std::vector<Eigen::Vector3d>& positions,
-                                                      std::size_t first,
-                                                      const LocalMapConfig& config) {
+                                                      std::size_t first, double radius_m) {
   std::vector<LocalMapInsertion> chosen;
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    if ((positions[i] - positions.back()).norm() < config.radius_m) {
+    if ((positions[i] - positions.back()).norm() < radius_m) {
       chosen.push_back({first + i, 0});
     }
   }

@@ -23,6 +23,9 @@ struct LocalMapConfig {
   double radius_m = 80.0;         // accumulate: what is farther from the body is forgotten
   int recent_keyframes = 15;      // recent: theta_lm
   double recent_spacing_m = 2.0;  // recent: one keyframe per cube of this edge
+  // Accumulate: bytes that it may take; where the map takes more, its radius becomes smaller. 0:
+  // any. By the limit of the memory of the run, no setting of its own.
+  double most_bytes = 0.0;
 };
 // Without the matcher, whose section stands by itself.
 void describe(ConfigTable& table, LocalMapConfig& config);
@@ -47,13 +50,27 @@ class LocalMap {
   // Throws ConfigError for settings of the matcher that cannot be.
   explicit LocalMap(const LocalMapConfig& config);
 
-  // Adds a keyframe and, if `forget`, drops what is too far from it.
+  // Adds a keyframe and, if `forget`, drops what is too far from it. Then, too, the radius becomes
+  // smaller where the map takes more than `most_bytes`, and larger again where it takes far less.
   void insert(const PlacedPoints& keyframe, bool forget);
   void clear();
+  // What it takes, about (TargetBuilder::bytes).
+  [[nodiscard]] double bytes() const { return builder_->bytes(); }
+  // The radius of now, and the radius that it had when it was empty: an empty map with that radius
+  // and the same insertions becomes the same map again.
+  [[nodiscard]] double radius_m() const { return radius_m_; }
+  [[nodiscard]] double first_radius_m() const { return first_radius_m_; }
+  // Of an empty map.
+  void set_radius(double radius_m) { radius_m_ = first_radius_m_ = radius_m; }
   [[nodiscard]] MatchTargetPtr snapshot();
 
  private:
+  void fit(const Eigen::Vector3d& place);
+
+  double most_radius_m_;
+  double most_bytes_;
   double radius_m_;
+  double first_radius_m_;
   std::unique_ptr<TargetBuilder> builder_;
 };
 
@@ -66,6 +83,6 @@ class LocalMap {
 // All keyframes, of those at these positions, that lie within the radius of the last one, as
 // insertions into an empty map; `first` is the index of the first position.
 [[nodiscard]] std::vector<LocalMapInsertion> keyframes_within_reach(
-    const std::vector<Eigen::Vector3d>& positions, std::size_t first, const LocalMapConfig& config);
+    const std::vector<Eigen::Vector3d>& positions, std::size_t first, double radius_m);
 
 }  // namespace understory

@@ -24,6 +24,7 @@ struct Search {
   LocalMapConfig local_map;
   SearchedMap map;
   LoopAgreement* agreement = nullptr;  // no other search uses it at the time
+  bool leave_map = false;
 };
 
 Eigen::Vector3d up_at(const SearchedMap& map, std::size_t keyframe) {
@@ -88,12 +89,16 @@ bool worth_applying(const Search& search, const std::vector<Pose>& solved) {
 void make_local_map(const Search& search, LoopOutcome& outcome) {
   if (search.local_map.method != LocalMapConfig::Method::kAccumulate) return;
   const std::size_t first = search.map.pieces.last_group_start();
+  if (search.leave_map) {
+    outcome.map_begins_at = first;
+    return;
+  }
   std::vector<Eigen::Vector3d> positions;
   for (std::size_t i = first; i < outcome.world_from_keyframe.size(); ++i) {
     positions.push_back(outcome.world_from_keyframe[i].translation());
   }
   outcome.local_map.emplace(search.local_map);
-  outcome.inserted = keyframes_within_reach(positions, first, search.local_map);
+  outcome.inserted = keyframes_within_reach(positions, first, search.local_map.radius_m);
   for (const LocalMapInsertion& insertion : outcome.inserted) {
     const auto points = search.map.points->get(insertion.keyframe);
     outcome.local_map->insert({points.get(), outcome.world_from_keyframe[insertion.keyframe]},
@@ -200,9 +205,11 @@ void describe(ConfigTable& table, LoopCloserConfig& config) {
             "smaller turns are not applied until the next loop");
 }
 
-LoopCloser::LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map)
+LoopCloser::LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map,
+                       bool leave_map)
     : config_(config),
       local_map_config_(local_map),
+      leave_map_(leave_map),
       agreement_(std::make_unique<LoopAgreement>(config.graph)) {}
 
 LoopCloser::~LoopCloser() {
@@ -302,7 +309,7 @@ bool LoopCloser::join_left(std::vector<Keyframe>& keyframes,
 void LoopCloser::begin(const std::vector<Keyframe>& keyframes,
                        const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points) {
   Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
-                agreement_.get()};
+                agreement_.get(), leave_map_};
   running_.emplace();
   running_->keyframes = keyframes.size();
   running_->outcome = std::async(std::launch::async, [this, search = std::move(search)]() mutable {

@@ -50,6 +50,8 @@ struct LoopOutcome {
   std::vector<Pose> world_from_keyframe;  // of all those, if a loop was verified; else empty
   std::optional<LocalMap> local_map;      // made of them around the last one, if it accumulates
   std::vector<LocalMapInsertion> inserted;
+  // Where it is left to whoever takes the outcome over: the first keyframe that it may be made of.
+  std::optional<std::size_t> map_begins_at;
 };
 
 // The map that scans are matched to at present, in the world frame, and the keyframes in it.
@@ -64,7 +66,9 @@ struct PresentMap {
 // close_in_present.
 class LoopCloser {
  public:
-  LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map);
+  // `leave_map`: outcomes come without a local map, which would be one more beside the present one.
+  LoopCloser(const LoopCloserConfig& config, const LocalMapConfig& local_map,
+             bool leave_map = false);
   ~LoopCloser();
   LoopCloser(const LoopCloser&) = delete;
   LoopCloser& operator=(const LoopCloser&) = delete;
@@ -129,6 +133,7 @@ class LoopCloser {
 
   LoopCloserConfig config_;
   LocalMapConfig local_map_config_;
+  bool leave_map_;
   std::vector<LoopAttempt> attempts_;
   // Of the running search while there is one; kept from one to the next.
   std::unique_ptr<LoopAgreement> agreement_;

@@ -60,6 +60,16 @@ namespace searched_map {  // map/searched_map.cc
 inline constexpr double kGuessIsWorthless = 1e4;
 }  // namespace searched_map
 
+namespace local_map {  // map/local_map.cc
+// Factor by which the radius becomes smaller where the map takes too much [chosen]
+inline constexpr double kSmaller = 0.9;
+// Share of what it may take below which the radius becomes larger again [bound: a radius larger by
+// 1 / kSmaller takes 1.37 times as much at most where the height of the stand counts, too]
+inline constexpr double kRoomToGrow = 0.7;
+// m: a smaller radius holds less than a scan shows of the stems around [chosen]
+inline constexpr double kLeastRadiusM = 20.0;
+}  // namespace local_map
+
 namespace keyframe_map {  // map/keyframe_map.cc
 // Keyframes whose points stay in memory, about 60 MB [bound: memory]
 inline constexpr std::size_t kCachedKeyframes = 150;

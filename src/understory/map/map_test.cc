@@ -1,10 +1,14 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <set>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "understory/map/keyframe_clouds.h"
 #include "understory/map/keyframe_map.h"
@@ -190,6 +194,108 @@ TEST(MapTiles, ThinsToTheFirstPointOfEachCube) {
       kept.push_back(p.stamp);
   });
   EXPECT_EQ(kept, (std::vector<TimeNs>{1, 3}));
+}
+
+// All that MapTiles hands back of the same points.
+struct HandedBack {
+  std::vector<std::pair<MapTiles::TileIndex, std::uint64_t>> sizes;
+  std::vector<std::pair<MapTiles::TileIndex, TimeNs>> points;
+  std::vector<Eigen::Vector3d> places_in_one;
+  std::size_t largest_block = 0;
+  std::size_t files = 0;
+};
+
+HandedBack handed_back(const std::filesystem::path& folder, double most_bytes) {
+  MapTiles::Config config{50.0, 0.05};
+  config.most_bytes = most_bytes;
+  MapTiles tiles(folder, config);
+  Random random(5);
+  for (int i = 0; i < 300'000; ++i)
+    tiles.add({random.uniform(-3, 60), random.uniform(0, 4), random.uniform(0, 1), i, 1});
+  HandedBack back;
+  back.sizes = tiles.sizes();
+  tiles.for_each_block([&](MapTiles::TileIndex index, std::span<const MapPoint> block) {
+    for (const MapPoint& p : block)
+      back.points.emplace_back(index, p.stamp);
+    back.largest_block = std::max(back.largest_block, block.size());
+  });
+  tiles.for_each_place_in({0, 0}, [&](std::span<const Eigen::Vector3d> places) {
+    back.places_in_one.insert(back.places_in_one.end(), places.begin(), places.end());
+  });
+  tiles.for_each_place_in({7, 7}, [&](std::span<const Eigen::Vector3d>) { ADD_FAILURE(); });
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    static_cast<void>(entry);
+    ++back.files;
+  }
+  return back;
+}
+
+// The least memory thins in many strips, and holds all points on disk.
+TEST(MapTiles, TheMemoryThatTheyMayTakeChangesNoPoint) {
+  const test::TemporaryFolder folder;
+  const HandedBack free = handed_back(folder / "free", 0.0);
+  const HandedBack tight = handed_back(folder / "tight", 1e6);
+  EXPECT_EQ(free.files, 0U);
+  EXPECT_EQ(tight.files, 3U);
+  EXPECT_EQ(free.sizes, tight.sizes);
+  EXPECT_EQ(free.points, tight.points);
+  EXPECT_EQ(free.places_in_one, tight.places_in_one);
+  ASSERT_EQ(free.sizes.size(), 3U);
+  EXPECT_EQ(free.sizes[1].second, free.places_in_one.size());
+  EXPECT_LT(free.points.size(), 300'000U);
+  EXPECT_GT(free.sizes[1].second, tight.largest_block);
+}
+
+std::vector<LocalMapInsertion> walk_of(std::size_t keyframes) {
+  std::vector<LocalMapInsertion> walk;
+  for (std::size_t i = 0; i < keyframes; ++i)
+    walk.push_back({i, i % 8 == 0 ? 1U : 0U});
+  return walk;
+}
+
+// A slab of points around each place; the walk goes 2 m a keyframe.
+void walk(LocalMap& map, const std::vector<LocalMapInsertion>& insertions) {
+  for (const LocalMapInsertion& insertion : insertions) {
+    FeaturePoints cloud;
+    for (int x = -30; x <= 30; ++x) {
+      for (int y = -30; y <= 30; ++y) {
+        for (int k = 0; k < 6; ++k)
+          cloud.points.emplace_back(0.5F * x + 0.05F * k, 0.5F * y + 0.03F * k, 0.02F * k);
+      }
+    }
+    const Pose pose(Eigen::Quaterniond::Identity(),
+                    Eigen::Vector3d(2.0 * static_cast<double>(insertion.keyframe), 0, 0));
+    map.insert({&cloud, pose}, insertion.forget != 0);
+  }
+}
+
+TEST(LocalMapWithinMemory, ItsRadiusShrinksUntilItFitsAndTheSameInsertionsMakeItAgain) {
+  LocalMapConfig config;
+  LocalMap whole(config);
+  walk(whole, walk_of(57));
+  EXPECT_EQ(whole.radius_m(), config.radius_m);
+  config.most_bytes = 0.6 * whole.bytes();
+  LocalMap fitted(config);
+  walk(fitted, walk_of(57));  // the last insertion forgets
+  EXPECT_LE(fitted.bytes(), config.most_bytes);
+  EXPECT_LT(fitted.radius_m(), config.radius_m);
+  EXPECT_GE(fitted.radius_m(), 20.0);
+  EXPECT_LT(fitted.snapshot()->size(), whole.snapshot()->size());
+  // As a resumed run does.
+  const double radius_m = fitted.radius_m();
+  fitted.clear();
+  EXPECT_EQ(fitted.first_radius_m(), radius_m);
+  walk(fitted, walk_of(33));
+  LocalMap again(config);
+  again.set_radius(fitted.first_radius_m());
+  walk(again, walk_of(33));
+  EXPECT_EQ(again.radius_m(), fitted.radius_m());
+  EXPECT_EQ(again.snapshot()->size(), fitted.snapshot()->size());
+  // An open place: the radius comes back.
+  fitted.clear();
+  for (int round = 0; round < 30; ++round)
+    walk(fitted, {{0, 1}});
+  EXPECT_EQ(fitted.radius_m(), config.radius_m);
 }
 
 TEST(MapTiles, RefusesPlacesThatAreNotNumbers) {

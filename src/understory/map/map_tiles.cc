@@ -4,6 +4,9 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <optional>
+#include <string>
+#include <utility>
 
 #include "understory/geometry/voxel_index.h"
 #include "understory/util/error.h"
@@ -14,8 +17,17 @@ namespace {
 constexpr std::uint64_t kBufferedPoints = 2'000'000;  // 48 MB over all tiles
 constexpr std::size_t kBlock = 1 << 16;  // points; 1.5 MB, so that they stay in the cache
 constexpr std::size_t kKeysAhead = 32;
-
+constexpr double kShareOfBuffers = 0.25;  // of most_bytes; the rest is for the index that thins
+constexpr double kIndexBytes = 64.0;      // of a VoxelIndex for each key, while it grows
+constexpr int kMostStrips = 64;
 constexpr double kGridStepsPerMetre = 4096.0;
+
+void append(const std::filesystem::path& path, const void* bytes, std::size_t size) {
+  std::ofstream file(path, std::ios::binary | std::ios::app);
+  file.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
+  file.close();
+  if (!file) throw OutputError(path.string(), "cannot be written (is the disk full?)");
+}
 
 }  // namespace
 
@@ -72,7 +84,7 @@ void MapTiles::add(const MapPoint& point) {
         add_to({index.first + dx, index.second + dy}, point, true);
     }
   }
-  if (buffered_ < kBufferedPoints) return;
+  if (buffered_ < buffered_at_most()) return;
   for (auto& [at, tile] : tiles_)
     write_out(at, tile);
   buffered_ = 0;
@@ -98,78 +110,128 @@ std::filesystem::path MapTiles::file_of(TileIndex index) const {
 void MapTiles::write_out(TileIndex index, Tile& tile) {
   if (tile.buffer.empty()) return;
   const std::filesystem::path path = file_of(index);
-  std::ofstream file(path, std::ios::binary | std::ios::app);
-  file.write(reinterpret_cast<const char*>(tile.buffer.data()),
-             static_cast<std::streamsize>(tile.buffer.size() * sizeof(Record)));
-  file.close();
-  if (!file) throw OutputError(path.string(), "cannot be written (is the disk full?)");
+  append(path, tile.buffer.data(), tile.buffer.size() * sizeof(Record));
   tile.written += tile.buffer.size();
   std::vector<Record>().swap(tile.buffer);
 }
 
-// Those of a tile that was never written lie in memory; `loaded` holds those that were.
-std::span<const MapTiles::Record> MapTiles::records_of(TileIndex index, const Tile& tile,
-                                                       std::vector<Record>& loaded) const {
-  if (tile.written == 0) return tile.buffer;
-  loaded.resize(tile.written);
-  const std::filesystem::path path = file_of(index);
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(loaded.data()),
-            static_cast<std::streamsize>(tile.written * sizeof(Record)));
-  if (!file) throw InputError(path.string(), "", "a temporary tile cannot be read back");
-  loaded.insert(loaded.end(), tile.buffer.begin(), tile.buffer.end());
-  return loaded;
+std::uint64_t MapTiles::buffered_at_most() const {
+  if (config_.most_bytes <= 0.0) return kBufferedPoints;
+  // Buffers grow by doubling.
+  const double points = kShareOfBuffers * config_.most_bytes / (2.0 * sizeof(Record));
+  return std::clamp<std::uint64_t>(static_cast<std::uint64_t>(points), kBlock, kBufferedPoints);
 }
 
-std::vector<MapTiles::Record> MapTiles::thinned(std::span<const Record> records) const {
-  VoxelIndex taken;
+// In blocks; those on disk come before those in memory.
+void MapTiles::for_each_record(TileIndex index, const Tile& tile,
+                               const RecordVisitor& visit) const {
+  if (tile.written > 0) {
+    const std::filesystem::path path = file_of(index);
+    std::ifstream file(path, std::ios::binary);
+    std::vector<Record> block;
+    for (std::uint64_t done = 0; done < tile.written; done += block.size()) {
+      block.resize(std::min<std::uint64_t>(kBlock, tile.written - done));
+      file.read(reinterpret_cast<char*>(block.data()),
+                static_cast<std::streamsize>(block.size() * sizeof(Record)));
+      if (!file) throw InputError(path.string(), "", "a temporary tile cannot be read back");
+      visit(block);
+    }
+  }
+  const std::span<const Record> waiting = tile.buffer;
+  for (std::size_t begin = 0; begin < waiting.size(); begin += kBlock)
+    visit(waiting.subspan(begin, std::min(kBlock, waiting.size() - begin)));
+}
+
+// Which records of a tile are the first in their cubes. A tile whose index would take too much is
+// gone through strip by strip; a cube lies in one strip.
+std::vector<bool> MapTiles::kept_of(TileIndex index, const Tile& tile) const {
+  const std::uint64_t count = tile.written + tile.buffer.size();
   const auto cell = [&](float value) {
     return voxel_floor(static_cast<double>(value) / config_.thin_m);
   };
-  const auto key_of = [&](const Record& r) { return voxel_key(cell(r.x), cell(r.y), cell(r.z)); };
-  // The index is larger than the cache: its memory is asked for some points ahead.
-  std::array<std::uint64_t, kKeysAhead> keys;
-  std::vector<Record> kept;
-  for (std::size_t begin = 0; begin < records.size(); begin += kKeysAhead) {
-    const std::size_t count = std::min(kKeysAhead, records.size() - begin);
-    for (std::size_t i = 0; i < count; ++i)
-      taken.prefetch(keys[i] = key_of(records[begin + i]));
-    for (std::size_t i = 0; i < count; ++i) {
-      if (taken.find(keys[i]) != VoxelIndex::kNone) continue;
-      taken.set(keys[i], 0);
-      kept.push_back(records[begin + i]);
-    }
+  int strips = 1;
+  if (config_.most_bytes > 0.0) {
+    const double index_bytes = kIndexBytes * static_cast<double>(count);
+    strips =
+        static_cast<int>(std::ceil(index_bytes / ((1.0 - kShareOfBuffers) * config_.most_bytes)));
+    strips = std::clamp(strips, 1, kMostStrips);
+  }
+  const int columns = cell(static_cast<float>(config_.tile_m)) + 1;
+  const auto strip_of = [&](int column) {
+    return strips == 1 ? 0 : std::clamp(column, 0, columns - 1) * strips / columns;
+  };
+  std::vector<bool> kept(count, false);
+  for (int strip = 0; strip < strips; ++strip) {
+    VoxelIndex taken;
+    std::uint64_t at = 0;
+    // The index is larger than the cache: its memory is asked for some points ahead.
+    std::array<std::uint64_t, kKeysAhead> keys;
+    for_each_record(index, tile, [&](std::span<const Record> records) {
+      for (std::size_t begin = 0; begin < records.size(); begin += kKeysAhead) {
+        const std::size_t here = std::min(kKeysAhead, records.size() - begin);
+        for (std::size_t i = 0; i < here; ++i) {
+          const Record& r = records[begin + i];
+          taken.prefetch(keys[i] = voxel_key(cell(r.x), cell(r.y), cell(r.z)));
+        }
+        for (std::size_t i = 0; i < here; ++i, ++at) {
+          if (strip_of(cell(records[begin + i].x)) != strip) continue;
+          if (taken.find(keys[i]) != VoxelIndex::kNone) continue;
+          taken.set(keys[i], 0);
+          kept[at] = true;
+        }
+      }
+    });
   }
   return kept;
 }
 
-void MapTiles::move_to_stored(TileIndex index, std::vector<Record>& records) const {
+MapTiles::Record MapTiles::stored(TileIndex index, Record record) const {
+  if (!stored_place_) return record;
   const Eigen::Vector3d from(corner(index.first), corner(index.second), 0.0);
-  for (Record& r : records) {
-    const Eigen::Vector3d place = from + Eigen::Vector3f(r.x, r.y, r.z).cast<double>();
-    const Eigen::Vector3f stored = (stored_place_(place) - from).cast<float>();
-    r.x = stored.x();
-    r.y = stored.y();
-    r.z = stored.z();
+  const Eigen::Vector3d place = from + Eigen::Vector3f(record.x, record.y, record.z).cast<double>();
+  const Eigen::Vector3f moved = (stored_place_(place) - from).cast<float>();
+  record.x = moved.x();
+  record.y = moved.y();
+  record.z = moved.z();
+  return record;
+}
+
+void MapTiles::thin(TileIndex index, Tile& tile) {
+  const std::vector<bool> kept = config_.thin_m > 0.0
+                                     ? kept_of(index, tile)
+                                     : std::vector<bool>(tile.written + tile.buffer.size(), true);
+  const bool on_disk = tile.written > 0;
+  const std::filesystem::path path = file_of(index);
+  std::filesystem::path thinned = path;
+  thinned += ".thin";
+  std::vector<Record> left;
+  std::uint64_t at = 0;
+  std::uint64_t written = 0;
+  const auto write = [&] {
+    append(thinned, left.data(), left.size() * sizeof(Record));
+    written += left.size();
+    left.clear();
+  };
+  for_each_record(index, tile, [&](std::span<const Record> records) {
+    for (const Record& record : records) {
+      if (kept[at++]) left.push_back(stored(index, record));
+    }
+    if (on_disk && left.size() >= kBlock) write();
+  });
+  if (on_disk) {
+    write();
+    left.shrink_to_fit();
+    std::filesystem::rename(thinned, path);
   }
+  tile.written = written;
+  tile.buffer = std::move(left);
 }
 
 void MapTiles::thin_all() {
   thinned_ = true;
-  if (config_.thin_m <= 0.0 && !stored_place_) return;
-  std::vector<Record> loaded;
   for (auto& [index, tile] : tiles_) {
-    const std::span<const Record> all = records_of(index, tile, loaded);
-    std::vector<Record> kept =
-        config_.thin_m > 0.0 ? thinned(all) : std::vector<Record>(all.begin(), all.end());
-    if (stored_place_) move_to_stored(index, kept);
-    const bool on_disk = tile.written > 0;
-    if (on_disk) {
-      std::filesystem::remove(file_of(index));
-      tile.written = 0;
-    }
-    tile.buffer = std::move(kept);
-    if (on_disk) write_out(index, tile);
+    if (config_.most_bytes > 0.0) write_out(index, tile);
+    if (config_.thin_m > 0.0 || stored_place_) thin(index, tile);
   }
 }
 
@@ -185,37 +247,73 @@ std::vector<std::pair<MapTiles::TileIndex, const MapTiles::Tile*>> MapTiles::til
 }
 
 void MapTiles::for_each(const std::function<void(TileIndex, const std::vector<MapPoint>&)>& visit) {
+  std::vector<MapPoint> points;
+  std::optional<TileIndex> last;
+  const auto hand_over = [&] {
+    if (last) visit(*last, points);
+    points.clear();
+  };
+  for_each_block([&](TileIndex index, std::span<const MapPoint> block) {
+    if (last != index) hand_over();
+    last = index;
+    points.insert(points.end(), block.begin(), block.end());
+  });
+  hand_over();
+}
+
+void MapTiles::for_each_block(
+    const std::function<void(TileIndex, std::span<const MapPoint>)>& visit) {
   if (!thinned_) thin_all();
   std::vector<MapPoint> points;
-  std::vector<Record> loaded;
   for (const auto& [index, tile] : tiles_in_order()) {
-    points.clear();
-    for (const Record& r : records_of(index, *tile, loaded)) {
-      points.push_back({corner(index.first) + static_cast<double>(r.x),
-                        corner(index.second) + static_cast<double>(r.y), static_cast<double>(r.z),
-                        r.stamp, r.intensity, r.of_neighbour});
-    }
-    visit(index, points);
+    const double x0 = corner(index.first);
+    const double y0 = corner(index.second);
+    for_each_record(index, *tile, [&, at = index](std::span<const Record> records) {
+      points.clear();
+      for (const Record& r : records) {
+        points.push_back({x0 + static_cast<double>(r.x), y0 + static_cast<double>(r.y),
+                          static_cast<double>(r.z), r.stamp, r.intensity, r.of_neighbour});
+      }
+      visit(at, points);
+    });
   }
+}
+
+void MapTiles::for_each_place_of(
+    TileIndex index, const Tile& tile,
+    const std::function<void(std::span<const Eigen::Vector3d>)>& visit) const {
+  const double x0 = corner(index.first);
+  const double y0 = corner(index.second);
+  std::vector<Eigen::Vector3d> places;
+  for_each_record(index, tile, [&](std::span<const Record> records) {
+    places.clear();
+    for (const Record& r : records) {
+      places.emplace_back(x0 + static_cast<double>(r.x), y0 + static_cast<double>(r.y),
+                          static_cast<double>(r.z));
+    }
+    visit(places);
+  });
 }
 
 void MapTiles::for_each_place(const std::function<void(std::span<const Eigen::Vector3d>)>& visit) {
   if (!thinned_) thin_all();
-  std::vector<Eigen::Vector3d> places;
-  std::vector<Record> loaded;
-  for (const auto& [index, tile] : tiles_in_order()) {
-    const double x0 = corner(index.first);
-    const double y0 = corner(index.second);
-    const std::span<const Record> records = records_of(index, *tile, loaded);
-    for (std::size_t begin = 0; begin < records.size(); begin += kBlock) {
-      places.clear();
-      for (const Record& r : records.subspan(begin, std::min(kBlock, records.size() - begin))) {
-        places.emplace_back(x0 + static_cast<double>(r.x), y0 + static_cast<double>(r.y),
-                            static_cast<double>(r.z));
-      }
-      visit(places);
-    }
-  }
+  for (const auto& [index, tile] : tiles_in_order())
+    for_each_place_of(index, *tile, visit);
+}
+
+void MapTiles::for_each_place_in(
+    TileIndex index, const std::function<void(std::span<const Eigen::Vector3d>)>& visit) {
+  if (!thinned_) thin_all();
+  const auto found = tiles_.find(index);
+  if (found != tiles_.end()) for_each_place_of(index, found->second, visit);
+}
+
+std::vector<std::pair<MapTiles::TileIndex, std::uint64_t>> MapTiles::sizes() {
+  if (!thinned_) thin_all();
+  std::vector<std::pair<TileIndex, std::uint64_t>> sizes;
+  for (const auto& [index, tile] : tiles_in_order())
+    sizes.emplace_back(index, tile->written + tile->buffer.size());
+  return sizes;
 }
 
 }  // namespace understory

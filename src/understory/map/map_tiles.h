@@ -31,7 +31,7 @@ struct MapPoint {
 
 // Sorts the points of a map of any size into square tiles, on disk where they are many, and hands
 // the tiles back one by one, thinned: at most one point (the first that was measured) in each cube
-// of `thin_m`. Memory is that of one tile and of the write buffers.
+// of `thin_m`. Memory is that of the write buffers and of the index that thins one tile.
 class MapTiles {
  public:
   struct Config {
@@ -39,6 +39,9 @@ class MapTiles {
     double thin_m = 0.02;  // 0 = keep every point
     double border_m =
         0.0;  // a tile also gets its neighbours' points that are so near; below tile_m
+    // Bytes for the write buffers, and for the index that thins; all points lie on disk then. 0:
+    // usual buffers, any index.
+    double most_bytes = 0.0;
   };
   using TileIndex = std::pair<std::int32_t, std::int32_t>;  // x, y in tiles
 
@@ -57,9 +60,17 @@ class MapTiles {
   // Calls `visit` with each non-empty tile's points, tiles in order of y then x. May be called
   // again, but after the first call no point may be added.
   void for_each(const std::function<void(TileIndex, const std::vector<MapPoint>&)>& visit);
+  // The same in blocks of some ten thousand points, so that no tile is held as a whole.
+  void for_each_block(const std::function<void(TileIndex, std::span<const MapPoint>)>& visit);
   // Calls `visit` with the places of all points (world frame, metres), in the order of for_each, a
   // few ten thousand at a time. May be called again, like for_each.
   void for_each_place(const std::function<void(std::span<const Eigen::Vector3d>)>& visit);
+  // The places of one tile, in the same way; nothing where there is no such tile.
+  void for_each_place_in(TileIndex index,
+                         const std::function<void(std::span<const Eigen::Vector3d>)>& visit);
+  // The tiles and how many points each has, thinned, in order of y then x.
+  [[nodiscard]] std::vector<std::pair<TileIndex, std::uint64_t>> sizes();
+  [[nodiscard]] double tile_m() const { return config_.tile_m; }
   [[nodiscard]] std::uint64_t points_added() const { return points_added_; }
 
  private:
@@ -68,12 +79,17 @@ class MapTiles {
   void add_to(TileIndex index, const MapPoint& point, bool of_neighbour);
   void write_out(TileIndex index, Tile& tile);
   void thin_all();
+  void thin(TileIndex index, Tile& tile);
+  [[nodiscard]] std::uint64_t buffered_at_most() const;
   [[nodiscard]] std::filesystem::path file_of(TileIndex index) const;
-  [[nodiscard]] std::span<const Record> records_of(TileIndex index, const Tile& tile,
-                                                   std::vector<Record>& loaded) const;
-  [[nodiscard]] std::vector<Record> thinned(std::span<const Record> records) const;
+  using RecordVisitor = std::function<void(std::span<const Record>)>;
+  void for_each_record(TileIndex index, const Tile& tile, const RecordVisitor& visit) const;
+  void for_each_place_of(TileIndex index, const Tile& tile,
+                         const std::function<void(std::span<const Eigen::Vector3d>)>& visit) const;
+  [[nodiscard]] std::vector<bool> kept_of(TileIndex index, const Tile& tile) const;
   [[nodiscard]] double corner(std::int32_t tiles) const;
-  void move_to_stored(TileIndex index, std::vector<Record>& records) const;
+  // A record as it is handed back.
+  [[nodiscard]] Record stored(TileIndex index, Record record) const;
   [[nodiscard]] std::vector<std::pair<TileIndex, const Tile*>> tiles_in_order() const;
 
   std::filesystem::path folder_;

@@ -136,6 +136,44 @@ inline constexpr double kCopcDiskBytesPerPoint = 40.0;
 inline constexpr std::uint64_t kSample = 400'000;
 }  // namespace cloud_tiles
 
+namespace tiled_map {  // pipeline/mapping/tiled_map.cc
+// m beside its tile at which a point may lie, as places are those of map.laz [bound: its steps]
+inline constexpr double kBesideTileM = 0.01;
+// Bytes that an inventory of a map on disk takes for each of its points [measured on simulated
+// runs]
+inline constexpr double kBytesPerPointWhole = 30.0;
+// The same of a tile, for each point in and around it [measured on simulated runs]
+inline constexpr double kBytesPerPoint = 30.0;
+}  // namespace tiled_map
+
+namespace memory_plan {  // pipeline/mapping/dense/memory_plan.cc
+// Bytes that a run takes beside what follows [measured on simulated runs]
+inline constexpr double kProgramBytes = 130e6;
+// Bytes for each return of a scan: the scans that wait, are worked on and are looked back at for a
+// loop [measured on simulated runs]
+inline constexpr double kBytesPerScanPoint = 1000.0;
+// Bytes for each return of a scan of a keyframe whose points are in memory [bound: 12 a point]
+inline constexpr double kBytesPerKeyframePoint = 12.0;
+// Returns of a scan of a lidar that nothing is known of [bound: 128 rings of 1,024 columns]
+inline constexpr std::uint64_t kPointsOfUnknown = 131'072;
+// Keyframes in memory, at least [chosen]
+inline constexpr int kFewestKeyframes = 30;
+// Share of what is left for keyframes, at most; the rest is for the local map [chosen]
+inline constexpr double kShareOfKeyframes = 0.3;
+// Bytes of the smallest local map [measured: 45 m around an OS0-128 in a stand]
+inline constexpr double kLeastLocalMapBytes = 60e6;
+// Share of what is left for making the tiles of the finished map [chosen]
+inline constexpr double kShareOfTiles = 0.4;
+// Bytes for that, at most: more helps no more [bound: time]
+inline constexpr double kMostTileBytes = 200e6;
+// Bytes that an inventory takes beside its points [measured on simulated runs]
+inline constexpr double kFinishBytes = 40e6;
+// Bytes for map.copc.laz [docs/reference/outputs.md]
+inline constexpr double kCopcBytes = 300e6;
+// Share of the limit from which on caches are emptied [chosen]
+inline constexpr double kShortShare = 0.85;
+}  // namespace memory_plan
+
 namespace stand_cloud {  // pipeline/inventory/stand_cloud.cc
 // m by which places may be rounded: a tenth of a thin stem [chosen]
 inline constexpr double kCoarsestStepM = 0.01;

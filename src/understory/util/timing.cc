@@ -44,6 +44,15 @@ double resident_memory_mb() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
+void give_back_what_is_freed() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  mallopt(M_TRIM_THRESHOLD, 8 << 20);
+  mallopt(M_TOP_PAD, 1 << 20);
+  mallopt(M_ARENA_MAX, 4);  // each keeps what its threads have freed
+#endif
+}
+
 void give_free_memory_back() {
 #ifdef __GLIBC__
   malloc_trim(0);

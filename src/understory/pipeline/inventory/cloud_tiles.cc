@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
+#include "understory/pipeline/inventory/tile_layout.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/error.h"
 
@@ -14,10 +14,6 @@ namespace understory {
 namespace {
 
 using namespace pipeline_constants::cloud_tiles;
-
-int floor_by(std::int32_t number, int by) {
-  return number >= 0 ? number / by : -((by - 1 - number) / by);
-}
 
 // A tile of the user's size is made of whole cells.
 double cell_for(const CloudTilesConfig& config, double extent_m) {
@@ -91,62 +87,28 @@ void CloudTiles::write_out(Cell& cell) {
 void CloudTiles::finish(int threads) {
   for (auto& [index, cell] : cells_)
     write_out(cell);
+  std::map<TileLayout::Cell, std::uint64_t> counts;
+  for (const auto& [index, cell] : cells_)
+    counts.emplace(index, cell.points);
+  const TileLayout layout(std::move(counts), cell_m_);
   const double bytes = 1e6 * config_.max_memory_mb - kBaseBytes;
   for (at_once_ = std::max(1, threads); at_once_ > 1; --at_once_) {
-    tile_cells_ = largest_tile(bytes / kBytesPerPoint / at_once_);
+    tile_cells_ = layout.largest_tile(bytes / kBytesPerPoint / at_once_);
     if (tile_cells_ * cell_m_ >= kSmallestSideBySide) break;
   }
-  if (at_once_ == 1) tile_cells_ = largest_tile(bytes / kBytesPerPoint);
+  if (at_once_ == 1) tile_cells_ = layout.largest_tile(bytes / kBytesPerPoint);
   if (config_.size_m > 0.0) {
     tile_cells_ = std::max(1, static_cast<int>(std::lround(config_.size_m / cell_m_)));
-    const double needed = static_cast<double>(most_points(tile_cells_)) * kBytesPerPoint;
+    const double needed = static_cast<double>(layout.most_points(tile_cells_)) * kBytesPerPoint;
     at_once_ = std::clamp(static_cast<int>(bytes / std::max(1.0, needed)), 1, std::max(1, threads));
   } else if (tile_cells_ == 0) {
     throw ConfigError({fmt::format(
         "tiles.max_memory_mb: expected {:.0f} at least for this cloud: so much takes a tile of "
         "{:.0f} m of it with what is around",
-        std::ceil((static_cast<double>(most_points(1)) * kBytesPerPoint + kBaseBytes) / 1e6),
+        std::ceil((static_cast<double>(layout.most_points(1)) * kBytesPerPoint + kBaseBytes) / 1e6),
         cell_m_)});
   }
-  lay_tiles();
-}
-
-std::uint64_t CloudTiles::most_points(int tile_cells) const {
-  std::map<CellIndex, std::uint64_t> tiles;
-  const int around = static_cast<int>(std::ceil(kAround / cell_m_));
-  for (const auto& [index, cell] : cells_) {
-    const auto first = [&](int number) { return floor_by(number - around, tile_cells); };
-    const auto last = [&](int number) { return floor_by(number + around, tile_cells); };
-    for (int row = first(index.first); row <= last(index.first); ++row) {
-      for (int column = first(index.second); column <= last(index.second); ++column)
-        tiles[{row, column}] += cell.points;
-    }
-  }
-  std::uint64_t most = 0;
-  for (const auto& [index, count] : tiles)
-    most = std::max(most, count);
-  return most;
-}
-
-// Cells a side of the largest tile with so many points at most; 0: none.
-int CloudTiles::largest_tile(double points) const {
-  int best = 0;
-  for (int cells = 1; cells <= kMostCellsOfTile; cells = std::max(cells + 1, cells * 5 / 4)) {
-    if (static_cast<double>(most_points(cells)) > points) break;
-    best = cells;
-  }
-  return best;
-}
-
-void CloudTiles::lay_tiles() {
-  std::set<CellIndex> held;
-  for (const auto& [index, cell] : cells_)
-    held.insert({floor_by(index.first, tile_cells_), floor_by(index.second, tile_cells_)});
-  for (const auto& [row, column] : held) {
-    tiles_.push_back({area_of({row * tile_cells_, column * tile_cells_}).low,
-                      area_of({(row + 1) * tile_cells_, (column + 1) * tile_cells_}).low});
-  }
-  if (tiles_.size() == 1) tiles_ = {GroundArea()};
+  tiles_ = layout.tiles(tile_cells_);
 }
 
 void CloudTiles::visit_cell(const Cell& cell, std::vector<TilePoint>& loaded,

@@ -78,10 +78,6 @@ class CloudTiles : public TiledCloud {
                   const RecordVisitor& visit) const;
   void visit_places(const Cell& cell, std::vector<TilePoint>& loaded,
                     std::vector<Eigen::Vector3d>& places, const PointVisitor& visit) const;
-  // Points in the fullest tile of so many cells a side, with what is around it.
-  [[nodiscard]] std::uint64_t most_points(int tile_cells) const;
-  [[nodiscard]] int largest_tile(double points) const;
-  void lay_tiles();
 
   CloudTilesConfig config_;
   mutable ScratchFile scratch_;

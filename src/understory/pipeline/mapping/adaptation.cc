@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "understory/pipeline/mapping/dense/memory_plan.h"
 #include "understory/pipeline/pipeline_constants.h"
 
 namespace understory {
@@ -118,6 +119,7 @@ Adapted<DenseMappingConfig> adapt(const DenseMappingConfig& asked, const ConfigO
                        conditions.imu_judged_s);
   }
   config.keyframe_map.local_map.viewpoint.lidar_in_source = traits.lidar_in_body;
+  keep_within_memory(config, traits);
   adapted.changes = changes.list();
   return adapted;
 }

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "understory/pipeline/mapping/dense/memory_plan.h"
 #include "understory/preprocess/point_order.h"
 #include "understory/recording/finding.h"
 #include "understory/util/error.h"
@@ -49,6 +50,8 @@ void EventLoop::begin() {
   request_.conditions.realtime = request_.realtime;
   if (depends_on_sensors(asked_)) source_ = learn_traits(std::move(source_), request_.traits);
   expect_imu();
+  if (const auto* dense = std::get_if<DenseMappingConfig>(&asked_))
+    expect_memory(*dense, request_.traits);
   state_.forget_former();
   adapt_to_recording();
   save_state();  // makes the run resumable from the start

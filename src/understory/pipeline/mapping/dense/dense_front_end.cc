@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "understory/pipeline/mapping/dense/memory_plan.h"
 #include "understory/sensor/scan_content.h"
 #include "understory/util/error.h"
 
@@ -41,6 +42,7 @@ DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTrait
       imu_cleared_s_(conditions.imu_cleared ? std::optional(conditions.imu_judged_s)
                                             : std::nullopt),
       opening_(std::make_unique<Opening>()) {
+  if (config.max_memory_mb > 0.0) give_back_what_is_freed();
   received_.clock = LidarImuClockCheck(config.odometry.motion.imu);
   const LoopClosureConfig& loops = config.keyframe_map.loop_closure.verification;
   for (const std::string& method : {loops.matcher.method, loops.refine}) {
@@ -379,6 +381,14 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   offer_cloud(estimate, map_->keyframes().size(), Pose());
   const auto moved = map_->add(record.stamp, state.world_from_body, map_points(estimate));
   if (moved) move_world(*moved);
+  watch_memory();
+}
+
+// What can be read again from the disk leaves the memory before the limit is reached.
+void DenseFrontEnd::watch_memory() {
+  if (!memory_is_short(config_.max_memory_mb)) return;
+  map_->free_cache();
+  give_free_memory_back();
 }
 
 // Loops have moved the present, too.

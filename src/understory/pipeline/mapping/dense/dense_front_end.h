@@ -168,6 +168,7 @@ class DenseFrontEnd : public FrontEnd {
   void on_scan(const Scan& scan);
   [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
+  void watch_memory();
   void move_world(const Pose& new_world_from_old_world);
   [[nodiscard]] FeaturePoints map_points(const DenseEstimate& estimate);
   [[nodiscard]] ScanCloudsConfig clouds_config() const;

@@ -59,7 +59,9 @@ class DenseMap : public MapMaker {
     const ScopedTimer timer(front_end_.times(), "finish_inventory");
     const LidarView view = learn_view(front_end_.clouds(), front_end_.rig().body_from_lidar);
     const std::vector<Pose> poses = poses_of(front_end_.map().keyframes());
-    made_.inventory = take_inventory(blocks_of(*made_.tiles), front_end_.config().inventory,
+    made_.forest = std::make_unique<TiledMap>(*made_.tiles, front_end_.config().inventory_bytes,
+                                              recording_.work);
+    made_.inventory = take_inventory(*made_.forest, front_end_.config().inventory,
                                      recording_.progress, seen_from(view, poses), places_of(poses));
     made_.lidar_view = figures_of(view);
     if (front_end_.counts().imu_samples == 0)

@@ -56,6 +56,8 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
               "with fewer points in a full scan, settings are adapted to a sparse lidar; 0: never");
     table.add("lost_after_scans", config.lost_after_scans, {1, 100000}, "scans",
               "unmatched scans in a row after which a new piece of map begins");
+    table.add("max_memory_mb", config.max_memory_mb, {0.0, 1e6}, "MB",
+              "memory that the run may have resident (10^6 bytes); 0: no limit");
     table.add("realtime_queue_scans", config.loop.realtime_queue_scans, {1, 1000}, "scans",
               "--realtime: scans that may wait; older ones are dropped");
   });

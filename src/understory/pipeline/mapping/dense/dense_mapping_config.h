@@ -47,7 +47,11 @@ struct DenseMappingConfig {
   // A lidar whose full scans have fewer points than this (16 beams) has what nobody set adapted to
   // it (adapt()): thinned like dense scans, its scans would leave too few points in a cell.
   int sparse_scan_points = 60000;
-  int lost_after_scans = 30;  // unmatched scans in a row after which a new segment begins
+  int lost_after_scans = 30;   // unmatched scans in a row after which a new segment begins
+  double max_memory_mb = 0.0;  // resident, MB of 10^6 bytes; 0: no limit
+  // What follows from it (memory_plan.h), no setting of its own: bytes that the inventory of the
+  // finished map may take; 0: any.
+  double inventory_bytes = 0.0;
 };
 
 // The table of all keys, bound to `config`.

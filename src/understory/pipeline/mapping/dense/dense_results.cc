@@ -18,6 +18,7 @@
 #include "understory/pipeline/judgement/stand_notes.h"
 #include "understory/pipeline/mapping/dense/dense_evidence.h"
 #include "understory/pipeline/mapping/dense/map_files.h"
+#include "understory/pipeline/mapping/dense/memory_plan.h"
 #include "understory/pipeline/mapping/finished_trajectory.h"
 #include "understory/pipeline/mapping/map_documents.h"
 #include "understory/pipeline/run_folder/run_truth.h"
@@ -350,6 +351,7 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
     const ScopedTimer timer(front_end.times(), "finish_write_map");
     add_map(recording, front_end.config(), made, picture, documents);
   }
+  tell_memory(front_end.config().max_memory_mb, recording.log);
   fill_report(recording, front_end, trajectory, documents.summary().scans, documents.report());
   documents.write(folder);
   return documents.outcome(terminal_summary(documents.summary(), trajectory, made.inventory,

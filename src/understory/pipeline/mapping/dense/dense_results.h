@@ -12,6 +12,7 @@
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/pipeline/mapping/dense/dense_trajectory.h"
 #include "understory/pipeline/mapping/front_end.h"
+#include "understory/pipeline/mapping/tiled_map.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
 
 namespace understory {
@@ -21,7 +22,8 @@ struct DenseProducts {
   TrajectoryFacts trajectory;
   std::optional<FoundPlacement> placement;  // where it was found before the map was made
   PlacedMap placed;
-  std::unique_ptr<MapTiles> tiles;  // of the finished cloud
+  std::unique_ptr<MapTiles> tiles;   // of the finished cloud
+  std::unique_ptr<TiledMap> forest;  // the same as the inventory takes it, which goes before it
   InventoryResult inventory;
   StandResult figures;      // of the stand and its plots, once the frame of the layers is known
   std::string not_upright;  // why z of the map is not up; empty: it is, or an IMU tells it

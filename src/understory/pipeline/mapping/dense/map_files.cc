@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,13 +25,41 @@ struct CloudFile {
   std::filesystem::path path;
 };
 
+// The trees that points belong to, of points that come tile by tile.
+class PointOwners {
+ public:
+  explicit PointOwners(const InventoryResult& inventory) : inventory_(inventory) {}
+
+  [[nodiscard]] std::uint32_t tree_at(const Eigen::Vector3d& point, double height_m) {
+    const OwnerTiles* tiles = inventory_.owner_tiles.get();
+    if (tiles == nullptr) return understory::tree_at(inventory_, point, height_m);
+    if (!held_ || !tiles->holds(*held_, point)) hold_tile_of(*tiles, point);
+    return held_ ? understory::tree_at(inventory_, owners_, point, height_m) : 0;
+  }
+
+ private:
+  void hold_tile_of(const OwnerTiles& tiles, const Eigen::Vector3d& point) {
+    held_.reset();
+    owners_ = {};
+    for (std::size_t tile = 0; tile < tiles.size() && !held_; ++tile) {
+      if (tiles.holds(tile, point)) held_ = tile;
+    }
+    if (held_) owners_ = tiles.owners(*held_);
+  }
+
+  const InventoryResult& inventory_;
+  std::optional<std::size_t> held_;
+  TreeOwners owners_;
+};
+
 // `obstacles`: written beside the map where they are wanted; may be null.
 std::uint64_t write_cloud(const CloudFile& to, MapTiles& tiles, const InventoryResult& inventory,
                           const ResultFrames& frames, MapPicture& picture, ObstacleFiles* obstacles,
                           const ProgressSink& progress) {
   LasWriter writer(to.path, to.options);
+  PointOwners owners(inventory);
   double done = 0.0;
-  tiles.for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+  tiles.for_each_block([&](MapTiles::TileIndex, std::span<const MapPoint> points) {
     for (const MapPoint& p : points) {
       const Eigen::Vector3d in_world(p.x, p.y, p.z);
       const double height = inventory.ground.height_above(in_world);
@@ -43,7 +72,7 @@ std::uint64_t write_cloud(const CloudFile& to, MapTiles& tiles, const InventoryR
       record.stamp = p.stamp;
       record.intensity = p.intensity;
       record.classification = las_class;
-      record.tree_id = tree_at(inventory, in_world, height);
+      record.tree_id = owners.tree_at(in_world, height);
       record.height_above_ground = static_cast<float>(height);
       writer.add(record);
       if (obstacles != nullptr) obstacles->add(in_world, height, record);
@@ -68,10 +97,10 @@ std::uint64_t write_map(const ReadRecording& recording, const DenseMappingConfig
   std::optional<ObstacleFiles> obstacles;
   if (config.obstacles.enabled) {
     obstacles.emplace(folder, config.obstacles, trajectory, frames.layers,
-                      inventory.owners.has_value());
+                      inventory.owners.has_value() || inventory.owner_tiles != nullptr);
   }
   LasOptions options = las_options(frames.layers);
-  options.trees = inventory.owners.has_value();
+  options.trees = inventory.owners.has_value() || inventory.owner_tiles != nullptr;
   if (config.copc) ask_for_copc(options, recording.log);
   const std::uint64_t points =
       write_cloud({options, folder / "map.laz"}, *made.tiles, inventory, frames, picture,

@@ -1,0 +1,77 @@
+"""`understory map --max-memory-mb`: the limit is kept and the results are the bytes of a run without one; a limit that is
+too small is refused before anything is touched, with the least that works; a killed run goes on with its limit."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent / "bad_input"))
+from program import PROGRAM, program
+
+SAME = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "gnss.csv", "map.laz", "trees.csv", "stem_curves.csv", "dtm.tif",
+        "chm.tif", "dsm.tif"]
+# Every point of every scan: without a limit the run takes far more.
+EVERY_POINT = ["--inventory", "full", "--set", "map.thin_m=0", "--set", "map.keyframe_thin_m=0", "--set", "map.cloud_distance_m=0"]
+
+
+def peak_mb(run):
+    return json.loads((run / "run.json").read_text())["peak_memory_mb"]
+
+
+def map_command(recording, run, *options):
+    return ["map", recording, "-o", run, *EVERY_POINT, *options]
+
+
+def refused(recording, run, *options):
+    done = program(*map_command(recording, run, "--overwrite", *options))
+    assert done.returncode == 2, (options, done.returncode, done.stderr)
+    return done.stderr
+
+
+def killed_among_tiles(recording, run, least):
+    command = [PROGRAM, *map(str, map_command(recording, run, "--max-memory-mb", least))]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    for _ in range(60_000):
+        if any(run.rglob("*.tile")):
+            break
+        assert process.poll() is None, "the run ended before it could be killed"
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+
+
+with tempfile.TemporaryDirectory() as scratch:
+    scratch = Path(scratch)
+    recording, free, tight, cut = scratch / "r.mcap", scratch / "free", scratch / "tight", scratch / "cut"
+    assert program("simulate", "handheld", "-o", recording, "--seed", "5", "--duration-s", "9").returncode == 0
+    status = program(*map_command(recording, free)).returncode
+    assert status in (0, 4)
+
+    before = (free / "trees.csv").read_bytes()
+    message = refused(recording, free, "--max-memory-mb", "100")
+    least = int(re.search(r"expected (\d+) at least for a lidar of \d+ points a scan", message)[1])
+    assert str(least - 1) in refused(recording, free, "--max-memory-mb", str(least - 1))
+    assert "max_memory_mb" in refused(recording, free, "--max-memory-mb=-1")
+    assert "max_memory_mb" in refused(recording, free, "--max-memory-mb", "many")
+    assert "--front-end dense" in refused(recording, free, "--max-memory-mb", str(least), "--front-end", "sparse")
+    assert (free / "trees.csv").read_bytes() == before, "a refusal touched the former results"
+
+    assert program(*map_command(recording, tight, "--max-memory-mb", least)).returncode == status
+    print(f"least limit {least} MB; resident without a limit {peak_mb(free):.0f} MB, with it {peak_mb(tight):.0f} MB")
+    assert peak_mb(tight) <= least and peak_mb(tight) <= 0.8 * peak_mb(free)
+    warned = json.loads((tight / "run.json").read_text())["warnings"]
+    assert "memory." not in json.dumps(warned), warned
+
+    killed_among_tiles(recording, cut, least)
+    assert program("map", "--resume", cut).returncode == status
+    assert peak_mb(cut) <= least
+    for run in (tight, cut):
+        different = [name for name in SAME if (run / name).read_bytes() != (free / name).read_bytes()]
+        assert not different, f"{run.name}: {different} differ"
+        assert not (run / ".understory").exists()
+    print(f"{len(SAME)} files have the same bytes")
