@@ -21,7 +21,7 @@ inline constexpr std::uint32_t kScans = 30;
 // Scans after which it is asked again whether a voxel lies on a level surface [bound: time]
 inline constexpr std::uint32_t kJudgeEvery = 10;
 // Points of a voxel that are summed up; at the next question its sums are halved [chosen]
-inline constexpr float kFullVoxel = 200.0F;
+inline constexpr float kFullVoxel = 1000.0F;
 // Smallest over middle variance: below, a surface [chosen, as in NDT]
 inline constexpr double kFlat = 0.15;
 // m: standard deviation across a surface that is noise [chosen, half of NDT's floor]
