@@ -79,6 +79,7 @@ TEST(PaperProfile, EdgesOfTheMapGraphHaveTheNoiseOfEquation36) {
 TEST(PaperProfile, WhatIsNotThePapersIsOff) {
   const DenseMappingConfig config = paper();
   EXPECT_EQ(config.odometry.isolated.within_m, 0.0);
+  EXPECT_EQ(config.odometry.carried.reach_m, 0.0);
   EXPECT_EQ(config.odometry.motion.velocity_gate_m_s, 0.0);
   EXPECT_EQ(config.odometry.motion.angular_gate_deg_s, 0.0);
   EXPECT_EQ(config.keyframe_map.local_map.matcher.get<NdtMatcherConfig>().cells.near_side_line,

@@ -20,9 +20,12 @@ struct BodyCloud {
   std::vector<std::uint16_t> ring;
   std::vector<std::uint32_t> t_ns;    // since `stamp`
   std::vector<PointFeature> feature;  // only where a matcher asks for it; else empty
+  // 1: it goes along with the lidar, and is not matched (CarriedReturns). Empty: none.
+  std::vector<std::uint8_t> carried;
 
   [[nodiscard]] std::size_t size() const { return points.size(); }
   [[nodiscard]] bool empty() const { return points.empty(); }
+  [[nodiscard]] bool is_carried(std::size_t i) const { return !carried.empty() && carried[i] != 0; }
   void resize(std::size_t n) {
     points.resize(n);
     intensity.resize(n);

@@ -13,6 +13,30 @@
 // or real clouds and measurements by their page.
 namespace understory::preprocess_constants {
 
+namespace carried_returns {  // preprocess/carried_returns.cc
+// m: edge of the voxels beside the lidar [chosen]
+inline constexpr double kVoxelM = 0.2;
+// Scans over which the share of a voxel is a mean [chosen: 3 s]
+inline constexpr std::uint32_t kScans = 30;
+// Scans after which it is asked again whether a voxel lies on a level surface [bound: time]
+inline constexpr std::uint32_t kJudgeEvery = 10;
+// Points of a voxel that are summed up; at the next question its sums are halved [chosen]
+inline constexpr float kFullVoxel = 1000.0F;
+// Smallest over middle variance: below, a surface [chosen, as in NDT]
+inline constexpr double kFlat = 0.15;
+// m: standard deviation across a surface that is noise [chosen, half of NDT's floor]
+inline constexpr double kNoiseM = 0.015;
+// m: standard deviation along the narrow side of a surface at least: narrower, it is a bar [chosen]
+inline constexpr double kWidthM = 0.08;
+// Cosine between the normal of a level surface and up, at least; 25 degrees [chosen]
+inline constexpr double kLevel = 0.9;
+// m: how far below a level surface another thing lies at least that makes it no ground [chosen:
+// rough ground is less high]
+inline constexpr double kDropM = 0.35;
+// Squared sine of the angle at which that lies below at least; 30 degrees [chosen]
+inline constexpr double kSteep = 0.25;
+}  // namespace carried_returns
+
 namespace event_orderer {  // preprocess/event_orderer.cc
 // Messages of a stream while no other has any: it cannot be compared then [not recorded]
 inline constexpr std::size_t kMostSuspects = 1000;

@@ -154,13 +154,17 @@ void VoxelFilter::choose_nearest_to_mean(const Points& points) {
   }
 }
 
-BodyCloud VoxelFilter::filter(const BodyCloud& cloud, const VoxelFilterConfig& config) {
+BodyCloud VoxelFilter::filter(const BodyCloud& cloud, const VoxelFilterConfig& config,
+                              bool carried_too) {
   const auto low = static_cast<float>(config.range_min_m);
   const auto high = static_cast<float>(config.range_max_m);
   const bool mean = config.point == VoxelPoint::kMean;
   sort_into_voxels(
       cloud.points, config.voxel_size_m,
-      [&](std::uint32_t i) { return cloud.range[i] >= low && cloud.range[i] <= high; },
+      [&](std::uint32_t i) {
+        return cloud.range[i] >= low && cloud.range[i] <= high &&
+               (carried_too || !cloud.is_carried(i));
+      },
       [&](Voxel& voxel, std::uint32_t i) {
         voxel.intensity += cloud.intensity[i];
         voxel.range += cloud.range[i];
@@ -188,17 +192,18 @@ BodyCloud VoxelFilter::filter(const BodyCloud& cloud, const VoxelFilterConfig& c
 }
 
 BodyCloud VoxelFilter::filter_features(const BodyCloud& cloud, const VoxelFilterConfig& config,
-                                       bool keep_none) {
+                                       bool for_map) {
   UNDERSTORY_CHECK(cloud.feature.size() == cloud.size());
   BodyCloud filtered;
   filtered.stamp = cloud.stamp;
   for (const PointFeature kind :
        {PointFeature::kEdge, PointFeature::kPlane, PointFeature::kGround, PointFeature::kNone}) {
-    if (kind == PointFeature::kNone && !keep_none) break;
+    if (kind == PointFeature::kNone && !for_map) break;
     BodyCloud part;
     part.stamp = cloud.stamp;
     for (std::size_t i = 0; i < cloud.size(); ++i) {
-      if (cloud.feature[i] == kind) append_point(cloud, i, part);
+      if (cloud.feature[i] == kind && (for_map || !cloud.is_carried(i)))
+        append_point(cloud, i, part);
     }
     const BodyCloud thinned = filter(part, config);
     for (std::size_t i = 0; i < thinned.size(); ++i)

@@ -31,11 +31,14 @@ void describe(ConfigTable& table, VoxelFilterConfig& config);
 // calls, so that a call costs no allocation beyond its result. Not thread-safe: one per thread.
 class VoxelFilter {
  public:
-  // Ranges are measured from the lidar where the cloud has them.
-  [[nodiscard]] BodyCloud filter(const BodyCloud& cloud, const VoxelFilterConfig& config);
-  // Each kind of feature by itself, edges first; those of kNone last, or left out.
+  // Ranges are measured from the lidar where the cloud has them. What is carried is left out unless
+  // it is asked for.
+  [[nodiscard]] BodyCloud filter(const BodyCloud& cloud, const VoxelFilterConfig& config,
+                                 bool carried_too = false);
+  // Each kind of feature by itself, edges first. Those of kNone and what is carried are left out,
+  // or come with the others for a map.
   [[nodiscard]] BodyCloud filter_features(const BodyCloud& cloud, const VoxelFilterConfig& config,
-                                          bool keep_none);
+                                          bool for_map);
   // Without range limits; points only. `keep` returns indices instead: the point of each voxel that
   // VoxelPoint names (kMean counts as kNearestToMean).
   [[nodiscard]] Points filter(const Points& points, double voxel_size_m);

@@ -136,5 +136,30 @@ TEST(VoxelFilter, DecimationIsEvenAndUnbiased) {
     EXPECT_NEAR(h, 3200, 250);
 }
 
+TEST(VoxelFilter, WhatIsCarriedComesOnlyWhereItIsAskedFor) {
+  BodyCloud cloud = random_cloud(4000, 5);
+  cloud.carried.assign(cloud.size(), 0);
+  BodyCloud others = cloud;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.points[i].x() > 0.0F) continue;
+    cloud.carried[i] = 1;
+    others.range[i] = 1e6F;  // beyond the limit
+  }
+  VoxelFilter filter;
+  EXPECT_EQ(filter.filter(cloud, {}).points, filter.filter(others, {}).points);
+  others = cloud;
+  others.carried.clear();
+  EXPECT_EQ(filter.filter(cloud, {}, true).points, filter.filter(others, {}).points);
+}
+
+TEST(VoxelFilter, OfFeaturesWhatIsCarriedComesForAMap) {
+  BodyCloud cloud = random_cloud(4000, 6);
+  cloud.feature.assign(cloud.size(), PointFeature::kEdge);
+  cloud.carried.assign(cloud.size(), 1);
+  VoxelFilter filter;
+  EXPECT_TRUE(filter.filter_features(cloud, {}, false).empty());
+  EXPECT_FALSE(filter.filter_features(cloud, {}, true).empty());
+}
+
 }  // namespace
 }  // namespace understory

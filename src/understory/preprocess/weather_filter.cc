@@ -35,9 +35,11 @@ void keep_only(const std::vector<std::uint8_t>& keep, BodyCloud& cloud) {
     cloud.range[kept] = cloud.range[i];
     cloud.ring[kept] = cloud.ring[i];
     cloud.t_ns[kept] = cloud.t_ns[i];
+    if (!cloud.carried.empty()) cloud.carried[kept] = cloud.carried[i];
     ++kept;
   }
   cloud.resize(kept);
+  if (!cloud.carried.empty()) cloud.carried.resize(kept);
 }
 
 }  // namespace

@@ -62,6 +62,18 @@ TEST(WeatherFilter, DarkReturnsThatStandAloneGoAndNothingElse) {
   EXPECT_EQ(cloud.ring.size(), cloud.size());
 }
 
+TEST(WeatherFilter, PointsKeepTheirMarks) {
+  BodyCloud cloud = wall();
+  add(cloud, {5.0F, 0.0F, 0.0F}, 8.0F);  // a flake
+  add(cloud, {5.0F, 2.0F, 0.0F}, 100.0F);
+  cloud.carried.assign(cloud.size(), 0);
+  cloud.carried.back() = 1;
+  WeatherFilter filter(switched_on());
+  ASSERT_EQ(filter.drop(cloud, Pose()), 1U);
+  ASSERT_EQ(cloud.carried.size(), cloud.size());
+  EXPECT_EQ(cloud.carried.back(), 1);
+}
+
 // A dark twig alone in its scan, seen from another place in the scan before.
 TEST(WeatherFilter, WhatWasThereBeforeStays) {
   const Vector3f twig(5.0F, 0.0F, 0.0F);

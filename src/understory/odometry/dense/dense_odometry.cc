@@ -43,6 +43,7 @@ void describe(ConfigTable& table, DenseOdometryConfig& config) {
   table.section("preprocess", [&] {
     table.section("voxel", [&] { describe(table, config.voxel); });
     table.section("isolated", [&] { describe(table, config.isolated); });
+    table.section("carried", [&] { describe(table, config.carried); });
     describe(table, config.tops);
     table.section("weather", [&] { describe(table, config.weather); });
     table.add("machine_boxes_file", config.machine_boxes_file,
@@ -65,6 +66,7 @@ DenseOdometry::DenseOdometry(const DenseOdometryConfig& config, const Rig& rig,
       times_(times),
       log_(log),
       uses_imu_(config.imu_enabled && rig.body_from_imu.has_value()),
+      carried_(config.carried),
       weather_(config.weather) {
   motion_ = uses_imu_ ? make_imu_smoother(config.motion, rig, &log)
                       : make_constant_velocity_model(config.motion, &log);
@@ -84,6 +86,7 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
     const ScopedTimer timer(times_, "odometry");
     estimate.scan_end = scan.end();
     const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, estimate.scan_end);
+    learn_carried(scan, guess);
     preprocess(scan, guess, estimate);
     const bool by_match = local_map && !known.pose;
     if (by_match) match(*local_map, motion_->predict(scan.stamp), known.terms, estimate);
@@ -124,6 +127,14 @@ void DenseOdometry::note_lidars(const Scan& scan) {
   lidars_ |= lidars;
 }
 
+void DenseOdometry::learn_carried(const Scan& scan, const std::vector<StampedPose>& path) {
+  const ScopedTimer timer(times_, "preprocess");
+  const Pose world_from_body =
+      path.empty() ? motion_->predict(scan.stamp).world_from_body : path.front().world_from_body;
+  carried_.learn(scan,
+                 (world_from_body * rig_.body_from_lidar).rotation_matrix().transpose().col(2));
+}
+
 void DenseOdometry::preprocess(const Scan& scan, const std::vector<StampedPose>& path,
                                DenseEstimate& estimate) {
   const ScopedTimer timer(times_, "preprocess");
@@ -137,6 +148,14 @@ void DenseOdometry::clean(const Scan& scan, const std::vector<StampedPose>& path
   drop_isolated(scan, config_.isolated, keep_);
   estimate.cloud = deskew(scan, rig_, path, keep_, config_.deskew).cloud;
   BodyCloud& cloud = estimate.cloud;
+  cloud.carried = carried_.mark(scan);
+  if (!cloud.carried.empty() && !keep_.empty()) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < keep_.size(); ++i) {
+      if (keep_[i] != 0) cloud.carried[kept++] = cloud.carried[i];
+    }
+    cloud.carried.resize(kept);
+  }
   estimate.weather =
       weather_.drop(cloud, path.empty() ? motion_->predict(scan.stamp).world_from_body
                                         : path.front().world_from_body);
@@ -300,6 +319,7 @@ void DenseOdometry::save(BinaryWriter& writer) const {
   writer.put(last_scan_);
   scan_motion_.save(writer);
   motion_->save(writer);
+  carried_.save(writer);
   weather_.save(writer);
 }
 
@@ -311,6 +331,7 @@ void DenseOdometry::load(BinaryReader& reader) {
   last_scan_ = reader.get<TimeNs>();
   scan_motion_.load(reader);
   motion_->load(reader);
+  carried_.load(reader);
   weather_.load(reader);
 }
 

@@ -12,6 +12,7 @@
 #include "understory/odometry/dense/scan_tops.h"
 #include "understory/odometry/motion/motion_model.h"
 #include "understory/preprocess/body_cloud.h"
+#include "understory/preprocess/carried_returns.h"
 #include "understory/preprocess/deskew.h"
 #include "understory/preprocess/isolated_points.h"
 #include "understory/preprocess/machine_boxes.h"
@@ -54,6 +55,7 @@ void describe(ConfigTable& table, ScanMatchConfig& config);
 struct DenseOdometryConfig {
   VoxelFilterConfig voxel;  // thins a scan before matching
   IsolatedPointsConfig isolated;
+  CarriedReturnsConfig carried;
   ScanTopsConfig tops;
   WeatherFilterConfig weather;
   ScanMatchConfig match;
@@ -153,6 +155,8 @@ class DenseOdometry {
                          const std::vector<StampedPose>& guess, DenseEstimate& estimate);
   void watch_scan_motion(const Scan& scan, const MatchTargetPtr& local_map,
                          const std::vector<StampedPose>& guess, const DenseEstimate& estimate);
+  // Learns which of the scan's points are carried along.
+  void learn_carried(const Scan& scan, const std::vector<StampedPose>& path);
   // A lidar that joins sees what is not in the map yet: what was found before says nothing then.
   void note_lidars(const Scan& scan);
   void match(const MatchTarget& local_map, const NavState& predicted, const PoseTerms& known,
@@ -169,6 +173,7 @@ class DenseOdometry {
   std::unique_ptr<MotionModel> motion_;
   std::vector<MachineBox> boxes_;
   VoxelFilter filter_;
+  CarriedReturns carried_;
   WeatherFilter weather_;
   bool last_matched_ = false;
   TimeNs last_scan_ = 0;            // stamp

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -179,6 +180,59 @@ TEST_F(LookingAround, FewPointsCountIfTheyLieOnTheMapsSurfaces) {
   EXPECT_TRUE(counted.matched);
   EXPECT_LT(counted.found_share, 0.5);
   EXPECT_FALSE(last_of(1.5, scattered(mostly_new)).matched);
+}
+
+// A bar that goes along 0.8 m to the left of the lidar, before all else, and a box around some of
+// what follows.
+Scan with_a_bar(const Scan& scan) {
+  Scan with = scan;
+  with.points.clear();
+  for (int i = 0; i < 400; ++i) {
+    const auto along = 0.002F * static_cast<float>(i);
+    with.points.push_back({0.0F, 0.8F, along - 0.4F, 1.0F, 0, 0, 0, 0});
+  }
+  for (int i = 0; i < 50; ++i)
+    with.points.push_back({0.0F, -0.8F, 0.0F, 1.0F, 0, 0, 0, 0});
+  with.points.insert(with.points.end(), scan.points.begin(), scan.points.end());
+  return with;
+}
+
+bool is_of_bar(const Eigen::Vector3f& point) {
+  return std::abs(point.x()) < 0.2F && std::abs(point.y() - 0.8F) < 0.2F &&
+         std::abs(point.z()) < 0.45F;
+}
+
+TEST_F(LookingAround, WhatGoesAlongIsNotMatched) {
+  const std::string boxes = ::testing::TempDir() + "dense_odometry_test_boxes.yaml";
+  std::ofstream(boxes) << "boxes: [{name: seat, frame: lidar, center_m: [0, -0.8, 0], "
+                          "rotation_deg: [0, 0, 0], size_m: [0.2, 0.2, 0.2]}]\n";
+  const MatchTargetPtr local_map = map();
+  for (const double reach : {3.0, 0.0}) {
+    StageTimes times;
+    Log log;
+    DenseOdometryConfig config;
+    config.elastic_scans = false;
+    config.machine_boxes_file = boxes;
+    config.carried.reach_m = reach;
+    DenseOdometry odometry(config, Rig(), nullptr, times, log);
+    odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+    for (int i = 0; i < 5; ++i) {
+      const Scan bare = scan(kPeriod * i);
+      const DenseEstimate estimate = odometry.process(with_a_bar(bare), local_map);
+      ASSERT_EQ(estimate.cloud.size(), bare.points.size() + 400);
+      std::size_t of_bar = 0;
+      for (std::size_t k = 0; k < 400; ++k)
+        of_bar += estimate.cloud.is_carried(k) ? 1 : 0;
+      EXPECT_EQ(of_bar, reach > 0.0 ? 400U : 0U) << i;
+      std::size_t others = 0;
+      for (std::size_t k = 400; k < estimate.cloud.size(); ++k)
+        others += estimate.cloud.is_carried(k) ? 1 : 0;
+      // Stems near by are not known to be none before the walker moves.
+      EXPECT_LT(others, bare.points.size() / (i < 3 ? 4 : 20)) << i;
+      const Points& matched = estimate.thinned.points;
+      EXPECT_EQ(std::any_of(matched.begin(), matched.end(), is_of_bar), reach == 0.0) << i;
+    }
+  }
 }
 
 }  // namespace

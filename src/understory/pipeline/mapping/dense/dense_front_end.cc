@@ -292,6 +292,9 @@ void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& reco
   ++received_.counts.scans;
   received_.counts.points += record.points;
   received_.counts.weather_points += estimate.weather;
+  const std::vector<std::uint8_t>& carried = estimate.cloud.carried;
+  received_.counts.carried_points +=
+      static_cast<std::uint64_t>(std::count(carried.begin(), carried.end(), 1));
   record.fitness_m2 = static_cast<float>(estimate.match.fitness_m2);
   record.inlier_ratio = static_cast<float>(estimate.match.inlier_ratio);
   record.iterations = static_cast<std::uint16_t>(estimate.match.iterations);
@@ -412,9 +415,10 @@ FeaturePoints DenseFrontEnd::map_points(const DenseEstimate& estimate) {
     BodyCloud thinned = cloud_filter_.filter_features(estimate.cloud, voxel, true);
     return {std::move(thinned.points), std::move(thinned.feature)};
   }
-  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m)
+  // What seems to be carried may be a stem beside a machine that stands: it is seen again later.
+  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m && cloud.carried.empty())
     return {estimate.thinned.points, {}};
-  return {cloud_filter_.filter(cloud, voxel).points, {}};
+  return {cloud_filter_.filter(cloud, voxel, true).points, {}};
 }
 
 ScanCloudsConfig DenseFrontEnd::clouds_config() const {

@@ -42,6 +42,7 @@ struct DenseCounts {
   std::uint64_t imu_samples = 0;
   std::uint64_t points = 0;
   std::uint64_t weather_points = 0;  // that the weather filter dropped
+  std::uint64_t carried_points = 0;  // that go along with the lidar and were not matched
   std::uint64_t by_satellites = 0;   // scans whose match or place satellites told something of
   std::uint64_t repeated = 0;        // scans that hold the same points as the one before
   std::uint64_t last_content = 0;    // of the last scan, see content_of

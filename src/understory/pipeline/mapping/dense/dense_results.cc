@@ -108,6 +108,7 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
   documents.count("scans_unmatched", counts.unmatched);
   documents.count("scans_velocity_gated", counts.gated);
   documents.count("scans_with_few_points", counts.empty_scans);
+  if (counts.carried_points > 0) documents.count("carried_points", counts.carried_points);
   if (counts.weather_points > 0) documents.count("weather_points", counts.weather_points);
   const std::uint64_t apart = counts.segments - joined_segments(front_end);
   documents.count("segments", apart);
