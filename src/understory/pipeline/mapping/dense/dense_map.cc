@@ -34,8 +34,9 @@ class DenseMap : public MapMaker {
     if (front_end_.config().gnss.use == GnssUse::kGeoreference) return;
     const ScopedTimer timer(front_end_.times(), "finish_gnss");
     const SolvedRun solved = solved_run();
+    const std::vector<GnssFix> fixes = front_end_.fixes();
     RunWithPositions with_positions =
-        use_positions(mapped_path(recording_, front_end_, solved.trajectory), solved,
+        use_positions(mapped_path(recording_, front_end_, solved.trajectory, fixes), solved,
                       front_end_.config().georeference, front_end_.config().gnss, recording_.log);
     if (!with_positions.world_from_keyframe.empty())
       front_end_.map().set_poses(with_positions.world_from_keyframe);

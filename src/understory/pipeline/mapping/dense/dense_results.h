@@ -25,9 +25,10 @@ struct DenseProducts {
   std::optional<FoundPlacement> placement;  // where it was found before the map was made
 };
 
-// How the front end's finished run lies against its fixes.
+// How the front end's finished run lies against its `fixes`, which must outlive the result.
 [[nodiscard]] MappedPath mapped_path(const ReadRecording& recording, const DenseFrontEnd& front_end,
-                                     const Trajectory& trajectory);
+                                     const Trajectory& trajectory,
+                                     const std::vector<GnssFix>& fixes);
 
 // Writes what the dense front end has found: trajectory, states, keyframes, graph, fixes, map,
 // trees, terrain, run.json, report. Throws OutputError.
