@@ -17,6 +17,16 @@ namespace understory::graph_constants {
 // rad a degree [mathematics]
 inline constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 
+namespace pose_graph {  // graph/pose_graph.cc
+// Loops up to which graduated non-convexity is run in full at each handover [bound: time, half a
+// second of one processor]
+inline constexpr std::size_t kFewLoops = 200;
+// Solutions at most until used loops and their residuals agree [chosen]
+inline constexpr int kTurnsToAgree = 4;
+// Loops that may change sides at one of these; more are no small change of the graph [chosen]
+inline constexpr std::size_t kMostChanges = 20;
+}  // namespace pose_graph
+
 namespace gnss_fusion {  // graph/gnss_fusion.cc
 // Keyframes that the expected error of a path is a mean of [bound: time]
 inline constexpr std::size_t kKeyframesOfExpectedError = 50;

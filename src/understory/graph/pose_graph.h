@@ -66,8 +66,14 @@ struct [[nodiscard]] PoseGraphResult {
 // Batch optimisation. Deterministic; thread-safe. The graph must be connected by its odometry;
 // keyframes that are not reached are an error of the caller. `agreement`: of the same settings and
 // of an earlier state of this graph, which it is brought up from; the result is the same without.
+// `decided`: the `loop_used` of an earlier state of this graph, whose loops are the first ones of
+// `problem`. Of some hundred loops or more it is begun from, and graduated non-convexity is run
+// only where the new loops change many of these decisions. The result is then one that the
+// truncated least squares do not improve by changing a single decision, but it may be another than
+// without.
 PoseGraphResult optimise_pose_graph(const PoseGraphProblem& problem, const PoseGraphConfig& config,
-                                    LoopAgreement* agreement = nullptr);
+                                    LoopAgreement* agreement = nullptr,
+                                    const std::vector<char>& decided = {});
 
 // For each loop whether it belongs to the largest set of loops that agree in pairs over the
 // odometry between them (Mangelson et al. 2018); one loop alone agrees with itself. Deterministic.

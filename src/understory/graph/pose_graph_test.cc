@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -143,6 +144,70 @@ TEST(PoseGraph, EachDefenceHelps) {
   EXPECT_LT(off(false, true), 0.05);
   EXPECT_LT(off(true, false), 0.05);
   EXPECT_GT(off(false, false), 0.5);
+}
+
+// Rounds of a circle with more loops than graduated non-convexity is run with at each handover.
+PoseGraphProblem many_rounds(std::uint64_t seed, int keyframes) {
+  Random random(seed);
+  const auto truth = [](int k) {
+    const double angle = 2.0 * std::numbers::pi * k / 60;
+    return Pose(so3_exp({0.0, 0.0, angle}),
+                Eigen::Vector3d(10.0 * std::sin(angle), -10.0 * std::cos(angle), 0.0));
+  };
+  PoseGraphProblem problem;
+  problem.world_from_keyframe.push_back(truth(0));
+  const auto edge = [&](int from, int to, double sd) {
+    return PoseEdge{from, to, truth(from).inverse() * truth(to) * noise(random, 0.1 * kDegree, sd),
+                    covariance(0.1 * kDegree, sd)};
+  };
+  for (int k = 1; k < keyframes; ++k) {
+    problem.odometry.push_back(edge(k - 1, k, 0.01));
+    problem.world_from_keyframe.push_back(problem.world_from_keyframe.back() *
+                                          problem.odometry.back().from_from_to);
+    if (k >= 60) problem.loops.push_back(edge(k - 60, k, 0.02));
+  }
+  return problem;
+}
+
+PoseGraphProblem with_first_loops(PoseGraphProblem problem, std::ptrdiff_t loops) {
+  problem.loops.resize(static_cast<std::size_t>(loops));
+  return problem;
+}
+
+TEST(PoseGraph, DecisionsAreKeptAsTheGraphGrows) {
+  const PoseGraphProblem whole = many_rounds(3, 290);
+  const std::vector<char> decided = optimise_pose_graph(with_first_loops(whole, 225), {}).loop_used;
+  const PoseGraphResult full = optimise_pose_graph(whole, {});
+  const PoseGraphResult kept = optimise_pose_graph(whole, {}, nullptr, decided);
+  ASSERT_TRUE(kept.converged);
+  EXPECT_EQ(kept.loop_used, full.loop_used);
+  EXPECT_LT(rmse(kept.world_from_keyframe, full.world_from_keyframe), 1e-4);
+}
+
+TEST(PoseGraph, ADecisionThatDoesNotHoldIsTakenBack) {
+  PoseGraphConfig config;
+  config.check_consistency = false;
+  PoseGraphProblem whole = many_rounds(4, 290);
+  std::vector<char> decided = optimise_pose_graph(with_first_loops(whole, 225), config).loop_used;
+  ASSERT_EQ(decided[20], 1);
+  const std::vector<char> right = optimise_pose_graph(whole, config).loop_used;
+  decided[20] = 0;  // a loop that is right
+  EXPECT_EQ(optimise_pose_graph(whole, config, nullptr, decided).loop_used, right);
+  decided[20] = 1;
+  const Pose off(Eigen::Quaterniond::Identity(), {0.3, 0.0, 0.0});
+  whole.loops[30].from_from_to = whole.loops[30].from_from_to * off;  // was right, now wrong
+  whole.loops.back().from_from_to = whole.loops.back().from_from_to * off;
+  const std::vector<char> used = optimise_pose_graph(whole, config, nullptr, decided).loop_used;
+  EXPECT_EQ(used[30], 0) << "an old loop that is wrong";
+  EXPECT_EQ(used.back(), 0) << "a new one";
+  // What is decided otherwise than by beginning anew costs next to nothing.
+  const auto truncated = [&](const PoseGraphResult& result) {
+    return result.final_cost +
+           0.5 * chi_squared_6(config.inlier_probability) *
+               static_cast<double>(std::count(result.loop_used.begin(), result.loop_used.end(), 0));
+  };
+  EXPECT_LT(truncated(optimise_pose_graph(whole, config, nullptr, decided)),
+            1.01 * truncated(optimise_pose_graph(whole, config)));
 }
 
 TEST(PoseGraph, WithoutLoopsNothingMoves) {

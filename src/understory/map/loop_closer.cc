@@ -25,6 +25,7 @@ struct Search {
   SearchedMap map;
   LoopAgreement* agreement = nullptr;  // no other search uses it at the time
   bool leave_map = false;
+  std::vector<char> decided;           // of the first loops of the map's graph
 };
 
 Eigen::Vector3d up_at(const SearchedMap& map, std::size_t keyframe) {
@@ -154,8 +155,11 @@ void apply_loops(Search& search, LoopOutcome& outcome) {
     found = true;
   }
   if (!found) return;
-  PoseGraphResult result =
-      optimise_pose_graph(search.map.problem, search.config.graph, search.agreement);
+  // Pieces that are joined bring loops of their own, between those that are known.
+  if (joined) search.decided.clear();
+  PoseGraphResult result = optimise_pose_graph(search.map.problem, search.config.graph,
+                                               search.agreement, search.decided);
+  if (result.converged) outcome.decided = result.loop_used;
   if (result.converged && (joined || worth_applying(search, result.world_from_keyframe)))
     outcome.world_from_keyframe = std::move(result.world_from_keyframe);
 }
@@ -269,7 +273,7 @@ std::optional<LoopOutcome> LoopCloser::close_in_present(
   if (config_.search.method != LoopSearchConfig::Method::kPaper || !due(keyframes))
     return std::nullopt;
   Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
-                agreement_.get()};
+                agreement_.get(), decided_};
   LoopOutcome outcome;
   outcome.keyframes = keyframes.size();
   const std::size_t query = keyframes.size() - 1;
@@ -277,7 +281,7 @@ std::optional<LoopOutcome> LoopCloser::close_in_present(
            search.map.problem, query, config_.search, known_against(search.map.pieces, query)))
     outcome.attempts.push_back(try_in_present(search, query, candidate, present));
   apply_loops(search, outcome);
-  attempts_.insert(attempts_.end(), outcome.attempts.begin(), outcome.attempts.end());
+  keep(outcome);
   return outcome;
 }
 
@@ -286,7 +290,7 @@ bool LoopCloser::join_left(std::vector<Keyframe>& keyframes,
                            const ProgressSink& progress) {
   if (!config_.enabled || !config_.pieces.enabled) return false;
   Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
-                agreement_.get()};
+                agreement_.get(), decided_};
   bool any = false;
   int left = config_.pieces.max_at_end;
   for (std::size_t piece = search.map.pieces.count(); piece-- > 1 && left > 0;) {
@@ -309,7 +313,7 @@ bool LoopCloser::join_left(std::vector<Keyframe>& keyframes,
 void LoopCloser::begin(const std::vector<Keyframe>& keyframes,
                        const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points) {
   Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
-                agreement_.get(), leave_map_};
+                agreement_.get(), leave_map_, decided_};
   running_.emplace();
   running_->keyframes = keyframes.size();
   running_->outcome = std::async(std::launch::async, [this, search = std::move(search)]() mutable {
@@ -332,8 +336,13 @@ std::optional<LoopOutcome> LoopCloser::take(std::size_t keyframes, bool wait, bo
     progress.poll();
   LoopOutcome outcome = running_->outcome.get();
   running_.reset();
-  attempts_.insert(attempts_.end(), outcome.attempts.begin(), outcome.attempts.end());
+  keep(outcome);
   return outcome;
+}
+
+void LoopCloser::keep(LoopOutcome& outcome) {
+  attempts_.insert(attempts_.end(), outcome.attempts.begin(), outcome.attempts.end());
+  if (!outcome.decided.empty()) decided_ = std::move(outcome.decided);
 }
 
 PoseGraphResult LoopCloser::optimise(const std::vector<Keyframe>& keyframes,
@@ -345,6 +354,7 @@ PoseGraphResult LoopCloser::optimise(const std::vector<Keyframe>& keyframes,
 
 void LoopCloser::save(BinaryWriter& writer) const {
   writer.put(last_search_);
+  writer.put(std::string(decided_.begin(), decided_.end()));
   writer.put(running_.has_value());
   if (!running_) return;
   writer.put(running_->keyframes);
@@ -355,6 +365,10 @@ void LoopCloser::load(BinaryReader& reader, std::vector<LoopAttempt> attempts,
                       const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points) {
   attempts_ = std::move(attempts);
   last_search_ = reader.get<TimeNs>();
+  const std::string decided = reader.get_string();
+  decided_.assign(decided.begin(), decided.end());
+  if (decided_.size() > attempts_.size())
+    throw InputError("checkpoint", "", "expected no more decisions than loops that were tried");
   if (!reader.get<bool>()) return;
   const auto known = reader.get<std::uint64_t>();
   if (known == 0 || known > keyframes.size())

@@ -48,6 +48,7 @@ struct LoopOutcome {
   std::size_t keyframes = 0;  // that were known when it began
   std::vector<LoopAttempt> attempts;
   std::vector<Pose> world_from_keyframe;  // of all those, if a loop was verified; else empty
+  std::vector<char> decided;              // of the loops of the graph then; empty: as before
   std::optional<LocalMap> local_map;      // made of them around the last one, if it accumulates
   std::vector<LocalMapInsertion> inserted;
   // Where it is left to whoever takes the outcome over: the first keyframe that it may be made of.
@@ -108,7 +109,7 @@ class LoopCloser {
   // The graph of the keyframes, with those loops.
   [[nodiscard]] PoseGraphProblem problem_of(const std::vector<Keyframe>& keyframes,
                                             const std::vector<std::uint64_t>& piece_starts) const;
-  // That graph optimised; without any loop, no poses.
+  // That graph optimised, with no regard to what was decided before; without any loop, no poses.
   [[nodiscard]] PoseGraphResult optimise(const std::vector<Keyframe>& keyframes,
                                          const std::vector<std::uint64_t>& piece_starts) const;
 
@@ -131,10 +132,14 @@ class LoopCloser {
                                      KeyframePoints& points) const;
   [[nodiscard]] bool due(const std::vector<Keyframe>& keyframes);
 
+  void keep(LoopOutcome& outcome);
+
   LoopCloserConfig config_;
   LocalMapConfig local_map_config_;
   bool leave_map_;
   std::vector<LoopAttempt> attempts_;
+  std::vector<char>
+      decided_;  // which of the first loops of the graph were used at the last handover
   // Of the running search while there is one; kept from one to the next.
   std::unique_ptr<LoopAgreement> agreement_;
   SideWork work_;

@@ -118,8 +118,9 @@ void describe_carrier(ConfigTable& table, CarrierConfig& c) {
     table.add_choice("route", c.route, {"auto", "loop", "strip"},
                      "auto: a strip road for a harvester, a loop for others");
     table.add("laps", c.laps, {1, 20}, "", "of a loop around its middle, each on its own way");
+    table.add("rounds", c.rounds, {1, 1000}, "", "of the whole loop, each on the same way");
     table.add("route_time_s", c.route_time_s, {0.0, 1e5}, "s",
-              "how long the route takes, 0 = as speed and stops give");
+              "how long the route (of a walk: a round) takes, 0 = as speed and stops give");
     table.add("one_way", c.one_way, "a strip road is driven once, not out and back");
     table.add("strip_roads", c.strip_roads, {1, 50}, "", "parallel roads of the stand");
     table.add("strip_road", c.strip_road, {1, 50}, "", "which of them is driven");
@@ -219,6 +220,11 @@ void check_site(const SiteConfig& site) {
   }
   if (site.carrier.kind == "still" && site.duration_s <= 0.0) {
     problems.push_back("carrier: kind still needs duration_s");
+  }
+  const bool strip = site.carrier.route == "strip" ||
+                     (site.carrier.route == "auto" && site.carrier.kind == "harvester");
+  if (site.carrier.rounds > 1 && (strip || site.carrier.work == "thinning")) {
+    problems.push_back("carrier: rounds above 1 need a loop, and no work thinning");
   }
   if (site.carrier.work == "thinning" && site.carrier.route_time_s <= 0.0) {
     problems.push_back("carrier: work thinning needs route_time_s");

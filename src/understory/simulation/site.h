@@ -111,7 +111,8 @@ struct CarrierConfig {
   double turn_rate_deg_s = 140.0;  // peak rate of a quick turn
   std::string route = "auto";      // loop, strip; auto: as suits the kind
   int laps = 1;                    // of a loop around its middle, each on a way of its own
-  double route_time_s = 0.0;       // how long the route takes, 0 = as speed and stops give
+  int rounds = 1;                  // of the whole loop, each on the same way
+  double route_time_s = 0.0;       // how long a round takes, 0 = as speed and stops give
   bool one_way = false;            // a strip road is driven once, not out and back
   int strip_roads = 1;             // parallel roads of the stand
   int strip_road = 1;              // which of them is driven

@@ -1,6 +1,10 @@
 #include "understory/graph/loops/loop_agreement.h"
 
 #include <algorithm>
+#include <functional>
+#include <limits>
+#include <queue>
+#include <set>
 #include <utility>
 
 #include "understory/geometry/symmetric_solver.h"
@@ -119,61 +123,122 @@ bool LoopAgreement::agree(const PoseEdge& i, const PoseEdge& j) const {
   return error.dot(SymmetricSolver<6>(covariance).solve(error)) < limit_;
 }
 
-// The set that begins with one loop, or none where it cannot be larger than `to_beat`.
-std::vector<std::size_t> LoopAgreement::set_from(std::size_t seed, std::size_t to_beat) const {
-  const std::size_t n = loops_.size();
-  std::vector<char> is_left(n, 1);
-  std::size_t left = n - 1 - against_[seed].size();
-  if (left + 1 <= to_beat) return {};
-  is_left[seed] = 0;
-  for (const std::size_t k : against_[seed])
-    is_left[k] = 0;
-  // How many of those left each of them contradicts, and all of these together.
-  std::vector<std::size_t> contradicts(n, 0);
-  std::size_t contradictions = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    if (is_left[k] == 0) continue;
-    for (const std::size_t m : against_[k])
-      contradicts[k] += is_left[m] != 0 ? 1 : 0;
-    contradictions += contradicts[k];
+std::vector<std::vector<std::size_t>> LoopAgreement::contested() const {
+  std::vector<std::vector<std::size_t>> parts;
+  std::vector<char> seen(loops_.size(), 0);
+  for (std::size_t first = 0; first < loops_.size(); ++first) {
+    if (seen[first] != 0 || against_[first].empty()) continue;
+    std::vector<std::size_t> part{first};
+    seen[first] = 1;
+    for (std::size_t at = 0; at < part.size(); ++at) {
+      for (const std::size_t k : against_[part[at]]) {
+        if (seen[k] == 0) part.push_back(k);
+        seen[k] = 1;
+      }
+    }
+    std::sort(part.begin(), part.end());
+    parts.push_back(std::move(part));
   }
-  std::vector<std::size_t> set{seed};
+  return parts;
+}
+
+// The set within a part that begins with one loop, or, without a seed, with that which contradicts
+// fewest. None where it cannot reach `at_least`. `scratch` is all zeros, of the size of loops_.
+std::vector<std::size_t> LoopAgreement::set_within(const std::vector<std::size_t>& part,
+                                                   std::optional<std::size_t> seed,
+                                                   std::size_t at_least, Scratch& scratch) const {
+  std::vector<std::size_t> set;
+  std::size_t left = part.size();
+  for (const std::size_t k : part)
+    scratch.is_left[k] = 1;
+  if (seed) {
+    set.push_back(*seed);
+    scratch.is_left[*seed] = 0;
+    for (const std::size_t k : against_[*seed])
+      scratch.is_left[k] = 0;
+    left -= 1 + against_[*seed].size();
+  }
+  // Those left, by how many of those left they contradict; an entry that is out of date is passed
+  // over. Loops that contradict none of those left are chosen at once, as that changes nothing.
+  using Entry = std::pair<std::size_t, std::size_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> next;
+  if (set.size() + left >= at_least) {
+    for (const std::size_t k : part) {
+      if (scratch.is_left[k] == 0) continue;
+      std::size_t contradicts = 0;
+      for (const std::size_t m : against_[k])
+        contradicts += scratch.is_left[m] != 0 ? 1 : 0;
+      scratch.contradicts[k] = contradicts;
+      if (contradicts > 0) {
+        next.emplace(contradicts, k);
+        continue;
+      }
+      set.push_back(k);
+      scratch.is_left[k] = 0;
+      --left;
+    }
+  }
   const auto drop = [&](std::size_t k) {
-    is_left[k] = 0;
+    scratch.is_left[k] = 0;
     --left;
-    contradictions -= contradicts[k];
     for (const std::size_t m : against_[k]) {
-      if (is_left[m] == 0) continue;
-      --contradicts[m];
-      --contradictions;
+      if (scratch.is_left[m] != 0) next.emplace(--scratch.contradicts[m], m);
     }
   };
-  while (left > 0 && set.size() + left > to_beat) {
-    std::size_t chosen = n;
-    for (std::size_t k = 0; k < n; ++k) {
-      if (is_left[k] == 0) continue;
-      // Those left all agree: each of them is chosen in turn.
-      if (contradictions == 0) set.push_back(k);
-      if (chosen == n || contradicts[k] < contradicts[chosen]) chosen = k;
-    }
-    if (contradictions == 0) return set;
-    set.push_back(chosen);
-    const std::vector<std::size_t> opponents = against_[chosen];
-    drop(chosen);
-    for (const std::size_t k : opponents) {
-      if (is_left[k] != 0) drop(k);
+  while (left > 0 && set.size() + left >= at_least && !next.empty()) {
+    const auto [contradicts, k] = next.top();
+    next.pop();
+    if (scratch.is_left[k] == 0 || contradicts != scratch.contradicts[k]) continue;
+    set.push_back(k);
+    drop(k);
+    for (const std::size_t m : against_[k]) {
+      if (scratch.is_left[m] != 0) drop(m);
     }
   }
+  for (const std::size_t k : part)
+    scratch.is_left[k] = 0;
   return left == 0 ? set : std::vector<std::size_t>{};
 }
 
+// A part that no loop contradicts another part of is worked out alone: what is chosen in one does
+// not change what is chosen in another. A seed changes only its own part, so the largest set is
+// made of the sets without a seed, but for one part.
 std::vector<std::size_t> LoopAgreement::largest_set() const {
-  std::vector<std::size_t> best;
-  for (std::size_t seed = 0; seed < loops_.size(); ++seed) {
-    std::vector<std::size_t> set = set_from(seed, best.size());
-    if (set.size() > best.size()) best = std::move(set);
+  constexpr auto kNone = std::numeric_limits<std::size_t>::max();
+  const std::vector<std::vector<std::size_t>> parts = contested();
+  Scratch scratch{std::vector<char>(loops_.size(), 0), std::vector<std::size_t>(loops_.size(), 0)};
+  std::vector<std::size_t> set;
+  std::size_t best_seed = kNone;  // of all seeds that gain most, the lowest
+  for (std::size_t k = 0; k < loops_.size(); ++k) {
+    if (!against_[k].empty()) continue;
+    if (set.empty()) best_seed = k;
+    set.push_back(k);
   }
-  return best;
+  std::size_t most_gained = 0;
+  std::size_t best_part = kNone;
+  std::vector<std::vector<std::size_t>> chosen;
+  std::vector<std::size_t> seeded;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    chosen.push_back(set_within(parts[p], std::nullopt, 0, scratch));
+    const std::size_t alone = chosen.back().size();
+    // Seeds that contradict the same loops lead to the same set.
+    std::set<std::vector<std::size_t>> tried;
+    for (const std::size_t seed : parts[p]) {
+      const std::size_t at_least = alone + most_gained + (seed < best_seed ? 0 : 1);
+      if (parts[p].size() - against_[seed].size() < at_least) continue;
+      if (!tried.insert(against_[seed]).second) continue;
+      std::vector<std::size_t> found = set_within(parts[p], seed, at_least, scratch);
+      if (found.size() < at_least) continue;
+      most_gained = found.size() - alone;
+      best_seed = seed;
+      best_part = p;
+      seeded = std::move(found);
+    }
+  }
+  if (best_part != kNone) chosen[best_part] = std::move(seeded);
+  for (const std::vector<std::size_t>& part : chosen)
+    set.insert(set.end(), part.begin(), part.end());
+  return set;
 }
 
 }  // namespace understory

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "understory/geometry/pose.h"
@@ -17,7 +18,8 @@ class LoopAgreement {
   explicit LoopAgreement(const PoseGraphConfig& config);
 
   // Takes up what the problem has beyond what is known. Begins anew where an edge that is known has
-  // changed. Linear in the loops for each new one, while few loops contradict others.
+  // changed. Linear in the loops for each new one, while those that contradict others fall into
+  // small parts.
   void update(const PoseGraphProblem& problem);
 
   // Of the largest set of loops found that all agree with each other: from each loop in turn
@@ -45,7 +47,15 @@ class LoopAgreement {
   [[nodiscard]] Stretch stretch(int a, int b) const;
   [[nodiscard]] bool agree(const PoseEdge& i, const PoseEdge& j) const;
   [[nodiscard]] std::vector<std::size_t> largest_set() const;
-  [[nodiscard]] std::vector<std::size_t> set_from(std::size_t seed, std::size_t to_beat) const;
+  // Loops that contradict others, in parts that contradict no other part.
+  [[nodiscard]] std::vector<std::vector<std::size_t>> contested() const;
+  struct Scratch {
+    std::vector<char> is_left;             // 1: neither chosen nor dropped yet
+    std::vector<std::size_t> contradicts;  // how many of those
+  };
+  [[nodiscard]] std::vector<std::size_t> set_within(const std::vector<std::size_t>& part,
+                                                    std::optional<std::size_t> seed,
+                                                    std::size_t at_least, Scratch& scratch) const;
 
   PoseGraphConfig config_;
   double limit_;

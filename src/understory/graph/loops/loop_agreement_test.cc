@@ -110,6 +110,37 @@ TEST(LoopAgreement, IsTheDefinitionHoweverTheLoopsCame) {
   }
 }
 
+// Loops that contradict each other far from others: the largest set is made part by part, with the
+// same result as from each loop in turn.
+TEST(LoopAgreement, PartsThatContradictNoOtherAreWorkedOutAlone) {
+  const PoseGraphConfig config;
+  std::size_t with_parts = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    PoseGraphProblem problem = rounds_with_loops(seed, 1, 0.0);
+    for (std::size_t k = 0; k < problem.odometry.size(); ++k)
+      problem.odometry[k].covariance *= 0.01 + 1e6 * (k % 40 == 39 ? 1.0 : 0.0);
+    const std::vector<Pose> truth = problem.world_from_keyframe;
+    Random random(seed);
+    problem.loops.clear();
+    for (int part = 0; part < 4; ++part) {
+      for (int i = 0; i < 5; ++i) {
+        const int to = 100 + 40 * (part % 2) + 3 * i + (part > 1 ? 20 : 0);
+        const int from = to - 100;
+        const Pose off(Eigen::Quaterniond::Identity(),
+                       {random.below(2) * 0.5 + part, random.below(2) * 0.5, 0.0});
+        problem.loops.push_back({from, to,
+                                 truth[static_cast<std::size_t>(from)].inverse() * off *
+                                     truth[static_cast<std::size_t>(to)],
+                                 1e-4 * Matrix6d::Identity()});
+      }
+    }
+    const std::vector<char> expected = by_definition(problem, config);
+    EXPECT_EQ(consistent_loops(problem, config), expected) << seed;
+    with_parts += std::count(expected.begin(), expected.end(), 1) > 8 ? 1 : 0;
+  }
+  EXPECT_GT(with_parts, 3U);
+}
+
 TEST(LoopAgreement, BeginsAnewWhereAnEdgeHasChanged) {
   const PoseGraphConfig config;
   PoseGraphProblem problem = rounds_with_loops(3, 20, 0.3);

@@ -16,6 +16,10 @@ RunDocuments map_documents(const ReadRecording& recording, const StageTimes& tim
     const GeoreferenceConfig& config = georeference_of(request.config);
     documents.summary().quality.merge(facts.online->write(recording.results, config));
   }
+  if (facts.memory_mb.size() > 1) {
+    documents.summary().quality["memory_mb_half"] = facts.memory_mb[facts.memory_mb.size() / 2];
+    documents.summary().quality["memory_mb_end"] = facts.memory_mb.back();
+  }
   if (!facts.realtime) return documents;
   documents.count("scans_dropped", facts.dropped_scans);
   add_latency(distribution_of(facts.latencies_ms), documents.summary());

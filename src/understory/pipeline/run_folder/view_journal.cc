@@ -88,6 +88,10 @@ ViewJournal::ViewJournal(std::filesystem::path path) : file_(std::move(path)) {}
 
 ViewJournal::ViewJournal(std::filesystem::path path, const RecordCount& known, ViewSink& sink)
     : file_(std::move(path), known) {
+  replay(sink);
+}
+
+void ViewJournal::replay(ViewSink& sink) const {
   const std::string file = file_.path().string();
   file_.for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
     BinaryReader reader({bytes.begin(), bytes.end()}, file);

@@ -34,6 +34,8 @@ class ViewJournal : public ViewSink {
   void on_pose(const StampedPose& pose, bool positioned) override;
   void on_view(const StemView& view, const SparseStep& step) override;
   void on_fix(const GnssFix& fix) override;
+  // Hands over all of it, from the beginning. Throws InputError where it is damaged.
+  void replay(ViewSink& sink) const;
   // Waits until everything is on the disk.
   void sync() { file_.sync(); }
   [[nodiscard]] const RecordCount& count() const { return file_.count(); }

@@ -43,6 +43,7 @@ Walk walk_at(const SiteConfig& config, const CarrierConfig& c, double length_m,
 Walk walk_along(const SiteConfig& config, double length_m, Random& random) {
   const Wander speed(random, 0.02, 0.15);
   CarrierConfig c = config.carrier;
+  c.route_time_s *= c.rounds;
   if (c.route_time_s > 0.0) {
     // The speed at which the whole route takes the time that it should.
     SiteConfig whole = config;

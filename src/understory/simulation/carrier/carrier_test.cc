@@ -129,6 +129,27 @@ FirstTurn first_turn_of(const std::string& kind, double turn_deg) {
   return found;
 }
 
+TEST(Route, RoundsLieOnEachOther) {
+  CarrierConfig once;
+  once.length_m = 80.0;
+  once.laps = 2;
+  CarrierConfig thrice = once;
+  thrice.rounds = 3;
+  const Route one(once, 5);
+  const Route three(thrice, 5);
+  EXPECT_NEAR(three.length_m(), 240.0, 1e-9);
+  for (double at = 0.3; at < 80.0; at += 3.7) {
+    EXPECT_EQ(three.place(at), one.place(at));
+    for (const double later : {80.0, 160.0}) {
+      EXPECT_LT((three.place(at + later) - one.place(at)).norm(), 1e-6);
+      const double turns = (three.heading(at + later) - one.heading(at)) / kTau;
+      EXPECT_NEAR(turns, later / 40.0, 1e-6) << "two laps a round";
+    }
+    const Eigen::Vector2d beside = one.place(at) + Eigen::Vector2d(3.0, 1.0);
+    EXPECT_EQ(three.distance_to(beside), one.distance_to(beside));
+  }
+}
+
 TEST(CarrierPath, TurnsOnTheSpotBeforeItLeaves) {
   for (const std::string kind : {"walk", "harvester", "uav"}) {
     for (const double turn_deg : {60.0, -60.0}) {

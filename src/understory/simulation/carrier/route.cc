@@ -69,6 +69,20 @@ Route::Route(const CarrierConfig& config, std::uint64_t seed) {
   for (Eigen::Vector2d& point : loop)
     point *= config.length_m / length;
   resample(loop, config.length_m);
+  if (config.rounds > 1) repeat(config.rounds);
+}
+
+// The same curve again and again, from its end, which is where it begins.
+void Route::repeat(int rounds) {
+  roads_ = points_;
+  const std::size_t once = points_.size();
+  const double turned = kTau * std::round((headings_.back() - headings_.front()) / kTau);
+  for (int round = 1; round < rounds; ++round) {
+    for (std::size_t i = 1; i < once; ++i) {
+      points_.push_back(points_[i]);
+      headings_.push_back(headings_[i] + round * turned);
+    }
+  }
 }
 
 // Roads that wind together, so that they stay about as far apart as they should.

@@ -14,9 +14,9 @@ namespace understory {
 class Route {
  public:
   // A loop: a closed curve of config.length_m that winds config.laps times around the middle of the
-  // stand. A strip road: of config.length_m if it is driven one way, else of half that length;
-  // beside it the other roads of the stand, on which nobody drives today. Roads of even numbers
-  // are driven westwards.
+  // stand, and that config.rounds times on the same way. A strip road: of config.length_m if it is
+  // driven one way, else of half that length; beside it the other roads of the stand, on which
+  // nobody drives today. Roads of even numbers are driven westwards.
   Route(const CarrierConfig& config, std::uint64_t seed);
 
   [[nodiscard]] double length_m() const {
@@ -34,13 +34,14 @@ class Route {
 
  private:
   void resample(const std::vector<Eigen::Vector2d>& dense, double length_m);
+  void repeat(int rounds);
   void make_roads(const CarrierConfig& config, Random& random);
 
   double step_m_ = 0.25;
   std::vector<Eigen::Vector2d> points_;  // step_m_ apart
   std::vector<double> headings_;
   // Points along all roads of the stand where there are several: the same whichever is driven, so
-  // that the trees beside them are.
+  // that the trees beside them are. Those of one round where there are several.
   std::vector<Eigen::Vector2d> roads_;
 };
 

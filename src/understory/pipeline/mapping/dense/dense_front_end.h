@@ -113,7 +113,9 @@ class DenseFrontEnd : public FrontEnd {
   // A pose for each part of each scan but the first; null with `scan_fraction` 1.
   [[nodiscard]] RelativePath* partial_path() { return partial_path_.get(); }
   [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_->clouds(); }
-  [[nodiscard]] const std::vector<GnssFix>& fixes() const { return received_.fixes; }
+  // All fixes so far, which lie on disk: read anew at each call.
+  [[nodiscard]] std::vector<GnssFix> fixes() const;
+  [[nodiscard]] std::size_t fix_count() const;
   [[nodiscard]] const DenseOdometry& odometry() const { return *odometry_; }
   // What satellites say of the scans; null where they do nothing (`gnss.match.use`).
   [[nodiscard]] const SatelliteBelief* satellites() const { return satellites_.get(); }
@@ -134,8 +136,8 @@ class DenseFrontEnd : public FrontEnd {
     DenseCounts counts;
     ImuUsage imu_usage;
     LidarImuClockCheck clock;
-    std::deque<ImuSample> imu;  // all before the first scan, then the last ones
-    std::vector<GnssFix> fixes;
+    std::deque<ImuSample> imu;   // all before the first scan, then the last ones
+    std::vector<GnssFix> fixes;  // those that are not on disk yet
   };
 
   // The first two scans, which may be done again (odometry/dense/start_in_motion.h), and what there
@@ -149,7 +151,7 @@ class DenseFrontEnd : public FrontEnd {
 
   void refuse_imu(const std::string& reason);
   void take(const Event& event, const Rig& rig);
-  void load_fixes(const RecordCount& known);
+  void put_fixes_away();
   void make_odometry(const Rig& rig);
   void tell_of_imu(TimeNs now);
   void make_satellites();
@@ -193,7 +195,7 @@ class DenseFrontEnd : public FrontEnd {
   std::unique_ptr<RelativePath> partial_path_;
   std::unique_ptr<ScanClouds> clouds_;
   VoxelFilter cloud_filter_;
-  std::unique_ptr<RecordFile> fixes_file_;  // as far as they were synced
+  std::unique_ptr<RecordFile> fixes_file_;  // null until fixes were put away
   TimeNs last_scan_end_ = 0;
   PositionedScan positioned_;  // the last one
   Recovery recovery_;

@@ -30,6 +30,8 @@ void DenseFrontEnd::make_satellites() {
 
 void DenseFrontEnd::take_fix(const GnssFix& fix) {
   received_.fixes.push_back(fix);
+  // Those of the first scans come again where these are done again.
+  if (started() && settled()) put_fixes_away();
   if (!satellites_) return;
   const Eigen::Vector3d antenna =
       rig_.body_from_gnss ? rig_.body_from_gnss->translation() : Eigen::Vector3d::Zero();
@@ -58,7 +60,7 @@ ScanKnowledge DenseFrontEnd::knowledge_of(const Scan& scan) {
 std::vector<PositionedScan> DenseFrontEnd::finish(const Rig& /*rig*/) {
   if (satellites_ && !satellites_->aligned()) {
     log_.warn("gnss.not_aligned",
-              received_.fixes.empty()
+              fix_count() == 0
                   ? "gnss.match.use: the recording has no positions by satellites; scans were "
                     "matched without them"
                   : "gnss.match.use: positions by satellites never told heading and place of the "

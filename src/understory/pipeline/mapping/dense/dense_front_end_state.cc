@@ -12,16 +12,8 @@ constexpr const char* kFixesFile = "fixes.bin";
 }  // namespace
 
 void DenseFrontEnd::sync() {
-  if (!fixes_file_ && !received_.fixes.empty())
-    fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile);
-  if (fixes_file_) {
-    for (std::size_t i = fixes_file_->count().records; i < received_.fixes.size(); ++i) {
-      BinaryWriter record;
-      put_fix(record, received_.fixes[i]);
-      fixes_file_->append({bytes_of(record.bytes())});
-    }
-    fixes_file_->sync();
-  }
+  put_fixes_away();
+  if (fixes_file_) fixes_file_->sync();
   if (!started()) return;
   journal_->sync();
   if (imu_path_) imu_path_->sync();
@@ -75,12 +67,33 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   if (satellites_) satellites_->save(writer);
 }
 
-void DenseFrontEnd::load_fixes(const RecordCount& known) {
-  fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile, known);
-  fixes_file_->for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
-    BinaryReader record({bytes.begin(), bytes.end()}, fixes_file_->path().string());
-    received_.fixes.push_back(get_fix(record));
-  });
+void DenseFrontEnd::put_fixes_away() {
+  if (received_.fixes.empty()) return;
+  if (!fixes_file_) fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile);
+  for (const GnssFix& fix : received_.fixes) {
+    BinaryWriter record;
+    put_fix(record, fix);
+    fixes_file_->append({bytes_of(record.bytes())});
+  }
+  received_.fixes.clear();
+}
+
+std::size_t DenseFrontEnd::fix_count() const {
+  const std::uint64_t away = fixes_file_ ? fixes_file_->count().records : 0;
+  return static_cast<std::size_t>(away) + received_.fixes.size();
+}
+
+std::vector<GnssFix> DenseFrontEnd::fixes() const {
+  std::vector<GnssFix> fixes;
+  fixes.reserve(fix_count());
+  if (fixes_file_) {
+    fixes_file_->for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
+      BinaryReader record({bytes.begin(), bytes.end()}, fixes_file_->path().string());
+      fixes.push_back(get_fix(record));
+    });
+  }
+  fixes.insert(fixes.end(), received_.fixes.begin(), received_.fixes.end());
+  return fixes;
 }
 
 void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
@@ -89,7 +102,7 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   imu_doubted_ = reader.get<bool>();
   if (reader.get<bool>()) imu_cleared_s_ = reader.get<double>();
   const auto fixes = reader.get<RecordCount>();
-  if (fixes.records > 0) load_fixes(fixes);
+  if (fixes.records > 0) fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile, fixes);
   received_.counts = reader.get<DenseCounts>();
   received_.imu_usage.load(reader);
   received_.clock.load(reader);

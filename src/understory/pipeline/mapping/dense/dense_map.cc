@@ -35,8 +35,9 @@ class DenseMap : public MapMaker {
     if (front_end_.config().gnss.use == GnssUse::kGeoreference) return;
     const ScopedTimer timer(front_end_.times(), "finish_gnss");
     const SolvedRun solved = solved_run();
+    const std::vector<GnssFix> fixes = front_end_.fixes();
     RunWithPositions with_positions =
-        use_positions(mapped_path(recording_, front_end_, solved.trajectory), solved,
+        use_positions(mapped_path(recording_, front_end_, solved.trajectory, fixes), solved,
                       front_end_.config().georeference, front_end_.config().gnss, recording_.log);
     if (!with_positions.world_from_keyframe.empty())
       front_end_.map().set_poses(with_positions.world_from_keyframe);
@@ -75,7 +76,9 @@ class DenseMap : public MapMaker {
   // By the run's own fixes; gnss.csv. Trees are found in the places that map.laz will hold.
   void place_on_globe() {
     const ScopedTimer timer(front_end_.times(), "finish_georeference");
-    const MappedPath path = mapped_path(recording_, front_end_, made_.trajectory.trajectory);
+    const std::vector<GnssFix> fixes = front_end_.fixes();
+    made_.has_fixes = !fixes.empty();
+    const MappedPath path = mapped_path(recording_, front_end_, made_.trajectory.trajectory, fixes);
     const GeoreferenceConfig& config = front_end_.config().georeference;
     made_.placed = made_.placement ? place_map(path, *made_.placement, config, recording_.log)
                                    : place_map(path, config, recording_.log);

@@ -118,7 +118,7 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
   documents.count("loops_closed",
                   static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 1)));
   documents.count("imu_samples", counts.imu_samples);
-  documents.count("gnss_fixes", front_end.fixes().size());
+  documents.count("gnss_fixes", front_end.fix_count());
   documents.count("lidar_points", counts.points);
   if (front_end.config().odometry.tops.points == ScanPoints::kTreeTops)
     documents.count("scans_by_tree_tops", counts.by_tree_tops);
@@ -205,13 +205,9 @@ void fill_constancy(RunSummary& summary, const TrajectoryFacts& trajectory) {
 }
 
 void fill_quality(const DenseFrontEnd& front_end, const TrajectoryFacts& trajectory,
-                  const RunFacts& facts, RunSummary& summary) {
+                  RunSummary& summary) {
   fill_constancy(summary, trajectory);
   summary.scan_blocks = joined(trajectory.costs, kScanBlocks);
-  if (facts.memory_mb.size() > 1) {
-    summary.quality["memory_mb_half"] = facts.memory_mb[facts.memory_mb.size() / 2];
-    summary.quality["memory_mb_end"] = facts.memory_mb.back();
-  }
   summary.recording_s = trajectory.duration_s;
   summary.quality["length_m"] = trajectory.length_m;
   summary.quality["inlier_ratio_mean"] = trajectory.match.inliers_mean;
@@ -309,18 +305,19 @@ void add_map(const ReadRecording& recording, const DenseMappingConfig& config, D
 }
 
 // Where the run lies on the globe.
-void tell_place(const DenseFrontEnd& front_end, PlacedMap& placed, RunDocuments& documents) {
+void tell_place(DenseProducts& made, RunDocuments& documents) {
+  PlacedMap& placed = made.placed;
   documents.summary().quality.merge(placed.figures);
   documents.report().fixes = std::move(placed.fixes);
-  documents.report().has_fixes = !front_end.fixes().empty();
+  documents.report().has_fixes = made.has_fixes;
   documents.place(placed.place, placed.frames);
 }
 
 }  // namespace
 
 MappedPath mapped_path(const ReadRecording& recording, const DenseFrontEnd& front_end,
-                       const Trajectory& trajectory) {
-  MappedPath path{recording.results, trajectory, front_end.fixes()};
+                       const Trajectory& trajectory, const std::vector<GnssFix>& fixes) {
+  MappedPath path{recording.results, trajectory, fixes};
   if (front_end.counts().imu_samples > 0) path.levelled_by = LevelledBy::kGravity;
   if (const auto& antenna = front_end.rig().body_from_gnss)
     path.antenna_in_body = antenna->translation();
@@ -342,11 +339,11 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   documents.judge_path();
   write_imu_path(recording, front_end, trajectory.trajectory, documents);
   write_partial_path(recording, front_end, trajectory.trajectory, documents);
-  fill_quality(front_end, trajectory, facts, documents.summary());
+  fill_quality(front_end, trajectory, documents.summary());
   tell_clock(recording, front_end, documents.summary());
   if (const auto truth = write_truth(recording.request.run_folder, recording.source))
     documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
-  tell_place(front_end, made.placed, documents);
+  tell_place(made, documents);
   MapPicture picture;
   {
     const ScopedTimer timer(front_end.times(), "finish_write_map");

@@ -21,6 +21,7 @@ namespace understory {
 struct DenseProducts {
   TrajectoryFacts trajectory;
   std::optional<FoundPlacement> placement;  // where it was found before the map was made
+  bool has_fixes = false;                   // of satellites
   PlacedMap placed;
   std::unique_ptr<MapTiles> tiles;   // of the finished cloud
   std::unique_ptr<TiledMap> forest;  // the same as the inventory takes it, which goes before it
@@ -30,9 +31,10 @@ struct DenseProducts {
   LidarViewFigures lidar_view;
 };
 
-// How the front end's finished run lies against its fixes.
+// How the front end's finished run lies against its `fixes`, which must outlive the result.
 [[nodiscard]] MappedPath mapped_path(const ReadRecording& recording, const DenseFrontEnd& front_end,
-                                     const Trajectory& trajectory);
+                                     const Trajectory& trajectory,
+                                     const std::vector<GnssFix>& fixes);
 
 // Writes what the dense front end has found beside trajectory, states and fixes, which are written
 // by then: keyframes, graph, map, trees, terrain, run.json, report. Throws OutputError.

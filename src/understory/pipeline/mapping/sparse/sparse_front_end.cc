@@ -28,7 +28,7 @@ std::vector<PositionedScan> SparseFrontEnd::handle(const Event& event, const Rig
   if (const auto* scan = std::get_if<ScanPtr>(&event)) return on_scan(*scan, rig);
   if (const auto* fix = std::get_if<GnssFix>(&event)) {
     journal_->on_fix(*fix);
-    on_fix(*fix);
+    counted_.on_fix(*fix);
   }
   if (const auto* sample = std::get_if<ImuSample>(&event)) on_sample(*sample, rig);
   return {};
@@ -64,28 +64,51 @@ std::vector<PositionedScan> SparseFrontEnd::record(const std::vector<StemScan>& 
     positioned.push_back({waiting_ends_.front(), pose, std::nullopt, false});
     waiting_ends_.pop_front();
     journal_->on_pose(pose, result.positioned);
-    on_pose(pose, result.positioned);
+    counted_.on_pose(pose, result.positioned);
     if (!result.positioned) continue;
     last_stems_ = result.view.stems.size();
     if (!result.keep) continue;
     journal_->on_view(result.view, result.step);
-    on_view(result.view, result.step);
+    counted_.on_view(result.view, result.step);
   }
   return positioned;
 }
 
-void SparseFrontEnd::on_pose(const StampedPose& pose, bool positioned) {
-  path_.push_back(pose);
-  positioned_ += positioned ? 1 : 0;
+void SparseFrontEnd::Counted::on_pose(const StampedPose& pose, bool was_positioned) {
+  if (scans == 0) first_scan = pose.stamp;
+  ++scans;
+  positioned += was_positioned ? 1 : 0;
 }
 
-void SparseFrontEnd::on_view(const StemView& view, const SparseStep& step) {
-  views_.push_back(view);
-  steps_.push_back(step);
+void SparseFrontEnd::Counted::on_view(const StemView& /*view*/, const SparseStep& /*step*/) {
+  ++views;
 }
 
-void SparseFrontEnd::on_fix(const GnssFix& fix) {
-  fixes_.push_back(fix);
+void SparseFrontEnd::Counted::on_fix(const GnssFix& /*fix*/) {
+  ++fixes;
+}
+
+void SparseFrontEnd::Found::on_pose(const StampedPose& pose, bool /*positioned*/) {
+  path.push_back(pose);
+}
+
+void SparseFrontEnd::Found::on_view(const StemView& view, const SparseStep& step) {
+  views.push_back(view);
+  steps.push_back(step);
+}
+
+void SparseFrontEnd::Found::on_fix(const GnssFix& fix) {
+  fixes.push_back(fix);
+}
+
+// Reads back what was put on disk.
+void SparseFrontEnd::recall() {
+  found_ = {};
+  found_.path.reserve(counted_.scans);
+  found_.views.reserve(counted_.views);
+  found_.steps.reserve(counted_.views);
+  found_.fixes.reserve(counted_.fixes);
+  if (journal_ != nullptr) journal_->replay(found_);
 }
 
 std::vector<PositionedScan> SparseFrontEnd::finish(const Rig& rig) {
@@ -104,10 +127,10 @@ FrontEndProgress SparseFrontEnd::progress() const {
 
 void SparseFrontEnd::hand_over(std::vector<StemView>& views, std::vector<SparseStep>& steps,
                                std::vector<StampedPose>& path, std::vector<GnssFix>& fixes) {
-  views = std::move(views_);
-  steps = std::move(steps_);
-  path = std::move(path_);
-  fixes = std::move(fixes_);
+  views = std::move(found_.views);
+  steps = std::move(found_.steps);
+  path = std::move(found_.path);
+  fixes = std::move(found_.fixes);
 }
 
 void SparseFrontEnd::refuse_imu(const std::string& reason) {
@@ -136,10 +159,9 @@ void SparseFrontEnd::save(BinaryWriter& writer) const {
 
 void SparseFrontEnd::load(BinaryReader& reader, const Rig& /*rig*/) {
   const auto known = reader.get<RecordCount>();
-  ViewSink& again = *this;
   if (known.records > 0)
-    journal_ = std::make_unique<ViewJournal>(folder_ / kViewsFile, known, again);
-  scans_ = path_.size();
+    journal_ = std::make_unique<ViewJournal>(folder_ / kViewsFile, known, counted_);
+  scans_ = counted_.scans;
   last_scan_end_ = reader.get<TimeNs>();
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);

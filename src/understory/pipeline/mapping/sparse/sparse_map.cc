@@ -70,11 +70,11 @@ CorrectionInput correction_input(SparseFrontEnd& front_end, const ReadRecording&
 }  // namespace
 
 std::string SparseFrontEnd::why_no_map(const Recording& source) const {
-  if (!path_.empty())
+  if (counted_.scans > 0)
     return fmt::format(
         "no stems in any of its {} scans: expected upright stems in scans with ring numbers, and a "
         "lidar whose rings are level within 25 degrees, upright or upside down",
-        path_.size());
+        counted_.scans);
   std::string topics;
   for (const TopicReport& topic : source.topics())
     topics += (topics.empty() ? "; it holds " : ", ") + topic.name + " (" + topic.type + ")";
@@ -83,6 +83,7 @@ std::string SparseFrontEnd::why_no_map(const Recording& source) const {
 
 std::unique_ptr<MapMaker> SparseFrontEnd::map_maker(const ReadRecording& recording) {
   remark_on_lever_arms(recording.source.rig(), recording.request.recording, recording.log);
+  recall();
   RunDocuments documents = documents_of(*this, recording, times_);
   CorrectionInput input = correction_input(*this, recording);
   const StemMapPlace place{recording.request.run_folder, recording.results,   times_, recording.log,
