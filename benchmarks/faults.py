@@ -18,7 +18,6 @@ Exit status 1 where a row misses it. Python standard library only, but for --pee
 """
 
 import argparse
-import hashlib
 import json
 import re
 import shutil
@@ -27,7 +26,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from program import (Failed, PROGRAM, TOP, machine, map_recording, own_cpus, run, say, simulated, truth_of,
+from program import (Failed, TOP, digest, machine, map_recording, own_cpus, run, say, simulated, truth_of,
                      understory, understory_json, version)
 
 RESULTS = TOP / "docs" / "method" / "faults.md"
@@ -76,7 +75,7 @@ FAULTS = [
     Fault("lidar at 5 Hz", {"lidar.rate_hz": 5}, "apart|scans a second|rate|matched"),
     Fault("blind for 3 s a minute",
           lambda _, length: {"blindness.interval_s": min(60.0, length), "blindness.length_s": 3},
-          "without points|no points|empty|blind|lost|nothing"),
+          "usable point|was lost"),
     Fault("no IMU", {"imu.enabled": "false"}, "IMU"),
 ]
 
@@ -110,7 +109,7 @@ class Rows:
 
     def __init__(self, folder):
         self.file = folder / "faults.jsonl"
-        self.program = hashlib.sha256(PROGRAM.read_bytes()).hexdigest()[:12]
+        self.program = digest()
         self.version = version()
         self.rows = {}
         for line in self.file.read_text().splitlines() if self.file.exists() else []:
