@@ -8,6 +8,7 @@
   ./run accuracy --faults --peers                RKO-LIO and DLIO on the same recordings
   ./run accuracy --faults --keep DIR             rows and their recordings' names go to DIR/faults.jsonl
                                                  (default out/faults); run again, it goes on where it was
+  ./run accuracy --faults --table                the rows that are there, without measuring any
   ./run accuracy --faults --write                puts the table into docs/method/faults.md
 
 Rows are kept with the version and the digest of the program. Those of another program are measured again.
@@ -133,7 +134,7 @@ def ape_m(trajectory, truth):
 
 
 def measure_ours(work, recording, row):
-    folder = work / "run"
+    folder = work / f"run_{row['site']}"
     shutil.rmtree(folder, ignore_errors=True)
     try:
         result = map_recording(recording, folder, settings=["map.enabled=false"])
@@ -255,6 +256,7 @@ def arguments():
     parser.add_argument("--only", nargs="+", metavar="WORD", help="faults with one of these in their names")
     parser.add_argument("--peers", action="store_true", help="RKO-LIO and DLIO too")
     parser.add_argument("--keep", type=Path, default=TOP / "out" / "faults", metavar="DIR")
+    parser.add_argument("--table", action="store_true", help="measure nothing: the rows that are there")
     parser.add_argument("--write", action="store_true", help="put the table into docs/method/faults.md")
     options = parser.parse_args()
     options.faults = [f for f in FAULTS if not options.only or any(w in f.name for w in options.only)]
@@ -273,7 +275,7 @@ def main():
     options.keep.mkdir(parents=True, exist_ok=True)
     rows = Rows(options.keep)
     systems = ["understory", *(PEERS if options.peers else [])]
-    for site in options.sites:
+    for site in options.sites if not options.table else []:
         for seed in options.seeds:
             for fault in [None, *options.faults]:
                 measure_case(rows, options.keep, site, seed, options.duration_s, fault, systems)
