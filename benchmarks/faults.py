@@ -118,6 +118,10 @@ class Rows:
             if row["program"] == self.program:
                 self.rows[row["key"]] = row
 
+    def lacks(self, key):
+        """Whether it is to be measured: also one that failed, as a full disk or a stopped command may be why."""
+        return key not in self.rows or self.rows[key]["status"] == "failed"
+
     def put(self, row):
         row |= {"program": self.program, "version": self.version}
         self.rows[row["key"]] = row
@@ -160,7 +164,7 @@ def measure_peer(work, recording, row, name):
 def measure_case(rows, work, site, seed, length_s, fault, systems):
     """The rows of one recording: those that are not there yet."""
     name = fault.name if fault else AS_IT_IS
-    missing = [s for s in systems if key_of(site, seed, length_s, name, s) not in rows.rows]
+    missing = [s for s in systems if rows.lacks(key_of(site, seed, length_s, name, s))]
     if fault and fault.name == "no IMU":  # they need one
         missing = [s for s in missing if s not in PEERS]
     if not missing:

@@ -231,6 +231,9 @@ void check_site(const SiteConfig& site) {
   if (site.carrier.kind == "still" && site.duration_s <= 0.0) {
     problems.push_back("carrier: kind still needs duration_s");
   }
+  if (site.blindness.interval_s > 0.0 && site.blindness.length_s >= site.blindness.interval_s) {
+    problems.push_back("blindness: length_s is not below interval_s");
+  }
   if (site.carrier.work == "thinning" && site.carrier.route_time_s <= 0.0) {
     problems.push_back("carrier: work thinning needs route_time_s");
   }

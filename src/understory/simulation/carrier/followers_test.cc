@@ -9,6 +9,7 @@
 #include "understory/simulation/sensors/scanner.h"
 #include "understory/simulation/stand/objects.h"
 #include "understory/simulation/world.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -108,6 +109,11 @@ TEST(CacheOfScans, IsOfSitesWhoseScansAreTheSame) {
   EXPECT_EQ(site_key(other), usual);
   other.lidar.dropout = 0.5;
   EXPECT_NE(site_key(other), usual);
+}
+
+TEST(Blindness, EndsBeforeItBeginsAgain) {
+  EXPECT_NO_THROW((void)load_site("handheld", {"blindness.interval_s=4"}));
+  EXPECT_THROW((void)load_site("handheld", {"blindness.interval_s=3"}), ConfigError);
 }
 
 TEST(Blindness, CountsInTheKeyOfTheCacheOnlyWhereItIs) {
