@@ -7,7 +7,8 @@
   ./run bench peers --write                       puts each table into docs/method/results.md when it is done
 
 From PyPI, into an environment of their own: evalio (LIO-SAM, DLIO, LOAM, KISS-ICP, GenZ-ICP, CT-ICP,
-MAD-ICP, FORM) and RKO-LIO. One after another, two threads, pinned to the same two processors. Errors
+MAD-ICP, FORM) and RKO-LIO; each in one of its own: SE3-LIO, GenZ-LIO, Pelorus, Super-LIO, Retro-SLAM. One
+after another, two threads, pinned to the same two processors. Errors
 are against the recording's truth; CPU and wall time a scan are without reading.
 """
 
@@ -29,8 +30,12 @@ BEGIN, END = "<!-- peers table: ./run bench peers --write -->", "<!-- end of pee
 # DLIO and LIO-SAM work in threads of their own and are fed at the sensor's rate.
 EVALIO = {"LioSAM": 1.0, "DLIO": 1.0, "LOAM": 0, "KissICP": 0, "GenZICP": 0, "CTICP": 0,
           "MadICP": 0, "FORM": 0}
+# Each in an environment of its own, as they pin versions that clash: its list of packages in
+# benchmarks/peers/newcomers. Those under the GPL are programs of their own, as all are.
+NEWCOMERS = {"SE3-LIO": "se3-lio", "GenZ-LIO": "genz-lio", "Pelorus": "pelorus", "Super-LIO": "super-lio",
+             "Retro-SLAM": "retro-slam"}
 # (understory where the site has one)
-WITH_IMU = {"understory", "LioSAM", "DLIO", "RKO-LIO"}
+WITH_IMU = {"understory", "LioSAM", "DLIO", "RKO-LIO", "SE3-LIO", "GenZ-LIO", "Pelorus", "Super-LIO"}
 
 
 def ours(recording, work, cpus, name, settings, more=()):
@@ -45,14 +50,30 @@ def ours(recording, work, cpus, name, settings, more=()):
             "trajectory": work / name / "trajectory.tum"}
 
 
+def interpreter(name):
+    """Of the environment that holds a peer; made where it is missing."""
+    if name not in NEWCOMERS:
+        return sys.executable
+    made = run(TOP / "tools" / "python-env.sh", f"benchmarks/peers/newcomers/{NEWCOMERS[name]}.txt")
+    if made.code != 0:
+        raise Failed(made.stderr.strip() or "no environment for it")
+    return made.stdout.strip().splitlines()[-1]
+
+
 def peer(name, recording, work, cpus):
     trajectory, summary = work / f"{name}.tum", work / f"{name}.json"
+    more = []
     if name in EVALIO:
         script, more = "evalio_peer", [name, EVALIO[name]]
+    elif name in NEWCOMERS:
+        script = NEWCOMERS[name].replace("-", "_") + "_peer"
     else:
-        script, more = "rko_lio_peer", []
-    done = run(sys.executable, PEERS / f"{script}.py", recording, trajectory, summary, 2, *more,
-               cpus=cpus)
+        script = "rko_lio_peer"
+    try:
+        python = interpreter(name)
+    except Failed as error:
+        return {"name": name, "failed": str(error).splitlines()[-1][:120]}
+    done = run(python, PEERS / f"{script}.py", recording, trajectory, summary, 2, *more, cpus=cpus)
     if done.code != 0:
         reason = (done.stderr.strip().splitlines() or ["no message"])[-1]
         return {"name": name, "failed": f"ended with {done.code}: {reason[:120]}"}
@@ -110,7 +131,7 @@ def measure(site, options, work):
             "understory, no IMU, no loops": lambda: ours(
                 recording, work, cpus, "understory, no IMU, no loops",
                 ["motion.imu_enabled=false", "loop_closure.enabled=false"])}
-    for name in [*EVALIO, "RKO-LIO"]:
+    for name in [*EVALIO, "RKO-LIO", *NEWCOMERS]:
         jobs[name] = lambda name=name: peer(name, recording, work, cpus)
     inertial = has_imu((truth / "site.yaml").read_text())
     if not inertial:

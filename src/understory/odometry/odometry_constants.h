@@ -74,6 +74,10 @@ inline constexpr double kOutageS = 1.0;
 inline constexpr double kFoundAgainShare = 0.5;
 // m: a prediction less certain is no better than staying where one was [chosen]
 inline constexpr double kWorthlessSigmaM = 10.0;
+// m: after a blind time, a prediction less certain does not wait for a better scan [chosen]
+inline constexpr double kCertainSigmaM = 1.0;
+// scans that it waits for: the first one sees part of a turn [chosen]
+inline constexpr std::uint32_t kWaitedScans = 5;
 // m/s: no carrier is faster [bound: carriers]
 inline constexpr double kHighestSpeedM_S = 100.0;
 }  // namespace recovery

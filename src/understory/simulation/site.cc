@@ -1,6 +1,7 @@
 #include "understory/simulation/site.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -151,6 +152,16 @@ void describe_scanned(ConfigTable& table, SiteConfig& config) {
   describe_mag(table, config.mag);
 }
 
+void describe_blindness(ConfigTable& table, BlindnessConfig& c) {
+  table.section("blindness", [&] {
+    table.add(
+        "interval_s", c.interval_s, {0.0, 1e6}, "s",
+        "from one time when nothing comes back to the lidar to the next, the first after half "
+        "of it; 0 = none");
+    table.add("length_s", c.length_s, {0.0, 1e6}, "s", "how long nothing comes back");
+  });
+}
+
 void describe_truth(ConfigTable& table, TruthConfig& c) {
   table.section("truth", [&] {
     table.add("points", c.points, "write points.laz: every point at its true place, with its tree");
@@ -226,6 +237,9 @@ void check_site(const SiteConfig& site) {
   if (site.carrier.rounds > 1 && (strip || site.carrier.work == "thinning")) {
     problems.push_back("carrier: rounds above 1 need a loop, and no work thinning");
   }
+  if (site.blindness.interval_s > 0.0 && site.blindness.length_s >= site.blindness.interval_s) {
+    problems.push_back("blindness: length_s is not below interval_s");
+  }
   if (site.carrier.work == "thinning" && site.carrier.route_time_s <= 0.0) {
     problems.push_back("carrier: work thinning needs route_time_s");
   }
@@ -234,12 +248,18 @@ void check_site(const SiteConfig& site) {
 
 }  // namespace
 
+bool BlindnessConfig::covers(double time_s) const {
+  if (interval_s <= 0.0 || time_s < 0.5 * interval_s) return false;
+  return std::fmod(time_s - 0.5 * interval_s, interval_s) < length_s;
+}
+
 void describe_used(ConfigTable& table, SiteConfig& config) {
   describe_usual(table, config);
   if (!config.scans) describe_scans(table, config);
   if (config.objects.any()) describe_objects(table, config.objects);
   if (config.truth.points) describe_truth(table, config.truth);
   if (config.second_lidar.enabled) describe_second_lidar(table, config.second_lidar);
+  if (config.blindness.interval_s > 0.0) describe_blindness(table, config.blindness);
 }
 
 void describe(ConfigTable& table, SiteConfig& config) {
@@ -248,6 +268,7 @@ void describe(ConfigTable& table, SiteConfig& config) {
   describe_objects(table, config.objects);
   describe_truth(table, config.truth);
   describe_second_lidar(table, config.second_lidar);
+  describe_blindness(table, config.blindness);
   table.add("draw", config.draw,
             "whether the seed draws ground, stand, objects, carrier and scanner; what a setting "
             "names is not drawn");
@@ -268,12 +289,19 @@ void append_file(const std::string& path, std::string& text) {
 
 std::uint64_t site_key(const SiteConfig& config) {
   SiteConfig copy = config;
+  // What the lidar does not see, and what its recording claims: scans are the same.
+  copy.imu = {};
+  copy.gnss = {};
+  copy.mag = {};
+  copy.lidar.time_offset_s = 0.0;
+  copy.lidar.error_m = copy.lidar.error_rpy_deg = {0.0, 0.0, 0.0};
   ConfigTable table;
   describe_scanned(table, copy);
   if (copy.objects.any()) describe_objects(table, copy.objects);
+  if (copy.blindness.interval_s > 0.0) describe_blindness(table, copy.blindness);
   // The number counts what the program itself makes otherwise of the same settings.
   const bool bundles = config.lidar.rays_per_beam >= kBundleRays;
-  std::string text = (bundles ? "3\n" : "2\n") + table.to_yaml(false);
+  std::string text = (bundles ? "5\n" : "4\n") + table.to_yaml(false);
   if (!config.stand.trees.empty()) {  // the content of files counts, not their names alone
     std::vector<std::string> files = tree_cloud_files(config.stand.trees);
     files.insert(files.begin(), config.stand.trees);

@@ -85,9 +85,11 @@ struct ObjectsConfig {
   int walkers = 0;           // who walk to and fro
   double clearance_m = 1.5;  // from the route to the nearest part
   double reach_m = 10.0;     // farther than that from there, none is placed
+  int followers = 0;         // who walk behind the carrier all the way, two abreast
+  double follow_m = 1.5;     // from the body to the first of them, in the plane
 
   [[nodiscard]] bool any() const {
-    return houses + posts + fences + vehicles + people + walkers > 0;
+    return houses + posts + fences + vehicles + people + walkers + followers > 0;
   }
 };
 
@@ -168,6 +170,15 @@ struct LidarConfig {
   double time_offset_s = 0.0;         // of the lidar's clock: stamps are late by this much
   std::vector<double> error_m = {0.0, 0.0, 0.0};  // of the extrinsics that the recording claims
   std::vector<double> error_rpy_deg = {0.0, 0.0, 0.0};
+};
+
+// Times when the lidar is covered, and nothing comes back: the scans are there, without points.
+struct BlindnessConfig {
+  double interval_s = 0.0;  // from one to the next, the first after half of it; 0 = none
+  double length_s = 3.0;
+
+  // Whether a time, in seconds since the path's zero, is one of these.
+  [[nodiscard]] bool covers(double time_s) const;
 };
 
 // A second lidar: of the model and with the faults of the first one, and with a clock of its own.
@@ -295,6 +306,7 @@ struct SiteConfig {
   StandConfig stand;
   CarrierConfig carrier;
   LidarConfig lidar;
+  BlindnessConfig blindness;
   SecondLidarConfig second_lidar;
   ImuConfig imu;
   GnssConfig gnss;
@@ -315,8 +327,9 @@ void describe(ConfigTable& table, SiteConfig& config);
 // where it is the usual one. The site.yaml of a truth has these keys.
 void describe_used(ConfigTable& table, SiteConfig& config);
 
-// Names a site with all its settings but those of the total station and the receiver's hold, and
-// with the content of its list of trees and of their clouds, for the cache of scans.
+// Names all of a site that its scans depend on, with the content of its list of trees and of their
+// clouds, for the cache of scans: not IMU, GNSS, magnetometer, total station, nor what is wrong
+// with the lidar's clock and claimed place.
 [[nodiscard]] std::uint64_t site_key(const SiteConfig& config);
 
 // A site that the program carries with it.

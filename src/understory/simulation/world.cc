@@ -1,5 +1,6 @@
 #include "understory/simulation/world.h"
 
+#include "understory/simulation/carrier/followers.h"
 #include "understory/simulation/stand/objects.h"
 
 namespace understory {
@@ -24,7 +25,8 @@ SimulatedWorld::SimulatedWorld(const SiteConfig& config)
               0.5 * config.stand.size_y_m + kTerrainMargin, seed, &route),
       stand(stand_of(config, terrain, route, seed)),
       plan(plan_carrier(config, route, terrain, stand)),
-      scene(config.stand, terrain, stand, seed, config.terrain.snow_m, plan.harvest,
+      scene(config.stand, terrain, with_followers(config.objects, plan.path, terrain, seed, stand),
+            seed, config.terrain.snow_m, plan.harvest,
             config.lidar.rays_per_beam >= kBundleRays ? Casting::kBundles : Casting::kRays),
       machine(config.carrier, plan, stand) {}
 

@@ -24,7 +24,7 @@ struct SimulatedWorld {
   const std::uint64_t seed;
   const Route route;
   const Terrain terrain;
-  const Stand stand;
+  Stand stand;  // those who follow the carrier are in it once its plan is made
   const CarrierPlan plan;
   ForestScene scene;
   const Machine machine;

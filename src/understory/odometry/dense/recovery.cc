@@ -10,14 +10,19 @@ namespace {
 
 using namespace odometry_constants::recovery;
 
+// m, of the worst direction.
+double place_sigma(const NavState& predicted) {
+  return std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
+}
+
 }  // namespace
 
 bool Recovery::is_outage(TimeNs stamp) const {
-  return to_seconds(stamp - last_scan_) > kOutageS;
+  return to_seconds(stamp - last_seen_) > kOutageS;
 }
 
 bool Recovery::lost_over_outage(TimeNs stamp, const DenseEstimate& estimate) const {
-  if (to_seconds(stamp - last_scan_) < kOutageS || last_inliers_ <= 0.0) return false;
+  if (to_seconds(stamp - last_seen_) < kOutageS || last_inliers_ <= 0.0) return false;
   return !estimate.matched || estimate.match.inlier_ratio < kFoundAgainShare * last_inliers_;
 }
 
@@ -30,9 +35,21 @@ bool Recovery::lost(const DenseEstimate& estimate, std::uint64_t unmatched_in_a_
          (!matched && unmatched_in_a_row + 1 >= static_cast<std::uint64_t>(lost_after_scans_));
 }
 
+bool Recovery::waits(const NavState& predicted, const DenseEstimate& estimate) {
+  const bool was_blind = last_scan_ > last_seen_;
+  if (!was_blind || estimate.matched || place_sigma(predicted) > kCertainSigmaM) return false;
+  return waited_++ < kWaitedScans;
+}
+
+void Recovery::note_scan(TimeNs stamp, bool seen) {
+  last_scan_ = stamp;
+  if (!seen) return;
+  last_seen_ = stamp;
+  waited_ = 0;
+}
+
 Pose Recovery::place_after_outage(const NavState& predicted) const {
-  const double sigma = std::sqrt(predicted.pose_covariance.diagonal().tail<3>().maxCoeff());
-  return sigma < kWorthlessSigmaM ? predicted.world_from_body : last_good_;
+  return place_sigma(predicted) < kWorthlessSigmaM ? predicted.world_from_body : last_good_;
 }
 
 void Recovery::note_good(const DenseEstimate& estimate) {
@@ -46,6 +63,8 @@ void Recovery::save(BinaryWriter& writer) const {
   writer.put(last_inliers_);
   writer.put_doubles(last_velocity_.data(), 3);
   writer.put(last_scan_);
+  writer.put(last_seen_);
+  writer.put(waited_);
 }
 
 void Recovery::load(BinaryReader& reader) {
@@ -53,6 +72,8 @@ void Recovery::load(BinaryReader& reader) {
   last_inliers_ = reader.get<double>();
   reader.get_doubles(last_velocity_.data(), 3);
   last_scan_ = reader.get<TimeNs>();
+  last_seen_ = reader.get<TimeNs>();
+  waited_ = reader.get<std::uint32_t>();
 }
 
 void put_at(const Pose& world_from_body, DenseOdometry& odometry, DenseEstimate& estimate) {

@@ -17,7 +17,8 @@ class Recovery {
   // Lost after so many scans in a row without a match.
   explicit Recovery(int lost_after_scans) : lost_after_scans_(lost_after_scans) {}
 
-  // Whether so much time has passed since the last scan that a match may be one by chance.
+  // Whether so much time has passed since the last scan with points that a match may be one by
+  // chance.
   [[nodiscard]] bool is_outage(TimeNs stamp) const;
   // After an outage: whether the match finds few of the points that matches found before it. (Right
   // matches after 10 s found 0.87 of that share, wrong ones 0.13.)
@@ -29,7 +30,14 @@ class Recovery {
   // nothing. World from body.
   [[nodiscard]] Pose place_after_outage(const NavState& predicted) const;
 
-  void note_scan(TimeNs stamp) { last_scan_ = stamp; }
+  // After a time when the lidar saw nothing: whether the next scan had better be waited for, as
+  // this one, which may see half around, was not matched and the prediction is certain to a metre.
+  // No more than five scans are waited for.
+  [[nodiscard]] bool waits(const NavState& predicted, const DenseEstimate& estimate);
+
+  // `seen`: it has points, and what to do about it was decided. One that is not is as none for
+  // outages: nothing tells whether the prediction still holds.
+  void note_scan(TimeNs stamp, bool seen = true);
   // Of a scan whose pose is good.
   void note_good(const DenseEstimate& estimate);
   // The first scan is done again.
@@ -48,6 +56,8 @@ class Recovery {
   Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero();  // of it, in its body frame
   double last_inliers_ = 0.0;  // share of its points near the map; 0: there was no match
   TimeNs last_scan_ = 0;
+  TimeNs last_seen_ = 0;      // stamp of the last scan that had points
+  std::uint32_t waited_ = 0;  // scans since the lidar sees again
 };
 
 // Puts a new odometry and the estimate of its first scan to a pose: to its position and heading;

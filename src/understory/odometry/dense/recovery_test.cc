@@ -52,6 +52,32 @@ TEST(Recovery, AfterAnOutageAMatchHasToFindHalfOfTheUsualPoints) {
   EXPECT_FALSE(recovery.lost_over_outage(from_seconds(11.1), estimate_at(1.0, 0.0)));
 }
 
+// Blind for 3 s: the first scan that sees half around is not matched. Were it taken for the place
+// where the carrier was last, the map would break there.
+TEST(Recovery, AfterABlindTimeACertainPredictionWaitsForTheNextScan) {
+  NavState predicted;
+  predicted.pose_covariance = Eigen::Matrix<double, 6, 6>::Identity() * 0.2 * 0.2;
+  Recovery recovery(30);
+  recovery.note_scan(from_seconds(10.0));
+  recovery.note_good(estimate_at(1.0, 0.8));
+  EXPECT_FALSE(recovery.waits(predicted, estimate_at(1.0, 0.0)));  // nothing was blind
+  for (double time = 10.1; time < 13.0; time += 0.1)
+    recovery.note_scan(from_seconds(time), false);
+  EXPECT_TRUE(recovery.is_outage(from_seconds(13.0)));
+  EXPECT_TRUE(recovery.lost_over_outage(from_seconds(13.0), estimate_at(1.0, 0.39)));
+  EXPECT_FALSE(recovery.waits(predicted, estimate_at(1.0, 0.39)));  // a match is judged at once
+  NavState uncertain = predicted;
+  uncertain.pose_covariance *= 26.0;
+  EXPECT_FALSE(recovery.waits(uncertain, estimate_at(1.0, 0.0)));
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_TRUE(recovery.waits(predicted, estimate_at(1.0, 0.0)));
+    recovery.note_scan(from_seconds(13.0 + 0.1 * i), false);
+  }
+  EXPECT_FALSE(recovery.waits(predicted, estimate_at(1.0, 0.0)));
+  recovery.note_scan(from_seconds(13.5));
+  EXPECT_FALSE(recovery.is_outage(from_seconds(13.6)));
+}
+
 TEST(Recovery, APredictionThatIsWorthNothingGivesWayToTheLastPlace) {
   Recovery recovery(30);
   recovery.note_good(estimate_at(7.0, 0.8));

@@ -383,7 +383,7 @@ void SceneContent::add_plants(const Stand& stand) {
 
 void SceneContent::add_things(const Stand& stand) {
   for (const StandObject& object : stand.objects) {
-    const bool walks = object.walk_m > 0.0;
+    const bool walks = object.walk_m > 0.0 || !object.track.empty();
     const auto cos_yaw = static_cast<float>(std::cos(object.yaw_rad));
     const auto sin_yaw = static_cast<float>(std::sin(object.yaw_rad));
     Eigen::Matrix<float, 3, 4> world_from_shape;

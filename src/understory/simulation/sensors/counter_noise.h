@@ -128,6 +128,7 @@ enum class NoiseStream : std::uint64_t {
   kHeadLog,
   kDrawnSite,
   kObjects,
+  kFollowers,
 };
 
 // The number of a stream, for seeds.

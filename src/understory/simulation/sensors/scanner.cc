@@ -110,6 +110,7 @@ Pose mount_pose(const std::vector<double>& place_m, const std::vector<double>& r
 Scanner::Scanner(const SiteConfig& config, ForestScene& scene, const CarrierPath& path,
                  const Machine& machine, TimeNs start)
     : config_(config.lidar),
+      blindness_(config.blindness),
       scene_(scene),
       path_(path),
       machine_(machine),
@@ -272,19 +273,20 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
 
 void Scanner::cast_block(double moment_s, Block& block) const {
   const std::int64_t first = block.first;
+  const std::size_t beams = model_.beams.size();
+  const bool two = config_.returns == 2;
+  block.readings.resize(static_cast<std::size_t>(block.end - first) * beams);
+  if (two) block.seconds.resize(block.readings.size());
+  if (keeps_sources_) block.sources.resize(block.readings.size());
+  if (keeps_sources_ && two) block.second_sources.resize(block.readings.size());
+  if (blindness_.covers(to_seconds(model_.firing_time(first)))) return;
   make_rays(moment_s, block);
   block.hits.resize(block.rays.size());
   scene_.cast(block.rays.data(), block.rays.size(), static_cast<float>(config_.min_range_m),
               static_cast<float>(config_.max_range_m), block.hits.data(),
               static_cast<std::size_t>(config_.rays_per_beam));
   if (!machine_.empty()) meet_machine(block);
-  const std::size_t beams = model_.beams.size();
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
-  block.readings.resize(block.slots.size());
-  const bool two = config_.returns == 2;
-  if (two) block.seconds.resize(block.readings.size());
-  if (keeps_sources_) block.sources.resize(block.readings.size());
-  if (keeps_sources_ && two) block.second_sources.resize(block.readings.size());
   NoiseRow row(seed_, 0);
   for (std::size_t i = 0; i < block.readings.size(); ++i) {
     const auto firing = static_cast<std::uint64_t>(first) + i / beams;

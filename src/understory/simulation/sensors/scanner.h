@@ -100,6 +100,7 @@ class Scanner {
   void add_spurious(Block& block) const;
 
   const LidarConfig config_;
+  const BlindnessConfig blindness_;
   ForestScene& scene_;
   const CarrierPath& path_;
   const Machine& machine_;

@@ -91,21 +91,6 @@ void make_vehicle(StandObject& vehicle, Random& random) {
   }
 }
 
-void make_person(StandObject& person, Random& random) {
-  const double height = random.uniform(1.55, 1.92);
-  set_size(person, 0.35, 0.5, height);
-  const double hip = 0.5 * height;
-  const double shoulder = 0.82 * height;
-  for (const double side : {-1.0, 1.0}) {
-    const double step = person.kind == ObjectKind::kWalker ? side * 0.2 : 0.0;
-    person.rods.push_back({{step, 0.12 * side, 0.06}, {0.0, 0.09 * side, hip}, 0.055, 0.085});
-    person.rods.push_back(
-        {{0.5 * step, 0.27 * side, hip}, {0.0, 0.22 * side, shoulder - 0.05}, 0.035, 0.05});
-  }
-  person.rods.push_back({{0.0, 0.0, hip}, {0.0, 0.0, shoulder - 0.1}, 0.14, 0.17});
-  person.rods.push_back({{0.0, 0.0, height - 0.2}, {0.0, 0.0, height - 0.1}, 0.09, 0.1});
-}
-
 void make_walk(StandObject& walker, Random& random) {
   walker.walk_m = random.uniform(4.0, 10.0);
   walker.speed_m_s = random.uniform(0.6, 1.5);
@@ -203,7 +188,8 @@ StandObject new_object(ObjectKind kind, Random& random) {
       break;
     case ObjectKind::kPerson:
     case ObjectKind::kWalker:
-      make_person(object, random);
+    case ObjectKind::kFollower:
+      shape_person(object, random);
       if (kind == ObjectKind::kWalker) make_walk(object, random);
       break;
   }
@@ -242,6 +228,15 @@ void make_room(const StandObject& object, Stand& stand) {
                 [&](const Wood& wood) { return covers(wood.from, wood.radius_from_m); });
 }
 
+ObjectMotion motion_on_track(const StandObject& object, double time_s) {
+  const double at = std::max(0.0, time_s) / object.track_step_s;
+  const auto low = static_cast<std::size_t>(at);
+  if (low + 1 >= object.track.size()) return {object.track.back(), Eigen::Vector2d::Zero()};
+  const Vector step = object.track[low + 1] - object.track[low];
+  return {object.track[low] + (at - static_cast<double>(low)) * step,
+          step.head<2>() / object.track_step_s};
+}
+
 }  // namespace
 
 void describe_objects(ConfigTable& table, ObjectsConfig& c) {
@@ -254,15 +249,35 @@ void describe_objects(ConfigTable& table, ObjectsConfig& c) {
     table.add("walkers", c.walkers, {0, 1000}, "", "people who walk to and fro");
     table.add("clearance_m", c.clearance_m, {0.5, 100.0}, "m", "from the route to their next part");
     table.add("reach_m", c.reach_m, {0.0, 1000.0}, "m", "farthest that they begin behind that");
+    table.add("followers", c.followers, {0, 20}, "",
+              "people who walk behind the carrier all the way, two abreast");
+    table.add("follow_m", c.follow_m, {0.5, 100.0}, "m", "from the body to the first of them");
   });
 }
 
+void shape_person(StandObject& person, Random& random) {
+  const double height = random.uniform(1.55, 1.92);
+  set_size(person, 0.35, 0.5, height);
+  const double hip = 0.5 * height;
+  const double shoulder = 0.82 * height;
+  for (const double side : {-1.0, 1.0}) {
+    const double step = person.kind != ObjectKind::kPerson ? side * 0.2 : 0.0;
+    person.rods.push_back({{step, 0.12 * side, 0.06}, {0.0, 0.09 * side, hip}, 0.055, 0.085});
+    person.rods.push_back(
+        {{0.5 * step, 0.27 * side, hip}, {0.0, 0.22 * side, shoulder - 0.05}, 0.035, 0.05});
+  }
+  person.rods.push_back({{0.0, 0.0, hip}, {0.0, 0.0, shoulder - 0.1}, 0.14, 0.17});
+  person.rods.push_back({{0.0, 0.0, height - 0.2}, {0.0, 0.0, height - 0.1}, 0.09, 0.1});
+}
+
 std::string object_name(ObjectKind kind) {
-  constexpr std::array kNames = {"wall", "post", "fence", "vehicle", "person", "walker"};
+  constexpr std::array kNames = {"wall",   "post",   "fence",   "vehicle",
+                                 "person", "walker", "follower"};
   return kNames.at(static_cast<std::size_t>(kind));
 }
 
 ObjectMotion motion_at(const StandObject& object, double time_s) {
+  if (!object.track.empty()) return motion_on_track(object, time_s);
   if (object.walk_m <= 0.0) return {object.foot, Eigen::Vector2d::Zero()};
   const double way =
       std::fmod(object.start_m + object.speed_m_s * std::max(0.0, time_s), 2.0 * object.walk_m);

@@ -79,7 +79,7 @@ struct Building {
 };
 
 // Kinds of things that are no trees. A wall is one side of a building.
-enum class ObjectKind { kWall, kPost, kFence, kVehicle, kPerson, kWalker };
+enum class ObjectKind { kWall, kPost, kFence, kVehicle, kPerson, kWalker, kFollower };
 
 // A thing that is no tree, made of boards and rods. Its own frame has the origin at its foot on the
 // ground, x along its length, z up.
@@ -101,6 +101,9 @@ struct StandObject {
   double speed_m_s = 0.0;
   double start_m = 0.0;          // how far it has come at time zero
   std::vector<double> ground_m;  // along its line, evenly apart, over the foot
+  // Places of a follower's foot, world frame, from the path's zero on; empty: it does not follow.
+  std::vector<Eigen::Vector3d> track;
+  double track_step_s = 0.05;  // from one to the next
 };
 
 // All that grows and lies in a site.

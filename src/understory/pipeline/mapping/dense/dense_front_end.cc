@@ -260,14 +260,17 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
       recovery_.is_outage(scan.stamp) ? odometry_->motion().predict(scan.stamp) : NavState();
   DenseEstimate estimate = odometry_->process(scan, map_->local_map(), knowledge_of(scan));
   if (estimate.update.status == MotionStatus::kIgnored) return;
-  if (!map_->keyframes().empty() && estimate.thinned.size() >= kFewPoints) {
-    if (recovery_.lost_over_outage(scan.stamp, estimate)) {
+  bool seen = estimate.thinned.size() >= kFewPoints;
+  if (!map_->keyframes().empty() && seen) {
+    if (recovery_.is_outage(scan.stamp) && recovery_.waits(predicted, estimate)) {
+      seen = false;
+    } else if (recovery_.lost_over_outage(scan.stamp, estimate)) {
       estimate = begin_segment(scan, recovery_.place_after_outage(predicted));
     } else if (recovery_.lost(estimate, received_.counts.lost_in_a_row)) {
       estimate = begin_segment(scan, recovery_.last_good());
     }
   }
-  recovery_.note_scan(scan.stamp);
+  recovery_.note_scan(scan.stamp, seen);
   if (estimate.tops) ++received_.counts.by_tree_tops;
   const std::uint64_t content = content_of(scan);
   received_.counts.repeated += is_repetition(content, received_.counts.last_content) ? 1 : 0;
@@ -359,7 +362,9 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   positioned_.new_world_from_old_world = estimate.update.new_world_from_old_world;
   const bool good =
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
-  received_.counts.lost_in_a_row = good ? 0 : received_.counts.lost_in_a_row + 1;
+  // A scan without points is no failed match: whether the position is lost, the next ones tell.
+  if (good) received_.counts.lost_in_a_row = 0;
+  if (!good && estimate.thinned.size() >= kFewPoints) ++received_.counts.lost_in_a_row;
   if (good) recovery_.note_good(estimate);
   const bool unseen = estimate.found_share < config_.keyframe_map.keyframe.below_found_share;
   const bool wanted = good && (unseen || map_->wants(state.world_from_body));
