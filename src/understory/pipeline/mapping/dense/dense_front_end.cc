@@ -27,6 +27,15 @@ FeaturePoints points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& c
   return kept;
 }
 
+Points carried_points(const BodyCloud& cloud, const VoxelFilterConfig& config) {
+  Points points;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.is_carried(i) && static_cast<double>(cloud.range[i]) >= config.range_min_m)
+      points.push_back(cloud.points[i]);
+  }
+  return points;
+}
+
 }  // namespace
 
 DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTraits& traits,
@@ -420,9 +429,13 @@ FeaturePoints DenseFrontEnd::map_points(const DenseEstimate& estimate) {
     BodyCloud thinned = cloud_filter_.filter_features(estimate.cloud, voxel, true);
     return {std::move(thinned.points), std::move(thinned.feature)};
   }
-  // What seems to be carried may be a stem beside a machine that stands: it is seen again later.
-  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m && cloud.carried.empty())
-    return {estimate.thinned.points, {}};
+  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m) {
+    // What seems to be carried may be a stem beside a machine that stands: it is seen again later.
+    Points points = estimate.thinned.points;
+    const Points carried = cloud_filter_.filter(carried_points(cloud, voxel), voxel.voxel_size_m);
+    points.insert(points.end(), carried.begin(), carried.end());
+    return {std::move(points), {}};
+  }
   return {cloud_filter_.filter(cloud, voxel, true).points, {}};
 }
 
