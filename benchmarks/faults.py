@@ -222,14 +222,14 @@ def table_row(rows, site, seed, length_s, fault, systems):
         cells += [f"{100 * floor:.1f}", own["status"], said]
     else:
         cells += ["", own["status"], ""]
-    cells += ["; ".join(own["reasons"] or [w for w in own["warnings"] if w.startswith("imu.")]).replace("|", "/")]
+    cells += [". ".join(own["reasons"] or [w for w in own["warnings"] if w.startswith("imu.")]).replace("|", "/")]
     return "| " + " | ".join(cells + [cell(found(s)) for s in systems[1:]]) + " |", good
 
 
 def render(rows, options, systems):
     head = ["site", "seed", "fault", "APE cm", "floor cm", "status", "", "reasons, or warnings of the IMU",
             *[f"{s}: APE cm" for s in systems[1:]]]
-    lines = [f"{rows.version}, {time.strftime('%Y-%m-%d')}, {machine()}; {options.duration_s:g} s each.", "",
+    lines = [f"{rows.version}, {time.strftime('%Y-%m-%d')}, {machine()}. {options.duration_s:g} s each.", "",
              "| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     missed = 0
     for site in options.sites:
