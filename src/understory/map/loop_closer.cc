@@ -24,8 +24,8 @@ struct Search {
   LocalMapConfig local_map;
   SearchedMap map;
   LoopAgreement* agreement = nullptr;  // no other search uses it at the time
-  bool leave_map = false;
   std::vector<char> decided;           // of the first loops of the map's graph
+  bool leave_map = false;
 };
 
 Eigen::Vector3d up_at(const SearchedMap& map, std::size_t keyframe) {
@@ -312,8 +312,8 @@ bool LoopCloser::join_left(std::vector<Keyframe>& keyframes,
 
 void LoopCloser::begin(const std::vector<Keyframe>& keyframes,
                        const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points) {
-  Search search{config_, local_map_config_, searched(keyframes, piece_starts, points),
-                agreement_.get(), leave_map_, decided_};
+  Search search{config_,          local_map_config_, searched(keyframes, piece_starts, points),
+                agreement_.get(), decided_,          leave_map_};
   running_.emplace();
   running_->keyframes = keyframes.size();
   running_->outcome = std::async(std::launch::async, [this, search = std::move(search)]() mutable {
