@@ -157,7 +157,7 @@ for page in sorted(pages):
 # The settings that a page lists in tables, first column, exist.
 settings = TOP / "docs" / "reference" / "configuration.md"
 listed = re.findall(r"^\| ([a-z_]+(?:\.[a-z_]+)+) \|", settings.read_text(), re.M)
-assert len(listed) == 40, len(listed)
+assert len(listed) >= 40, len(listed)
 wrong += [f"{settings.name}: no key {key}" for key in listed if key not in keys["map"] | keys["map by stems"] | keys["inventory"]]
 assert not wrong, "\n".join(wrong)
 print(f"{len(reached)} pages, {counted} sentences, {checked} commands")
