@@ -1,4 +1,4 @@
-"""`map` and `inventory RUN` list the same trees, whatever frame the layers are in.
+"""`map` and `inventory RUN` list the same trees, and whatever frame the layers are in.
 
 Walks are mapped with layers in the world frame, in a national grid and in degrees. The map of each
 run is taken stock of twice: from memory and in tiles.
@@ -38,6 +38,7 @@ def check(folder, recording, name, *options):
         assert len(again) == len(listed), (name, way, len(listed), len(again))
         for mine, theirs in zip(listed, again):
             assert mine == theirs, (name, way, mine, theirs)
+    return listed
 
 
 def main():
@@ -46,9 +47,9 @@ def main():
         handheld, harvester = folder / "walk.mcap", folder / "ride.mcap"
         run("simulate", "handheld", "-o", handheld, "--seed", "19", "--duration-s", "8")
         run("simulate", "harvester", "-o", harvester, "--seed", "6", "--duration-s", "8")
-        check(folder, handheld, "world", "--set", "georeference.enabled=false")
-        check(folder, handheld, "grid")
-        check(folder, handheld, "degrees", "--crs", "EPSG:4979")
+        world = check(folder, handheld, "world", "--set", "georeference.enabled=false")
+        assert world == check(folder, handheld, "grid", "--crs", "EPSG:3067")
+        assert world == check(folder, handheld, "degrees", "--crs", "EPSG:4979")
         check(folder, harvester, "harvester")
 
 

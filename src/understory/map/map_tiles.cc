@@ -20,7 +20,7 @@ constexpr std::size_t kKeysAhead = 32;
 constexpr double kShareOfBuffers = 0.25;  // of most_bytes; the rest is for the index that thins
 constexpr double kIndexBytes = 64.0;      // of a VoxelIndex for each key, while it grows
 constexpr int kMostStrips = 64;
-constexpr double kGridStepsPerMetre = 4096.0;
+constexpr double kGridStepsPerMetre = 512.0;
 
 void append(const std::filesystem::path& path, const void* bytes, std::size_t size) {
   std::ofstream file(path, std::ios::binary | std::ios::app);
@@ -51,8 +51,8 @@ struct MapTiles::Tile {
   std::uint64_t written = 0;  // records in its file
 };
 
-MapTiles::MapTiles(std::filesystem::path folder, const Config& config, StoredPlace stored_place)
-    : folder_(std::move(folder)), config_(config), stored_place_(std::move(stored_place)) {
+MapTiles::MapTiles(std::filesystem::path folder, const Config& config)
+    : folder_(std::move(folder)), config_(config) {
   std::error_code error;
   std::filesystem::remove_all(folder_, error);
   std::filesystem::create_directories(folder_, error);
@@ -186,10 +186,10 @@ std::vector<bool> MapTiles::kept_of(TileIndex index, const Tile& tile) const {
 }
 
 MapTiles::Record MapTiles::stored(TileIndex index, Record record) const {
-  if (!stored_place_) return record;
+  if (!config_.on_grid) return record;
   const Eigen::Vector3d from(corner(index.first), corner(index.second), 0.0);
   const Eigen::Vector3d place = from + Eigen::Vector3f(record.x, record.y, record.z).cast<double>();
-  const Eigen::Vector3f moved = (stored_place_(place) - from).cast<float>();
+  const Eigen::Vector3f moved = (on_map_grid(place) - from).cast<float>();
   record.x = moved.x();
   record.y = moved.y();
   record.z = moved.z();
@@ -231,7 +231,7 @@ void MapTiles::thin_all() {
   thinned_ = true;
   for (auto& [index, tile] : tiles_) {
     if (config_.most_bytes > 0.0) write_out(index, tile);
-    if (config_.thin_m > 0.0 || stored_place_) thin(index, tile);
+    if (config_.thin_m > 0.0 || config_.on_grid) thin(index, tile);
   }
 }
 

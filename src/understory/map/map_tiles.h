@@ -24,8 +24,9 @@ struct MapPoint {
   bool of_neighbour = false;  // lies in another tile, within `border_m` of this one
 };
 
-// Places of a finished map lie on a grid of 2^-12 m, 0.24 mm. Single precision holds them exactly
-// up to 4 km from a place of the grid, so each reader of the map works with the same numbers.
+// Places of a finished map lie on a grid of 2^-9 m (2 mm) in the world frame. map.laz may round
+// them to a millimetre in any other frame: its reader finds the same places again, and so the same
+// trees. Single precision holds them exactly up to 32 km from a place of the grid.
 [[nodiscard]] double on_map_grid(double metres);
 [[nodiscard]] Eigen::Vector3d on_map_grid(const Eigen::Vector3d& place);
 
@@ -38,20 +39,16 @@ class MapTiles {
     double tile_m = 20.0;
     double thin_m = 0.02;  // 0 = keep every point
     double border_m =
-        0.0;  // a tile also gets its neighbours' points that are so near; below tile_m
+        0.0;               // a tile also gets its neighbours' points that are so near; below tile_m
+    bool on_grid = false;  // points are handed back at the nearest place of on_map_grid()
     // Bytes for the write buffers, and for the index that thins; all points lie on disk then. 0:
     // usual buffers, any index.
     double most_bytes = 0.0;
   };
   using TileIndex = std::pair<std::int32_t, std::int32_t>;  // x, y in tiles
 
-  // A place of the world frame, metres, as the files of the map give it back: on the grid of
-  // on_map_grid(), and the same again for the place that it returned.
-  using StoredPlace = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
-
-  // `folder` is made, and removed again by the destructor. `stored_place`, if any, is applied to
-  // the points that are handed back.
-  MapTiles(std::filesystem::path folder, const Config& config, StoredPlace stored_place = {});
+  // `folder` is made, and removed again by the destructor.
+  MapTiles(std::filesystem::path folder, const Config& config);
   ~MapTiles();
   MapTiles(const MapTiles&) = delete;
   MapTiles& operator=(const MapTiles&) = delete;
@@ -94,7 +91,6 @@ class MapTiles {
 
   std::filesystem::path folder_;
   Config config_;
-  StoredPlace stored_place_;
   std::map<TileIndex, Tile> tiles_;
   std::uint64_t points_added_ = 0;
   std::uint64_t buffered_ = 0;

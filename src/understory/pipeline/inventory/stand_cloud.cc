@@ -12,7 +12,7 @@
 #include "understory/forest/cloud_shape.h"
 #include "understory/geometry/rotation_between.h"
 #include "understory/georeference/systems/coordinate_system.h"
-#include "understory/pipeline/georeferencing/stored_places.h"
+#include "understory/map/map_tiles.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/error.h"
 
@@ -63,12 +63,11 @@ std::optional<CloudMove> upright_move(const CloudFrame& frame) {
       }};
 }
 
-// From the frame of the layers of a run to its world frame; none for another cloud.
+// From the frame of the layers of a run to the places that its map has in the world frame; none for
+// another cloud.
 PlaceChange into_world(const LayerFrame* layers) {
   if (layers == nullptr) return {};
-  return [stored = StoredPlaces(*layers)](const Eigen::Vector3d& place) {
-    return stored.from_layers(place);
-  };
+  return [layers](const Eigen::Vector3d& place) { return on_map_grid(layers->to_world(place)); };
 }
 
 void move_cloud(const CloudMove& move, PointCloudFile& cloud) {

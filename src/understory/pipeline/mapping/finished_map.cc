@@ -1,18 +1,16 @@
 #include "understory/pipeline/mapping/finished_map.h"
 
-#include <utility>
-
 #include "understory/util/error.h"
 
 namespace understory {
 
 std::unique_ptr<MapTiles> make_finished_map(const KeyframeClouds& clouds,
                                             const std::vector<Keyframe>& keyframes,
-                                            const MapTiles::Config& config,
+                                            MapTiles::Config config,
                                             const std::filesystem::path& folder,
-                                            const ProgressSink& progress,
-                                            MapTiles::StoredPlace stored_place) {
-  auto tiles = std::make_unique<MapTiles>(folder, config, std::move(stored_place));
+                                            const ProgressSink& progress) {
+  config.on_grid = true;
+  auto tiles = std::make_unique<MapTiles>(folder, config);
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     const KeyframeCloud cloud = clouds.read(i);
     const auto keyframe = static_cast<std::size_t>(cloud.id);

@@ -11,13 +11,12 @@
 
 namespace understory {
 
-// All clouds at their keyframes' finished poses, sorted into tiles in `folder`. `stored_place`: see
-// MapTiles.
+// All clouds at their keyframes' finished poses, sorted into tiles in `folder`. What the tiles hand
+// back lies on the map's grid, as every reader of map.laz gets it.
 [[nodiscard]] std::unique_ptr<MapTiles> make_finished_map(const KeyframeClouds& clouds,
                                                           const std::vector<Keyframe>& keyframes,
-                                                          const MapTiles::Config& config,
+                                                          MapTiles::Config config,
                                                           const std::filesystem::path& folder,
-                                                          const ProgressSink& progress,
-                                                          MapTiles::StoredPlace stored_place = {});
+                                                          const ProgressSink& progress);
 
 }  // namespace understory

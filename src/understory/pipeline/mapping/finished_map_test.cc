@@ -33,10 +33,10 @@ TEST(FinishedMap, CloudsMoveWithTheirKeyframes) {
   ASSERT_EQ(found.size(), 3U);
   const Pose& first = keyframes[0].world_from_body;
   const Eigen::Vector3d ahead = Eigen::Vector3d::UnitX();
-  EXPECT_LT((found[5].first - first * ahead).norm(), 1e-5);
-  EXPECT_LT((found[6].first - first * (keyframe_from_body * ahead)).norm(), 1e-5);
-  EXPECT_LT((found[7].first - keyframes[1].world_from_body * Eigen::Vector3d(0.0, 2.0, 0.0)).norm(),
-            1e-5);
+  EXPECT_EQ(found[5].first, on_map_grid(first * ahead));
+  EXPECT_EQ(found[6].first, on_map_grid(first * (keyframe_from_body * ahead)));
+  EXPECT_EQ(found[7].first,
+            on_map_grid(keyframes[1].world_from_body * Eigen::Vector3d(0.0, 2.0, 0.0)));
   EXPECT_EQ(found[6].second, 1'101'000'000);
 }
 

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include "understory/forest/cloud_shape.h"
-#include "understory/pipeline/georeferencing/stored_places.h"
 #include "understory/pipeline/inventory/lidar_view.h"
 #include "understory/pipeline/judgement/input_remarks.h"
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
@@ -48,11 +47,9 @@ class DenseMap : public MapMaker {
     place_on_globe();
     if (!front_end_.config().map_enabled) return;
     const ScopedTimer timer(front_end_.times(), "finish_gather_map");
-    const auto stored = [places = StoredPlaces(made_.placed.frames.layers)](
-                            const Eigen::Vector3d& place) { return places.from_world(place); };
-    made_.tiles = make_finished_map(front_end_.clouds(), front_end_.map().keyframes(),
-                                    front_end_.config().map, recording_.work / "tiles",
-                                    recording_.progress, stored);
+    made_.tiles =
+        make_finished_map(front_end_.clouds(), front_end_.map().keyframes(),
+                          front_end_.config().map, recording_.work / "tiles", recording_.progress);
   }
 
   void list_trees() override {
@@ -73,7 +70,7 @@ class DenseMap : public MapMaker {
   RunOutcome write() override { return write_dense_results(recording_, front_end_, made_); }
 
  private:
-  // By the run's own fixes; gnss.csv. Trees are found in the places that map.laz will hold.
+  // By the run's own fixes; gnss.csv.
   void place_on_globe() {
     const ScopedTimer timer(front_end_.times(), "finish_georeference");
     const std::vector<GnssFix> fixes = front_end_.fixes();
