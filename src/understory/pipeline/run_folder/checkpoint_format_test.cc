@@ -4,10 +4,14 @@
 
 #include "understory/calibration/lidar_imu/clock_check.h"
 #include "understory/georeference/satellites/online_georeference.h"
+#include "understory/map/loop_closer.h"
+#include "understory/odometry/dense/recovery.h"
 #include "understory/odometry/imu/imu_watch.h"
 #include "understory/pipeline/judgement/imu_usage.h"
+#include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/run_folder/checkpoint.h"
+#include "understory/preprocess/carried_returns.h"
 #include "understory/preprocess/event_orderer.h"
 #include "understory/recording/messages/event_bytes.h"
 #include "understory/recording/messages/fix_joiner.h"
@@ -28,7 +32,7 @@ std::size_t size_of(const Put& put) {
 // was begun before would have been read as another one. Where this fails, kCheckpointFormat grows
 // by one, and the sizes here become the new ones.
 TEST(CheckpointFormat, GrowsWithWhatIsKept) {
-  EXPECT_EQ(kCheckpointFormat, 11);
+  EXPECT_EQ(kCheckpointFormat, 12);
   Log log;
   const auto saved = [](const auto& part) {
     return size_of([&](BinaryWriter& writer) { part.save(writer); });
@@ -39,6 +43,10 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(LidarImuClockCheck()), 41U);
   EXPECT_EQ(saved(OnlineGeoreference(OnlineGeoreferenceConfig())), 221632U);
   EXPECT_EQ(saved(TopicStatistics()), 136U);
+  EXPECT_EQ(saved(Recovery(30)), 108U);
+  EXPECT_EQ(saved(CarriedReturns(CarriedReturnsConfig())), 20U);
+  EXPECT_EQ(saved(LoopCloser(LoopCloserConfig(), LocalMapConfig())), 17U);
+  EXPECT_EQ(sizeof(DenseCounts), 184U);
   EXPECT_EQ(saved(FixJoiner()), 55U);
   EXPECT_EQ(size_of([](BinaryWriter& writer) { put_traits(writer, {}); }), 54U);
   EXPECT_EQ(size_of([](BinaryWriter& writer) { put_rig(writer, {}); }), 148U);
