@@ -137,7 +137,8 @@ inline constexpr std::uint64_t kSample = 400'000;
 }  // namespace cloud_tiles
 
 namespace tiled_map {  // pipeline/mapping/tiled_map.cc
-// m beside its tile at which a point may lie, as places are those of map.laz [bound: its steps]
+// m beside its tile at which a point may lie, as places are moved to the map's grid [bound: its
+// step]
 inline constexpr double kBesideTileM = 0.01;
 // Bytes that an inventory of a map on disk takes for each of its points [measured on simulated
 // runs]
@@ -182,6 +183,11 @@ inline constexpr double kCoarsestStepM = 0.01;
 inline constexpr double kSameUnit = 1e-4;
 }  // namespace stand_cloud
 
+namespace labelled_cloud {  // pipeline/inventory/labelled_cloud.cc
+// m beside a tile: cubes of crowns that begin in it reach so far [bound: their edge]
+inline constexpr double kBesideTile = 0.25;
+}  // namespace labelled_cloud
+
 namespace cloud_inventory {  // pipeline/inventory/cloud_inventory.cc
 // m above the ground that a tenth of the canopy model reaches: trees, whose stems must be listed
 // [chosen]
@@ -193,8 +199,6 @@ inline constexpr double kTallM = 42.0;
 // Height over diameter: no tall stand is more slender; real ones have 40 to 100, in feet of height
 // and metres of diameter 3.3 times as much [bound: forests]
 inline constexpr double kMostSlender = 150.0;
-// m beside a tile: cubes of crowns that begin in it reach so far [bound: their edge]
-inline constexpr double kBesideTile = 0.25;
 // m: a thinner cloud without a stem may be a cut [chosen: stems need 1.5 m at least]
 inline constexpr double kThinCutM = 1.0;
 // Trees with both figures at least [chosen]
