@@ -138,8 +138,8 @@ class LoopCloser {
   LocalMapConfig local_map_config_;
   bool leave_map_;
   std::vector<LoopAttempt> attempts_;
-  std::vector<char>
-      decided_;  // which of the first loops of the graph were used at the last handover
+  // Of the first loops of the graph, at the last handover: 1 where it was used.
+  std::vector<char> decided_;
   // Of the running search while there is one; kept from one to the next.
   std::unique_ptr<LoopAgreement> agreement_;
   SideWork work_;

@@ -128,7 +128,7 @@ void DenseOdometry::note_lidars(const Scan& scan) {
 }
 
 void DenseOdometry::learn_carried(const Scan& scan, const std::vector<StampedPose>& path) {
-  const ScopedTimer timer(times_, "preprocess");
+  const ScopedTimer timer(times_, "carried");
   const Pose world_from_body =
       path.empty() ? motion_->predict(scan.stamp).world_from_body : path.front().world_from_body;
   carried_.learn(scan,
