@@ -15,7 +15,7 @@ from program import PROGRAM, program
 
 SAME = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "gnss.csv", "map.laz", "trees.csv", "stem_curves.csv", "dtm.tif",
         "chm.tif", "dsm.tif"]
-# Every point of every scan: without a limit the run takes far more.
+# Every point of every scan. A limit that is not shared among what the run holds leaves 0.74 of the memory, not 0.65.
 EVERY_POINT = ["--inventory", "full", "--set", "map.thin_m=0", "--set", "map.keyframe_thin_m=0", "--set", "map.cloud_distance_m=0"]
 
 
@@ -63,7 +63,7 @@ with tempfile.TemporaryDirectory() as scratch:
 
     assert program(*map_command(recording, tight, "--max-memory-mb", least)).returncode == status
     print(f"least limit {least} MB; resident without a limit {peak_mb(free):.0f} MB, with it {peak_mb(tight):.0f} MB")
-    assert peak_mb(tight) <= least and peak_mb(tight) <= 0.8 * peak_mb(free)
+    assert peak_mb(tight) <= least and peak_mb(tight) <= 0.7 * peak_mb(free)
     warned = json.loads((tight / "run.json").read_text())["warnings"]
     assert "memory." not in json.dumps(warned), warned
 
