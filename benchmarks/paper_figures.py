@@ -18,8 +18,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from figures.catalogue import Plan, all_figures
+from figures.catalogue import all_figures
 from figures.page import Entry, entries_in, markdown, save_entry, write_html
+from figures.paper_figure import Plan
 from figures.runs import SHORT_S, Runs
 from program import TOP, Failed, say
 

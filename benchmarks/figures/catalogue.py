@@ -1,37 +1,10 @@
 """Which figures there are. A figure names the runs that it needs and draws itself from them."""
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Callable
-
-from figures.runs import Recording
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Which recordings the figures are drawn from. `seconds`: of each only so much; None: whole."""
-
-    seed: int
-    seconds: float | None = None
-    folder: Path = Path("figures")
-    keys: tuple = ()  # ((key, value), ...) of every site, e.g. a lidar with fewer columns
-
-    def recording(self, site, keys=(), short=""):
-        """`short`: a word for `keys`, which are this figure's own."""
-        return Recording(site, self.seed, self.seconds, (*keys, *self.keys), short)
-
-
-@dataclass(frozen=True)
-class PaperFigure:
-    key: str  # P2-F4
-    title: str
-    jobs: Callable  # Plan -> {name: Job}
-    draw: Callable  # Plan, title, {name: Run} -> Drawn
+from figures import flights, large_maps, penalties, strip_roads, walks
 
 
 def all_figures():
     """By key, in the order of the papers."""
-    from figures import flights, large_maps, penalties, strip_roads, walks
     made = [figure for module in (strip_roads, flights, large_maps, penalties, walks) for figure in module.FIGURES]
     order = lambda figure: (figure.key.split("-F")[0], int(figure.key.split("-F")[1]))
     return {figure.key: figure for figure in sorted(made, key=order)}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from figures.catalogue import PaperFigure
+from figures.paper_figure import PaperFigure
 from figures.data import laid_on, layer_path, off_by, paired, read_cloud, read_path, read_table, rms
 from figures.drawing import Drawn, Sheet, cells_of, shown_part
 from figures.runs import Job, settings

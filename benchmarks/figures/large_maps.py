@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from figures.catalogue import PaperFigure
+from figures.paper_figure import PaperFigure
 from figures.data import layer_path, read_cloud
 from figures.drawing import COLOURS, Drawn, Sheet, cells_of, shown_part
 from figures.runs import Job, settings

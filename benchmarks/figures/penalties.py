@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from figures.catalogue import PaperFigure
+from figures.paper_figure import PaperFigure
 from figures.data import rms
 from figures.drawing import Drawn, Sheet
 from program import TOP, Failed, run

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.patches import Ellipse
 from scipy.spatial import cKDTree
 
-from figures.catalogue import PaperFigure
+from figures.paper_figure import PaperFigure
 from figures.data import (Path3, enu, laid_on, list_in_site, moved, off_by, opened, origin_of, paired, read_path,
                           read_table, rms)
 from figures.drawing import COLOURS, Drawn, Sheet

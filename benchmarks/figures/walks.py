@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib import ticker
 
-from figures.catalogue import PaperFigure
+from figures.paper_figure import PaperFigure
 from figures.data import enu, laid_on, list_in_site, off_by, origin_of, paired, read_path, read_table, rms
 from figures.drawing import Drawn, Sheet
 from figures.runs import Job, settings

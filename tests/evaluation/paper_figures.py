@@ -18,8 +18,9 @@ sys.path.insert(0, str(TOP / "benchmarks"))
 
 import paper_figures  # noqa: E402
 from figures import strip_roads, walks  # noqa: E402
-from figures.catalogue import Plan, all_figures  # noqa: E402
+from figures.catalogue import all_figures  # noqa: E402
 from figures.data import Path3, enu, laid_on, moved, off_by, paired, read_path, rigid_fit  # noqa: E402
+from figures.paper_figure import Plan  # noqa: E402
 from figures.runs import Job, Recording, Run, Runs  # noqa: E402
 from program import understory_json  # noqa: E402
 
