@@ -109,8 +109,9 @@ Walk walk(const Stand& stand, const Eigen::Vector3d& slip,
     const Pose truth =
         Pose(Eigen::Quaterniond::Identity(), step > kSteps / 2 ? slip : Eigen::Vector3d::Zero()) *
         estimated(step);
-    const auto now = map.add(TimeNs{step} * kNsPerSecond, moved * estimated(step),
-                             {scan_at(stand, truth, static_cast<std::uint64_t>(step)), {}});
+    const auto now =
+        map.add(TimeNs{step} * kNsPerSecond, {.world_from_body = moved * estimated(step)},
+                {scan_at(stand, truth, static_cast<std::uint64_t>(step)), {}});
     if (now) moved = *now * moved;
   }
   map.finish();

@@ -26,6 +26,12 @@ void describe(ConfigTable& table, KeyframeConfig& config) {
   table.add("below_found_share", config.below_found_share, {0.0, 1.0}, "",
             "a scan that finds less than this share of what is usual in the map becomes a "
             "keyframe, too; of sparse scans 0.75, 0: none");
+  table.add("above_fitness_m2", config.above_fitness_m2, {0.0, 100.0}, "m^2",
+            "a scan whose matched points lie farther from the map than this, squared, in the mean, "
+            "becomes a keyframe, too; 0: none");
+  table.add("max_fitness_m2", config.max_fitness_m2, {0.0, 100.0}, "m^2",
+            "a scan whose matched points lie farther from the map than this, squared, in the mean, "
+            "becomes no keyframe (P2); 0: all may");
 }
 
 double keyframe_distance(const Pose& world_from_last, const Pose& world_from_current,
@@ -78,13 +84,17 @@ void KeyframeMap::start() {
   history_ = std::make_unique<KeyframeHistory>(folder_);
 }
 
-bool KeyframeMap::wants(const Pose& world_from_body) const {
+bool KeyframeMap::wants(const KeyframeOffer& offer) const {
   if (keyframes_.size() == segment_start()) return true;
-  return keyframe_distance(keyframes_.back().world_from_body, world_from_body, config_.keyframe) >=
-         config_.keyframe.distance_m;
+  const KeyframeConfig& config = config_.keyframe;
+  if (config.max_fitness_m2 > 0.0 && offer.fitness_m2 > config.max_fitness_m2) return false;
+  if (offer.found_share < config.below_found_share) return true;
+  if (config.above_fitness_m2 > 0.0 && offer.fitness_m2 > config.above_fitness_m2) return true;
+  return keyframe_distance(keyframes_.back().world_from_body, offer.world_from_body, config) >=
+         config.distance_m;
 }
 
-std::optional<Pose> KeyframeMap::add(TimeNs stamp, const Pose& world_from_body,
+std::optional<Pose> KeyframeMap::add(TimeNs stamp, const KeyframeOffer& offer,
                                      const FeaturePoints& points_in_body) {
   const ScopedTimer timer(times_, "keyframe");
   std::optional<Pose> moved;
@@ -93,12 +103,12 @@ std::optional<Pose> KeyframeMap::add(TimeNs stamp, const Pose& world_from_body,
   }
   Keyframe keyframe;
   keyframe.stamp = stamp;
-  keyframe.world_from_body = moved ? *moved * world_from_body : world_from_body;
+  keyframe.world_from_body = moved ? *moved * offer.world_from_body : offer.world_from_body;
   if (!keyframes_.empty()) {
     keyframe.previous_from_this =
         keyframes_.back().world_from_body.inverse() * keyframe.world_from_body;
   }
-  keyframe.covariance = edge_covariance(keyframe.previous_from_this);
+  keyframe.covariance = edge_covariance(keyframe.previous_from_this) + offer.covariance;
   keyframe.begins_piece = !keyframes_.empty() && keyframes_.size() == segment_start();
   keyframes_.push_back(keyframe);
   points_->append(stamp, points_in_body);

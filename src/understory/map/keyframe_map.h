@@ -38,8 +38,23 @@ struct KeyframeConfig {
   // A scan becomes a keyframe, too, when it finds less than this share of what scans usually find
   // again in the map: it sees what the rings of the others left out. 0: never.
   double below_found_share = 0.0;
+  // The same where a match's fitness (RegistrationResult::fitness_m2) exceeds this. 0: never.
+  double above_fitness_m2 = 0.0;
+  // But none becomes a keyframe whose match has a larger fitness than this, P2 section 2.3. 0: all
+  // may.
+  double max_fitness_m2 = 0.0;
 };
 void describe(ConfigTable& table, KeyframeConfig& config);
+
+// A scan that was matched to the local map, as it is offered to become a keyframe.
+struct KeyframeOffer {
+  Pose world_from_body;
+  // Of the pose in the local map, right perturbation, rotation first: large in the directions that
+  // the match left open.
+  Matrix6d covariance = Matrix6d::Zero();
+  double found_share = 1.0;  // of what scans usually find again in the map
+  double fitness_m2 = 0.0;   // of its match, mean squared distance
+};
 
 // Weighted distance between two poses, P4 (37) with the right difference (Errata), metres.
 [[nodiscard]] double keyframe_distance(const Pose& world_from_last, const Pose& world_from_current,
@@ -76,11 +91,12 @@ class KeyframeMap {
   // Begins with an empty map.
   void start();
 
-  // Whether a scan at this pose is to become a keyframe (37); true for the first.
-  [[nodiscard]] bool wants(const Pose& world_from_body) const;
-  // Adds a keyframe and updates the local map. Returns the motion of the world, if it moved, that
+  // Whether a scan is to become a keyframe, P4 (37), P2 section 2.3; true for the first.
+  [[nodiscard]] bool wants(const KeyframeOffer& offer) const;
+  // Adds a keyframe and updates the local map. Its edge to the last keyframe has the noise of the
+  // odometry on the way and that of its pose. Returns the motion of the world, if it moved, that
   // has been applied to the new keyframe as well.
-  [[nodiscard]] std::optional<Pose> add(TimeNs stamp, const Pose& world_from_body,
+  [[nodiscard]] std::optional<Pose> add(TimeNs stamp, const KeyframeOffer& offer,
                                         const FeaturePoints& points_in_body);
   // Begins anew after the scans could not be matched any more: the next keyframe is joined to the
   // last one by a prediction only, and the local map starts empty.

@@ -375,8 +375,9 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   if (good) received_.counts.lost_in_a_row = 0;
   if (!good && estimate.thinned.size() >= kFewPoints) ++received_.counts.lost_in_a_row;
   if (good) recovery_.note_good(estimate);
-  const bool unseen = estimate.found_share < config_.keyframe_map.keyframe.below_found_share;
-  const bool wanted = good && (unseen || map_->wants(state.world_from_body));
+  const KeyframeOffer offer = {state.world_from_body, state.pose_covariance, estimate.found_share,
+                               estimate.match.fitness_m2};
+  const bool wanted = good && map_->wants(offer);
   // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop
   // closure, levelling) moves the scans with them.
   const bool first = map_->keyframes().empty();
@@ -396,7 +397,7 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   }
   record.becomes_keyframe = 1;
   offer_cloud(estimate, map_->keyframes().size(), Pose());
-  const auto moved = map_->add(record.stamp, state.world_from_body, map_points(estimate));
+  const auto moved = map_->add(record.stamp, offer, map_points(estimate));
   if (moved) move_world(*moved);
   watch_memory();
 }
