@@ -1,7 +1,8 @@
 """`map` and `inventory RUN` list the same trees, and whatever frame the layers are in.
 
 Walks are mapped with layers in the world frame, in a national grid and in degrees. The map of each
-run is taken stock of twice: from memory and in tiles.
+run is taken stock of twice: from memory and in tiles. Where the recording names its lidar, both
+commands correct diameters for its wide beams.
 """
 
 import csv
@@ -51,6 +52,12 @@ def main():
         assert world == check(folder, handheld, "grid", "--crs", "EPSG:3067")
         assert world == check(folder, handheld, "degrees", "--crs", "EPSG:4979")
         check(folder, harvester, "harvester")
+        # The simulated beams have no width, so that all that is taken away is too much.
+        (folder / "lidar.yaml").write_text("lidar_model: OS-0-128\n")
+        named = check(folder, handheld, "named", "--set", "georeference.enabled=false", "--extrinsics", folder / "lidar.yaml")
+        assert len(named) == len(world), (len(named), len(world))
+        thinner = sorted(float(tree[4]) - float(wide[4]) for tree, wide in zip(world, named))
+        assert 0.0005 < thinner[len(thinner) // 2] < 0.02, thinner
 
 
 if __name__ == "__main__":

@@ -230,6 +230,7 @@ std::string run_json(const RunSummary& summary) {
     json["lidar_view"] = {{"body_from_lidar", numbers(summary.lidar_view.body_from_lidar)},
                           {"highest_deg", numbers(summary.lidar_view.highest_deg)}};
   }
+  if (!summary.lidar_model.empty()) json["lidar_model"] = summary.lidar_model;
   json["coordinate_system"] = summary.crs_wkt.empty() ? Json(nullptr) : Json(summary.crs_wkt);
   if (summary.place) json["georeference"] = to_json(*summary.place);
   if (!summary.frames.empty()) json["frames"] = summary.frames;

@@ -119,6 +119,7 @@ struct RunSummary {
   // The frame of each file that has one: "world", or the coordinate system.
   std::map<std::string, std::string> frames;
   LidarViewFigures lidar_view;  // empty = unknown
+  std::string lidar_model;      // empty = unknown, or several
 };
 
 // Of a run at the speed of its sensors: milliseconds from the end of a scan to its pose, as the

@@ -309,6 +309,8 @@ class Simulator::Impl : public SimulatedWorld {
     }
     if (site.scans) rig.lidar_model = site.lidar.model;
     if (rig.lidar_model.rfind("OS", 0) == 0) rig.lidar_model.insert(2, "-");
+    // Its beams have no width, unlike those of the lidar of this name.
+    if (site.scans && site.lidar.rays_per_beam == 1) rig.lidar_model += ", single rays";
     rig.lidar_extrinsic_source = "simulation";
     if (site.imu.enabled) rig.imu_extrinsic_source = "simulation";
     rig.gnss_extrinsic_source = "simulation";

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -60,8 +61,8 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-// Least absolute deviations of d / sqrt(h - 1.3) = a + b d over the full heights: a start that far
-// ones do not move.
+// A quantile of d / sqrt(h - 1.3) = a + b d over the full heights, so that most trees are lower: a
+// start that hidden tops do not pull down (Koenker and Bassett, Econometrica 46, 1978).
 HeightCurve start_of(const std::vector<TreeOnCurve>& trees) {
   HeightCurve curve;
   double scale = 0.0;
@@ -73,8 +74,10 @@ HeightCurve start_of(const std::vector<TreeOnCurve>& trees) {
     for (const TreeOnCurve& tree : trees) {
       if (tree.is_bound) continue;
       const double ratio = tree.dbh_m / std::sqrt(tree.height_m - kBreastHeight);
-      const double residual = std::abs(ratio - curve.a - curve.b * tree.dbh_m);
-      const double weight = round == 0 ? 1.0 : 1.0 / std::max(residual, kLeastResidual * scale);
+      const double residual = ratio - curve.a - curve.b * tree.dbh_m;  // below 0: a high tree
+      const double side = residual < 0.0 ? kStartQuantile : 1.0 - kStartQuantile;
+      const double weight =
+          round == 0 ? 1.0 : side / std::max(std::abs(residual), kLeastResidual * scale);
       const Eigen::Vector2d row(1.0, tree.dbh_m);
       normal += weight * row * row.transpose();
       right += weight * ratio * row;
@@ -89,12 +92,22 @@ HeightCurve start_of(const std::vector<TreeOnCurve>& trees) {
   return curve;
 }
 
+// Scatter wider than that of stands comes from hidden tops.
+double possible_scatter(const HeightCurve& curve, const std::vector<TreeOnCurve>& trees,
+                        double scatter_m) {
+  double sum = 0.0;
+  for (const TreeOnCurve& tree : trees)
+    sum += curve.at(tree.dbh_m);
+  const double most = kMostScatter * sum / static_cast<double>(trees.size());
+  return std::max(kLeastScatter, std::min(scatter_m, most));
+}
+
 // Of the full heights about the start, by their median: those that are far off do not widen it.
 double first_scatter(const HeightCurve& curve, const std::vector<TreeOnCurve>& trees) {
   std::vector<double> residuals;
   for (const TreeOnCurve& tree : trees)
     if (!tree.is_bound) residuals.push_back(std::abs(tree.height_m - curve.at(tree.dbh_m)));
-  return std::max(kLeastScatter, kMedianToSd * median_of(std::move(residuals)));
+  return possible_scatter(curve, trees, kMedianToSd * median_of(std::move(residuals)));
 }
 
 // Density of a standard normal value, and the chance that it is larger.
@@ -110,10 +123,24 @@ double chance_above(double z) {
 double chance_to_end(const HeightCurve& curve, const TreeOnCurve& tree) {
   const double mean = curve.at(tree.dbh_m);
   const double z = (tree.height_m - mean) / curve.sd_m;
-  const double before = tree.is_bound ? kBoundsThatEnd : kSeenThatEnd;
+  const double before = tree.is_bound ? curve.bounds_that_end : curve.seen_that_end;
   const double ends = before * normal_density(z) / curve.sd_m;
   const double goes_on = (1.0 - before) * chance_above(z) / mean;
   return ends > 0.0 ? ends / (ends + goes_on) : 0.0;
+}
+
+// The shares of trees that end at their heights, from the chances of all; what is known before
+// counts as some trees.
+void learn_shares(const std::vector<TreeOnCurve>& trees, HeightCurve& curve) {
+  std::array<double, 2> ends = {kShareTrees * kSeenThatEnd, kShareTrees * kBoundsThatEnd};
+  std::array<double, 2> all = {kShareTrees, kShareTrees};
+  for (const TreeOnCurve& tree : trees) {
+    if (tree.height_m - curve.at(tree.dbh_m) >= kFarOff * curve.sd_m) continue;
+    ends[tree.is_bound ? 1 : 0] += chance_to_end(curve, tree);
+    all[tree.is_bound ? 1 : 0] += 1.0;
+  }
+  curve.seen_that_end = ends[0] / all[0];
+  curve.bounds_that_end = ends[1] / all[1];
 }
 
 double weight_of(const HeightCurve& curve, const TreeOnCurve& tree) {
@@ -147,7 +174,7 @@ bool improve(const std::vector<TreeOnCurve>& trees, HeightCurve& curve) {
     part *= 0.5;
   curve.a += part * step[0];
   curve.b = std::max(0.0, curve.b + part * step[1]);
-  curve.sd_m = std::max(kLeastScatter, std::sqrt(squares / std::max(1.0, weights - 2.0)));
+  curve.sd_m = possible_scatter(curve, trees, std::sqrt(squares / std::max(1.0, weights - 2.0)));
   return true;
 }
 
@@ -182,6 +209,10 @@ HeightAbove HeightCurve::above(double dbh_m, double bound_m) const {
                             (1.0 - ends) * (variance + square_of(higher - height)))};
 }
 
+bool HeightCurve::is_likely_height(double dbh_m, double height_m) const {
+  return height_m >= at(dbh_m) || chance_to_end(*this, {dbh_m, height_m, false}) >= 0.5;
+}
+
 std::optional<HeightCurve> fit_height_curve(const std::vector<Tree>& trees) {
   const std::vector<TreeOnCurve> known = trees_with_both(trees);
   const auto bounds = static_cast<std::size_t>(
@@ -190,7 +221,10 @@ std::optional<HeightCurve> fit_height_curve(const std::vector<Tree>& trees) {
   HeightCurve curve = start_of(known);
   if (!(curve.a > 0.0) || !(curve.b >= 0.0)) return std::nullopt;
   curve.sd_m = first_scatter(curve, known);
+  curve.seen_that_end = kSeenThatEnd;
+  curve.bounds_that_end = kBoundsThatEnd;
   for (int round = 0; round < kRounds; ++round) {
+    learn_shares(known, curve);
     if (!improve(known, curve)) return std::nullopt;
   }
   if (!(curve.a > 0.0)) return std::nullopt;

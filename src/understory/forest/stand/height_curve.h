@@ -25,6 +25,9 @@ struct HeightCurve {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  // of a and b
   std::size_t trees = 0;                                 // with full heights
   std::size_t lower_bounds = 0;                          // that count as well
+  // Share of the trees that end at their full height, and at their lower bound.
+  double seen_that_end = 1.0;
+  double bounds_that_end = 1.0;
 
   // Metres; `dbh_m` over 0.
   [[nodiscard]] double at(double dbh_m) const;
@@ -33,6 +36,8 @@ struct HeightCurve {
   // A tree with a lower bound: its expected height and the standard deviation of that, metres. It
   // ends there, or is higher by the normal distribution about the curve: both by their chances.
   [[nodiscard]] HeightAbove above(double dbh_m, double bound_m) const;
+  // Whether a tree with a full height more likely ends there than goes on.
+  [[nodiscard]] bool is_likely_height(double dbh_m, double height_m) const;
 };
 
 // Whether the tree may be higher than its height says. It tells no height then.
@@ -40,9 +45,9 @@ struct HeightCurve {
 
 // The curve of the trees with diameter and height. Each tree ends at its height, or goes on: then
 // the view ended anywhere below. Expectation and maximization weigh it by the chance of the first,
-// which is smaller for lower bounds and for low trees. Trees that are far too high count for
-// nothing (Tukey's biweight). No curve where the full heights are fewer than 8, all of trees about
-// as thick, or where thicker ones are no higher.
+// which is smaller for lower bounds and for low trees. How many end is found with the curve. Trees
+// that are far too high count for nothing (Tukey's biweight). No curve where the full heights are
+// fewer than 8, all of trees about as thick, or where thicker ones are no higher.
 [[nodiscard]] std::optional<HeightCurve> fit_height_curve(const std::vector<Tree>& trees);
 
 }  // namespace understory

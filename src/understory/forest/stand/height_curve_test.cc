@@ -139,19 +139,42 @@ TEST(HeightCurve, TheHeightOfALowerBoundIsTheMeanOfBothKinds) {
       return std::exp(-0.5 * z * z) / std::sqrt(2.0 * M_PI) / curve->sd_m;
     };
     for (double h = bound + 5e-4; h < mean + 20.0; h += 1e-3) {
-      chance += 1e-3 * density(h) / mean;  // the view may end anywhere below the curve
-      first += 1e-3 * h * density(h) / mean;
-      second += 1e-3 * h * h * density(h) / mean;
+      // The view may end anywhere below the curve.
+      const double goes_on = (1.0 - curve->bounds_that_end) * density(h) / mean;
+      chance += 1e-3 * goes_on;
+      first += 1e-3 * h * goes_on;
+      second += 1e-3 * h * h * goes_on;
     }
-    const double all = density(bound) + chance;  // half of the bounds end there
-    first = (first + density(bound) * bound) / all;
-    second = (second + density(bound) * bound * bound) / all;
+    const double ends = curve->bounds_that_end * density(bound);
+    const double all = ends + chance;
+    first = (first + ends * bound) / all;
+    second = (second + ends * bound * bound) / all;
     const HeightAbove height = curve->above(0.2, bound);
     EXPECT_NEAR(height.height_m, first, 1e-3);
     EXPECT_NEAR(height.sd_m, std::sqrt(second - first * first), 2e-3);
   }
   EXPECT_NEAR(curve->above(0.2, 2.0).height_m, mean, 1e-6) << "a bound that tells nothing";
   EXPECT_GE(curve->above(0.2, 60.0).height_m, 60.0);
+}
+
+// A lidar that cannot look up shows the true tops of few trees, and calls many others seen.
+TEST(HeightCurve, LiesAtTheTallTreesWhereMostTopsAreHidden) {
+  Random random(9);
+  std::vector<Tree> trees;
+  for (int i = 0; i < 120; ++i) {
+    const double dbh = random.uniform(0.1, 0.4);
+    const double height = true_height(dbh) + random.normal(0.0, 0.8);
+    const bool hidden = random.uniform(0.0, 1.0) < 0.65;
+    trees.push_back(tree_of(dbh, hidden ? height * random.uniform(0.4, 1.0) : height));
+  }
+  const auto curve = fit_height_curve(trees);
+  ASSERT_TRUE(curve);
+  for (const double dbh : {0.15, 0.25, 0.35})
+    EXPECT_NEAR(curve->at(dbh) / true_height(dbh), 1.0, 0.06) << dbh;
+  EXPECT_NEAR(curve->seen_that_end, 0.4, 0.15);
+  EXPECT_FALSE(curve->is_likely_height(0.3, 0.7 * true_height(0.3)));
+  EXPECT_TRUE(curve->is_likely_height(0.3, true_height(0.3)));
+  EXPECT_TRUE(curve->is_likely_height(0.3, 1.4 * true_height(0.3))) << "too high is not hidden";
 }
 
 TEST(HeightCurve, IsNotGuessedFromFewOrEqualTrees) {

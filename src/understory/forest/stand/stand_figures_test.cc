@@ -143,8 +143,8 @@ TEST(StandFigures, AHeightThatWasNotSeenComesFromTheCurveAndAVolumeFromTheForm) 
     trees[i].stem_volume_m3 = NAN;
   }
   // A lower bound is no height.
+  trees[6].stem_volume_m3 *= 1.0 - 6.0 / trees[6].height_m;
   trees[6].height_m -= 6.0;
-  trees[6].stem_volume_m3 *= 0.5;
   trees[6].height_is_lower_bound = 1.0;
   const StandFigures filled = stand_figures(stand_trees(trees, {}), seen, all, {});
   EXPECT_EQ(filled.heights_filled_in, 4U);

@@ -19,9 +19,9 @@ double positive_or_zero(double value) {
   return value > 0.0 && std::isfinite(value) ? value : 0.0;
 }
 
-// Basal area times height: the volume of the cylinder.
-double cylinder_m3(const StandTree& tree) {
-  return 0.25 * M_PI * square(tree.dbh_m.value) * tree.height_m.value;
+// Basal area times height: the volume of the cylinder. NaN where one is unknown.
+double cylinder_m3(double dbh_m, double height_m) {
+  return 0.25 * M_PI * square(dbh_m) * height_m;
 }
 
 // The form factor, and how far single trees are from it.
@@ -30,33 +30,33 @@ struct FormFactor {
   double sd = 0.0;
 };
 
-FormFactor form_factor_of(const std::vector<StandTree>& trees) {
+// Of all listed volumes. That up to a lower bound counts with the bound as height: the form of the
+// stem ends there, too.
+FormFactor form_factor_of(const std::vector<Tree>& trees, double min_dbh_m) {
   double volumes = 0.0;
   double cylinders = 0.0;
-  std::size_t count = 0;
-  const auto knows = [](const StandTree& tree) {
-    return std::isfinite(tree.volume_m3.value) && !tree.height_filled_in &&
-           !tree.height_is_lower_bound && std::isfinite(tree.height_m.value);
-  };
-  for (const StandTree& tree : trees) {
-    if (!knows(tree)) continue;
-    volumes += tree.volume_m3.value;
-    cylinders += cylinder_m3(tree);
-    ++count;
+  std::vector<double> factors;
+  for (const Tree& tree : trees) {
+    const double cylinder = cylinder_m3(tree.dbh_m, tree.height_m);
+    if (!(tree.dbh_m >= min_dbh_m) || !(cylinder > 0.0) || !std::isfinite(tree.stem_volume_m3))
+      continue;
+    volumes += tree.stem_volume_m3;
+    cylinders += cylinder;
+    factors.push_back(tree.stem_volume_m3 / cylinder);
   }
-  if (count < kLeastVolumes || !(cylinders > 0.0)) return {};
+  if (factors.size() < kLeastVolumes) return {};
   FormFactor factor{volumes / cylinders, 0.0};
   double squares = 0.0;
-  for (const StandTree& tree : trees)
-    if (knows(tree)) squares += square(tree.volume_m3.value / cylinder_m3(tree) - factor.value);
-  factor.sd = std::sqrt(squares / static_cast<double>(count - 1));
+  for (const double single : factors)
+    squares += square(single - factor.value);
+  factor.sd = std::sqrt(squares / static_cast<double>(factors.size() - 1));
   return factor;
 }
 
 // What is known of a height that was not seen to its top.
 void fill_in_height(const std::optional<HeightCurve>& curve, const Tree& listed, StandTree& tree) {
   if (std::isfinite(tree.height_m.value)) return;
-  const bool bound = is_lower_bound(listed) && std::isfinite(listed.height_m);
+  const bool bound = std::isfinite(listed.height_m);
   if (curve) {
     const HeightAbove height = bound ? curve->above(listed.dbh_m, listed.height_m)
                                      : HeightAbove{curve->at(listed.dbh_m), curve->sd_m};
@@ -74,7 +74,7 @@ void fill_in_volume(const FormFactor& factor, StandTree& tree) {
   if (std::isfinite(tree.volume_m3.value) || !std::isfinite(factor.value) ||
       !std::isfinite(tree.height_m.value))
     return;
-  const double cylinder = cylinder_m3(tree);
+  const double cylinder = cylinder_m3(tree.dbh_m.value, tree.height_m.value);
   tree.volume_m3.value = factor.value * cylinder;
   tree.volume_m3.sd =
       std::sqrt(square(factor.sd * cylinder) +
@@ -117,8 +117,10 @@ StandTrees stand_trees(const std::vector<Tree>& trees, const StandTableConfig& c
     counted.place_sd_m = std::sqrt(
         0.5 * (square(positive_or_zero(tree.x_sd_m)) + square(positive_or_zero(tree.y_sd_m))));
     counted.dbh_m = {tree.dbh_m, positive_or_zero(tree.dbh_sd_m)};
-    // A lower bound is no height, nor is the volume up to it one.
-    if (!is_lower_bound(tree)) {
+    // A lower bound is no height, nor is the volume up to it one. The same holds for a height far
+    // below those of the trees that are as thick.
+    if (!is_lower_bound(tree) && (!stand.curve || !std::isfinite(tree.height_m) ||
+                                  stand.curve->is_likely_height(tree.dbh_m, tree.height_m))) {
       const bool known = std::isfinite(tree.height_sd_m);
       counted.height_m = {tree.height_m, known ? tree.height_sd_m : kHeightSd};
       counted.volume_m3 = {tree.stem_volume_m3, positive_or_zero(tree.stem_volume_sd_m3)};
@@ -126,7 +128,7 @@ StandTrees stand_trees(const std::vector<Tree>& trees, const StandTableConfig& c
     fill_in_height(stand.curve, tree, counted);
     stand.trees.push_back(counted);
   }
-  const FormFactor factor = form_factor_of(stand.trees);
+  const FormFactor factor = form_factor_of(trees, config.min_dbh_m);
   stand.form_factor = factor.value;
   for (StandTree& tree : stand.trees) {
     fill_in_volume(factor, tree);

@@ -20,6 +20,7 @@ BeamConfig beams_of(LidarSensor sensor) {
     case LidarSensor::kVlp16:
     case LidarSensor::kVlp32:
       return {sensor, 3.0, 0.0127, 60.0};
+    case LidarSensor::kRecording:
     case LidarSensor::kUnknown:
       break;
   }
@@ -54,12 +55,14 @@ double chance_at(double across_m, double radius_m, const BeamFootprint& beam) {
 void describe(ConfigTable& table, BeamConfig& config) {
   table.add_enum(
       "sensor", config.sensor,
-      {{"unknown", LidarSensor::kUnknown},
+      {{"recording", LidarSensor::kRecording},
+       {"unknown", LidarSensor::kUnknown},
        {"OS0", LidarSensor::kOs0},
        {"OS1", LidarSensor::kOs1},
        {"VLP-16", LidarSensor::kVlp16},
        {"VLP-32C", LidarSensor::kVlp32}},
-      "lidar whose wide beams the diameters are corrected for; needs to know where it was");
+      "lidar whose wide beams the diameters are corrected for, recording: the one that the run's "
+      "recording names; needs to know where it was");
   table.add("divergence_mrad", config.divergence_mrad, {0.0, 20.0}, "mrad",
             "full width of a beam, 0: that of the sensor");
   table.add("exit_m", config.exit_m, {0.0, 0.1}, "m",
@@ -67,6 +70,23 @@ void describe(ConfigTable& table, BeamConfig& config) {
   table.add(
       "reach_m", config.reach_m, {0.0, 1000.0}, "m",
       "distance at which half of the echoes of a surface of 10 % return, 0: that of the sensor");
+}
+
+LidarSensor sensor_of_model(std::string_view lidar_model) {
+  // With and without the hyphen after OS; the number of rings after the next one.
+  const auto is_ouster = [&](std::string_view family) {
+    std::string_view rest = lidar_model;
+    if (!rest.starts_with("OS")) return false;
+    rest.remove_prefix(rest.starts_with("OS-") ? 3 : 2);
+    if (!rest.starts_with(family)) return false;
+    rest.remove_prefix(family.size());
+    return rest == "-32" || rest == "-64" || rest == "-128";
+  };
+  if (is_ouster("0")) return LidarSensor::kOs0;
+  if (is_ouster("1")) return LidarSensor::kOs1;
+  if (lidar_model == "VLP-16") return LidarSensor::kVlp16;
+  if (lidar_model == "VLP-32C") return LidarSensor::kVlp32;
+  return LidarSensor::kUnknown;
 }
 
 BeamFootprint footprint_at(const BeamConfig& config, double range_m) {

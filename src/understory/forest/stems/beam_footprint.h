@@ -1,24 +1,30 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string_view>
 #include <vector>
 
 #include "understory/util/config/config.h"
 
 namespace understory {
 
-// Lidars whose beams are known from their data sheets.
-enum class LidarSensor { kUnknown, kOs0, kOs1, kVlp16, kVlp32 };
+// Lidars whose beams are known from their data sheets. kRecording: the one that the recording
+// names.
+enum class LidarSensor { kRecording, kUnknown, kOs0, kOs1, kVlp16, kVlp32 };
 
 // How wide the beams of the scanner are and how weak an echo it still tells. Numbers that are 0 are
 // those of the sensor; of an unknown sensor nothing is compensated.
 struct BeamConfig {
-  LidarSensor sensor = LidarSensor::kUnknown;
+  LidarSensor sensor = LidarSensor::kRecording;
   double divergence_mrad = 0.0;  // full width, four standard deviations of a Gaussian beam
   double exit_m = 0.0;           // width at the sensor
   double reach_m = 0.0;          // from here half of the echoes of a surface of 10 % return
 };
 void describe(ConfigTable& table, BeamConfig& config);
+
+// The lidar of this model, as recordings name it ("OS-0-128", "OS1-64", "VLP-16"); kUnknown for
+// any other name.
+[[nodiscard]] LidarSensor sensor_of_model(std::string_view lidar_model);
 
 // The beams that met a stem.
 struct BeamFootprint {

@@ -21,6 +21,18 @@ TEST(BeamFootprint, WidthGrowsWithTheRangeAndIsNothingWithoutASensorOrARange) {
   EXPECT_NEAR(footprint_at(own, 10.0).sd_m, 0.0695 / 4.0, 1e-12);
 }
 
+TEST(BeamFootprint, ARecordingNamesItsLidar) {
+  EXPECT_EQ(sensor_of_model("OS-0-128"), LidarSensor::kOs0);
+  EXPECT_EQ(sensor_of_model("OS0-32"), LidarSensor::kOs0);
+  EXPECT_EQ(sensor_of_model("OS-1-64"), LidarSensor::kOs1);
+  EXPECT_EQ(sensor_of_model("VLP-16"), LidarSensor::kVlp16);
+  EXPECT_EQ(sensor_of_model("VLP-32C"), LidarSensor::kVlp32);
+  // Their beams are others, or are not known.
+  for (const char* other :
+       {"", "OS", "OS-0", "OS-2-128", "OS-0-128, single rays", "RS-16", "Mid-360", "VLP-16 Hi-Res"})
+    EXPECT_EQ(sensor_of_model(other), LidarSensor::kUnknown) << other;
+}
+
 TEST(BeamFootprint, RangesCountByTheReturnsThatTheyGive) {
   // Four times as many returns from 5 m as from 10 m.
   const std::vector<Eigen::Vector3d> scanner = {{4.0, 0.0, 3.0}, {0.0, 8.0, 6.0}};

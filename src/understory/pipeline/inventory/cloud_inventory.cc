@@ -278,8 +278,10 @@ InventoryResult inventory_of(const InventoryRequest& request, const Stock& stock
   if (request.slice) return take_slice(blocks, stock.path.string(), request.config, progress);
   const Lookouts seen = stock.of_run ? seen_in_run(request.cloud) : Lookouts();
   const std::vector<Eigen::Vector3d> scanner = scanner_places(request, stock);
-  if (!stock.stand.streamed) return take_inventory(blocks, request.config, progress, seen, scanner);
-  return take_inventory(*stock.stand.streamed->tiles, request.config, progress, seen, scanner);
+  InventoryConfig config = request.config;
+  if (stock.of_run) config.beam = beams_in_run(config.beam, request.cloud);
+  if (!stock.stand.streamed) return take_inventory(blocks, config, progress, seen, scanner);
+  return take_inventory(*stock.stand.streamed->tiles, config, progress, seen, scanner);
 }
 
 void take_stock(const InventoryRequest& request, const RunFolder& place, const fs::path& results,

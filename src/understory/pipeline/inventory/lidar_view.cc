@@ -129,4 +129,21 @@ std::vector<Eigen::Vector3d> places_in_run(const std::filesystem::path& run) {
   return places;
 }
 
+std::string single_lidar_model(const Rig& rig) {
+  return rig.further_lidars.empty() ? rig.lidar_model : std::string();
+}
+
+BeamConfig beams_in(const BeamConfig& config, const Rig& rig) {
+  BeamConfig known = config;
+  if (known.sensor == LidarSensor::kRecording)
+    known.sensor = sensor_of_model(single_lidar_model(rig));
+  return known;
+}
+
+BeamConfig beams_in_run(const BeamConfig& config, const std::filesystem::path& run) {
+  Rig rig;
+  rig.lidar_model = RunJson(run).find_text("/lidar_model");
+  return beams_in(config, rig);
+}
+
 }  // namespace understory

@@ -3,12 +3,14 @@
 #include <Eigen/Core>
 #include <array>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "understory/forest/inventory.h"
 #include "understory/geometry/pose.h"
 #include "understory/map/keyframe_clouds.h"
 #include "understory/output/run_summary.h"
+#include "understory/sensor/rig.h"
 
 namespace understory {
 
@@ -45,5 +47,13 @@ struct LidarView {
 // run folder, nothing where it has none.
 [[nodiscard]] std::vector<Eigen::Vector3d> places_of(const std::vector<Pose>& world_from_body);
 [[nodiscard]] std::vector<Eigen::Vector3d> places_in_run(const std::filesystem::path& run);
+
+// The beams of a recording's lidar where the setting leaves that to the recording. Several lidars
+// are none. The second form takes what run.json tells of the lidar.
+[[nodiscard]] BeamConfig beams_in(const BeamConfig& config, const Rig& rig);
+[[nodiscard]] BeamConfig beams_in_run(const BeamConfig& config, const std::filesystem::path& run);
+
+// The model as run.json tells it; empty where it is unknown or several lidars were merged.
+[[nodiscard]] std::string single_lidar_model(const Rig& rig);
 
 }  // namespace understory

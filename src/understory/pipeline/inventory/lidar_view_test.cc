@@ -125,5 +125,29 @@ TEST(LidarView, IsTheSameFromARunFolder) {
   EXPECT_LT(seen, 124);
 }
 
+TEST(LidarView, BeamsAreThoseOfTheRecordingUnlessTheUserNamesOthers) {
+  const test::TemporaryFolder folder;
+  Rig rig;
+  rig.lidar_model = "OS-1-64";
+  RunSummary summary;
+  summary.lidar_model = single_lidar_model(rig);
+  write_run_json(folder.path() / "run.json", summary);
+  BeamConfig config;
+  EXPECT_EQ(beams_in(config, rig).sensor, LidarSensor::kOs1);
+  EXPECT_EQ(beams_in_run(config, folder.path()).sensor, LidarSensor::kOs1);
+  config.sensor = LidarSensor::kVlp16;
+  EXPECT_EQ(beams_in(config, rig).sensor, LidarSensor::kVlp16);
+  EXPECT_EQ(beams_in_run(config, folder.path()).sensor, LidarSensor::kVlp16);
+  config.sensor = LidarSensor::kUnknown;
+  EXPECT_EQ(beams_in_run(config, folder.path()).sensor, LidarSensor::kUnknown);
+  // Two lidars in one scan, and a run that tells none.
+  rig.further_lidars.emplace_back();
+  config.sensor = LidarSensor::kRecording;
+  EXPECT_EQ(beams_in(config, rig).sensor, LidarSensor::kUnknown);
+  summary.lidar_model = single_lidar_model(rig);
+  write_run_json(folder.path() / "run.json", summary);
+  EXPECT_EQ(beams_in_run(config, folder.path()).sensor, LidarSensor::kUnknown);
+}
+
 }  // namespace
 }  // namespace understory

@@ -59,8 +59,10 @@ class DenseMap : public MapMaker {
     const std::vector<Pose> poses = poses_of(front_end_.map().keyframes());
     made_.forest = std::make_unique<TiledMap>(*made_.tiles, front_end_.config().inventory_bytes,
                                               recording_.work);
-    made_.inventory = take_inventory(*made_.forest, front_end_.config().inventory,
-                                     recording_.progress, seen_from(view, poses), places_of(poses));
+    InventoryConfig config = front_end_.config().inventory;
+    config.beam = beams_in(config.beam, front_end_.rig());
+    made_.inventory = take_inventory(*made_.forest, config, recording_.progress,
+                                     seen_from(view, poses), places_of(poses));
     made_.lidar_view = figures_of(view);
     if (front_end_.counts().imu_samples == 0)
       made_.not_upright =

@@ -11,6 +11,7 @@
 #include "understory/output/plot_files.h"
 #include "understory/output/report/map_picture.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/inventory/lidar_view.h"
 #include "understory/pipeline/inventory/stand_documents.h"
 #include "understory/pipeline/judgement/match_course.h"
 #include "understory/pipeline/judgement/path_evidence.h"
@@ -293,6 +294,7 @@ void add_map(const ReadRecording& recording, const DenseMappingConfig& config, D
   const ResultFrames& frames = made.placed.frames;
   documents.count("trees", made.inventory.trees.size());
   documents.summary().lidar_view = made.lidar_view;
+  documents.summary().lidar_model = single_lidar_model(recording.source.rig());
   if (!made.tiles) return;
   note_doubts(made.inventory, documents.summary());
   documents.summary().quality["area_m2"] = made.inventory.area_m2;
