@@ -73,6 +73,17 @@ TEST(GlobalMatch, GivesTheSameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(done[0].verdict.chance, done[1].verdict.chance);
 }
 
+TEST(GlobalMatch, SparseScansAreNotMatchedWithSmallCells) {
+  const SearchCloud sparse = prepare_search(two_scans().target);
+  ASSERT_LT(two_scans().target.size(), 35000U);
+  EXPECT_EQ(sparse.fine_target, sparse.target);
+  Points dense = two_scans().target;
+  while (dense.size() < 35000U)
+    dense.insert(dense.end(), two_scans().target.begin(), two_scans().target.end());
+  const SearchCloud more = prepare_search(dense);
+  EXPECT_NE(more.fine_target, more.target);
+}
+
 TEST(GlobalMatch, TwoStandsAreNotMatched) {
   const TwoScans& scans = two_scans();
   const testing::ScanStand other(77);
