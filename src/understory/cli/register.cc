@@ -15,25 +15,18 @@
 #include "understory/recording/finding.h"
 #include "understory/registration/global/match_verdict.h"
 #include "understory/registration/matchers.h"
+#include "understory/registration/two_clouds.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
 struct RegisterConfig {
-  double target_voxel_m = 0.1;
-  double source_voxel_m = 0.25;
-  MatcherConfig matcher;
+  double target_voxel_m = kTargetVoxelM;
+  double source_voxel_m = kSourceVoxelM;
+  MatcherConfig matcher = matchers_of_two_clouds();
   SparseIcpConfig stem_icp;
   GoIcpConfig go_icp;
-
-  // Of two clouds there is less in a cell than of the keyframes of a map.
-  RegisterConfig() {
-    auto& ndt = matcher.get<NdtMatcherConfig>();
-    ndt.cell_sizes_m = {3.0, 1.0};
-    ndt.cells.sigma_floor_m = 0.03;
-    matcher.get<IcpMatcherConfig>().far_distance_m = 0.0;  // the guess is the user's
-  }
 };
 
 void describe(ConfigTable& table, RegisterConfig& config) {
@@ -111,24 +104,28 @@ Points in_frame(const Loaded& cloud, const Pose& file_from_frame) {
   return moved;
 }
 
-RegistrationResult match(const RegisterOptions& options, const RegisterConfig& config,
-                         const Loaded& target_cloud, const Loaded& source_cloud,
-                         const Pose& guess) {
+// What the method makes of a guess, with both clouds ready for it.
+MatchFrom matching(const RegisterOptions& options, const RegisterConfig& config,
+                   const Loaded& target_cloud, const Loaded& source_cloud) {
   const Points& target = target_cloud.points;
   const Points& source = source_cloud.points;
   VoxelFilter filter;
-  const auto matcher = make_matcher(config.matcher, options.method);
+  const std::shared_ptr<const Matcher> matcher = make_matcher(config.matcher, options.method);
   if (const auto finder = matcher->feature_finder()) {
     const FeaturePoints a =
         features_of_cloud(*finder, target, target_cloud.ring, config.target_voxel_m);
     const FeaturePoints b =
         features_of_cloud(*finder, source, source_cloud.ring, config.source_voxel_m);
-    return match_clouds_by_features(*matcher, a, b, guess);
+    return [matcher, a, b](const Pose& guess) {
+      return match_clouds_by_features(*matcher, a, b, guess);
+    };
   }
   const Points thinned = filter.filter(source, config.source_voxel_m);
   const double voxel_m = matcher->sums_up_points() ? config.target_voxel_m : config.source_voxel_m;
-  return matcher->make_target(filter.filter(target, voxel_m))
-      ->match(thinned, guess, {}, MatchStart::kFar);
+  const MatchTargetPtr map = matcher->make_target(filter.filter(target, voxel_m));
+  return [map, thinned](const Pose& guess) {
+    return map->match(thinned, guess, {}, MatchStart::kFar);
+  };
 }
 
 void print_json(const RegistrationResult& result, const MatchVerdict& verdict,
@@ -174,10 +171,8 @@ void print_text(const RegistrationResult& result, const MatchVerdict& verdict,
 GlobalRegistration registered(const RegisterOptions& options, const RegisterConfig& config,
                               const Loaded& target, const Loaded& source, const Pose& guess) {
   if (options.method == kGlobal) return register_globally(target.points, source.points);
-  GlobalRegistration done;
-  done.result = match(options, config, target, source, guess);
-  done.verdict = judge_match(target.points, source.points, done.result);
-  return done;
+  return match_and_judge(target.points, source.points, guess,
+                         matching(options, config, target, source));
 }
 
 int print_registration(const RegisterOptions& options, const GlobalRegistration& done,

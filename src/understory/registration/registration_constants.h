@@ -44,6 +44,18 @@ inline constexpr std::size_t kEnoughForWideSteps = 8000;
 inline constexpr std::size_t kWideEvery = 4;
 }  // namespace ndt
 
+namespace wide_steps {  // registration/wide_steps.h
+// Points that steps from far take, and every so many of a scan that has more [as
+// ndt::kEnoughForWideSteps]
+inline constexpr std::size_t kEnough = 8000;
+// The next of these [as kEnough]
+inline constexpr std::size_t kEvery = 4;
+// m, rad: a shorter step ends them [as NdtConfig::wide_until_m; the same at 20 m]
+inline constexpr double kTranslation = 0.02;
+// The next of these [chosen]
+inline constexpr double kRotation = 0.001;
+}  // namespace wide_steps
+
 namespace ndt_matcher {  // registration/ndt/ndt_matcher.cc
 // points that shape cells twice as large or larger [as kEnoughForWideSteps]
 inline constexpr std::size_t kEnoughForCoarse = 20000;

@@ -161,8 +161,10 @@ template <typename Target>
   }
   std::vector<typename Target::Known> known(source.means.size());
   MatchSums at;
+  Pose summed_at;
   const auto evaluate = [&](const Pose& pose) {
     at = gaussian_sums(target, source, pose, config, known);
+    summed_at = pose;
     PoseCost sum = gaussian_cost(at, config);
     add_terms(terms, pose, config.independent_share * static_cast<double>(at.matched), sum);
     return sum;
@@ -171,7 +173,8 @@ template <typename Target>
   const Minimum minimum = minimise(evaluate, guess,
                                    {config.max_iterations, config.step_translation_m,
                                     config.step_rotation_rad, config.max_step_m, range});
-  at = gaussian_sums(target, source, minimum.pose, config, known);
+  if (summed_at.matrix() != minimum.pose.matrix())
+    at = gaussian_sums(target, source, minimum.pose, config, known);
   return judged_match(minimum, at, source.means, range, guess, Judgement(config));
 }
 

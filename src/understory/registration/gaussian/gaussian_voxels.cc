@@ -53,6 +53,12 @@ const GaussianVoxel* GaussianVoxels::find(const Eigen::Vector3d& at, bool faces,
   const GaussianVoxel* best = nullptr;
   double best_squared = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < (faces ? kFaces.size() : 1); ++k) {
+    if (k > 0) {  // nothing beyond a face lies nearer than the face
+      const std::size_t axis = (k - 1) / 2;
+      const double in_voxel = at[static_cast<Eigen::Index>(axis)] - voxel_m_ * own[axis];
+      const double to_face = k % 2 == 1 ? in_voxel : voxel_m_ - in_voxel;
+      if (to_face * to_face >= best_squared) continue;
+    }
     const Place place = {own[0] + kFaces[k][0], own[1] + kFaces[k][1], own[2] + kFaces[k][2]};
     const std::uint32_t found = index_.find(voxel_key_of(place));
     if (found == VoxelIndex::kNone || !(voxels_[found].count > 0.0F)) continue;

@@ -6,6 +6,7 @@
 
 #include "understory/registration/gaussian/gaussian_match.h"
 #include "understory/registration/matcher.h"
+#include "understory/registration/wide_steps.h"
 
 // The seam's target and cost for all methods that match to Gaussians.
 namespace understory::internal {
@@ -58,7 +59,9 @@ class StagedTarget : public MatchTarget {
          ++i) {
       const auto& [target, steps] = stages_[i];
       if (source.means.empty() || !same_source_) source = target->source_of(points);
-      result = gaussian_match(*target, source, result.target_from_source, terms, steps);
+      const bool wide = i + 1 < stages_.size();
+      result = gaussian_match(*target, wide ? wide_part_of(source) : source,
+                              result.target_from_source, terms, wide ? wide_steps(steps) : steps);
       iterations += result.iterations;
       if (!result.usable()) break;
     }
@@ -75,6 +78,10 @@ class StagedTarget : public MatchTarget {
   }
 
  private:
+  [[nodiscard]] static GaussianSource wide_part_of(const GaussianSource& source) {
+    return {wide_part(source.means), wide_part(source.covariances), wide_part(source.features)};
+  }
+
   std::vector<GaussianStage<Target>> stages_;
   double reach_m_;
   bool same_source_;

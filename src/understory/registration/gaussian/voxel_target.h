@@ -1,7 +1,7 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <cmath>
 #include <memory>
 #include <utility>
 
@@ -12,8 +12,17 @@ namespace understory::internal {
 
 // Rows R with e^T W^-1 e = |R e|^2, from the Cholesky factor of W (positive definite).
 [[nodiscard]] inline Eigen::Matrix3d whitening(const Eigen::Matrix3d& covariance) {
-  const Eigen::LLT<Eigen::Matrix3d> factor(covariance);
-  return factor.matrixL().solve(Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d& w = covariance;
+  // L L^T = W; the rows are L^-1. Written out: this is done for every pair at every step.
+  const double a = 1.0 / std::sqrt(w(0, 0));
+  const double l10 = w(1, 0) * a;
+  const double l20 = w(2, 0) * a;
+  const double b = 1.0 / std::sqrt(w(1, 1) - l10 * l10);
+  const double l21 = (w(2, 1) - l20 * l10) * b;
+  const double c = 1.0 / std::sqrt(w(2, 2) - l20 * l20 - l21 * l21);
+  Eigen::Matrix3d rows;
+  rows << a, 0.0, 0.0, -a * l10 * b, b, 0.0, (l10 * l21 * b - l20) * a * c, -l21 * b * c, c;
+  return rows;
 }
 
 // What VGICP and NDT from distribution to distribution share: a mean of the source meets the

@@ -138,8 +138,10 @@ RegistrationResult register_gicp(const IcpMap& target, const Points& source,
   }
   std::vector<IcpMap::Known> known(source.size());
   MatchSums at;
+  Pose summed_at;
   const auto evaluate = [&](const Pose& pose) {
     at = gicp_cost(target, source, surfaces, pose, config, known);
+    summed_at = pose;
     const double share = config.independent_share;
     PoseCost sum{share * at.cost, share * at.gradient, share * at.hessian};
     internal::add_terms(terms, pose, share * static_cast<double>(at.matched), sum);
@@ -150,7 +152,8 @@ RegistrationResult register_gicp(const IcpMap& target, const Points& source,
       internal::minimise(evaluate, guess,
                          {config.max_iterations, config.step_translation_m,
                           config.step_rotation_rad, config.max_step_m, range});
-  at = gicp_cost(target, source, surfaces, minimum.pose, config, known);
+  if (summed_at.matrix() != minimum.pose.matrix())
+    at = gicp_cost(target, source, surfaces, minimum.pose, config, known);
   return internal::judged_match(minimum, at, source, range, guess, internal::Judgement(config));
 }
 

@@ -1,8 +1,10 @@
 #include "understory/registration/gicp/gicp_matcher.h"
 #include "understory/registration/icp/icp_map_builder.h"
+#include "understory/registration/wide_steps.h"
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 namespace understory {
 namespace {
@@ -44,7 +46,9 @@ class GicpTarget : public MatchTarget {
     const std::vector<SurfacePatch> surfaces = source_surfaces(source, near_);
     if (start == MatchStart::kNear || far_.max_distance_m <= near_.max_distance_m)
       return register_gicp(*map_, source, surfaces, guess, terms, near_);
-    const RegistrationResult far = register_gicp(*map_, source, surfaces, guess, terms, far_);
+    const RegistrationResult far =
+        register_gicp(*map_, internal::wide_part(source), internal::wide_part(surfaces), guess,
+                      terms, internal::wide_steps(far_));
     if (!far.usable()) return far;
     RegistrationResult result =
         register_gicp(*map_, source, surfaces, far.target_from_source, terms, near_);

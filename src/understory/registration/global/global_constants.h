@@ -115,6 +115,50 @@ inline constexpr double kSameTurn = 0.05;
 inline constexpr double kSamePlace = 0.7;
 }  // namespace upright_search
 
+namespace feature_search {  // registration/global/feature_search.cc
+// m: radius of a spin image, and its heights from the place of the feature [chosen: a room's corner
+// and what is beside it]
+inline constexpr float kRadius = 3.0F;
+// The next of these [chosen]
+inline constexpr float kLowest = -2.0F;
+// The next of these [chosen]
+inline constexpr float kHighest = 4.0F;
+// m above the ground: features stand higher [chosen]
+inline constexpr float kAbove = 0.5F;
+// m: features are so far apart [chosen]
+inline constexpr double kSpacing = 0.5;
+// m: what tells corners and ends lies nearer; points of it at least; how far the mean lies from an
+// end, as a share of the first; narrow over wide variance of a corner [chosen]
+inline constexpr float kNear = 1.5F;
+// The next of these [chosen]
+inline constexpr double kFewestAround = 12.0;
+// The next of these [chosen: half of a wall that ends has its mean half as far away]
+inline constexpr double kEndShare = 0.3;
+// The next of these [chosen]
+inline constexpr double kCornerRatio = 0.1;
+// m: two pairs are consistent if lengths and rises differ by less; shorter ones tell no heading
+// [chosen: half the spacing of features]
+inline constexpr double kSameLength = 0.4;
+// The next of these [chosen]
+inline constexpr double kSameRise = 0.6;
+// The next of these [chosen]
+inline constexpr double kShortest = 2.0;
+// Fits, and the pairs that begin one beside its seed; rounds of a fit [chosen]
+inline constexpr std::size_t kSeeds = 40;
+// The next of these [chosen]
+inline constexpr std::size_t kFriends = 9;
+// The next of these [chosen]
+inline constexpr int kRounds = 4;
+// m: pairs that lie on each other; fewest of a motion [chosen]
+inline constexpr double kReach = 0.6;
+// The next of these [chosen]
+inline constexpr int kFewestMatched = 5;
+// m, rad: nearer motions are one [as upright_search]
+inline constexpr double kSamePlace = 0.7;
+// The next of these [as upright_search]
+inline constexpr double kSameTurn = 0.05;
+}  // namespace feature_search
+
 namespace search_cloud {  // registration/global/search_cloud.cc
 // m: edge of the voxels that thin a cloud [chosen]
 inline constexpr double kVoxel = 0.2;
@@ -179,6 +223,11 @@ namespace global_match {  // registration/global/global_match.cc
 inline constexpr std::size_t kCandidates = 24;
 // The next of these [bound]
 inline constexpr std::size_t kRefined = 3;
+// Score below which local features are sought, too [chosen: below nearly all right answers of seeds
+// 11 and 12]; most features [bound: time]
+inline constexpr double kPoorScore = 0.5;
+// The next of these [bound]
+inline constexpr std::size_t kFeatures = 700;
 // points above the ground that refine a pose, and those that take its last steps [bound: time]
 inline constexpr std::size_t kFewPlants = 1500;
 // The next of these [bound]

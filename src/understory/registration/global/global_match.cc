@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "understory/registration/global/feature_search.h"
 #include "understory/registration/global/global_constants.h"
 #include "understory/registration/global/pose_evidence.h"
 #include "understory/registration/global/upright_search.h"
@@ -59,6 +60,33 @@ void try_heights(const SearchCloud& target, const SearchCloud& source, const Poi
   }
 }
 
+// Refines the best few of the candidates, and leaves those alone.
+void refine_best(const SearchCloud& target, const SearchCloud& source, const Points& few,
+                 std::vector<GlobalCandidate>& candidates) {
+  sort_by_score(candidates);
+  drop_doubles(candidates);
+  candidates.resize(std::min(candidates.size(), kRefined));
+  for (GlobalCandidate& candidate : candidates)
+    refine_coarsely(target, source, few, 0.0, candidate);
+  sort_by_score(candidates);
+  drop_doubles(candidates);
+}
+
+// Poses by what looks alike, where uprights tell none that fits. The features are worked out here,
+// because few clouds need them.
+std::vector<GlobalCandidate> by_features(const SearchCloud& target, const SearchCloud& source) {
+  const auto found = match_local_features(
+      find_local_features(target.points, target.above_m, kFeatures),
+      find_local_features(source.points, source.above_m, kFeatures), kCandidates);
+  std::vector<GlobalCandidate> candidates;
+  for (const FeatureMatch& match : found) {
+    candidates.push_back({match.target_from_source,
+                          pose_score(target, source, match.target_from_source),
+                          match.target_from_source, 0});
+  }
+  return candidates;
+}
+
 }  // namespace
 
 std::vector<GlobalCandidate> search_poses(const SearchCloud& target, const SearchCloud& source) {
@@ -68,15 +96,16 @@ std::vector<GlobalCandidate> search_poses(const SearchCloud& target, const Searc
                           pose_score(target, source, match.target_from_source),
                           match.target_from_source, match.matched});
   }
-  sort_by_score(candidates);
-  drop_doubles(candidates);
-  candidates.resize(std::min(candidates.size(), kRefined));
   Points few = thin_evenly(source.plants, kFewPlants, source.plants.size() + 1);
   few.insert(few.end(), source.ground.begin(), source.ground.end());
-  for (GlobalCandidate& candidate : candidates)
-    refine_coarsely(target, source, few, 0.0, candidate);
-  sort_by_score(candidates);
-  drop_doubles(candidates);
+  refine_best(target, source, few, candidates);
+  if (candidates.empty() || candidates.front().score < kPoorScore) {
+    std::vector<GlobalCandidate> others = by_features(target, source);
+    refine_best(target, source, few, others);
+    candidates.insert(candidates.end(), others.begin(), others.end());
+    sort_by_score(candidates);
+    drop_doubles(candidates);
+  }
   if (!candidates.empty() && candidates.front().score < kSureScore)
     try_heights(target, source, few, candidates.front());
   return candidates;

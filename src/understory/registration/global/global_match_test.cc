@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "understory/registration/global/global_match.h"
 #include "understory/registration/global/level_cloud.h"
@@ -13,6 +14,8 @@
 #include "understory/registration/global/test_scans.h"
 #include "understory/registration/global/upright_search.h"
 #include "understory/registration/global/uprights.h"
+#include "understory/registration/matcher.h"
+#include "understory/registration/ndt/ndt_matcher.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
@@ -46,6 +49,12 @@ const TwoScans& two_scans() {
   return scans;
 }
 
+MatchVerdict judged(const TwoScans& scans, const RegistrationResult& result) {
+  const SearchCloud target = prepare_search(scans.target);
+  const SearchCloud source = prepare_search(scans.source);
+  return judge_match(target, source, result, search_poses(target, source));
+}
+
 TEST(GlobalMatch, FindsThePoseWithoutAGuessAndTrustsIt) {
   const TwoScans& scans = two_scans();
   const GlobalRegistration done = register_globally(scans.target, scans.source);
@@ -64,6 +73,17 @@ TEST(GlobalMatch, GivesTheSameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(done[0].verdict.chance, done[1].verdict.chance);
 }
 
+TEST(GlobalMatch, SparseScansAreNotMatchedWithSmallCells) {
+  const SearchCloud sparse = prepare_search(two_scans().target);
+  ASSERT_LT(two_scans().target.size(), 35000U);
+  EXPECT_EQ(sparse.fine_target, sparse.target);
+  Points dense = two_scans().target;
+  while (dense.size() < 35000U)
+    dense.insert(dense.end(), two_scans().target.begin(), two_scans().target.end());
+  const SearchCloud more = prepare_search(dense);
+  EXPECT_NE(more.fine_target, more.target);
+}
+
 TEST(GlobalMatch, TwoStandsAreNotMatched) {
   const TwoScans& scans = two_scans();
   const testing::ScanStand other(77);
@@ -80,13 +100,35 @@ TEST(MatchVerdict, AConvergedMatchInAWrongPlaceIsRefused) {
   RegistrationResult result;
   result.status = RegistrationStatus::kConverged;
   result.target_from_source = scans.truth;
-  EXPECT_TRUE(judge_match(scans.target, scans.source, result).trusted);
+  EXPECT_TRUE(judged(scans, result).trusted);
   for (const Pose& step : {turned(2.5, 0.0, 0.0, 0.0), turned(0.0, 0.0, 0.0, 0.3)}) {
     result.target_from_source = scans.truth * step;
-    const MatchVerdict verdict = judge_match(scans.target, scans.source, result);
+    const MatchVerdict verdict = judged(scans, result);
     EXPECT_FALSE(verdict.trusted);
     EXPECT_NE(verdict.reason.find("another pose"), std::string::npos) << verdict.reason;
   }
+}
+
+TEST(MatchVerdict, AMatchFromABadGuessBeginsAgainWhereTheSearchPutsIt) {
+  const TwoScans& scans = two_scans();
+  NdtMatcherConfig ndt;
+  ndt.cell_sizes_m = {3.0, 1.0};
+  const MatchTargetPtr target = make_matcher(ndt)->make_target(voxel_means(scans.target, 0.1));
+  const Points source = voxel_means(scans.source, 0.25);
+  std::vector<Pose> guesses;
+  const MatchFrom match = [&](const Pose& guess) {
+    guesses.push_back(guess);
+    return target->match(source, guess, {}, MatchStart::kFar);
+  };
+  const GlobalRegistration near =
+      match_and_judge(scans.target, scans.source, scans.truth * turned(0.1, 0.0, 0.0, 0.01), match);
+  EXPECT_TRUE(near.verdict.trusted) << near.verdict.reason;
+  EXPECT_EQ(guesses.size(), 1U);  // trusted at once
+  const GlobalRegistration far =
+      match_and_judge(scans.target, scans.source, scans.truth * turned(6.0, 3.0, 0.0, 1.5), match);
+  EXPECT_TRUE(far.verdict.trusted) << far.verdict.reason;
+  expect_pose(far.result.target_from_source, scans.truth, 0.1, 0.5);
+  EXPECT_EQ(guesses.size(), 3U);
 }
 
 TEST(MatchVerdict, AMatchThatDidNotConvergeOrLeavesDirectionsOpenIsRefused) {
@@ -94,10 +136,10 @@ TEST(MatchVerdict, AMatchThatDidNotConvergeOrLeavesDirectionsOpenIsRefused) {
   RegistrationResult result;
   result.target_from_source = scans.truth;
   result.status = RegistrationStatus::kIterationLimit;
-  EXPECT_FALSE(judge_match(scans.target, scans.source, result).trusted);
+  EXPECT_FALSE(judged(scans, result).trusted);
   result.status = RegistrationStatus::kConverged;
   result.degenerate_directions = Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, 1);
-  EXPECT_FALSE(judge_match(scans.target, scans.source, result).trusted);
+  EXPECT_FALSE(judged(scans, result).trusted);
 }
 
 // What speaks for a pose is counted at the right one, and what speaks against it at a wrong one.
@@ -122,7 +164,7 @@ TEST(MatchVerdict, AMatchBesideTheRightPoseIsRefused) {
   result.status = RegistrationStatus::kConverged;
   for (const double off : {0.28, 0.3, 0.35, 0.45}) {
     result.target_from_source = scans.truth * turned(off, 0.0, 0.0, 0.0);
-    const MatchVerdict verdict = judge_match(scans.target, scans.source, result);
+    const MatchVerdict verdict = judged(scans, result);
     EXPECT_FALSE(verdict.trusted) << off << " m beside it";
     EXPECT_GT(verdict.moved_m, 0.25) << off;
   }

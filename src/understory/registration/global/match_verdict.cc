@@ -122,16 +122,40 @@ MatchVerdict judge_pose(const SearchCloud& target, const SearchCloud& source,
   return verdict;
 }
 
-MatchVerdict judge_match(const Points& target, const Points& source,
-                         const RegistrationResult& result) {
+MatchVerdict judge_match(const SearchCloud& a, const SearchCloud& b,
+                         const RegistrationResult& result,
+                         const std::vector<GlobalCandidate>& found) {
   if (std::string trouble = trouble_of(result); !trouble.empty())
     return refused_verdict(std::move(trouble));
-  const SearchCloud a = prepare_search(target);
-  const SearchCloud b = prepare_search(source);
   if (std::string refusal = refusal_of(a, b); !refusal.empty())
     return refused_verdict(std::move(refusal));
   const Pose pose = a.level_from_cloud * result.target_from_source * b.level_from_cloud.inverse();
-  return judge_pose(a, b, pose, search_poses(a, b));
+  return judge_pose(a, b, pose, found);
+}
+
+GlobalRegistration match_and_judge(const SearchCloud& a, const SearchCloud& b, const Pose& guess,
+                                   const MatchFrom& match,
+                                   const std::vector<GlobalCandidate>& found) {
+  GlobalRegistration done;
+  done.result = match(guess);
+  done.verdict = judge_match(a, b, done.result, found);
+  if (done.verdict.trusted || found.empty()) return done;
+  GlobalRegistration again;
+  again.result =
+      match(a.level_from_cloud.inverse() * found.front().target_from_source * b.level_from_cloud);
+  again.verdict = judge_match(a, b, again.result, found);
+  if (!again.verdict.trusted) return done;
+  again.result.iterations += done.result.iterations;
+  return again;
+}
+
+GlobalRegistration match_and_judge(const Points& target, const Points& source, const Pose& guess,
+                                   const MatchFrom& match) {
+  const SearchCloud a = prepare_search(target);
+  const SearchCloud b = prepare_search(source);
+  std::vector<GlobalCandidate> found;
+  if (refusal_of(a, b).empty()) found = search_poses(a, b);
+  return match_and_judge(a, b, guess, match, found);
 }
 
 GlobalRegistration register_globally(const Points& target, const Points& source) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -47,14 +48,29 @@ struct MatchVerdict {
 
 // The same for the outcome of any method, between the frames of the points (metres, z about up). A
 // match that did not converge, or that leaves directions open, is never trusted.
-[[nodiscard]] MatchVerdict judge_match(const Points& target, const Points& source,
-                                       const RegistrationResult& result);
+[[nodiscard]] MatchVerdict judge_match(const SearchCloud& target, const SearchCloud& source,
+                                       const RegistrationResult& result,
+                                       const std::vector<GlobalCandidate>& found);
 
 // A match without a guess, and what is to be thought of it.
 struct GlobalRegistration {
   RegistrationResult result;  // of NDT at the end; kTooFewMatches where no pose was found
   MatchVerdict verdict;
 };
+
+// What a method makes of a guess; poses between the frames of the points.
+using MatchFrom = std::function<RegistrationResult(const Pose& guess)>;
+
+// The match that a method makes from a guess, with its verdict. Where that is not trusted, the
+// method begins again at the best pose of a search without a guess, and that answer is taken if it
+// is trusted. The frames are those of the points; `found`: what search_poses gave for the clouds.
+[[nodiscard]] GlobalRegistration match_and_judge(const SearchCloud& target,
+                                                 const SearchCloud& source, const Pose& guess,
+                                                 const MatchFrom& match,
+                                                 const std::vector<GlobalCandidate>& found);
+// The same for clouds that are not ready.
+[[nodiscard]] GlobalRegistration match_and_judge(const Points& target, const Points& source,
+                                                 const Pose& guess, const MatchFrom& match);
 
 // Finds the pose of the source on the target anywhere and at any heading. Both clouds: metres, z
 // within 40 degrees of up, each in its own frame. Thread-safe; same bits for any number of threads.

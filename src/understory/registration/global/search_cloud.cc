@@ -171,7 +171,9 @@ SearchCloud prepare_search(const Points& points) {
       upright.at *= 1.0 + kBehind / std::max(upright.at.norm(), 1.0);
   }
   cloud.target = ndt_target(cloud, {kCoarseCell, kMiddleCell}, points.size() < kFewRings);
-  cloud.fine_target = ndt_target(cloud, {kMiddleCell, kFineCell}, points.size() < kFewRings);
+  // Small cells of a sparse scan hold too little for a distribution, and leave directions open.
+  cloud.fine_target =
+      points.size() < kFewRings ? cloud.target : ndt_target(cloud, {kMiddleCell, kFineCell}, false);
   return cloud;
 }
 
