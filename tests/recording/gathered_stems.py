@@ -1,5 +1,4 @@
-"""A Mid-360 by stems: its scans are gathered, every scan gets a pose, and the path is that of the truth. Several lidars of
-which one has no rings are refused by name."""
+"""A Mid-360 by stems: its scans are gathered, every scan gets a pose, and the path is that of the truth."""
 
 import json
 import os
