@@ -120,6 +120,19 @@ def render(results, what, inertial=True):
     return "\n".join(lines) + "\n"
 
 
+def cpu_of(result):
+    return {"CPU ms a scan": result["cpu_ms"]["mean"]} if "cpu_ms" in result else {}
+
+
+def as_point_clouds(recording, truth):
+    """The recording that peers read: PointCloud2. A simulated Livox writes its driver's own messages."""
+    if "Mid-360" not in (truth / "site.yaml").read_text():
+        return recording
+    plain = recording.with_name(f"{recording.stem}_clouds.mcap")
+    understory("convert", recording, plain, "--overwrite")
+    return plain
+
+
 def measure(site, options, work):
     what = f"{site}, seed {options.seed}, {options.duration_s:g} s"
     recording = work / f"{site}.mcap"
@@ -127,12 +140,13 @@ def measure(site, options, work):
     understory("simulate", site, "-o", recording, "--overwrite", "--seed", options.seed, "--duration-s",
                options.duration_s)
     cpus, truth, results = own_cpus(), recording.with_suffix(".truth"), []
+    plain = as_point_clouds(recording, truth)
     jobs = {"understory": lambda: ours(recording, work, cpus, "understory", []),
             "understory, no IMU, no loops": lambda: ours(
                 recording, work, cpus, "understory, no IMU, no loops",
                 ["motion.imu_enabled=false", "loop_closure.enabled=false"])}
     for name in [*EVALIO, "RKO-LIO", *NEWCOMERS]:
-        jobs[name] = lambda name=name: peer(name, recording, work, cpus)
+        jobs[name] = lambda name=name: peer(name, plain, work, cpus)
     inertial = has_imu((truth / "site.yaml").read_text())
     if not inertial:
         del jobs["understory, no IMU, no loops"]
@@ -146,9 +160,10 @@ def measure(site, options, work):
         say(f"  {name}")
         results.append(add_errors(job(), truth))
         say("    " + ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}"
-                               for k, v in results[-1].items()
-                               if k in ("failed", "ape_cm", "drift", "answered")))
-    recording.unlink()
+                               for k, v in {**results[-1], **cpu_of(results[-1])}.items()
+                               if k in ("failed", "ape_cm", "drift", "answered", "CPU ms a scan")))
+    for written in {recording, plain}:
+        written.unlink()
     return render(results, what, inertial)
 
 

@@ -46,9 +46,9 @@ class Organiser:
     """Puts the points of a scan into rings and columns."""
 
     def __init__(self, scan, period_ns):
-        self.rows = 16 if scan.rings.max() < 16 else 32 if scan.rings.max() < 32 else 128
-        # A spinning sensor with fixed firing times: a column is a firing of all lasers.
-        firing_ns = {16: 55_296, 32: 55_296, 128: period_ns / 1024}[self.rows]
+        self.rows = next(rows for rows in (4, 16, 32, 128) if scan.rings.max() < rows)
+        # A sensor with fixed firing times: a column is a firing of all lasers. Four are the lines of a Mid-360.
+        firing_ns = {4: 20_000, 16: 55_296, 32: 55_296, 128: period_ns / 1024}[self.rows]
         # Where not every revolution is recorded, a scan is over long before the next begins.
         sweep_ns = min(period_ns, 1.02 * scan.offsets_ns.max() + firing_ns)
         if sweep_ns > 0.9 * period_ns:

@@ -50,12 +50,12 @@ def check_samples(folder):
             assert abs(again["duration_s"] - first["duration_s"]) < 1e-6, target
 
 
-def datagram(stamp_ns, source_port, port, payload):
-    """A record of a .pcap"""
+def datagram(stamp_ns, source_port, port, payload, device=0):
+    """A record of a .pcap; the link address of the sensor ends with `device`"""
     udp = struct.pack(">HHHH", source_port, port, 8 + len(payload), 0) + payload
     ip = bytes([0x45, 0]) + struct.pack(">HHHBBH", 20 + len(udp), 1, 0, 64, 17, 0) \
         + bytes([192, 168, 1, 201, 192, 168, 1, 1]) + udp
-    frame = bytes(12) + b"\x08\x00" + ip
+    frame = bytes(11) + bytes([device]) + b"\x08\x00" + ip
     return struct.pack("<IIII", stamp_ns // 10**9, stamp_ns % 10**9 // 1000, len(frame),
                        len(frame)) + frame
 
@@ -115,6 +115,44 @@ def check_captures(folder):
             assert again[kind][count] == seen[kind][count], (recording, kind, count)
     code, _, errors = run("info", other)
     assert code == 3 and "RoboSense" in errors and "PointCloud2" in errors, errors
+
+
+def check_bad_captures(folder):
+    """Packets that are cut, doubled, of two sensors of one address on one port, of an unknown firmware"""
+    start = 1_700_000_000 * 10**9
+    head = struct.pack("<IHHQII", 0xA1B2C3D4, 2, 4, 0, 65535, 1)
+
+    def capture(name, packets):
+        file = folder / name
+        file.write_bytes(head + b"".join(datagram(start + 400_000 * i, 10000, 2368, data, device)
+                                         for i, device, data in packets))
+        return file
+
+    whole = [(i, 1, hesai_packet(i)) for i in range(750)]
+    points = info(capture("whole.pcap", whole))["lidar"]["points"]
+    cut = info(capture("cut.pcap", [(i, d, data[:500] if i == 300 else data) for i, d, data in whole]))
+    assert cut["lidar"]["points"] == points - 256, cut["lidar"]
+    assert any("has 500 bytes, expected 1080" in each for each in cut["warnings"]), cut["warnings"]
+    doubled = info(capture("doubled.pcap", [each for each in whole for _ in range(1 + (each[0] == 300))]))
+    assert doubled["lidar"]["points"] == points, doubled["lidar"]
+    assert any("comes twice" in each for each in doubled["warnings"]), doubled["warnings"]
+    strange = [(i, d, data[:2] + bytes([9, 7]) + data[4:]) for i, d, data in whole]
+    code, _, errors = run("info", capture("strange.pcap", strange))
+    assert code == 3 and "another Hesai (protocol 9.7" in errors and "PointCloud2" in errors, errors
+    both = capture("both.pcap", [each for i in range(750) for each in ((i, 1, hesai_packet(i)), (i, 2, hesai_packet(i)))])
+    seen = info(both)
+    assert seen["lidar"]["points"] == points, seen["lidar"]
+    names = [f"udp 2368 from 192.168.1.201 (00:00:00:00:00:0{device})" for device in (1, 2)]
+    assert {each["name"] for each in seen["topics"]} == set(names), seen["topics"]
+    assert any(f"packets of 2 lidars; only those of {names[0]}" in each for each in seen["warnings"]), seen["warnings"]
+    code, out, errors = run("info", "--json", both, "--lidar-topic", names[1])
+    assert code == 0 and json.loads(out)["lidar"]["points"] == points, errors
+    rig = folder / "both.yaml"
+    rig.write_text("body_frame: base\nlidars:\n" + "".join(
+        f'  - {{topic: "{name}", body_from_lidar: {{translation_m: [{i}, 0, 0]}}}}\n' for i, name in enumerate(names)))
+    code, out, errors = run("info", "--json", both, "--extrinsics", rig)
+    merged = json.loads(out)["lidar"]["points"]
+    assert code == 0 and merged == 2 * points, (merged, points, errors)
 
 
 def check_refusals(folder):
@@ -203,6 +241,7 @@ def main():
         folder = pathlib.Path(name)
         check_samples(folder)
         check_captures(folder)
+        check_bad_captures(folder)
         check_refusals(folder)
         check_damage(folder)
         check_copies(folder)

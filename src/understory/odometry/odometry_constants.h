@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <numbers>
 
+#include "understory/util/time.h"
+
 // The fitted and chosen numbers of the layer `odometry` that are no settings, which stand in the
 // Config structs. One namespace for each file that uses them. A comment gives the unit (none: a
 // plain number), the meaning, and in brackets where the number comes from:
@@ -208,6 +210,28 @@ inline constexpr double kLargestGyroBias = 0.1;
 // rad by which a stand leans as a whole, one standard deviation [chosen]
 inline constexpr double kStandLeans = 0.3 * kRadPerDegree;
 }  // namespace stem_imu
+
+namespace gathered_scan {  // odometry/stems/gathered_scan.cc, stem_pacer.cc
+// ns of the scans that are gathered: a Mid-360 leaves 2.5 degrees between its strokes in a tenth of
+// a second [tuned on mid360]
+inline constexpr TimeNs kWindow = 500'000'000;
+// ns from pose to pose of the path within it [chosen: a walker's turn is even for so long]
+inline constexpr TimeNs kPathStep = 10'000'000;
+// deg: height of a ring [tuned on mid360, 2 to 6 tried: four points a cell in half a second]
+inline constexpr double kRingDeg = 4.0;
+// deg: width of a column [tuned on mid360, 0.2 to 0.5 tried]
+inline constexpr double kColumnDeg = 0.25;
+// of a turn [mathematics]
+inline constexpr std::uint32_t kColumns = 1440;
+// Points of a cell at least: one alone may be a twig, or an edge [tuned on mid360]
+inline constexpr std::size_t kFewestOfACell = 2;
+// m about the median range of a cell within which points are of one surface [chosen]
+inline constexpr float kSameSurface = 0.15F;
+// m from the axis of the lidar: nearer points have no azimuth to speak of [chosen]
+inline constexpr double kNearest = 0.3;
+// Times that the motion of a window is taken from the match of its own stems [tuned on mid360]
+inline constexpr int kRounds = 2;
+}  // namespace gathered_scan
 
 namespace stem_levelling {  // odometry/stems/stem_levelling.cc
 // degrees of freedom of Student's t, for stems that lean [chosen: heavy tails]

@@ -8,8 +8,8 @@ namespace {
 
 const ConfigTable::Range kPositive{1e-9, 1e9};
 const ConfigTable::Range kNotNegative{0.0, 1e9};
-const std::vector<std::string> kLidarModels = {"OS0-128", "VLP-16", "OS1-64",  "OS1-128",
-                                               "HDL-64",  "RS-16",  "Mid-360", "VLP-32C"};
+const std::vector<std::string> kLidarModels = {"OS0-128", "VLP-16",  "OS1-64",  "OS1-128", "HDL-64",
+                                               "RS-16",   "Mid-360", "VLP-32C", "XT32"};
 
 }  // namespace
 

@@ -237,6 +237,14 @@ StemScan StemFrontEnd::add(const Scan& scan, int frame, const Rig& rig, const Im
   return result;
 }
 
+GatheredMotion StemFrontEnd::gathered_motion(const ImuBuffer* samples) const {
+  GatheredMotion motion;
+  motion.per_s = motion_per_s_;
+  if (config_.imu.use && watch_.usable()) motion.samples = samples;
+  motion.gyro_bias = imu_.gyro_bias();
+  return motion;
+}
+
 void StemFrontEnd::save(BinaryWriter& writer) const {
   odometry_.save(writer);
   imu_.save(writer);

@@ -7,6 +7,7 @@
 #include "understory/features/lidar_stems.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/odometry/imu/imu_watch.h"
+#include "understory/odometry/stems/gathered_scan.h"
 #include "understory/odometry/stems/sparse_odometry.h"
 #include "understory/odometry/stems/stem_imu.h"
 #include "understory/preprocess/machine_boxes.h"
@@ -76,6 +77,14 @@ class StemFrontEnd {
   [[nodiscard]] const SparseOdometry& odometry() const { return odometry_; }
   // Whether the IMU agrees with the stems; left out from then on where it is sure to do harm.
   [[nodiscard]] ImuTrust imu_trust() const { return watch_.trust(); }
+  // Of the body up to the scan that was added last, right perturbation; zero where it does not
+  // follow the one before.
+  [[nodiscard]] const Vector6d& motion_per_s() const { return motion_per_s_; }
+  // How scans from here on are gathered (gathered_scan.h): `samples` may be null.
+  [[nodiscard]] GatheredMotion gathered_motion(const ImuBuffer* samples) const;
+  [[nodiscard]] const std::vector<MachineBox>* machine_boxes() const {
+    return config_.machine_boxes.get();
+  }
   // From here on by stems alone.
   void refuse_imu() { config_.imu.use = false; }
 

@@ -35,7 +35,9 @@ std::optional<StemImu::Motion> StemImu::motion(const ImuBuffer& samples, TimeNs 
   motion.previous_from_now =
       (body_from_imu_turn * whole.rotation * body_from_imu_turn.conjugate()).normalized();
   motion.mean_force = body_from_imu_turn * whole.velocity / whole.duration;
-  const std::vector<InertialSample> within = samples.slice_available(scan.stamp, scan.end());
+  // A scan of one moment has the rate of that.
+  std::vector<InertialSample> within{between.back()};
+  if (scan.end() > scan.stamp) within = samples.slice_available(scan.stamp, scan.end());
   if (within.empty()) return std::nullopt;
   for (const InertialSample& sample : within) {
     motion.rate_in_scan +=

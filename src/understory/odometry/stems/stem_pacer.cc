@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/features/lidar_stems.h"
 #include "understory/geometry/pose_io.h"
+#include "understory/odometry/odometry_constants.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
+
+using namespace odometry_constants::gathered_scan;
 
 StemScan between(const StampedPose& from, const StemScan& to, const Scan& scan, int frame) {
   StemScan result;
@@ -47,12 +51,16 @@ bool StemPacer::even(const StemScan& last) const {
 }
 
 bool StemPacer::due(TimeNs stamp) const {
+  if (gathers_)
+    return waiting_.back()->end() + from_seconds(0.5 * period_s_) - waiting_.front()->stamp >=
+           kWindow;
   if (!last_ || static_cast<int>(waiting_.size()) >= wait_) return true;
   return to_seconds(stamp - last_->stamp) + period_s_ > config_.longest_gap_s;
 }
 
 std::vector<StemScan> StemPacer::add(ScanPtr scan, const Rig& rig) {
   const TimeNs stamp = scan->stamp;
+  if (waiting_.empty()) gathers_ = !all_have_level_rings(*scan, rig);
   waiting_.push_back(std::move(scan));
   return due(stamp) ? settle(rig) : std::vector<StemScan>();
 }
@@ -61,12 +69,38 @@ std::vector<StemScan> StemPacer::finish(const Rig& rig) {
   return waiting_.empty() ? std::vector<StemScan>() : settle(rig);
 }
 
+// At the end of a recording a part of a window waits; it is gathered as it is.
+std::vector<StemScan> StemPacer::settle_gathered(const Rig& rig) {
+  const TimeNs stamp = waiting_.back()->stamp;
+  const int last_frame = first_frame_ + static_cast<int>(waiting_.size()) - 1;
+  GatheredMotion motion = front_end_.gathered_motion(&samples_);
+  StemFrontEnd positioned = front_end_;
+  StemScan last;
+  for (int round = 0; round < kRounds; ++round) {
+    positioned = front_end_;
+    last = positioned.add(*gather_scans(waiting_, stamp, rig, motion, front_end_.machine_boxes()),
+                          last_frame, rig, &samples_);
+    if (last.step.status != SparseStepStatus::kTracked) break;
+    motion.per_s = positioned.motion_per_s();
+  }
+  front_end_ = std::move(positioned);
+  const StampedPose from =
+      last_ ? *last_ : StampedPose{waiting_.front()->stamp, last.step.world_from_body};
+  std::vector<StemScan> results;
+  for (std::size_t i = 0; i + 1 < waiting_.size(); ++i)
+    results.push_back(between(from, last, *waiting_[i], first_frame_ + static_cast<int>(i)));
+  results.push_back(std::move(last));
+  return results;
+}
+
 std::vector<StemScan> StemPacer::settle(const Rig& rig) {
   std::vector<StemScan> results;
   const bool trusted = imu_trust().trusted;
   const int last_frame = first_frame_ + static_cast<int>(waiting_.size()) - 1;
   bool whole = waiting_.size() == 1;
-  if (!whole) {
+  if (gathers_) {
+    results = settle_gathered(rig);
+  } else if (!whole) {
     StemFrontEnd trial = front_end_;
     StemScan ahead = trial.add(*waiting_.back(), last_frame, rig, &samples_);
     whole = even(ahead);

@@ -20,7 +20,11 @@ void describe(ConfigTable& table, StemPaceConfig& config);
 // between get their poses by powers of the motion. If that one does not lie where even motion would
 // have led it, within the error of its own match, nothing is made of it: those that waited are
 // positioned one after another, as if there had been no pause. Holds the scans of one gap, no more.
-// Not thread-safe; deterministic.
+//
+// Scans of a lidar whose lines sweep over its field of view (Livox) show no stem each. Half a
+// second of them is gathered to one (gathered_scan.h), which is positioned at the last of its
+// scans. The motion within that time is guessed from before, and then taken from its own match. Not
+// thread-safe; deterministic.
 class StemPacer {
  public:
   StemPacer(const StemPaceConfig& config, const StemFrontEndConfig& front_end, Log* log = nullptr)
@@ -45,6 +49,7 @@ class StemPacer {
 
  private:
   [[nodiscard]] std::vector<StemScan> settle(const Rig& rig);
+  [[nodiscard]] std::vector<StemScan> settle_gathered(const Rig& rig);
   [[nodiscard]] bool even(const StemScan& last) const;
   [[nodiscard]] bool due(TimeNs stamp) const;
 
@@ -57,6 +62,7 @@ class StemPacer {
   int wait_ = 1;         // scans from one that is positioned to the next
   std::optional<StampedPose> last_;
   double period_s_ = 0.0;
+  bool gathers_ = false;  // what waits; told by the first scan that does
 };
 
 }  // namespace understory

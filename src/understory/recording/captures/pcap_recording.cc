@@ -66,7 +66,7 @@ class VelodynePcap : public DecodedPcap<VelodyneDecoder> {
     while (behind < kFramesForPosition && file_->next(frame)) {
       behind += behind > 0 ? 1 : 0;
       const auto datagram = udp.add(frame.link_type, frame.bytes, frame.stamp);
-      if (!datagram || datagram->source != lidar_.source) continue;
+      if (!datagram || !stream_of(*datagram).same_sensor(lidar_)) continue;
       if (from_lidar(*datagram)) behind = std::max(behind, 1);
       if (from_lidar(*datagram) && first.model_name().empty())
         first.add_packet(datagram->payload.data(), datagram->payload.size(), datagram->stamp);
@@ -85,11 +85,11 @@ class VelodynePcap : public DecodedPcap<VelodyneDecoder> {
     if (from_lidar(datagram) && datagram.payload.size() == VelodyneDecoder::kDataPacketSize) {
       decoder_.add_packet(datagram.payload.data(), datagram.payload.size(), datagram.stamp);
       take_scans();
-    } else if (datagram.source == lidar_.source && is_velodyne_position(datagram.payload)) {
+    } else if (stream_of(datagram).same_sensor(lidar_) && is_velodyne_position(datagram.payload)) {
       const auto fix =
           decoder_.add_position_packet(datagram.payload.data(), datagram.payload.size());
       if (!fix) return;
-      second_statistics_.report().name = UdpStream{datagram.source, datagram.port}.name();
+      second_statistics_.report().name = stream_of(datagram).name();
       second_statistics_.report().conventions =
           "NMEA in position packets; UTC; no height unless GGA";
       second_statistics_.add_stamp(fix->stamp);
@@ -127,8 +127,8 @@ class OusterPcap : public DecodedPcap<OusterDecoder> {
   void find_imu() {
     for (const auto& [key, stream] : survey_.streams) {
       const auto count = stream.by_size.find(kOusterImuPacketSize);
-      if (key.source != lidar_.source || count == stream.by_size.end()) continue;
-      if (!imu_ || key.port == metadata_.imu_port) imu_ = key;
+      if (!key.same_sensor(lidar_) || count == stream.by_size.end()) continue;
+      if (!imu_ || key.port == static_cast<std::uint32_t>(metadata_.imu_port)) imu_ = key;
     }
     if (imu_) second_statistics_.report().name = imu_->name();
     if (imu_ || metadata_.legacy_imu) return;
@@ -144,7 +144,7 @@ class OusterPcap : public DecodedPcap<OusterDecoder> {
         (size != kOusterImuPacketSize || !imu_ || imu_->port != lidar_.port)) {
       decoder_.add_lidar_packet(data, size);
       take_scans();
-    } else if (imu_ && datagram.source == imu_->source && datagram.port == imu_->port) {
+    } else if (imu_ && stream_of(datagram) == *imu_) {
       const auto sample = decoder_.add_imu_packet(data, size);
       if (!sample) return;
       second_statistics_.add_stamp(sample->stamp);
@@ -157,7 +157,7 @@ class OusterPcap : public DecodedPcap<OusterDecoder> {
   std::string sensor() const override { return "Ouster " + metadata_.product; }
   [[nodiscard]] std::string unused_sensor(const Datagram& datagram) const override {
     if (datagram.payload.size() == metadata_.lidar_packet_size()) return "another lidar";
-    const bool imu = !imu_ && metadata_.legacy_imu && datagram.source == lidar_.source &&
+    const bool imu = !imu_ && metadata_.legacy_imu && stream_of(datagram).same_sensor(lidar_) &&
                      datagram.payload.size() == kOusterImuPacketSize;
     return imu ? "the IMU" : PcapRecording::unused_sensor(datagram);
   }
@@ -177,28 +177,30 @@ std::optional<UdpStream> choose(const PcapSurvey& survey, const OpenOptions& opt
                                 const std::string& file, Log& log, Count&& count) {
   std::optional<UdpStream> best;
   std::uint64_t most = 0;
-  int streams = 0;
+  int named_lidars = 0;
+  int lidars = 0;
   for (const auto& [key, stream] : survey.streams) {
     const std::uint64_t packets = count(stream);
     const bool named = options.lidar_topic.empty() || key.is_named(options.lidar_topic);
-    streams += packets > 0 ? 1 : 0;
+    lidars += packets > 0 ? 1 : 0;
+    named_lidars += named && packets > 0 ? 1 : 0;
     if (named && packets > most) {
       most = packets;
       best = key;
     }
   }
-  int same_name = 0;
-  for (const auto& [key, stream] : survey.streams)
-    same_name += best && options.lidar_topic != best->full_name() && key.name() == best->name() &&
-                         count(stream) > 0
-                     ? 1
-                     : 0;
-  if (best && streams > 1 && (options.lidar_topic.empty() || same_name > 1)) {
+  if (!best) return best;
+  const std::string name = survey.name_of(*best);
+  if (named_lidars > 1) {
     log.warn("recording.lidars",
-             file + ": packets of " + std::to_string(streams) + " lidars; only those of " +
-                 (same_name > 1 ? best->full_name() : best->name()) + " are used" +
-                 (same_name > 1 ? ": several send to that port" : "") +
+             file + ": packets of " + std::to_string(lidars) + " lidars; only those of " + name +
+                 " are used" + (name == best->name() ? "" : ": several send to that port") +
                  " (choose with --lidar-topic, or merge them: --lidar-topic A,B)");
+  }
+  if (survey.streams.at(*best).makers() > 1) {
+    log.warn("recording.lidars", file + ": " + name +
+                                     ": packets of lidars of several makers from one address; only "
+                                     "those of the maker with most packets are used");
   }
   return best;
 }

@@ -50,7 +50,7 @@ class LivoxPcap : public DecodedPcap<LivoxDecoder> {
     second_statistics_.report().conventions = "g converted to m/s²; rad/s; with gravity";
     rig_.lidar_model = survey_.streams[lidar].model;
     for (const auto& [key, stream] : survey_.streams) {
-      if (key.source == lidar.source && stream.livox_imu > 0) imu_ = key;
+      if (key.same_sensor(lidar) && stream.livox_imu > 0) imu_ = key;
     }
     if (imu_) place_imu();
   }
@@ -82,9 +82,8 @@ class LivoxPcap : public DecodedPcap<LivoxDecoder> {
   // One stream may hold both.
   void take(const Datagram& datagram) override {
     const auto head = livox_head(datagram.payload);
-    const bool own = datagram.source == lidar_.source;
     const bool of_imu = head && head->imu;
-    if (own && of_imu && imu_ && datagram.port == imu_->port) {
+    if (of_imu && imu_ && stream_of(datagram) == *imu_) {
       const auto sample =
           decoder_.add_imu_packet(datagram.payload.data(), datagram.payload.size(), datagram.stamp);
       if (!sample) return;

@@ -120,7 +120,7 @@ class PcapRecording : public Recording, public ArrivalTimes {
   }
 
   [[nodiscard]] bool from_lidar(const Datagram& datagram) const {
-    return datagram.source == lidar_.source && datagram.port == lidar_.port;
+    return stream_of(datagram) == lidar_;
   }
   void emit_scan(ScanPtr scan) {
     lidar_statistics_.add_stamp(scan->stamp);
@@ -128,7 +128,7 @@ class PcapRecording : public Recording, public ArrivalTimes {
     ready_.emplace_back(std::move(scan));
   }
   void ignore(const Datagram& datagram) {
-    const UdpStream key{datagram.source, datagram.port};
+    const UdpStream key = stream_of(datagram);
     const bool is_new = ignored_.count(key) == 0;
     if (is_new && ignored_.size() >= kMostIgnoredStreams) return;
     const std::string sensor = unused_sensor(datagram);

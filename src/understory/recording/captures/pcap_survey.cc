@@ -73,7 +73,7 @@ struct LidarKind {
 };
 
 // The place where this datagram is counted; null where there are too many streams already.
-PcapSurvey::Stream* stream_of(PcapSurvey& survey, const UdpStream& key, bool is_lidar) {
+PcapSurvey::Stream* place_of(PcapSurvey& survey, const UdpStream& key, bool is_lidar) {
   const auto found = survey.streams.find(key);
   if (found != survey.streams.end()) return &found->second;
   if (survey.streams.size() >= kMostStreams) {
@@ -118,11 +118,25 @@ std::string PcapSurvey::list() const {
          (text.empty() ? "no UDP packets" : text);
 }
 
+std::string UdpStream::device_name() const {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (int shift = 40; shift >= 0; shift -= 8) {
+    text += text.empty() ? "" : ":";
+    text += {kDigits[device >> (shift + 4) & 15], kDigits[device >> shift & 15]};
+  }
+  return full_name() + " (" + text + ")";
+}
+
 std::string PcapSurvey::name_of(const UdpStream& key) const {
-  const bool shared = std::any_of(streams.begin(), streams.end(), [&](const auto& other) {
-    return other.first.port == key.port && other.first != key && other.second.has_lidar();
-  });
-  return shared ? key.full_name() : key.name();
+  bool port = false;
+  bool address = false;
+  for (const auto& [other, stream] : streams) {
+    if (other == key || other.port != key.port || !stream.has_lidar()) continue;
+    port = true;
+    address = address || other.source == key.source;
+  }
+  return address ? key.device_name() : port ? key.full_name() : key.name();
 }
 
 std::string PcapSurvey::unread() const {
@@ -155,13 +169,13 @@ PcapSurvey survey_pcap(PcapFile& file, const PcapWanted& wanted) {
       ++(datagram->checksum_ok ? survey.good_checksums : survey.bad_checksums);
     const std::size_t size = datagram->payload.size();
     const LidarKind kind(*datagram, wanted);
-    const UdpStream key{datagram->source, datagram->port};
+    const UdpStream key = stream_of(*datagram);
     const bool is_wanted =
         kind.is_wanted(wanted) && (wanted.stream.empty() || key.is_named(wanted.stream));
     // Where the lidar starts late, as much is looked at from there on.
     if (is_wanted && !found && survey.frames > kFrames) enough = survey.frames + kFrames;
     found = found || is_wanted;
-    PcapSurvey::Stream* at = stream_of(survey, key, kind.is_lidar());
+    PcapSurvey::Stream* at = place_of(survey, key, kind.is_lidar());
     if (at == nullptr) continue;
     PcapSurvey::Stream& stream = *at;
     ++stream.datagrams;

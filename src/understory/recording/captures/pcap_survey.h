@@ -9,16 +9,24 @@
 
 namespace understory {
 
-// Where datagrams come from and go to.
+// Where datagrams come from and go to. Sensors of one maker leave the works with the same address:
+// those that share one are told apart by the address of the link layer, if the capture has it.
 struct UdpStream {
+  std::uint64_t device = 0;  // as in Datagram
   std::uint32_t source = 0;
-  std::uint16_t port = 0;
+  std::uint32_t port = 0;
   auto operator<=>(const UdpStream&) const = default;  // NOLINT(modernize-use-nullptr)
   [[nodiscard]] std::string name() const { return "udp " + std::to_string(port); }
   // Where several sensors send to one port: "udp 2368 from 192.168.1.201".
   [[nodiscard]] std::string full_name() const { return name() + " from " + address(); }
+  // Where several of them have one address: "udp 2368 from 192.168.1.201 (60:76:88:00:00:01)".
+  [[nodiscard]] std::string device_name() const;
   [[nodiscard]] bool is_named(const std::string& text) const {
-    return text == name() || text == full_name();
+    return text == name() || text == full_name() || text == device_name();
+  }
+  // Whether both come from one sensor.
+  [[nodiscard]] bool same_sensor(const UdpStream& other) const {
+    return source == other.source && device == other.device;
   }
   // "192.168.1.201"; meaningless for IPv6.
   [[nodiscard]] std::string address() const {
@@ -26,6 +34,11 @@ struct UdpStream {
            std::to_string(source >> 8 & 255) + "." + std::to_string(source & 255);
   }
 };
+
+// The stream that a datagram belongs to.
+[[nodiscard]] inline UdpStream stream_of(const Datagram& datagram) {
+  return {datagram.device, datagram.source, datagram.port};
+}
 
 // What the datagrams of a capture are, as far as they were looked at.
 struct PcapSurvey {
@@ -40,6 +53,10 @@ struct PcapSurvey {
     std::uint64_t ouster = 0;    // of the size that Ouster's metadata gives
     std::uint64_t position = 0;  // Velodyne position packets
     std::map<std::size_t, std::uint64_t> by_size;  // at most 16 sizes
+    // Makers whose lidars are read, of which packets are in the stream.
+    [[nodiscard]] int makers() const {
+      return (velodyne > 0 ? 1 : 0) + (hesai > 0 ? 1 : 0) + (livox > 0 ? 1 : 0);
+    }
     [[nodiscard]] bool has_lidar() const {
       return velodyne > 0 || ouster > 0 || hesai > 0 || livox > 0;
     }
@@ -54,7 +71,8 @@ struct PcapSurvey {
   [[nodiscard]] bool trust_checksums() const { return good_checksums > 10 * bad_checksums; }
   // What lidars there are whose packets are not read; empty: none.
   [[nodiscard]] std::string unread() const;
-  // Of a stream: with its address where lidars at other addresses send to the same port.
+  // Of a stream: with its address where other lidars send to the same port, and with that of the
+  // link layer where they have the same address.
   [[nodiscard]] std::string name_of(const UdpStream& key) const;
   // For messages: "1500 frames: udp 7502: 192 x 8448 bytes, ..."
   [[nodiscard]] std::string list() const;

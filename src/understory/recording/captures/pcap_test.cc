@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "understory/recording/bags/byte_source.h"
+#include "understory/recording/captures/hesai_test_support.h"
 #include "understory/recording/captures/packet_test_support.h"
 #include "understory/recording/captures/pcap_recording.h"
 #include "understory/recording/captures/pcap_survey.h"
@@ -259,6 +260,69 @@ TEST(Pcap, FindsTheLidarOfAnOptionThatStartsLate) {
   while (first->next()) {
   }
   EXPECT_EQ(test::count_of(log, "recording.late_sensor"), 1U) << test::all_warnings(log);
+}
+
+// A frame of the sensor whose link address ends with `device`.
+Bytes from_device(std::uint8_t device, const Bytes& udp) {
+  Bytes frame = plain(test::make_ip(udp));
+  frame[11] = device;
+  return frame;
+}
+
+// Two turns of each of two lidars with the address that they had from the works, one behind the
+// other's packets; the second one has a return in every other firing.
+Bytes two_of_one_address() {
+  Bytes file = test::pcap_header();
+  for (int i = 0; i < kPackets; ++i) {
+    test::VelodynePacket half;
+    half.azimuth_cdeg = (480 * i) % 36000;
+    half.us = static_cast<std::uint32_t>(1327 * i);
+    half.distance = i % 2 == 0 ? 2500 : 0;
+    test::add_record(file, stamp_of(i), from_device(0xA1, velodyne_udp(i)));
+    test::add_record(file, stamp_of(i),
+                     from_device(0xB2, test::make_udp(2368, test::make_packet(half))));
+  }
+  return file;
+}
+
+// Bug: their packets were taken for those of one sensor whose time jumps to and fro.
+TEST(Pcap, TellsSensorsOfOneAddressApartByTheirLinkAddress) {
+  const auto points_of = [](const std::string& name, Log& log) {
+    OpenOptions options;
+    options.lidar_topic = name;
+    const auto recording =
+        open_pcap(bytes_in_memory(two_of_one_address(), "test.pcap"), options, log);
+    std::size_t points = 0;
+    while (const auto event = recording->next())
+      points += std::get<ScanPtr>(*event)->points.size();
+    EXPECT_EQ(recording->topics().size(), 2U);
+    return points;
+  };
+  const std::string at = "udp 2368 from 192.168.1.201 (11:11:11:11:11:";
+  Log one;
+  EXPECT_EQ(points_of(at + "a1)", one), kPackets * 384U);
+  EXPECT_TRUE(one.warnings().empty()) << test::all_warnings(one);
+  Log other;
+  EXPECT_EQ(points_of(at + "b2)", other), kPackets * 192U);
+  EXPECT_TRUE(other.warnings().empty()) << test::all_warnings(other);
+  Log none;
+  EXPECT_EQ(points_of("", none), kPackets * 384U);
+  const std::string said = test::all_warnings(none);
+  EXPECT_NE(said.find("packets of 2 lidars; only those of " + at + "a1) are used"),
+            std::string::npos)
+      << said;
+}
+
+// Lidars of two makers that share an address cannot be told apart where frames have none of their
+// own: the one with most packets is read, and that is said.
+TEST(Pcap, SaysThatTwoMakersShareAnAddress) {
+  Bytes file = make_capture();
+  test::HesaiPacket hesai;
+  for (int i = 0; i < 20; ++i)
+    test::add_record(file, stamp_of(i), plain(test::make_ip(test::make_udp(2368, hesai.bytes()))));
+  Log log;
+  EXPECT_EQ(read(file, log).points, kPackets * 384U);
+  EXPECT_EQ(test::count_of(log, "recording.lidars"), 1U) << test::all_warnings(log);
 }
 
 TEST(Pcap, FindsTheMetadataBesideAnOusterCapture) {

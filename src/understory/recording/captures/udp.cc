@@ -62,6 +62,29 @@ std::optional<ByteSpan> ip_packet(int link_type, ByteSpan frame) {
   return frame.subspan(skip);
 }
 
+// Where a frame came from: its link address of six bytes, as a number; 0 where there is none.
+std::uint64_t device_of(int link_type, ByteSpan frame) {
+  constexpr std::size_t kBytes = 6;
+  std::size_t at = 0;
+  switch (link_type) {
+    case 1:
+      at = 6;
+      break;
+    case 113:
+      if (frame.size() < 16 || be16(frame, 4) != kBytes) return 0;
+      at = 6;
+      break;
+    case 276:
+      if (frame.size() < 20 || frame[11] != kBytes) return 0;
+      at = 12;
+      break;
+    default:
+      return 0;
+  }
+  if (frame.size() < at + kBytes) return 0;
+  return (static_cast<std::uint64_t>(be16(frame, at)) << 32) | be32(frame, at + 2);
+}
+
 std::uint32_t sum_words(ByteSpan bytes, std::uint32_t sum) {
   for (std::size_t i = 0; i + 1 < bytes.size(); i += 2)
     sum += be16(bytes, i);
@@ -97,17 +120,23 @@ std::optional<Datagram> udp_datagram(ByteSpan udp, ByteSpan addresses, TimeNs st
 std::optional<Datagram> UdpAssembler::add(int link_type, ByteSpan frame, TimeNs stamp) {
   const auto packet = ip_packet(link_type, frame);
   if (!packet || packet->empty()) return std::nullopt;
+  const std::uint64_t device = device_of(link_type, frame);
+  std::optional<Datagram> datagram;
   switch ((*packet)[0] >> 4) {
     case 4:
-      return ipv4(*packet, stamp);
+      datagram = ipv4(*packet, device, stamp);
+      break;
     case 6:
-      return ipv6(*packet, stamp);
+      datagram = ipv6(*packet, stamp);
+      break;
     default:
-      return std::nullopt;
+      break;
   }
+  if (datagram) datagram->device = device;
+  return datagram;
 }
 
-std::optional<Datagram> UdpAssembler::ipv4(ByteSpan packet, TimeNs stamp) {
+std::optional<Datagram> UdpAssembler::ipv4(ByteSpan packet, std::uint64_t device, TimeNs stamp) {
   if (packet.size() < 20) return std::nullopt;
   const std::size_t header = static_cast<std::size_t>(packet[0] & 0xF) * 4;
   const std::size_t total = be16(packet, 2);
@@ -119,7 +148,7 @@ std::optional<Datagram> UdpAssembler::ipv4(ByteSpan packet, TimeNs stamp) {
   const std::size_t offset = static_cast<std::size_t>(flags & 0x1FFF) * 8;
   ByteSpan body = packet.subspan(header, total - header);
   if (more || offset > 0) {
-    const Key key{be32(packet, 12), be32(packet, 16), be16(packet, 4)};
+    const Key key{device, be32(packet, 12), be32(packet, 16), be16(packet, 4)};
     if (!add_fragment(key, offset, more, body)) return std::nullopt;
     body = whole_;
   }

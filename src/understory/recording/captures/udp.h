@@ -18,6 +18,7 @@ namespace understory {
 struct Datagram {
   TimeNs stamp = 0;          // of the frame that completed it
   std::uint32_t source = 0;  // IPv4 address; for IPv6 a hash of it
+  std::uint64_t device = 0;  // address of the link layer that it came from (MAC); 0: not told
   std::uint16_t source_port = 0;
   std::uint16_t port = 0;  // destination
   bool has_checksum = false;
@@ -40,9 +41,10 @@ class UdpAssembler {
 
  private:
   struct Key {
+    std::uint64_t device = 0;
     std::uint32_t source = 0;
     std::uint32_t destination = 0;
-    std::uint16_t id = 0;
+    std::uint64_t id = 0;
     bool operator==(const Key&) const = default;
   };
   struct Partial {
@@ -52,7 +54,7 @@ class UdpAssembler {
     std::size_t total_size = 0;  // 0: the last fragment has not come
   };
 
-  [[nodiscard]] std::optional<Datagram> ipv4(ByteSpan packet, TimeNs stamp);
+  [[nodiscard]] std::optional<Datagram> ipv4(ByteSpan packet, std::uint64_t device, TimeNs stamp);
   [[nodiscard]] std::optional<Datagram> ipv6(ByteSpan packet, TimeNs stamp);
   [[nodiscard]] bool add_fragment(const Key& key, std::size_t offset, bool more, ByteSpan part);
 

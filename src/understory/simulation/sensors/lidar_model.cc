@@ -78,6 +78,19 @@ LidarModel vlp_16(const LidarConfig& config) {
   return model;
 }
 
+// 32 lasers a degree apart, from the highest down: 6 us after the block's time and then 1.512 us
+// from laser to laser, 50 us a sequence (PandarXT User Manual, "Channel Distribution" and "Absolute
+// Time of Point Cloud Data").
+LidarModel xt_32(const LidarConfig& config) {
+  LidarModel model;
+  for (int i = 0; i < 32; ++i)
+    model.beams.push_back(
+        {kDegree * (15 - i), 0.0, 1512.0 * i, static_cast<std::uint16_t>(31 - i)});
+  model.revolution_ns = 1e9 / config.rate_hz;
+  model.firing_ns = 50000.0;
+  return model;
+}
+
 // Four lines from -7 to 52 degrees and 200 000 points a second (Mid-360 User Manual v1.2,
 // "Specifications"). Livox publishes no equation of the pattern. This one stands in for it: one
 // turn a frame, and a golden share of a swing left over from turn to turn, so that swings of later
@@ -150,6 +163,7 @@ LidarModel make_lidar_model(const LidarConfig& config) {
   LidarModel model;
   if (config.model == "VLP-16") model = vlp_16(config);
   if (config.model == "VLP-32C") model = vlp_32c(config);
+  if (config.model == "XT32") model = xt_32(config);
   if (config.model == "RS-16") model = rs_16(config);
   if (config.model == "HDL-64") model = hdl_64(config);
   if (config.model == "Mid-360") model = mid_360(config);

@@ -42,11 +42,11 @@ void SparseFrontEnd::on_sample(const ImuSample& sample, const Rig& rig) {
 
 std::vector<PositionedScan> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig) {
   const ScopedTimer timer(times_, "scan");
-  if (scans_ == 0 && !all_have_level_rings(*scan, rig)) {
+  if (scans_ == 0 && !rig.further_lidars.empty() && !all_have_level_rings(*scan, rig)) {
     throw InputError(rig.lidar_model.empty() ? "the lidar" : rig.lidar_model, "",
                      "its lines sweep over the whole field of view, so that no stem can be cut "
-                     "from a single scan: stems need the rings of a spinning lidar. Use "
-                     "--front-end dense");
+                     "from a single scan, and several lidars are not gathered over time: name one "
+                     "with --lidar-topic, or use --front-end dense");
   }
   ++scans_;
   const std::uint64_t content = content_of(*scan);
