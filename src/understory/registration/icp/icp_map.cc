@@ -39,20 +39,18 @@ InCube locate(const Eigen::Vector3d& point, double cube_m) {
 
 }  // namespace
 
-IcpMap::Nearest IcpMap::look_around(const std::array<int, 3>& cube,
-                                    const Eigen::Vector3f& from_centre, int reach) const {
+internal::NearestTwo IcpMap::look_around(const std::array<int, 3>& cube,
+                                         const Eigen::Vector3f& from_centre, int reach) const {
   const auto edge = static_cast<float>(cube_m_);
   constexpr float kNone = std::numeric_limits<float>::infinity();
-  Nearest found{kNone, kNone, 0};
-  blocks_.for_each_near(cube, reach, [&](std::uint32_t first, int x, int y, int z) {
+  internal::NearestTwo found{kNone, kNone, 0, 0};
+  blocks_.for_each_near(cube, reach, [&](std::uint32_t spot, int x, int y, int z) {
     const Eigen::Vector3f step(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
-    for (std::uint32_t i = first; i != VoxelIndex::kNone; i = spots_[i].next) {
-      const float squared = (from_centre - edge * step - spots_[i].from_centre).squaredNorm();
-      if (squared < found.best) {
-        found = {squared, found.best, i};
-      } else {
-        found.second = std::min(found.second, squared);
-      }
+    const float squared = (from_centre - edge * step - spots_[spot].from_centre).squaredNorm();
+    if (squared < found.best) {
+      found = {squared, found.best, spot, 0};
+    } else {
+      found.second = std::min(found.second, squared);
     }
   });
   return found;
@@ -66,22 +64,32 @@ bool IcpMap::nearest(const Eigen::Vector3d& at, double max_distance_m, IcpPair& 
     const int reach =
         std::min(kMaxReach, static_cast<int>(std::ceil(max_distance_m / cube_m_ - 1e-9)));
     // What lies within a cube's edge is among the cubes beside the own one.
-    Nearest found = look_around(located.at, located.from_centre, 1);
+    const auto search = [&](int cubes) {
+      return apart_ ? apart_->nearest(located.at, located.from_centre, cubes)
+                    : look_around(located.at, located.from_centre, cubes);
+    };
+    internal::NearestTwo found = search(1);
     double sure_m = cube_m_;
     if (reach > 1 && static_cast<double>(found.best) > sure_m * sure_m) {
-      found = look_around(located.at, located.from_centre, reach);
+      found = search(reach);
       sure_m = reach * cube_m_;
     }
     known.slack_m = 0.0;
     if (!(static_cast<double>(found.best) <= max_distance_m * max_distance_m)) return false;
     const double others_m = std::min(sure_m, std::sqrt(static_cast<double>(found.second)));
     // A tenth of a millimetre for what rounding does to the squares.
-    known = {at, 0.5 * (others_m - std::sqrt(static_cast<double>(found.best))) - 1e-4, found.spot};
+    known = {at, 0.5 * (others_m - std::sqrt(static_cast<double>(found.best))) - 1e-4, found.spot,
+             found.point};
   }
-  const Spot& spot = spots_[known.spot];
-  pair.offset = at - centre_of(spot.at) - spot.from_centre.cast<double>();
+  if (apart_) {
+    pair.offset = at - apart_->place_of(known.spot, known.point);
+    pair.patch = apart_->patch(known.spot);
+  } else {
+    const Spot& spot = spots_[known.spot];
+    pair.offset = at - centre_of(spot.at) - spot.from_centre.cast<double>();
+    pair.patch = spot.patch;
+  }
   pair.squared_m2 = static_cast<float>(pair.offset.squaredNorm());
-  pair.patch = spot.patch;
   return static_cast<double>(pair.squared_m2) <= max_distance_m * max_distance_m;
 }
 
@@ -96,6 +104,7 @@ void IcpMapBuilder::clear() {
   due_.clear();
   map_ = std::make_shared<IcpMap>();
   map_->cube_m_ = config_.cube_m;
+  if (config_.epsilon_m > 0.0) map_->apart_.emplace(config_);
 }
 
 void IcpMapBuilder::insert(const Points& points_in_source, const Pose& map_from_source) {
@@ -103,44 +112,14 @@ void IcpMapBuilder::insert(const Points& points_in_source, const Pose& map_from_
   parallel_for(located.size(), 4096, [&](std::size_t i) {
     located[i] = locate(map_from_source * points_in_source[i].cast<double>(), config_.cube_m);
   });
-  for (const InCube& point : located) {
-    if (config_.epsilon_m > 0.0) {
-      add_apart(point.at, point.from_centre);
-    } else {
-      add(point.at, point.from_centre);
-    }
+  if (map_->apart_) {
+    own_map();
+    for (const InCube& point : located)
+      map_->apart_->insert(point.at, point.from_centre);
+    return;
   }
-}
-
-bool IcpMapBuilder::is_apart(const Place& at, const Eigen::Vector3f& from_centre) const {
-  const auto edge = static_cast<float>(config_.cube_m);
-  const auto least = static_cast<float>(config_.epsilon_m);
-  for (int step = 0; step < 27; ++step) {
-    const std::array<int, 3> by = {step % 3 - 1, step / 3 % 3 - 1, step / 9 - 1};
-    const Eigen::Vector3f there =
-        edge * Eigen::Vector3f(static_cast<float>(by[0]), static_cast<float>(by[1]),
-                               static_cast<float>(by[2]));
-    for (std::uint32_t i = index_.find(key_of({at[0] + by[0], at[1] + by[1], at[2] + by[2]}));
-         i != VoxelIndex::kNone; i = cubes_[i].next) {
-      const Cube& other = cubes_[i];
-      const Eigen::Vector3f place(other.sum[0], other.sum[1], other.sum[2]);
-      if ((there + place - from_centre).squaredNorm() <= least * least) return false;
-    }
-  }
-  return true;
-}
-
-void IcpMapBuilder::add_apart(const Place& at, const Eigen::Vector3f& from_centre) {
-  if (!is_apart(at, from_centre)) return;
-  const auto number = static_cast<std::uint32_t>(cubes_.size());
-  Cube& point = cubes_.emplace_back();
-  point.at = at;
-  for (int k = 0; k < 3; ++k)
-    point.sum[k] = from_centre[k];
-  point.count = 1.0F;
-  point.next = index_.find(key_of(at));
-  index_.set(key_of(at), number);
-  due_.push_back(number);
+  for (const InCube& point : located)
+    add(point.at, point.from_centre);
 }
 
 void IcpMapBuilder::add(const Place& at, const Eigen::Vector3f& from_centre) {
@@ -181,7 +160,6 @@ void IcpMapBuilder::settle_due() {
     IcpMap::Spot& spot = map_->spots_[number];
     if (number >= known) {
       spot.at = cube.at;
-      spot.next = cube.next;
       map_->blocks_.set(cube.at, number);
     }
     const Eigen::Vector3f mean =
@@ -214,22 +192,11 @@ void IcpMapBuilder::remove(std::uint32_t cube) {
   if (config_.covariances) map_->covariances_.pop_back();
 }
 
-// Points of one cube hang together, so that the map is made anew of those that stay.
-void IcpMapBuilder::keep_within(const Eigen::Vector3d& center, double radius_m) {
-  const auto stays = [&](const Cube& point) {
-    return (map_->centre_of(point.at) - center).squaredNorm() <= radius_m * radius_m;
-  };
-  const auto staying = static_cast<std::size_t>(std::count_if(cubes_.begin(), cubes_.end(), stays));
-  if (10 * staying >= 9 * cubes_.size()) return;
-  const std::vector<Cube> points = std::move(cubes_);
-  clear();
-  for (const Cube& point : points) {
-    if (stays(point)) add_apart(point.at, {point.sum[0], point.sum[1], point.sum[2]});
-  }
-}
-
 void IcpMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m) {
-  if (config_.epsilon_m > 0.0) return keep_within(center, radius_m);
+  if (map_->apart_) {
+    own_map();
+    return map_->apart_->remove_beyond(center, radius_m);
+  }
   settle_due();
   for (std::uint32_t c = 0; c < cubes_.size();) {
     if ((map_->centre_of(cubes_[c].at) - center).squaredNorm() > radius_m * radius_m) {
@@ -241,6 +208,7 @@ void IcpMapBuilder::remove_beyond(const Eigen::Vector3d& center, double radius_m
 }
 
 double IcpMapBuilder::bytes() const {
+  if (map_->apart_) return map_->apart_->bytes();
   const auto cubes = static_cast<double>(cubes_.size());
   double spot = sizeof(Cube) + sizeof(IcpMap::Spot);
   if (config_.covariances) spot += sizeof(Eigen::Matrix3f);
@@ -251,11 +219,10 @@ SurfaceSums IcpMapBuilder::sums_around(std::uint32_t cube) const {
   const auto edge = static_cast<float>(config_.cube_m);
   SurfaceSums sums;
   map_->blocks_.for_each_near(
-      map_->spots_[cube].at, kSurroundings, [&](std::uint32_t first, int x, int y, int z) {
+      map_->spots_[cube].at, kSurroundings, [&](std::uint32_t near, int x, int y, int z) {
         const Eigen::Vector3f step(static_cast<float>(x), static_cast<float>(y),
                                    static_cast<float>(z));
-        for (std::uint32_t near = first; near != VoxelIndex::kNone; near = map_->spots_[near].next)
-          sums.add(edge * step + map_->spots_[near].from_centre);
+        sums.add(edge * step + map_->spots_[near].from_centre);
       });
   return sums;
 }
@@ -272,14 +239,15 @@ void IcpMapBuilder::work_out(std::uint32_t cube) {
 }
 
 IcpMapPtr IcpMapBuilder::snapshot() {
+  if (map_->apart_) {
+    own_map();
+    map_->apart_->settle();
+    return map_;
+  }
   settle_due();
   std::vector<std::uint32_t> affected;
   map_->blocks_.for_each_affected([](std::uint32_t) { return kSurroundings; },
-                                  [&](std::uint32_t first) {
-                                    for (std::uint32_t cube = first; cube != VoxelIndex::kNone;
-                                         cube = map_->spots_[cube].next)
-                                      affected.push_back(cube);
-                                  });
+                                  [&](std::uint32_t cube) { affected.push_back(cube); });
   map_->blocks_.forget_changes();
   parallel_for(affected.size(), 256, [&](std::size_t i) { work_out(affected[i]); });
   return map_;

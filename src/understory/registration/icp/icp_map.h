@@ -4,31 +4,18 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
 #include "understory/geometry/voxel_index.h"
 #include "understory/registration/cell_blocks.h"
+#include "understory/registration/icp/apart_points.h"
+#include "understory/registration/icp/icp_map_config.h"
 #include "understory/registration/icp/surface.h"
 
 namespace understory {
-
-// The map of points with surfaces that ICP and GICP match to.
-struct IcpMapConfig {
-  // One point per cube of this edge: the mean of all that fell into it.
-  double cube_m = 0.25;
-  // Above 0: instead of that, a point enters as it is if it is farther than this from all others,
-  // P3 section 3.3; at most cube_m. Cubes only help to find it then.
-  double epsilon_m = 0.0;
-  // A cube's mean is taken anew once its points have grown by this share; 0: always.
-  double growth = 0.5;
-  // The surfaces around a point are worked out again once its mean has moved by this; 0: always.
-  double moved_m = 0.01;
-  bool planes = true;          // the surface around each point; false: points alone
-  double max_planarity = 0.1;  // see IcpConfig
-  bool covariances = false;    // the covariance around each point, too
-};
 
 // Target of ICP made of clouds that come one after another: points with the surface around each.
 // Immutable for all who hold it, and shared between threads; made by IcpMapBuilder.
@@ -37,13 +24,14 @@ class IcpMap {
   // Distances beyond so many cubes are not searched.
   static constexpr int kMaxReach = 4;
 
-  [[nodiscard]] std::size_t size() const { return spots_.size(); }
+  [[nodiscard]] std::size_t size() const { return apart_ ? apart_->size() : spots_.size(); }
   // What a search found for a point that moves step by step: as long as it stays within `slack_m`
   // of where it was searched, no other point of the map can have become nearer.
   struct Known {
     Eigen::Vector3d searched_at = Eigen::Vector3d::Zero();
     double slack_m = 0.0;
-    std::uint32_t spot = 0;  // of the map, for covariance()
+    std::uint32_t spot = 0;   // of the map, for covariance()
+    std::uint32_t point = 0;  // see internal::NearestTwo
   };
   // The nearest point within the distance, at most kMaxReach cubes; false if none. `known` is that
   // of the same point and distance before, or new.
@@ -52,11 +40,13 @@ class IcpMap {
   // The covariance around a point, m^2 (axes of the map); null where it tells nothing. Of a map
   // with IcpMapConfig::covariances.
   [[nodiscard]] const Eigen::Matrix3f* covariance(std::uint32_t spot) const {
-    return covariances_[spot](0, 0) >= 0.0F ? &covariances_[spot] : nullptr;
+    const Eigen::Matrix3f& found = apart_ ? apart_->covariance(spot) : covariances_[spot];
+    return found(0, 0) >= 0.0F ? &found : nullptr;
   }
   // Calls act(point in the map frame, surface) for each point, in no order that means anything.
   template <typename Act>
   void for_each(const Act& act) const {
+    if (apart_) return apart_->for_each(act);
     for (const Spot& spot : spots_)
       act(centre_of(spot.at) + spot.from_centre.cast<double>(), spot.patch);
   }
@@ -66,25 +56,20 @@ class IcpMap {
   struct Spot {
     Eigen::Vector3f from_centre;  // of its cube, so that precision is the same everywhere
     SurfacePatch patch;
-    std::array<int, 3> at{};                 // cube
-    std::uint32_t next = VoxelIndex::kNone;  // another one of the cube (epsilon_m)
+    std::array<int, 3> at{};  // cube
   };
   [[nodiscard]] Eigen::Vector3d centre_of(const std::array<int, 3>& cube) const {
     return cube_m_ * (Eigen::Vector3d(cube[0], cube[1], cube[2]) + Eigen::Vector3d::Constant(0.5));
   }
-  // The two nearest of the spots looked at, squared metres.
-  struct Nearest {
-    float best = 0.0F;
-    float second = 0.0F;
-    std::uint32_t spot = 0;
-  };
-  [[nodiscard]] Nearest look_around(const std::array<int, 3>& cube,
-                                    const Eigen::Vector3f& from_centre, int reach) const;
+  [[nodiscard]] internal::NearestTwo look_around(const std::array<int, 3>& cube,
+                                                 const Eigen::Vector3f& from_centre,
+                                                 int reach) const;
 
   double cube_m_ = 1.0;
   std::vector<Spot> spots_;
   std::vector<Eigen::Matrix3f> covariances_;  // of the spots, if wanted; first entry -1: nothing
   internal::CellBlocks blocks_;
+  std::optional<internal::ApartPoints> apart_;  // all of it, with epsilon_m; the others are empty
 };
 using IcpMapPtr = std::shared_ptr<const IcpMap>;
 
@@ -96,8 +81,7 @@ class IcpMapBuilder {
 
   // Adds points given in a source frame (a keyframe's body).
   void insert(const Points& points_in_source, const Pose& map_from_source);
-  // Forgets the cubes farther than that from the centre (map frame); with epsilon_m only once
-  // a tenth of the points is.
+  // Forgets the cubes farther than that from the centre (map frame).
   void remove_beyond(const Eigen::Vector3d& center, double radius_m);
   void clear();
   // See TargetBuilder::bytes.
@@ -113,12 +97,8 @@ class IcpMapBuilder {
     float count = 0.0F;
     float due = 1.0F;  // its mean is taken at so many points
     Place at{};
-    std::uint32_t next = VoxelIndex::kNone;  // another one of the same place (epsilon_m)
   };
   void add(const Place& at, const Eigen::Vector3f& from_centre);
-  void add_apart(const Place& at, const Eigen::Vector3f& from_centre);
-  [[nodiscard]] bool is_apart(const Place& at, const Eigen::Vector3f& from_centre) const;
-  void keep_within(const Eigen::Vector3d& center, double radius_m);
   void own_map();
   void settle_due();
   void remove(std::uint32_t cube);
@@ -128,7 +108,7 @@ class IcpMapBuilder {
   IcpMapConfig config_;
   std::vector<Cube> cubes_;  // those in the map first, in its order
   VoxelIndex index_;
-  std::vector<std::uint32_t> due_;  // cubes whose mean is to be taken; of epsilon_m new points
+  std::vector<std::uint32_t> due_;  // cubes whose mean is to be taken
   std::shared_ptr<IcpMap> map_;
 };
 

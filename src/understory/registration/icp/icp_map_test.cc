@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 
 #include "understory/util/random.h"
 
@@ -215,18 +216,24 @@ TEST(IcpMap, WithEpsilonPointsEnterThatAreFartherFromAllOthers) {
   }
   EXPECT_LT(expected.size(), 3500U);
   const IcpMapPtr map = builder.snapshot();
-  for (int i = 0; i < 500; ++i) {
+  int spared = 0;  // searches
+  for (int i = 0; i < 1500; ++i) {
     const Eigen::Vector3d at =
         pose * Eigen::Vector3d(random.uniform(-1.5, 1.5), random.uniform(-1.5, 1.5),
                                random.uniform(-1.5, 1.5));
     IcpPair pair;
+    // Searched near here before: what is known of that must not mislead.
     IcpMap::Known known;
+    const Eigen::Vector3d before(random.uniform(0.0, 0.03), 0.0, 0.0);
+    static_cast<void>(map->nearest(at + before, 0.8, pair, known));
+    if (before.x() < known.slack_m) ++spared;
     const double nearest = farthest_from({at}, expected);
     ASSERT_EQ(map->nearest(at, 0.8, pair, known), nearest <= 0.8) << nearest;
     if (nearest <= 0.8) {
       EXPECT_NEAR(pair.offset.norm(), nearest, 1e-5);
     }
   }
+  EXPECT_GT(spared, 100);
 }
 
 TEST(IcpMap, WithEpsilonWhatIsFarIsForgottenAndMayComeAgain) {
@@ -244,6 +251,104 @@ TEST(IcpMap, WithEpsilonWhatIsFarIsForgottenAndMayComeAgain) {
     EXPECT_LT((point - corner).norm(), 2.0 + kCube);
   builder.insert(points, Pose());
   EXPECT_EQ(builder.snapshot()->size(), all);
+}
+
+// Also beside the forgotten ones: no surface remembers them.
+TEST(IcpMap, WithEpsilonIsTheSameMadeInStepsOrAtOnce) {
+  Random random(10);
+  const Points near = random_points(random, 6000, 2.0);
+  const Points far = random_points(random, 2000, 2.0);
+  const Pose away(Eigen::Quaterniond::Identity(), {30.0, 0.0, 0.0});
+  const Pose beside(Eigen::Quaterniond::Identity(), {4.2, 0.0, 0.0});  // 0.2 m away
+  IcpMapConfig config{.cube_m = kCube, .epsilon_m = 0.08, .growth = 0.0, .max_planarity = 0.99};
+  config.covariances = true;
+  IcpMapBuilder at_once(config);
+  at_once.insert(near, Pose());
+  IcpMapBuilder in_steps(config);
+  in_steps.insert(far, away);
+  IcpMapPtr held = in_steps.snapshot();
+  const std::size_t size = held->size();
+  for (std::size_t i = 0; i < 3; ++i) {
+    in_steps.insert({near.begin() + static_cast<std::ptrdiff_t>(2000 * i),
+                     near.begin() + static_cast<std::ptrdiff_t>(2000 * (i + 1))},
+                    Pose());
+    if (i == 0) in_steps.insert(far, beside);
+    static_cast<void>(in_steps.snapshot());
+    // From there nearly a plane, between the points of both clouds.
+    if (i == 2) in_steps.remove_beyond({-50.0, 0.0, 0.0}, 52.1);
+  }
+  EXPECT_EQ(held->size(), size);
+  const IcpMapPtr expected = at_once.snapshot();
+  const IcpMapPtr stepwise = in_steps.snapshot();
+  ASSERT_EQ(stepwise->size(), expected->size());
+  int compared = 0;
+  int told = 0;
+  for (const Eigen::Vector3d& point : points_of(*expected)) {
+    IcpPair a;
+    IcpPair b;
+    IcpMap::Known in_expected;
+    IcpMap::Known in_stepwise;
+    ASSERT_TRUE(expected->nearest(point, 0.5, a, in_expected));
+    ASSERT_TRUE(stepwise->nearest(point, 0.5, b, in_stepwise));
+    EXPECT_EQ(b.squared_m2, 0.0F);
+    EXPECT_EQ(a.patch.surface, b.patch.surface);
+    const Eigen::Matrix3f* covariance = expected->covariance(in_expected.spot);
+    const Eigen::Matrix3f* other = stepwise->covariance(in_stepwise.spot);
+    ASSERT_EQ(covariance == nullptr, other == nullptr);
+    ++compared;
+    if (covariance == nullptr) continue;
+    EXPECT_LT((*covariance - *other).norm(), 1e-4F);
+    ++told;
+  }
+  EXPECT_GT(compared, 500);
+  EXPECT_GT(told, 500);
+}
+
+// The covariance of a cube is that of all points up to two cubes away, here taken one by one.
+TEST(IcpMap, WithEpsilonTheCovarianceIsThatOfTheSurroundings) {
+  Random random(11);
+  const Points points = random_points(random, 3000, 1.2);
+  IcpMapBuilder builder({.cube_m = kCube, .epsilon_m = 0.05, .growth = 0.0, .covariances = true});
+  builder.insert(points, Pose());
+  const IcpMapPtr map = builder.snapshot();
+  const std::vector<Eigen::Vector3d> all = points_of(*map);
+  const auto cube_of = [](const Eigen::Vector3d& p, Eigen::Index axis) {
+    return std::lround(std::floor(p[axis] / kCube));
+  };
+  for (std::size_t i = 0; i < all.size(); i += 40) {
+    SurfaceSums sums;
+    for (const Eigen::Vector3d& other : all) {
+      bool near = true;
+      for (Eigen::Index axis = 0; axis < 3; ++axis)
+        near = near && std::abs(cube_of(other, axis) - cube_of(all[i], axis)) <= 2;
+      if (near) sums.add((other - all[i]).cast<float>());
+    }
+    IcpPair pair;
+    IcpMap::Known known;
+    ASSERT_TRUE(map->nearest(all[i], 0.5, pair, known));
+    const std::optional<Eigen::Matrix3f> expected = covariance_of(sums);
+    const Eigen::Matrix3f* covariance = map->covariance(known.spot);
+    ASSERT_EQ(expected.has_value(), covariance != nullptr);
+    if (expected) {
+      EXPECT_LT((*expected - *covariance).norm(), 1e-4F);
+    }
+  }
+}
+
+// Of a dense local map a point takes little over the six bytes of its place.
+TEST(IcpMap, WithEpsilonAPointTakesFewBytes) {
+  Random random(12);
+  Points ground;
+  for (int i = 0; i < 60'000; ++i)
+    ground.emplace_back(static_cast<float>(random.uniform(-6.0, 6.0)),
+                        static_cast<float>(random.uniform(-6.0, 6.0)),
+                        static_cast<float>(random.normal(0.1, 0.01)));
+  IcpMapBuilder builder({.cube_m = kCube, .epsilon_m = 0.05});
+  builder.insert(ground, Pose());
+  const auto points = static_cast<double>(builder.snapshot()->size());
+  EXPECT_GT(points, 20'000.0);
+  EXPECT_LT(builder.bytes(), 12.0 * points);
+  EXPECT_GT(builder.bytes(), 6.0 * points);
 }
 
 }  // namespace
