@@ -152,6 +152,12 @@ inline constexpr int kFewestVotes = 3;
 inline constexpr int kYawCells = 24;
 }  // namespace tree_pattern
 
+namespace blur_change {  // graph/self_correction/blur_change.cc
+// Grids on which cells are counted [chosen: on 12 grids beta of lieksa2, seed 24, differs by 1.4 %
+// (sd); the mean of 8 changes by less than the parts of a map differ]
+inline constexpr int kGrids = 8;
+}  // namespace blur_change
+
 namespace correction_methods {  // graph/self_correction/correction_methods.cc
 // Share in common that a pair counts with at least [bound: keeps variances finite]
 inline constexpr double kLeastOverlap = 0.05;

@@ -23,8 +23,7 @@ FeaturePoints some_points() {
 
 // A map with one keyframe at the origin.
 struct Begun {
-  explicit Begun(const KeyframeMap::Config& config)
-      : map(config, folder.path(), times, log) {
+  explicit Begun(const KeyframeMap::Config& config) : map(config, folder.path(), times, log) {
     map.start();
     (void)map.add(TimeNs{0}, {}, some_points());
   }

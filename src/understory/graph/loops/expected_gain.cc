@@ -28,8 +28,7 @@ class GainCorrection {
         config_(config),
         result_(result),
         all_around_({views.overlap.cone().range_m, M_PI}),
-        poses_(result.world_from_view),
-        min_beta_(beta()) {
+        poses_(result.world_from_view) {
     chain_.push_back(poses_.front());
     walked_m2_.push_back(0.0);
     const std::vector<double> variances = plane_variances_m2(views);
@@ -69,10 +68,6 @@ class GainCorrection {
   }
 
  private:
-  [[nodiscard]] double beta() const {
-    return blur_ratio(map_points(views_.problem.map_views, poses_, {}), config_.sharpness);
-  }
-
   // Pairs with overlapping sectors; (27) is not asked of them, as it is the ones that do not fit
   // yet that tell most.
   [[nodiscard]] GainQueue make_queue() {
@@ -162,7 +157,8 @@ class GainCorrection {
     return std::clamp(upper_median(ratios, 1.0), kLeastScale, kMostScale);
   }
 
-  // All accepted pairs at once with the odometry; keeps the poses if the map is the sharpest yet.
+  // All accepted pairs at once with the odometry. Keeps the poses unless they blur the map, against
+  // the poses kept so far or those that the correction began with.
   void solve() {
     PoseGraphProblem graph = chain_problem(views_.problem, poses_);
     graph.loops = views_.problem.loops;
@@ -185,9 +181,10 @@ class GainCorrection {
     poses_ = solved.world_from_keyframe;
     for (std::size_t k = 0; k < accepted_.size(); ++k)
       accepted_[k].used = solved.loop_used[given + k] != 0;
-    const double now = beta();
-    if (now >= min_beta_) return;
-    min_beta_ = now;
+    if (blurs(views_, views_.problem.world_from_view, poses_, config_) ||
+        blurs(views_, result_.world_from_view, poses_, config_)) {
+      return;
+    }
     result_.world_from_view = poses_;
     kept_.clear();
     for (const Accepted& accepted : accepted_) {
@@ -224,7 +221,6 @@ class GainCorrection {
   SelfCorrectionResult& result_;
   ConeOverlap all_around_;
   std::vector<Pose> poses_;
-  double min_beta_;
   std::vector<Pose> chain_;        // the odometry's own poses
   std::vector<double> walked_m2_;  // its variance up to each view
   std::vector<Accepted> accepted_;

@@ -133,6 +133,14 @@ double beta_of(const CorrectionViews& views, const std::vector<Pose>& poses,
   return blur_ratio(map_points(views.problem.map_views, poses, {}), config.sharpness);
 }
 
+bool blurs(const CorrectionViews& views, const std::vector<Pose>& before,
+           const std::vector<Pose>& after, const SelfCorrectionConfig& config) {
+  const BlurChange change =
+      blur_change(map_points(views.problem.map_views, before, {}),
+                  map_points(views.problem.map_views, after, {}), config.sharpness);
+  return change.deviations > config.blurrier_sd;
+}
+
 TriedCorrection tried_correction(const CorrectionPair& pair, const PairMatch& match,
                                  const std::vector<Pose>& poses) {
   TriedCorrection tried;
@@ -237,9 +245,8 @@ void correct_by_pose_graph(const CorrectionViews& views, const SelfCorrectionCon
   }
   const PoseGraphResult solved = optimise_pose_graph(graph, {});
   result.stopped_because = solved.converged ? "solved at once" : solved.reason;
-  const double beta = beta_of(views, poses, config);
-  if (beta_of(views, solved.world_from_keyframe, config) >= beta) {
-    result.stopped_because = "the map would not have become sharper";
+  if (blurs(views, poses, solved.world_from_keyframe, config)) {
+    result.stopped_because = "the map would have become blurrier";
     return;
   }
   result.world_from_view = solved.world_from_keyframe;

@@ -34,6 +34,11 @@ struct CorrectionViews {
 [[nodiscard]] double beta_of(const CorrectionViews& views, const std::vector<Pose>& poses,
                              const SelfCorrectionConfig& config);
 
+// Whether the poses `after` make a blurrier map than `before`, beyond what beta can tell
+// (SelfCorrectionConfig::blurrier_sd).
+[[nodiscard]] bool blurs(const CorrectionViews& views, const std::vector<Pose>& before,
+                         const std::vector<Pose>& after, const SelfCorrectionConfig& config);
+
 // Pairs as the config asks for them, in its order; sets result.promising.
 [[nodiscard]] std::vector<CorrectionPair> chosen_pairs(const CorrectionViews& views,
                                                        const SelfCorrectionConfig& config,

@@ -56,7 +56,6 @@ void correct_by_gaussian_process(const CorrectionViews& views, const SelfCorrect
   const std::vector<PathObservation> loops = observed_loops(views.problem.loops);
   std::vector<Pose> poses = first;
   std::vector<PairMatch> accepted(pairs.size());
-  double min_beta = result.before.beta;
   result.stopped_because = "no pair could be matched";
   // Matched from where they are, regressed, and matched again from there.
   constexpr int kRounds = 2;
@@ -84,12 +83,10 @@ void correct_by_gaussian_process(const CorrectionViews& views, const SelfCorrect
     if (rows.empty()) return;
     const PathProcessResult regressed = regress_path(first, variances, observations, {});
     poses = regressed.world_from_view;
-    const double beta = beta_of(views, poses, config);
-    if (beta >= min_beta) {
-      if (round == 0) result.stopped_because = "the map would not have become sharper";
+    if (blurs(views, first, poses, config) || blurs(views, result.world_from_view, poses, config)) {
+      if (round == 0) result.stopped_because = "the map would have become blurrier";
       continue;
     }
-    min_beta = beta;
     result.world_from_view = poses;
     result.stopped_because = account_of(regressed);
     for (std::size_t k = 0; k < rows.size(); ++k) {

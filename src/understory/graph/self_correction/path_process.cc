@@ -15,12 +15,6 @@ namespace {
 
 using namespace graph_constants::path_process;
 
-Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d result;
-  result << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return result;
-}
-
 // A motion of the world seen at a place: its rotation vector and by what it moves the place.
 Vector6d seen_at(const Pose& motion, const Eigen::Vector3d& place) {
   Vector6d result;

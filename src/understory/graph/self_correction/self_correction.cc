@@ -93,6 +93,9 @@ void describe(ConfigTable& table, SelfCorrectionConfig& config) {
             "most corrections, as a share of the views (the lattice has its own number)");
   table.add("patience", config.patience, {1, 1'000'000}, "",
             "method powers: ends after so many corrections without a sharper map");
+  table.add("blurrier_sd", config.blurrier_sd, {0.0, 100.0}, "sd",
+            "a solution is refused that is blurrier (beta) by more than this many of beta's own "
+            "standard deviations; methods that solve all pairs at once");
   table.add("eliminate_factor", config.eliminate_factor, {0.0, 1e6}, "",
             "views farther from the trees than this times the median (mean square) are left out of "
             "the map; 0: none");
@@ -184,6 +187,11 @@ SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
     const RegistrationNoise noise =
         registration_noise(problem.map_views, result.world_from_view, {}, config.sharpness);
     result.use = views_worth_keeping(noise, config.eliminate_factor, config.eliminate_share);
+  }
+  if (corrected) {
+    result.blur =
+        blur_change(map_points(problem.map_views, problem.world_from_view, {}),
+                    map_points(problem.map_views, result.world_from_view, {}), config.sharpness);
   }
   if (corrected || config.eliminate_factor > 0.0)
     result.after =

@@ -7,6 +7,7 @@
 #include "understory/geometry/pose.h"
 #include "understory/graph/map_sharpness.h"
 #include "understory/graph/pose_graph.h"
+#include "understory/graph/self_correction/blur_change.h"
 #include "understory/graph/self_correction/correction_pairs.h"
 #include "understory/graph/self_correction/power_correction.h"
 #include "understory/registration/stems/go_icp.h"
@@ -60,7 +61,10 @@ struct SelfCorrectionConfig {
   double min_final_overlap = 0.4;  // lambda0, where the match ends
   double largest_share = 0.04;     // corrections at most, of the views (not for the lattice)
   int patience = 20;               // corrections without a sharper map, then it ends (powers)
-  double eliminate_factor = 0.0;   // P0 section 4.2; 0: all views stay
+  // Solutions of all pairs at once: refused where beta is larger than before by more than this many
+  // of its own standard deviations (BlurChange). 0: where it is larger at all.
+  double blurrier_sd = 2.0;
+  double eliminate_factor = 0.0;  // P0 section 4.2; 0: all views stay
   double eliminate_share = 0.05;
   SharpnessConfig sharpness;
   int seed = 1;
@@ -105,12 +109,13 @@ struct [[nodiscard]] SelfCorrectionResult {
   int go_icp_calls = 0;
   MapSharpness before;
   MapSharpness after;
+  BlurChange blur;  // from before to after
   std::string stopped_because;
 };
 
-// Corrects a map by itself. The map is never left blurrier (beta) than it was. Too few views or
-// stems are no error: nothing is tried then. Deterministic; same result for any number of threads.
-// Polls `progress`.
+// Corrects a map by itself. The map is never left blurrier (beta) than it was, beyond what beta can
+// tell (SelfCorrectionConfig::blurrier_sd). Too few views or stems are no error: nothing is tried
+// then. Deterministic; same result for any number of threads. Polls `progress`.
 SelfCorrectionResult self_correct(const SelfCorrectionProblem& problem,
                                   const SelfCorrectionConfig& config,
                                   const ProgressSink& progress = {});

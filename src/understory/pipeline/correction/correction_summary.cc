@@ -58,6 +58,8 @@ void add_self_correction(const CorrectionRun& run, RunSummary& summary) {
   const SelfCorrectionResult& self = run.correction.self;
   add_sharpness("before", self.before, summary);
   add_sharpness("after", self.after, summary);
+  summary.quality["beta_change"] = self.blur.ratio - 1.0;
+  summary.quality["beta_change_deviations"] = self.blur.deviations;
   summary.counts["corrections"] = self.kept;
   summary.counts["corrections_tried"] = static_cast<std::int64_t>(self.tried.size());
   summary.counts["corrections_by_go_icp"] = self.go_icp_calls;
