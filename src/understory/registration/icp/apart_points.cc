@@ -277,9 +277,9 @@ bool ApartPoints::insert(const Place& cube, const Eigen::Vector3f& from_centre) 
   const std::uint64_t bit = std::uint64_t{1} << bit_of(cube);
   const std::size_t rank = rank_of(block, bit_of(cube));
   if ((block.present & bit) == 0) {
-    Cube cube;
-    cube.end = begin_of(block, rank);
-    insert_at(block.cubes, rank, cube);
+    Cube added;
+    added.end = begin_of(block, rank);
+    insert_at(block.cubes, rank, added);
     if (config_.covariances)
       insert_at<Eigen::Matrix3f>(block.covariances, rank, Eigen::Matrix3f::Constant(-1.0F));
     block.present |= bit;
