@@ -31,7 +31,7 @@ void describe(ConfigTable& table, KeyframeConfig& config) {
             "becomes a keyframe, too; 0: none");
   table.add("max_fitness_m2", config.max_fitness_m2, {0.0, 100.0}, "m^2",
             "a scan whose matched points lie farther from the map than this, squared, in the mean, "
-            "becomes no keyframe (P2); 0: all may");
+            "becomes no keyframe; 0: all may");
 }
 
 double keyframe_distance(const Pose& world_from_last, const Pose& world_from_current,
