@@ -88,11 +88,10 @@ void judge_clock(const LidarClock& clock, const std::vector<std::string>& doubts
     outcome.reasons.push_back(clock.topic + ": its clock is not found: the motion is too calm");
   } else if (clock.sd_s > kSureSdS) {
     if (outcome.status == RunStatus::kComplete) outcome.status = RunStatus::kPartial;
-    outcome.reasons.push_back(
-        fmt::format("{}: {:.0f} s of this motion tell its clock to {:.1f} ms alone (standard "
-                    "deviation): record "
-                    "45 s or more with turns",
-                    clock.topic, clock.result.duration_s, 1e3 * clock.sd_s));
+    outcome.reasons.push_back(fmt::format(
+        "{}: its clock is known to {:.1f} ms only (standard deviation), from {:.0f} s of "
+        "motion. Record 45 s or more with turns",
+        clock.topic, 1e3 * clock.sd_s, clock.result.duration_s));
   }
   for (const std::string& doubt : doubts) {
     outcome.status = RunStatus::kUntrusted;

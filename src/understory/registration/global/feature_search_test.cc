@@ -11,6 +11,7 @@
 #include "understory/registration/global/feature_search.h"
 #include "understory/registration/global/match_verdict.h"
 #include "understory/registration/global/search_cloud.h"
+#include "understory/registration/global/test_scans.h"
 #include "understory/util/random.h"
 
 namespace understory {
@@ -59,20 +60,7 @@ struct Sheds {
     return best < 50.0 ? best : 0.0;
   }
   [[nodiscard]] Points scan(const Pose& world_from_lidar, std::uint64_t seed) const {
-    Random random(seed);
-    Points points;
-    for (int ring = 0; ring < 48; ++ring) {
-      const double elevation = (-28.0 + 1.2 * ring) * M_PI / 180.0;
-      for (int k = 0; k < 900; ++k) {
-        const double azimuth = 2.0 * M_PI * k / 900.0;
-        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
-                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-        const double range =
-            cast(world_from_lidar.translation(), world_from_lidar.rotation() * ray);
-        if (range > 0.5) points.push_back(((range + 0.01 * random.normal()) * ray).cast<float>());
-      }
-    }
-    return points;
+    return testing::scan_rings(*this, world_from_lidar, 900, seed);
   }
 };
 

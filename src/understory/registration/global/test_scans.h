@@ -11,6 +11,27 @@
 
 namespace understory::testing {
 
+// A scan of 48 rings with 1 cm of noise, in the frame of the lidar. `scene.cast(eye, ray)` gives
+// the range along a unit ray, 0 where nothing is hit.
+template <typename Scene>
+[[nodiscard]] Points scan_rings(const Scene& scene, const Pose& world_from_lidar, int columns,
+                                std::uint64_t seed) {
+  Random random(seed);
+  Points points;
+  for (int ring = 0; ring < 48; ++ring) {
+    const double elevation = (-28.0 + 1.2 * ring) * M_PI / 180.0;
+    for (int k = 0; k < columns; ++k) {
+      const double azimuth = 2.0 * M_PI * k / columns;
+      const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+      const double range =
+          scene.cast(world_from_lidar.translation(), world_from_lidar.rotation() * ray);
+      if (range > 0.5) points.push_back(((range + 0.01 * random.normal()) * ray).cast<float>());
+    }
+  }
+  return points;
+}
+
 // A plane stand of round stems on rolling ground, and what one lidar sees of it: for tests of
 // matching without a guess.
 struct ScanStand {
@@ -53,22 +74,9 @@ struct ScanStand {
     }
     return best < 40.0 ? best : 0.0;
   }
-  // 48 rings, 640 returns each, with 1 cm of noise, in the frame of the lidar.
+  // In the frame of the lidar.
   [[nodiscard]] Points scan(const Pose& world_from_lidar, std::uint64_t seed) const {
-    Random random(seed);
-    Points points;
-    for (int ring = 0; ring < 48; ++ring) {
-      const double elevation = (-28.0 + 1.2 * ring) * M_PI / 180.0;
-      for (int k = 0; k < 640; ++k) {
-        const double azimuth = 2.0 * M_PI * k / 640.0;
-        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
-                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-        const double range =
-            cast(world_from_lidar.translation(), world_from_lidar.rotation() * ray);
-        if (range > 0.5) points.push_back(((range + 0.01 * random.normal()) * ray).cast<float>());
-      }
-    }
-    return points;
+    return scan_rings(*this, world_from_lidar, 640, seed);
   }
 };
 

@@ -23,10 +23,10 @@ struct NearestTwo {
 };
 
 // Points that are all farther than epsilon from each other (P3 section 3.3), in cubes that share a
-// surface. The points of a block of 4 x 4 x 4 cubes lie side by side, cube after cube, each in
-// 65,536 steps of its cube's edge along an axis (4 micrometres of 0.25 m). Directions of surfaces
-// have steps of 1/32,767. A cube is named by its block's number times 64 plus its bit, until points
-// are removed. Readers may share it between threads while nobody writes.
+// surface. The points of a block of 4 x 4 x 4 cubes lie side by side, cube after cube. A coordinate
+// of a point is one of 65,536 steps along its cube's edge (4 micrometres of 0.25 m). Directions of
+// surfaces have steps of 1/32,767. A cube is named by its block's number times 64 plus its bit,
+// until points are removed. Readers may share it between threads while nobody writes.
 class ApartPoints {
  public:
   using Place = std::array<int, 3>;
