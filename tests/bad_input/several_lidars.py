@@ -106,8 +106,12 @@ def clocks(folder):
     recording = simulated("clocks.mcap", "lidar.time_offset_s=0.03", "second_lidar.time_offset_s=-0.03",
                           "carrier.turn_interval_s=3")
     done = program("calibrate", "lidars", recording, *BOTH, "-o", folder / "rig")
-    assert done.returncode in (0, 4), done.stderr
     found = json.loads((folder / "rig" / "calibration.json").read_text())
+    unsure = [lidar["topic"] for lidar in found["lidars"] if lidar["sd_s"] > 1e-3]
+    assert unsure, "the recording is so short that no clock can be sure"
+    assert done.returncode == 4 and found["status"] == "partial", done.stderr
+    for topic in unsure:
+        assert f"{topic}: its clock is known to" in done.stderr, done.stderr
     late = {lidar["topic"]: lidar["late_s"] for lidar in found["lidars"]}
     assert abs(late["/lidar"] - 0.03) < 0.01 and abs(late["/lidar_2"] + 0.03) < 0.01, late
     again = program("calibrate", "lidars", recording, "--extrinsics", folder / "rig" / "extrinsics.yaml",
