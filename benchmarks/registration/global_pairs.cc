@@ -6,13 +6,12 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "understory/recording/clouds/cloud_file.h"
+#include "posed_scans.h"
 #include "understory/registration/global/global_match.h"
 #include "understory/registration/global/match_verdict.h"
 #include "understory/registration/global/pose_evidence.h"
@@ -23,6 +22,9 @@
 namespace understory {
 namespace {
 
+using benchmarks::for_each_posed_scan;
+using benchmarks::overlap;
+
 struct Sample {
   SearchCloud cloud;
   Pose world_from_cloud;
@@ -31,28 +33,13 @@ struct Sample {
 
 std::vector<Sample> load(const std::string& folder, Log& log) {
   std::vector<Sample> samples;
-  std::ifstream poses(folder + "/poses.txt");
-  for (int i = 0;; ++i) {
-    Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
-    for (int k = 0; k < 12; ++k)
-      poses >> m(k / 4, k % 4);
-    if (!poses) break;
-    char name[32];
-    std::snprintf(name, sizeof name, "/scan_%03d.bin", i);
-    const Points points = read_cloud(folder + name, log).points;
+  for_each_posed_scan(folder, log, [&](const Points& points, const Pose& world_from_cloud) {
     const double start = process_cpu_seconds();
-    Sample sample{prepare_search(points), Pose::from_matrix(m)};
+    Sample sample{prepare_search(points), world_from_cloud};
     sample.prepare_ms = 1e3 * (process_cpu_seconds() - start);
     samples.push_back(std::move(sample));
-  }
+  });
   return samples;
-}
-
-double overlap(const SearchCloud& target, const SearchCloud& source, const Pose& pose) {
-  std::size_t near = 0;
-  for (const Eigen::Vector3f& point : source.points)
-    near += target.near->near((pose * point.cast<double>()).cast<float>()) ? 1 : 0;
-  return static_cast<double>(near) / static_cast<double>(source.points.size());
 }
 
 void match(const Sample& a, const Sample& b, bool same_place, std::size_t i, std::size_t j) {

@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -17,8 +16,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "posed_scans.h"
 #include "understory/preprocess/voxel_filter.h"
-#include "understory/recording/clouds/cloud_file.h"
 #include "understory/registration/global/global_match.h"
 #include "understory/registration/global/match_verdict.h"
 #include "understory/registration/two_clouds.h"
@@ -29,6 +28,9 @@
 
 namespace understory {
 namespace {
+
+using benchmarks::for_each_posed_scan;
+using benchmarks::overlap;
 
 struct Options {
   std::string method;
@@ -48,17 +50,9 @@ struct Sample {
 
 std::vector<Sample> load(const std::string& folder, const Options& options, Log& log) {
   std::vector<Sample> samples;
-  std::ifstream poses(folder + "/poses.txt");
   VoxelFilter filter;
-  for (int i = 0;; ++i) {
-    Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
-    for (int k = 0; k < 12; ++k)
-      poses >> m(k / 4, k % 4);
-    if (!poses) break;
-    char name[32];
-    std::snprintf(name, sizeof name, "/scan_%03d.bin", i);
-    const Points points = read_cloud(folder + name, log).points;
-    Sample sample{prepare_search(points), nullptr, {}, Pose::from_matrix(m)};
+  for_each_posed_scan(folder, log, [&](const Points& points, const Pose& world_from_cloud) {
+    Sample sample{prepare_search(points), nullptr, {}, world_from_cloud};
     if (options.method != "global") {
       const auto matcher = make_matcher(matchers_of_two_clouds(), options.method);
       sample.target = matcher->make_target(
@@ -66,15 +60,8 @@ std::vector<Sample> load(const std::string& folder, const Options& options, Log&
       sample.source = filter.filter(points, kSourceVoxelM);
     }
     samples.push_back(std::move(sample));
-  }
+  });
   return samples;
-}
-
-double overlap(const SearchCloud& target, const SearchCloud& source, const Pose& pose) {
-  std::size_t near = 0;
-  for (const Eigen::Vector3f& point : source.points)
-    near += target.near->near((pose * point.cast<double>()).cast<float>()) ? 1 : 0;
-  return static_cast<double>(near) / static_cast<double>(source.points.size());
 }
 
 Pose moved_at_random(const Pose& truth, const Options& options, Random& random) {
