@@ -44,6 +44,18 @@ def each_sample(folder):
     assert 1e-5 < max(far) < 0.05, f"a prediction is {max(far):.6f} m from the scan that comes later"
 
 
+@cases.case("edges of the graph know what each match told, not the length of the way alone")
+def edges(folder):
+    run = mapped(folder / "run", "--set", "map.enabled=false")
+    unequal = 0
+    lines = [line.split() for line in (run / "graph.g2o").read_text().splitlines() if line.startswith("EDGE_SE3")]
+    for line in lines:
+        information = [float(cell) for cell in line[10:]]  # upper triangle, translation first
+        xx, yy, zz = information[0], information[6], information[11]
+        unequal += max(xx, yy, zz) > 1.0001 * min(xx, yy, zz)
+    assert len(lines) > 10 and unequal > 0.8 * len(lines), f"{unequal} of {len(lines)} edges differ by direction"
+
+
 @cases.case("quarters of scans give four poses a scan, and no other file changes")
 def quarters(folder):
     plain, run = mapped(folder / "plain"), mapped(folder / "parts", "--set", "scan_fraction=0.25")
