@@ -13,8 +13,8 @@
 
 namespace understory::benchmarks {
 
-// Calls act(points in the frame of their lidar, true pose world_from_lidar) for each scan of a folder
-// that pair_scans wrote, in order.
+// Calls act(points in the frame of their lidar, true pose world_from_lidar) for each scan of a
+// folder that pair_scans wrote, in order.
 template <typename Act>
 void for_each_posed_scan(const std::string& folder, Log& log, const Act& act) {
   std::ifstream poses(folder + "/poses.txt");
