@@ -6,7 +6,7 @@ import math
 import random
 
 SEED = 5
-NOISE_M = 0.1
+NOISES_M = (0.1, 0.2)
 NEAR_M = 20.0
 VIEW_RAD = math.radians(105)  # to each side
 CLUTTER_REACH_M = 30.0
@@ -16,9 +16,11 @@ def _half(view, draw):
     return [stem for stem in view if draw.random() < 0.5]
 
 
-def _noisy(view, draw):
-    return [{**stem, **{c: f"{float(stem[c]) + draw.gauss(0.0, NOISE_M):.3f}" for c in "xyz"}}
-            for stem in view]
+def _noisy(noise_m):
+    def moved(view, draw):
+        return [{**stem, **{c: f"{float(stem[c]) + draw.gauss(0.0, noise_m):.3f}" for c in "xyz"}}
+                for stem in view]
+    return moved
 
 
 def _near(view, _):
@@ -42,7 +44,7 @@ def _cluttered(view, draw):
 WAYS = {"as it is": lambda view, _: view,
         "half of each view's stems missed": _half,
         "half as many again that are none": _cluttered,
-        f"{100 * NOISE_M:.0f} cm of noise a coordinate": _noisy,
+        **{f"{100 * noise:.0f} cm of noise a coordinate": _noisy(noise) for noise in NOISES_M},
         f"only stems within {NEAR_M:.0f} m": _near,
         "210 degrees ahead": _ahead}
 

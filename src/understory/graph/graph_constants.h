@@ -94,6 +94,11 @@ inline constexpr double kLoopShiftL0 = 0.02;
 inline constexpr double kNearestOverlap = 0.8;
 // Of the least overlap: with less no other view is tried [not recorded]
 inline constexpr double kHopeless = 0.5;
+// Standard deviations by which two views lie nearer than the largest distance [chosen]
+inline constexpr double kSureSigmas = 2.0;
+// Of the variances of the steps between views laid together: their error as a whole [chosen: three
+// times that of a random walk to both sides]
+inline constexpr double kGatheredShare = 0.25;
 }  // namespace stem_loops
 
 namespace loop_closure {  // graph/loops/loop_closure.cc

@@ -84,8 +84,9 @@ class GainCorrection {
   }
 
   [[nodiscard]] SparsePoints gathered(int centre) const {
-    return gather_views(views_.problem.views, poses_, centre, config_.gain.window_l0 * views_.l0_m,
-                        config_.gain.window_views, kGatherL0 * views_.l0_m);
+    return gather_views(
+        views_.problem.views, poses_, centre,
+        {config_.gain.window_l0 * views_.l0_m, config_.gain.window_views, kGatherL0 * views_.l0_m});
   }
 
   [[nodiscard]] PairMatch match(const CorrectionPair& pair) const {

@@ -6,6 +6,7 @@
 
 #include "understory/geometry/matrix_inverse.h"
 #include "understory/graph/graph_constants.h"
+#include "understory/graph/loops/view_cone.h"
 #include "understory/graph/stem_matching/pair_matching.h"
 #include "understory/registration/stems/tilt_about.h"
 #include "understory/util/error.h"
@@ -30,13 +31,11 @@ double median_l0(const std::vector<SparsePoints>& views) {
 // day. In half of the stems one triangle in eight is whole.
 std::vector<SparsePoints> gathered_views(const std::vector<SparsePoints>& views,
                                          const std::vector<Pose>& poses,
-                                         const StemLoopConfig& config) {
-  if (config.gather_l0 <= 0.0) return views;
-  const double l0_m = median_l0(views);
+                                         const Gathering& gathering) {
+  if (gathering.reach_m <= 0.0) return views;
   std::vector<SparsePoints> gathered(views.size());
   parallel_for(views.size(), 4, [&](std::size_t i) {
-    gathered[i] = gather_views(views, poses, static_cast<int>(i), config.gather_l0 * l0_m,
-                               config.gather_views, kMergeL0 * l0_m);
+    gathered[i] = gather_views(views, poses, static_cast<int>(i), gathering);
   });
   return gathered;
 }
@@ -68,14 +67,14 @@ Matrix6d loop_covariance(const SparseIcpResult& icp, const SparsePoints& source,
 
 class Finder {
  public:
-  Finder(const std::vector<SparsePoints>& single, const std::vector<SparsePoints>& views,
-         const std::vector<Pose>& poses, const StemLoopConfig& config)
-      : single_(single),
+  Finder(const StemPath& path, const std::vector<SparsePoints>& views, double gathered_reach_m,
+         const StemLoopConfig& config)
+      : path_(path),
         views_(views),
-        poses_(poses),
+        gathered_reach_m_(gathered_reach_m),
         config_(config),
         l0_m_(median_l0(views)),
-        patterns_(places_of(views, poses, l0_m_, config)) {}
+        patterns_(places_of(views, path.world_from_view, l0_m_, config)) {}
 
   [[nodiscard]] std::optional<StemLoop> find(int query) const {
     const int before = query - config_.exclude_recent + 1;
@@ -93,7 +92,9 @@ class Finder {
   [[nodiscard]] const SparsePoints& view(int i) const {
     return views_[static_cast<std::size_t>(i)];
   }
-  [[nodiscard]] const Pose& pose(int i) const { return poses_[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] const Pose& pose(int i) const {
+    return path_.world_from_view[static_cast<std::size_t>(i)];
+  }
 
   [[nodiscard]] StemLoop verify(const std::vector<SparsePoints>& views, int query, int match,
                                 const Pose& guess) const {
@@ -108,9 +109,16 @@ class Finder {
     loop.score = icp.overlap * std::exp(-apart * apart);
     loop.match_from_query = icp.target_from_source;
     loop.covariance = loop_covariance(icp, source, l0_m_);
-    loop.verified = icp.overlap >= config_.min_overlap &&
-                    icp.target_from_source.translation().norm() <= config_.max_distance_m;
     return loop;
+  }
+
+  // Whether the views overlap by that much and surely lie near enough to each other.
+  [[nodiscard]] bool verified(const StemLoop& loop, double min_overlap) const {
+    const Eigen::Vector3d& shift = loop.match_from_query.translation();
+    const Eigen::Vector2d way = shift.head<2>().normalized();
+    const double variance = way.dot(loop.covariance.block<2, 2>(3, 3) * way);
+    return loop.overlap >= min_overlap &&
+           shift.norm() + kSureSigmas * std::sqrt(variance) <= config_.max_distance_m;
   }
 
   // The view around the place that the query stands nearest to.
@@ -127,21 +135,39 @@ class Finder {
     return moved.overlap >= kNearestOverlap * loop.overlap ? moved : loop;
   }
 
-  // Views laid together find a place, and single ones tell how they lie to each other: where those
-  // have little in common, what was gathered carries the odometry's errors into the loop.
+  // Views laid together find a place. The two views themselves tell how they lie to each other,
+  // where they have enough in common. Views that face opposite ways have not: there what was laid
+  // together tells it, with the odometry's errors.
   [[nodiscard]] StemLoop confirmed(StemLoop loop) const {
-    const StemLoop single = verify(single_, loop.query, loop.match, loop.match_from_query);
-    loop.verified = single.verified;
-    if (!single.verified) return loop;
-    loop.overlap = single.overlap;
-    loop.match_from_query = single.match_from_query;
-    loop.covariance = single.covariance;
+    StemLoop single = verify(path_.views, loop.query, loop.match, loop.match_from_query);
+    single.score = loop.score;
+    single.verified = verified(single, config_.min_overlap);
+    if (single.verified || gathered_reach_m_ <= 0.0) return single.verified ? single : loop;
+    loop.covariance += gathered_covariance(loop.query) + gathered_covariance(loop.match);
+    loop.verified = verified(loop, config_.min_gathered_overlap);
     return loop;
   }
 
-  const std::vector<SparsePoints>& single_;
+  // Of the views laid together around one, as a whole, against that one. Of a random walk to both
+  // sides the mean has a twelfth of the variance of the whole way. A view that looks to one side
+  // has most stems from there, and the errors of neighbouring steps are alike.
+  [[nodiscard]] Matrix6d gathered_covariance(int centre) const {
+    Matrix6d sum = Matrix6d::Zero();
+    const auto count = static_cast<int>(path_.world_from_view.size());
+    for (const int side : {-1, 1}) {
+      double way = 0.0;
+      for (int k = centre; k + side >= 0 && k + side < count; k += side) {
+        way += (pose(k + side).translation() - pose(k).translation()).norm();
+        if (way > gathered_reach_m_) break;
+        sum += path_.step_covariances[static_cast<std::size_t>(std::max(k, k + side))];
+      }
+    }
+    return kGatheredShare * sum;
+  }
+
+  const StemPath& path_;
   const std::vector<SparsePoints>& views_;  // laid together
-  const std::vector<Pose>& poses_;
+  double gathered_reach_m_;                 // 0: they are single ones
   const StemLoopConfig& config_;
   double l0_m_;
   TreePatterns patterns_;
@@ -158,6 +184,8 @@ void describe(ConfigTable& table, StemLoopConfig& config) {
             "largest distance between two views of one place");
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
             "least share of stems that two views have in common");
+  table.add("min_gathered_overlap", config.min_gathered_overlap, {0.0, 1.0}, "",
+            "the same of joined views, where two views alone have less in common");
   table.add(
       "gather_l0", config.gather_l0, {0.0, 100.0}, "stem spacings",
       "views within this distance along the path, to each side, are joined; 0: each view alone");
@@ -167,14 +195,18 @@ void describe(ConfigTable& table, StemLoopConfig& config) {
   table.section("icp", [&] { describe(table, config.icp); });
 }
 
-std::vector<StemLoop> find_stem_loops(const std::vector<SparsePoints>& level_views,
-                                      const std::vector<Pose>& world_from_level,
-                                      const StemLoopConfig& config, const ProgressSink& progress) {
-  UNDERSTORY_CHECK(level_views.size() == world_from_level.size());
-  const std::vector<SparsePoints> gathered = gathered_views(level_views, world_from_level, config);
-  const Finder finder(level_views, gathered, world_from_level, config);
-  std::vector<std::optional<StemLoop>> found(level_views.size());
-  parallel_for(level_views.size(), 4, [&](std::size_t i) {
+std::vector<StemLoop> find_stem_loops(const StemPath& path, const StemLoopConfig& config,
+                                      const ProgressSink& progress) {
+  UNDERSTORY_CHECK(path.views.size() == path.world_from_view.size());
+  UNDERSTORY_CHECK(path.views.size() == path.step_covariances.size());
+  const double l0_m = median_l0(path.views);
+  const Gathering gathering{config.gather_l0 * l0_m, config.gather_views, kMergeL0 * l0_m,
+                            estimate_view_cone(path.views).range_m};
+  const std::vector<SparsePoints> gathered =
+      gathered_views(path.views, path.world_from_view, gathering);
+  const Finder finder(path, gathered, gathering.reach_m, config);
+  std::vector<std::optional<StemLoop>> found(path.views.size());
+  parallel_for(path.views.size(), 4, [&](std::size_t i) {
     progress.poll();
     found[i] = finder.find(static_cast<int>(i));
   });

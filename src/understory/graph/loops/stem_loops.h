@@ -16,9 +16,10 @@ struct StemLoopConfig {
   int exclude_recent = 50;      // views; nearer ones are the same passage
   double place_spacing = 2.0;   // L0; of the places that are kept to be found, along the path
   double max_distance_m = 3.0;  // views farther apart than this are not of the same place
-  double gather_l0 = 1.5;       // views within that part of the way to each side are laid together,
-  int gather_views = 4;         // at most that many to each side; 0 L0: each view by itself
+  double gather_l0 = 5.0;       // views within that part of the way to each side are laid together,
+  int gather_views = 10;        // at most that many to each side; 0 L0: each view by itself
   double min_overlap = 0.4;     // P0's lambda0, section 2.3
+  double min_gathered_overlap = 0.5;  // of views laid together, where single ones have too little
 };
 void describe(ConfigTable& table, StemLoopConfig& config);
 
@@ -26,7 +27,7 @@ void describe(ConfigTable& table, StemLoopConfig& config);
 struct StemLoop {
   int query = 0;
   int match = 0;         // an earlier view
-  double overlap = 0.0;  // of the two views after matching, 0..1; unverified: as laid together
+  double overlap = 0.0;  // of the two views after matching, 0..1; else of those laid together
   // Overlap as laid together, less the farther the views are apart (views of one place overlap
   // wherever they look from, but also with the next place): overlap * exp(-(distance /
   // max_distance_m)^2).
@@ -36,14 +37,21 @@ struct StemLoop {
   bool verified = false;                       // overlap and distance are those of a loop
 };
 
+// What loops are looked for in: views of stems along a path.
+struct StemPath {
+  const std::vector<SparsePoints>& views;  // level frames
+  // How neighbouring views lie to each other, and which earlier view lies nearest to a place that
+  // was found. No guess is taken from it.
+  const std::vector<Pose>& world_from_view;
+  const std::vector<Matrix6d>& step_covariances;  // of the motion from the view before, right
+};
+
 // For every view the place seen before that it looks like most: found by tree pattern and ICP among
 // views laid together with their neighbours (`gather_l0`), verified and measured by ICP of the two
-// views themselves. `world_from_level` says how neighbouring views lie to each other and which
-// earlier view lies nearest to the place found, no more: no guess is taken from it. Views without
-// any candidate have no row. Same result for any number of threads. Polls
+// views themselves, or else of what was laid together. Stems farther than views reach are left out
+// of that. Views without any candidate have no row. Same result for any number of threads. Polls
 // `progress`.
-[[nodiscard]] std::vector<StemLoop> find_stem_loops(const std::vector<SparsePoints>& level_views,
-                                                    const std::vector<Pose>& world_from_level,
+[[nodiscard]] std::vector<StemLoop> find_stem_loops(const StemPath& path,
                                                     const StemLoopConfig& config,
                                                     const ProgressSink& progress = {});
 

@@ -306,12 +306,12 @@ TEST(PairMatching, FindsAPairWhoseGuessIsOffAndRefusesOneOfStrangers) {
 
 TEST(PairMatching, GatheredViewsSeeMoreAndSharper) {
   const Drive seen = drive(10);
-  const SparsePoints gathered = gather_views(seen.problem.views, seen.truth, 60, 3.0, 12, 0.4);
+  const SparsePoints gathered = gather_views(seen.problem.views, seen.truth, 60, {3.0, 12, 0.4});
   EXPECT_GT(gathered.size(), seen.problem.views[60].size() * 5 / 4);
   // Against the trees as all views see them on average.
   double squares = 0.0;
   std::size_t counted = 0;
-  const SparsePoints many = gather_views(seen.problem.views, seen.truth, 60, 15.0, 40, 0.4);
+  const SparsePoints many = gather_views(seen.problem.views, seen.truth, 60, {15.0, 40, 0.4});
   const PlaneGrid grid(many);
   for (const Eigen::Vector3d& point : gathered) {
     const auto near = grid.nearest(point, 0.3, 0.0);

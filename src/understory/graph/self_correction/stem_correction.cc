@@ -112,7 +112,8 @@ SelfCorrectionProblem problem_of(LevelViews& level, const std::vector<SparseStep
 // Loops over the odometry; leaves the poses and the accepted loops in the problem.
 void close_loops(const StemCorrectionConfig& config, const ProgressSink& progress,
                  SelfCorrectionProblem& problem, StemCorrection& result) {
-  result.loops = find_stem_loops(problem.views, problem.world_from_view, config.loops, progress);
+  result.loops = find_stem_loops({problem.views, problem.world_from_view, problem.step_covariances},
+                                 config.loops, progress);
   result.accepted.assign(result.loops.size(), 0);
   result.loop_shift_m.assign(result.loops.size(), 0.0);
   PoseGraphProblem graph = chain_problem(problem, problem.world_from_view);

@@ -116,8 +116,8 @@ PairMatch match_lattice_pair(const SparseTarget& target, const SparsePoints& sou
 }
 
 SparsePoints gather_views(const std::vector<SparsePoints>& views,
-                          const std::vector<Pose>& world_from_view, int centre, double reach_m,
-                          int max_views, double merge_m) {
+                          const std::vector<Pose>& world_from_view, int centre,
+                          const Gathering& gathering) {
   // The reach is measured along the way, so that a turn on the spot gathers all around.
   const auto last_within = [&](int step) {
     double way = 0.0;
@@ -125,14 +125,14 @@ SparsePoints gather_views(const std::vector<SparsePoints>& views,
     while (k + step >= 0 && at(k + step) < views.size()) {
       way += (world_from_view[at(k + step)].translation() - world_from_view[at(k)].translation())
                  .norm();
-      if (way > reach_m) break;
+      if (way > gathering.reach_m) break;
       k += step;
     }
     return k;
   };
   const int first = last_within(-1);
   const int last = last_within(1);
-  const int stride = std::max(1, (last - first) / (2 * max_views));
+  const int stride = std::max(1, (last - first) / (2 * gathering.max_views));
   const Pose centre_from_world = world_from_view[at(centre)].inverse();
   SparsePoints sums;
   std::vector<int> sights;
@@ -147,7 +147,9 @@ SparsePoints gather_views(const std::vector<SparsePoints>& views,
     std::vector<char> taken(means.size(), 0);
     for (const Eigen::Vector3d& point : views[at(k)]) {
       const Eigen::Vector3d here = centre_from_view * point;
-      const auto found = means.empty() ? PlaneGrid::Neighbour{} : grid.nearest(here, merge_m, 0.0);
+      if (gathering.radius_m > 0.0 && here.head<2>().norm() > gathering.radius_m) continue;
+      const auto found =
+          means.empty() ? PlaneGrid::Neighbour{} : grid.nearest(here, gathering.merge_m, 0.0);
       if (found.index < 0) {
         sums.push_back(here);
         sights.push_back(1);

@@ -37,10 +37,18 @@ PairMatch match_lattice_pair(const SparseTarget& target, const SparsePoints& sou
 [[nodiscard]] Matrix6d match_covariance(const Matrix6d& information, const SparsePoints& source,
                                         double shift_sd_m);
 
+// Which views are laid together, and which of their stems.
+struct Gathering {
+  double reach_m = 0.0;   // along the way, to each side
+  int max_views = 0;      // to each side, evenly over the reach
+  double merge_m = 0.0;   // stems of different views nearer than that are one
+  double radius_m = 0.0;  // in the plane, of the stems that are kept; 0: all
+};
+
 // Views around one, laid together in its frame by their poses: stems seen in several views are
 // means, those seen once among three views or more are left out.
 [[nodiscard]] SparsePoints gather_views(const std::vector<SparsePoints>& views,
                                         const std::vector<Pose>& world_from_view, int centre,
-                                        double reach_m, int max_views, double merge_m);
+                                        const Gathering& gathering);
 
 }  // namespace understory
