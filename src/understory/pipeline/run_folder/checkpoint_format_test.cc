@@ -48,7 +48,7 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(LoopCloser(LoopCloserConfig(), LocalMapConfig())), 17U);
   EXPECT_EQ(sizeof(DenseCounts), 184U);
   EXPECT_EQ(saved(FixJoiner()), 55U);
-  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_traits(writer, {}); }), 54U);
+  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_traits(writer, {}); }), 62U);
   EXPECT_EQ(size_of([](BinaryWriter& writer) { put_rig(writer, {}); }), 148U);
   EXPECT_EQ(size_of([](BinaryWriter& writer) { put_fix(writer, {}); }), 160U);
   EXPECT_EQ(size_of([](BinaryWriter& writer) { put_imu(writer, {}); }), 57U);
