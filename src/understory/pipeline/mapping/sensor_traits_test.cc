@@ -78,8 +78,8 @@ TEST(SensorTraits, TellWhatTheSensorsAre) {
 // Lidars are placed on the body, and stay so in a checkpoint.
 TEST(SensorTraits, TellWhereAllLidarsAre) {
   SensorTraits traits;
-  static_cast<void>(learn_traits(
-      std::make_unique<ScansOf>(std::vector<std::size_t>(3, 29'000), true), traits));
+  static_cast<void>(
+      learn_traits(std::make_unique<ScansOf>(std::vector<std::size_t>(3, 29'000), true), traits));
   ASSERT_EQ(traits.further_lidars_in_body.size(), 1U);
   EXPECT_LT((traits.further_lidars_in_body[0] - Eigen::Vector3d(1.0, 2.0, 5.0)).norm(), 1e-12);
   BinaryWriter writer;

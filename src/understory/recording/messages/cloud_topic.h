@@ -29,8 +29,8 @@ class CloudTopic {
     ring_count_ = count;
     no_rings_ = count == 0;
   }
-  // Its scans are those of several lidars, merged (kRingsALidar).
-  void know_merged() { merged_ = true; }
+  // Whether its scans are those of several lidars, merged (kRingsALidar).
+  void know_merged(bool merged) { merged_ = merged; }
   // What the first seconds tell of a Livox (`lidar` may be null or another sensor): its model, and
   // where its IMU is, if both have one frame. Warns where the place is not known.
   void know_livox(const TopicSurvey* lidar, SensorPlaces& places, TransformTree& transforms);

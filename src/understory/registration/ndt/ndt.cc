@@ -81,7 +81,8 @@ RegistrationResult register_ndt(const NdtMap& target, const NdtSource& source, c
     plain.hessian = NdtConfig::Hessian::kGaussNewton;
     sums = ndt_cost(target, source, minimum.pose, plain, 1.0, coarser);
   }
-  return internal::judged_match(minimum, sums, source.points, range, guess, internal::Judgement(config));
+  return internal::judged_match(minimum, sums, source.points, range, guess,
+                                internal::Judgement(config));
 }
 
 RegistrationResult register_ndt(std::span<const NdtMapPtr> targets, const NdtSource& source,

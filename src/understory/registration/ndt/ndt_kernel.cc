@@ -40,7 +40,7 @@ constexpr std::size_t kBlock = 128;
 struct LocalPose {
   std::array<int, 3> base;
   Eigen::Matrix3f rotation;
-  Eigen::Vector3f translation;  // metres from the corner of the base cell
+  Eigen::Vector3f translation;              // metres from the corner of the base cell
   std::vector<Eigen::Vector3f> viewpoints;  // from the source's origin, axes of the target
   float cell;
   float per_cell;
@@ -146,8 +146,8 @@ struct PointIndices {
 
 class Accumulator {
  public:
-  Accumulator(const NdtMap& target, const NdtSource& source, const Pose& pose, const NdtConfig& config,
-              double widening)
+  Accumulator(const NdtMap& target, const NdtSource& source, const Pose& pose,
+              const NdtConfig& config, double widening)
       : target_(target),
         source_(source),
         local_(localise(pose, target.cell_size(), target.viewpoints_in_source())),
