@@ -48,6 +48,7 @@ def merged(folder):
 def converted(folder):
     again = folder / "again.mcap"
     assert program("convert", WALK, again, *BOTH).returncode == 0
+    assert info_of(again)["lidar"]["rings"] == info_of(WALK, *BOTH)["lidar"]["rings"] == 32
     tables = []
     for name, recording, options in (("a", WALK, BOTH), ("b", again, ())):
         table = folder / f"{name}.csv.gz"

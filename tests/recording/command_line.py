@@ -69,6 +69,21 @@ def hesai_packet(i):
         + struct.pack("<I", 400 * i) + b"\x42" + struct.pack("<I", i)
 
 
+def velodyne_packet(i):
+    """Of a VLP-16 that turns ten times a second, 1.327 ms each"""
+    blocks = b"".join(struct.pack("<HH", 0xEEFF, round(47.77 * i * 10 + 39.8 * b) % 36000)
+                      + struct.pack("<HB", 2500, 9) * 32 for b in range(12))
+    return blocks + struct.pack("<IBB", 800_000_000 + 1327 * i, 0x37, 0x22)
+
+
+def velodyne_capture(folder, packets):
+    start = 1_700_000_000 * 10**9
+    file = folder / "velodyne.pcap"
+    file.write_bytes(struct.pack("<IHHQII", 0xA1B2C3D4, 2, 4, 0, 65535, 1) + b"".join(
+        datagram(start + 1_327_000 * i, 2368, 2368, data) for i, data in enumerate(packets)))
+    return file
+
+
 def livox_packet(i, imu=False):
     """Of a Mid-360, 0.48 ms each"""
     data = struct.pack("<6f", 0, 0, 0.1, 0, 0, 1) if imu else \
@@ -111,7 +126,7 @@ def check_captures(folder):
         target = folder / (recording.stem + ".mcap")
         assert run("convert", recording, target)[0] == 0
         again = info(target)
-        for kind, count in (("lidar", "scans"), ("lidar", "points"), ("imu", "samples")):
+        for kind, count in (("lidar", "scans"), ("lidar", "points"), ("lidar", "rings"), ("imu", "samples")):
             assert again[kind][count] == seen[kind][count], (recording, kind, count)
     code, _, errors = run("info", other)
     assert code == 3 and "RoboSense" in errors and "PointCloud2" in errors, errors
@@ -139,6 +154,22 @@ def check_bad_captures(folder):
     strange = [(i, d, data[:2] + bytes([9, 7]) + data[4:]) for i, d, data in whole]
     code, _, errors = run("info", capture("strange.pcap", strange))
     assert code == 3 and "another Hesai (protocol 9.7" in errors and "PointCloud2" in errors, errors
+    velodyne = [velodyne_packet(i) for i in range(400)]
+    points = info(velodyne_capture(folder, velodyne))["lidar"]["points"]
+    cut = info(velodyne_capture(folder, velodyne[:200] + [velodyne[200][:700]] + velodyne[201:]))
+    assert cut["lidar"]["points"] == points - 384, cut["lidar"]
+    assert any("has 700 bytes, expected 1206" in each for each in cut["warnings"]), cut["warnings"]
+    doubled = info(velodyne_capture(folder, velodyne[:200] + [velodyne[200]] + velodyne[200:]))
+    assert doubled["lidar"]["points"] == points, doubled["lidar"]
+    assert any("comes twice" in each for each in doubled["warnings"]), doubled["warnings"]
+    code, _, errors = run("info", velodyne_capture(folder, [each[:-1] + b"\x99" for each in velodyne]))
+    assert code == 3 and "a Velodyne of unknown product 153" in errors and "PointCloud2" in errors, errors
+    unknown = folder / "livox9.pcap"
+    unknown.write_bytes(head + b"".join(
+        datagram(start + 480_000 * i, 56300, 56301, b"\x09" + livox_packet(i)[1:]) for i in range(100)))
+    code, _, errors = run("info", unknown)
+    assert code == 3 and "a Livox of unknown version 9" in errors and "PointCloud2" in errors, errors
+    points = info(folder / "whole.pcap")["lidar"]["points"]
     both = capture("both.pcap", [each for i in range(750) for each in ((i, 1, hesai_packet(i)), (i, 2, hesai_packet(i)))])
     seen = info(both)
     assert seen["lidar"]["points"] == points, seen["lidar"]

@@ -20,6 +20,7 @@ enum class PointFeature : std::uint8_t {
 struct FeaturePoints {
   Points points;
   std::vector<PointFeature> features;
+  std::vector<std::uint8_t> lidars = {};  // which lidar measured each; empty: the first one all
 };
 
 }  // namespace understory

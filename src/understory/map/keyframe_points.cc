@@ -13,7 +13,8 @@ KeyframePoints::KeyframePoints(const std::filesystem::path& file, const RecordCo
     : clouds_(file, known), cached_(cached) {}
 
 // What says that a cloud has features stands in the column of intensities, which these clouds do
-// not have: a feature is its number and one, and 0 is none at all.
+// not have: a feature is its number and one, and 0 is none at all. The lidar stands in the column
+// of times.
 void KeyframePoints::append(TimeNs stamp, const FeaturePoints& cloud) {
   const std::lock_guard lock(mutex_);
   KeyframeCloud stored{static_cast<std::int32_t>(clouds_.size()), stamp, {}, {}};
@@ -21,7 +22,8 @@ void KeyframePoints::append(TimeNs stamp, const FeaturePoints& cloud) {
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     const Eigen::Vector3f& p = cloud.points[i];
     const int feature = cloud.features.empty() ? 0 : static_cast<int>(cloud.features[i]) + 1;
-    stored.points.push_back({p.x(), p.y(), p.z(), static_cast<std::uint16_t>(feature), 0});
+    const std::uint16_t lidar = cloud.lidars.empty() ? 0 : cloud.lidars[i];
+    stored.points.push_back({p.x(), p.y(), p.z(), static_cast<std::uint16_t>(feature), lidar});
   }
   remember(clouds_.size(), std::make_shared<const FeaturePoints>(cloud));
   clouds_.append(stored);
@@ -37,9 +39,16 @@ std::shared_ptr<const FeaturePoints> KeyframePoints::get(std::size_t keyframe) {
   const KeyframeCloud stored = clouds_.read(keyframe);
   FeaturePoints cloud;
   cloud.points.reserve(stored.points.size());
+  bool further = false;
   for (const KeyframePoint& p : stored.points) {
     cloud.points.emplace_back(p.x, p.y, p.z);
     if (p.intensity > 0) cloud.features.push_back(static_cast<PointFeature>(p.intensity - 1));
+    further = further || p.t_10us > 0;
+  }
+  if (further) {
+    cloud.lidars.reserve(stored.points.size());
+    for (const KeyframePoint& p : stored.points)
+      cloud.lidars.push_back(static_cast<std::uint8_t>(p.t_10us));
   }
   auto shared = std::make_shared<const FeaturePoints>(std::move(cloud));
   remember(keyframe, shared);

@@ -12,6 +12,7 @@
 
 #include "understory/map/keyframe_clouds.h"
 #include "understory/map/keyframe_map.h"
+#include "understory/map/keyframe_points.h"
 #include "understory/map/local_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/util/error.h"
@@ -92,6 +93,24 @@ TEST(KeyframeClouds, ADamagedCloudIsAnInputErrorWhenItIsRead) {
 }
 
 // P2 (37): metres and turns on one scale.
+TEST(KeyframePoints, KeepTheirFeaturesAndLidarsOnTheDisk) {
+  const test::TemporaryFolder folder;
+  const Points three(3, Eigen::Vector3f(1.0F, 2.0F, 3.0F));
+  const std::vector<FeaturePoints> clouds = {
+      {three, {}, {}},
+      {three, {}, {0, 1, 15}},
+      {three, {PointFeature::kEdge, PointFeature::kNone, PointFeature::kGround}, {2, 0, 0}}};
+  KeyframePoints points(folder.path() / "points", 10);
+  for (const FeaturePoints& cloud : clouds)
+    points.append(TimeNs{0}, cloud);
+  points.forget();  // what is in memory
+  for (std::size_t i = 0; i < clouds.size(); ++i) {
+    EXPECT_EQ(points.get(i)->points, clouds[i].points);
+    EXPECT_EQ(points.get(i)->features, clouds[i].features);
+    EXPECT_EQ(points.get(i)->lidars, clouds[i].lidars);
+  }
+}
+
 TEST(KeyframeDistance, WeighsTurnsAgainstMetres) {
   KeyframeConfig config;
   config.rotation_as_metre_deg = 20.0;

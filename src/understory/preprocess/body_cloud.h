@@ -35,4 +35,8 @@ struct BodyCloud {
   }
 };
 
+// Which lidar of several measured each point, by its ring (kRingsALidar); empty where it was the
+// first one always.
+[[nodiscard]] std::vector<std::uint8_t> lidars_of(const std::vector<std::uint16_t>& rings);
+
 }  // namespace understory

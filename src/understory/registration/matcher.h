@@ -105,6 +105,8 @@ class TargetBuilder {
 struct Viewpoint {
   // Where the lidar is in the frames of the sources, metres; unknown: nothing.
   std::optional<Eigen::Vector3d> lidar_in_source;
+  // Where lidars 1, 2 ... of a scan of several are, metres (FeaturePoints::lidars).
+  std::vector<Eigen::Vector3d> further_lidars_in_source = {};
 };
 
 // A whole scan with its rings: parallel arrays in the order in which it was measured. Axes with z

@@ -181,6 +181,16 @@ std::vector<PartEstimate> DenseOdometry::match_parts(const Scan& scan,
   return estimates;
 }
 
+RegistrationResult DenseOdometry::match_cloud(const MatchTarget& local_map, const BodyCloud& cloud,
+                                              const Pose& guess, const PoseTerms& terms,
+                                              MatchStart start) const {
+  std::vector<std::uint8_t> lidars = lidars_of(cloud.ring);
+  if (features_ == nullptr && lidars.empty())
+    return local_map.match(cloud.points, guess, terms, start);
+  return local_map.match_features({cloud.points, cloud.feature, std::move(lidars)}, guess, terms,
+                                  start);
+}
+
 // The match of a part is looser than that of a scan in some directions: there the prediction
 // counts.
 PartEstimate DenseOdometry::match_part(const Scan& part, const MatchTarget& local_map) {
@@ -195,10 +205,7 @@ PartEstimate DenseOdometry::match_part(const Scan& part, const MatchTarget& loca
   const bool far = sigma > config_.match.coarse_above_sigma * local_map.reach_m();
   const MatchStart start = far ? MatchStart::kFar : MatchStart::kNear;
   const RegistrationResult match =
-      features_ == nullptr
-          ? local_map.match(seen.thinned.points, predicted.world_from_body, {}, start)
-          : local_map.match_features({seen.thinned.points, seen.thinned.feature},
-                                     predicted.world_from_body, {}, start);
+      match_cloud(local_map, seen.thinned, predicted.world_from_body, {}, start);
   const double least =
       std::max(config_.match.min_inlier_ratio, config_.match.min_inlier_share * usual_inliers_);
   estimate.matched = match.usable() && match.inlier_ratio >= least;
@@ -261,10 +268,7 @@ void DenseOdometry::match(const MatchTarget& local_map, const NavState& predicte
   }
   const MatchStart start = far ? MatchStart::kFar : MatchStart::kNear;
   estimate.match =
-      features_ == nullptr
-          ? local_map.match(estimate.thinned.points, predicted.world_from_body, terms, start)
-          : local_map.match_features({estimate.thinned.points, estimate.thinned.feature},
-                                     predicted.world_from_body, terms, start);
+      match_cloud(local_map, estimate.thinned, predicted.world_from_body, terms, start);
   const double found = estimate.match.inlier_ratio;
   estimate.matched = estimate.match.usable() && found >= config.min_inlier_ratio;
   if (estimate.matched) compare_with_usual(estimate);

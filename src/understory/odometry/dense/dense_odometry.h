@@ -149,6 +149,9 @@ class DenseOdometry {
   void preprocess(const Scan& scan, const std::vector<StampedPose>& path, DenseEstimate& estimate);
   void clean(const Scan& scan, const std::vector<StampedPose>& path, DenseEstimate& estimate);
   [[nodiscard]] PartEstimate match_part(const Scan& part, const MatchTarget& local_map);
+  [[nodiscard]] RegistrationResult match_cloud(const MatchTarget& local_map, const BodyCloud& cloud,
+                                               const Pose& guess, const PoseTerms& terms,
+                                               MatchStart start) const;
   // Whether no IMU tells of the motion.
   [[nodiscard]] bool by_scans_alone() const;
   void match_elastically(const Scan& scan, const MatchTarget& target,

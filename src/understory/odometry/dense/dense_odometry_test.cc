@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -147,6 +148,47 @@ TEST_F(LookingAround, ALidarThatJoinsIsNoReasonToDoubtTheMatch) {
   const DenseEstimate doubted = last_of(0);
   EXPECT_FALSE(doubted.matched);
   EXPECT_EQ(doubted.match.reason, "suddenly much less than before");
+}
+
+// Notes which lidars the points of a match are of, and matches nothing.
+class LidarsOfMatch : public MatchTarget {
+ public:
+  explicit LidarsOfMatch(std::vector<std::uint8_t>& seen) : seen_(seen) {}
+  RegistrationResult match(const Points& source, const Pose& /*guess*/, const PoseTerms& /*terms*/,
+                           MatchStart /*start*/) const override {
+    seen_.assign(source.size(), 0);
+    return {};
+  }
+  RegistrationResult match_features(const FeaturePoints& source, const Pose& /*guess*/,
+                                    const PoseTerms& /*terms*/,
+                                    MatchStart /*start*/) const override {
+    seen_ = source.lidars;
+    EXPECT_EQ(seen_.size(), source.points.size());
+    return {};
+  }
+  double reach_m() const override { return 0.5; }
+  std::size_t size() const override { return 1; }
+
+ private:
+  std::vector<std::uint8_t>& seen_;
+};
+
+TEST_F(LookingAround, AMatchKnowsWhichLidarMeasuredAPoint) {
+  Rig rig;
+  rig.further_lidars.push_back({Pose(), kRingsALidar});
+  const auto share_of_second = [&](std::uint16_t first_ring) {
+    StageTimes times;
+    Log log;
+    DenseOdometry odometry({}, rig, nullptr, times, log);
+    odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+    std::vector<std::uint8_t> lidars;
+    const auto target = std::make_shared<const LidarsOfMatch>(lidars);
+    static_cast<void>(odometry.process(with_another_lidar(scan(0.0), first_ring), target));
+    const auto of_second = std::count(lidars.begin(), lidars.end(), 1);
+    return static_cast<double>(of_second) / static_cast<double>(lidars.size());
+  };
+  EXPECT_NEAR(share_of_second(kRingsALidar), 0.75, 0.02);
+  EXPECT_EQ(share_of_second(0), 0.0);
 }
 
 // A scan of another place: its points lie beside the surfaces of the map.

@@ -24,12 +24,14 @@ struct Slice {
 
 std::vector<Slice> slices_of(const BodyCloud& source, TimeNs duration) {
   std::vector<Slice> slices(kSlices);
+  const std::vector<std::uint8_t> lidars = lidars_of(source.ring);
   for (std::size_t i = 0; i < source.size(); ++i) {
     const double share = static_cast<double>(source.t_ns[i]) / static_cast<double>(duration);
     const auto at = static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * kSlices);
     Slice& slice = slices[std::min(at, kSlices - 1)];
     slice.cloud.points.push_back(source.points[i]);
     if (!source.feature.empty()) slice.cloud.features.push_back(source.feature[i]);
+    if (!lidars.empty()) slice.cloud.lidars.push_back(lidars[i]);
     slice.share += share;
   }
   std::erase_if(slices,

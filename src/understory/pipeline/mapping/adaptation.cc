@@ -118,7 +118,7 @@ Adapted<DenseMappingConfig> adapt(const DenseMappingConfig& asked, const ConfigO
     changes.set_anyway("motion.imu_enabled", "false", conditions.imu_refused,
                        conditions.imu_judged_s);
   }
-  config.keyframe_map.local_map.viewpoint.lidar_in_source = traits.lidar_in_body;
+  config.keyframe_map.local_map.viewpoint = {traits.lidar_in_body, traits.further_lidars_in_body};
   keep_within_memory(config, traits);
   adapted.changes = changes.list();
   return adapted;

@@ -73,6 +73,10 @@ std::unique_ptr<Recording> learn_traits(std::unique_ptr<Recording> source, Senso
   traits.imu_is_numb = samples == 0 && unusable_messages(*source, "imu") > 0;
   traits.has_imu = rig.body_from_imu.has_value() && !traits.imu_is_numb;
   traits.lidar_in_body = rig.body_from_lidar.translation();
+  for (const FurtherLidar& further : rig.further_lidars) {
+    traits.further_lidars_in_body.emplace_back(
+        (rig.body_from_lidar * further.lidar_from_further).translation());
+  }
   return std::make_unique<ReadAhead>(std::move(source), std::move(events));
 }
 
@@ -94,6 +98,9 @@ void put_traits(BinaryWriter& writer, const SensorTraits& traits) {
   writer.put(traits.has_imu);
   writer.put(traits.imu_is_numb);
   writer.put_doubles(traits.lidar_in_body.data(), 3);
+  writer.put(static_cast<std::uint64_t>(traits.further_lidars_in_body.size()));
+  for (const Eigen::Vector3d& place : traits.further_lidars_in_body)
+    writer.put_doubles(place.data(), 3);
 }
 
 SensorTraits get_traits(BinaryReader& reader) {
@@ -105,6 +112,8 @@ SensorTraits get_traits(BinaryReader& reader) {
   traits.has_imu = reader.get<bool>();
   traits.imu_is_numb = reader.get<bool>();
   reader.get_doubles(traits.lidar_in_body.data(), 3);
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left)
+    reader.get_doubles(traits.further_lidars_in_body.emplace_back().data(), 3);
   return traits;
 }
 

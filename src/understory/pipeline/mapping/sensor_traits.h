@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -20,7 +21,8 @@ struct SensorTraits {
   TimeNs first_scan = 0;          // stamp
   bool has_imu = false;           // one whose place on the carrier is known, and that measures
   bool imu_is_numb = false;       // there is one, and none of its first samples is a number
-  Eigen::Vector3d lidar_in_body = Eigen::Vector3d::Zero();  // m
+  Eigen::Vector3d lidar_in_body = Eigen::Vector3d::Zero();   // m
+  std::vector<Eigen::Vector3d> further_lidars_in_body = {};  // m, of a scan of several lidars
 };
 // One line for people: "lidar: 29184 points a scan, 16 rings, 10.0 scans a second; with an IMU".
 [[nodiscard]] std::string to_string(const SensorTraits& traits);

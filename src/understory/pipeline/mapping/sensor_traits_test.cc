@@ -10,9 +10,12 @@ namespace {
 // Scans of the given sizes, 100 ms apart, an IMU sample before each.
 class ScansOf : public Recording {
  public:
-  explicit ScansOf(std::vector<std::size_t> sizes) : sizes_(std::move(sizes)) {
+  explicit ScansOf(std::vector<std::size_t> sizes, bool second_lidar = false)
+      : sizes_(std::move(sizes)) {
     rig_.body_from_imu = Pose();
     rig_.body_from_lidar = Pose(Eigen::Quaterniond::Identity(), {1.0, 2.0, 3.0});
+    const Pose second(Eigen::Quaterniond::Identity(), {0.0, 0.0, 2.0});
+    if (second_lidar) rig_.further_lidars.push_back({second, kRingsALidar});
   }
   std::optional<Event> next() override {
     if (i_ == 2 * sizes_.size()) return std::nullopt;
@@ -70,6 +73,20 @@ TEST(SensorTraits, TellWhatTheSensorsAre) {
   EXPECT_EQ(traits.lidar_in_body, Eigen::Vector3d(1.0, 2.0, 3.0));
   EXPECT_EQ(to_string(traits),
             "lidar: 29100 points a scan, 16 rings, 10.0 scans a second; with an IMU");
+}
+
+// Lidars are placed on the body, and stay so in a checkpoint.
+TEST(SensorTraits, TellWhereAllLidarsAre) {
+  SensorTraits traits;
+  static_cast<void>(
+      learn_traits(std::make_unique<ScansOf>(std::vector<std::size_t>(3, 29'000), true), traits));
+  ASSERT_EQ(traits.further_lidars_in_body.size(), 1U);
+  EXPECT_LT((traits.further_lidars_in_body[0] - Eigen::Vector3d(1.0, 2.0, 5.0)).norm(), 1e-12);
+  BinaryWriter writer;
+  put_traits(writer, traits);
+  BinaryReader reader(writer.bytes(), "test");
+  EXPECT_EQ(get_traits(reader).further_lidars_in_body, traits.further_lidars_in_body);
+  EXPECT_TRUE(reader.at_end());
 }
 
 // Scans, and an IMU whose samples the reader drops.

@@ -82,7 +82,7 @@ class VelodynePcap : public DecodedPcap<VelodyneDecoder> {
   }
 
   void take(const Datagram& datagram) override {
-    if (from_lidar(datagram) && datagram.payload.size() == VelodyneDecoder::kDataPacketSize) {
+    if (from_lidar(datagram) && begins_as_velodyne(datagram.payload)) {
       decoder_.add_packet(datagram.payload.data(), datagram.payload.size(), datagram.stamp);
       take_scans();
     } else if (stream_of(datagram).same_sensor(lidar_) && is_velodyne_position(datagram.payload)) {

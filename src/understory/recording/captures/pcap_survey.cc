@@ -23,11 +23,26 @@ constexpr std::uint16_t kMid360Port = 56300;  // from which it sends its points
 // A lidar whose packets are known and not read; empty for other datagrams.
 std::string unread_lidar(ByteSpan payload) {
   constexpr std::uint8_t kVls128 = 0xA1;
-  if (is_velodyne_data(payload) && payload[VelodyneDecoder::kDataPacketSize - 1] == kVls128)
-    return "a Velodyne VLS-128";
+  if (is_velodyne_data(payload)) {
+    const std::uint8_t product = payload[VelodyneDecoder::kDataPacketSize - 1];
+    if (product == kVls128) return "a Velodyne VLS-128";
+    if (velodyne_model(product) == VelodyneModel::kUnknown)
+      return "a Velodyne of unknown product " + std::to_string(product);
+  }
   const std::uint8_t msop[] = {0x55, 0xAA, 0x05};
   const bool robosense = payload.size() == 1248 && std::memcmp(payload.data(), msop, 3) == 0;
   return robosense ? "a RoboSense" : "";
+}
+
+// Of a Livox by its port alone: points whose layout is not known.
+std::string unread_livox(const Datagram& datagram) {
+  constexpr std::uint16_t kHapPort = 57000;
+  constexpr std::uint16_t kAviaPort = 65000;
+  constexpr std::size_t kLeastPoints = 500;  // bytes; answers to commands are smaller
+  const std::uint16_t port = datagram.source_port;
+  if (port != kMid360Port && port != kHapPort && port != kAviaPort) return "";
+  if (datagram.payload.size() < kLeastPoints) return "";
+  return "a Livox of unknown version " + std::to_string(datagram.payload[0]);
 }
 
 // What a datagram is of, by its bytes.
@@ -46,6 +61,8 @@ struct LidarKind {
     } else if (const auto head = livox_head(payload)) {
       (head->imu ? livox_imu : livox) = true;
       if (head->protocol == 2 && datagram.source_port == kMid360Port) model = "Mid-360";
+    } else {
+      unread = unread_livox(datagram);
     }
   }
   [[nodiscard]] bool is_lidar() const { return velodyne || ouster || hesai || livox; }
@@ -92,9 +109,12 @@ PcapSurvey::Stream* place_of(PcapSurvey& survey, const UdpStream& key, bool is_l
 
 }  // namespace
 
+bool begins_as_velodyne(ByteSpan payload) {
+  return payload.size() >= 2 && payload[0] == 0xFF && payload[1] == 0xEE;
+}
+
 bool is_velodyne_data(ByteSpan payload) {
-  return payload.size() == VelodyneDecoder::kDataPacketSize && payload[0] == 0xFF &&
-         payload[1] == 0xEE;
+  return payload.size() == VelodyneDecoder::kDataPacketSize && begins_as_velodyne(payload);
 }
 
 bool is_velodyne_position(ByteSpan payload) {

@@ -78,6 +78,8 @@ struct PcapSurvey {
   [[nodiscard]] std::string list() const;
 };
 
+// Whether a datagram begins as one of Velodyne's; it may be cut.
+[[nodiscard]] bool begins_as_velodyne(ByteSpan payload);
 // Whether a datagram is one of Velodyne's, by its length and its first bytes.
 [[nodiscard]] bool is_velodyne_data(ByteSpan payload);
 [[nodiscard]] bool is_velodyne_position(ByteSpan payload);

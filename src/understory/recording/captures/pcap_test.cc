@@ -169,6 +169,49 @@ TEST(Pcap, LeavesOutARecordWhoseTimeIsDaysOff) {
   EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U) << test::all_warnings(log);
 }
 
+TEST(Pcap, NamesAPacketOfAVelodyneThatIsCut) {
+  Bytes file = test::pcap_header();
+  for (int i = 0; i < kPackets; ++i) {
+    test::VelodynePacket packet;
+    packet.azimuth_cdeg = (480 * i) % 36000;
+    packet.us = static_cast<std::uint32_t>(1327 * i);
+    Bytes payload = test::make_packet(packet);
+    if (i == 70) payload.resize(700);
+    test::add_record(file, stamp_of(i), plain(test::make_ip(test::make_udp(2368, payload))));
+  }
+  Log log;
+  EXPECT_EQ(read(file, log).points, (kPackets - 1) * 384U);
+  EXPECT_NE(test::all_warnings(log).find("has 700 bytes, expected 1206"), std::string::npos)
+      << test::all_warnings(log);
+}
+
+TEST(Pcap, NamesLidarsOfAnUnknownKindWithTheWayAround) {
+  const auto error_of = [](const Bytes& udp) -> std::string {
+    Bytes file = test::pcap_header();
+    for (int i = 0; i < 30; ++i)
+      test::add_record(file, stamp_of(i), plain(test::make_ip(udp)));
+    Log log;
+    try {
+      read(file, log);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  Bytes velodyne = test::make_packet({});
+  velodyne.back() = 0x99;
+  const std::string product = error_of(test::make_udp(2368, velodyne));
+  EXPECT_NE(product.find("a Velodyne of unknown product 153"), std::string::npos) << product;
+  EXPECT_NE(product.find("PointCloud2"), std::string::npos) << product;
+  Bytes livox(1380, 0);
+  livox[0] = 9;
+  Bytes from_its_port = test::make_udp(56301, livox);
+  from_its_port[0] = 56300 >> 8;  // the port of the sender
+  from_its_port[1] = 56300 & 0xFF;
+  const std::string version = error_of(from_its_port);
+  EXPECT_NE(version.find("a Livox of unknown version 9"), std::string::npos) << version;
+}
+
 TEST(Pcap, LeavesOutPacketsWhoseChecksumIsWrong) {
   Bytes file = test::pcap_header();
   for (int i = 0; i < kPackets; ++i) {

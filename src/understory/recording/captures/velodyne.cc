@@ -5,6 +5,7 @@
 #include <cstring>
 #include <numbers>
 #include <string_view>
+#include <utility>
 
 #include "understory/recording/captures/nmea.h"
 #include "understory/recording/captures/scan_assembly.h"
@@ -83,8 +84,12 @@ void VelodyneDecoder::add_packet(const std::uint8_t* data, std::size_t size, Tim
     return;
   }
   if (!accept_model(data[kTrailer + 5])) return;
-  const Blocks blocks = read_blocks(data);
   const auto counter_us = read<std::uint32_t>(data + kTrailer);
+  if (comes_twice(data, counter_us)) {
+    damaged("comes twice");
+    return;
+  }
+  const Blocks blocks = read_blocks(data);
   const auto time = clock_.time(counter_us, stamp);
   if (!time) {
     damaged("its time stamp of " + std::to_string(counter_us) +
@@ -98,6 +103,14 @@ void VelodyneDecoder::add_packet(const std::uint8_t* data, std::size_t size, Tim
     for (int sequence = 0; sequence < table_.sequences_per_block; ++sequence)
       decode_sequence(blocks, block, sequence, *time);
   }
+}
+
+// A head that turns sends no two packets of one time and the same azimuths.
+bool VelodyneDecoder::comes_twice(const std::uint8_t* data, std::uint32_t counter_us) {
+  const std::array<std::uint32_t, 3> marks = {
+      counter_us, read<std::uint16_t>(data + 2),
+      read<std::uint16_t>(data + (kBlocks - 1) * kBlockSize + 2)};
+  return marks == std::exchange(last_marks_, marks);
 }
 
 // The model is that of the first packet; a packet that contradicts it is taken as damaged unless
@@ -301,6 +314,7 @@ void VelodyneDecoder::save(BinaryWriter& writer) const {
   writer.put(packets_);
   writer.put(received_);
   writer.put(last_fix_);
+  writer.put(last_marks_);
   for (const double value : {rate_cdeg_per_us_, turned_cdeg_, missing_cdeg_})
     writer.put(value);
   writer.put(scan_begin_);
@@ -318,6 +332,7 @@ void VelodyneDecoder::load(BinaryReader& reader) {
   packets_ = reader.get<std::uint64_t>();
   received_ = reader.get<std::uint64_t>();
   last_fix_ = reader.get<TimeNs>();
+  last_marks_ = reader.get<std::array<std::uint32_t, 3>>();
   for (double* value : {&rate_cdeg_per_us_, &turned_cdeg_, &missing_cdeg_})
     *value = reader.get<double>();
   scan_begin_ = reader.get<TimeNs>();

@@ -42,7 +42,8 @@ struct VelodyneConfig {
 // packets that have a valid fix, else of the `stamp` given with the packet. Where sensor clock and
 // stamp differ by more than a second (no GNSS at the sensor), the sensor's clock gives the
 // differences, and the stamps, smoothed, the offset.
-// Damaged packets are passed over with a warning ("recording.damaged"). Not thread-safe.
+// Damaged packets, and those that come twice in a row, are passed over with a warning
+// ("recording.damaged_packet"). Not thread-safe.
 class VelodyneDecoder {
  public:
   static constexpr std::size_t kDataPacketSize = 1206;
@@ -92,6 +93,7 @@ class VelodyneDecoder {
   };
 
   [[nodiscard]] bool accept_model(std::uint8_t product_byte);
+  [[nodiscard]] bool comes_twice(const std::uint8_t* data, std::uint32_t counter_us);
   [[nodiscard]] Blocks read_blocks(const std::uint8_t* data);
   [[nodiscard]] double sequence_start_us(std::size_t block, int sequence) const;
   void set_rates(Blocks& blocks);
@@ -116,6 +118,8 @@ class VelodyneDecoder {
   std::uint64_t packets_ = 0;
   std::uint64_t received_ = 0;
   TimeNs last_fix_ = -1;
+  // Time, first and last azimuth of the last packet; none has 2^32 - 1 microseconds.
+  std::array<std::uint32_t, 3> last_marks_ = {0xFFFFFFFFU, 0, 0};
   double rate_cdeg_per_us_ = 0.36;
   double turned_cdeg_ = -1.0;  // azimuth since the scan's start angle; -1: no scan yet
   TimeNs scan_begin_ = 0;

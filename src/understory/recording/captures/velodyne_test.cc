@@ -242,5 +242,24 @@ TEST(Velodyne, PassesOverDamageAndGoesOn) {
   EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 5U) << test::all_warnings(log);
 }
 
+TEST(Velodyne, LeavesOutPacketsThatComeTwice) {
+  Log log;
+  VelodyneDecoder decoder({}, "test", log);
+  for (int i = 0; i < 3; ++i) {
+    VelodynePacket packet;
+    packet.us = static_cast<std::uint32_t>(1327 * i);
+    packet.azimuth_cdeg = static_cast<std::uint16_t>(480 * i);
+    const TimeNs stamp = kFullHour + 1'327'000LL * i;
+    add(decoder, packet, stamp);
+    if (i == 1) add(decoder, packet, stamp + 30'000);
+  }
+  const auto scans = drain(decoder);
+  ASSERT_EQ(scans.size(), 1U);
+  EXPECT_EQ(scans[0]->points.size(), 3U * 384);
+  EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 1U);
+  EXPECT_NE(test::all_warnings(log).find("packet 3: comes twice"), std::string::npos)
+      << test::all_warnings(log);
+}
+
 }  // namespace
 }  // namespace understory

@@ -1,9 +1,11 @@
 #include "understory/recording/messages/cloud_topic.h"
 
 #include <algorithm>
+#include <map>
 
 #include "understory/recording/finding.h"
 #include "understory/recording/messages/livox_sensor.h"
+#include "understory/sensor/rig.h"
 
 namespace understory {
 namespace {
@@ -14,6 +16,19 @@ bool lacks_times(const Scan& scan) {
          std::all_of(scan.points.begin(), scan.points.end(), [&](const ScanPoint& point) {
            return point.t_ns == scan.points.front().t_ns;
          });
+}
+
+// The beams of all lidars in a merged scan.
+int rings_of_lidars(const Scan& scan) {
+  std::map<int, int> rings;  // by lidar
+  for (const ScanPoint& point : scan.points) {
+    int& count = rings[point.ring / kRingsALidar];
+    count = std::max(count, point.ring % kRingsALidar + 1);
+  }
+  int sum = 0;
+  for (const auto& [lidar, count] : rings)
+    sum += count;
+  return sum;
 }
 
 }  // namespace
@@ -94,7 +109,8 @@ void CloudTopic::warn_of(const ConvertedCloud& converted, const std::string& top
 ScanPtr CloudTopic::add(const PointCloud2Message& cloud, TimeNs log_time, TopicReport& report) {
   std::optional<ConvertedCloud> converted = convert(cloud, log_time, report);
   if (!converted) return nullptr;
-  ring_count_ = std::max(ring_count_, converted->scan->ring_count);
+  if (merged_) converted->scan->ring_count = rings_of_lidars(*converted->scan);
+  ring_count_ = no_rings_ ? 0 : std::max(ring_count_, converted->scan->ring_count);
   converted->scan->ring_count = ring_count_;
   warn_of(*converted, report.name, false);
   return std::move(converted->scan);

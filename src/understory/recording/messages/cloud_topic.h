@@ -23,8 +23,14 @@ class CloudTopic {
   // `file` names the recording in warnings; `log` must outlive this.
   CloudTopic(std::string file, Log& log) : file_(std::move(file)), log_(log) {}
 
-  // The number of beams, where the recording itself tells it.
-  void know_rings(int count) { ring_count_ = count; }
+  // The number of beams, where the recording itself tells it; 0: its rings are none, as the lines
+  // of a Livox.
+  void know_rings(int count) {
+    ring_count_ = count;
+    no_rings_ = count == 0;
+  }
+  // Whether its scans are those of several lidars, merged (kRingsALidar).
+  void know_merged(bool merged) { merged_ = merged; }
   // What the first seconds tell of a Livox (`lidar` may be null or another sensor): its model, and
   // where its IMU is, if both have one frame. Warns where the place is not known.
   void know_livox(const TopicSurvey* lidar, SensorPlaces& places, TransformTree& transforms);
@@ -54,6 +60,8 @@ class CloudTopic {
   Log& log_;
   std::optional<TimeConvention> convention_;
   int ring_count_ = 0;
+  bool no_rings_ = false;
+  bool merged_ = false;
   std::optional<int> livox_id_;  // of the sensor that is used
 };
 

@@ -161,9 +161,9 @@ class MessageRecording : public Recording, public ArrivalTimes {
     const auto rings = metadata.find("ring_count");
     if (rings != metadata.end()) clouds_.know_rings(std::atoi(rings->second.substr(0, 6).c_str()));
     const auto merged = metadata.find("merged_lidars");
-    if (merged != metadata.end())
-      places_.set_merged_lidars(
-          static_cast<std::size_t>(std::clamp(std::atoi(merged->second.c_str()), 0, kMostMerged)));
+    const int lidars = merged == metadata.end() ? 0 : std::atoi(merged->second.c_str());
+    clouds_.know_merged(lidars > 0);
+    places_.set_merged_lidars(static_cast<std::size_t>(std::clamp(lidars, 0, kMostMerged)));
     place_sensors();
   }
 

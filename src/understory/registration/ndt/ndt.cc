@@ -31,7 +31,7 @@ void describe(ConfigTable& table, NdtConfig& config) {
   internal::describe_steps(table, config);
 }
 
-RegistrationResult register_ndt(const NdtMap& target, const Points& source, const Pose& guess,
+RegistrationResult register_ndt(const NdtMap& target, const NdtSource& source, const Pose& guess,
                                 const PoseTerms& terms, const NdtConfig& config,
                                 const NdtMap* coarser) {
   if (target.empty())
@@ -40,11 +40,14 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
     return internal::refused(RegistrationStatus::kTooFewPoints,
                              "only " + std::to_string(source.size()) + " source points", guess);
   }
-  const double range = internal::mean_range(source);
+  const double range = internal::mean_range(source.points);
   double widening = config.widening;
   MatchSums sums;
   Pose summed_at;
-  const Points few = thin_evenly(source, kEnoughForWideSteps, kWideEvery);
+  const Points few_points = thin_evenly(source.points, kEnoughForWideSteps, kWideEvery);
+  const std::vector<std::uint8_t> few_lidars =
+      thin_evenly(source.lidars, kEnoughForWideSteps, kWideEvery);
+  const NdtSource few(few_points, few_lidars);
   const auto evaluate = [&](const Pose& pose) {
     sums = ndt_cost(target, widening > 1.0 ? few : source, pose, config, widening, coarser);
     summed_at = pose;
@@ -78,10 +81,11 @@ RegistrationResult register_ndt(const NdtMap& target, const Points& source, cons
     plain.hessian = NdtConfig::Hessian::kGaussNewton;
     sums = ndt_cost(target, source, minimum.pose, plain, 1.0, coarser);
   }
-  return internal::judged_match(minimum, sums, source, range, guess, internal::Judgement(config));
+  return internal::judged_match(minimum, sums, source.points, range, guess,
+                                internal::Judgement(config));
 }
 
-RegistrationResult register_ndt(std::span<const NdtMapPtr> targets, const Points& source,
+RegistrationResult register_ndt(std::span<const NdtMapPtr> targets, const NdtSource& source,
                                 const Pose& guess, const PoseTerms& terms, const NdtConfig& config,
                                 const NdtMap* coarser) {
   UNDERSTORY_CHECK(!targets.empty());

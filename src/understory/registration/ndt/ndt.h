@@ -47,7 +47,7 @@ void describe(ConfigTable& table, NdtConfig& config);
 // same bits for any number of threads. Thread-safe. `coarser`: of the same cloud, with larger
 // cells; points whose cell in `target` has too few points for a distribution are matched to these.
 // Null: such points match nothing.
-[[nodiscard]] RegistrationResult register_ndt(const NdtMap& target, const Points& source,
+[[nodiscard]] RegistrationResult register_ndt(const NdtMap& target, const NdtSource& source,
                                               const Pose& guess, const PoseTerms& terms,
                                               const NdtConfig& config,
                                               const NdtMap* coarser = nullptr);
@@ -55,13 +55,13 @@ void describe(ConfigTable& table, NdtConfig& config);
 // Coarse to fine: each map in turn, the result of one is the guess of the next. `coarser` goes with
 // the last.
 [[nodiscard]] RegistrationResult register_ndt(std::span<const NdtMapPtr> targets,
-                                              const Points& source, const Pose& guess,
+                                              const NdtSource& source, const Pose& guess,
                                               const PoseTerms& terms, const NdtConfig& config,
                                               const NdtMap* coarser = nullptr);
 
 // The cost that register_ndt minimises (terms left out), with its gradient and Hessian with respect
 // to a right perturbation. For tests and for those who optimise it with other terms.
-[[nodiscard]] MatchSums ndt_cost(const NdtMap& target, const Points& source,
+[[nodiscard]] MatchSums ndt_cost(const NdtMap& target, const NdtSource& source,
                                  const Pose& target_from_source, const NdtConfig& config,
                                  double widening = 1.0, const NdtMap* coarser = nullptr);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "understory/registration/ndt/ndt_batch.h"
@@ -39,19 +40,23 @@ constexpr std::size_t kBlock = 128;
 struct LocalPose {
   std::array<int, 3> base;
   Eigen::Matrix3f rotation;
-  Eigen::Vector3f translation;  // metres from the corner of the base cell
-  Eigen::Vector3f viewpoint;    // from the source's origin, axes of the target
+  Eigen::Vector3f translation;              // metres from the corner of the base cell
+  std::vector<Eigen::Vector3f> viewpoints;  // from the source's origin, axes of the target
   float cell;
   float per_cell;
 };
 
-LocalPose localise(const Pose& pose, double cell_size, const Eigen::Vector3d& viewpoint) {
+LocalPose localise(const Pose& pose, double cell_size,
+                   const std::vector<Eigen::Vector3d>& viewpoints) {
+  std::vector<Eigen::Vector3f> turned;
+  for (const Eigen::Vector3d& viewpoint : viewpoints)
+    turned.emplace_back((pose.rotation_matrix() * viewpoint).cast<float>());
   const Eigen::Vector3d origin = (pose.translation() / cell_size).array().floor();
   return {
       {static_cast<int>(origin.x()), static_cast<int>(origin.y()), static_cast<int>(origin.z())},
       pose.rotation_matrix().cast<float>(),
       (pose.translation() - cell_size * origin).cast<float>(),
-      (pose.rotation_matrix() * viewpoint).cast<float>(),
+      std::move(turned),
       static_cast<float>(cell_size),
       static_cast<float>(1.0 / cell_size)};
 }
@@ -141,11 +146,11 @@ struct PointIndices {
 
 class Accumulator {
  public:
-  Accumulator(const NdtMap& target, const Points& source, const Pose& pose, const NdtConfig& config,
-              double widening)
+  Accumulator(const NdtMap& target, const NdtSource& source, const Pose& pose,
+              const NdtConfig& config, double widening)
       : target_(target),
         source_(source),
-        local_(localise(pose, target.cell_size(), target.viewpoint_in_source())),
+        local_(localise(pose, target.cell_size(), target.viewpoints_in_source())),
         exact_(config.hessian == NdtConfig::Hessian::kNewton),
         trilinear_(config.search == NdtConfig::Search::k8) {
     const MixtureConstants mixture =
@@ -162,7 +167,8 @@ class Accumulator {
     std::array<Placed, kBlock> placed;
     const std::size_t n = which.count;
     for (std::size_t i = 0; i < n; ++i) {
-      placed[i] = place(source_[which.index[i]]);
+      placed[i] = place(source_.points[which.index[i]]);
+      placed[i].lidar = std::min(source_.lidar_of(which.index[i]), local_.viewpoints.size() - 1);
       target_.prefetch(placed[i].at[0], placed[i].at[1], placed[i].at[2]);
     }
     for (std::size_t i = 0; i < n; ++i) {
@@ -183,6 +189,7 @@ class Accumulator {
     Eigen::Vector3f lever;  // from the source's origin, axes of the target
     std::array<int, 3> at;  // cell
     float fraction[3];      // place in the cell, 0..1
+    std::size_t lidar;      // by which it was measured
     const NdtCell* own;
   };
 
@@ -218,7 +225,7 @@ class Accumulator {
       nearest = std::min(nearest, offset.squaredNorm());
       if (cell->rows == 0) continue;
       if (cell->near_side_m > 0.0F) {
-        const Eigen::Vector3f ray = placed.lever - local_.viewpoint;
+        const Eigen::Vector3f ray = placed.lever - local_.viewpoints[placed.lidar];
         offset += cell->near_side_m / std::max(ray.norm(), 1e-3F) * ray - cell->mean_near_side;
       }
       if (batch.full()) batch.flush(d2_, pull_, sums);
@@ -232,7 +239,7 @@ class Accumulator {
   }
 
   const NdtMap& target_;
-  const Points& source_;
+  const NdtSource& source_;
   LocalPose local_;
   bool exact_;
   bool trilinear_;
@@ -261,7 +268,7 @@ void add_block(const NdtSums& block, MatchSums& to) {
 
 }  // namespace
 
-MatchSums ndt_cost(const NdtMap& target, const Points& source, const Pose& target_from_source,
+MatchSums ndt_cost(const NdtMap& target, const NdtSource& source, const Pose& target_from_source,
                    const NdtConfig& config, double widening, const NdtMap* coarser) {
   const Accumulator accumulator(target, source, target_from_source, config, widening);
   std::optional<Accumulator> fallback;

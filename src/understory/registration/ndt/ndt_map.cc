@@ -188,10 +188,15 @@ void NdtMapBuilder::clear() {
   state_->config = config;
   state_->map = std::make_shared<NdtMap>();
   state_->map->cell_size_ = config.cell_size_m;
-  if (config.viewpoint_in_source) state_->map->viewpoint_in_source_ = *config.viewpoint_in_source;
+  if (!config.viewpoint_in_source) return;
+  std::vector<Eigen::Vector3d>& viewpoints = state_->map->viewpoints_in_source_;
+  viewpoints = {*config.viewpoint_in_source};
+  viewpoints.insert(viewpoints.end(), config.further_viewpoints_in_source.begin(),
+                    config.further_viewpoints_in_source.end());
 }
 
-void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_source) {
+void NdtMapBuilder::insert(const NdtSource& source, const Pose& map_from_source) {
+  const Points& points_in_source = source.points;
   State& s = *state_;
   const double size = s.config.cell_size_m;
   // In cell units from a whole cell near the source, so that single precision is enough.
@@ -203,12 +208,16 @@ void NdtMapBuilder::insert(const Points& points_in_source, const Pose& map_from_
   const auto edge = static_cast<float>(size);
   s.located.resize(points_in_source.size());
   const bool rays = s.config.viewpoint_in_source.has_value();
-  const Eigen::Vector3f viewpoint =
-      rays ? Eigen::Vector3f(s.config.viewpoint_in_source->cast<float>()) : Eigen::Vector3f::Zero();
+  std::vector<Eigen::Vector3f> viewpoints;
+  for (const Eigen::Vector3d& place : s.map->viewpoints_in_source_)
+    viewpoints.emplace_back(place.cast<float>());
   parallel_for(points_in_source.size(), 4096, [&](std::size_t i) {
     const Eigen::Vector3f p = r * points_in_source[i] + t;
     State::Located& to = s.located[i];
-    if (rays) to.ray = (r * (points_in_source[i] - viewpoint)).normalized();
+    if (rays) {
+      const std::size_t lidar = std::min(source.lidar_of(i), viewpoints.size() - 1);
+      to.ray = (r * (points_in_source[i] - viewpoints[lidar])).normalized();
+    }
     for (int k = 0; k < 3; ++k) {
       const int whole = voxel_floor(p[k]);
       to.at[static_cast<std::size_t>(k)] = base[static_cast<std::size_t>(k)] + whole;

@@ -27,6 +27,8 @@ struct NdtMapConfig {
   // Where the lidar is in the frames of the sources, if known; those matched to the map have it in
   // the same place.
   std::optional<Eigen::Vector3d> viewpoint_in_source = std::nullopt;
+  // With a viewpoint: where the further lidars of a scan of several are.
+  std::vector<Eigen::Vector3d> further_viewpoints_in_source = {};
   // With a viewpoint: what a cell shows lies before its middle, towards wherever it is seen from,
   // by this share of the spread along its second axis, 0..2; of a stem (a single view of a cylinder
   // would give 1.36, and cells hold many views), and of what is neither surface nor line. See
@@ -56,13 +58,29 @@ struct alignas(64) NdtCell {           // a cache line
   Eigen::Vector3f mean_near_side = Eigen::Vector3f::Zero();
 };
 
+// Points and which lidar measured each (0: the first one), in parallel; without lidars the first
+// one measured all. Refers to what it is made of.
+struct NdtSource {
+  // NOLINTNEXTLINE(google-explicit-constructor): points alone are a source, too
+  NdtSource(const Points& all, std::span<const std::uint8_t> lidar_of = {})
+      : points(all), lidars(lidar_of) {}
+  const Points& points;
+  std::span<const std::uint8_t> lidars;
+
+  [[nodiscard]] std::size_t size() const { return points.size(); }
+  [[nodiscard]] std::size_t lidar_of(std::size_t i) const { return lidars.empty() ? 0 : lidars[i]; }
+};
+
 // Target of NDT: a grid of normal distributions. Immutable for all who hold it, and shared between
 // threads; made by NdtMapBuilder. Cells are addressed by integers: floor(coordinate / cell_size).
 class NdtMap {
  public:
   [[nodiscard]] double cell_size() const { return cell_size_; }
-  // NdtMapConfig::viewpoint_in_source, or the source's origin.
-  [[nodiscard]] const Eigen::Vector3d& viewpoint_in_source() const { return viewpoint_in_source_; }
+  // Where the lidars are in the frame of a source: NdtMapConfig::viewpoint_in_source, or the
+  // source's origin, and those of the further lidars.
+  [[nodiscard]] const std::vector<Eigen::Vector3d>& viewpoints_in_source() const {
+    return viewpoints_in_source_;
+  }
   [[nodiscard]] std::size_t size() const { return cells_.size(); }
   [[nodiscard]] bool empty() const { return cells_.empty(); }
   // The cell at integer coordinates, or null.
@@ -81,7 +99,7 @@ class NdtMap {
  private:
   friend class NdtMapBuilder;
   double cell_size_ = 1.0;
-  Eigen::Vector3d viewpoint_in_source_ = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> viewpoints_in_source_ = {Eigen::Vector3d::Zero()};
   std::vector<NdtCell> cells_;
   std::vector<std::array<int, 3>> coordinates_;
   VoxelIndex index_;
@@ -99,7 +117,7 @@ class NdtMapBuilder {
   NdtMapBuilder& operator=(NdtMapBuilder&&) noexcept;
 
   // Adds points given in a source frame (a keyframe's body).
-  void insert(const Points& points_in_source, const Pose& map_from_source);
+  void insert(const NdtSource& points_in_source, const Pose& map_from_source);
   // Forgets the cells farther than that from the centre (map frame).
   void remove_beyond(const Eigen::Vector3d& center, double radius_m);
   void clear();

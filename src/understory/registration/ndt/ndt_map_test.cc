@@ -313,10 +313,11 @@ Points ring_in_grass() {
   return points;
 }
 
-double steepest_row(const NdtMapConfig& config) {
+double steepest_row(const NdtMapConfig& config, std::uint8_t lidar = 0) {
   const Points points = ring_in_grass();
-  const PlacedCloud cloud{&points, Pose()};
-  const NdtMapPtr map = build_ndt_map({&cloud, 1}, config);
+  NdtMapBuilder builder(config);
+  builder.insert({points, std::vector<std::uint8_t>(points.size(), lidar)}, Pose());
+  const NdtMapPtr map = builder.snapshot();
   double steepest = 0.0;
   for (const NdtCell& cell : map->cells()) {
     for (int k = 0; k < cell.rows; ++k) {
@@ -336,6 +337,19 @@ TEST(NdtMap, WhatWasSeenEdgeOnIsNoGround) {
   // The same points seen from above are ground.
   config.viewpoint_in_source = Eigen::Vector3d(4.0, 0.0, 3.0);
   EXPECT_GT(steepest_row(config), 10.0);
+}
+
+// Pins a defect: of several lidars the rays of all began at the first one, so that the traces of
+// rings of the others passed for level ground.
+TEST(NdtMap, WhatASecondLidarSawEdgeOnIsNoGround) {
+  NdtMapConfig config;
+  config.few_rings = true;
+  config.viewpoint_in_source = Eigen::Vector3d(4.0, 0.0, 3.0);
+  config.further_viewpoints_in_source = {Eigen::Vector3d::Zero()};
+  EXPECT_GT(steepest_row(config, 0), 10.0);
+  EXPECT_LT(steepest_row(config, 1), 0.1);
+  // One whose place is not known counts as the last that is.
+  EXPECT_LT(steepest_row(config, 2), 0.1);
 }
 
 }  // namespace

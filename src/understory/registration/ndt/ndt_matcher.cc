@@ -18,7 +18,8 @@ using namespace registration_constants::ndt_matcher;
 
 class NdtCost : public MatchCost {
  public:
-  NdtCost(const NdtMap& map, const NdtMap* coarser, const Points& source, const NdtConfig& config)
+  NdtCost(const NdtMap& map, const NdtMap* coarser, const NdtSource& source,
+          const NdtConfig& config)
       : map_(map), coarser_(coarser), source_(source), config_(config) {
     config_.hessian = NdtConfig::Hessian::kGaussNewton;  // the curvature has to be positive
   }
@@ -33,7 +34,7 @@ class NdtCost : public MatchCost {
  private:
   const NdtMap& map_;
   const NdtMap* coarser_;
-  const Points& source_;
+  NdtSource source_;
   NdtConfig config_;
 };
 
@@ -45,20 +46,38 @@ class NdtTarget : public MatchTarget {
 
   [[nodiscard]] RegistrationResult match(const Points& source, const Pose& guess,
                                          const PoseTerms& terms, MatchStart start) const override {
-    const std::span<const NdtMapPtr> maps(maps_);
-    return register_ndt(start == MatchStart::kFar ? maps : maps.last(1), source, guess, terms,
-                        config_, coarser_.get());
+    return match_source(source, guess, terms, start);
+  }
+  [[nodiscard]] RegistrationResult match_features(const FeaturePoints& source, const Pose& guess,
+                                                  const PoseTerms& terms,
+                                                  MatchStart start) const override {
+    return match_source({source.points, source.lidars}, guess, terms, start);
   }
   [[nodiscard]] double reach_m() const override { return maps_.back()->cell_size(); }
   [[nodiscard]] std::size_t size() const override { return maps_.back()->size(); }
   [[nodiscard]] std::unique_ptr<const MatchCost> cost(const Points& source,
                                                       MatchStart start) const override {
+    return cost_of(source, start);
+  }
+  [[nodiscard]] std::unique_ptr<const MatchCost> cost_of_features(const FeaturePoints& source,
+                                                                  MatchStart start) const override {
+    return cost_of({source.points, source.lidars}, start);
+  }
+
+ private:
+  [[nodiscard]] RegistrationResult match_source(const NdtSource& source, const Pose& guess,
+                                                const PoseTerms& terms, MatchStart start) const {
+    const std::span<const NdtMapPtr> maps(maps_);
+    return register_ndt(start == MatchStart::kFar ? maps : maps.last(1), source, guess, terms,
+                        config_, coarser_.get());
+  }
+  [[nodiscard]] std::unique_ptr<const MatchCost> cost_of(const NdtSource& source,
+                                                         MatchStart start) const {
     const bool far = start == MatchStart::kFar;
     return std::make_unique<NdtCost>(far ? *maps_.front() : *maps_.back(),
                                      far ? nullptr : coarser_.get(), source, config_);
   }
 
- private:
   std::vector<NdtMapPtr> maps_;
   NdtMapPtr coarser_;
   NdtConfig config_;
@@ -90,20 +109,33 @@ class NdtTargetBuilder : public TargetBuilder {
       NdtMapConfig cells = config.cells;
       cells.cell_size_m = size;
       cells.viewpoint_in_source = viewpoint.lidar_in_source;
+      cells.further_viewpoints_in_source = viewpoint.further_lidars_in_source;
       builders_.emplace_back(cells);
     }
   }
 
   void insert(const Points& points_in_source, const Pose& target_from_source,
               std::optional<double> forget_beyond_m) override {
-    const Points part = thin_evenly(points_in_source, kEnoughForCoarse, kCoarseEvery);
+    insert_source(points_in_source, target_from_source, forget_beyond_m);
+  }
+  void insert_features(const FeaturePoints& points_in_source, const Pose& target_from_source,
+                       std::optional<double> forget_beyond_m) override {
+    insert_source({points_in_source.points, points_in_source.lidars}, target_from_source,
+                  forget_beyond_m);
+  }
+  void insert_source(const NdtSource& source, const Pose& target_from_source,
+                     std::optional<double> forget_beyond_m) {
+    const Points part_points = thin_evenly(source.points, kEnoughForCoarse, kCoarseEvery);
+    const std::vector<std::uint8_t> part_lidars =
+        thin_evenly(source.lidars, kEnoughForCoarse, kCoarseEvery);
+    const NdtSource part(part_points, part_lidars);
     const double finest = config_.cell_sizes_m.back();
     parallel_for(builders_.size(), 1, [&](std::size_t i) {
       NdtMapBuilder& builder = builders_[i];
       // That for sparse places has all points, too.
       const bool coarse =
           i < config_.cell_sizes_m.size() && config_.cell_sizes_m[i] >= 2.0 * finest;
-      builder.insert(coarse ? part : points_in_source, target_from_source);
+      builder.insert(coarse ? part : source, target_from_source);
       if (forget_beyond_m)
         builder.remove_beyond(target_from_source.translation(), *forget_beyond_m);
     });

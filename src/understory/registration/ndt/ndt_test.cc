@@ -458,5 +458,35 @@ TEST(Ndt, TheNearSideThatGoesAlongDoesNotHoldMatchesBack) {
   EXPECT_LT(std::abs(free), 0.7 * held) << free << " mm; without " << held;
 }
 
+// The points of a second lidar alone are matched as if it were the first one.
+TEST(Ndt, EachLidarIsMatchedFromItsOwnPlace) {
+  const Stand stand = make_stand({.half_width_m = 25.0}, 1);
+  const auto scan_at = [&](double x, std::uint64_t seed) {
+    return scan_stand(stand, upright(x, 0, 2.0), testing::vlp16(), seed);
+  };
+  const Points target = scan_at(0.0, 1);
+  const Points source = scan_at(0.4, 2);
+  const auto result_of = [&](const NdtMapConfig& config, std::uint8_t lidar) {
+    NdtMapBuilder builder(config);
+    const std::vector<std::uint8_t> of_target(target.size(), lidar);
+    const std::vector<std::uint8_t> of_source(source.size(), lidar);
+    builder.insert({target, of_target}, upright(0, 0, 2.0));
+    return register_ndt(*builder.snapshot(), {source, of_source}, upright(0.4, 0, 2.0), {}, {});
+  };
+  NdtMapConfig config;
+  config.cell_size_m = 0.5;
+  config.volume_weight = 1.0;
+  config.few_rings = true;
+  config.viewpoint_in_source = Eigen::Vector3d::Zero();
+  const RegistrationResult alone = result_of(config, 0);
+  ASSERT_TRUE(alone.usable()) << alone.reason;
+  config.viewpoint_in_source = Eigen::Vector3d(6.0, 5.0, 2.0);
+  config.further_viewpoints_in_source = {Eigen::Vector3d::Zero()};
+  const RegistrationResult as_second = result_of(config, 1);
+  EXPECT_EQ(alone.target_from_source.matrix(), as_second.target_from_source.matrix());
+  EXPECT_EQ(alone.information, as_second.information);
+  EXPECT_NE(alone.target_from_source.matrix(), result_of(config, 0).target_from_source.matrix());
+}
+
 }  // namespace
 }  // namespace understory
