@@ -3,11 +3,13 @@
 #include <cstddef>
 
 #include "understory/calibration/lidar_imu/clock_check.h"
+#include "understory/calibration/lidar_imu/online_calibration.h"
 #include "understory/georeference/satellites/online_georeference.h"
 #include "understory/map/loop_closer.h"
 #include "understory/odometry/dense/recovery.h"
 #include "understory/odometry/imu/imu_watch.h"
 #include "understory/pipeline/judgement/imu_usage.h"
+#include "understory/pipeline/mapping/adaptation.h"
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/run_folder/checkpoint.h"
@@ -32,7 +34,7 @@ std::size_t size_of(const Put& put) {
 // was begun before would have been read as another one. Where this fails, kCheckpointFormat grows
 // by one, and the sizes here become the new ones.
 TEST(CheckpointFormat, GrowsWithWhatIsKept) {
-  EXPECT_EQ(kCheckpointFormat, 13);
+  EXPECT_EQ(kCheckpointFormat, 14);
   Log log;
   const auto saved = [](const auto& part) {
     return size_of([&](BinaryWriter& writer) { part.save(writer); });
@@ -41,6 +43,8 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 613U);
   EXPECT_EQ(saved(ImuUsage()), 25U);
   EXPECT_EQ(saved(LidarImuClockCheck()), 41U);
+  EXPECT_EQ(saved(OnlineImuCalibration()), 0U);
+  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_conditions(writer, {}); }), 0U);
   EXPECT_EQ(saved(OnlineGeoreference(OnlineGeoreferenceConfig())), 221632U);
   EXPECT_EQ(saved(TopicStatistics()), 136U);
   EXPECT_EQ(saved(Recovery(30)), 108U);
