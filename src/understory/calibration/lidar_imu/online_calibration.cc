@@ -68,7 +68,8 @@ void OnlineImuCalibration::add_scan(const StampedPose& world_from_body_at_middle
                                     const Pose& given) {
   given_ = given;
   window_.push_back(world_from_body_at_middle);
-  if (to_seconds(window_.back().stamp - window_.front().stamp) >= kFitWindowS + kMarginS) end_window();
+  if (to_seconds(window_.back().stamp - window_.front().stamp) >= kFitWindowS + kMarginS)
+    end_window();
 }
 
 void OnlineImuCalibration::move_world(const Pose& new_world_from_old_world) {
@@ -124,7 +125,8 @@ std::optional<OnlineImuEstimate> OnlineImuCalibration::so_far() const {
   estimate.differs =
       far_from_none<3>(step.head<3>(), estimate.covariance.topLeftCorner<3, 3>(), kTakeTurnRad) ||
       far_from_none<3>(step.segment<3>(3), estimate.covariance.block<3, 3>(3, 3), kTakePlaceM) ||
-      far_from_none<1>(step.tail<1>(), estimate.covariance.bottomRightCorner<1, 1>(), kTakeLatenessS);
+      far_from_none<1>(step.tail<1>(), estimate.covariance.bottomRightCorner<1, 1>(),
+                       kTakeLatenessS);
   return estimate;
 }
 

@@ -20,9 +20,9 @@ Pose motion_until(const std::vector<StampedPose>& path, TimeNs stamp) {
     if (path[i].stamp < stamp && i + 1 < path.size()) continue;
     const double share = to_seconds(stamp - path[i - 1].stamp) /
                          std::max(to_seconds(path[i].stamp - path[i - 1].stamp), 1e-9);
-    return path.front().world_from_body.inverse() *
-           interpolate(path[i - 1].world_from_body, path[i].world_from_body,
-                       std::clamp(share, 0.0, 1.0));
+    return path.front().world_from_body.inverse() * interpolate(path[i - 1].world_from_body,
+                                                                path[i].world_from_body,
+                                                                std::clamp(share, 0.0, 1.0));
   }
   return {};
 }

@@ -26,8 +26,9 @@ struct RunConditions {
   bool imu_cleared = false;   // it was doubted, and it was right: it counts as proven
   std::string imu_refused;    // why it is left out for good; empty: it is not
   double imu_judged_s = 0.0;  // when the last of these was found, seconds since the first scan
-  std::optional<RefinedImu> imu_refined;  // what it is mapped with instead of what is given
-  int imu_refinements = 0;                // how often it was begun anew for that
+  std::optional<RefinedImu> imu_refined = std::nullopt;  // what it is mapped with instead of what
+                                                         // is given
+  int imu_refinements = 0;                               // how often it was begun anew for that
 };
 void put_origins(BinaryWriter& writer, const ConfigOrigins& origins);
 [[nodiscard]] ConfigOrigins get_origins(BinaryReader& reader);

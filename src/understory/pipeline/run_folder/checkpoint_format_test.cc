@@ -43,8 +43,8 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 613U);
   EXPECT_EQ(saved(ImuUsage()), 25U);
   EXPECT_EQ(saved(LidarImuClockCheck()), 41U);
-  EXPECT_EQ(saved(OnlineImuCalibration()), 0U);
-  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_conditions(writer, {}); }), 0U);
+  EXPECT_EQ(saved(OnlineImuCalibration()), 569U);
+  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_conditions(writer, {}); }), 24U);
   EXPECT_EQ(saved(OnlineGeoreference(OnlineGeoreferenceConfig())), 221632U);
   EXPECT_EQ(saved(TopicStatistics()), 136U);
   EXPECT_EQ(saved(Recovery(30)), 108U);

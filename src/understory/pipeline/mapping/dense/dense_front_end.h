@@ -209,9 +209,9 @@ class DenseFrontEnd : public FrontEnd {
   Recovery recovery_;
   std::string imu_refused_;
   bool imu_doubted_ = false;
-  std::optional<double> imu_cleared_s_;  // seconds since the first scan, of the verdict
+  std::optional<double> imu_cleared_s_;    // seconds since the first scan, of the verdict
   std::optional<RefinedImu> imu_refined_;  // what the IMU is used with instead of what is given
-  std::unique_ptr<Opening> opening_;     // until the first scans are settled
+  std::unique_ptr<Opening> opening_;       // until the first scans are settled
 };
 
 }  // namespace understory

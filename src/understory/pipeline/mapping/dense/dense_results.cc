@@ -154,8 +154,7 @@ void tell_calibration(const ReadRecording& recording, DenseFrontEnd& front_end,
     figures.covariance.insert(figures.covariance.end(), row.begin(), row.end());
   figures.duration_s = found->duration_s;
   figures.windows = found->windows;
-  figures.begun_anew =
-      static_cast<std::uint64_t>(recording.request.conditions.imu_refinements);
+  figures.begun_anew = static_cast<std::uint64_t>(recording.request.conditions.imu_refinements);
   const std::optional<RefinedImu>& used = front_end.imu_used();
   if (used && recording.source.rig().body_from_imu) {
     const Pose change = recording.source.rig().body_from_imu->inverse() * used->body_from_imu;

@@ -101,7 +101,7 @@ class SparseFrontEnd : public FrontEnd {
   ImuUsage imu_usage_;
   LidarImuClockCheck clock_{ImuNoiseConfig(), LidarImuClockCheck::Turns::kAboutUp};
   bool points_have_times_ = false;  // of the last scan
-  std::size_t scans_ = 0;  // of which the last may still wait
+  std::size_t scans_ = 0;           // of which the last may still wait
   std::uint64_t repeated_ = 0;
   std::uint64_t last_content_ = 0;
   std::size_t last_stems_ = 0;
