@@ -94,7 +94,7 @@ def by_stems(folder):
     for offset_s, told in ((0.02, True), (0.0, False)):
         place = folder / str(offset_s)
         place.mkdir()
-        facts, warnings = mapped(walked(place, offset_s), place / "run", "--front-end", "sparse")
+        facts, warnings = mapped(walked(place, offset_s, seconds=42), place / "run", "--front-end", "sparse")
         assert ("imu.clock" in warnings) == told, warnings
         assert abs(facts["quality"]["imu_late_ms"] - 1e3 * offset_s) < 8, facts["quality"]
         assert "imu_turned_deg" not in facts["quality"]
