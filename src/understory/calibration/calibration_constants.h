@@ -162,4 +162,23 @@ inline constexpr double kTellSigmas = 4.0;
 inline constexpr double kMostToldSdS = 0.01;
 }  // namespace clock_check
 
+namespace online_calibration {  // calibration/lidar_imu/online_calibration.cc
+// s of a window [chosen: a walk of this length tells the lateness to 1 ms and the rotation to 0.1
+// degrees]
+inline constexpr double kFitWindowS = 20.0;
+// s that samples reach beyond the poses [bound: the lateness in reach of a fit, and a sample]
+inline constexpr double kMarginS = 0.35;
+// Squared limits of what counts as told; a smaller variance is that of a value that is kept [bound:
+// a value that is kept has 1e-9, and 0.01 of a limit is 1e-4]
+inline constexpr double kKeptVariance = 1e-7;
+// Standard deviations from the given values at which others are taken [chosen]
+inline constexpr double kTakeSigmas = 3.0;
+// rad: a smaller turn is not worth mapping anew [chosen: half of what a calibration is good to]
+inline constexpr double kTakeTurnRad = 8.7e-4;
+// m: the same of the place [as kTakeTurnRad]
+inline constexpr double kTakePlaceM = 0.01;
+// s: the same of the lateness [as kTakeTurnRad]
+inline constexpr double kTakeLatenessS = 5e-4;
+}  // namespace online_calibration
+
 }  // namespace understory::calibration_constants

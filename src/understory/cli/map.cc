@@ -33,6 +33,7 @@ struct MapOptions {
   PlotOptions plots;
   std::string front_end = kDenseFrontEnd;
   bool imu_rate = false;
+  bool refine_imu = false;
   bool realtime = false;
   bool copc = false;
   std::string max_memory_mb;
@@ -108,6 +109,9 @@ void set_of_dense(const MapOptions& options, std::vector<std::string>& settings)
   set(options.imu_rate,
       "--imu-rate predicts from positioned scans, which a run by stems does not have",
       "imu_rate=true");
+  set(options.refine_imu,
+      "--refine-imu refines by positioned scans of all points, which a run by stems does not have",
+      "refine_imu=true");
   set(options.copc, "--copc writes the cloud of a map, which a run by stems does not make",
       "map.copc=true");
   set(!options.max_memory_mb.empty(),
@@ -196,6 +200,9 @@ void add_map_command(CLI::App& app, Command& chosen) {
   command->add_flag("--imu-rate", options->imu_rate,
                     "Write trajectory_imu.tum as well: a predicted pose for each sample of the "
                     "IMU");
+  command->add_flag("--refine-imu", options->refine_imu,
+                    "Refine place and clock of the IMU while mapping; where they differ from what "
+                    "is given, the recording is mapped anew with them");
   command->add_flag("--realtime", options->realtime,
                     "Play the recording at sensor speed; late scans are dropped "
                     "(time_repair.window_s is 0, of stems also stems.pace.longest_gap_s)");

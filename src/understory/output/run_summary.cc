@@ -82,6 +82,25 @@ Json or_null(const std::string& text) {
   return text.empty() ? Json(nullptr) : Json(text);
 }
 
+Json to_json(const ImuCalibrationFigures& figures) {
+  Json rows = Json::array();
+  for (std::size_t row = 0; row < 7; ++row) {
+    const auto first = figures.covariance.begin() + static_cast<std::ptrdiff_t>(7 * row);
+    rows.push_back(std::vector<double>(first, first + 7));
+  }
+  return {{"body_from_imu",
+           {{"translation_m", figures.translation_m}, {"rotation_xyzw", figures.rotation_xyzw}}},
+          {"imu_late_s", figures.late_s},
+          {"order", {"rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m", "late_s"}},
+          {"covariance", rows},
+          {"duration_s", figures.duration_s},
+          {"windows", figures.windows},
+          {"begun_anew", figures.begun_anew},
+          {"used_imu_late_s", figures.used_late_s},
+          {"used_moved_m", figures.moved_m},
+          {"used_turned_deg", figures.turned_deg}};
+}
+
 // All digits: whoever reads it brings layers back to the world frame by it.
 Json to_json(const RunPlace& place) {
   Json json;
@@ -230,6 +249,7 @@ std::string run_json(const RunSummary& summary) {
     json["lidar_view"] = {{"body_from_lidar", numbers(summary.lidar_view.body_from_lidar)},
                           {"highest_deg", numbers(summary.lidar_view.highest_deg)}};
   }
+  if (summary.imu_calibration) json["imu_calibration"] = to_json(*summary.imu_calibration);
   if (!summary.lidar_model.empty()) json["lidar_model"] = summary.lidar_model;
   json["coordinate_system"] = summary.crs_wkt.empty() ? Json(nullptr) : Json(summary.crs_wkt);
   if (summary.place) json["georeference"] = to_json(*summary.place);

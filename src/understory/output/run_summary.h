@@ -92,6 +92,20 @@ struct RunPlace {
   double heading_sd_deg = std::numeric_limits<double>::quiet_NaN();
 };
 
+// Place and clock of the IMU as a run refined them, beside what it was mapped with.
+struct ImuCalibrationFigures {
+  std::vector<double> translation_m;  // of body_from_imu
+  std::vector<double> rotation_xyzw;
+  double late_s = 0.0;             // stamp of the IMU less that of the lidar, for one moment
+  std::vector<double> covariance;  // 7 x 7, row by row: rotation, place, lateness
+  double duration_s = 0.0;         // of the motion that tells it
+  std::uint64_t windows = 0;       // that it was told by
+  std::uint64_t begun_anew = 0;    // times that the recording was
+  double moved_m = 0.0;            // from what the recording gave to what it was mapped with
+  double turned_deg = 0.0;         // the same
+  double used_late_s = 0.0;        // lateness that it was mapped with
+};
+
 // What run.json says. Warnings are one per kind. A command makes it with RunDocuments
 // (pipeline/run_folder/run_documents.h), which fills in what all commands have in common.
 struct RunSummary {
@@ -118,8 +132,9 @@ struct RunSummary {
   std::optional<RunPlace> place;           // of runs with a world frame
   // The frame of each file that has one: "world", or the coordinate system.
   std::map<std::string, std::string> frames;
-  LidarViewFigures lidar_view;  // empty = unknown
-  std::string lidar_model;      // empty = unknown, or several
+  LidarViewFigures lidar_view;                           // empty = unknown
+  std::optional<ImuCalibrationFigures> imu_calibration;  // with `refine_imu`
+  std::string lidar_model;                               // empty = unknown, or several
 };
 
 // Of a run at the speed of its sensors: milliseconds from the end of a scan to its pose, as the

@@ -105,6 +105,12 @@ inline constexpr double kSparseCloudM = 0.1;
 inline constexpr double kSparseInlierRatio = 0.05;
 }  // namespace adaptation
 
+namespace event_loop {  // pipeline/mapping/event_loop.cc
+// Times that a recording is begun anew with a refined IMU at most [bound: time; the second time
+// differs from the first by what the fit is not linear in]
+inline constexpr int kMostRefinements = 3;
+}  // namespace event_loop
+
 namespace cloud_tiles {  // pipeline/inventory/cloud_tiles.cc, streamed_cloud.cc
 // m: edge of the cells on disk: what lies around a tile is read by them [bound: time]
 inline constexpr double kCell = 10.0;

@@ -55,7 +55,7 @@ bool ClockCheckResult::clock_is_off() const {
 }
 
 bool ClockCheckResult::axes_are_off() const {
-  return turned_rad > std::max(kTellTurnRad, kTellSigmas * turned_sd_rad);
+  return turned_sd_rad > 0.0 && turned_rad > std::max(kTellTurnRad, kTellSigmas * turned_sd_rad);
 }
 
 void LidarImuClockCheck::add_sample(const ImuSample& sample) {
@@ -112,14 +112,18 @@ std::optional<LidarImuClockCheck::Step> LidarImuClockCheck::step(const Seen& fro
   const Eigen::Quaterniond by_lidar =
       quaternion_of(from.world_from_imu).conjugate() * quaternion_of(to.world_from_imu);
   return Step{duration_s, array_of(so3_log(turn)), array_of(so3_log(turn.conjugate() * by_lidar)),
-              array_of(Vector3d(*rate_after - turn.conjugate() * *rate_before))};
+              array_of(Vector3d(*rate_after - turn.conjugate() * *rate_before)),
+              array_of(Vector3d(quaternion_of(to.world_from_imu).conjugate() * Vector3d::UnitZ()))};
 }
 
 // Sum of squares of what a second of lateness changes.
-double LidarImuClockCheck::strength(const Stretch& stretch) {
+double LidarImuClockCheck::strength(const Stretch& stretch) const {
   double sum = 0.0;
-  for (const Step& one : stretch)
-    sum += vector_of(one.rate_change).squaredNorm();
+  for (const Step& one : stretch) {
+    const Vector3d change = vector_of(one.rate_change);
+    const double about_up = change.dot(vector_of(one.up));
+    sum += turns_ == Turns::kAll ? change.squaredNorm() : about_up * about_up;
+  }
   return sum;
 }
 
@@ -133,8 +137,44 @@ void LidarImuClockCheck::keep() {
   }
   const auto weakest = std::min_element(
       kept_.begin(), kept_.end(),
-      [](const Stretch& a, const Stretch& b) { return strength(a) < strength(b); });
+      [this](const Stretch& a, const Stretch& b) { return strength(a) < strength(b); });
   if (strength(stretch) > strength(*weakest)) *weakest = std::move(stretch);
+}
+
+// What each step leaves unexplained, and how it changes with the parameters.
+PathResiduals LidarImuClockCheck::residuals_of(const Stretch& stretch) const {
+  const auto count = static_cast<Eigen::Index>(stretch.size());
+  PathResiduals residuals;
+  residuals.axes = turns_ == Turns::kAll ? 3 : 1;
+  residuals.values.resize(residuals.axes * count);
+  residuals.by_step.setZero(residuals.axes * count, kLidarImuParameters);
+  const auto rate = [&](Eigen::Index k) {
+    const Step& one = stretch[static_cast<std::size_t>(std::clamp<Eigen::Index>(k, 0, count - 1))];
+    return Vector3d(vector_of(one.turn) / one.duration_s);
+  };
+  // Bends of the scans before and behind the step, see LidarImuState.
+  const auto bend = [&](Eigen::Index scan) {
+    return Vector3d(rate(scan + 1) - rate(scan) - rate(scan - 1) + rate(scan - 2));
+  };
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Step& one = stretch[static_cast<std::size_t>(k)];
+    Eigen::Matrix<double, 3, kLidarImuParameters> rows;
+    rows.setZero();
+    rows.leftCols<3>() = skew(vector_of(one.turn));
+    rows.col(kLatenessParameter) = -vector_of(one.rate_change);
+    rows.middleCols<3>(kBiasParameter) = one.duration_s * Eigen::Matrix3d::Identity();
+    rows.col(kBendParameter) = -0.5 * one.duration_s * (bend(k + 1) - bend(k));
+    const Vector3d difference = vector_of(one.difference);
+    if (turns_ == Turns::kAll) {
+      residuals.values.segment<3>(3 * k) = difference;
+      residuals.by_step.middleRows<3>(3 * k) = rows;
+    } else {
+      const Vector3d up = vector_of(one.up);
+      residuals.values[k] = up.dot(difference);
+      residuals.by_step.row(k) = up.transpose() * rows;
+    }
+  }
+  return residuals;
 }
 
 std::optional<ClockCheckResult> LidarImuClockCheck::result() const {
@@ -143,29 +183,9 @@ std::optional<ClockCheckResult> LidarImuClockCheck::result() const {
   ClockCheckResult found;
   NormalEquations equations;
   for (const Stretch& stretch : all.kept_) {
-    const auto count = static_cast<Eigen::Index>(stretch.size());
-    PathResiduals residuals{Eigen::VectorXd(3 * count), {}};
-    residuals.by_step.setZero(3 * count, kLidarImuParameters);
-    const auto rate = [&](Eigen::Index k) {
-      const Step& one =
-          stretch[static_cast<std::size_t>(std::clamp<Eigen::Index>(k, 0, count - 1))];
-      return Vector3d(vector_of(one.turn) / one.duration_s);
-    };
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const Step& one = stretch[static_cast<std::size_t>(k)];
+    for (const Step& one : stretch)
       found.duration_s += one.duration_s;
-      residuals.values.segment<3>(3 * k) = vector_of(one.difference);
-      auto rows = residuals.by_step.middleRows<3>(3 * k);
-      rows.leftCols<3>() = skew(vector_of(one.turn));
-      rows.col(kLatenessParameter) = -vector_of(one.rate_change);
-      rows.middleCols<3>(kBiasParameter) = one.duration_s * Eigen::Matrix3d::Identity();
-      // Bends of the scans before and behind the step, see LidarImuState.
-      const auto bend = [&](Eigen::Index scan) {
-        return Vector3d(rate(scan + 1) - rate(scan) - rate(scan - 1) + rate(scan - 2));
-      };
-      rows.col(kBendParameter) = -0.5 * one.duration_s * (bend(k + 1) - bend(k));
-    }
-    add_coloured(residuals, equations);
+    add_coloured(residuals_of(stretch), equations);
   }
   if (found.duration_s < kShortestCheckedS) return std::nullopt;
   equations.information += weak_information();
@@ -174,12 +194,13 @@ std::optional<ClockCheckResult> LidarImuClockCheck::result() const {
   const LidarImuStep step = -equations.information.ldlt().solve(equations.gradient);
   found.late_s = step[kLatenessParameter];
   found.late_sd_s = std::sqrt(covariance(kLatenessParameter, kLatenessParameter));
+  if (!(found.late_sd_s < kMostToldSdS)) return std::nullopt;
+  if (turns_ == Turns::kAboutUp) return found;
   const Vector3d turned = step.head<3>();
   found.turned_rad = turned.norm();
   const Eigen::Matrix3d turns = covariance.topLeftCorner<3, 3>();
   const Vector3d axis = turned.stableNormalized();
   found.turned_sd_rad = 1.0 / std::sqrt(axis.dot(turns.ldlt().solve(axis)));
-  if (!(found.late_sd_s < kMostToldSdS)) return std::nullopt;
   return found;
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "understory/calibration/lidar_imu/path_and_imu.h"
 #include "understory/odometry/imu/imu_buffer.h"
 #include "understory/util/files/binary_io.h"
 #include "understory/util/time.h"
@@ -17,8 +18,8 @@ struct ClockCheckResult {
   double duration_s = 0.0;  // of the motion that tells it
   double late_s = 0.0;      // the IMU's stamp less that of the lidar, for one moment
   double late_sd_s = 0.0;
-  double turned_rad = 0.0;  // between the IMU's true and its given axes
-  double turned_sd_rad = 0.0;
+  double turned_rad = 0.0;     // between the IMU's true and its given axes
+  double turned_sd_rad = 0.0;  // 0: turns about up tell none
   // Above 5 ms and 1 degree, and many standard deviations from none.
   [[nodiscard]] bool clock_is_off() const;
   [[nodiscard]] bool axes_are_off() const;
@@ -31,9 +32,13 @@ struct ClockCheckResult {
 // four stretches of 250 steps that tell the most, and changes nothing. Not thread-safe.
 class LidarImuClockCheck {
  public:
+  // What the matches tell of a turn: all of it, or the turn about up alone, as matches of stems do
+  // whose tilt is that of the IMU. These tell the lateness, and no turn of the axes.
+  enum class Turns { kAll, kAboutUp };
   // `noise`: limits of the samples.
   LidarImuClockCheck() : LidarImuClockCheck(ImuNoiseConfig()) {}
-  explicit LidarImuClockCheck(const ImuNoiseConfig& noise) : imu_(noise, nullptr) {}
+  explicit LidarImuClockCheck(const ImuNoiseConfig& noise, Turns turns = Turns::kAll)
+      : turns_(turns), imu_(noise, nullptr) {}
 
   // In order of time.
   void add_sample(const ImuSample& sample);
@@ -65,14 +70,17 @@ class LidarImuClockCheck {
     std::array<double, 3> turn{};         // by the gyroscope, rotation vector
     std::array<double, 3> difference{};   // from it to the turn by the lidar
     std::array<double, 3> rate_change{};  // of the turn rate, from middle to middle
+    std::array<double, 3> up{};           // z of the world
   };
   using Stretch = std::vector<Step>;
 
   [[nodiscard]] std::optional<Step> step(const Seen& from, const Seen& to) const;
   [[nodiscard]] std::optional<Eigen::Vector3d> rate_at(TimeNs stamp) const;
-  static double strength(const Stretch& stretch);
+  [[nodiscard]] double strength(const Stretch& stretch) const;
+  [[nodiscard]] PathResiduals residuals_of(const Stretch& stretch) const;
   void keep();
 
+  Turns turns_;
   ImuBuffer imu_;
   std::vector<Seen> seen_;  // at most two
   Stretch current_;

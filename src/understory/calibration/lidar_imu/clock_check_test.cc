@@ -15,8 +15,11 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 // What the check says of a walk. `turned`: of the given axes of the IMU against the true ones.
 std::optional<ClockCheckResult> checked(const SimulatedWalk& walk,
                                         const Eigen::Quaterniond& turned = {1, 0, 0, 0},
-                                        std::size_t save_at = 0) {
-  LidarImuClockCheck check;
+                                        std::size_t save_at = 0, bool about_up = false) {
+  using Turns = LidarImuClockCheck::Turns;
+  const LidarImuClockCheck fresh(ImuNoiseConfig(), about_up ? Turns::kAboutUp : Turns::kAll);
+  LidarImuClockCheck check = fresh;
+  Random tilting(17, 0);
   const Eigen::Quaterniond lidar_from_imu = walk.lidar_from_imu.rotation() * turned;
   const auto samples =
       walk.imu.samples(walk.world_from_lidar.front().stamp, walk.world_from_lidar.back().stamp);
@@ -30,12 +33,17 @@ std::optional<ClockCheckResult> checked(const SimulatedWalk& walk,
       sample.specific_force = samples[next].specific_force();
       check.add_sample(sample);
     }
-    check.add_scan(pose.stamp, pose.stamp, pose.world_from_body.rotation(), lidar_from_imu);
+    // Stems hardly tell the tilt.
+    const double degrees = about_up ? 1.0 : 0.0;
+    const Eigen::Vector3d tilt(tilting.normal(), tilting.normal(), 0.0);
+    check.add_scan(pose.stamp, pose.stamp,
+                   so3_exp(degrees * kDegree * tilt) * pose.world_from_body.rotation(),
+                   lidar_from_imu);
     if (i + 1 != save_at) continue;
     BinaryWriter writer;
     check.save(writer);
     BinaryReader reader(writer.bytes(), "saved");
-    check = LidarImuClockCheck();
+    check = fresh;
     check.load(reader);
   }
   return check.result();
@@ -54,6 +62,20 @@ TEST(ClockCheck, TellsALateClockAndIsSilentAboutAGoodOne) {
     EXPECT_TRUE(late->clock_is_off()) << seed << ": " << late->late_s << " " << late->late_sd_s;
     EXPECT_NEAR(late->late_s, late_s, 0.004);
     EXPECT_FALSE(late->axes_are_off()) << seed << ": " << late->turned_rad / kDegree;
+  }
+}
+
+TEST(ClockCheck, TellsALateClockByTurnsAboutUpAlone) {
+  for (int seed = 0; seed < 4; ++seed) {
+    const auto good = checked(simulated_walk(seed, 40.0, 0.0), {1, 0, 0, 0}, 0, true);
+    ASSERT_TRUE(good);
+    EXPECT_FALSE(good->clock_is_off()) << seed << ": " << good->late_s << " " << good->late_sd_s;
+    const double late_s = seed % 2 == 0 ? 0.02 : -0.02;
+    const auto late = checked(simulated_walk(seed, 40.0, late_s), {1, 0, 0, 0}, 0, true);
+    ASSERT_TRUE(late);
+    EXPECT_TRUE(late->clock_is_off()) << seed << ": " << late->late_s << " " << late->late_sd_s;
+    EXPECT_NEAR(late->late_s, late_s, 0.006);
+    EXPECT_FALSE(late->axes_are_off());
   }
 }
 

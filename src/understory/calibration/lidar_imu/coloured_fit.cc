@@ -1,9 +1,9 @@
 #include "understory/calibration/lidar_imu/coloured_fit.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "understory/calibration/calibration_constants.h"
 
@@ -41,22 +41,24 @@ Eigen::MatrixXd trigonometric(Eigen::Index count) {
 }
 
 Waves waves_of(const PathResiduals& residuals, Eigen::Index axis, const Eigen::MatrixXd& table) {
-  const Eigen::Index count = residuals.values.size() / 3;
+  const Eigen::Index axes = residuals.axes;
+  const Eigen::Index count = residuals.values.size() / axes;
   Waves signal(count, kColumns);
   for (Eigen::Index i = 0; i < count; ++i) {
-    signal(i, 0) = residuals.values[3 * i + axis];
-    signal.block<1, kLidarImuParameters>(i, 1) = residuals.by_step.row(3 * i + axis);
+    signal(i, 0) = residuals.values[axes * i + axis];
+    signal.block<1, kLidarImuParameters>(i, 1) = residuals.by_step.row(axes * i + axis);
   }
   return table * signal;
 }
 
-// Mean power of the residuals of the three axes at each frequency.
-Eigen::VectorXd power_of(const std::array<Waves, 3>& axes) {
-  const Eigen::Index frequencies = axes[0].rows() / 2;
+// Mean power of the residuals of the axes at each frequency.
+Eigen::VectorXd power_of(const std::vector<Waves>& axes) {
+  const Eigen::Index frequencies = axes.front().rows() / 2;
+  const auto number = static_cast<double>(axes.size());
   Eigen::VectorXd power = Eigen::VectorXd::Zero(frequencies);
   for (const Waves& waves : axes) {
     for (Eigen::Index f = 0; f < frequencies; ++f)
-      power[f] += waves.block<2, 1>(2 * f, 0).squaredNorm() / 3.0;
+      power[f] += waves.block<2, 1>(2 * f, 0).squaredNorm() / number;
   }
   return power;
 }
@@ -73,6 +75,10 @@ Eigen::VectorXd law_of(const Eigen::VectorXd& power, Eigen::Index count) {
                              static_cast<double>(count));
     parts.row(f) << 1.0, of_differences, of_differences * of_differences;
   }
+  // The sum over all differences is that of the first and the last value alone, and so on: small,
+  // but not nothing. Without this a signal of differences would know its mean for certain.
+  const auto all = static_cast<double>(count);
+  parts.row(0) << 1.0, 2.0 / all, 4.0 / all;
   const auto some = parts.bottomRows(used);
   const Eigen::ArrayXd measured = power.tail(used).array().max(kLeastPower);
   Eigen::Vector3d sizes = Eigen::Vector3d::Constant(measured.mean() / 3.0);
@@ -103,10 +109,11 @@ Eigen::VectorXd smooth_power(const Eigen::VectorXd& power, Eigen::Index count) {
 }  // namespace
 
 void add_coloured(const PathResiduals& residuals, NormalEquations& equations) {
-  const Eigen::Index count = residuals.values.size() / 3;
+  const Eigen::Index count = residuals.values.size() / residuals.axes;
   const Eigen::MatrixXd table = trigonometric(count);
-  const std::array<Waves, 3> axes = {waves_of(residuals, 0, table), waves_of(residuals, 1, table),
-                                     waves_of(residuals, 2, table)};
+  std::vector<Waves> axes;
+  for (Eigen::Index axis = 0; axis < residuals.axes; ++axis)
+    axes.push_back(waves_of(residuals, axis, table));
   const Eigen::VectorXd power = smooth_power(power_of(axes), count);
   for (const Waves& waves : axes) {
     for (Eigen::Index f = 0; f < power.size(); ++f) {

@@ -53,5 +53,31 @@ TEST(ColouredFit, FindsASlopeInErrorsThatCancelFarBetterThanTheirSizeSays) {
   EXPECT_LT(chi, 1.35);
 }
 
+// A regression: the mean of differences counted as known for certain, and a calibration of a calm
+// stretch became no number. Their sum is the last value less the first: its variance is that of
+// two.
+TEST(ColouredFit, TheMeanOfDifferencesIsKnownByTheirEndsAlone) {
+  constexpr Eigen::Index kCount = 200;
+  for (int seed = 0; seed < 20; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed), 0);
+    PathResiduals residuals;
+    residuals.axes = 1;
+    residuals.values.resize(kCount);
+    residuals.by_step.setZero(kCount, kLidarImuParameters);
+    residuals.by_step.col(0).setOnes();
+    double last = random.normal();
+    for (Eigen::Index i = 0; i < kCount; ++i) {
+      const double next = random.normal();
+      residuals.values[i] = next - last;
+      last = next;
+    }
+    NormalEquations equations;
+    add_coloured(residuals, equations);
+    const double known = 0.5 * kCount * kCount;  // one over the variance of the mean
+    EXPECT_LT(equations.information(0, 0), 3.0 * known) << seed;
+    EXPECT_GT(equations.information(0, 0), 0.1 * known) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace understory

@@ -36,11 +36,12 @@ using LidarImuStep = Eigen::Matrix<double, kLidarImuParameters, 1>;
 using LidarImuMatrix = Eigen::Matrix<double, kLidarImuParameters, kLidarImuParameters>;
 [[nodiscard]] LidarImuState stepped(const LidarImuState& state, const LidarImuStep& step);
 
-// By how much path and IMU differ at one scan after the other, an axis a column: rows 3 k to
-// 3 k + 2 are those of scan k.
+// By how much path and IMU differ at one scan after the other: of three axes, rows 3 k to 3 k + 2
+// are those of scan k; of one axis row k is.
 struct PathResiduals {
   Eigen::VectorXd values;
   Eigen::Matrix<double, Eigen::Dynamic, kLidarImuParameters> by_step;
+  Eigen::Index axes = 3;  // or 1
 };
 
 // Poses in a row that the samples of the IMU cover without a gap.

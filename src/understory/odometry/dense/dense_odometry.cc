@@ -14,6 +14,19 @@ namespace {
 
 using namespace odometry_constants::dense_odometry;
 
+// From the first pose of a path to that at `stamp`.
+Pose motion_until(const std::vector<StampedPose>& path, TimeNs stamp) {
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    if (path[i].stamp < stamp && i + 1 < path.size()) continue;
+    const double share = to_seconds(stamp - path[i - 1].stamp) /
+                         std::max(to_seconds(path[i].stamp - path[i - 1].stamp), 1e-9);
+    return path.front().world_from_body.inverse() * interpolate(path[i - 1].world_from_body,
+                                                                path[i].world_from_body,
+                                                                std::clamp(share, 0.0, 1.0));
+  }
+  return {};
+}
+
 }  // namespace
 
 void describe(ConfigTable& table, ScanMatchConfig& config) {
@@ -88,6 +101,8 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
     const std::vector<StampedPose> guess = motion_->predict_path(scan.stamp, estimate.scan_end);
     learn_carried(scan, guess);
     preprocess(scan, guess, estimate);
+    estimate.stamp_from_middle =
+        motion_until(guess, scan.stamp + (estimate.scan_end - scan.stamp) / 2);
     const bool by_match = local_map && !known.pose;
     if (by_match) match(*local_map, motion_->predict(scan.stamp), known.terms, estimate);
     watch_scan_motion(scan, local_map, guess, estimate);

@@ -83,6 +83,7 @@ struct DenseEstimate {
   BodyCloud thinned;              // what was matched, of the tops or of the cloud
   std::size_t weather = 0;        // returns that the weather filter dropped
   TimeNs scan_end = 0;            // time of the scan's last point
+  Pose stamp_from_middle;         // motion of the body to half of its time, as it was deskewed
   double wall_ms = 0.0;
   double cpu_ms = 0.0;
 };

@@ -29,6 +29,7 @@ std::string report_html(const ReportInput& input, const std::vector<std::string>
   html += loops_section(input);
   html += correction_section(input);
   html += matching_section(input);
+  html += imu_section(input);
   html += time_section(input);
   html += made_section(input);
   return html + "</main><script>\n\"use strict\";\n" + report_script() +

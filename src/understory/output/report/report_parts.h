@@ -35,6 +35,8 @@ namespace understory {
 // Its figures: pairs of views, sights before and after, trees over the distance from the way.
 [[nodiscard]] std::string correction_figures(const ReportCorrection& correction);
 [[nodiscard]] std::string truth_section(const ReportInput& input);
+// Place and clock of the IMU, where they were refined.
+[[nodiscard]] std::string imu_section(const ReportInput& input);
 [[nodiscard]] std::string time_section(const ReportInput& input);
 [[nodiscard]] std::string made_section(const ReportInput& input);
 

@@ -238,6 +238,34 @@ std::string truth_section(const ReportInput& input) {
   return html + "</section>\n";
 }
 
+std::string imu_section(const ReportInput& input) {
+  if (!input.summary.imu_calibration) return "";
+  const ImuCalibrationFigures& imu = *input.summary.imu_calibration;
+  std::string html = fmt::format(
+      "<section><h2>Place and clock of the IMU</h2><p>The recording itself tells them, by {:.0f} s "
+      "of motion. {}</p><div class=\"wide\"><table><tr><th></th><th class=\"n\">refined</th><th "
+      "class=\"n\">standard deviation</th></tr>",
+      imu.duration_s,
+      imu.begun_anew == 0
+          ? std::string("It was mapped with those given.")
+          : fmt::format(
+                "It was mapped with an IMU that lies {:.3f} m and {:.2f} degrees from where "
+                "it was given, and whose stamps are {:.1f} ms late.",
+                imu.moved_m, imu.turned_deg, 1e3 * imu.used_late_s));
+  const auto row = [&](const char* name, double value, std::size_t parameter, double unit) {
+    const double sd = unit * std::sqrt(std::max(imu.covariance[8 * parameter], 0.0));
+    html += fmt::format("<tr><td>{}</td><td class=\"n\">{:.3f}</td><td class=\"n\">{}</td></tr>",
+                        name, value, sd > 0.0 ? fmt::format("{:.3f}", sd) : "as given");
+  };
+  row("stamps late by, ms", 1e3 * imu.late_s, 6, 1e3);
+  row("x on the body, m", imu.translation_m[0], 3, 1.0);
+  row("y on the body, m", imu.translation_m[1], 4, 1.0);
+  row("z on the body, m", imu.translation_m[2], 5, 1.0);
+  return html +
+         "</table></div><p>Its rotation and the whole covariance stand in run.json, under "
+         "imu_calibration.</p></section>\n";
+}
+
 std::string time_section(const ReportInput& input) {
   std::string html;
   const bool timed = std::any_of(input.scans.begin(), input.scans.end(),

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "understory/geometry/pose_io.h"
 #include "understory/pipeline/mapping/dense/memory_plan.h"
 #include "understory/pipeline/pipeline_constants.h"
 
@@ -180,6 +181,12 @@ void put_conditions(BinaryWriter& writer, const RunConditions& conditions) {
   writer.put(conditions.imu_cleared);
   writer.put(conditions.imu_refused);
   writer.put(conditions.imu_judged_s);
+  writer.put(conditions.imu_refined.has_value());
+  if (conditions.imu_refined) {
+    put_pose(writer, conditions.imu_refined->body_from_imu);
+    writer.put(conditions.imu_refined->late_s);
+  }
+  writer.put(conditions.imu_refinements);
 }
 
 RunConditions get_conditions(BinaryReader& reader) {
@@ -189,6 +196,12 @@ RunConditions get_conditions(BinaryReader& reader) {
   conditions.imu_cleared = reader.get<bool>();
   conditions.imu_refused = reader.get_string();
   conditions.imu_judged_s = reader.get<double>();
+  if (reader.get<bool>()) {
+    conditions.imu_refined.emplace();
+    conditions.imu_refined->body_from_imu = get_pose(reader);
+    conditions.imu_refined->late_s = reader.get<double>();
+  }
+  conditions.imu_refinements = reader.get<int>();
   return conditions;
 }
 

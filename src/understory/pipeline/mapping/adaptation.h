@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "understory/geometry/pose.h"
 #include "understory/pipeline/mapping/dense/dense_mapping_config.h"
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/mapping/sparse/sparse_mapping_config.h"
@@ -11,6 +13,12 @@
 
 namespace understory {
 
+// Place and clock of an IMU as a run has refined them.
+struct RefinedImu {
+  Pose body_from_imu;
+  double late_s = 0.0;  // its stamps, as the recording has them, less those of the lidar
+};
+
 // What else than its sensors decides how a recording is mapped.
 struct RunConditions {
   bool realtime = false;      // at the speed of the sensors
@@ -18,6 +26,9 @@ struct RunConditions {
   bool imu_cleared = false;   // it was doubted, and it was right: it counts as proven
   std::string imu_refused;    // why it is left out for good; empty: it is not
   double imu_judged_s = 0.0;  // when the last of these was found, seconds since the first scan
+  std::optional<RefinedImu> imu_refined = std::nullopt;  // what it is mapped with instead of what
+                                                         // is given
+  int imu_refinements = 0;                               // how often it was begun anew for that
 };
 void put_origins(BinaryWriter& writer, const ConfigOrigins& origins);
 [[nodiscard]] ConfigOrigins get_origins(BinaryReader& reader);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "understory/pipeline/mapping/dense/memory_plan.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/preprocess/point_order.h"
 #include "understory/recording/finding.h"
 #include "understory/util/error.h"
@@ -13,6 +14,9 @@
 #include "understory/util/timing.h"
 
 namespace understory {
+
+using namespace pipeline_constants::event_loop;
+
 namespace {
 
 // Why the recording is begun anew, for the log.
@@ -119,7 +123,7 @@ RunFacts EventLoop::run() {
     }
     handle_ready();
     if (!ended) save_state_if_due();
-    if (start_over_for_imu()) ended = false;
+    if (start_over_for_imu() || start_over_for_refined_imu()) ended = false;
   }
   if (stopped_ && front_end_->settled()) save_state();
   note_positioned(front_end_->finish(source_->rig()));
@@ -135,7 +139,13 @@ bool EventLoop::stopped() {
 // A recording that the system cannot read any further ends the run there, with what it has.
 std::optional<Event> EventLoop::next_event() {
   try {
-    return source_->next();
+    std::optional<Event> event = source_->next();
+    const std::optional<RefinedImu>& refined = request_.conditions.imu_refined;
+    if (event && refined) {
+      if (auto* sample = std::get_if<ImuSample>(&*event))
+        sample->stamp -= from_seconds(refined->late_s);
+    }
+    return event;
   } catch (const ReadError& error) {
     if (!front_end_->has_map()) throw;
     unreadable_ = error.what();
@@ -230,6 +240,26 @@ bool EventLoop::start_over_for_stamps() {
   stamps_trusted_ = true;
   log_.forget_all_but("");
   log_.info("the recording is started again with the IMU's own stamps");
+  start_over();
+  return true;
+}
+
+// Place and clock of the IMU were given wrongly: the recording is begun anew with what it tells
+// itself. Each time brings them nearer. True if it was begun anew; a run at the speed of its
+// sensors cannot.
+bool EventLoop::start_over_for_refined_imu() {
+  RunConditions& conditions = request_.conditions;
+  if (player_ != nullptr || conditions.imu_refinements >= kMostRefinements) return false;
+  if (!front_end_->settled()) return false;
+  const std::optional<RefinedImu> found = front_end_->refined_imu();
+  if (!found) return false;
+  log_.forget_all_but("");
+  log_.info(
+      fmt::format("the recording is mapped again from its beginning, with place and clock of the "
+                  "IMU as it tells them itself (its stamps are {:.1f} ms late)",
+                  1e3 * found->late_s));
+  ++conditions.imu_refinements;
+  conditions.imu_refined = found;
   start_over();
   return true;
 }

@@ -69,6 +69,7 @@ class EventLoop {
   void save_state_if_due();
   [[nodiscard]] bool start_over_for_imu();
   [[nodiscard]] bool start_over_for_stamps();
+  [[nodiscard]] bool start_over_for_refined_imu();
   void start_over();
   [[nodiscard]] RunFacts facts();
   [[nodiscard]] std::string remark(const FrontEndProgress& so_far) const;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -80,6 +81,7 @@ struct Script {
   TimeNs imu_wrong_at = 0;                    // unless it was made without the IMU; 0: never
   TimeNs imu_suspected_at = 0;                // by a front end that was told nothing; 0: never
   TimeNs imu_cleared_at = 0;                  // by one that doubts it; 0: never
+  TimeNs imu_refined_at = 0;                  // by any, 10 ms more each time; 0: never
 };
 
 class MadeUpFrontEnd : public FrontEnd {
@@ -117,6 +119,11 @@ class MadeUpFrontEnd : public FrontEnd {
     if (!conditions_.imu_doubted && !conditions_.imu_cleared && reached(script_.imu_suspected_at))
       return {ImuFinding::Verdict::kSuspected, ""};
     return {};
+  }
+  [[nodiscard]] std::optional<RefinedImu> refined_imu() const override {
+    if (script_.imu_refined_at == 0 || last_scan_ < script_.imu_refined_at) return std::nullopt;
+    const double late_s = conditions_.imu_refined ? conditions_.imu_refined->late_s : 0.0;
+    return RefinedImu{Pose(), late_s + 0.01};
   }
   [[nodiscard]] FrontEndProgress progress() const override { return {"made up", scans_, ""}; }
   [[nodiscard]] bool has_map() const override { return scans_ > 0; }
@@ -300,6 +307,46 @@ TEST_F(EventLoopTest, AnImuThatWasDoubtedAndIsRightHasTheRecordingBegunAnew) {
   EXPECT_TRUE(course_.made_for[2].imu_cleared);
   EXPECT_NEAR(course_.made_for[2].imu_judged_s, 5.0, 1e-9);
   EXPECT_EQ(events_handled_, events_.size());
+}
+
+// Its samples then come with the refined clock, from the first one on. It ends though each pass
+// finds another lateness.
+TEST_F(EventLoopTest, ARefinedImuHasTheRecordingBegunAnewThreeTimesAtMost) {
+  script_.imu_refined_at = at(3.0);
+  (void)run();
+  EXPECT_EQ(course_.opened, 4);
+  ASSERT_EQ(course_.made_for.size(), 4U);
+  EXPECT_FALSE(course_.made_for[0].imu_refined);
+  for (int pass = 1; pass < 4; ++pass) {
+    const RunConditions& conditions = course_.made_for[static_cast<std::size_t>(pass)];
+    ASSERT_TRUE(conditions.imu_refined);
+    EXPECT_NEAR(conditions.imu_refined->late_s, 0.01 * pass, 1e-12);
+    EXPECT_EQ(conditions.imu_refinements, pass);
+  }
+  EXPECT_EQ(events_handled_, events_.size());
+  // Of the last pass: scans at every tenth of a second, samples 30 ms before every fiftieth.
+  std::size_t samples = 0;
+  for (std::size_t i = course_.handled.size() - events_.size(); i < course_.handled.size(); ++i)
+    samples += (course_.handled[i] - kStart + from_seconds(0.03)) % kImuStep == 0 ? 1 : 0;
+  EXPECT_EQ(samples, 500U);
+}
+
+// The clock that was found goes on after a run was cut off.
+TEST_F(EventLoopTest, ARefinedImuIsKeptByACheckpoint) {
+  script_.imu_refined_at = at(3.0);
+  script_.throws_at = at(7.0);
+  EXPECT_THROW((void)run(), std::runtime_error);
+  script_ = {};
+  course_ = {};
+  UnfinishedRun unfinished = RunState::reopen(request_.run_folder);
+  unfinished.request.config = request_.config;
+  request_ = unfinished.request;
+  (void)run(unfinished.state);
+  ASSERT_EQ(course_.made_for.size(), 1U);
+  ASSERT_TRUE(course_.made_for[0].imu_refined);
+  EXPECT_NEAR(course_.made_for[0].imu_refined->late_s, 0.03, 1e-12);
+  EXPECT_EQ(course_.made_for[0].imu_refinements, 3);
+  EXPECT_EQ(course_.handled.back(), event_time(events_.back()) - from_seconds(0.03));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,9 @@ class FrontEnd : public Resumable {
   [[nodiscard]] virtual TimeNs first_scan() const = 0;
   // What was positioned with an IMU that is not trusted is better done again without it.
   [[nodiscard]] virtual ImuFinding imu_finding() const = 0;
+  // Place and clock of the IMU that the scans so far tell, where they differ from those that they
+  // were positioned with and this is to be mended.
+  [[nodiscard]] virtual std::optional<RefinedImu> refined_imu() const { return std::nullopt; }
   [[nodiscard]] virtual FrontEndProgress progress() const = 0;
 
   // Whether there is anything to make a map of, and why not.

@@ -1,5 +1,10 @@
 #include "understory/pipeline/mapping/map_documents.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
 #include "understory/pipeline/georeferencing/online_path.h"
 #include "understory/pipeline/source.h"
 
@@ -24,6 +29,32 @@ RunDocuments map_documents(const ReadRecording& recording, const StageTimes& tim
   documents.count("scans_dropped", facts.dropped_scans);
   add_latency(distribution_of(facts.latencies_ms), documents.summary());
   return documents;
+}
+
+void tell_imu_clock(const std::optional<ClockCheckResult>& check, Log& log, RunSummary& summary) {
+  if (!check) return;
+  summary.quality["imu_late_ms"] = 1e3 * check->late_s;
+  summary.quality["imu_late_sd_ms"] = 1e3 * check->late_sd_s;
+  constexpr const char* kRemedy =
+      "`understory calibrate lidar-imu` finds it, and `map --extrinsics` takes it out; "
+      "`map --refine-imu` does both by all points";
+  if (check->clock_is_off())
+    log.warn("imu.clock",
+             fmt::format("the clock of the IMU seems to be {:.0f} ± {:.0f} ms {} by that of the "
+                         "lidar: {}",
+                         1e3 * std::abs(check->late_s), 1e3 * check->late_sd_s,
+                         check->late_s > 0.0 ? "late" : "early", kRemedy));
+  if (!(check->turned_sd_rad > 0.0)) return;
+  constexpr double kDegreesARad = 180.0 / std::numbers::pi;
+  const double turned_deg = kDegreesARad * check->turned_rad;
+  const double turned_sd_deg = kDegreesARad * check->turned_sd_rad;
+  summary.quality["imu_turned_deg"] = turned_deg;
+  summary.quality["imu_turned_sd_deg"] = turned_sd_deg;
+  if (check->axes_are_off())
+    log.warn("imu.axes",
+             fmt::format("the axes of the IMU seem to be turned by {:.1f} ± {:.1f} degrees from "
+                         "where they are given: {}",
+                         turned_deg, turned_sd_deg, kRemedy));
 }
 
 }  // namespace understory

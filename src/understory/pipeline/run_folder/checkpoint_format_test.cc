@@ -3,11 +3,13 @@
 #include <cstddef>
 
 #include "understory/calibration/lidar_imu/clock_check.h"
+#include "understory/calibration/lidar_imu/online_calibration.h"
 #include "understory/georeference/satellites/online_georeference.h"
 #include "understory/map/loop_closer.h"
 #include "understory/odometry/dense/recovery.h"
 #include "understory/odometry/imu/imu_watch.h"
 #include "understory/pipeline/judgement/imu_usage.h"
+#include "understory/pipeline/mapping/adaptation.h"
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/run_folder/checkpoint.h"
@@ -41,6 +43,8 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 613U);
   EXPECT_EQ(saved(ImuUsage()), 25U);
   EXPECT_EQ(saved(LidarImuClockCheck()), 41U);
+  EXPECT_EQ(saved(OnlineImuCalibration()), 569U);
+  EXPECT_EQ(size_of([](BinaryWriter& writer) { put_conditions(writer, {}); }), 24U);
   EXPECT_EQ(saved(OnlineGeoreference(OnlineGeoreferenceConfig())), 221632U);
   EXPECT_EQ(saved(TopicStatistics()), 136U);
   EXPECT_EQ(saved(Recovery(30)), 108U);

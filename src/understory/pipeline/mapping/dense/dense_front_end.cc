@@ -66,9 +66,11 @@ DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTrait
       imu_doubted_(conditions.imu_doubted),
       imu_cleared_s_(conditions.imu_cleared ? std::optional(conditions.imu_judged_s)
                                             : std::nullopt),
+      imu_refined_(conditions.imu_refined),
       opening_(std::make_unique<Opening>()) {
   if (config.max_memory_mb > 0.0) give_back_what_is_freed();
   received_.clock = LidarImuClockCheck(config.odometry.motion.imu);
+  if (config.refine_imu) received_.calibration.emplace();
   const LoopClosureConfig& loops = config.keyframe_map.loop_closure.verification;
   for (const std::string& method : {loops.matcher.method, loops.refine}) {
     if (method == LoopClosureConfig::kNoRefinement) continue;
@@ -124,6 +126,7 @@ void DenseFrontEnd::take(const Event& event, const Rig& rig) {
       opening_->before = received_;
       rig_ = rig;
       if (without_samples()) rig_.body_from_imu.reset();
+      refine_rig();
       start_anew();
     }
     if (partial_path_) match_parts(**scan);
@@ -136,6 +139,7 @@ void DenseFrontEnd::take_sample(const ImuSample& sample) {
   if (started())
     received_.imu_usage.add(sample, rig_.body_from_imu.has_value(), config_.odometry.motion.imu);
   received_.clock.add_sample(sample);
+  if (received_.calibration) received_.calibration->add_sample(sample);
   received_.imu.push_back(sample);
   const std::size_t most = started() && settled() ? kRecentImu : kMostWaitingImu;
   while (received_.imu.size() > most)
@@ -163,6 +167,7 @@ void DenseFrontEnd::complete_rig(const Rig& rig) {
   if (rig_.body_from_imu || !rig.body_from_imu || without_samples()) return;
   rig_.body_from_imu = rig.body_from_imu;
   rig_.imu_extrinsic_source = rig.imu_extrinsic_source;
+  refine_rig();
   const std::vector<ImuSample> recent(received_.imu.begin(), received_.imu.end());
   odometry_->take_imu(*rig_.body_from_imu, recent);
   if (odometry_->uses_imu()) tell_of_imu(recovery_.last_scan());
@@ -256,6 +261,7 @@ DenseEstimate DenseFrontEnd::begin_segment(const Scan& scan, const Pose& about_t
                         "relative to the old one is a guess",
                         format_seconds(scan.stamp)));
   received_.clock.break_off();
+  if (received_.calibration) received_.calibration->break_off();
   const bool proven = odometry_->motion().imu_trust().proven;
   make_odometry(rig_);
   for (const ImuSample& sample : received_.imu)
@@ -354,25 +360,6 @@ void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& reco
   }
 }
 
-// Nothing of the run depends on it.
-void DenseFrontEnd::check_clock(const DenseEstimate& estimate, const ScanRecord& record) {
-  if (!odometry_->uses_imu() || !rig_.body_from_imu) return;
-  if (!estimate.matched || record.outcome != ScanOutcome::kMatched) {
-    received_.clock.break_off();
-    return;
-  }
-  received_.clock.add_scan(record.stamp, estimate.scan_end,
-                           estimate.match.target_from_source.rotation(),
-                           rig_.body_from_imu->rotation());
-  if (const auto& levelled = estimate.update.new_world_from_old_world)
-    received_.clock.turn_world(levelled->rotation());
-}
-
-std::optional<ClockCheckResult> DenseFrontEnd::clock_check() const {
-  if (!started() || !odometry_->uses_imu()) return std::nullopt;
-  return received_.clock.result();
-}
-
 void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record) {
   NavState state = estimate.state;
   if (estimate.update.new_world_from_old_world) {
@@ -429,6 +416,7 @@ void DenseFrontEnd::watch_memory() {
 void DenseFrontEnd::move_world(const Pose& new_world_from_old_world) {
   odometry_->move_world(new_world_from_old_world);
   received_.clock.turn_world(new_world_from_old_world.rotation());
+  if (received_.calibration) received_.calibration->move_world(new_world_from_old_world);
   if (satellites_) satellites_->move_present(new_world_from_old_world);
   std::optional<Pose>& so_far = positioned_.new_world_from_old_world;
   so_far = so_far ? new_world_from_old_world * *so_far : new_world_from_old_world;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "understory/calibration/lidar_imu/clock_check.h"
+#include "understory/calibration/lidar_imu/online_calibration.h"
 #include "understory/georeference/satellites/satellite_belief.h"
 #include "understory/map/keyframe_map.h"
 #include "understory/map/scan_clouds.h"
@@ -77,6 +78,7 @@ class DenseFrontEnd : public FrontEnd {
   void run_in_real_time() override { map_->take_loops_when_found(); }
   [[nodiscard]] TimeNs first_scan() const override { return traits_.first_scan; }
   [[nodiscard]] ImuFinding imu_finding() const override;
+  [[nodiscard]] std::optional<RefinedImu> refined_imu() const override;
   [[nodiscard]] FrontEndProgress progress() const override;
   [[nodiscard]] bool has_map() const override { return !map_->keyframes().empty(); }
   [[nodiscard]] std::string why_no_map(const Recording& source) const override;
@@ -103,6 +105,10 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] const ImuUsage& imu_usage() const { return received_.imu_usage; }
   // How far the IMU's clock and axes seem to be off; nothing where it is not used or not told.
   [[nodiscard]] std::optional<ClockCheckResult> clock_check() const;
+  // Place and clock of the IMU by the whole run, and what it was mapped with: as in
+  // `refined_imu`. Nothing without `refine_imu` and where the motion does not tell them.
+  [[nodiscard]] std::optional<OnlineImuEstimate> imu_calibration() const;
+  [[nodiscard]] const std::optional<RefinedImu>& imu_used() const { return imu_refined_; }
   [[nodiscard]] const KeyframeMap& map() const { return *map_; }
   [[nodiscard]] KeyframeMap& map() { return *map_; }
   // Whether the configuration of this run has it use an IMU.
@@ -136,6 +142,7 @@ class DenseFrontEnd : public FrontEnd {
     DenseCounts counts;
     ImuUsage imu_usage;
     LidarImuClockCheck clock;
+    std::optional<OnlineImuCalibration> calibration;  // with `refine_imu`
     std::deque<ImuSample> imu;   // all before the first scan, then the last ones
     std::vector<GnssFix> fixes;  // those that are not on disk yet
   };
@@ -179,6 +186,7 @@ class DenseFrontEnd : public FrontEnd {
                    const Pose& keyframe_from_body);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
   void check_clock(const DenseEstimate& estimate, const ScanRecord& record);
+  void refine_rig();
 
   DenseMappingConfig config_;
   SensorTraits traits_;
@@ -201,8 +209,9 @@ class DenseFrontEnd : public FrontEnd {
   Recovery recovery_;
   std::string imu_refused_;
   bool imu_doubted_ = false;
-  std::optional<double> imu_cleared_s_;  // seconds since the first scan, of the verdict
-  std::unique_ptr<Opening> opening_;     // until the first scans are settled
+  std::optional<double> imu_cleared_s_;    // seconds since the first scan, of the verdict
+  std::optional<RefinedImu> imu_refined_;  // what the IMU is used with instead of what is given
+  std::unique_ptr<Opening> opening_;       // until the first scans are settled
 };
 
 }  // namespace understory

@@ -45,6 +45,7 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   writer.put(received_.counts);
   received_.imu_usage.save(writer);
   received_.clock.save(writer);
+  if (received_.calibration) received_.calibration->save(writer);
   writer.put(last_scan_end_);
   const ScanClouds::Last last_cloud = clouds_ ? clouds_->last() : ScanClouds::Last();
   writer.put(last_cloud.keyframe);
@@ -106,6 +107,7 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   received_.counts = reader.get<DenseCounts>();
   received_.imu_usage.load(reader);
   received_.clock.load(reader);
+  if (received_.calibration) received_.calibration->load(reader);
   last_scan_end_ = reader.get<TimeNs>();
   ScanClouds::Last last_cloud;
   last_cloud.keyframe = reader.get<std::uint64_t>();

@@ -12,6 +12,9 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   ConfigTable table;
   table.add("imu_rate", config.imu_rate,
             "write trajectory_imu.tum, a prediction of the pose for each sample of the IMU");
+  table.add("refine_imu", config.refine_imu,
+            "refine place and clock of the IMU while mapping; what differs from the given values "
+            "is mapped anew");
   table.add("scan_fraction", config.scan_fraction, {0.05, 1.0}, "",
             "below 1: each such part of a scan gives a pose as soon as its last point is there, in "
             "trajectory_partial.tum");
@@ -107,6 +110,12 @@ ReadConfig<DenseMappingConfig> read_dense_mapping_config(const std::string& prof
     if (config.imu_rate && !config.odometry.imu_enabled)
       throw ConfigError(
           {"imu_rate: predictions for each sample of the IMU need "
+           "motion.imu_enabled=true"});
+  });
+  problems.gather([&] {
+    if (config.refine_imu && !config.odometry.imu_enabled)
+      throw ConfigError(
+          {"refine_imu: place and clock of the IMU are refined where it is used: "
            "motion.imu_enabled=true"});
   });
   problems.gather([&] {

@@ -26,6 +26,8 @@ namespace understory {
 struct DenseMappingConfig {
   EventLoopConfig loop;
   bool imu_rate = false;  // write trajectory_imu.tum: a prediction for each sample of the IMU
+  // Refine place and clock of the IMU from the recording itself.
+  bool refine_imu = false;
   // Below 1: each such part of a scan gives a pose of its own, in trajectory_partial.tum.
   double scan_fraction = 1.0;
   DenseOdometryConfig odometry;

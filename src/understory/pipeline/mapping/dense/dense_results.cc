@@ -127,31 +127,42 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
     documents.count("scans_by_satellites", counts.by_satellites);
 }
 
-// Warns where the IMU's clock or axes do not seem to be what the run takes them for.
 void tell_clock(const ReadRecording& recording, DenseFrontEnd& front_end, RunSummary& summary) {
   const ScopedTimer timer(front_end.times(), "finish_imu_clock");
-  const std::optional<ClockCheckResult> check = front_end.clock_check();
-  if (!check) return;
-  const double turned_deg = check->turned_rad * 180.0 / M_PI;
-  const double turned_sd_deg = check->turned_sd_rad * 180.0 / M_PI;
-  summary.quality["imu_late_ms"] = 1e3 * check->late_s;
-  summary.quality["imu_late_sd_ms"] = 1e3 * check->late_sd_s;
-  summary.quality["imu_turned_deg"] = turned_deg;
-  summary.quality["imu_turned_sd_deg"] = turned_sd_deg;
-  constexpr const char* kRemedy =
-      "`understory calibrate lidar-imu` finds it, and `map --extrinsics` takes it out";
-  if (check->clock_is_off())
-    recording.log.warn(
-        "imu.clock",
-        fmt::format("the clock of the IMU seems to be {:.0f} ± {:.0f} ms {} by that of the lidar: "
-                    "{}",
-                    1e3 * std::abs(check->late_s), 1e3 * check->late_sd_s,
-                    check->late_s > 0.0 ? "late" : "early", kRemedy));
-  if (check->axes_are_off())
-    recording.log.warn("imu.axes",
-                       fmt::format("the axes of the IMU seem to be turned by {:.1f} ± {:.1f} "
-                                   "degrees from where they are given: {}",
-                                   turned_deg, turned_sd_deg, kRemedy));
+  tell_imu_clock(front_end.clock_check(), recording.log, summary);
+}
+
+// Place and clock of the IMU as the recording itself tells them.
+void tell_calibration(const ReadRecording& recording, DenseFrontEnd& front_end,
+                      RunSummary& summary) {
+  if (!front_end.config().refine_imu) return;
+  const ScopedTimer timer(front_end.times(), "finish_imu_calibration");
+  const std::optional<OnlineImuEstimate> found = front_end.imu_calibration();
+  if (!found) {
+    recording.log.warn("imu.not_refined",
+                       "place and clock of the IMU were not refined: it needs an IMU that is "
+                       "used, and 10 s of quick turns and tilting");
+    return;
+  }
+  const Pose& pose = found->body_from_imu;
+  const Eigen::Quaterniond& q = pose.rotation();
+  ImuCalibrationFigures figures;
+  figures.translation_m.assign(pose.translation().begin(), pose.translation().end());
+  figures.rotation_xyzw = {q.x(), q.y(), q.z(), q.w()};
+  figures.late_s = found->late_s;
+  for (const auto& row : found->covariance.rowwise())
+    figures.covariance.insert(figures.covariance.end(), row.begin(), row.end());
+  figures.duration_s = found->duration_s;
+  figures.windows = found->windows;
+  figures.begun_anew = static_cast<std::uint64_t>(recording.request.conditions.imu_refinements);
+  const std::optional<RefinedImu>& used = front_end.imu_used();
+  if (used && recording.source.rig().body_from_imu) {
+    const Pose change = recording.source.rig().body_from_imu->inverse() * used->body_from_imu;
+    figures.moved_m = change.translation().norm();
+    figures.turned_deg = so3_log(change.rotation()).norm() * 180.0 / M_PI;
+    figures.used_late_s = used->late_s;
+  }
+  summary.imu_calibration = figures;
 }
 
 // trajectory_partial.tum. A pose is there when the last point of its part is, and the part is
@@ -343,6 +354,7 @@ RunOutcome write_dense_results(const ReadRecording& recording, DenseFrontEnd& fr
   write_partial_path(recording, front_end, trajectory.trajectory, documents);
   fill_quality(front_end, trajectory, documents.summary());
   tell_clock(recording, front_end, documents.summary());
+  tell_calibration(recording, front_end, documents.summary());
   if (const auto truth = write_truth(recording.request.run_folder, recording.source))
     documents.compare_with_truth(compare_with_truth(trajectory.trajectory, *truth));
   tell_place(made, documents);

@@ -37,7 +37,9 @@ std::vector<PositionedScan> SparseFrontEnd::handle(const Event& event, const Rig
 // The recording has said so where it does not know the IMU's place; it may learn it later.
 void SparseFrontEnd::on_sample(const ImuSample& sample, const Rig& rig) {
   imu_usage_.add(sample, rig.body_from_imu.has_value(), ImuNoiseConfig());
-  if (rig.body_from_imu) pacer_.add(sample);
+  if (!rig.body_from_imu) return;
+  pacer_.add(sample);
+  clock_.add_sample(sample);
 }
 
 std::vector<PositionedScan> SparseFrontEnd::on_scan(const ScanPtr& scan, const Rig& rig) {
@@ -54,14 +56,17 @@ std::vector<PositionedScan> SparseFrontEnd::on_scan(const ScanPtr& scan, const R
   last_content_ = content;
   last_scan_end_ = scan->end();
   waiting_ends_.push_back(last_scan_end_);
-  return record(pacer_.add(scan, rig));
+  points_have_times_ = scan->has_point_times;
+  return record(pacer_.add(scan, rig), rig);
 }
 
-std::vector<PositionedScan> SparseFrontEnd::record(const std::vector<StemScan>& results) {
+std::vector<PositionedScan> SparseFrontEnd::record(const std::vector<StemScan>& results,
+                                                   const Rig& rig) {
   std::vector<PositionedScan> positioned;
   for (const StemScan& result : results) {
     const StampedPose pose{result.view.stamp, result.step.world_from_body};
     positioned.push_back({waiting_ends_.front(), pose, std::nullopt, false});
+    check_clock(result, waiting_ends_.front(), rig);
     waiting_ends_.pop_front();
     journal_->on_pose(pose, result.positioned);
     counted_.on_pose(pose, result.positioned);
@@ -72,6 +77,24 @@ std::vector<PositionedScan> SparseFrontEnd::record(const std::vector<StemScan>& 
     counted_.on_view(result.view, result.step);
   }
   return positioned;
+}
+
+// Nothing of the run depends on it. Without times of points nobody knows which moment a scan shows.
+void SparseFrontEnd::check_clock(const StemScan& result, TimeNs end, const Rig& rig) {
+  if (!rig.body_from_imu || !points_have_times_ || !result.positioned) return;
+  const SparseStepStatus status = result.step.status;
+  if (status == SparseStepStatus::kWeak || status == SparseStepStatus::kUnmatched) {
+    clock_.break_off();
+    return;
+  }
+  clock_.add_scan(result.view.stamp, end, result.step.world_from_body.rotation(),
+                  rig.body_from_imu->rotation());
+}
+
+std::optional<ClockCheckResult> SparseFrontEnd::clock_check() const {
+  if (!imu_refused_.empty() || !config_.front_end.imu.use || !pacer_.imu_trust().usable)
+    return std::nullopt;
+  return clock_.result();
 }
 
 void SparseFrontEnd::Counted::on_pose(const StampedPose& pose, bool was_positioned) {
@@ -112,7 +135,7 @@ void SparseFrontEnd::recall() {
 }
 
 std::vector<PositionedScan> SparseFrontEnd::finish(const Rig& rig) {
-  return record(pacer_.finish(rig));
+  return record(pacer_.finish(rig), rig);
 }
 
 ImuFinding SparseFrontEnd::imu_finding() const {
@@ -152,6 +175,7 @@ void SparseFrontEnd::save(BinaryWriter& writer) const {
   writer.put(last_scan_end_);
   writer.put(imu_refused_);
   imu_usage_.save(writer);
+  clock_.save(writer);
   writer.put(repeated_);
   writer.put(last_content_);
   pacer_.save(writer);
@@ -166,6 +190,7 @@ void SparseFrontEnd::load(BinaryReader& reader, const Rig& /*rig*/) {
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);
   imu_usage_.load(reader);
+  clock_.load(reader);
   repeated_ = reader.get<std::uint64_t>();
   last_content_ = reader.get<std::uint64_t>();
   pacer_.load(reader);

@@ -3,8 +3,10 @@
 #include <deque>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "understory/calibration/lidar_imu/clock_check.h"
 #include "understory/odometry/stems/stem_pacer.h"
 #include "understory/pipeline/judgement/imu_usage.h"
 #include "understory/pipeline/mapping/front_end.h"
@@ -54,6 +56,8 @@ class SparseFrontEnd : public FrontEnd {
   // For how long the IMU's samples could not be used.
   [[nodiscard]] const ImuUsage& imu_usage() const { return imu_usage_; }
   [[nodiscard]] ImuTrust imu_trust() const { return pacer_.imu_trust(); }
+  // How late the IMU's clock seems to be; nothing where it is not used or not told.
+  [[nodiscard]] std::optional<ClockCheckResult> clock_check() const;
 
   // Why this run does without the IMU: an earlier pass found it to be wrong; empty if it does not.
   [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
@@ -83,7 +87,8 @@ class SparseFrontEnd : public FrontEnd {
   void recall();
   [[nodiscard]] std::vector<PositionedScan> on_scan(const ScanPtr& scan, const Rig& rig);
   void on_sample(const ImuSample& sample, const Rig& rig);
-  std::vector<PositionedScan> record(const std::vector<StemScan>& results);
+  std::vector<PositionedScan> record(const std::vector<StemScan>& results, const Rig& rig);
+  void check_clock(const StemScan& result, TimeNs end, const Rig& rig);
   void refuse_imu(const std::string& reason);
 
   SparseMappingConfig config_;
@@ -94,7 +99,9 @@ class SparseFrontEnd : public FrontEnd {
   TimeNs last_scan_end_ = 0;
   std::string imu_refused_;
   ImuUsage imu_usage_;
-  std::size_t scans_ = 0;  // of which the last may still wait
+  LidarImuClockCheck clock_{ImuNoiseConfig(), LidarImuClockCheck::Turns::kAboutUp};
+  bool points_have_times_ = false;  // of the last scan
+  std::size_t scans_ = 0;           // of which the last may still wait
   std::uint64_t repeated_ = 0;
   std::uint64_t last_content_ = 0;
   std::size_t last_stems_ = 0;

@@ -35,6 +35,7 @@ RunDocuments documents_of(const SparseFrontEnd& front_end, const ReadRecording& 
   if (!head_log.empty()) documents.add_input(head_log);
   documents.count("views", front_end.views().size());
   documents.count("scans_positioned", front_end.positioned());
+  tell_imu_clock(front_end.clock_check(), recording.log, documents.summary());
   documents.report().made_from =
       fmt::format("{}, {} scans, stems of {} views", recording.source.format(),
                   front_end.path().size(), front_end.views().size());
