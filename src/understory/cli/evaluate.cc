@@ -58,7 +58,7 @@ std::vector<std::string> notes_on(const TrajectoryErrors& errors) {
   if (!errors.alignment_determined)
     notes.push_back(fmt::format(
         "the rotation of the {} alignment is not determined: the positions lie in one place or "
-        "nearly on a line{}; rotation errors and velocities after it would mean nothing",
+        "nearly on a line{}. Rotation errors and velocities then mean nothing",
         to_string(errors.alignment),
         std::isfinite(errors.alignment_sd_deg)
             ? fmt::format(" (it is off by some {:.1f} deg)", errors.alignment_sd_deg)

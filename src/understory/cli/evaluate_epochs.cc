@@ -215,8 +215,8 @@ int evaluate_epochs(const TreeOptions& options, CommandContext& context) {
   if (!result.changes.misfit()) return kExitDone;
   context.log.warn(
       "evaluate.misfit",
-      fmt::format("{:.0f} % of the thick trees of NEW are not in OLD, though they must have stood "
-                  "then: the lists do not fit together as they lie{}",
+      fmt::format("the lists do not fit together as they lie: {:.0f} % of the thick trees of NEW "
+                  "are not in OLD, though they must have stood then{}",
                   100.0 * result.changes.missed_share,
                   options.alignment == "none" ? "; try --align yaw" : ""));
   return kExitUntrusted;

@@ -181,7 +181,7 @@ void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
   command->add_flag("--json", options->json, "Print one JSON object");
   command->footer(
       "Of a cloud: the mean map entropy. It is small for a crisp map.\n"
-      "Of stems: all three figures are small for a sharp map: the share of its area that is\n"
+      "Of stems: three figures, all small for a sharp map. They are the share of its area that is\n"
       "blurred, its box dimension (0 points, 1 lines, 2 areas), and how far the sights of a tree\n"
       "lie from their mean.\n\nExamples:\n  understory evaluate map forest\n"
       "  understory evaluate map stems.csv.gz forest");

@@ -115,8 +115,8 @@ void add_path_options(CLI::App& command, TreeOptions& options) {
       ->capture_default_str();
   command.add_option(
       "--other-path", options.other_path,
-      "The trajectory of the other map, in B's frame: also the consistency of both over "
-      "the trees near both paths, whole and in parts of 50 m");
+      "The trajectory of the other map, in B's frame. Adds how well both maps agree on the trees "
+      "near both paths, as a whole and in parts of 50 m");
   command
       .add_option("--pairing-m", options.consistency.pairing_m,
                   "Trees that near count as the same for the consistency")

@@ -143,14 +143,13 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
   command
       .add_option(
           "--antenna-m", options.antenna_m,
-          "Position in the body frame of the GNSS antenna, or of what stood on the control "
-          "points: x y z (if not given: where run.json has it, for the run's own fixes, else "
-          "the origin)")
+          "Position of the GNSS antenna, or of what stood on the control points, in the body "
+          "frame: x y z (if not given: that of run.json for the run's own fixes, else 0 0 0)")
       ->expected(3);
   command
       .add_option("--second-antenna-m", options.second_antenna_m,
-                  "Position in the body frame of the antenna that the headings of the fixes lead "
-                  "to: x y z (if not given: where run.json has it, for the run's own fixes)")
+                  "Position of the antenna that the headings of the fixes lead to, in the body "
+                  "frame: x y z (if not given: that of run.json for the run's own fixes)")
       ->expected(3);
   command
       .add_option("--time-offset-s", options.time_offset_s,
@@ -211,8 +210,8 @@ void add_tree_options(CLI::App& command, GeoreferenceOptions& options) {
                      "Coordinate system of a tree map that states none, for instance EPSG:3067");
   command
       .add_option("--near", options.near,
-                  "Rough position of the middle of the run's trees, in the coordinates of the tree "
-                  "map: x y (if not given, by GNSS or anywhere in the map)")
+                  "Roughly where the middle of the run's trees lies on the tree map: x y (if not "
+                  "given, by GNSS or anywhere in the map)")
       ->expected(2);
   command
       .add_option("--radius-m", options.radius_m,

@@ -55,8 +55,8 @@ std::string diameter_complaint(const std::vector<Tree>& a, const std::vector<Tre
   const double ratio = upper_median(ratios);
   if (ratio < kMostRatio && ratio > 1.0 / kMostRatio) return {};
   return fmt::format(
-      "the diameters of the second list are {:.3g} times those of the first, over {} trees that "
-      "both hold: one of them is in another unit, or holds radii",
+      "the diameters of the second list are {:.3g} times those of the first, over {} trees of "
+      "both. One list is in another unit, or holds radii",
       ratio, ratios.size());
 }
 

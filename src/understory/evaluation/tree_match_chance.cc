@@ -170,8 +170,8 @@ MatchChance match_chance(const std::vector<Tree>& a, const std::vector<Tree>& b,
 std::string chance_complaint(const MatchChance& chance) {
   if (chance.beyond_chance) return {};
   std::string text = fmt::format(
-      "the {} trees found in both maps are no more than chance explains: their weight is {:.1f}, "
-      "and that of copies of the second map without its trees' places {:.1f} +- {:.1f}",
+      "the {} trees found in both maps are no more than chance explains. They agree with a score "
+      "of {:.1f}, and random places of the second map's trees with {:.1f} +- {:.1f}",
       chance.pairs, chance.weight, chance.chance_weight, chance.chance_sd);
   if (std::isfinite(chance.diameter_correlation))
     text += fmt::format("; their diameters agree with a correlation of {:.2f}",

@@ -69,7 +69,7 @@ class CutSurface {
     for (const Square& square : squares_)
       if (square.high > square.low) all.push_back(square.high - square.low);
     if (all.empty()) return 0.0;
-    const auto at = static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(all.size() - 1));
+    const auto at = static_cast<std::ptrdiff_t>(kThinner * static_cast<double>(all.size() - 1));
     std::nth_element(all.begin(), all.begin() + at, all.end());
     return static_cast<double>(all[static_cast<std::size_t>(at)]);
   }

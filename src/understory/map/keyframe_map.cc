@@ -282,9 +282,9 @@ void KeyframeMap::tell_of_radius() {
   if (told_of_radius_ || radius_m >= config_.local_map.radius_m) return;
   told_of_radius_ = true;
   log_.warn("memory.radius",
-            fmt::format("the map that scans are matched to does not fit into run.max_memory_mb: it "
-                        "ends {:.0f} m from the lidar, not {:.0f} m (local_map.radius_m), from "
-                        "keyframe {} on. Poses may differ from those without a limit",
+            fmt::format("the local map does not fit into run.max_memory_mb: it ends {:.0f} m from "
+                        "the lidar, not {:.0f} m (local_map.radius_m), from keyframe {} on. Poses "
+                        "may differ from those without a limit",
                         radius_m, config_.local_map.radius_m, keyframes_.size()));
 }
 
