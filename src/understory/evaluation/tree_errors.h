@@ -19,10 +19,10 @@ namespace understory {
 // number.
 [[nodiscard]] std::vector<Tree> read_trees(const std::filesystem::path& path);
 
-// Finds the motion that lays A on B without a start value: hypotheses from pairs of trees of A and
-// equally distant pairs of B, the one with most matches, then least squares over the matches until
-// they stay the same. `yaw` turns about the vertical and shifts; `se3` uses heights and turns
-// fully. Empty if no hypothesis matches three trees. Polls `progress`.
+// Finds the motion that lays A on B without a start value. Pairs of trees of A and equally distant
+// pairs of B give hypotheses, of which the one with most matches is taken. Least squares over the
+// matches follow until they stay the same. `yaw` turns about the vertical and shifts; `se3` uses
+// heights and turns fully. Empty if no hypothesis matches three trees. Polls `progress`.
 [[nodiscard]] std::optional<Pose> align_trees(const std::vector<Tree>& a,
                                               const std::vector<Tree>& b, Alignment alignment,
                                               double radius_m, const ProgressSink& progress = {});

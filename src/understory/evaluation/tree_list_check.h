@@ -23,9 +23,9 @@ namespace understory {
 // Why a list counts trees twice, in words for the user. Empty: few of its rows do, as forks may.
 [[nodiscard]] std::string doubles_complaint(const std::vector<Tree>& trees);
 
-// Whether one list is a copy of the other, or of a part of it: over half of the trees of the
-// shorter one stand in the longer one with the same place to the last digit and as many
-// observations, in any order.
+// Whether one list is a copy of the other, or of a part of it. Over half of the trees of the
+// shorter one then stand in the longer one, in any order. They have the same place to the last
+// digit and as many observations.
 [[nodiscard]] bool are_copies(const std::vector<Tree>& a, const std::vector<Tree>& b);
 
 }  // namespace understory

@@ -30,9 +30,9 @@ struct DeformationField {
                                                  const std::vector<Tree>& to,
                                                  const TreeMergeConfig& config);
 
-// Q(w) of P1 (9): S moved by w of its field towards L, and L by 1 - w of its own towards S; of
-// pairs that come nearer than `duplicate_m`, the nearest first, one stays: half way between, with
-// what the surer of both knows. Q(0) holds S where it is, Q(1) L. Numbered anew, S first.
+// Q(w) of P1 (9): S is moved by w of its field towards L, and L by 1 - w of its own towards S. Of
+// pairs nearer than `duplicate_m`, the nearest first, one tree stays. It stands half way between,
+// with what the surer of both knows. Q(0) holds S where it is, Q(1) L. Numbered anew, S first.
 struct MergedTrees {
   std::vector<Tree> trees;
   std::vector<int> index_in_s;  // per tree: where it comes from, -1 if not in that list

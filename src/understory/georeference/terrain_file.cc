@@ -73,8 +73,8 @@ class TerrainFile {
   [[nodiscard]] double cell() const { return to_map_[1]; }
   [[nodiscard]] Raster read(const PlaneArea& area) const;
 
-  // GDAL finds a line of an ASCII grid behind the one before, and where the file is cut off it
-  // looks for all of them again and again, without end: so they are asked for one by one.
+  // GDAL finds a line of an ASCII grid behind the one before. Where the file is cut off it looks
+  // for all of them again and again, without end. So lines are asked for one by one.
   void pass_lines(GDALRasterBand* band, int lines) const {
     if (std::string(dataset_->GetDriverName()).find("ASCII") == std::string::npos &&
         std::string(dataset_->GetDriverName()) != "AAIGrid")

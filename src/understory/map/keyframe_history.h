@@ -24,10 +24,10 @@ struct KeyframeGrowth {
 };
 
 // The same on disk, so that a checkpoint needs to hold no more than how far it has come. What is
-// new is appended to keyframes.bin. What changes in old keyframes, their poses after a loop was
-// closed, is written as a whole to a file of its own (poses.1.bin, poses.2.bin ...), and only if it
-// has changed since the last checkpoint; the last three are kept for the checkpoints before.
-// Not thread-safe. Throws OutputError where the disk is full.
+// new is appended to keyframes.bin. What changes in old keyframes is their poses after a loop was
+// closed. They are written as a whole to a file of their own (poses.1.bin, poses.2.bin ...), if
+// they have changed since the last checkpoint. The last three files are kept for the checkpoints
+// before. Not thread-safe. Throws OutputError where the disk is full.
 class KeyframeHistory {
  public:
   // Begins anew in a work folder.

@@ -77,9 +77,9 @@ class KeyframeMap {
     double edge_translation_m = 0.0;
     double edge_rotation_deg_per_sqrt_m = 0.02;
     double edge_translation_m_per_sqrt_m = 0.01;
-    // By the limit of the memory of the run, no settings of their own: keyframes whose points stay
-    // in memory, and whether the local map of a found loop is made only when the present one is
-    // gone.
+    // By the limit of the memory of the run, no settings of their own. They say which keyframes'
+    // points stay in memory, and whether the local map of a found loop is made only when the
+    // present one is gone.
     std::size_t cached_keyframes = map_constants::keyframe_map::kCachedKeyframes;
     bool one_local_map = false;
   };

@@ -74,9 +74,9 @@ class LocalMap {
   std::unique_ptr<TargetBuilder> builder_;
 };
 
-// Which of the keyframes at these positions (oldest first) P4's local map is made of: of the most
-// recent `recent_keyframes` (of all while there are fewer) the one nearest to the mean of each cube
-// of `recent_spacing_m`.
+// Which of the keyframes at these positions (oldest first) P4's local map is made of. Of the most
+// recent `recent_keyframes` (or all, if fewer) it is the one nearest to the mean of each cube of
+// `recent_spacing_m`.
 [[nodiscard]] std::vector<std::size_t> recent_keyframes(
     const std::vector<Eigen::Vector3d>& positions, const LocalMapConfig& config);
 

@@ -54,9 +54,9 @@ using PathRun = std::vector<StampedPose>;
 
 // Turns from scan to scan: the rotation vector from what the gyroscope says, P2 (3), to what the
 // path says, in the frame of the IMU, radians. One for each step of the run.
-// Velocities from step to step: the change of the IMU's mean velocity from one step of the path to
-// the next, less that which gravity and accelerometer make of it; P2 (4) with the velocity
-// eliminated; in the frame of the path, m/s. One for each pair of steps. With derivatives, found
+// Velocities from step to step, in the frame of the path, m/s: P2 (4) with the velocity eliminated.
+// It is the change of the IMU's mean velocity from one step of the path to the next. What gravity
+// and accelerometer make of it is taken off. One for each pair of steps. With derivatives, found
 // numerically. Throws InternalError where the IMU does not cover the run at the state's lateness.
 struct LidarImuResiduals {
   PathResiduals turns;

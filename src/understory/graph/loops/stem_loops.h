@@ -36,12 +36,11 @@ struct StemLoop {
   bool verified = false;                       // overlap and distance are those of a loop
 };
 
-// For every view the place seen before that it looks like most: found by tree pattern and ICP among
-// views laid together with their neighbours (`gather_l0`), verified and measured by ICP of the two
-// views themselves. `world_from_level` says how neighbouring views lie to each other and which
+// For every view the place seen before that it looks like most. Tree pattern and ICP find it among
+// views laid together with their neighbours (`gather_l0`). ICP of the two views themselves verifies
+// and measures it. `world_from_level` says how neighbouring views lie to each other and which
 // earlier view lies nearest to the place found, no more: no guess is taken from it. Views without
-// any candidate have no row. Same result for any number of threads. Polls
-// `progress`.
+// any candidate have no row. Same result for any number of threads. Polls `progress`.
 [[nodiscard]] std::vector<StemLoop> find_stem_loops(const std::vector<SparsePoints>& level_views,
                                                     const std::vector<Pose>& world_from_level,
                                                     const StemLoopConfig& config,

@@ -60,9 +60,9 @@ class ForestScene {
   ForestScene(const ForestScene&) = delete;
   ForestScene& operator=(const ForestScene&) = delete;
 
-  // Brings the scene to a moment (seconds since the path's zero): stems and crowns are where the
-  // wind has them at wind_s, what was felled by stand_s is gone and what fell by then lies there;
-  // before the first call all stand at rest. What a moment looks like does not depend on those
+  // Brings the scene to a moment (seconds since the path's zero). Stems and crowns are where the
+  // wind has them at wind_s. What was felled by stand_s is gone, and what fell by then lies there.
+  // Before the first call all stand at rest. What a moment looks like does not depend on those
   // before it. Not while others cast.
   void arrange(double wind_s, double stand_s);
   // When the harvest changes the scene, in order.
