@@ -1,7 +1,7 @@
 // Matches scans without a guess and prints what came of it, a line of JSON a pair:
 //   global_pairs FOLDER_A FOLDER_B [MOST_M [MOST_PAIRS]]
 // Folders as pair_scans writes them. Of one folder (A = B) all pairs not farther apart than MOST_M
-// are matched; of two, every scan of A with one of B: they show different places.
+// are matched. Of two, every scan of A with one of B: they show different places.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

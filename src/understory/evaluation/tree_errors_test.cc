@@ -140,8 +140,8 @@ TEST(TreeErrors, AgreementOfTwoMapsNearAPath) {
   Trajectory path;
   for (int k = 0; k <= 10; ++k)
     path.push_back({k, Pose(Eigen::Quaterniond::Identity(), {10.0 * k, 0.0, 0.0})});
-  // Ten trees beside the path in both maps, two of them missed by B, one false in B; far trees
-  // of A alone do not count; one pair lies across the limit.
+  // Ten trees beside the path in both maps, two of them missed by B, one false in B. Far trees of A
+  // alone do not count. One pair lies across the limit.
   std::vector<Tree> a;
   std::vector<Tree> b;
   for (int k = 0; k < 10; ++k) {

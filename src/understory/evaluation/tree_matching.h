@@ -28,7 +28,7 @@ struct TreeAssignmentConfig {
 
 // One-to-one pairs within the radius that cost least together, in position and diameter. A pair
 // costs (d / radius)^2 + min(1, difference / (share * larger diameter))^2, its second term 1/2
-// where a diameter is unknown; a tree of A without a partner costs 2, as the worst pair. So no two
+// where a diameter is unknown. A tree of A without a partner costs 2, as the worst pair. So no two
 // free trees are left within the radius. Exact over all trees (least_cost_assignment). In ascending
 // order of the index into A. Throws InputError where more than `most_pairs` lie within the radius.
 [[nodiscard]] std::vector<TreePair> assign_trees(const std::vector<Tree>& a,

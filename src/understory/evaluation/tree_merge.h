@@ -16,7 +16,7 @@ struct TreeMergeConfig {
 };
 
 // What leads each tree of a map to the other map, smoothed over natural neighbours, metres in the
-// plane. P1 (8): the difference to the nearest tree, where there is one within reach; then (7) in
+// plane. P1 (8): the difference to the nearest tree, where there is one within reach. Then (7) in
 // the form of the errata, ((I + D^-1 A) / 2)^(2k), over the Delaunay graph of all trees of `from`.
 // Trees without a partner take what their neighbours say, so a constant difference is preserved
 // whatever is missing. Zero where no tree near has a partner.

@@ -84,7 +84,7 @@ struct InventoryResult {
 
 // Ground, canopy, trees of a whole cloud: six runs through it. With `lookouts` trees that may go on
 // above the view have no height, and tops that were hardly seen are lower bounds. `scanner`: where
-// it was, metres, world frame; with it only what is in its sight counts as seen, and diameters are
+// it was, metres, world frame. With it only what is in its sight counts as seen, and diameters are
 // corrected for the width of its beams. Deterministic for any number of threads. Throws Stopped.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,

@@ -61,7 +61,7 @@ struct KeyframeOffer {
                                        const KeyframeConfig& config);
 
 // The second graph of P4 F2: keyframes, and the local map made of them. Scans are positioned in the
-// world frame of these keyframes; when a loop closure moves them, `add` says by how much the
+// world frame of these keyframes. When a loop closure moves them, `add` says by how much the
 // present part of the world moved. Not thread-safe.
 class KeyframeMap {
  public:

@@ -16,7 +16,7 @@ struct LocalMapConfig {
   // The method that scans are matched to the map by, and what the map is made of for it.
   MatcherConfig matcher;
   Viewpoint viewpoint;  // of the keyframes
-  // Accumulate: every keyframe within the radius stays, however old; recent: only the last
+  // Accumulate: every keyframe within the radius stays, however old. Recent: only the last
   // keyframes, thinned by a voxel grid of their positions (P4 section 3.1.1, Local Map).
   enum class Method { kAccumulate, kRecent };
   Method method = Method::kAccumulate;

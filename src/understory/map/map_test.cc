@@ -112,7 +112,7 @@ TEST(KeyframeDistance, WeighsTurnsAgainstMetres) {
 }
 
 // P4 section 3.1.1, Local Map: of the last 15 keyframes the one nearest to the mean of those in
-// each cube; while there are fewer than 15, of all of them.
+// each cube. While there are fewer than 15, of all of them.
 TEST(LocalMapOfThePaper, TakesOneOfTheRecentKeyframesPerCube) {
   LocalMapConfig config;
   config.recent_keyframes = 15;

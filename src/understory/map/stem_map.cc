@@ -217,7 +217,7 @@ std::vector<int> chances(const std::vector<Gathered>& trees, const std::vector<S
   return count;
 }
 
-// Two trees side by side are seen together now and then; the two images of one tree that a bent
+// Two trees side by side are seen together now and then. The two images of one tree that a bent
 // path makes are not, as a view has only one of them.
 bool same_tree(const Gathered& a, const Gathered& b, int chances) {
   const double expected = static_cast<double>(a.views.size()) *

@@ -16,7 +16,7 @@
 namespace understory {
 
 // Time repair. Events come in the order of the recording, which may be shuffled within limits, hold
-// duplicates, and come from clocks that jump or run apart; they leave in the order of time.
+// duplicates, and come from clocks that jump or run apart. They leave in the order of time.
 //
 // - Each stream has its own clock. The lidar's is the one that counts. A stream whose stamps are a
 //   constant time ahead of or behind it, told by the order of arrival (stream_offset.h), is shifted

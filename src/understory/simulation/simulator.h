@@ -24,7 +24,7 @@ class Simulator : public Recording {
  public:
   explicit Simulator(const SiteConfig& config);
   // Reads scans from a folder of casts where they are kept there, and keeps those that it casts
-  // (ScanCache); the events are the same as without. What is kept is held against what the program
+  // (ScanCache). The events are the same as without. What is kept is held against what the program
   // casts today, and forgotten with a warning ("simulation.cache") where it differs.
   Simulator(const SiteConfig& config, const std::string& cache_folder, Log& log);
   ~Simulator() override;

@@ -47,7 +47,7 @@ struct PathResiduals {
 using PathRun = std::vector<StampedPose>;
 
 // Cuts a path where scans lie more than half a second apart or the IMU is silent at any lateness
-// within `latest_s` of `imu_late_s`; runs have at least 20 poses and at most 1000.
+// within `latest_s` of `imu_late_s`. Runs have at least 20 poses and at most 1000.
 [[nodiscard]] std::vector<PathRun> runs_with_imu(const std::vector<StampedPose>& world_from_lidar,
                                                  const ImuBuffer& imu, double imu_late_s,
                                                  double latest_s);

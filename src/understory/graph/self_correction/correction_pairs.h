@@ -25,7 +25,7 @@ struct CorrectionPair {
 // Which of the promising pairs are matched.
 enum class PairRule {
   kPoissonDisks,  // P0 (28, 29)
-  // What P0's section 3 proposes: choice and order by the association of Delaunay stars; the pair
+  // What P0's section 3 proposes: choice and order by the association of Delaunay stars. The pair
   // that is expected to tell most, then the one that tells most beside it.
   kDelaunayStars
 };

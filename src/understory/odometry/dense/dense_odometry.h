@@ -116,7 +116,7 @@ class DenseOdometry {
   [[nodiscard]] DenseEstimate process(const Scan& scan, const MatchTargetPtr& local_map,
                                       const ScanKnowledge& known = {});
   // Poses from the parts of a scan that comes next (parts_of), each matched to the local map from
-  // where the motion leads; nothing that `process` does depends on it. Empty without a local map,
+  // where the motion leads. Nothing that `process` does depends on it. Empty without a local map,
   // before the first scan and for a scan that is not after the last one.
   [[nodiscard]] std::vector<PartEstimate> match_parts(const Scan& scan,
                                                       const MatchTargetPtr& local_map,

@@ -60,8 +60,8 @@ class Recovery {
   std::uint32_t waited_ = 0;  // scans since the lidar sees again
 };
 
-// Puts a new odometry and the estimate of its first scan to a pose: to its position and heading;
-// the vertical stays that of the odometry.
+// Puts a new odometry and the estimate of its first scan to a pose: to its position and heading.
+// The vertical stays that of the odometry.
 void put_at(const Pose& world_from_body, DenseOdometry& odometry, DenseEstimate& estimate);
 
 }  // namespace understory

@@ -79,7 +79,7 @@ struct ImuTrust {
 
 // The first graph of P4 F2: a state for every scan, prediction in between. One per run, not
 // thread-safe. World frame: up against gravity, the first body pose at the origin with heading zero
-// of the body's x axis; without an IMU the first body frame itself.
+// of the body's x axis. Without an IMU the first body frame itself.
 //
 // Order of calls for a scan: first add_imu for all samples that are there, best up to the end of
 // the scan. Then predict_path over the scan to deskew it, predict at its stamp as the start of the

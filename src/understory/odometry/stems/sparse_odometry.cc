@@ -12,7 +12,7 @@
 namespace understory {
 namespace {
 
-// Takes out what is left of tilt in a pose's rotation, keeping the heading of its x axis; of its y
+// Takes out what is left of tilt in a pose's rotation, keeping the heading of its x axis. Of its y
 // axis less a right angle, where x is upright.
 Pose upright(const Pose& pose) {
   Eigen::Vector3d x = pose.rotation() * Eigen::Vector3d::UnitX();

@@ -34,7 +34,7 @@ class RunState {
   // InputError if there is none, with the state as it was; OutputError as RunFolder::reclaim.
   [[nodiscard]] static UnfinishedRun reopen(const std::filesystem::path& run_folder);
 
-  // Of a run that begins: notes what the inputs are; of one that is resumed: throws InputError if
+  // Of a run that begins: notes what the inputs are. Of one that is resumed: throws InputError if
   // they are not those that it was begun with.
   void check_inputs(const MappingRequest& request);
 

@@ -172,7 +172,7 @@ TEST(Hesai, NamesPacketsThatAreCutDoubledMissingOrStrange) {
   decoder.finish();
   EXPECT_EQ(decoder.take_scan()->points.size(), 9U * 256U);
   const std::string all = test::all_warnings(log);
-  // Of one key the log keeps the first message; each was counted: the cut one and the step over it,
+  // Of one key the log keeps the first message. Each was counted: the cut one and the step over it,
   // the double, the missing, the mode, and the three at the end.
   EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 8U) << all;
   EXPECT_NE(all.find("has 900 bytes, expected 1080"), std::string::npos) << all;

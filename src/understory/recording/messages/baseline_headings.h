@@ -70,7 +70,7 @@ class SecondPositions {
   // The position at a time: the one of that moment, else between two that are close. Nothing as
   // long as there is none.
   [[nodiscard]] std::optional<GnssFix> at(TimeNs stamp) const;
-  // The nearest one, where it is so near that only the stamps may differ; it is less certain by the
+  // The nearest one, where it is so near that only the stamps may differ. It is less certain by the
   // way that the antenna goes in between.
   [[nodiscard]] std::optional<GnssFix> near(TimeNs stamp) const;
 

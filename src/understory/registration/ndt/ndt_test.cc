@@ -239,7 +239,7 @@ TEST(Ndt, FollowsTheStemsAndNotTheRingsOnTheGround) {
   }
 }
 
-// With nothing but smooth ground, moves along it and turns about its normal are undetermined; the
+// With nothing but smooth ground, moves along it and turns about its normal are undetermined. The
 // pose stays where the guess was along them, though every ring of the map pulls.
 TEST(Ndt, SmoothGroundAloneLeavesItsPlaneUndetermined) {
   const Stand stand;
