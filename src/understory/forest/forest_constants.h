@@ -180,7 +180,7 @@ inline constexpr double kLeastAbove = 1.5;
 inline constexpr double kStraight = 6.0;
 }  // namespace tree_heights
 
-namespace tree_tops {  // forest/tree_tops.cc
+namespace top_judgement {  // forest/top_judgement.cc
 // Points in the half metre below the top of a tree whose top was seen, at least [bound: what a top
 // is called seen by]
 inline constexpr int kTopPoints = 5;
@@ -200,7 +200,7 @@ inline constexpr double kLeastExpected = 12.0;
 inline constexpr double kScannerHeight = 1.5;
 // Places of the scanner that a top is looked at from, about [bound: time]
 inline constexpr std::size_t kMostLookouts = 64;
-}  // namespace tree_tops
+}  // namespace top_judgement
 
 namespace sight_lines {  // forest/trees/occupied_space.cc
 // m: edge of the cubes of a stand that hold points [chosen]

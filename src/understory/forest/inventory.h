@@ -15,7 +15,7 @@
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/tiles/crown_tiles.h"
 #include "understory/forest/tiles/tiled_cloud.h"
-#include "understory/forest/tree_tops.h"
+#include "understory/forest/top_judgement.h"
 #include "understory/forest/trees/canopy_crowns.h"
 #include "understory/forest/trees/thin_coverage.h"
 #include "understory/forest/trees/tree_owners.h"

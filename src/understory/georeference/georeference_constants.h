@@ -370,7 +370,7 @@ inline constexpr double kThinnestM = 0.01;
 // Parts of the source that are tried [bound: time]
 inline constexpr std::size_t kParts = 3;
 // Cells along a side of a map of trees at most [bound: memory]
-inline constexpr double kMostCells = 2000.0;
+inline constexpr double kMostGridCells = 2000.0;
 // Steps of the heading within which places of the search are one [chosen]
 inline constexpr double kApartTurns = 2.5;
 // Share of the reach of the source at which a step of the heading is kTurnM [bound: half of the

@@ -1,4 +1,4 @@
-#include "understory/forest/tree_tops.h"
+#include "understory/forest/top_judgement.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@
 namespace understory {
 namespace {
 
-using namespace forest_constants::tree_tops;
+using namespace forest_constants::top_judgement;
 
 // On the stem, `height_m` above the ground, world frame.
 Eigen::Vector3d place_on(const InventoryResult& result, const StemFit& stem, double height_m) {
