@@ -18,7 +18,7 @@
 #include "understory/georeference/satellites/satellite_fit.h"
 #include "understory/georeference/satellites/satellite_smoothing.h"
 #include "understory/georeference/satellites/split_fit.h"
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/simulation/sensors/inertial.h"
 #include "understory/simulation/sensors/satellite.h"
 #include "understory/simulation/world.h"

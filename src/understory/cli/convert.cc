@@ -12,7 +12,7 @@
 #include "understory/cli/convert_layers.h"
 #include "understory/cli/convert_stems.h"
 #include "understory/cli/open_options.h"
-#include "understory/output/las_writer.h"
+#include "understory/output/clouds/las_writer.h"
 #include "understory/pipeline/source.h"
 #include "understory/recording/bags/mcap_writer.h"
 #include "understory/recording/clouds/cloud_folder_writer.h"

@@ -301,7 +301,7 @@ inline constexpr std::size_t kAroundPit = 6;
 inline constexpr float kPit = 2.0F;
 }  // namespace canopy_crowns
 
-namespace slice_inventory {  // forest/slice_inventory.cc
+namespace slice_inventory {  // forest/slice/slice_inventory.cc
 // m: one point per cube; a cut has few enough for thin cubes [chosen]
 inline constexpr double kThin = 0.005;
 // m: edge of the cells that its area is counted in [chosen]

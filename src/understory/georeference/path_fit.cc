@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/geometry/symmetric_eigen.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"

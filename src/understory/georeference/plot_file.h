@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/geometry/plot_shape.h"
+#include "understory/geometry/plane/plot_shape.h"
 
 namespace understory {
 

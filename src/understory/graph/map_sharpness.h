@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/registration/test_stand.h"
 #include "understory/util/files/folder_test_support.h"
 

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "understory/map/keyframe_clouds.h"
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_clouds.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/map/local_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/util/error.h"

@@ -7,8 +7,8 @@
 #include <tuple>
 #include <unordered_map>
 
-#include "understory/geometry/alpha_shape.h"
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/alpha_shape.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/graph/loops/view_cone.h"
 #include "understory/map/map_constants.h"
 #include "understory/util/error.h"

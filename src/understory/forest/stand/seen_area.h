@@ -6,7 +6,7 @@
 
 #include "understory/forest/cell_grid.h"
 #include "understory/forest/stand_constants.h"
-#include "understory/geometry/plot_shape.h"
+#include "understory/geometry/plane/plot_shape.h"
 
 namespace understory {
 

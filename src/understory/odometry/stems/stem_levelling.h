@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/sensor/stem_view.h"
 
 namespace understory {

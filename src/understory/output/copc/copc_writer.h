@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "understory/output/clouds/las_stream.h"
 #include "understory/output/copc/copc_octree.h"
-#include "understory/output/las_stream.h"
 #include "understory/util/progress.h"
 
 namespace understory {

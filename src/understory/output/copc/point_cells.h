@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "understory/output/las_stream.h"
+#include "understory/output/clouds/las_stream.h"
 
 namespace understory {
 

@@ -8,7 +8,7 @@
 
 #include "understory/forest/inventory.h"
 #include "understory/geometry/pose.h"
-#include "understory/map/keyframe_clouds.h"
+#include "understory/map/keyframes/keyframe_clouds.h"
 #include "understory/output/run_summary.h"
 #include "understory/sensor/rig.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/pipeline/run_folder/journal.h"
 
 namespace understory {

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "understory/recording/bags/byte_source.h"
-#include "understory/recording/captures/hesai_test_support.h"
+#include "understory/recording/captures/hesai/hesai_test_support.h"
 #include "understory/recording/captures/packet_test_support.h"
 #include "understory/recording/captures/pcap_recording.h"
 #include "understory/recording/captures/pcap_survey.h"

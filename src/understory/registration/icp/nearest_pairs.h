@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 
 namespace understory {
 

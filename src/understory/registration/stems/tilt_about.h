@@ -1,6 +1,6 @@
 #pragma once
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/geometry/pose.h"
 
 namespace understory {
