@@ -83,9 +83,9 @@ StemTraits stem_traits(const SectionView& view, const StemChain& chain,
           std::log(kSpacing + spacing / n / (2.0 * config.usual_radius_m))};
 }
 
-// Traits are brought to mean 0 and spread 1; squares let a trait have a best value, and how much a
-// trait says depends on the number of sections (the first) and on how finely a stem is sampled (the
-// last).
+// Traits are brought to mean 0 and spread 1, and squares let a trait have a best value. How much a
+// trait says depends on the number of sections (the first trait). It also depends on how finely a
+// stem is sampled (the last).
 double stem_score(const StemTraits& traits) {
   StemTraits z{};
   for (std::size_t i = 0; i < z.size(); ++i)

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <optional>
 #include <sstream>
 #include <string_view>
-#include <system_error>
 
 #include "understory/util/error.h"
+#include "understory/util/files/csv.h"
 #include "understory/util/files/text_file.h"
 
 namespace understory {
@@ -27,32 +26,11 @@ std::string lower(std::string text) {
   return text;
 }
 
-std::vector<std::string> split(const std::string& line) {
-  std::vector<std::string> cells;
-  std::istringstream stream(line);
-  for (std::string cell; std::getline(stream, cell, ',');) {
-    const auto blank = [](unsigned char c) { return std::isspace(c) != 0; };
-    cell.erase(cell.begin(), std::find_if_not(cell.begin(), cell.end(), blank));
-    while (!cell.empty() && blank(static_cast<unsigned char>(cell.back())))
-      cell.pop_back();
-    cells.push_back(cell);
-  }
-  return cells;
-}
-
 FileKind kind_of(const std::string& first_line) {
   const std::string line = lower(first_line);
   const auto has = [&](std::string_view word) { return line.find(word) != std::string::npos; };
   if (has("elevation") && has("azimuth")) return FileKind::kAngles;
   return has("channel") && has("fire") ? FileKind::kFiringTimes : FileKind::kOther;
-}
-
-std::optional<double> number(const std::string& cell) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value))
-    return std::nullopt;
-  return value;
 }
 
 // Rows of numbers behind the header, by channel: channel i + 1 is row i.
@@ -65,13 +43,12 @@ std::vector<std::vector<double>> read_table(const std::string& path, FileKind ki
   std::vector<std::vector<double>> rows;
   std::size_t known = 0;
   for (std::size_t at = 2; std::getline(stream, line); ++at) {
-    const std::vector<std::string> cells = split(line);
-    if (cells.empty() || (cells.size() == 1 && cells[0].empty())) continue;
+    if (trimmed(line).empty()) continue;
     const std::string place = "line " + std::to_string(at);
     std::vector<double> values;
-    for (const std::string& cell : cells) {
-      const auto value = number(cell);
-      if (!value || values.size() == columns) break;
+    for (const std::string_view cell : split(line, ",", false)) {
+      const std::optional<double> value = to_number(cell);
+      if (!value || !std::isfinite(*value) || values.size() == columns) break;
       values.push_back(*value);
     }
     if (values.size() != columns) throw InputError(path, place, expected);
@@ -82,7 +59,7 @@ std::vector<std::vector<double>> read_table(const std::string& path, FileKind ki
     const auto index = static_cast<std::size_t>(channel) - 1;
     if (rows.size() <= index) rows.resize(index + 1);
     if (!rows[index].empty())
-      throw InputError(path, place, "channel " + cells[0] + " stands there twice");
+      throw InputError(path, place, "channel " + std::to_string(index + 1) + " stands there twice");
     rows[index] = values;
     ++known;
   }
