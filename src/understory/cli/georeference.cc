@@ -235,7 +235,7 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
     names.emplace_back(method.name);
     meanings.push_back(std::string(method.name) + ": " + method.meaning);
   }
-  command->add_option("--method", options->method, fmt::format("{}", fmt::join(meanings, "; ")))
+  command->add_option("--method", options->method, fmt::format("{}", fmt::join(meanings, "\n")))
       ->required()
       ->check(CLI::IsMember(names));
   add_satellite_options(*command, *options);

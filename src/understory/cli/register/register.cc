@@ -233,10 +233,10 @@ void add_register_command(CLI::App& app, Command& chosen) {
   methods.insert(methods.end(), {kGlobal, "stem-icp", "go-icp"});
   command
       ->add_option("--method", options->method,
-                   matcher_summaries() +
-                       ", global (no guess, any place and heading; z about up); for sparse clouds "
-                       "of stems, z up: stem-icp (trimmed, from the guess) or "
-                       "go-icp (searches)")
+                   matcher_summaries("\n") +
+                       "\nglobal (no guess, any place and heading; z about up)\n"
+                       "stem-icp (sparse clouds of stems, z up: trimmed, from the guess)\n"
+                       "go-icp (sparse clouds of stems, z up: a search without a guess)")
       ->check(CLI::IsMember(methods));
   command
       ->add_option("--guess", options->guess,
