@@ -144,12 +144,12 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
       .add_option(
           "--antenna-m", options.antenna_m,
           "Position of the GNSS antenna, or of what stood on the control points, in the body "
-          "frame: x y z (if not given: that of run.json for the run's own fixes, else 0 0 0)")
+          "frame: x y z. If not given: that of run.json for the run's own fixes, else 0 0 0")
       ->expected(3);
   command
       .add_option("--second-antenna-m", options.second_antenna_m,
                   "Position of the antenna that the headings of the fixes lead to, in the body "
-                  "frame: x y z (if not given: that of run.json for the run's own fixes)")
+                  "frame: x y z. If not given: that of run.json for the run's own fixes")
       ->expected(3);
   command
       .add_option("--time-offset-s", options.time_offset_s,

@@ -216,7 +216,7 @@ int evaluate_epochs(const TreeOptions& options, CommandContext& context) {
   context.log.warn(
       "evaluate.misfit",
       fmt::format("the lists do not fit together as they lie: {:.0f} % of the thick trees of NEW "
-                  "are not in OLD, though they must have stood then{}",
+                  "are missing from OLD{}",
                   100.0 * result.changes.missed_share,
                   options.alignment == "none" ? "; try --align yaw" : ""));
   return kExitUntrusted;

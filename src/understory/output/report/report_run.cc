@@ -119,8 +119,8 @@ std::string distance_meaning(const ReportInput& input) {
   const double cell_cm = 100.0 * input.map_cell_m;
   return fmt::format(
              "<p>The map keeps one mean place for each cube of {:.0f} cm. The distance is that of "
-             "a point to the mean of its cube, so it is not the error of the map: {:.0f} to {:.0f} "
-             "cm are usual, and {:.0f} cm come about by chance.",
+             "a point to the mean of its cube, so it is not the error of the map. Usual are {:.0f} "
+             "to {:.0f} cm, and {:.0f} cm come about by chance.",
              cell_cm, kLeastUsual * cell_cm, kMostUsual * cell_cm, kByChance * cell_cm) +
          line;
 }

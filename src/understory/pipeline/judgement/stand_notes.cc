@@ -43,8 +43,7 @@ StandNotes notes_on(const InventoryResult& inventory) {
   if (const std::vector<LookAgain>& places = inventory.look_again; !places.empty())
     notes.look_again = fmt::format(
         "walk here: {} {} would show {} of the {} doubtful stems from an unseen side, or from "
-        "near. "
-        "They are numbered on the map of report.html, and in layer look_again of trees.gpkg",
+        "near. See the numbers on the map of report.html, and layer look_again of trees.gpkg",
         places.size(), places.size() == 1 ? "place" : "places", trees_at(places),
         doubts.weak_diameters);
   if (inventory.thin.share > kThinShare)
