@@ -18,7 +18,7 @@
 #include "understory/georeference/satellites/satellite_fit.h"
 #include "understory/georeference/satellites/satellite_smoothing.h"
 #include "understory/georeference/satellites/split_fit.h"
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/simulation/sensors/inertial.h"
 #include "understory/simulation/sensors/satellite.h"
 #include "understory/simulation/world.h"
@@ -69,7 +69,7 @@ std::vector<ImuSample> samples_of(const SimulatedWorld& world, TimeNs start, Tim
 }
 
 // The run as `map` has it before positions enter its graph: a keyframe each metre, with the
-// odometry's default covariances; without its loops, whose work is done.
+// odometry's default covariances. Without its loops, whose work is done.
 SolvedRun solved_run(const Trajectory& run) {
   const KeyframeMap::Config edges;
   SolvedRun solved;

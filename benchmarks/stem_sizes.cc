@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/evaluation/tree_errors.h"
+#include "understory/evaluation/trees/tree_errors.h"
 #include "understory/forest/ground/ground.h"
+#include "understory/forest/slice/slice_thinner.h"
 #include "understory/forest/stems/beam_footprint.h"
-#include "understory/forest/stems/slice_thinner.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/stems/stem_fit.h"

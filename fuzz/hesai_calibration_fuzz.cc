@@ -1,5 +1,5 @@
 #include "fuzz_file.h"
-#include "understory/recording/captures/hesai_calibration.h"
+#include "understory/recording/captures/hesai/hesai_calibration.h"
 #include "understory/util/error.h"
 
 // The bytes as an angle correction file and as a firing time file.

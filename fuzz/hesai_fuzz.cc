@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "fuzz_input.h"
-#include "understory/recording/captures/hesai.h"
+#include "understory/recording/captures/hesai/hesai.h"
 
 // Packets one after another. Before each stand two bytes: by them its stamp advances, and its
 // length is chosen among those of the models.

@@ -2,8 +2,8 @@
 #include <filesystem>
 
 #include "fuzz_folder.h"
-#include "understory/map/keyframe_clouds.h"
-#include "understory/map/keyframe_history.h"
+#include "understory/map/keyframes/keyframe_clouds.h"
+#include "understory/map/keyframes/keyframe_history.h"
 #include "understory/pipeline/run_folder/journal.h"
 #include "understory/pipeline/run_folder/view_journal.h"
 

@@ -1,6 +1,6 @@
 #include "fuzz_file.h"
 #include "understory/evaluation/trajectory.h"
-#include "understory/evaluation/tree_errors.h"
+#include "understory/evaluation/trees/tree_errors.h"
 #include "understory/util/error.h"
 
 namespace {

@@ -2,7 +2,8 @@
 """Fails on any #include in src/understory that does not lead to a layer above its own.
 
 The order of the layers is the list in the top CMakeLists.txt. A file may include its own layer and
-those before it; nothing else inside the project, and nothing by a relative path.
+those before it; nothing else inside the project, and nothing by a relative path. Fails, too, on a
+folder of more than 40 files, a file of more than 500 lines, and two headers of one name.
 
     check_layers.py [SOURCE_TREE]     exit 0: in order; 1: prints each wrong arrow; 2: no such tree
 """
@@ -10,6 +11,9 @@ those before it; nothing else inside the project, and nothing by a relative path
 import pathlib
 import re
 import sys
+
+MOST_FILES = 40
+MOST_LINES = 500
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
 LAYERS = re.compile(r"foreach\(layer IN ITEMS\s+([a-z_\s]+)\)")
@@ -34,8 +38,25 @@ def wrong_arrow(layer, included, order):
     return None
 
 
+def untidy(tree, root):
+    """Yields one line for each folder or file that is too large, and for each name of two headers."""
+    folders, headers = {}, {}
+    for path in sorted(p for p in root.rglob("*") if p.is_file()):
+        folders.setdefault(path.parent, []).append(path)
+        lines = path.read_text(encoding="utf-8").count("\n")
+        if path.suffix in (".cc", ".h") and lines > MOST_LINES:
+            yield f"{path.relative_to(tree)}:1: {lines} lines, {MOST_LINES} at most"
+        if path.suffix == ".h":
+            if path.name in headers:
+                yield f"{path.relative_to(tree)}:1: {headers[path.name].relative_to(tree)} has this name, too"
+            headers.setdefault(path.name, path)
+    for folder, files in folders.items():
+        if len(files) > MOST_FILES:
+            yield f"{folder.relative_to(tree)}: {len(files)} files, {MOST_FILES} at most"
+
+
 def check(tree):
-    """Yields one line for each wrong include of a source tree."""
+    """Yields one line for each wrong include of a source tree, and for what is untidy in it."""
     order = layer_order(tree)
     root = tree / "src" / "understory"
     for path in sorted(p for p in root.rglob("*") if p.suffix in (".cc", ".h")):
@@ -49,6 +70,7 @@ def check(tree):
             reason = wrong_arrow(layer, found.group(1), order) if found else None
             if reason:
                 yield f'{name}:{number}: includes "{found.group(1)}": {reason}'
+    yield from untidy(tree, root)
 
 
 def main():
@@ -58,7 +80,7 @@ def main():
         print(f"check_layers.py: {tree} has no CMakeLists.txt", file=sys.stderr)
         return 2
     wrong = list(check(tree))
-    print("\n".join(wrong) if wrong else "layers: every include leads upwards")
+    print("\n".join(wrong) if wrong else "layers: every include leads upwards, no folder or file is too large")
     return 1 if wrong else 0
 
 

@@ -46,6 +46,15 @@ class CheckLayers(unittest.TestCase):
     def test_folder_that_is_no_layer_is_an_error(self):
         self.assertEqual(len(findings({"helpers/a.h": ""})), 1)
 
+    def test_large_folders_and_files_and_names_twice_are_errors(self):
+        few = {f"util/f{i}.cc": "" for i in range(40)}
+        self.assertEqual(findings({**few, "util/files/a.h": "x\n" * 500}), [])
+        found = findings({**few, "util/f40.cc": "", "geometry/a.h": "x\n" * 501, "cli/a.h": ""})
+        self.assertEqual(len(found), 3)
+        self.assertIn("geometry/a.h:1: 501 lines", "\n".join(found))
+        self.assertIn("src/understory/cli/a.h has this name, too", "\n".join(found))
+        self.assertIn("src/understory/util: 41 files", "\n".join(found))
+
     def test_the_project_itself_has_a_readable_order(self):
         here = pathlib.Path(__file__).resolve().parent.parent
         order = check_layers.layer_order(here)

@@ -1,7 +1,7 @@
 // Matches scans without a guess and prints what came of it, a line of JSON a pair:
 //   global_pairs FOLDER_A FOLDER_B [MOST_M [MOST_PAIRS]]
 // Folders as pair_scans writes them. Of one folder (A = B) all pairs not farther apart than MOST_M
-// are matched; of two, every scan of A with one of B: they show different places.
+// are matched. Of two, every scan of A with one of B: they show different places.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -81,7 +81,7 @@ void match(const Sample& a, const Sample& b, bool same_place, std::size_t i, std
   std::printf("}\n");
 }
 
-void run(const std::string& first, const std::string& second, double most_m) {
+void run(const std::string& first, const std::string& second, double same_place_m) {
   Log log;
   const std::vector<Sample> a = load(first, log);
   const bool same = first == second;
@@ -90,7 +90,7 @@ void run(const std::string& first, const std::string& second, double most_m) {
     for (std::size_t j = same ? i + 1 : 0; j < (same ? a.size() : other.size()); ++j) {
       const Sample& b = same ? a[j] : other[j];
       const Pose between = a[i].world_from_cloud.inverse() * b.world_from_cloud;
-      if (same ? between.translation().norm() > most_m : i != j) continue;
+      if (same ? between.translation().norm() > same_place_m : i != j) continue;
       match(a[i], b, same, i, j);
     }
   }

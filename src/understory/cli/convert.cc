@@ -12,7 +12,7 @@
 #include "understory/cli/convert_layers.h"
 #include "understory/cli/convert_stems.h"
 #include "understory/cli/open_options.h"
-#include "understory/output/las_writer.h"
+#include "understory/output/clouds/las_writer.h"
 #include "understory/pipeline/source.h"
 #include "understory/recording/bags/mcap_writer.h"
 #include "understory/recording/clouds/cloud_folder_writer.h"
@@ -226,15 +226,16 @@ void add_convert_command(CLI::App& app, Command& chosen) {
   auto options = std::make_shared<ConvertOptions>();
   CLI::App* command =
       app.add_subcommand("convert",
-                         "Write a recording as MCAP (OUT ends in .mcap), as a "
-                         "folder of clouds, or as the stems seen in "
-                         "it (OUT ends in .csv.gz; of a cloud, too); or the trees of "
-                         "a run as GeoJSON (.geojson) or into PostGIS (--to)");
+                         "Write a recording in another format, or the trees of a run as GeoJSON "
+                         "or into PostGIS");
   command
       ->add_option("IN", options->input,
                    "Recording: file or folder, or sim:SITE?key=value; or a run folder")
       ->required();
-  command->add_option("OUT", options->output, "File .mcap, .csv.gz or .geojson, or a folder");
+  command->add_option(
+      "OUT", options->output,
+      "x.mcap: a recording; x.csv.gz: the stems seen in it, or in a cloud; x.geojson: "
+      "the trees of a run; else a folder of clouds");
   command->add_flag("--overwrite", options->overwrite, "Replace a file OUT that is there already");
   command->add_option("--format", options->format, "Clouds of a folder (default pcd)")
       ->check(CLI::IsMember({"pcd", "ply", "las", "laz", "bin"}));

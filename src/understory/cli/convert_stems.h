@@ -12,9 +12,9 @@ namespace understory {
 // Whether an output is a table of stems: its name ends in .csv.gz.
 [[nodiscard]] bool is_stems_file(const std::string& output);
 
-// Writes the stems of each scan of a recording, as seen from where the body was (the motion within
-// a scan is not taken out), or those of a cloud (.las, .laz, .ply, .pcd) that is a map. Returns the
-// exit code. Throws InputError where there is none.
+// Writes the stems of each scan of a recording, as seen from where the body was. The motion within
+// a scan is not taken out. Of a cloud (.las, .laz, .ply, .pcd), which is a map, it writes the stems
+// of that. Returns the exit code. Throws InputError where there is none.
 [[nodiscard]] int convert_to_stems(const std::string& input, const std::string& output,
                                    const OpenOptions& open, bool overwrite,
                                    CommandContext& context);

@@ -143,14 +143,13 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
   command
       .add_option(
           "--antenna-m", options.antenna_m,
-          "Position in the body frame of the GNSS antenna, or of what stood on the control "
-          "points: x y z (if not given: where run.json has it, for the run's own fixes, else "
-          "the origin)")
+          "Position of the GNSS antenna, or of what stood on the control points, in the body "
+          "frame: x y z. If not given: that of run.json for the run's own fixes, else 0 0 0")
       ->expected(3);
   command
       .add_option("--second-antenna-m", options.second_antenna_m,
-                  "Position in the body frame of the antenna that the headings of the fixes lead "
-                  "to: x y z (if not given: where run.json has it, for the run's own fixes)")
+                  "Position of the antenna that the headings of the fixes lead to, in the body "
+                  "frame: x y z. If not given: that of run.json for the run's own fixes")
       ->expected(3);
   command
       .add_option("--time-offset-s", options.time_offset_s,
@@ -211,8 +210,8 @@ void add_tree_options(CLI::App& command, GeoreferenceOptions& options) {
                      "Coordinate system of a tree map that states none, for instance EPSG:3067");
   command
       .add_option("--near", options.near,
-                  "Rough position of the middle of the run's trees, in the coordinates of the tree "
-                  "map: x y (if not given, by GNSS or anywhere in the map)")
+                  "Roughly where the middle of the run's trees lies on the tree map: x y (if not "
+                  "given, by GNSS or anywhere in the map)")
       ->expected(2);
   command
       .add_option("--radius-m", options.radius_m,
@@ -236,7 +235,7 @@ void add_georeference_command(CLI::App& app, Command& chosen) {
     names.emplace_back(method.name);
     meanings.push_back(std::string(method.name) + ": " + method.meaning);
   }
-  command->add_option("--method", options->method, fmt::format("{}", fmt::join(meanings, "; ")))
+  command->add_option("--method", options->method, fmt::format("{}", fmt::join(meanings, "\n")))
       ->required()
       ->check(CLI::IsMember(names));
   add_satellite_options(*command, *options);

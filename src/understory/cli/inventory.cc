@@ -25,13 +25,13 @@ struct InventoryOptions {
 void add_cloud_frame_options(CLI::App& command, CloudFrame& frame) {
   command
       .add_option("--unit-m", frame.unit_m,
-                  "Metres per unit of the cloud: 0.001 for millimetres, 0.3048 for feet (metres "
-                  "if not given, and it is checked that they can be)")
+                  "Metres per unit of the cloud: 0.001 for millimetres, 0.3048 for feet (if not "
+                  "given, 1, which is checked)")
       ->check(CLI::Range(1e-6, 1e6));
   command
       .add_option("--up", frame.up,
-                  "The cloud's direction that points up: x, y, z, -x, -y, -z or =X,Y,Z (z if not "
-                  "given, and it is checked that it can be)")
+                  "The cloud's direction that points up: x, y, z, -x, -y, -z or =X,Y,Z (if not "
+                  "given, z, which is checked)")
       ->check([](const std::string& text) {
         return is_direction(text) ? std::string()
                                   : "expected x, y, z, -x, -y, -z or three numbers X,Y,Z";

@@ -128,8 +128,8 @@ std::vector<std::string> settings_of(const MapOptions& options) {
   const std::vector<std::string> plots = plot_settings(options.plots, "inventory.stand.");
   if (!plots.empty() && options.front_end != kDenseFrontEnd)
     throw ConfigError(
-        {"--plots and --plot-grid take their figures from the cloud of a map, which a run by stems "
-         "does not make: leave them out, or map with --front-end dense"});
+        {"--plots and --plot-grid need the cloud of a map, and a run by stems makes none: leave "
+         "them out, or map with --front-end dense"});
   settings.insert(settings.end(), plots.begin(), plots.end());
   return settings;
 }
@@ -187,16 +187,16 @@ void add_map_command(CLI::App& app, Command& chosen) {
                       "UTM zone)");
   command
       ->add_option("--inventory", options->inventory,
-                   "What is measured of the trees: diameters and heights (basic, if not given), or "
-                   "stem curves, volumes, crowns and the tree of each point as well (full)")
+                   "What is measured of the trees. basic (if not given): diameters and heights. "
+                   "full: also stem curves, volumes, crowns and the tree of each point")
       ->check(CLI::IsMember({"basic", "full"}));
   add_plot_options(*command, options->plots);
   command->add_flag("--copc", options->copc,
                     "Write map.copc.laz as well: the points of map.laz as Cloud Optimized Point "
                     "Cloud, which QGIS and web viewers show at once");
   command->add_option("--max-memory-mb", options->max_memory_mb,
-                      "Most memory that the run may have resident, MB of 10^6 bytes (if not given "
-                      "as much as it likes): what does not fit is held on disk");
+                      "Most memory that the run may take, in MB of 10^6 bytes (if not given, no "
+                      "limit). What does not fit is held on disk");
   command->add_flag("--imu-rate", options->imu_rate,
                     "Write trajectory_imu.tum as well: a predicted pose for each sample of the "
                     "IMU");
@@ -204,8 +204,9 @@ void add_map_command(CLI::App& app, Command& chosen) {
                     "Refine place and clock of the IMU while mapping; where they differ from what "
                     "is given, the recording is mapped anew with them");
   command->add_flag("--realtime", options->realtime,
-                    "Play the recording at sensor speed; late scans are dropped "
-                    "(time_repair.window_s is 0, of stems also stems.pace.longest_gap_s)");
+                    "Play the recording at the speed of the sensor; scans that come too late are "
+                    "left out (sets time_repair.window_s, and by stems also "
+                    "stems.pace.longest_gap_s, to 0)");
   command->add_flag("--overwrite", options->overwrite,
                     "Start anew although the run folder holds a run, finished or not");
   command->add_flag(
@@ -215,7 +216,7 @@ void add_map_command(CLI::App& app, Command& chosen) {
   add_open_options(*command, options->open);
   command->footer(
       "Example:\n  understory map plot7.mcap -o plot7 --profile handheld\n"
-      "  understory map sim:handheld?seed=3 -o run --set loop_closure.enabled=false\n"
+      "  understory map 'sim:handheld?seed=3' -o run --set loop_closure.enabled=false\n"
       "  understory map sim:lieksa2 -o forest --front-end sparse");
   command->callback([&chosen, options, command] {
     chosen = [options, command](CommandContext& context) {

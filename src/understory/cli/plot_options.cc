@@ -3,10 +3,11 @@
 namespace understory {
 
 void add_plot_options(CLI::App& command, PlotOptions& options) {
-  command.add_option("--plots", options.plots,
-                     "Sample plots that get figures of their own: X,Y,R (one circle), a .csv with "
-                     "id,x,y,radius_m, or a GeoPackage with polygons (or points with radius_m); in "
-                     "the coordinates of trees.gpkg");
+  command.add_option(
+      "--plots", options.plots,
+      "Sample plots that get figures of their own, in the coordinates of trees.gpkg. "
+      "X,Y,R (one circle), a .csv with id,x,y,radius_m, or a GeoPackage with polygons "
+      "or with points and radius_m");
   command.add_option("--plot-grid", options.grid_m, "Figures by grid cells of this side, metres");
 }
 

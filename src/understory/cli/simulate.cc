@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "understory/cli/command.h"
-#include "understory/output/las_writer.h"
+#include "understory/output/clouds/las_writer.h"
 #include "understory/recording/bags/mcap_writer.h"
 #include "understory/simulation/sensors/field_log.h"
 #include "understory/simulation/simulator.h"

@@ -5,7 +5,7 @@
 
 namespace understory {
 
-// The word that is nearest to `given` by letters to change, add, leave out or swap; empty if none
+// The word that is nearest to `given` by letters to change, add, leave out or swap. Empty if none
 // is near enough to have been meant.
 [[nodiscard]] std::string nearest_word(const std::string& given,
                                        const std::vector<std::string>& words);

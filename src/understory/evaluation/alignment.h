@@ -24,9 +24,9 @@ enum class Alignment {
 // The motion that lays the estimate on the truth, and what is known of it.
 struct AlignmentResult {
   Pose target_from_source;
-  // False where the points do not fix the motion (all in one place, or for SE(3) on a line, or so
-  // nearly that their noise decides: rotation_sd_deg over 5): rotation errors after it mean
-  // nothing.
+  // False where the points do not fix the motion: rotation errors after it then mean nothing. They
+  // lie in one place, or for SE(3) on a line, or so nearly that their noise decides
+  // (rotation_sd_deg over 5).
   bool determined = false;
   // How far the rotation itself is off because the pairs do not agree: jackknife over ten parts of
   // the pairs in their order, degrees. NaN where it is unknown (under six pairs).

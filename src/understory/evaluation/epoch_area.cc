@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "understory/evaluation/evaluation_constants.h"
-#include "understory/evaluation/tree_changes.h"
+#include "understory/evaluation/trees/tree_changes.h"
 
 namespace understory {
 namespace {

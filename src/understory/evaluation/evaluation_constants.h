@@ -13,7 +13,7 @@
 // or real clouds and measurements by their page.
 namespace understory::evaluation_constants {
 
-namespace tree_match_chance {  // evaluation/tree_match_chance.cc
+namespace tree_match_chance {  // evaluation/trees/tree_match_chance.cc
 // Copies that are mirrored and aligned anew [bound: time]
 inline constexpr std::size_t kSearchedCopies = 3;
 // Copies that are shifted [bound: time]
@@ -36,7 +36,7 @@ inline constexpr double kMostShift = 5.0;
 inline constexpr double kLeastSpreadM = 0.005;
 }  // namespace tree_match_chance
 
-namespace tree_matching {  // evaluation/tree_matching.cc
+namespace tree_matching {  // evaluation/trees/tree_matching.cc
 // Cost of a pair for its diameters where one of them is unknown; 0 to 1 else [chosen: half way, so
 // that a tree whose diameter fits comes first, and one whose diameter does not comes last]
 inline constexpr double kUnknownDiameterCost = 0.5;
@@ -44,7 +44,7 @@ inline constexpr double kUnknownDiameterCost = 0.5;
 inline constexpr double kUnmatchedCost = 2.0;
 }  // namespace tree_matching
 
-namespace tree_class_errors {  // evaluation/tree_class_errors.cc
+namespace tree_class_errors {  // evaluation/trees/tree_class_errors.cc
 // Classes of diameter at most; larger diameters are in another unit [bound: memory and a table that
 // can be read]
 inline constexpr double kMostClasses = 1000.0;
@@ -53,7 +53,7 @@ inline constexpr double kMostClasses = 1000.0;
 inline constexpr double kOnTheBorder = 1e-9;
 }  // namespace tree_class_errors
 
-namespace tree_changes {  // evaluation/tree_changes.cc, epoch_area.cc
+namespace tree_changes {  // evaluation/trees/tree_changes.cc, epoch_area.cc
 // Standard deviations beyond which an increment is significant [bound: 95 % of normal errors]
 inline constexpr double kSignificance = 1.96;
 // Trees that tell a spread or a quantile at least [chosen]
@@ -78,7 +78,7 @@ inline constexpr double kMostMissedShare = 0.5;
 inline constexpr double kPathStepM = 0.5;
 }  // namespace tree_changes
 
-namespace tree_list_check {  // evaluation/tree_list_check.cc
+namespace tree_list_check {  // evaluation/trees/tree_list_check.cc
 // m: no stand has a larger median of diameters; groves of giant sequoias come near it [bound:
 // forests]
 inline constexpr double kThickestMedianM = 3.0;
@@ -102,7 +102,7 @@ inline constexpr std::size_t kLeastDoubles = 3;
 inline constexpr double kMostDoubles = 0.02;
 }  // namespace tree_list_check
 
-namespace tree_alignment {  // evaluation/tree_alignment.cc
+namespace tree_alignment {  // evaluation/trees/tree_alignment.cc
 // m between two trees of one list that are tried as a pair at least. Long pairs fix the heading
 // better and are rarer, short ones are more often both within the other list [chosen: suits plots
 // and strip roads]

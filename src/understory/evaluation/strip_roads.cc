@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "understory/evaluation/tree_errors.h"
-#include "understory/evaluation/tree_rates.h"
+#include "understory/evaluation/trees/tree_errors.h"
+#include "understory/evaluation/trees/tree_rates.h"
 #include "understory/util/error.h"
 
 namespace understory {

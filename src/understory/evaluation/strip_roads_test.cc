@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "understory/evaluation/tree_rates.h"
+#include "understory/evaluation/trees/tree_rates.h"
 
 namespace understory {
 namespace {

@@ -179,7 +179,7 @@ SegmentError segment_error(const Paired& paired, const std::vector<double>& path
   return result;
 }
 
-// 100, 200 ... 800 m on runs that are long enough for all of them; on shorter ones also a tenth of
+// 100, 200 ... 800 m on runs that are long enough for all of them. On shorter ones also a tenth of
 // each, so that a walk round a plot has segments at all. Only lengths that occur are listed.
 void add_segments(const Paired& paired, TrajectoryErrors& errors) {
   const std::vector<double> path = accumulated_path(paired.truth);

@@ -216,9 +216,9 @@ WorldFrame world_frame_of(const fs::path& file) {
   const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
   if (json.is_discarded())
     throw InputError(run.string(), "",
-                     "expected an undamaged run.json: it tells of files in north, east, down, and "
-                     "not whether " +
-                         file.filename().string() + " is one of them");
+                     "expected an undamaged run.json: this one does not say whether " +
+                         file.filename().string() +
+                         " is in north, east, down or in east, north, up");
   const auto frames = json.is_object() ? json.find("frames") : json.end();
   if (frames == json.end() || !frames->is_object()) return WorldFrame::kEnu;
   const auto frame = frames->find(file.filename().string());

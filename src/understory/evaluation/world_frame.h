@@ -9,7 +9,7 @@
 namespace understory {
 
 // The axes in which the text files of a run tell world coordinates (`output.world_frame`). Within
-// the program they are always east, north, up (z up against gravity); only files are turned, when a
+// the program they are always east, north, up (z up against gravity). Only files are turned, when a
 // run is written, and turned back, when one is read. Axes of the body stay as they are.
 enum class WorldFrame { kEnu, kNed };
 

@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/evaluation/tree_errors.h"
-#include "understory/evaluation/tree_falls.h"
+#include "understory/evaluation/trees/tree_errors.h"
+#include "understory/evaluation/trees/tree_falls.h"
 #include "understory/util/error.h"
 #include "understory/util/files/folder_test_support.h"
 

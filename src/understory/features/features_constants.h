@@ -163,4 +163,28 @@ namespace lidar_stems {  // features/lidar_stems.cc
 inline constexpr double kSameStem = 0.3;
 }  // namespace lidar_stems
 
+namespace stem_score {  // features/stem_score.cc: scales of the traits; their weights stand there
+// m^2, sections of a level: others whose surface lies within 0.6 m crowd a section [chosen]
+inline constexpr double kCrowdM2 = 0.36;
+// Sections to either side that are looked at [chosen]
+inline constexpr int kCrowdSections = 6;
+// Lean that counts as one (m/m) [chosen: most stems lean less]
+inline constexpr double kLean = 0.06;
+// Traits in standard deviations, or in leans, count no farther [chosen]
+inline constexpr double kMostSds = 4.0;
+// m that are added to the extent of a chain before its logarithm [chosen: 0 has a value then]
+inline constexpr double kExtentM = 0.1;
+// m that are added to its lowest height above the ground [chosen: likewise]
+inline constexpr double kLowestM = 0.3;
+// m that are added to the error of a width [chosen: likewise]
+inline constexpr double kWidthM = 0.05;
+// The same, usual diameters: to the spacing of returns [chosen]
+inline constexpr double kSpacing = 0.02;
+}  // namespace stem_score
+
+namespace tree_tops {  // features/tree_tops.cc
+// Standard deviations to which a smoothed canopy takes neighbours [bound: 99 % of the weight]
+inline constexpr double kSmoothedSds = 2.5;
+}  // namespace tree_tops
+
 }  // namespace understory::features_constants

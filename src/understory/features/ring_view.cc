@@ -107,7 +107,7 @@ void RingView::calibrate() {
   range_sd_m_ = std::clamp(range_sd_m_, kLeastRangeSd, kMostRangeSd);
 }
 
-// Whether two returns of a ring that follow each other may lie on one stem: its depth falls by up
+// Whether two returns of a ring that follow each other may lie on one stem. Its depth falls by up
 // to its radius from its middle to its edge, the faster the wider the step.
 bool RingView::linked(const Return& a, const Return& b) const {
   if (a.only_hides() || b.only_hides()) return false;

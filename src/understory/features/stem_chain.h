@@ -45,7 +45,7 @@ struct StemChainConfig {
                                                     const StemChainConfig& config);
 
 // The chain's radius from the widths of its sections and of the beams that passed between them, and
-// from what is usual; then its line by robust least squares from the centres that follow. The
+// from what is usual. Then its line by robust least squares from the centres that follow. The
 // surface that beams hit lies before the centre by pi/4 of the radius in the mean over the width
 // (P1 figure 11).
 void fit_chain(const SectionView& view, const StemChainConfig& config, StemChain& chain);

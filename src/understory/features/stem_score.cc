@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/features/features_constants.h"
+
 namespace understory {
 namespace {
+
+using namespace features_constants::stem_score;
 
 // Fitted by benchmarks/stem_score.py to the chains of simulated frames (VLP-16 and OS0-128 of four
 // sites, seeds 11 to 14) whose truth is known; docs/method/sparse.md.
@@ -45,9 +49,9 @@ StemTraits stem_traits(const SectionView& view, const StemChain& chain,
     for (const int direction : {-1, 1}) {
       for (int j = i + direction; j >= 0 && j < static_cast<int>(sections.size()); j += direction) {
         const StemSection& other = sections[static_cast<std::size_t>(j)];
-        if (other.level != section.level || std::abs(j - i) > 6) break;
+        if (other.level != section.level || std::abs(j - i) > kCrowdSections) break;
         const double off = (other.surface - section.surface).squaredNorm();
-        crowd += off < 0.36 ? 1.0 : 0.0;
+        crowd += off < kCrowdM2 ? 1.0 : 0.0;
       }
     }
     spacing += section.spacing_m;
@@ -69,19 +73,19 @@ StemTraits stem_traits(const SectionView& view, const StemChain& chain,
           chain.hits / (n + chain.hits),
           rough / n,
           hidden / n,
-          std::min(chain.misfit, 4.0),
-          std::min(chain.line.state.tail<2>().norm() / 0.06, 4.0),
-          std::log(0.1 + std::max(0.0, extent)),
-          width_sd / (0.05 + 0.5 * spacing / n),
-          std::log(0.3 + std::max(0.0, lowest_above_ground_m)),
-          std::min(odd, 4.0),
+          std::min(chain.misfit, kMostSds),
+          std::min(chain.line.state.tail<2>().norm() / kLean, kMostSds),
+          std::log(kExtentM + std::max(0.0, extent)),
+          width_sd / (kWidthM + 0.5 * spacing / n),
+          std::log(kLowestM + std::max(0.0, lowest_above_ground_m)),
+          std::min(odd, kMostSds),
           std::log(1.0 + crowd / n),
-          std::log(0.02 + spacing / n / (2.0 * config.usual_radius_m))};
+          std::log(kSpacing + spacing / n / (2.0 * config.usual_radius_m))};
 }
 
-// Traits are brought to mean 0 and spread 1; squares let a trait have a best value, and how much a
-// trait says depends on the number of sections (the first) and on how finely a stem is sampled (the
-// last).
+// Traits are brought to mean 0 and spread 1, and squares let a trait have a best value. How much a
+// trait says depends on the number of sections (the first trait). It also depends on how finely a
+// stem is sampled (the last).
 double stem_score(const StemTraits& traits) {
   StemTraits z{};
   for (std::size_t i = 0; i < z.size(); ++i)

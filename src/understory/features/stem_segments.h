@@ -42,10 +42,10 @@ struct StemSegment {
   int levels_with_3 = 0;  // of these with three returns or more
   int returns = 0;
   std::uint32_t t_ns = 0;  // mean time of its returns since the frame's stamp
-  // Of the foot's x and y and of the axis' slope in x and y, in the level frame (z up, turned as
-  // little as possible against the frame of the points; of a lidar that hangs upside down, after
-  // half a turn about its x axis).
-  // Not aligned to more than malloc gives: std::stable_sort's buffer is not either.
+  // Of the foot's x and y and of the axis' slope in x and y, in the level frame. Its z is up, and
+  // it is turned as little as possible against the frame of the points. Of a lidar that hangs
+  // upside down, half a turn about its x axis comes first. Not aligned to more than malloc gives:
+  // std::stable_sort's buffer is not either.
   Eigen::Matrix<double, 4, 4, Eigen::DontAlign> covariance = Eigen::Matrix4d::Zero();
   std::array<double, 15> traits{};  // what the score was made from (stem_score.h)
 };
@@ -61,9 +61,9 @@ struct StemSegments {
 };
 
 // Upright stems in one frame of a spinning lidar with any number of rings, in the frame of the
-// lidar, without the motion within the scan (a stem is seen in a millisecond: its `t_ns` says
-// when). Takes the spacing of returns and the noise from the frame itself; no parameter of the
-// site.
+// lidar. The motion within the scan is not taken out: a stem is seen in a millisecond, and its
+// `t_ns` says when. Takes the spacing of returns and the noise from the frame itself; no parameter
+// of the site.
 //
 // Each ring is cut into narrow runs of returns with a step in depth at both sides. Runs of
 // different rings that lie on one upright line are gathered into segments by a sequential

@@ -6,6 +6,7 @@
 #include <limits>
 #include <unordered_map>
 
+#include "understory/features/features_constants.h"
 #include "understory/geometry/symmetric_eigen.h"
 
 namespace understory {
@@ -172,7 +173,7 @@ std::vector<Eigen::Vector3f> top_points(std::span<const Eigen::Vector3f> points,
 
 Raster smoothed_canopy(const Raster& raster, double sd_m) {
   const double sd = sd_m / raster.cell_m;
-  const int reach = static_cast<int>(std::ceil(2.5 * sd));
+  const int reach = static_cast<int>(std::ceil(features_constants::tree_tops::kSmoothedSds * sd));
   Raster result = raster;
   std::fill(result.values.begin(), result.values.end(), std::numeric_limits<float>::quiet_NaN());
   for (int row = 0; row < raster.rows; ++row) {

@@ -180,7 +180,7 @@ inline constexpr double kLeastAbove = 1.5;
 inline constexpr double kStraight = 6.0;
 }  // namespace tree_heights
 
-namespace tree_tops {  // forest/tree_tops.cc
+namespace top_judgement {  // forest/top_judgement.cc
 // Points in the half metre below the top of a tree whose top was seen, at least [bound: what a top
 // is called seen by]
 inline constexpr int kTopPoints = 5;
@@ -200,7 +200,7 @@ inline constexpr double kLeastExpected = 12.0;
 inline constexpr double kScannerHeight = 1.5;
 // Places of the scanner that a top is looked at from, about [bound: time]
 inline constexpr std::size_t kMostLookouts = 64;
-}  // namespace tree_tops
+}  // namespace top_judgement
 
 namespace sight_lines {  // forest/trees/occupied_space.cc
 // m: edge of the cubes of a stand that hold points [chosen]
@@ -301,7 +301,7 @@ inline constexpr std::size_t kAroundPit = 6;
 inline constexpr float kPit = 2.0F;
 }  // namespace canopy_crowns
 
-namespace slice_inventory {  // forest/slice_inventory.cc
+namespace slice_inventory {  // forest/slice/slice_inventory.cc
 // m: one point per cube; a cut has few enough for thin cubes [chosen]
 inline constexpr double kThin = 0.005;
 // m: edge of the cells that its area is counted in [chosen]
@@ -309,6 +309,9 @@ inline constexpr float kAreaCell = 1.0F;
 // m: a cloud whose squares are thicker is no cut [chosen: a cut of 20 cm on a slope of 45 degrees
 // has 1.2 m in a square; a stand has 5 and more]
 inline constexpr double kThickest = 1.5;
+// Share of the squares that are no thicker than the thickness of the cut [chosen: single points
+// below or above a cut make few squares thick]
+inline constexpr double kThinner = 0.9;
 // Squares along the longer side of the surface that it is drawn over [bound: memory]
 inline constexpr double kMostCells = 1000.0;
 }  // namespace slice_inventory
@@ -379,6 +382,10 @@ inline constexpr double kFewPerM2 = 5.0;
 }  // namespace thin_coverage
 
 namespace tree_segments {  // forest/trees/tree_segments.cc
+// m above the ground: from here on points are kept densely [chosen: the cross section begins there]
+inline constexpr double kLowFromM = 0.8;
+// m above the ground: up to here [chosen: likewise]
+inline constexpr double kLowToM = 2.0;
 // m: one point per cube near breast height, where the cross section is drawn [chosen]
 inline constexpr double kLowThin = 0.015;
 // m: one point per cube elsewhere [chosen]

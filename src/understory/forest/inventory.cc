@@ -192,8 +192,8 @@ void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
   if (by_crown > 0 && result.from_above) return;
   if (returns == 0) {
     result.remarks.push_back(fmt::format(
-        "No point lies between {} and {} m above the lowest points: the ground below the trees is "
-        "missing from the cloud, or it was cut to another layer.",
+        "No point lies between {} and {} m above the lowest points. The ground below the trees is "
+        "missing from the cloud, or the cloud is a cut at another height.",
         config.stems.lowest_m, config.stems.highest_m));
   } else if (result.too_sparse) {
     result.remarks.push_back(fmt::format(

@@ -15,7 +15,7 @@
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/tiles/crown_tiles.h"
 #include "understory/forest/tiles/tiled_cloud.h"
-#include "understory/forest/tree_tops.h"
+#include "understory/forest/top_judgement.h"
 #include "understory/forest/trees/canopy_crowns.h"
 #include "understory/forest/trees/thin_coverage.h"
 #include "understory/forest/trees/tree_owners.h"
@@ -84,7 +84,7 @@ struct InventoryResult {
 
 // Ground, canopy, trees of a whole cloud: six runs through it. With `lookouts` trees that may go on
 // above the view have no height, and tops that were hardly seen are lower bounds. `scanner`: where
-// it was, metres, world frame; with it only what is in its sight counts as seen, and diameters are
+// it was, metres, world frame. With it only what is in its sight counts as seen, and diameters are
 // corrected for the width of its beams. Deterministic for any number of threads. Throws Stopped.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,

@@ -6,7 +6,7 @@
 // The numbers of stems in one thin cut that are no settings, in the form of forest_constants.h.
 namespace understory::stem_constants {
 
-namespace slice_stems {  // forest/stems/slice_stems.cc
+namespace slice_stems {  // forest/slice/slice_stems.cc
 // m: halves of the widths of the bands that circles are searched with: sharp clouds, then those
 // that scatter or show two rings [chosen]
 inline constexpr std::array<double, 2> kBands = {0.01, 0.025};

@@ -39,7 +39,7 @@ struct Raster {
     if (!contains(column, row)) return std::numeric_limits<double>::quiet_NaN();
     return z0 + static_cast<double>(values[index(column, row)]);
   }
-  // Bilinear between the centres of cells; held constant beyond the outer centres; NaN further than
+  // Bilinear between the centres of cells. Held constant beyond the outer centres. NaN further than
   // one cell outside, or where less than a quarter (by weight) of the four cells is known.
   [[nodiscard]] double interpolate(double x, double y) const;
 };

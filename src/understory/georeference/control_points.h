@@ -20,7 +20,7 @@ struct ControlPoint {
 struct ControlFitConfig {
   double tilt_sd_deg = 0.05;  // how far the run's up may be off, each level axis
   // Error of a point in the run and in the survey together, one axis, before the points are looked
-  // at; their residuals change it as far as there are more points than unknowns [chosen].
+  // at. Their residuals change it as far as there are more points than unknowns [chosen].
   double sd_m = 0.1;
   double least_blunder_m = 0.3;  // what agrees better with the others is no blunder [chosen]
 };

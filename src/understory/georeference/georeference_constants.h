@@ -259,6 +259,24 @@ inline constexpr double kMostDeg = 90.0;
 inline constexpr std::size_t kFewestPoints = 3;
 // m: extent of each path at least [chosen]
 inline constexpr double kLeastExtentM = 5.0;
+// m: points of a path within such a cell are one, with their number as weight [chosen]
+inline constexpr double kGatheredM = 0.02;
+// Cells along the longer path where every heading is tried [bound: time]
+inline constexpr double kCoarseCells = 150.0;
+// m: such a cell at least [chosen]
+inline constexpr double kLeastCoarseM = 1.0;
+// Steps of the search from one heading [bound: time]
+inline constexpr int kCoarseSteps = 30;
+// m: places behind and before along the road from which a search begins again [chosen]
+inline constexpr double kSlidesM[] = {-16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0};
+// Rounds of that at most [chosen]
+inline constexpr int kSlideRounds = 4;
+// Steps of each of these searches at most [bound: time]
+inline constexpr int kSlideSteps = 100;
+// A search from beside counts as better if its sum is less than this share [chosen]
+inline constexpr double kBetter = 0.999;
+// Steps of the shift for a turned path, for the heading's error [bound: time]
+inline constexpr int kTurnedSteps = 15;
 }  // namespace path_fit
 
 namespace terrain_file {  // georeference/terrain_file.cc
@@ -351,6 +369,23 @@ inline constexpr double kThickestM = 2.0;
 inline constexpr double kThinnestM = 0.01;
 // Parts of the source that are tried [bound: time]
 inline constexpr std::size_t kParts = 3;
+// Cells along a side of a map of trees at most [bound: memory]
+inline constexpr double kMostGridCells = 2000.0;
+// Steps of the heading within which places of the search are one [chosen]
+inline constexpr double kApartTurns = 2.5;
+// Share of the reach of the source at which a step of the heading is kTurnM [bound: half of the
+// area of a disc lies within]
+inline constexpr double kTurnReach = 0.7;
+// Distances of trees: cell of the area that the source counts as seen [chosen]
+inline constexpr double kSeenCell = 0.3;
+// m: such a cell at least [chosen]
+inline constexpr double kLeastSeenCellM = 0.5;
+// Factor of the noise when more of the source is laid on: a long map is bent [chosen]
+inline constexpr double kGrownNoise = 1.3;
+// m: that noise at least [chosen]
+inline constexpr double kLeastGrownM = 0.5;
+// Share of the matches that the part would lead to expect, below which growing ends [chosen]
+inline constexpr double kGrownMatches = 0.6;
 }  // namespace tree_match
 namespace layer_frame {  // georeference/systems/layer_frame.cc
 // m: nodes of the grid that points are interpolated in. The level plane leaves the ellipsoid by

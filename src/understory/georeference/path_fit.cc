@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/geometry/symmetric_eigen.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"
@@ -245,11 +245,12 @@ double turn_deg(const Motion& a, const Motion& b) {
 // Where the search from every heading ends, the best first.
 std::vector<std::pair<double, Motion>> starts(const std::vector<Vector3d>& path,
                                               const std::vector<Vector3d>& fixes, int yaws) {
-  const double cell_m = std::max(1.0, std::max(extent_m(path), extent_m(fixes)) / 150.0);
+  const double cell_m =
+      std::max(kLeastCoarseM, std::max(extent_m(path), extent_m(fixes)) / kCoarseCells);
   const Fitter coarse(levelled(gathered(path, cell_m)), levelled(gathered(fixes, cell_m)));
   std::vector<std::pair<double, Motion>> ends;
   for (int k = 0; k < yaws; ++k) {
-    const Motion end = coarse.descend(coarse.centred(2.0 * M_PI * k / yaws), true, 30);
+    const Motion end = coarse.descend(coarse.centred(2.0 * M_PI * k / yaws), true, kCoarseSteps);
     const Pairs pairs = coarse.pairs(end);
     ends.emplace_back(Fitter::value_of(pairs, std::numeric_limits<double>::infinity()), end);
   }
@@ -265,14 +266,14 @@ Motion slid(const Fitter& fitter, Motion best, const Vector2d& along, bool robus
     return robust ? Fitter::width_of(fitter.pairs(motion))
                   : std::numeric_limits<double>::infinity();
   };
-  constexpr int kRounds = 4;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kSlideRounds; ++round) {
     Motion better = best;
-    for (const double shift_m : {-16.0, -8.0, -4.0, -2.0, 2.0, 4.0, 8.0, 16.0}) {
-      const Motion end = fitter.descend({best.yaw, best.shift + shift_m * along}, robust, 100);
+    for (const double shift_m : kSlidesM) {
+      const Motion end =
+          fitter.descend({best.yaw, best.shift + shift_m * along}, robust, kSlideSteps);
       const double width_m = std::min(width(better), width(end));
       if (Fitter::value_of(fitter.pairs(end), width_m) <
-          0.999 * Fitter::value_of(fitter.pairs(better), width_m))
+          kBetter * Fitter::value_of(fitter.pairs(better), width_m))
         better = end;
     }
     if ((better.shift - best.shift).norm() == 0.0) break;
@@ -285,7 +286,7 @@ Motion slid(const Fitter& fitter, Motion best, const Vector2d& along, bool robus
 // slowly, so fixes that follow each other say nearly the same.
 double independent_fixes(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
                          const Motion& motion, double width_m) {
-  const PlaneGrid grid(gathered(path, 0.02).points);
+  const PlaneGrid grid(gathered(path, kGatheredM).points);
   const Pose source_from_target = motion.pose().inverse();
   std::vector<Vector2d> errors;
   for (const Vector3d& fix : fixes) {
@@ -317,7 +318,6 @@ double independent_fixes(const std::vector<Vector3d>& path, const std::vector<Ve
 // flat profiles. Half of the wider side and the narrower one, at most 90 degrees.
 double heading_sd_deg(const Fitter& fitter, const Motion& best, double width_m,
                       double independent) {
-  constexpr int kSteps = 15;
   const double value = Fitter::value_of(fitter.pairs(best), width_m);
   const double noise_m2 = std::max(value, kLeastNoiseM * kLeastNoiseM);
   double sum = 0.0;
@@ -325,7 +325,7 @@ double heading_sd_deg(const Fitter& fitter, const Motion& best, double width_m,
     double sd = kMostDeg;
     for (double deg = kFirstDeg; deg <= kMostDeg; deg *= 2.0) {
       const Motion turned =
-          fitter.slide(fitter.turned(best, side * deg * M_PI / 180.0), width_m, kSteps);
+          fitter.slide(fitter.turned(best, side * deg * M_PI / 180.0), width_m, kTurnedSteps);
       const double rise = Fitter::value_of(fitter.pairs(turned), width_m) - value;
       const double sigmas2 = independent * rise / noise_m2;
       if (sigmas2 < 1.0) continue;
@@ -339,7 +339,7 @@ double heading_sd_deg(const Fitter& fitter, const Motion& best, double width_m,
 
 void tell_fixes(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
                 double width_m, PathFit& fit) {
-  const PlaneGrid grid(gathered(path, 0.02).points);
+  const PlaneGrid grid(gathered(path, kGatheredM).points);
   const Pose source_from_target = fit.target_from_source.inverse();
   double squares = 0.0;
   double sum = 0.0;
@@ -359,7 +359,7 @@ void tell_fixes(const std::vector<Vector3d>& path, const std::vector<Vector3d>& 
 
 void tell_path(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
                PathFit& fit) {
-  const PlaneGrid grid(gathered(fixes, 0.02).points);
+  const PlaneGrid grid(gathered(fixes, kGatheredM).points);
   double squares = 0.0;
   double sum = 0.0;
   for (const Vector3d& point : path) {
@@ -384,7 +384,7 @@ PathFit fit_path(const std::vector<Vector3d>& path, const std::vector<Vector3d>&
     return fit;
   }
   const auto ends = starts(path, fixes, config.yaw_starts);
-  const Fitter fine(gathered(path, 0.02), gathered(fixes, 0.02));
+  const Fitter fine(gathered(path, kGatheredM), gathered(fixes, kGatheredM));
   // The best three ends that differ, each refined with everything.
   const Vector2d along = main_direction(fixes);
   std::vector<Motion> refined;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/geometry/plot_shape.h"
+#include "understory/geometry/plane/plot_shape.h"
 
 namespace understory {
 
@@ -25,9 +25,9 @@ struct PlotOutline {
 // file that GDAL reads (GeoPackage, GeoJSON, Shapefile) with polygons, or with points and a column
 // radius_m. Of several layers it is `plots`, or else the first. Coordinates of a text or .csv are
 // those of `system` ("EPSG:3067" or WKT; empty: a local frame). Those of another file are brought
-// there from its own system. Throws InputError where the file cannot be read or holds no plots, an
-// id twice, a radius that is not over 0, a coordinate that is no number, or an outline without an
-// area, and where only one of both systems is known.
+// there from its own system. Throws InputError where the file cannot be read, holds no plots, or an
+// id twice. So it does for a radius that is not over 0, a coordinate that is no number, and an
+// outline without an area. Where only one of both systems is known, it throws, too.
 [[nodiscard]] std::vector<PlotOutline> read_plots(const std::string& given,
                                                   const std::string& system);
 

@@ -73,8 +73,8 @@ class TerrainFile {
   [[nodiscard]] double cell() const { return to_map_[1]; }
   [[nodiscard]] Raster read(const PlaneArea& area) const;
 
-  // GDAL finds a line of an ASCII grid behind the one before, and where the file is cut off it
-  // looks for all of them again and again, without end: so they are asked for one by one.
+  // GDAL finds a line of an ASCII grid behind the one before. Where the file is cut off it looks
+  // for all of them again and again, without end. So lines are asked for one by one.
   void pass_lines(GDALRasterBand* band, int lines) const {
     if (std::string(dataset_->GetDriverName()).find("ASCII") == std::string::npos &&
         std::string(dataset_->GetDriverName()) != "AAIGrid")
@@ -115,8 +115,8 @@ Raster TerrainFile::read(const PlaneArea& area) const {
   const int last_row = clamped(std::ceil((area.high.y() - south) / dy) + 1.0, height);
   if (last_column <= first_column || last_row <= first_row)
     fail(
-        fmt::format("expected a terrain model of the place: it holds x {:.1f} to {:.1f}, y {:.1f} "
-                    "to {:.1f}; asked for x {:.1f} to {:.1f}, y {:.1f} to {:.1f}",
+        fmt::format("expected a terrain model of the place. It holds x {:.1f} to {:.1f}, y {:.1f} "
+                    "to {:.1f}. The run needs x {:.1f} to {:.1f}, y {:.1f} to {:.1f}",
                     to_map_[0], to_map_[0] + width * cell(), south, south + height * dy,
                     area.low.x(), area.high.x(), area.low.y(), area.high.y()));
   Raster raster;

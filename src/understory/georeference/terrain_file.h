@@ -16,10 +16,10 @@ struct PlaneArea {
 };
 
 // Reads heights from a terrain model: GeoTIFF, ESRI ASCII grid (.asc), XYZ on a regular grid, or
-// whatever else GDAL knows as a raster; north-up, first band, metres; no-data cells are NaN.
+// whatever else GDAL knows as a raster. North-up, first band, metres. No-data cells are NaN.
 //
 // A model without a coordinate system is taken as it lies. One with a system is brought into the
-// frame east, north, up at `origin` by the full transform; without an origin it is taken as it lies
+// frame east, north, up at `origin` by the full transform. Without an origin it is taken as it lies
 // too, in the system's own metres.
 //
 // Only the part over `area` is read. Throws InputError where the file is no raster of heights, is

@@ -68,9 +68,9 @@ struct [[nodiscard]] GnssFusionResult {
   std::vector<Eigen::Vector3d> residual;  // position minus antenna, metres
 };
 
-// Solves the pose graph together with positions by satellites (P2-6, P4-5): odometry, the loops
-// that `loop_used` marks, tilts, positions with a lever arm, headings of a second antenna, and the
-// receivers' slow errors, which are estimated along. Nothing is held: the positions tell where the
+// Solves the pose graph together with positions by satellites (P2-6, P4-5). In it are odometry, the
+// loops that `loop_used` marks, tilts, positions with a lever arm and headings of a second antenna.
+// The receivers' slow errors are estimated along. Nothing is held: the positions tell where the
 // path is. `problem` is in its world frame, whose z axis is up; `enu_from_world` is a first guess,
 // for instance from a rigid fit. Deterministic; thread-safe. Where the system is undetermined the
 // path is that of the guess.

@@ -22,7 +22,7 @@ Matrix6d covariance(double rotation, double translation) {
   return c;
 }
 
-// A walk of `n` keyframes, a metre and a second apart, in bends, as the odometry has it: the world
+// A walk of `n` keyframes, a metre and a second apart, in bends, as the odometry has it. The world
 // frame begins at the first keyframe and turns away from the truth with the way.
 struct Walk {
   std::vector<Pose> truth;  // east, north, up

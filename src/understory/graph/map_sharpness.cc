@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <numeric>
 
-#include "understory/geometry/alpha_shape.h"
+#include "understory/geometry/plane/alpha_shape.h"
 #include "understory/util/error.h"
 #include "understory/util/median.h"
 #include "understory/util/parallel.h"

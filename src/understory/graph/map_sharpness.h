@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/geometry/points.h"
 #include "understory/geometry/pose.h"
 
@@ -83,8 +83,8 @@ struct MapSharpness {
                                          const SharpnessConfig& config);
 
 // Views whose sights lie so far from the trees that the map is better without them, P0 section 4.2
-// and (33): those with a mean square of more than `factor` times the median, the worst first, at
-// most `max_share` of all. 0 in the result: left out. `factor` <= 0 keeps all.
+// and (33). They have a mean square of more than `factor` times the median. The worst come first,
+// at most `max_share` of all. 0 in the result: left out. `factor` <= 0 keeps all.
 [[nodiscard]] std::vector<char> views_worth_keeping(const RegistrationNoise& noise, double factor,
                                                     double max_share);
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/registration/test_stand.h"
 #include "understory/util/files/folder_test_support.h"
 
@@ -146,7 +146,7 @@ TEST(FalseLoops, ATrueReturnIsClosed) {
 }
 
 // All three steps of P4 (38). The candidate is matched to the map of the present, so the edge tells
-// the slip that the odometry does not know of; only its choice was the paper's before.
+// the slip that the odometry does not know of. Only its choice was the paper's before.
 TEST(FalseLoops, ThePapersLoopsTakeTheEdgeFromTheMatchToTheLocalMap) {
   const Eigen::Vector3d slip(0.8, -0.6, 0.0);
   const Walk result = walk(grown_stand(), slip, paper_config());

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/graph/loops/view_cone.h"
 #include "understory/map/map_constants.h"
 #include "understory/util/error.h"

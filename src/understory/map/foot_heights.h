@@ -17,10 +17,10 @@ struct CarriedHeight {
 };
 
 // Of each view the median height of the body above the feet within some metres, with the tilt of
-// its pose. A person or a machine carries a scanner at one height, so a wide range says that the
-// points of the stems do not lie on the ground: then heights and tilt of the path follow their
-// errors, and nothing else shows it. The plane is not touched by that. Nothing where fewer than
-// 20 views have three stems near them. Deterministic.
+// its pose. A person or a machine carries a scanner at one height. So a wide range says that the
+// points of the stems do not lie on the ground. Heights and tilt of the path then follow their
+// errors, and nothing else shows it. The plane is not touched by that. Nothing where fewer than 20
+// views have three stems near them. Deterministic.
 [[nodiscard]] std::optional<CarriedHeight> carried_height(const std::vector<StemView>& views,
                                                           const std::vector<Pose>& world_from_body);
 

@@ -16,7 +16,7 @@ struct LocalMapConfig {
   // The method that scans are matched to the map by, and what the map is made of for it.
   MatcherConfig matcher;
   Viewpoint viewpoint;  // of the keyframes
-  // Accumulate: every keyframe within the radius stays, however old; recent: only the last
+  // Accumulate: every keyframe within the radius stays, however old. Recent: only the last
   // keyframes, thinned by a voxel grid of their positions (P4 section 3.1.1, Local Map).
   enum class Method { kAccumulate, kRecent };
   Method method = Method::kAccumulate;
@@ -74,9 +74,9 @@ class LocalMap {
   std::unique_ptr<TargetBuilder> builder_;
 };
 
-// Which of the keyframes at these positions (oldest first) P4's local map is made of: of the most
-// recent `recent_keyframes` (of all while there are fewer) the one nearest to the mean of each cube
-// of `recent_spacing_m`.
+// Which of the keyframes at these positions (oldest first) P4's local map is made of. Of the most
+// recent `recent_keyframes` (or all, if fewer) it is the one nearest to the mean of each cube of
+// `recent_spacing_m`.
 [[nodiscard]] std::vector<std::size_t> recent_keyframes(
     const std::vector<Eigen::Vector3d>& positions, const LocalMapConfig& config);
 

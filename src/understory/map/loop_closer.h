@@ -11,8 +11,8 @@
 #include "understory/graph/loops/loop_closure.h"
 #include "understory/graph/loops/loop_search.h"
 #include "understory/graph/pose_graph.h"
-#include "understory/map/keyframe.h"
-#include "understory/map/keyframe_points.h"
+#include "understory/map/keyframes/keyframe.h"
+#include "understory/map/keyframes/keyframe_points.h"
 #include "understory/map/local_map.h"
 #include "understory/map/loop_attempt.h"
 #include "understory/map/map_pieces.h"
@@ -61,10 +61,10 @@ struct PresentMap {
   std::vector<std::size_t> keyframes;
 };
 
-// Looks for loops beside the scan loop: one search at a time in the background, begun at most every
-// `search.interval_s` of recording, its result taken over at a keyframe that is fixed in advance,
-// so that results do not depend on how fast the machine is. P2-7; P4 section 3.1.1 in its own way:
-// close_in_present.
+// Looks for loops beside the scan loop, one search at a time in the background. A search begins at
+// most every `search.interval_s` of recording. Its result is taken over at a keyframe that is fixed
+// in advance, so that results do not depend on how fast the machine is. P2-7; P4 section 3.1.1 in
+// its own way: close_in_present.
 class LoopCloser {
  public:
   // `leave_map`: outcomes come without a local map, which would be one more beside the present one.

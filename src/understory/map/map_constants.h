@@ -70,7 +70,7 @@ inline constexpr double kRoomToGrow = 0.7;
 inline constexpr double kLeastRadiusM = 20.0;
 }  // namespace local_map
 
-namespace keyframe_map {  // map/keyframe_map.cc
+namespace keyframe_map {  // map/keyframes/keyframe_map.cc
 // Keyframes whose points stay in memory, about 60 MB [bound: memory]
 inline constexpr std::size_t kCachedKeyframes = 150;
 }  // namespace keyframe_map

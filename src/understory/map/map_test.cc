@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "understory/map/keyframe_clouds.h"
-#include "understory/map/keyframe_map.h"
-#include "understory/map/keyframe_points.h"
+#include "understory/map/keyframes/keyframe_clouds.h"
+#include "understory/map/keyframes/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_points.h"
 #include "understory/map/local_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/util/error.h"
@@ -131,7 +131,7 @@ TEST(KeyframeDistance, WeighsTurnsAgainstMetres) {
 }
 
 // P4 section 3.1.1, Local Map: of the last 15 keyframes the one nearest to the mean of those in
-// each cube; while there are fewer than 15, of all of them.
+// each cube. While there are fewer than 15, of all of them.
 TEST(LocalMapOfThePaper, TakesOneOfTheRecentKeyframesPerCube) {
   LocalMapConfig config;
   config.recent_keyframes = 15;

@@ -30,7 +30,7 @@ struct MapPoint {
 [[nodiscard]] double on_map_grid(double metres);
 [[nodiscard]] Eigen::Vector3d on_map_grid(const Eigen::Vector3d& place);
 
-// Sorts the points of a map of any size into square tiles, on disk where they are many, and hands
+// Sorts the points of a map of any size into square tiles, on disk where they are many. It hands
 // the tiles back one by one, thinned: at most one point (the first that was measured) in each cube
 // of `thin_m`. Memory is that of the write buffers and of the index that thins one tile.
 class MapTiles {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "understory/geometry/points.h"
-#include "understory/map/keyframe.h"
+#include "understory/map/keyframes/keyframe.h"
 #include "understory/registration/range_offset/range_offset.h"
 #include "understory/util/config/config.h"
 

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "understory/map/keyframe_clouds.h"
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_clouds.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/preprocess/body_cloud.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/util/files/binary_io.h"

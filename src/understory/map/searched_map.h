@@ -7,8 +7,8 @@
 #include "understory/geometry/points.h"
 #include "understory/graph/loops/loop_closure.h"
 #include "understory/graph/pose_graph.h"
-#include "understory/map/keyframe.h"
-#include "understory/map/keyframe_points.h"
+#include "understory/map/keyframes/keyframe.h"
+#include "understory/map/keyframes/keyframe_points.h"
 #include "understory/map/loop_attempt.h"
 #include "understory/map/map_pieces.h"
 

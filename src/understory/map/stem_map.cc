@@ -7,8 +7,8 @@
 #include <tuple>
 #include <unordered_map>
 
-#include "understory/geometry/alpha_shape.h"
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/alpha_shape.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/graph/loops/view_cone.h"
 #include "understory/map/map_constants.h"
 #include "understory/util/error.h"
@@ -217,7 +217,7 @@ std::vector<int> chances(const std::vector<Gathered>& trees, const std::vector<S
   return count;
 }
 
-// Two trees side by side are seen together now and then; the two images of one tree that a bent
+// Two trees side by side are seen together now and then. The two images of one tree that a bent
 // path makes are not, as a view has only one of them.
 bool same_tree(const Gathered& a, const Gathered& b, int chances) {
   const double expected = static_cast<double>(a.views.size()) *

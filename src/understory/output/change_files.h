@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "understory/evaluation/tree_changes.h"
+#include "understory/evaluation/trees/tree_changes.h"
 #include "understory/georeference/systems/layer_frame.h"
-#include "understory/output/point_table.h"
+#include "understory/output/clouds/point_table.h"
 
 namespace understory {
 

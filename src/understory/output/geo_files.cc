@@ -15,8 +15,8 @@
 #include <utility>
 
 #include "understory/geometry/quiet_gdal.h"
+#include "understory/output/clouds/point_table.h"
 #include "understory/output/plot_files.h"
-#include "understory/output/point_table.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
 

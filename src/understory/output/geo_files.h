@@ -33,9 +33,9 @@ struct LookPoint {
   std::string reason;
 };
 
-// GeoPackage with the layer `trees` of points (x, y, z = ground) and the columns of trees.csv, and
-// where there is a path with the layer `path`, where there are places to look from again with the
-// layer `look_again`, and where there are plots with the layer `plots` (polygons, their rings
+// GeoPackage with the layer `trees` of points (x, y, z = ground) and the columns of trees.csv.
+// Where there is a path it has the layer `path`, and where there are places to look from again the
+// layer `look_again`. Where there are plots it has the layer `plots` (polygons, their rings
 // `drawn`). Without a system the layers have srs_id -1 (undefined Cartesian), which QGIS takes for
 // metres. `heights` says what z is above.
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,

@@ -9,7 +9,7 @@
 #include "understory/geometry/stamped_pose.h"
 #include "understory/georeference/systems/layer_frame.h"
 #include "understory/georeference/systems/moved_raster.h"
-#include "understory/output/las_writer.h"
+#include "understory/output/clouds/las_writer.h"
 
 namespace understory {
 

@@ -16,10 +16,10 @@ struct QgisProject {
   std::array<double, 4> extent{};
 };
 
-// Writes map.qgs, which opens the layers of trees.gpkg (trees, places to look from again, plots and
-// path), chm.tif, dsm.tif, dtm.tif, free_height.tif, obstacles.laz and map.laz as far as they lie
-// in the folder, by relative paths. QGIS 3.16 or newer; the cloud needs 3.26 and is not shown until
-// it is switched on. Throws OutputError.
+// Writes map.qgs, which opens what lies in the folder, by relative paths. It knows the layers of
+// trees.gpkg (trees, places to look from again, plots and path), chm.tif, dsm.tif, dtm.tif,
+// free_height.tif, obstacles.laz and map.laz. QGIS 3.16 or newer; the cloud needs 3.26 and is not
+// shown until it is switched on. Throws OutputError.
 void write_qgis_project(const std::filesystem::path& folder, const QgisProject& project);
 // Its text. `files`: names of the files that are there; `vectors`: names of the layers of
 // trees.gpkg.

@@ -29,8 +29,9 @@ namespace understory {
 [[nodiscard]] std::vector<InputHash> hash_inputs(const std::string& recording, Log& log,
                                                  const ProgressSink& progress = {});
 
-// The files and folders that opening a recording reads: itself, parts of a bag that lie outside its
-// folder, the metadata and extrinsics that were named, and the site and the trees of a simulation.
+// The files and folders that opening a recording reads. They are the recording, parts of a bag
+// outside its folder, the metadata and extrinsics that were named, and the site and the trees of a
+// simulation.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const std::string& recording,
                                                           const OpenOptions& options);
 

@@ -16,7 +16,7 @@
 namespace understory {
 
 // Time repair. Events come in the order of the recording, which may be shuffled within limits, hold
-// duplicates, and come from clocks that jump or run apart; they leave in the order of time.
+// duplicates, and come from clocks that jump or run apart. They leave in the order of time.
 //
 // - Each stream has its own clock. The lidar's is the one that counts. A stream whose stamps are a
 //   constant time ahead of or behind it, told by the order of arrival (stream_offset.h), is shifted
@@ -25,18 +25,16 @@ namespace understory {
 // - Lidar and IMU move time on. An event leaves once the newest time of theirs is `window_s` ahead
 //   of it. GNSS and magnetometer follow, and never make another stream late. With a window of 0
 //   every stream is taken to be in order by itself, for least delay.
-// - A scan's time is its end, and it leaves right after the first IMU sample at or past that end,
-// so
-//   that deskewing never lacks samples; unless the IMU has been silent for `imu_silence_s`.
+// - A scan's time is its end, and it leaves right after the first IMU sample at or past that end.
+//   So deskewing never lacks samples, unless the IMU has been silent for `imu_silence_s`.
 // - Same stream and same stamp: the second is dropped. With the same content it was recorded twice;
 //   with other content its clock stands still, and what it says is lost. Earlier than what already
 //   left of the same stream: dropped.
 // - A stream whose stamps step away by more than `clock_jump_s` from its own past and from the
-// other
-//   sensors has a clock jump: its stamps are shifted so that it goes on at its usual rate, until it
-//   jumps back. If lidar and IMU step forward together, or the other one has fallen silent before,
-//   it is a gap in the recording and the stamps stand; backward together, all are shifted. A single
-//   stamp far off is dropped.
+//   other sensors has a clock jump. Its stamps are shifted so that it goes on at its usual rate,
+//   until it jumps back. If lidar and IMU step forward together, or the other one has fallen silent
+//   before, it is a gap in the recording and the stamps stand. Backward together, all are shifted.
+//   A single stamp far off is dropped.
 // Everything that was mended is counted and goes to the log under keys "time.*". The outcome
 // depends on the order of the pushes alone. Not thread-safe.
 class EventOrderer {

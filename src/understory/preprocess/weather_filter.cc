@@ -46,8 +46,8 @@ void keep_only(const std::vector<std::uint8_t>& keep, BodyCloud& cloud) {
 
 void describe(ConfigTable& table, WeatherFilterConfig& config) {
   table.add("enabled", config.enabled,
-            "drop returns that are dark and stand alone in their scan and in those before it: "
-            "snow, spurious ranges of a cold lidar and of the low sun");
+            "drop dark returns that stand alone in their scan and in those before: snow, false "
+            "ranges of a cold lidar and of the low sun");
   table.add("apart", config.apart, {0.001, 10.0}, "",
             "how far from others a return is weather: share of its range over its brightness; less "
             "drops more");

@@ -10,8 +10,8 @@
 
 namespace understory {
 
-// The scans of a spinning lidar as they are finished. A stream begins anywhere in a turn: the first
-// scan is then a part, the next one comes after a part of the usual time, and the speed that the
+// The scans of a spinning lidar as they are finished. A stream begins anywhere in a turn. The first
+// scan is then a part, and the next one comes after a part of the usual time. The speed that the
 // two seem to tell is as wrong as that time is short. So such a part is left out, with a warning
 // ("scan.part"), unless it is all there is or lasts as long as the next one. Not thread-safe.
 class FinishedScans {

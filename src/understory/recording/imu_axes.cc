@@ -45,7 +45,7 @@ void ImuAxisCheck::add(const ImuSample& sample) {
   if (sample.stamp - window_.start >= kTiltWindow) close_window();
 }
 
-// The mean force of a window stands for its middle; from the middle of the first to that of the
+// The mean force of a window stands for its middle. From the middle of the first to that of the
 // third the turn is half of the outer windows' and all of the middle one's.
 void ImuAxisCheck::close_window() {
   windows_.push_back(window_);

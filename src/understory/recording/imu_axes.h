@@ -18,7 +18,7 @@ class ImuAxisCheck {
  public:
   ImuAxisCheck();
   void add(const ImuSample& sample);
-  // "x y z" where the axes agree, "y -x z" and so on where another way fits far better; empty if
+  // "x y z" where the axes agree, "y -x z" and so on where another way fits far better. Empty if
   // there was too little tilting to tell.
   [[nodiscard]] std::string result() const;
   // The factor by which angular rates have to be multiplied to fit the tilts, with the axes of

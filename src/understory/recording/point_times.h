@@ -52,7 +52,7 @@ struct CloudTimes {
 
 // 1, 1e-3, 1e-6 and 1e-9 s in nanoseconds.
 [[nodiscard]] TimeNs ns_per_unit(double unit_s);
-// A raw time as nanoseconds, 0 if it is not a number or beyond the year 2110; exact for integers
+// A raw time as nanoseconds, 0 if it is not a number or beyond the year 2110. Exact for integers
 // and for absolute seconds as far as a double is.
 [[nodiscard]] TimeNs raw_time_to_ns(double raw, double unit_s);
 

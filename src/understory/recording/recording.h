@@ -51,7 +51,7 @@ class Recording {
   virtual ~Recording() = default;
 
   // The next event, or nothing at the end. Damage inside the file is passed over with a warning in
-  // the Log given at opening (key "recording.damaged", with file and position); what follows it is
+  // the Log given at opening (key "recording.damaged", with file and position). What follows it is
   // read as far as the format allows.
   [[nodiscard]] virtual std::optional<Event> next() = 0;
 

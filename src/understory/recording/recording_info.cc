@@ -19,7 +19,7 @@ std::string format(const char* pattern, double value) {
   return text;
 }
 
-// Steps, gaps and disorder of a row of stamps; the newest stamp so far is the measure, so that a
+// Steps, gaps and disorder of a row of stamps. The newest stamp so far is the measure, so that a
 // single one far ahead counts once.
 class StampRow {
  public:

@@ -61,7 +61,7 @@ class MatchTarget {
   [[nodiscard]] virtual double reach_m() const = 0;
   // Points, or cells of a method that sums up points, that the finest steps match to.
   [[nodiscard]] virtual std::size_t size() const = 0;
-  // The cost of a source in the coarsest (kFar) or in the last (kNear) steps; null if the method
+  // The cost of a source in the coarsest (kFar) or in the last (kNear) steps. Null if the method
   // makes no cost small that can be told at a pose.
   [[nodiscard]] virtual std::unique_ptr<const MatchCost> cost(const Points& source,
                                                               MatchStart start) const {

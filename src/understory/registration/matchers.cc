@@ -31,11 +31,11 @@ std::vector<std::string> matcher_names() {
   return names;
 }
 
-std::string matcher_summaries() {
+std::string matcher_summaries(const std::string& between) {
   std::string text;
   const MatcherConfig config;
   for_each_method(config, [&]<typename Config>(const Config&) {
-    text += (text.empty() ? "" : ", ") + std::string(Config::kName) + " (" + Config::kSummary + ")";
+    text += (text.empty() ? "" : between) + Config::kName + " (" + Config::kSummary + ")";
   });
   return text;
 }

@@ -50,7 +50,7 @@ struct MatcherConfig {
 
 // Names of the methods, and "name (summary), ..." for help texts.
 [[nodiscard]] std::vector<std::string> matcher_names();
-[[nodiscard]] std::string matcher_summaries();
+[[nodiscard]] std::string matcher_summaries(const std::string& between = ", ");
 
 // The key `method` and one section for each method's settings; or those sections alone.
 void describe(ConfigTable& table, MatcherConfig& config);

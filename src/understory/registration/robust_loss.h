@@ -26,7 +26,7 @@ enum class LossKind {
 struct RobustLossConfig {
   LossKind kind = LossKind::kGemanMcClure;
   // The scale comes from the median residual of each step, times the constant that makes the loss
-  // 95 % efficient for normal errors; false: it is the method's setting.
+  // 95 % efficient for normal errors. False: it is the method's setting.
   bool estimate_scale = false;
   double trim_share = 0.8;  // kTrimmed: the share of residuals that counts, 0..1
 };

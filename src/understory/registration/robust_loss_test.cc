@@ -54,7 +54,7 @@ std::vector<float> normal_squares(double sigma, std::size_t n, std::uint64_t see
 }
 
 // Of normal residuals the scale is their standard deviation times the constant of the loss, also
-// with a third of them far astray; without the estimate it is the setting.
+// with a third of them far astray. Without the estimate it is the setting.
 TEST(RobustLoss, TheScaleFollowsTheResiduals) {
   std::vector<float> squared = normal_squares(0.05, 20000, 1);
   const auto huber = [&](bool estimate) {

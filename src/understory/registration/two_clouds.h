@@ -4,7 +4,7 @@
 
 namespace understory {
 
-// What all methods are set to where two clouds are matched, and not scans to a map: of two clouds
+// What all methods are set to where two clouds are matched, and not scans to a map. Of two clouds
 // there is less in a cell than of the keyframes of a map, and the guess is the user's.
 [[nodiscard]] inline MatcherConfig matchers_of_two_clouds() {
   MatcherConfig config;

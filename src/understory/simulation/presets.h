@@ -6,8 +6,8 @@
 namespace understory {
 
 // Sensors that were measured, as settings of a site ("imu.gyro_noise=..."). A site names one by
-// imu_preset or gnss_preset; what it or a setting says of the same keys besides:
-// the preset goes over the site's file, a setting over the preset.
+// imu_preset or gnss_preset. What it or a setting says of the same keys besides: the preset goes
+// over the site's file, a setting over the preset.
 struct SensorPreset {
   std::string name;
   std::vector<std::string> settings;

@@ -24,7 +24,7 @@ class Simulator : public Recording {
  public:
   explicit Simulator(const SiteConfig& config);
   // Reads scans from a folder of casts where they are kept there, and keeps those that it casts
-  // (ScanCache); the events are the same as without. What is kept is held against what the program
+  // (ScanCache). The events are the same as without. What is kept is held against what the program
   // casts today, and forgotten with a warning ("simulation.cache") where it differs.
   Simulator(const SiteConfig& config, const std::string& cache_folder, Log& log);
   ~Simulator() override;
@@ -55,10 +55,10 @@ class Simulator : public Recording {
   [[nodiscard]] const SiteConfig& site() const;
   [[nodiscard]] double duration_s() const;
 
-  // Writes the truth of what has been read so far into a folder, which is made if need be:
-  // trajectory.tum, velocity.csv, imu_bias.csv (at every scan's stamp, skipped ones too),
-  // returns.csv.gz (of the scans that were cast: a skipped scan has no returns), trees.csv,
-  // total_station.csv (where the site has one), dtm.tif, site.yaml. Throws OutputError.
+  // Writes the truth of what has been read so far into a folder, which is made if need be. Its
+  // files are trajectory.tum, velocity.csv, imu_bias.csv (at every scan's stamp, skipped ones too),
+  // trees.csv, dtm.tif and site.yaml. returns.csv.gz is of the scans that were cast,
+  // total_station.csv is there where the site has one. Throws OutputError.
   void write_truth(const std::string& folder) const;
 
  private:

@@ -47,7 +47,7 @@ class TruthLog {
   std::vector<ScanTruth> scans_;
   std::vector<ScanTruth> further_;  // of the second lidar
   // Of all scans, one after another, in blocks. A small vector a scan, kept among large ones that
-  // come and go, made the heap of a long run grow by 60 kB a scan; a single vector takes up to
+  // come and go, made the heap of a long run grow by 60 kB a scan. A single vector takes up to
   // three times its size while it grows: a strip road by stems had 28 MB more at its peak.
   std::vector<std::vector<Packed>> blocks_;
   std::vector<std::size_t> stems_end_;  // of each scan

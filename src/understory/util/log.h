@@ -15,8 +15,8 @@ enum class LogLevel { kDebug, kInfo, kWarning, kError };
 // something to say. Thread-safe.
 //
 // Warnings are kept as well as passed on, because a run's warnings belong in its run.json. A
-// warning has a `key` that names its kind ("imu.gap"): the first three of a kind are passed to the
-// sink at once, all are counted, so that a defect that repeats a million times neither floods the
+// warning has a `key` that names its kind ("imu.gap"). The first three of a kind are passed to the
+// sink at once, and all are counted. So a defect that repeats a million times neither floods the
 // terminal nor fills the memory.
 class Log {
  public:

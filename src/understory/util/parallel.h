@@ -25,8 +25,8 @@ void parallel_for(std::size_t n, std::size_t grain, const Body& body) {
                             });
 }
 
-// Sum over [0, n) that gives the same bits for any number of threads: the indices are cut into
-// blocks of fixed size, `accumulate(sum, i)` runs in order within a block, and the blocks' sums are
+// Sum over [0, n) that gives the same bits for any number of threads. The indices are cut into
+// blocks of fixed size, and `accumulate(sum, i)` runs in order within a block. The blocks' sums are
 // added in order of the blocks. `Sum` needs operator+=.
 template <typename Sum, typename Accumulate>
 [[nodiscard]] Sum ordered_sum(std::size_t n, std::size_t block, const Sum& zero,

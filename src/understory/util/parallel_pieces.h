@@ -8,8 +8,8 @@
 
 namespace understory {
 
-// parallel_for for few large pieces of work with parallel loops inside: while a thread waits for
-// such a loop it takes up no further piece, so that as many are at work as there are threads.
+// parallel_for for few large pieces of work with parallel loops inside. A thread that waits for
+// such a loop takes up no further piece, so that as many are at work as there are threads.
 template <typename Body>
 void parallel_pieces(std::size_t n, const Body& body) {
   parallel_for(n, 1,

@@ -29,8 +29,8 @@ struct AxisNoise {
 // Allan deviation that the figures make at an averaging time in seconds, in the unit of the signal.
 [[nodiscard]] double fitted_deviation(const AxisNoise& noise, double time_s);
 
-// Fits the three figures to a curve by P2's Allan variance method: the sum of the three parts that
-// makes the measured variances the likeliest, each with the chi-squared distribution of as many
+// Fits the three figures to a curve by P2's Allan variance method. They are those whose sum makes
+// the measured variances the likeliest. Each variance has the chi-squared distribution with as many
 // degrees of freedom as windows of its averaging time follow one another. Standard deviations count
 // that variances at different averaging times are not independent. `duration_s`: of the signal.
 // Averaging times below 0.1 s are left out. Throws InternalError for fewer than three others.

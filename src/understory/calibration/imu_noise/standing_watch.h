@@ -15,7 +15,7 @@ struct StandingStretch {
   [[nodiscard]] double duration_s() const { return to_seconds(to - from); }
 };
 
-// Finds when an IMU stood still, by windows of a second: nothing shakes or turns it within one, and
+// Finds when an IMU stood still, by windows of a second. Nothing shakes or turns it within one, and
 // its mean rates and forces are those of the stretch that it goes on with. A stretch also ends at a
 // gap of more than half a second. Memory grows with the number of stretches. Not thread-safe.
 class StandingWatch {

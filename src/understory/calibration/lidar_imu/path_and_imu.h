@@ -48,16 +48,16 @@ struct PathResiduals {
 using PathRun = std::vector<StampedPose>;
 
 // Cuts a path where scans lie more than half a second apart or the IMU is silent at any lateness
-// within `latest_s` of `imu_late_s`; runs have at least 20 poses and at most 1000.
+// within `latest_s` of `imu_late_s`. Runs have at least 20 poses and at most 1000.
 [[nodiscard]] std::vector<PathRun> runs_with_imu(const std::vector<StampedPose>& world_from_lidar,
                                                  const ImuBuffer& imu, double imu_late_s,
                                                  double latest_s);
 
 // Turns from scan to scan: the rotation vector from what the gyroscope says, P2 (3), to what the
 // path says, in the frame of the IMU, radians. One for each step of the run.
-// Velocities from step to step: the change of the IMU's mean velocity from one step of the path to
-// the next, less that which gravity and accelerometer make of it; P2 (4) with the velocity
-// eliminated; in the frame of the path, m/s. One for each pair of steps. With derivatives, found
+// Velocities from step to step, in the frame of the path, m/s: P2 (4) with the velocity eliminated.
+// It is the change of the IMU's mean velocity from one step of the path to the next. What gravity
+// and accelerometer make of it is taken off. One for each pair of steps. With derivatives, found
 // numerically. Throws InternalError where the IMU does not cover the run at the state's lateness.
 struct LidarImuResiduals {
   PathResiduals turns;

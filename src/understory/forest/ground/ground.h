@@ -42,7 +42,7 @@ struct GroundModel {
 
 // Memory grows with the area, not with the number of points. Deterministic for any number of
 // threads and any order of points, but for `level_m`: heights are held in single precision above
-// it; without it above the first point. The result has an empty terrain if there are no points.
+// it. Without it above the first point. The result has an empty terrain if there are no points.
 // Polls `progress`.
 [[nodiscard]] GroundModel estimate_ground(const PointBlocks& cloud, const GroundConfig& config,
                                           const ProgressSink& progress = {},

@@ -10,7 +10,7 @@ namespace understory {
 
 // Tells points below the ground: ghosts of other pulses, echoes that took a longer way. Where a
 // cloud is dense there are some in every square metre, so that the lowest points say nothing of the
-// ground; but they are spread over tens of metres of depth, and ground is a layer. In squares of 2
+// ground. But they are spread over tens of metres of depth, and ground is a layer. In squares of 2
 // m the lowest layer of 1 m that holds a few points, and 0.4 % of all there, is taken for real.
 class LowNoise {
  public:

@@ -35,7 +35,7 @@ struct Cells {
   }
 };
 
-// Sums along a line of cells: entry c is how many of the cells before column c - `margin` hold
+// Sums along a line of cells. Entry c is how many of the cells before column c - `margin` hold
 // anything, so that every stretch within `margin` of the line is a difference of two entries.
 void sum_line(const Cells& cells, int row, int margin, std::vector<int>& sums) {
   sums.assign(static_cast<std::size_t>(cells.columns + 2 * margin + 1), 0);

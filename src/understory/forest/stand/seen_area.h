@@ -6,7 +6,7 @@
 
 #include "understory/forest/cell_grid.h"
 #include "understory/forest/stand_constants.h"
-#include "understory/geometry/plot_shape.h"
+#include "understory/geometry/plane/plot_shape.h"
 
 namespace understory {
 
@@ -67,8 +67,8 @@ struct VisibleArea {
   [[nodiscard]] double area_in_m2(const PlotShape& plot) const;
 };
 
-// Cells with returns, gaps filled that chance leaves at their density; then those with
-// the density that stems need; then, where a path is given, those in reach and in a straight line
+// Cells with returns, with the gaps filled that chance leaves at their density. Of them those with
+// the density that stems need. Where a path is given, those of them in reach and in a straight line
 // of sight from it, past all `stems`. At the border of the returns half of a cell counts for each
 // side, as the true border lies anywhere in it. `path`, `stems` and cells: relative to `origin`.
 // Deterministic for any number of threads.

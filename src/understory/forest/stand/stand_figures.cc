@@ -48,8 +48,9 @@ struct Candidate {
   double wrong_side = 0.0;  // chance that it stands on the other side of the border
 };
 
-// What every figure of a plot has in common: a figure moves by `pull` of a tree if that tree is in
-// the sum or not, and by `spread` (a standard deviation) through the errors of its measurement.
+// What every figure of a plot has in common. A figure moves by `pull` of a tree if that tree is in
+// the sum or not. It moves by `spread` (a standard deviation) through the errors of its
+// measurement.
 class PlotSums {
  public:
   PlotSums(const StandTrees& stand, const VisibleArea& seen, const PlotShape& plot, double missing)

@@ -5,7 +5,7 @@
 
 #include "understory/forest/stand/seen_area.h"
 #include "understory/forest/stand/stand_trees.h"
-#include "understory/geometry/plot_shape.h"
+#include "understory/geometry/plane/plot_shape.h"
 
 namespace understory {
 

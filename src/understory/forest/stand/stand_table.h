@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "understory/forest/stand/stand_figures.h"
-#include "understory/geometry/plot_shape.h"
+#include "understory/geometry/plane/plot_shape.h"
 
 namespace understory {
 

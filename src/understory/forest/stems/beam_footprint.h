@@ -57,7 +57,7 @@ struct BeamFootprint {
 [[nodiscard]] double diameter_sd_m(double spread_m, double arc_deg, double range_m,
                                    bool compensated);
 
-// By how much a fit of `arc_deg` of the circumference makes a radius too large for that: the whole
+// By how much a fit of `arc_deg` of the circumference makes a radius too large for that. The whole
 // excess counts where a stem was seen from one side, nothing where it was seen all around.
 [[nodiscard]] double excess_radius_m(const BeamFootprint& beam, double radius_m, double arc_deg);
 

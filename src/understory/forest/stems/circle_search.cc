@@ -213,9 +213,9 @@ class GroupSearch {
     return root * eighth * std::sqrt(eighth);
   }
 
-  // Points on the circle less those inside it, which a stem cannot have, about per
-  // length of the circumference: a large circle through a thicket and a stem in it collects more
-  // points than the stem, but hardly more per length. Gives up as soon as it cannot beat `best`.
+  // Points on the circle less those inside it, which a stem cannot have, about per length of the
+  // circumference. A large circle through a thicket and a stem in it collects more points than the
+  // stem, but hardly more per length. Gives up as soon as it cannot beat `best`.
   double score(Circle& circle, double best) {
     const Eigen::Vector2f centre = circle.centre.cast<float>();
     const auto radius = static_cast<float>(circle.radius_m);

@@ -287,8 +287,8 @@ class Estimator {
     return true;
   }
 
-  // Beams from one direction fall evenly over the stem's width, so they hit places in proportion to
-  // the cosine of their angle to it, and none beyond a right angle: what is seen is a sum of such
+  // Beams from one direction fall evenly over the stem's width. So they hit places in proportion to
+  // the cosine of their angle to it, and none beyond a right angle. What is seen is a sum of such
   // lobes. That ties the radius to the width seen where the side away from the scanner is unknown.
   void learn_views(const std::vector<double>& seen) {
     for (int round = 0; round < kViewRounds; ++round) {

@@ -8,7 +8,7 @@
 namespace understory {
 
 // A slowly tapering cylinder through points that scatter about its surface to all sides. Fitting
-// distances makes a stem too thick where the scatter is no longer small beside the radius: a point
+// distances makes a stem too thick where the scatter is no longer small beside the radius. A point
 // displaced along the surface lies outside of it, and the side that was not seen holds nothing
 // against a larger circle. Here the place on the surface from which a point came is unknown and is
 // averaged over (expectation maximisation; Dempster, Laird and Rubin, J. R. Stat. Soc. B 39, 1977):

@@ -22,7 +22,7 @@ struct PointGroupConfig {
   double margin_m = 1.3;  // a window of a large group also holds the points so near to it
   bool whole = false;     // none is cut
   GroundArea area;        // groups that reach into it are asked for
-  // Where the frame of the points begins; groups of one cloud have the same place in any frame that
+  // Where the frame of the points begins. Groups of one cloud have the same place in any frame that
   // begins at a multiple of the reach.
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();
 };

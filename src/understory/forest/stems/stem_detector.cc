@@ -176,9 +176,9 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
 }
 
 // After the refined fit, which may have found a much thinner stem in the circle's edge. What shows
-// another side in each slice is a piece of a machine or a heap of branches (a stem's pieces were
-// filled to 0.67 and more on the tuning maps); what shows in few slices has to stand clear, and
-// must not be cut off where it was seen well.
+// another side in each slice is a piece of a machine or a heap of branches. A stem's pieces were
+// filled to 0.67 and more on the tuning maps. What shows in few slices has to stand clear, and must
+// not be cut off where it was seen well.
 bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
   const StemFit& stem = fit.stem;
   const StemEvidence& e = fit.evidence;

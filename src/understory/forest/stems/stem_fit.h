@@ -39,7 +39,7 @@ struct StemFitResult {
                                      const StemDetectorConfig& config);
 
 // The same stem by fit_noisy_cylinder, from its fit and, where the points would also suit a thinner
-// stem in the circle's edge, from that one; the likelier of both. `points` should hold all within
+// stem in the circle's edge, from that one. The likelier of both. `points` should hold all within
 // 0.35 m of the surface. The figures are taken anew.
 [[nodiscard]] StemFitResult refine_stem(const std::vector<SlicePoint>& points,
                                         const StemFitResult& fit, const StemDetectorConfig& config);

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "understory/forest/forest_constants.h"
-#include "understory/forest/stems/slice_thinner.h"
+#include "understory/forest/slice/slice_thinner.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/tile_shelf.h"
 

@@ -22,7 +22,7 @@ struct LookPlace {
   std::vector<std::size_t> stems;  // numbers of the weak ones, nearest first
 };
 
-// A few places to stand at, so that the weak stems are seen again from their unseen sides: each is
+// A few places to stand at, so that the weak stems are seen again from their unseen sides. Each is
 // within 2 to 8 m of its stems, with no other stem between, outside of all stems, and where
 // `walkable` is true. A stem that was seen all round has too few points, and any side of it counts.
 // Places come by the number of stems that no place before them shows. Those that show fewer than

@@ -22,8 +22,8 @@ class CoverageGrid {
   // A point up to 3.5 m above the ground.
   void add(const Eigen::Vector2d& place) { ++counts_.at(place.x(), place.y()); }
   void add(const CoverageGrid& other);  // what another one counted
-  // Cells with fewer than 5 points per square metre: at 10 m from a lidar that is held 1.5 m high a
-  // stem of 20 cm then has fewer than 25 points up to 3.5 m, which the search for stems wants.
+  // Cells with fewer than 5 points per square metre. At 10 m from a lidar held 1.5 m high a stem of
+  // 20 cm then has fewer than 25 points up to 3.5 m. The search for stems wants as many.
   [[nodiscard]] ThinCoverage thin() const;
 
  private:

@@ -13,7 +13,7 @@ namespace {
 using namespace forest_constants::tree_segments;
 
 std::uint64_t cube_of(const Eigen::Vector3d& p) {
-  const double size = p.z() > 0.8 && p.z() < 2.0 ? kLowThin : kThin;
+  const double size = p.z() > kLowFromM && p.z() < kLowToM ? kLowThin : kThin;
   const auto part = [&](double v) {
     return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v / size)) + (1 << 20)) &
            0x1fffff;

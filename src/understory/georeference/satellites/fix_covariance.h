@@ -15,10 +15,10 @@ struct FixCovarianceConfig {
   double least_sd_m = 0.01;          // no fix is better [bound: GNSS]
 };
 
-// Covariance of a fix, east, north, up, m^2: the receiver's own where it is one (finite, positive
-// on its diagonal, no correlation beyond one), else from HDOP and VDOP as P2 section 3 does, else
-// the default. HDOP is of both axes of the plane together. Receivers under trees promise too much:
-// the fits estimate one more factor for all fixes.
+// Covariance of a fix, east, north, up, m^2. It is the receiver's own where that is one (finite,
+// positive on its diagonal, no correlation beyond one). Else it comes from HDOP and VDOP as in P2
+// section 3, else it is the default. HDOP is of both axes of the plane together. Receivers under
+// trees promise too much: the fits estimate one more factor for all fixes.
 [[nodiscard]] Eigen::Matrix3d fix_covariance(const GnssFix& fix, const FixCovarianceConfig& config);
 
 }  // namespace understory

@@ -33,8 +33,8 @@ GnssErrors errors_of(const SplitFit& seen, double step_s) {
 }
 
 // A receiver that states decimetres and does not jump by more from pair to pair is as good as it
-// states (RTK in the open): what is smooth in the residuals is the error of the path. Under trees a
-// receiver that states too little jumps, too.
+// states (RTK in the open). What is smooth in the residuals is then the error of the path. Under
+// trees a receiver that states too little jumps, too.
 GnssErrors errors_of_good_receiver(const SplitFit& seen, const GnssErrors& shown,
                                    const SplitFitConfig& config) {
   const double plane_m = seen.plane_times.stated_sd_m;

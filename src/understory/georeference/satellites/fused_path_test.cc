@@ -19,7 +19,7 @@ const Vector3d kArm(0.2, -0.3, 2.0);
 const Pose kEnuFromWorld(Eigen::Quaterniond(Eigen::AngleAxisd(2.2, Vector3d::UnitZ())),
                          Vector3d(4.0, -3.0, 1.0));
 
-// A walk of `n` keyframes, a metre and a second apart, along bends; the map's steps are too long by
+// A walk of `n` keyframes, a metre and a second apart, along bends. The map's steps are too long by
 // `scale_error`, and its edges say that they err ten times as much as they do otherwise.
 struct Walk {
   std::vector<Pose> truth;  // world frame

@@ -42,10 +42,10 @@ struct ReceiverKind {
 };
 
 // Kalman filters side by side, one for each kind of receiver that is thinkable before the first
-// pair. The pairs tell the parameters of a linear problem and which kinds are probable; kinds that
+// pair. The pairs tell the parameters of a linear problem and which kinds are probable. Kinds that
 // are not make room for others that are like the probable ones. Memory and the work on a pair do
-// not grow with the number of pairs. Deterministic; not thread-safe. Liu and West (2001),
-// "Combined parameter and state estimation in simulation-based filtering".
+// not grow with the number of pairs. Deterministic; not thread-safe. Liu and West (2001), "Combined
+// parameter and state estimation in simulation-based filtering".
 template <int Parameters, int Axes>
 class ReceiverFilters {
  public:

@@ -88,8 +88,8 @@ double whiten(const NoisyTimes& times, const ReceiverNoise& noise, Eigen::Matrix
 [[nodiscard]] Eigen::MatrixXd noise_covariance(const NoisyTimes& times, const NoiseBelief& belief);
 
 // Of each pair the length of its residual (a column an axis) beside the slow and the steady errors
-// that the residuals make probable, where it is over four standard deviations of the fast error; 0
-// for the others. Pairs in time; metres.
+// that the residuals make probable. It is 0 where it is not over four standard deviations of the
+// fast error. Pairs in time; metres.
 [[nodiscard]] Eigen::VectorXd runaways_m(const NoisyTimes& times, const ReceiverNoise& noise,
                                          const Eigen::MatrixXd& residuals);
 

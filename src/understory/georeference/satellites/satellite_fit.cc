@@ -97,7 +97,7 @@ struct SixFit {
   Matrix6d covariance = Matrix6d::Zero();
 };
 
-// P4 (45-52). Positions that were smoothed err as the fixes do; attitudes keep the error of their
+// P4 (45-52). Positions that were smoothed err as the fixes do. Attitudes keep the error of their
 // covariance over the whole path, since it is that of biases and of the heading.
 SixFit fit_six(const std::vector<StampedPose>& trajectory,
                const std::vector<SmoothedPose>& smoothed, const SplitFit& seen,

@@ -87,7 +87,7 @@ struct SatellitePairs {
   std::string reason;             // why there are none, for a person
 };
 
-// Where the antenna was at a time, world frame, linear between poses; nothing outside of the path
+// Where the antenna was at a time, world frame, linear between poses. Nothing outside of the path
 // or where poses are more than two seconds apart. `trajectory` is in order of time.
 [[nodiscard]] std::optional<Eigen::Vector3d> antenna_place(
     const std::vector<StampedPose>& trajectory, const Eigen::Vector3d& antenna_in_body,

@@ -18,7 +18,7 @@ enum class HeightWish {
 
 // The coordinate system that a map gets where the user names none: ETRS-TM35FIN (EPSG:3067) in
 // Finland, the UTM zone of WGS 84 elsewhere. With heights above the geoid a vertical part follows:
-// N2000 in Finland, else EGM2008 or EGM96, the first whose grid PROJ has; none where it has none.
+// N2000 in Finland, else EGM2008 or EGM96, the first whose grid PROJ has. None where it has none.
 [[nodiscard]] std::string default_system(const GeodeticPlace& place, HeightWish heights);
 
 // The same vertical part for a system that the user names and that has none.

@@ -21,8 +21,8 @@ struct PatternFit {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
 };
 
-// Expectation maximisation from a start that is off by a metre or so: each tree of the source is
-// either one of the trees of the target near it, displaced by noise, or none of them, and then the
+// Expectation maximisation from a start that is off by a metre or so. Each tree of the source is
+// either one of the trees of the target near it, displaced by noise, or none of them. Then the
 // trees there are as dense as around. Noise and share are fitted, too. Deterministic.
 [[nodiscard]] PatternFit fit_pattern(const std::vector<PatternTree>& source,
                                      const PatternGrid& target, const PlaneMotion& start,

@@ -81,7 +81,7 @@ PatternGrid::PatternGrid(std::vector<PatternTree> trees, const SeenArea& seen) {
   high.array() += seen.reach_m + cell_m_;
   const Eigen::Vector2d size = high - low_;
   // No more than four million cells, however far apart the trees are.
-  cell_m_ = std::max({cell_m_, size.x() / 2000.0, size.y() / 2000.0});
+  cell_m_ = std::max({cell_m_, size.x() / kMostGridCells, size.y() / kMostGridCells});
   columns_ = static_cast<int>(size.x() / cell_m_) + 1;
   rows_ = static_cast<int>(size.y() / cell_m_) + 1;
   sort_into_cells(trees);

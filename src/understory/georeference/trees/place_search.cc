@@ -235,7 +235,8 @@ std::vector<PlaceCandidate> apart(std::vector<PlaceCandidate> all, double yaw_st
     const PlaneMotion& motion = candidate.target_from_source;
     const bool known = std::any_of(kept.begin(), kept.end(), [&](const PlaceCandidate& other) {
       return (other.target_from_source.at - motion.at).norm() < kApartM &&
-             angle_between(other.target_from_source.yaw_rad, motion.yaw_rad) < 2.5 * yaw_step;
+             angle_between(other.target_from_source.yaw_rad, motion.yaw_rad) <
+                 kApartTurns * yaw_step;
     });
     if (!known) kept.push_back(candidate);
     if (kept.size() >= kCandidates) break;
@@ -277,7 +278,7 @@ PlaceSearch search_places(const std::vector<PatternTree>& source, const PatternG
   spread = std::max(1.0, std::sqrt(spread));
   const ScoreRasters rasters = rasters_of(target, disc, reach, likeness, sizes);
   const auto headings = static_cast<std::size_t>(
-      std::ceil(2.0 * std::numbers::pi * std::max(0.7 * reach, spread) / kTurnM));
+      std::ceil(2.0 * std::numbers::pi * std::max(kTurnReach * reach, spread) / kTurnM));
   const double step = 2.0 * std::numbers::pi / static_cast<double>(headings);
   std::vector<std::vector<PlaceCandidate>> found(headings);
   parallel_for(headings, 1, [&](std::size_t k) {

@@ -48,9 +48,10 @@ struct PlaceSearch {
 };
 
 // Goes through all headings and all places of the disc on a grid of 1 m. At each pose every tree of
-// the source adds the logarithm of how much likelier trees of the target there are than by chance:
-// a correlation of the source with one raster of the target. `source` lies around its origin.
-// Needs trees in both. Uses all threads; the same result for any number of them. Polls `progress`.
+// the source adds the logarithm of how much likelier trees of the target there are than by chance.
+// This is a correlation of the source with one raster of the target. `source` lies around its
+// origin. Needs trees in both. Uses all threads; the same result for any number of them. Polls
+// `progress`.
 [[nodiscard]] PlaceSearch search_places(const std::vector<PatternTree>& source,
                                         const PatternGrid& target, const SearchDisc& disc,
                                         const TreeLikeness& likeness,

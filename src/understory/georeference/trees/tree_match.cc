@@ -103,8 +103,8 @@ std::vector<PatternFit> refined(const std::vector<PatternTree>& part, const Patt
   std::sort(fits.begin(), fits.end(), better);
   fits.resize(std::min(fits.size(), kRefined));
   const double spacing_m = 1.0 / std::sqrt(PatternGrid(part).median_density());
-  const PatternGrid seen(
-      part, {kSeenReach * spacing_m, kSeenShrink * spacing_m, std::max(0.5, 0.3 * spacing_m)});
+  const PatternGrid seen(part, {kSeenReach * spacing_m, kSeenShrink * spacing_m,
+                                std::max(kLeastSeenCellM, kSeenCell * spacing_m)});
   parallel_for(fits.size(), 1, [&](std::size_t k) {
     fits[k] = fit_pattern(part, target, fits[k].target_from_source, likeness, kAllSteps);
     // Half the sum of two likelihood ratios is one, too.
@@ -160,9 +160,9 @@ PatternFit grown(const PatternFit& start, const std::vector<PatternTree>& all, d
     for (const PatternTree& tree : all)
       if (tree.at.norm() <= reach) part.push_back(tree);
     TreeLikeness likeness = best.likeness;
-    likeness.sd_m = std::clamp(1.3 * likeness.sd_m, 0.5, kMostSdM);
+    likeness.sd_m = std::clamp(kGrownNoise * likeness.sd_m, kLeastGrownM, kMostSdM);
     const PatternFit fit = fit_pattern(part, target, best.target_from_source, likeness, kAllSteps);
-    if (fit.matched < 0.6 * best.matched / best.covered * fit.covered) break;
+    if (fit.matched < kGrownMatches * best.matched / best.covered * fit.covered) break;
     best = fit;
   }
   return best;
@@ -283,9 +283,8 @@ void judge(const PartOnTarget& finding, const TreeMatchConfig& config, TreeMatch
         best.matched, finding.part.trees.size(), kLeastMatched);
   } else if (!(finding.chance <= config.most_chance)) {
     match.reason = fmt::format(
-        "the best place may be chance: of {} trees {:.0f} have a partner there, and among all "
-        "places and headings chance gives one as good with a probability of {:.2g} ({:.0e} at "
-        "most)",
+        "the best place may be chance: of {} trees {:.0f} have a partner there. The probability "
+        "that chance gives a place as good is {:.2g} ({:.0e} at most)",
         finding.part.trees.size(), best.matched, finding.chance, config.most_chance);
   } else {
     match.trusted = true;

@@ -64,10 +64,10 @@ struct TreeMatch {
 };
 
 // Finds `source` in `target` at any heading, without a guess. It tries all headings and places of
-// the area on a grid (place_search.h), refines the best ones (pattern_fit.h), and judges the best
-// of all by two chances: how rarely trees without relation reach its likelihood ratio, and how far
-// it stands out from the other places. Sizes help where both maps have heights or both have
-// diameters. Trees with a position that is not finite are passed over.
+// the area on a grid (place_search.h), and refines the best ones (pattern_fit.h). It judges the
+// best of all by two chances. One is how rarely trees without relation reach its likelihood ratio,
+// the other how far it stands out from the other places. Sizes help where both maps have heights or
+// both have diameters. Trees with a position that is not finite are passed over.
 //
 // Not found where either map has too few trees or the area holds none. Deterministic, the same for
 // any number of threads. Polls `progress`, and throws nothing else.

@@ -142,7 +142,7 @@ class GainCorrection {
   }
 
   // By what factor the variance of the odometry differs from what it says, from what the matches
-  // moved of its own chain: twice the squared shift over the variance is chi squared with 2 degrees
+  // moved of its own chain. Twice the squared shift over the variance is chi squared with 2 degrees
   // of freedom, whose median is 2 ln 2. Else the solver would take right matches for wrong ones.
   [[nodiscard]] double odometry_variance_scale() const {
     constexpr double kMedian = 0.6931471805599453;

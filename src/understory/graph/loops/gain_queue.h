@@ -10,12 +10,12 @@ namespace understory {
 
 // Chooses the pair of views to be matched next by what the match is expected to tell.
 //
-// The error of the path is taken as a random walk: the relative position of views j < i is
-// uncertain by the sum of the variances of the steps between, and what two pairs ask about is
-// correlated by the steps that they share. A match of a pair with noise r tells
-// 1/2 ln(1 + v / r) nats, v being the variance that is left after the matches taken so far (as in
-// Gaussian process regression over the path; P1 section 5 names it for the corrections themselves).
-// Not thread-safe; deterministic.
+// The error of the path is taken as a random walk. The relative position of views j < i is
+// uncertain by the sum of the variances of the steps between. What two pairs ask about is
+// correlated by the steps that they share. A match of a pair with noise r tells 1/2 ln(1 + v / r)
+// nats. v is the variance that is left after the matches taken so far, as in Gaussian process
+// regression over the path (P1 section 5 names it for the corrections themselves). Not thread-safe;
+// deterministic.
 class GainQueue {
  public:
   // `step_variance_m2[k]` is of the step from view k - 1 to k; `noise_m2[c]` of a match of pair c.

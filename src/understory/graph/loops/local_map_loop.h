@@ -16,10 +16,10 @@ struct LocalMapLoopInput {
   Pose world_from_query;                   // of the scan about to be mapped
 };
 
-// Steps 2 and 3 of P4's loop closure (section 3.1.1): the candidate's scan is registered to the
-// present local map, beginning where the graph has it; the pose of the query relative to the result
-// is the edge (`target_from_source`, from the candidate). Its fitness is the mean squared distance
-// of the scan's points from their nearest points of the map (36); worse than `max_fitness_m2` it is
+// Steps 2 and 3 of P4's loop closure (section 3.1.1). The candidate's scan is registered to the
+// present local map, from where the graph has it. The pose of the query relative to the result is
+// the edge (`target_from_source`, from the candidate). Its fitness is the mean squared distance of
+// the scan's points from their nearest points of the map (36); worse than `max_fitness_m2` it is
 // refused. Covariance: `sigma_rotation_deg`, `sigma_translation_m` of the configuration alone, as
 // (36) has it below its threshold. Pure; parallel inside; same bits for any number of threads.
 [[nodiscard]] LoopVerification register_to_local_map(const LocalMapLoopInput& input,

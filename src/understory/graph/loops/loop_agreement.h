@@ -22,9 +22,9 @@ class LoopAgreement {
   // small parts.
   void update(const PoseGraphProblem& problem);
 
-  // Of the largest set of loops found that all agree with each other: from each loop in turn
-  // greedily, the one that agrees with most of those left first; ties go to the lower number.
-  // One entry for each loop.
+  // Of the largest set of loops found that all agree with each other. From each loop in turn the
+  // set grows greedily, by the one that agrees with most of those left. Ties go to the lower
+  // number. One entry for each loop.
   [[nodiscard]] const std::vector<char>& used() const { return used_; }
   // Pairs of loops compared so far.
   [[nodiscard]] std::size_t compared() const { return compared_; }

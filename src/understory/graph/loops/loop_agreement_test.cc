@@ -19,7 +19,7 @@
 namespace understory {
 namespace {
 
-// Rounds of a circle with a keyframe each metre and noise of the odometry; loops from each round to
+// Rounds of a circle with a keyframe each metre and noise of the odometry. Loops from each round to
 // the first, of which a share is wrong by metres, some of these all alike.
 PoseGraphProblem rounds_with_loops(std::uint64_t seed, std::size_t loops, double wrong_share) {
   Random random(seed);

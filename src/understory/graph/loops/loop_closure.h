@@ -10,9 +10,9 @@
 
 namespace understory {
 
-// Two places that may be the same, and their estimated relative pose. Points of both in
-// the body frames of their keyframes, thinned by a voxel filter (about 0.2-0.4 m); best each a
-// small map of a few keyframes around it.
+// Two places that may be the same, and their estimated relative pose. Points of both in the body
+// frames of their keyframes, thinned by a voxel filter (about 0.2-0.4 m). Best each a small map of
+// a few keyframes around it.
 struct LoopInput {
   Points target_points;
   Points source_points;

@@ -16,10 +16,10 @@ struct UnplacedCloud {
 };
 [[nodiscard]] UnplacedCloud make_unplaced(Points points, const Eigen::Vector3d& up);
 
-// Whether two clouds show one place, without a guess: their motion is found by upright things and
-// NDT (registration/global), has to be trusted by the verdict on such matches, and is then verified
-// as every loop is (verify_loop), from that pose on. `reason` of the result says what failed.
-// Pure; parallel inside; same bits for any number of threads.
+// Whether two clouds show one place, without a guess. Their motion is found by upright things and
+// NDT (registration/global), and the verdict on such matches has to trust it. From that pose on it
+// is verified as every loop is (verify_loop). `reason` of the result says what failed. Pure;
+// parallel inside; same bits for any number of threads.
 [[nodiscard]] LoopVerification verify_place_again(const UnplacedCloud& target,
                                                   const UnplacedCloud& source,
                                                   const LoopClosureConfig& config);

@@ -46,10 +46,10 @@ struct StemPath {
   const std::vector<Matrix6d>& step_covariances;  // of the motion from the view before, right
 };
 
-// For every view the place seen before that it looks like most: found by tree pattern and ICP among
-// views laid together with their neighbours (`gather_l0`), verified and measured by ICP of the two
-// views themselves, or else of what was laid together. Stems farther than views reach are left out
-// of that. Views without any candidate have no row. Same result for any number of threads. Polls
+// For every view the place seen before that it looks like most. Tree pattern and ICP find it among
+// views laid together with their neighbours (`gather_l0`), without stems farther away than views
+// reach. ICP of the two views themselves verifies and measures it, or else ICP of what was laid
+// together. Views without any candidate have no row. Same result for any number of threads. Polls
 // `progress`.
 [[nodiscard]] std::vector<StemLoop> find_stem_loops(const StemPath& path,
                                                     const StemLoopConfig& config,

@@ -53,8 +53,8 @@ Walk walk_there_and_back(int views_each_way, double missed = 0.2, double half_an
   return walk;
 }
 
-// How many views of the walk found a view at their place, and how many of these loops are verified;
-// of those the motion must be right, too.
+// How many views of the walk found a view at their place, and how many of these loops are verified.
+// Of those the motion must be right, too.
 struct Found {
   int right = 0;
   int verified = 0;

@@ -25,7 +25,7 @@ struct CorrectionPair {
 // Which of the promising pairs are matched.
 enum class PairRule {
   kPoissonDisks,  // P0 (28, 29)
-  // What P0's section 3 proposes: choice and order by the association of Delaunay stars; the pair
+  // What P0's section 3 proposes: choice and order by the association of Delaunay stars. The pair
   // that is expected to tell most, then the one that tells most beside it.
   kDelaunayStars
 };
@@ -49,9 +49,9 @@ void describe(ConfigTable& table, PairConfig& config);
 // P0 (27).
 [[nodiscard]] bool acceptable(double error_m, double overlap, const PairConfig& config);
 
-// e of a pair of views as they are placed: mean distance in the plane from the stems of the source
-// that lie in the target's sector to the nearest of the target's, the worst share of
-// `outlier_ratio` left out. NaN where fewer than `kFewestStems` lie in the sector.
+// e of a pair of views as they are placed. It is the mean distance in the plane from the stems of
+// the source that lie in the target's sector to the nearest of the target's. The worst share of
+// `outlier_ratio` is left out. NaN where fewer than `kFewestStems` lie in the sector.
 [[nodiscard]] double placed_error(const SparseTarget& target, const SparsePoints& source,
                                   const Pose& target_from_source, const ConeOverlap& overlap,
                                   double outlier_ratio);

@@ -9,12 +9,12 @@ namespace understory {
 // Corrections of a path by Gaussian process regression, which P1 section 5 names as what could
 // stand in for its powers.
 //
-// What the odometry gets wrong in a step, a turn w and a shift v in the axes of the world at the
-// place of the view that the step leads to, is taken as a Gaussian process over the steps: sd in
-// the plane as the odometry says times `scale`, correlation exp(-|m - l| / length). A match of
-// views j and i observes what the steps between add up to. The correction of a view is the
-// posterior mean, added up as motions (SE(3)) from the first view on: smooth over `length_views`,
-// and where no match tells anything it goes back to the odometry.
+// What the odometry gets wrong in a step is a turn w and a shift v, in the axes of the world at the
+// place of the view that the step leads to. It is taken as a Gaussian process over the steps, with
+// correlation exp(-|m - l| / length) and, in the plane, the sd of the odometry times `scale`. A
+// match of views j and i observes what the steps between add up to. The correction of a view is
+// the posterior mean, added up as motions (SE(3)) from the first view on. It is smooth over
+// `length_views`, and where no match tells anything it goes back to the odometry.
 struct PathObservation {
   int j = 0;  // the earlier view
   int i = 0;

@@ -9,8 +9,8 @@
 namespace understory {
 namespace {
 
-// Sums of `step(k)` for k = j + 1..l, over that for k = j + 1..i: from j + 1, as a step belongs to
-// the view that it leads to (the sums as printed begin at j and would not be 0 there).
+// Sums of `step(k)` for k = j + 1..l, over that for k = j + 1..i. They begin at j + 1, as a step
+// belongs to the view that it leads to (the sums as printed begin at j and would not be 0 there).
 template <typename Step>
 std::vector<double> cumulative(int j, int i, const Step& step) {
   std::vector<double> u(at(i - j + 1), 0.0);
@@ -22,8 +22,8 @@ std::vector<double> cumulative(int j, int i, const Step& step) {
   return u;
 }
 
-// The u in [0, 1] for which j (j^-1 i)^u lies nearest to l, P0 (32): a coarse search, then a golden
-// one around the best, as the distance may have several minima on a path with loops.
+// The u in [0, 1] for which j (j^-1 i)^u lies nearest to l, P0 (32). A coarse search comes first,
+// then a golden one around the best: the distance may have several minima on a path with loops.
 double nearest_on_screw(const Pose& j_from_i, const Pose& j_from_l, const PowerConfig& config) {
   const auto distance = [&](double u) {
     return motion_metric(j_from_i.power(u).inverse() * j_from_l, config);

@@ -31,9 +31,9 @@ PairMatch match_lattice_pair(const SparseTarget& target, const SparsePoints& sou
                              const Pose& j_from_i, const ConeOverlap& overlap,
                              const SelfCorrectionConfig& config);
 
-// Covariance of a match, right perturbation: its own, widened as stems are no independent points,
-// and what both sides got wrong alike, of which `shift_sd_m` is the part in the plane. A tilt turns
-// the view about the middle of its points (`source`).
+// Covariance of a match, right perturbation: its own, widened as stems are no independent points.
+// What both sides got wrong alike is added, of which `shift_sd_m` is the part in the plane. A tilt
+// turns the view about the middle of its points (`source`).
 [[nodiscard]] Matrix6d match_covariance(const Matrix6d& information, const SparsePoints& source,
                                         double shift_sd_m);
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "understory/geometry/delaunay.h"
+#include "understory/geometry/plane/delaunay.h"
 
 namespace understory {
 namespace {

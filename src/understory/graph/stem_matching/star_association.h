@@ -23,11 +23,11 @@ struct StarNoise {
   double seen = 0.6;  // probability that a neighbour is seen, and is one, in the other view too
 };
 
-// Probabilistic data association of two views' stems: a stem of the one is the same as one of the
-// other with the probability that its place (uncertain by `guess_variance_m2` per axis) and its
-// star speak for it, against all others within reach and against none. Returned is the number of
-// stems whose partner is known, the sum of squared probabilities: a stem that could be either of
-// two counts half. Heights do not count. Thread-safe.
+// Probabilistic data association of two views' stems. Two stems are the same with the probability
+// that place (uncertain by `guess_variance_m2` per axis) and star speak for it. Against it stand
+// all others within reach, and that there is none. Returned is the number of stems whose partner is
+// known, the sum of squared probabilities: a stem that could be either of two counts half. Heights
+// do not count. Thread-safe.
 [[nodiscard]] double associated_stems(const StarView& target, const StarView& source,
                                       const Pose& target_from_source, double guess_variance_m2,
                                       const StarNoise& noise);

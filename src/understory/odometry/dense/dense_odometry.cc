@@ -36,8 +36,8 @@ void describe(ConfigTable& table, ScanMatchConfig& config) {
   table.add("min_inlier_share", config.min_inlier_share, {0.0, 1.0}, "",
             "a match counts if it finds this share of what the matches before it found, or more");
   table.add("few_found_residual", config.few_found_residual, {0.0, 100.0}, "",
-            "a match that finds less counts all the same if its distance from the map's surfaces "
-            "is at most so many times the usual one; of sparse scans 1.5, 0: it does not");
+            "a match that finds less counts if its distance from the map is at most so many times "
+            "the usual one; 0: it never counts; of sparse scans 1.5");
   table.add(
       "coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "reaches",
       "standard deviation of the prediction above which a match begins with its widest steps. A "

@@ -37,9 +37,9 @@ struct ScanMatchConfig {
   // it.)
   double min_inlier_share = 0.5;
   // But a scan with few rings that turns over even ground lies between the rings of the map, and
-  // finds little of what is there: such a match counts if what it finds lies on the map's surfaces
-  // within this many times the usual distance. (Scans of another place have 1.9 times and more.)
-  // 0: it does not count.
+  // finds little of what is there. Such a match counts if what it finds lies on the map's surfaces
+  // within this many times the usual distance. (Scans of another place have 1.9 times and more.) 0:
+  // it does not count.
   double few_found_residual = 0.0;
   // The match begins from far (MatchStart) where the prediction may be off by more than this share
   // of the local map's reach (one sigma), or the last scan found no match.
@@ -117,7 +117,7 @@ class DenseOdometry {
   [[nodiscard]] DenseEstimate process(const Scan& scan, const MatchTargetPtr& local_map,
                                       const ScanKnowledge& known = {});
   // Poses from the parts of a scan that comes next (parts_of), each matched to the local map from
-  // where the motion leads; nothing that `process` does depends on it. Empty without a local map,
+  // where the motion leads. Nothing that `process` does depends on it. Empty without a local map,
   // before the first scan and for a scan that is not after the last one.
   [[nodiscard]] std::vector<PartEstimate> match_parts(const Scan& scan,
                                                       const MatchTargetPtr& local_map,

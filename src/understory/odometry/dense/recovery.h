@@ -30,9 +30,9 @@ class Recovery {
   // nothing. World from body.
   [[nodiscard]] Pose place_after_outage(const NavState& predicted) const;
 
-  // After a time when the lidar saw nothing: whether the next scan had better be waited for, as
-  // this one, which may see half around, was not matched and the prediction is certain to a metre.
-  // No more than five scans are waited for.
+  // After a time when the lidar saw nothing: whether the next scan had better be waited for. That
+  // is so where this one, which may see half around, was not matched and the prediction is certain
+  // to a metre. No more than five scans are waited for.
   [[nodiscard]] bool waits(const NavState& predicted, const DenseEstimate& estimate);
 
   // `seen`: it has points, and what to do about it was decided. One that is not is as none for
@@ -60,8 +60,8 @@ class Recovery {
   std::uint32_t waited_ = 0;  // scans since the lidar sees again
 };
 
-// Puts a new odometry and the estimate of its first scan to a pose: to its position and heading;
-// the vertical stays that of the odometry.
+// Puts a new odometry and the estimate of its first scan to a pose: to its position and heading.
+// The vertical stays that of the odometry.
 void put_at(const Pose& world_from_body, DenseOdometry& odometry, DenseEstimate& estimate);
 
 }  // namespace understory

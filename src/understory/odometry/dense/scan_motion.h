@@ -10,19 +10,19 @@
 
 namespace understory {
 
-// How far the sensor moves within scans, over how far it moves from scan to scan in the same time:
-// 1 where the times of the points are right, -1 where they run backwards, 0 where the points have
-// been deskewed already or all have the same time, 0.1 where they say that a scan takes ten times
-// as long.
+// How far the sensor moves within scans, over how far it moves from scan to scan in the same time.
+// It is 1 where the times of the points are right, and -1 where they run backwards. It is 0 where
+// the points have been deskewed already or all have the same time. It is 0.1 where they say that a
+// scan takes ten times as long.
 struct ScanMotion {
   int probes = 0;
   double ratio = 0.0;  // by least squares over the probes; 0 before there is one
 };
 
-// Finds out from scans now and then, while the sensor moves: the first and the last pose of a scan
-// are matched each by itself (scan_path.h, hardly bound by what was guessed), and the motion
-// between them is held against that since the scan before. Costs one such match every `kEvery`
-// scans. Not thread-safe.
+// Finds out from scans now and then, while the sensor moves. The first and the last pose of a scan
+// are matched each by itself (scan_path.h, hardly bound by what was guessed). The motion between
+// them is held against that since the scan before. Costs one such match every `kEvery` scans. Not
+// thread-safe.
 class ScanMotionWatch {
  public:
   static constexpr int kEvery = 30;

@@ -29,9 +29,9 @@ struct ScanPathCorrection {
 };
 
 // Where the motion within a scan is a guess, as it is without an IMU, a rigid match averages over
-// what the guess got wrong. Here the first and the last pose of the scan are matched together, with
-// the points in between moving along in proportion to their time (the elastic scan of Dellenbach et
-// al., CT-ICP, 2022, for any cost of a match).
+// what the guess got wrong. Here the first and the last pose of the scan are matched together. The
+// points in between move along in proportion to their time (the elastic scan of Dellenbach et al.,
+// CT-ICP, 2022, for any cost of a match).
 //   target: the local map that the scan lies in; without a cost there is no correction
 //   source: deskewed along the guessed path, body frame at its stamp; thinned
 //   duration: from the stamp to the last point, > 0

@@ -20,10 +20,10 @@ struct AssumedMotion {
 [[nodiscard]] bool is_part_of_turn(const Scan& first, const Scan& second);
 
 // A carrier that is on its way when the recording begins smears its first scan, and the second,
-// matched to it, tells the speed. Returns the motion to do both again with; nothing where `assumed`
-// smears the first scan by no more than 5 mm at 10 m beside it, or where the second scan comes half
-// a second later or more and tells nothing of it. `world_from_second` is the pose by matching.
-// `rate_is_known`: an IMU tells the turning, which stays as assumed.
+// matched to it, tells the speed. Returns the motion to do both again with. Returns nothing where
+// `assumed` smears the first scan by no more than 5 mm at 10 m beside it. So it does where the
+// second scan comes half a second later or more and tells nothing of it. `world_from_second` is the
+// pose by matching. `rate_is_known`: an IMU tells the turning, which stays as assumed.
 [[nodiscard]] std::optional<AssumedMotion> better_start(const Scan& first, const Scan& second,
                                                         const Pose& world_from_first,
                                                         const Pose& world_from_second,

@@ -15,16 +15,17 @@ namespace understory {
 // same way at all times and have the length of gravity.
 //
 // An IMU that is contradicted before it has ever agreed is put on probation: the motion model goes
-// on without it, so that a wrong IMU no longer bends the lidar's turns that it is measured by,
-// until there has been enough turning for a verdict. Where a run before this one found that it was
-// right, it is vouched for: until then contradictions are the lidar's fault. Not thread-safe.
+// on without it. So a wrong IMU no longer bends the lidar's turns that it is measured by, until
+// there has been enough turning for a verdict. Where a run before this one found that it was right,
+// it is vouched for: until then contradictions are the lidar's fault. Not thread-safe.
 class TrustMonitor {
  public:
   explicit TrustMonitor(double gravity_m_s2) : gravity_(gravity_m_s2) {}
 
-  // Turn of the IMU from scan to scan, as rotation vectors in its frame at the first scan: from
-  // matching and from the gyroscope without any estimate of its bias (an estimate that follows the
-  // lidar would hide what is looked for). `gyro_turning`: all that it turned, to and fro, radians.
+  // Turn of the IMU from scan to scan, as rotation vectors in its frame at the first scan. One is
+  // from matching, one from the gyroscope without any estimate of its bias: an estimate that
+  // follows the lidar would hide what is looked for. `gyro_turning`: all that it turned, to and
+  // fro, radians.
   void add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
                 double gyro_turning, double duration_s);
   // The same where matching knows the turn too badly to say anything.

@@ -27,7 +27,7 @@ class ImuBuffer {
   void add(const ImuSample& sample);
 
   // Samples over [from, to] with interpolated ones at both ends, for preintegration. Across holes
-  // of up to max_gap_s the samples are joined linearly, or held at the ends; empty if a longer hole
+  // of up to max_gap_s the samples are joined linearly, or held at the ends. Empty if a longer hole
   // (or the beginning or end of the data) lies in between.
   [[nodiscard]] std::vector<InertialSample> slice(TimeNs from, TimeNs to) const;
   // The same from `from` as far as the samples reach without a hole, at most to `to`; empty if they

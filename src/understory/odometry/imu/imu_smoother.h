@@ -17,7 +17,7 @@ class ImuSmoother : public MotionModel {
  public:
   ImuSmoother(const MotionConfig& config, const Pose& body_from_imu, Log* log);
 
-  // Goes on from a state that another model has come to, in its world; to be called before the
+  // Goes on from a state that another model has come to, in its world. To be called before the
   // first scan, after the samples around that state. The vertical is learnt anew, from the IMU.
   void take_over(const NavState& state);
 

@@ -51,8 +51,8 @@ struct [[nodiscard]] MotionUpdate {
   NavState state;
   double velocity_jump_m_s = 0.0;  // what the lidar factor would have changed, or changed
   // Set (seldom, in the first seconds) when the estimate of the vertical became good enough to
-  // level the world: the model has moved its own state by new_world_from_old_world (`state` is in
-  // the new world); the caller moves its map, keyframes and trajectory by the same.
+  // level the world. The model has then moved its own state by new_world_from_old_world (`state` is
+  // in the new world). The caller moves its map, keyframes and trajectory by the same.
   std::optional<Pose> new_world_from_old_world;
 };
 
@@ -79,11 +79,11 @@ struct ImuTrust {
 
 // The first graph of P4 F2: a state for every scan, prediction in between. One per run, not
 // thread-safe. World frame: up against gravity, the first body pose at the origin with heading zero
-// of the body's x axis; without an IMU the first body frame itself.
+// of the body's x axis. Without an IMU the first body frame itself.
 //
-// Order of calls for a scan: add_imu for all samples that are there (best up to the end of the
-// scan), predict_path over the scan to deskew it, predict at its stamp as the start of the match,
-// add_scan with the result.
+// Order of calls for a scan: first add_imu for all samples that are there, best up to the end of
+// the scan. Then predict_path over the scan to deskew it, predict at its stamp as the start of the
+// match, and add_scan with the result.
 class MotionModel {
  public:
   virtual ~MotionModel() = default;

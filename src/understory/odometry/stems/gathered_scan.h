@@ -23,7 +23,7 @@ struct GatheredMotion {
 
 // Several scans of a lidar whose lines sweep over its field of view (Livox), as one scan with level
 // rings: what stem_segments.h cuts. All points lie where they were at `stamp`, in the frame of the
-// lidar. They fall into cells of elevation and azimuth; a cell with two points or more gives one
+// lidar. They fall into cells of elevation and azimuth. A cell with two points or more gives one
 // return, the mean of those about its median range. Rings count from the lowest cell up.
 //
 // `scans` are in order of time, at least one. Points within `boxes` (may be null) are left out. The

@@ -12,7 +12,7 @@
 namespace understory {
 namespace {
 
-// Takes out what is left of tilt in a pose's rotation, keeping the heading of its x axis; of its y
+// Takes out what is left of tilt in a pose's rotation, keeping the heading of its x axis. Of its y
 // axis less a right angle, where x is upright.
 Pose upright(const Pose& pose) {
   Eigen::Vector3d x = pose.rotation() * Eigen::Vector3d::UnitX();
@@ -25,9 +25,9 @@ Pose upright(const Pose& pose) {
 
 // Turns a view that was matched towards the tilt that its stems show, by a share. In the plane its
 // feet stay on those that they were matched to, as well as they can: the body stands some metres
-// above them, and turned about its own place by a hundredth of a degree, always the same way, it
-// would lose half a millimetre at each view. Its height stays: the
-// tilt comes from the axes of the stems, not from heights.
+// above them. Turned about its own place by a hundredth of a degree, always the same way, it would
+// lose half a millimetre at each view. Its height stays: the tilt comes from the axes of the stems,
+// not from heights.
 Pose hold_tilt(const Pose& world_from_level, const Matrix6d& information, double share) {
   const Eigen::Vector3d seen = world_from_level.rotation() * Eigen::Vector3d::UnitZ();
   const Eigen::Quaterniond whole = rotation_between(seen, Eigen::Vector3d::UnitZ());

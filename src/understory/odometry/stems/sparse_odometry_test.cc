@@ -85,7 +85,7 @@ TEST(StemUp, AnyAxisOfTheBodyMayBeUp) {
   }
 }
 
-// A little tilt turns the heading of the level frame by as little, wherever up is; the smallest
+// A little tilt turns the heading of the level frame by as little, wherever up is. The smallest
 // turn from an axis that points down would turn it by up to half a turn.
 TEST(StemUp, HeadingOfTheLevelFrameIsSteady) {
   for (const Eigen::Vector3d& about :

@@ -125,7 +125,7 @@ StemFrontEnd::Guess StemFrontEnd::guess(const Scan& scan, int frame, const Rig& 
     guess.motion_per_s.head<3>() = guess.by_imu->rate_in_scan;
   }
   if (!scan.has_point_times) return guess;
-  // The step of a first try says how the body moved up to this scan; the scan itself lies half a
+  // The step of a first try says how the body moved up to this scan. The scan itself lies half a
   // step later than the middle of that. Where scans follow each other without a pause, what is
   // taken out wrongly would come back larger by such an outlook, so there is none.
   const bool pauses = to_seconds(scan.end() - scan.stamp) < kPause * since;

@@ -105,7 +105,7 @@ class StemFrontEnd {
   // along which most stems stand.
   [[nodiscard]] FoundStems find_stems(const Scan& scan, const Rig& rig, const ImuBuffer* samples);
   // Up in the lidar as it was last. At first both ends of gravity, where there is an IMU, of the z
-  // axis of the lidar and of that of the body; an earlier one is the likelier.
+  // axis of the lidar and of that of the body. An earlier one is the likelier.
   [[nodiscard]] std::vector<Eigen::Vector3d> possible_ups(const Scan& scan, const Rig& rig,
                                                           const ImuBuffer* samples) const;
   [[nodiscard]] StemView view_of(const Scan& scan, int frame, const FoundStems& found,

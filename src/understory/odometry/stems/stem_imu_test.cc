@@ -11,7 +11,7 @@ namespace understory {
 namespace {
 
 // An IMU with its z axis forward, on a body that stands pitched by 5 degrees and turns to and fro
-// about the vertical; its gyroscope has a bias.
+// about the vertical. Its gyroscope has a bias.
 struct Swing {
   Pose body_from_imu{so3_exp(Eigen::Vector3d(0.0, 0.5 * std::numbers::pi, 0.0)),
                      Eigen::Vector3d(0.3, 0.0, 1.0)};

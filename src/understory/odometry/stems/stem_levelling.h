@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/sensor/stem_view.h"
 
 namespace understory {
@@ -18,12 +18,12 @@ struct StemUp {
 // `about_up` is up in the body as it is known otherwise, within 90 degrees: it tells which end of
 // an axis is the upper one, and stays where fewer than three axes are known.
 [[nodiscard]] StemUp stem_up(const StemView& view, const Eigen::Vector3d& about_up);
-// Up of a view of which nothing else is known, unit: the mean of the axes if most of them point to
-// one side, as those of upright stems do; else the z axis of the body.
+// Up of a view of which nothing else is known, unit. It is the mean of the axes if most of them
+// point to one side, as those of upright stems do, else the z axis of the body.
 [[nodiscard]] Eigen::Vector3d up_of_axes(const StemView& view);
 
 // A turn that makes `up_in_body` the z axis: the smallest one. Where up is more than 120 degrees
-// off the z axis of the body, half a turn about the x axis comes first: the smallest turn alone
+// off the z axis of the body, half a turn about the x axis comes first. The smallest turn alone
 // would turn the heading by far for a little tilt.
 [[nodiscard]] Eigen::Quaterniond level_from_body(const StemUp& up);
 

@@ -18,7 +18,7 @@ void describe(ConfigTable& table, StemPaceConfig& config);
 // The rate of positioning, by what the scans at hand allow (P0, contribution iii): while a body
 // stands or moves evenly, ever more scans wait (1, 3, 7 ...) until one is positioned, and those
 // between get their poses by powers of the motion. If that one does not lie where even motion would
-// have led it, within the error of its own match, nothing is made of it: those that waited are
+// have led it, within the error of its own match, nothing is made of it. Those that waited are then
 // positioned one after another, as if there had been no pause. Holds the scans of one gap, no more.
 //
 // Scans of a lidar whose lines sweep over its field of view (Livox) show no stem each. Half a

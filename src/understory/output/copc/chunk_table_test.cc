@@ -5,7 +5,7 @@
 #include <cstring>
 #include <sstream>
 
-#include "understory/output/las_stream.h"
+#include "understory/output/clouds/las_stream.h"
 
 namespace understory {
 namespace {

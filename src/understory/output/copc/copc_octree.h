@@ -56,7 +56,7 @@ struct CopcShape {
 // Hands nodes on, in the order in which they shall lie in the file.
 using CopcNodes = std::function<void(std::vector<CopcNode>&&)>;
 
-// Puts each point into one node of the octree over `cube`, in which all lie: into the first one
+// Puts each point into one node of the octree over `cube`, in which all lie. It is the first one
 // from the root down where no other point lies in its cell, the 128th part of the node's side.
 // Every point lies in the cube of its node, and every node on the way to another holds points.
 // Cubes with more points than go into memory are divided on the disk, beside `file`. Deterministic:

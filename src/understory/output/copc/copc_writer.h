@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "understory/output/clouds/las_stream.h"
 #include "understory/output/copc/copc_octree.h"
-#include "understory/output/las_stream.h"
 #include "understory/util/progress.h"
 
 namespace understory {
@@ -20,7 +20,7 @@ namespace understory {
 // Cloud Optimized Point Cloud 1.0 (https://copc.io): LAZ 1.4 of point format 6 whose chunks are the
 // nodes of an octree, so that a viewer reads only what it shows. Points wait in memory or on the
 // disk (32 bytes each) until `commit` builds the octree, in some 300 MB of memory whatever their
-// number; nodes are compressed in parallel. The file appears with `commit`; it has the same bytes
+// number. Nodes are compressed in parallel. The file appears with `commit`; it has the same bytes
 // for any number of threads. Failures are OutputErrors. Not thread-safe.
 class CopcWriter {
  public:

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/output/las_writer.h"
+#include "understory/output/clouds/las_writer.h"
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
 #include "understory/util/files/folder_test_support.h"

@@ -9,12 +9,12 @@
 #include <span>
 #include <vector>
 
-#include "understory/output/las_stream.h"
+#include "understory/output/clouds/las_stream.h"
 
 namespace understory {
 
-// Points of a cloud by the cells of a grid. As many as may wait in memory are sorted together;
-// where there are more they go to a file of the system's that has no name, so that nothing of it
+// Points of a cloud by the cells of a grid. As many as may wait in memory are sorted together.
+// Where there are more they go to a file of the system's that has no name, so that nothing of it
 // stays behind a killed process. Within a cell points keep the order in which they came. Not
 // thread-safe.
 class PointCells {

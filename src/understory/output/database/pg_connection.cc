@@ -139,8 +139,8 @@ void PgConnection::commit() {
   if (PQresultStatus(result.get()) == PGRES_COMMAND_OK) return;
   if (PQstatus(impl_->connection.get()) == CONNECTION_OK) fail("at COMMIT");
   throw OutputError(name_,
-                    "the connection was lost while the transaction ended: it holds the run wholly "
-                    "or not at all; run the same command again, which replaces its rows");
+                    "the connection was lost while the transaction ended. The database holds the "
+                    "whole run or nothing of it. Run the same command again: it replaces its rows");
 }
 
 std::string copy_field(const std::string& text) {

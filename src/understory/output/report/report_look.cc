@@ -35,7 +35,9 @@ const Tree* tree_of(const InventoryResult& inventory, int id) {
 std::string place_text(const MapView& view, const Eigen::Vector3d& place) {
   const Eigen::Vector2d at = view.drawn(place);
   const bool degrees = view.drawing != nullptr && view.per_metre() > 100.0 * view.scale;
-  return fmt::format("x {:.{}f}, y {:.{}f}", at.x(), degrees ? 6 : 1, at.y(), degrees ? 6 : 1);
+  if (degrees) return fmt::format("x {:.6f}, y {:.6f}", at.x(), at.y());
+  return view.drawing == nullptr ? fmt::format("x {:.1f}, y {:.1f}", at.x(), at.y())
+                                 : fmt::format("E {:.1f}, N {:.1f}", at.x(), at.y());
 }
 
 }  // namespace

@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/output/output_constants.h"
 #include "understory/output/report/report_parts.h"
 #include "understory/output/report/svg_plot.h"
 
 namespace understory {
+
+using namespace output_constants::matching;
+
 namespace {
 
 constexpr std::size_t kPlotPoints = 1'600;
@@ -90,14 +94,15 @@ std::string loop_counts(const ReportInput& input) {
 std::string match_shares(const ReportInput& input) {
   std::size_t weak = 0;
   std::size_t lost = 0;
-  for (const ReportScan& scan : input.scans) {
-    if (std::isnan(scan.inlier_ratio)) {
+  for (std::size_t i = 1; i < input.scans.size(); ++i) {
+    if (std::isnan(input.scans[i].inlier_ratio)) {
       ++lost;
-    } else if (scan.weak) {
+    } else if (input.scans[i].weak) {
       ++weak;
     }
   }
-  const double all = static_cast<double>(input.scans.size());
+  // The first scan is where the map begins: it has nothing to match.
+  const double all = static_cast<double>(std::max<std::size_t>(2, input.scans.size()) - 1);
   return fmt::format(
       "<p>The program lays each scan on the map of the scans before it. {:.1f} % of the scans "
       "matched well, {:.1f} % weakly (orange on the map), {:.1f} % not at all (red: the position "
@@ -114,9 +119,9 @@ std::string distance_meaning(const ReportInput& input) {
   const double cell_cm = 100.0 * input.map_cell_m;
   return fmt::format(
              "<p>The map keeps one mean place for each cube of {:.0f} cm. The distance is that of "
-             "a point to the mean of its cube, so it is not the error of the map: {:.0f} to {:.0f} "
-             "cm are usual, and {:.0f} cm come about by chance.",
-             cell_cm, 0.32 * cell_cm, 0.46 * cell_cm, 0.5 * cell_cm) +
+             "a point to the mean of its cube, so it is not the error of the map. Usual are {:.0f} "
+             "to {:.0f} cm, and {:.0f} cm come about by chance.",
+             cell_cm, kLeastUsual * cell_cm, kMostUsual * cell_cm, kByChance * cell_cm) +
          line;
 }
 
@@ -161,7 +166,7 @@ std::string loops_section(const ReportInput& input) {
   if (input.scans.empty() || input.moved) return "";
   std::string html =
       "<section><h2>Places seen again</h2><p>Where the path returns to a place, the program "
-      "recognises it and takes out the error that has grown since: it closes a loop.</p>";
+      "recognises it. It then takes out the error that has grown since: it closes a loop.</p>";
   if (!input.loop_closure_enabled) return html + "<p>This was switched off.</p></section>\n";
   html += loop_counts(input);
   if (input.loops.empty()) {

@@ -282,8 +282,8 @@ std::string about_trees(const InventoryResult& inventory) {
         "still. Where foliage hid the top, the tree is higher.</p>";
   if (inventory.trees.size() > inventory.stems.size())
     html +=
-        "<p>Trees without a diameter were found by their crowns: x and y are those of the top, and "
-        "the area is that of the crown seen from above. Trees below other crowns are not "
+        "<p>Trees without a diameter were found by their crowns. Their x and y are those of the "
+        "top. The area is that of the crown seen from above. Trees below other crowns are not "
         "listed.</p>";
   return html;
 }

@@ -99,9 +99,9 @@ void add_carried_height(const CorrectionRun& run, RunDocuments& documents) {
   if (!feet_leave_the_ground(*carried)) return;
   documents.remark(
       "stems.heights",
-      fmt::format("the body is {:.1f} to {:.1f} m above the feet of the stems near it: "
-                  "their points do not lie on the ground, so heights of the path and "
-                  "of trees are not to be trusted",
+      fmt::format("the body is {:.1f} to {:.1f} m above the feet of the stems near it. Their "
+                  "points do not lie on the ground, so heights of the path and of trees are not "
+                  "to be trusted",
                   carried->low_m, carried->high_m));
 }
 

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "understory/evaluation/tree_falls.h"
+#include "understory/evaluation/trees/tree_falls.h"
 #include "understory/util/error.h"
 #include "understory/util/files/folder_test_support.h"
 

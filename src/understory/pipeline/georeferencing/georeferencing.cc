@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "understory/evaluation/tree_falls.h"
+#include "understory/evaluation/trees/tree_falls.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/georeferencing/methods/placement_figures.h"
 #include "understory/pipeline/georeferencing/methods/placement_methods.h"

@@ -51,7 +51,7 @@ struct FoundPlacement {
                                             GeoreferenceMethod method, Log& log);
 // Lays a run on the globe. Writes gnss.csv, with the fixes in the run's world frame and what became
 // of each. Where there are no fixes, or the fit is not to be trusted, the layers stay in the world
-// frame, with the reason; where there are fixes a warning says so. The run's status does not depend
+// frame, with the reason. Where there are fixes a warning says so. The run's status does not depend
 // on it. Throws OutputError.
 [[nodiscard]] PlacedMap place_map(const MappedPath& run, const FoundPlacement& found,
                                   const GeoreferenceConfig& config, Log& log);

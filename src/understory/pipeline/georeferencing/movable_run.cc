@@ -3,7 +3,7 @@
 #include <cmath>
 #include <system_error>
 
-#include "understory/evaluation/tree_errors.h"
+#include "understory/evaluation/trees/tree_errors.h"
 #include "understory/output/layer_files.h"
 #include "understory/output/moved_vectors.h"
 #include "understory/output/run_tables.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/evaluation/tree_falls.h"
+#include "understory/evaluation/trees/tree_falls.h"
 #include "understory/evaluation/world_frame.h"
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/georeference/systems/layer_frame.h"

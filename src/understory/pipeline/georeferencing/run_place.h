@@ -33,10 +33,10 @@ struct ResultFrames {
 };
 
 // The frames of a run whose world frame lies at a place, in the coordinate system that the user
-// wants or that is usual there; fills in what `place` says of it. Where `place.heights`
-// says already what heights are above, they stay so, and no geoid is asked for. Warns where the
-// system is not made for the place, and where PROJ lacks the geoid that was asked for. Throws
-// ConfigError where the system does not reach the place.
+// wants or that is usual there. Fills in what `place` says of it. Where `place.heights` says
+// already what heights are above, they stay so, and no geoid is asked for. Warns where the system
+// is not made for the place, and where PROJ lacks the geoid that was asked for. Throws ConfigError
+// where the system does not reach the place.
 [[nodiscard]] ResultFrames frames_at(RunPlace& place, const GeoreferenceConfig& config, Log& log);
 
 // What run.json of a folder says of its place: nothing where it says that it has none, or nothing.

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
-#include "understory/forest/slice_inventory.h"
+#include "understory/forest/slice/slice_inventory.h"
 #include "understory/georeference/systems/coordinate_system.h"
+#include "understory/output/clouds/las_stream.h"
 #include "understory/output/inventory_files.h"
-#include "understory/output/las_stream.h"
 #include "understory/output/layer_files.h"
 #include "understory/output/plot_files.h"
 #include "understory/output/qgis_project.h"

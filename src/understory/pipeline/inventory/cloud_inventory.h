@@ -18,7 +18,7 @@ struct InventoryRequest {
   std::filesystem::path run_folder;
   bool overwrite = false;  // what an earlier run left in the folder
   CloudFrame frame;
-  // Where the scanner was, frame of the cloud: `timestamp_s x y z qx qy qz qw` a line; empty: that
+  // Where the scanner was, frame of the cloud: `timestamp_s x y z qx qy qz qw` a line. Empty: that
   // of the run, if there is one.
   std::filesystem::path trajectory;
   bool slice = false;  // the cloud is one thin cut near breast height: only diameters and places

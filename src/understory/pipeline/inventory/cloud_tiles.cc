@@ -92,15 +92,16 @@ void CloudTiles::finish(int threads) {
     counts.emplace(index, cell.points);
   const TileLayout layout(std::move(counts), cell_m_);
   const double bytes = 1e6 * config_.max_memory_mb - kBaseBytes;
-  for (at_once_ = std::max(1, threads); at_once_ > 1; --at_once_) {
-    tile_cells_ = layout.largest_tile(bytes / kBytesPerPoint / at_once_);
+  for (tiles_in_parallel_ = std::max(1, threads); tiles_in_parallel_ > 1; --tiles_in_parallel_) {
+    tile_cells_ = layout.largest_tile(bytes / kBytesPerPoint / tiles_in_parallel_);
     if (tile_cells_ * cell_m_ >= kSmallestSideBySide) break;
   }
-  if (at_once_ == 1) tile_cells_ = layout.largest_tile(bytes / kBytesPerPoint);
+  if (tiles_in_parallel_ == 1) tile_cells_ = layout.largest_tile(bytes / kBytesPerPoint);
   if (config_.size_m > 0.0) {
     tile_cells_ = std::max(1, static_cast<int>(std::lround(config_.size_m / cell_m_)));
     const double needed = static_cast<double>(layout.most_points(tile_cells_)) * kBytesPerPoint;
-    at_once_ = std::clamp(static_cast<int>(bytes / std::max(1.0, needed)), 1, std::max(1, threads));
+    tiles_in_parallel_ =
+        std::clamp(static_cast<int>(bytes / std::max(1.0, needed)), 1, std::max(1, threads));
   } else if (tile_cells_ == 0) {
     throw ConfigError({fmt::format(
         "tiles.max_memory_mb: expected {:.0f} at least for this cloud: so much takes a tile of "

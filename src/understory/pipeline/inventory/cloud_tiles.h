@@ -46,7 +46,7 @@ class CloudTiles : public TiledCloud {
   void finish(int threads);
 
   [[nodiscard]] const std::vector<GroundArea>& tiles() const override { return tiles_; }
-  [[nodiscard]] bool side_by_side() const override { return at_once_ > 1; }
+  [[nodiscard]] bool side_by_side() const override { return tiles_in_parallel_ > 1; }
   void all(const PointVisitor& visit) const override;
   void in(const GroundArea& area, const PointVisitor& visit) const override;
   [[nodiscard]] std::optional<double> level() const override { return level_; }
@@ -93,7 +93,7 @@ class CloudTiles : public TiledCloud {
   float lowest_ = 0.0F;
   float highest_ = 0.0F;
   int tile_cells_ = 1;
-  int at_once_ = 1;
+  int tiles_in_parallel_ = 1;
   std::vector<GroundArea> tiles_;
 };
 

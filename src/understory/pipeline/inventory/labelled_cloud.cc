@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "understory/output/las_writer.h"
+#include "understory/output/clouds/las_writer.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/parallel.h"
 

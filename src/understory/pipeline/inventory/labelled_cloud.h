@@ -5,7 +5,7 @@
 
 #include "understory/forest/inventory.h"
 #include "understory/georeference/systems/layer_frame.h"
-#include "understory/output/las_stream.h"
+#include "understory/output/clouds/las_stream.h"
 #include "understory/pipeline/inventory/stand_cloud.h"
 #include "understory/util/progress.h"
 

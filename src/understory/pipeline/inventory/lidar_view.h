@@ -8,7 +8,7 @@
 
 #include "understory/forest/inventory.h"
 #include "understory/geometry/pose.h"
-#include "understory/map/keyframe_clouds.h"
+#include "understory/map/keyframes/keyframe_clouds.h"
 #include "understory/output/run_summary.h"
 #include "understory/sensor/rig.h"
 
@@ -35,7 +35,7 @@ struct LidarView {
 [[nodiscard]] LidarView learn_view(const KeyframeClouds& clouds, const Pose& body_from_lidar);
 
 // Where the lidar was, of the poses, when a place within 60 m was in its view (world frame, about
-// one place a metre); occlusion is not looked at.
+// one place a metre). Occlusion is not looked at.
 [[nodiscard]] Lookouts seen_from(const LidarView& view, const std::vector<Pose>& world_from_body);
 
 // For run.json, and back with the keyframes of the run folder. Empty where the folder does not

@@ -31,8 +31,8 @@ void describe_stand(const StandResult& stand, RunDocuments& documents) {
   if (seen.heights_lower_bounds > 0)
     documents.remark(
         "plots",
-        fmt::format("Heights and volumes of the stand are lower bounds: the tops of {} of {} trees "
-                    "were not seen, and too few others show theirs for a height curve.",
+        fmt::format("Heights and volumes of the stand are lower bounds. The tops of {} of {} trees "
+                    "were not seen, and too few others were for a height curve.",
                     seen.heights_lower_bounds, seen.trees));
   documents.count("plots", stand.table.plots.size());
   for (const std::string& remark : stand.remarks)

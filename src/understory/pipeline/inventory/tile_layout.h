@@ -22,7 +22,7 @@ class TileLayout {
   [[nodiscard]] std::uint64_t most_points(int tile_cells) const;
   // Cells a side of the largest tile with so many points at most; 0: none.
   [[nodiscard]] int largest_tile(double points) const;
-  // The tiles of so many cells a side that hold points, in order of y then x; a single endless one
+  // The tiles of so many cells a side that hold points, in order of y then x. A single endless one
   // where one tile holds all.
   [[nodiscard]] std::vector<GroundArea> tiles(int tile_cells) const;
 

@@ -21,8 +21,9 @@ struct ReadingFacts {
 };
 void gather_reading(const ReadingFacts& facts, RunEvidence& evidence);
 
-// What the front end found out about the IMU: whether the accelerations by matching are those of
-// the accelerometer, how long it could not be gone by, and whether it was left out at the end.
+// What the front end found out about the IMU. It says whether the accelerations by matching are
+// those of the accelerometer, how long it could not be gone by, and whether it was left out at the
+// end.
 void gather_imu_trust(const ImuTrust& trust, RunEvidence& evidence);
 
 }  // namespace understory

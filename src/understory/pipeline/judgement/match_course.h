@@ -8,9 +8,9 @@
 
 namespace understory {
 
-// Follows how well scans fit the map, in windows of two seconds: where they find few of their
-// points in it, and where the points that they find lie no nearer than chance would put them. The
-// first ten seconds do not count: the map is a few scans then. Memory: 40 bytes a window. Not
+// Follows how well scans fit the map, in windows of two seconds. It notes where scans find few of
+// their points in it, and where the points that they find lie no nearer than chance would put them.
+// The first ten seconds do not count: the map is a few scans then. Memory: 40 bytes a window. Not
 // thread-safe.
 class MatchCourse {
  public:

@@ -63,10 +63,10 @@ struct MatchEvidence {
   double inliers_mean = 0.0;    // share of a scan's points near the map, 0 to 1
   double inliers_low = 0.0;     // the same of the tenth of the scans that have least
   double fitness_rms_m = 0.0;   // distance of matched points from what they matched
-  // Of the windows of two seconds after the beginning, see MatchCourse: the share in which scans
-  // find few of their points in the map; in which found points lie where chance puts them; and the
-  // distance of matched points in the last third of the run over that in the first, 1 where it is
-  // not known.
+  // Of the windows of two seconds after the first ones, see MatchCourse. First the share in which
+  // scans find few of their points in the map, then that in which found points lie where chance
+  // puts them. Last the distance of matched points in the last third of the run over that in the
+  // first, 1 where it is not known.
   double few_share = 0.0;
   double chance_share = 0.0;
   double blur_growth = 1.0;

@@ -170,8 +170,7 @@ class Judge {
     if (share(evidence_.mixed_times, match.scans) > kMostMixedTimes) {
       std::string mixed = fmt::format(
           "in {} of {} scans the times of points are in no order: a driver or a converter has "
-          "mixed "
-          "them up, and the motion within a scan (points 10 m away move by {:.2f} m) cannot be "
+          "mixed them up. The motion within a scan (points 10 m away move by {:.2f} m) cannot be "
           "taken out",
           evidence_.mixed_times, match.scans, match.smear_m);
       match.smear_m > config_.max_smear_m ? hurt(std::move(mixed)) : missing(std::move(mixed));
@@ -345,8 +344,8 @@ class Judge {
     }
     if (match.blur_growth > config_.max_blur_growth) {
       hurt(fmt::format(
-          "the map blurs as it grows: matched points lie {:.2f} times as far from it in the last "
-          "third of the run as in the first",
+          "the map blurs as it grows: in the last third of the run matched points lie {:.2f} times "
+          "as far from it",
           match.blur_growth));
     }
   }
@@ -416,7 +415,7 @@ class Judge {
     const StandEvidence& stand = evidence_.stand;
     if (!stand.not_upright.empty()) {
       hurt("the map does not stand upright: " + stand.not_upright +
-           ". Without an IMU its vertical is that of the scanner at the first scan: record the "
+           ". Without an IMU its vertical is that of the scanner at the first scan. Record the "
            "IMU, or bring the map upright with `understory inventory --up`");
       return;  // that there are no stems follows from it
     }

@@ -42,8 +42,8 @@ StandNotes notes_on(const InventoryResult& inventory) {
   notes.doubts = doubts_text(doubts);
   if (const std::vector<LookAgain>& places = inventory.look_again; !places.empty())
     notes.look_again = fmt::format(
-        "walk here: {} {} would show {} of the {} doubtful stems from a side that was not seen, or "
-        "from near (numbers on the map of report.html, layer look_again of trees.gpkg)",
+        "walk here: {} {} would show {} of the {} doubtful stems from an unseen side, or from "
+        "near. See the numbers on the map of report.html, and layer look_again of trees.gpkg",
         places.size(), places.size() == 1 ? "place" : "places", trees_at(places),
         doubts.weak_diameters);
   if (inventory.thin.share > kThinShare)

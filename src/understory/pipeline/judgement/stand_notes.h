@@ -9,7 +9,7 @@
 namespace understory {
 
 // What a list of trees leaves in doubt, in words for someone still in the forest: doubtful
-// diameters and missing heights; places from where to look again; where coverage is thin. They do
+// diameters and missing heights. Places from where to look again. Where coverage is thin. They do
 // not lower the verdict. Empty where nothing is in doubt.
 struct StandNotes {
   std::string doubts;

@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "understory/map/keyframe_clouds.h"
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_clouds.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/util/progress.h"
 

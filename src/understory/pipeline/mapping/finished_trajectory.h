@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/pipeline/run_folder/journal.h"
 
 namespace understory {
@@ -18,10 +18,11 @@ struct FinishedScan {
 };
 
 // Hands out the scans of the journal in order, with the poses that the finished keyframes give
-// them: between two keyframes a scan keeps its odometry from the first one, and what the second
-// graph moved the second keyframe against that odometry is spread over the scans between by powers
-// of the correction, in proportion to time (P0 (19)). Nothing is spread over the way to a keyframe
-// that begins a piece of map: its scan is where it is, those before belong to the piece before.
+// them. Between two keyframes a scan keeps its odometry from the first one. What the second graph
+// moved the second keyframe against that odometry is spread over the scans between. It goes by
+// powers of the correction, in proportion to time (P0 (19)). Nothing is spread over the way to a
+// keyframe that begins a piece of map: its scan is where it is, those before belong to the piece
+// before.
 void for_each_finished_scan(const Journal& journal, const std::vector<Keyframe>& keyframes,
                             const std::function<void(const FinishedScan&)>& visit);
 

@@ -26,8 +26,8 @@ struct MappingRun {
 
 // From a raw recording to the run folder: the main job, and the function to read first. Throws
 // InputError or OutputError where nothing usable can be made, and Stopped where the user stops it
-// once the recording is read; what a killed run leaves behind is
-// finished by way of `reopen_mapping`.
+// once the recording is read. What a killed run leaves behind is finished by way of
+// `reopen_mapping`.
 [[nodiscard]] RunOutcome run_mapping(MappingRun run, Log& log, const ProgressSink& progress,
                                      const StopRequested& stop_requested);
 

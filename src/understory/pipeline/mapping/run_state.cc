@@ -96,7 +96,7 @@ std::string joined(const std::vector<std::string>& problems) {
 [[noreturn]] void nothing_whole(const std::filesystem::path& run_folder,
                                 const std::vector<std::string>& problems) {
   throw InputError(run_folder.string(), "",
-                   "no checkpoint of this run can be gone on from (" + joined(problems) +
+                   "no checkpoint of this run is whole (" + joined(problems) +
                        "); nothing was changed: map the recording anew with --overwrite");
 }
 

@@ -17,12 +17,12 @@ namespace understory {
 
 struct UnfinishedRun;
 
-// The state of a run in progress, by either front end: the files of the session and the two newest
-// checkpoints in the work folder of the run folder, which is claimed for as long. Gone when the run
-// is finished.
+// The state of a run in progress, by either front end. It is the files of the session and the two
+// newest checkpoints in the work folder of the run folder, which is claimed for as long. Gone when
+// the run is finished.
 //
-// A power cut at any moment costs what came after the last checkpoint: what a checkpoint counts on
-// is on the disk before it, it is there before the one before the last is gone, and each record of
+// A power cut at any moment costs what came after the last checkpoint. What a checkpoint counts on
+// is on the disk before it, and it is there before the one before the last is gone. Each record of
 // each file has a checksum. docs/method/decisions/003-durability.md
 class RunState {
  public:
@@ -34,7 +34,7 @@ class RunState {
   // InputError if there is none, with the state as it was; OutputError as RunFolder::reclaim.
   [[nodiscard]] static UnfinishedRun reopen(const std::filesystem::path& run_folder);
 
-  // Of a run that begins: notes what the inputs are; of one that is resumed: throws InputError if
+  // Of a run that begins: notes what the inputs are. Of one that is resumed: throws InputError if
   // they are not those that it was begun with.
   void check_inputs(const MappingRequest& request);
 

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "understory/evaluation/tree_errors.h"
-#include "understory/evaluation/tree_falls.h"
-#include "understory/evaluation/tree_list_check.h"
+#include "understory/evaluation/trees/tree_errors.h"
+#include "understory/evaluation/trees/tree_falls.h"
+#include "understory/evaluation/trees/tree_list_check.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/run_folder/run_documents.h"

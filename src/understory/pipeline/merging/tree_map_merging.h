@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "understory/evaluation/tree_match_chance.h"
-#include "understory/evaluation/tree_merge.h"
+#include "understory/evaluation/trees/tree_match_chance.h"
+#include "understory/evaluation/trees/tree_merge.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"

@@ -92,7 +92,7 @@ void expect_same(const std::vector<InputIdentity>& begun_with,
     throw InputError(now[i].path, "",
                      "is not " + now[i].what + " that the run was begun with (" +
                          begun_with[i].mark + " then, " + now[i].mark +
-                         " now): put that back, or map this one into another folder");
+                         " now): put the first one back, or map this one into another folder");
   }
   UNDERSTORY_CHECK(begun_with.size() == now.size());
 }

@@ -11,7 +11,7 @@ namespace understory {
 
 // The moving part of a run whose whole state can be written and read back
 // (pipeline/mapping/run_state.h). What grows with the run is in append-only files of its own in the
-// work folder; the state tells how far of them it counts on.
+// work folder. The state tells how far of them it counts on.
 class Resumable {
  public:
   Resumable() = default;

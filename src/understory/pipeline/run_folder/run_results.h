@@ -19,7 +19,7 @@ struct FormerResults {
 [[nodiscard]] FormerResults former_results(const std::filesystem::path& folder);
 
 // The first name of a result in the folder that is not one of `own`, or leads to anything but a
-// regular file; empty if there is none.
+// regular file. Empty if there is none.
 [[nodiscard]] std::string foreign_result(const std::filesystem::path& folder,
                                          const std::set<std::string>& own);
 

@@ -341,7 +341,7 @@ std::unique_ptr<MessageSource> read_db3(std::unique_ptr<ByteSource> bytes, Log& 
 std::unique_ptr<MessageSource> read_db3(const std::string& path, Log& log) {
   if (open_file(path)->size() == 0) throw InputError(path, "", "the file is empty");
   // A bag that was being written may have its newest part in a journal, which can be read only
-  // where the folder is writable; "immutable" reads the file alone.
+  // where the folder is writable. "immutable" reads the file alone.
   for (const char* mode : {"", "&immutable=1"}) {
     sqlite3* raw = nullptr;
     const int state = sqlite3_open_v2((uri_of(path) + mode).c_str(), &raw,

@@ -54,7 +54,7 @@ class Registry {
   Channels channels_;
 };
 
-// Finds one block after the other, in the order of the file; where that is not the order of time
+// Finds one block after the other, in the order of the file. Where that is not the order of time
 // and the file has an intact index, in the order of that. After damage it looks for the next record
 // that makes sense.
 class Walker {

@@ -25,8 +25,8 @@ namespace understory {
 // The files that a bag's metadata.yaml names. Throws ConfigError if it cannot be understood.
 [[nodiscard]] std::vector<std::string> bag_file_names(const std::string& metadata,
                                                       const std::string& origin);
-// The files of a bag that its metadata.yaml names, that are there and that lie outside its folder;
-// none of what is no folder of a bag. Paths are absolute where the folder's is, or the name.
+// The files of a bag that its metadata.yaml names, that are there and that lie outside its folder.
+// None of what is no folder of a bag. Paths are absolute where the folder's is, or the name.
 [[nodiscard]] std::vector<std::string> bag_parts_outside(const std::string& path);
 // The files of the bag's folder one after the other, .db3 or .mcap, also with .zstd behind it
 // (those are unpacked while they are read); or one such file. A part that is damaged is read as far

@@ -19,10 +19,10 @@ enum class OusterProfile {
   kRng15Dual,
 };
 
-// What an Ouster sensor says of itself, in any layout of its metadata JSON: the flat legacy one
-// (firmware 1.x and 2.0 with defaults where a key is missing), and the nested one of firmware 2.4 /
-// 3.x (sensor_info, beam_intrinsics, lidar_intrinsics, imu_intrinsics, lidar_data_format,
-// config_params). Lengths in metres here.
+// What an Ouster sensor says of itself, in any layout of its metadata JSON. One is the flat legacy
+// one (firmware 1.x and 2.0 with defaults where a key is missing). The other is the nested one of
+// firmware 2.4 / 3.x (sensor_info, beam_intrinsics, lidar_intrinsics, imu_intrinsics,
+// lidar_data_format, config_params). Lengths in metres here.
 struct OusterMetadata {
   std::string product;  // "OS-1-128"
   std::string serial;

@@ -269,11 +269,12 @@ std::unique_ptr<PcapRecording> open(std::unique_ptr<ByteSource> source, const Op
                          "record its PointCloud2");
   if (beside.trouble) throw InputError(*beside.trouble);
   if (!beside.metadata) {
-    throw InputError(name, "",
-                     "expected packets of a Velodyne, Hesai or Livox, or Ouster packets with their "
-                     "metadata (--metadata FILE, or a .json beside it whose name its name begins "
-                     "with); found " +
-                         survey.list());
+    throw InputError(
+        name, "",
+        "expected packets of a Velodyne, Hesai or Livox, or of an Ouster with its "
+        "metadata (--metadata FILE, or a .json beside it whose name begins that of the "
+        "capture); found " +
+            survey.list());
   }
   const auto lidar = choose(survey, options, name, log,
                             [](const PcapSurvey::Stream& stream) { return stream.ouster; });

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "understory/recording/captures/hesai.h"
+#include "understory/recording/captures/hesai/hesai.h"
 #include "understory/recording/captures/livox_packets.h"
 #include "understory/recording/messages/livox_sensor.h"
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "understory/recording/captures/hesai_tables.h"
+#include "understory/recording/captures/hesai/hesai_tables.h"
 #include "understory/recording/captures/livox_packets.h"
 #include "understory/recording/captures/velodyne.h"
 #include "understory/util/files/read_error.h"

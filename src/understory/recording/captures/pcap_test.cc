@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "understory/recording/bags/byte_source.h"
-#include "understory/recording/captures/hesai_test_support.h"
+#include "understory/recording/captures/hesai/hesai_test_support.h"
 #include "understory/recording/captures/packet_test_support.h"
 #include "understory/recording/captures/pcap_recording.h"
 #include "understory/recording/captures/pcap_survey.h"
@@ -313,7 +313,7 @@ Bytes from_device(std::uint8_t device, const Bytes& udp) {
 }
 
 // Two turns of each of two lidars with the address that they had from the works, one behind the
-// other's packets; the second one has a return in every other firing.
+// other's packets. The second one has a return in every other firing.
 Bytes two_of_one_address() {
   Bytes file = test::pcap_header();
   for (int i = 0; i < kPackets; ++i) {

@@ -9,12 +9,12 @@
 
 namespace understory {
 
-// The positions of an RTKLIB solution file (.pos, from rnx2rtkp, rtkpost or rtknavi): degrees, or
-// degrees with minutes and seconds, or earth-centred metres; dates or GPS weeks; GPS time, UTC or
-// JST; fields apart by blanks, commas, semicolons or tabs. Stamps are UTC, heights ellipsoidal
-// (heights of the geoid are told by a warning), covariances those of the columns sdn ... sdun.
-// Damaged lines are left out with a warning ("recording.damaged_line"). Throws InputError for a
-// file of baselines or velocities alone.
+// The positions of an RTKLIB solution file (.pos, from rnx2rtkp, rtkpost or rtknavi). They are
+// degrees, degrees with minutes and seconds, or earth-centred metres. Times are dates or GPS weeks,
+// in GPS time, UTC or JST. Blanks, commas, semicolons or tabs lie between fields. Stamps are UTC,
+// heights ellipsoidal (heights of the geoid are told by a warning), covariances those of the
+// columns sdn ... sdun. Damaged lines are left out with a warning ("recording.damaged_line").
+// Throws InputError for a file of baselines or velocities alone.
 [[nodiscard]] std::vector<GnssFix> read_rtklib_solution(std::istream& stream,
                                                         const std::string& source, Log& log);
 // The same from a plain file. Throws ReadError where the system cannot read it.

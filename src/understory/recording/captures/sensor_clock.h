@@ -14,7 +14,7 @@ namespace understory {
 // seconds, give the offset. Not thread-safe.
 class SensorClock {
  public:
-  // Absolute time of a packet; nothing if its time jumps by more than half a second against the
+  // Absolute time of a packet. Nothing if its time jumps by more than half a second against the
   // stamps, unless the packet before it jumped in the same way.
   [[nodiscard]] std::optional<TimeNs> time(TimeNs sensor, TimeNs stamp);
   // Whether the sensor's time is used as it is; also before the first packet.

@@ -158,7 +158,7 @@ VelodyneDecoder::Blocks VelodyneDecoder::read_blocks(const std::uint8_t* data) {
   return blocks;
 }
 
-// The rate of turn behind each block is the difference to the next block; blocks whose azimuth goes
+// The rate of turn behind each block is the difference to the next block. Blocks whose azimuth goes
 // neither with the block before nor with the one behind, by the packet's median rate, are damaged.
 void VelodyneDecoder::set_rates(Blocks& blocks) {
   const std::size_t step = dual_ ? 2 : 1;

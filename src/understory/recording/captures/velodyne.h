@@ -57,7 +57,7 @@ class VelodyneDecoder {
   // A position packet: the clock is set by it, and the fix in its NMEA sentence is given if it is a
   // new and valid one.
   std::optional<GnssFix> add_position_packet(const std::uint8_t* data, std::size_t size);
-  // Joins a position packet's time of day with the data packets' clock; false if the packet has no
+  // Joins a position packet's time of day with the data packets' clock. False if the packet has no
   // valid fix or the sensor is not locked to it.
   bool set_clock(const std::uint8_t* data, std::size_t size);
 

@@ -19,7 +19,7 @@ class VelodyneClock {
     kFree,      // the counter is unrelated to UTC: offset from the stamps, smoothed
   };
 
-  // Absolute time of a counter value; nothing if the value is impossible or jumps against the
+  // Absolute time of a counter value. Nothing if the value is impossible or jumps against the
   // stamps, unless the packet before it jumped in the same way.
   [[nodiscard]] std::optional<TimeNs> time(std::uint32_t counter_us, TimeNs stamp);
   // A position packet: its own counter and the UTC time of its sentence. False (and nothing

@@ -8,7 +8,7 @@
 namespace understory {
 
 // A folder of clouds (.pcd, .ply, .las, .laz, KITTI .bin) in the order of their names, or one such
-// file as a recording of one scan; in a folder also imu.csv, gnss.csv or *.nmea, merged by time.
+// file as a recording of one scan. In a folder imu.csv, gnss.csv and *.nmea are merged by time.
 // Throws InputError if there is no cloud in it or the times are unusable.
 [[nodiscard]] bool is_cloud_folder(const std::string& path);
 [[nodiscard]] bool is_cloud_file(const std::string& path);

@@ -35,7 +35,7 @@ struct CloudTable {
 void store_number(double value, FieldType type, std::uint8_t* into);
 
 // Readers of one format each. They throw InputError if the header cannot be used or no point can be
-// had; where only a part of the points is there or readable, that part is given with a warning
+// had. Where only a part of the points is there or readable, that part is given with a warning
 // ("recording.damaged").
 [[nodiscard]] CloudTable read_pcd(ByteSource& file, Log& log);
 [[nodiscard]] CloudTable read_ply(ByteSource& file, Log& log);

@@ -172,7 +172,7 @@ void read_binary(ByteSource& file, const PcdHeader& header, CloudTable& table, L
   integers_to_doubles(header, table);
 }
 
-// Field by field for all points, then compressed; what can be expanded of damaged data lacks the
+// Field by field for all points, then compressed. What can be expanded of damaged data lacks the
 // last fields, so that only whole x, y and z columns are of use.
 void read_compressed(ByteSource& file, const PcdHeader& header, CloudTable& table, Log& log) {
   constexpr std::uint64_t kBestRatio = 133;  // 264 bytes from 2 or 3

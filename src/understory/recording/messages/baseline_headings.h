@@ -21,11 +21,11 @@ struct HeadingByPositions {
 // positions is that of the antennas.
 //
 // A pair whose distance is far off tells no heading. The standard deviation comes from both
-// covariances, across the line, or from the scatter of the distances about that of the antennas,
-// whichever is larger: receivers under trees promise too much, and errors across the line are as
-// large as those along it. Errors that both antennas share cancel, and the covariances do not tell
-// which they are: then a heading is better than it says. Where the distances scatter by too much,
-// those that are right are so by chance, and no pair tells a heading.
+// covariances, across the line, or from the scatter of the distances about that of the antennas, if
+// that is larger. Receivers under trees promise too much, and errors across the line are as large
+// as those along it. Errors that both antennas share cancel, and the covariances do not tell which
+// they are: then a heading is better than it says. Where the distances scatter by too much, those
+// that are right are so by chance, and no pair tells a heading.
 //
 // Deterministic; not thread-safe.
 class BaselineHeadings {
@@ -70,7 +70,7 @@ class SecondPositions {
   // The position at a time: the one of that moment, else between two that are close. Nothing as
   // long as there is none.
   [[nodiscard]] std::optional<GnssFix> at(TimeNs stamp) const;
-  // The nearest one, where it is so near that only the stamps may differ; it is less certain by the
+  // The nearest one, where it is so near that only the stamps may differ. It is less certain by the
   // way that the antenna goes in between.
   [[nodiscard]] std::optional<GnssFix> near(TimeNs stamp) const;
 

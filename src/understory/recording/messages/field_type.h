@@ -16,7 +16,7 @@ enum class FieldType : std::uint8_t {
   kFloat64 = 8
 };
 
-// Calls visit with a zero of the C++ type that the field has and returns what it gives; for a value
+// Calls visit with a zero of the C++ type that the field has and returns what it gives. For a value
 // that names no type (a message may hold any) the zero of that.
 template <typename Visit>
 auto visit_field_type(FieldType type, const Visit& visit) {

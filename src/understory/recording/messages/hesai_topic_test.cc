@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "understory/recording/bags/byte_source.h"
-#include "understory/recording/captures/hesai_test_support.h"
+#include "understory/recording/captures/hesai/hesai_test_support.h"
 #include "understory/recording/captures/pcap_recording.h"
 #include "understory/recording/messages/message_encode.h"
 #include "understory/recording/messages/message_recording.h"

@@ -78,7 +78,7 @@ class MessageSource {
   // What the file itself says of its sensors (kSensorMetadata of our own recordings).
   [[nodiscard]] virtual std::map<std::string, std::string> sensor_metadata() const { return {}; }
   // The first messages of each topic that `wanted` accepts, at most `most` of each, wherever in the
-  // file they stand: found by its index; none where it has no index. `next` goes on as if they had
+  // file they stand: found by its index. None where it has no index. `next` goes on as if they had
   // not been looked for.
   [[nodiscard]] virtual std::vector<StoredMessage> first_messages(const WantedChannel& /*wanted*/,
                                                                   std::size_t /*most*/) {

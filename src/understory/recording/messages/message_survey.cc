@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "understory/recording/captures/hesai_tables.h"
+#include "understory/recording/captures/hesai/hesai_tables.h"
 #include "understory/recording/captures/nmea.h"
 #include "understory/recording/messages/message_decode.h"
 #include "understory/recording/messages/packet_topic.h"

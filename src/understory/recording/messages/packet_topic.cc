@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "understory/recording/captures/hesai.h"
+#include "understory/recording/captures/hesai/hesai.h"
 #include "understory/recording/captures/velodyne.h"
 #include "understory/util/error.h"
 

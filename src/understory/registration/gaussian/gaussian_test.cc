@@ -82,7 +82,7 @@ TEST(PointToGaussian, AThinCovarianceIsPointToPlane) {
               1e-3 * std::pow(normal.dot(e), 2) / 1e-4);
 }
 
-// The cost of one point against (3), worked out with an inverse; for the Gaussian of the source, W
+// The cost of one point against (3), worked out with an inverse. For the Gaussian of the source, W
 // is the sum with the source's turned one.
 TEST(PointToGaussian, ThePairCountsInTheMetricOfTheMap) {
   const IcpMapPtr map = covariance_map();

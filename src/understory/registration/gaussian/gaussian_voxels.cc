@@ -30,7 +30,7 @@ std::uint64_t voxel_key_of(const std::array<int, 3>& at) {
 }
 
 // Along a surface or a pole the spread of the points is that of the voxel's box and of the pattern
-// of the scan: it is widened, so that it does not hold the pose where it is.
+// of the scan. It is widened, so that it does not hold the pose where it is.
 Eigen::Matrix3f widened_along(const Eigen::Matrix3f& covariance) {
   SymmetricEigen3 eigen = fast_symmetric_eigen(covariance.cast<double>());
   const bool plane = eigen.values[0] < kPlaneRatio * eigen.values[1];

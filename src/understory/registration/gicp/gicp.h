@@ -32,9 +32,9 @@ struct GicpConfig {
 };
 void describe(ConfigTable& table, GicpConfig& config);
 
-// Generalised ICP, P4 (42) [Segal et al., Generalized-ICP, 2009, (2)]: each point of source and
-// target is a normal distribution that is flat along its surface, and the distance of a pair counts
-// in the metric of the sum of the two. `surfaces` are the source's, see source_surfaces. Parallel;
+// Generalised ICP, P4 (42) [Segal et al., Generalized-ICP, 2009, (2)]. Each point of source and
+// target is a normal distribution that is flat along its surface. The distance of a pair counts in
+// the metric of the sum of the two. `surfaces` are the source's, see source_surfaces. Parallel;
 // same bits for any number of threads. Thread-safe.
 [[nodiscard]] RegistrationResult register_gicp(const IcpMap& target, const Points& source,
                                                const std::vector<SurfacePatch>& surfaces,

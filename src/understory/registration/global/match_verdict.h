@@ -29,7 +29,7 @@ struct MatchVerdict {
   PoseEvidence evidence;
   double score = 0.0;  // of the pose, as GlobalCandidate::score
   std::optional<RivalPose> rival;
-  // How far NDT with small cells moves the pose on; NaN where sparse clouds have too little for it,
+  // How far NDT with small cells moves the pose on. NaN where sparse clouds have too little for it,
   // and then it says nothing against the pose.
   double moved_m = std::numeric_limits<double>::quiet_NaN();
   double moved_deg = std::numeric_limits<double>::quiet_NaN();

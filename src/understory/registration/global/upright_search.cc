@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <tuple>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/registration/global/global_constants.h"
 #include "understory/util/median.h"
 

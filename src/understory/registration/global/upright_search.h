@@ -17,7 +17,7 @@ struct UprightMatch {
 
 // Motions that bring uprights onto uprights, anywhere and at any heading; the best first, `most` of
 // them. Each two uprights of the source that are as far apart as two of the target vote for the
-// motion between them; the fullest cells of votes are fitted by nearest uprights. Thread-safe,
+// motion between them. The fullest cells of votes are fitted by nearest uprights. Thread-safe,
 // deterministic.
 [[nodiscard]] std::vector<UprightMatch> match_uprights(const std::vector<Upright>& target,
                                                        const std::vector<Upright>& source,

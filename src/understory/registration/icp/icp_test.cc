@@ -114,13 +114,13 @@ TEST(Icp, RecoversKnownMotionsWithAllMetricsAndKernels) {
   const Pose guess =
       pair.truth * Pose::exp((Vector6d() << 0.01, -0.01, 0.02, 0.1, -0.1, 0.05).finished());
   const IcpTarget planes(pair.target, IcpConfig());
-  const auto expect_found = [&](const IcpConfig& config, double most_m) {
+  const auto expect_found = [&](const IcpConfig& config, double max_error_m) {
     const RegistrationResult result =
         config.metric == IcpConfig::Metric::kTrimmed
             ? register_icp(IcpTarget(pair.target, config), pair.source, guess, {}, config)
             : register_icp(planes, pair.source, guess, {}, config);
     ASSERT_TRUE(result.usable()) << result.reason;
-    EXPECT_LT(right_difference(result.target_from_source, pair.truth).tail<3>().norm(), most_m)
+    EXPECT_LT(right_difference(result.target_from_source, pair.truth).tail<3>().norm(), max_error_m)
         << static_cast<int>(config.metric) << " " << static_cast<int>(config.loss.kind);
   };
   for (const auto metric : {IcpConfig::Metric::kSymmetric, IcpConfig::Metric::kTrimmed}) {

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <vector>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 
 namespace understory {
 
 // The nearest target point of each source point while the source moves step by step, as in ICP. A
-// search also tells how far every other target point is at least; as long as the source point has
+// search also tells how far every other target point is at least. As long as the source point has
 // not moved by what that leaves, the result stands without another search. The same results as
 // PlaneGrid::nearest. Not thread-safe.
 class NearestPairs {

@@ -39,7 +39,7 @@ struct SurfacePatch {
 };
 [[nodiscard]] SurfacePatch surface_of(const SurfaceSums& sums, double max_planarity);
 
-// Covariance of a neighbourhood, m^2; nothing where it is the trace of a ring of the lidar on level
+// Covariance of a neighbourhood, m^2. Nothing where it is the trace of a ring of the lidar on level
 // ground, which tells nothing, or too few points. P3 (3): W of a point of the map.
 [[nodiscard]] std::optional<Eigen::Matrix3f> covariance_of(const SurfaceSums& sums);
 // Of each point of a cloud, from its `neighbours` (4 to 100) nearest points, m^2. Traces of rings

@@ -24,7 +24,7 @@ struct NdtConfig {
   Hessian hessian = Hessian::kGaussNewton;
   // Share of points expected to match nothing, P4 after (41) [Magnusson 2009, (6.8)].
   double outlier_ratio = 0.3;
-  // The first steps see normals this much wider, which pull from farther away; they end when a step
+  // The first steps see normals this much wider, which pull from farther away. They end when a step
   // is shorter than `wide_until_m` (turns count at the mean range of the points).
   double widening = 3.0;
   double wide_until_m = 0.02;

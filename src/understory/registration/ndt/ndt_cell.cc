@@ -125,7 +125,7 @@ NdtCell make_cell(const CellMoments& moments, const NdtMapConfig& config,
   }
   const double longest = std::min(shape.variance[2] + floor, box);
   // What is neither surface nor line is seen from one side only, and that side goes with the lidar
-  // (docs/method/registration.md); what NdtCell::near_side_m leaves of that counts little. The same
+  // (docs/method/registration.md). What NdtCell::near_side_m leaves of that counts little. The same
   // goes for the second direction, along which a cell ends where the lidar could no longer see it.
   const double share = line ? 1.0 : config.volume_weight;
   for (int i = 0; i < 2; ++i) {

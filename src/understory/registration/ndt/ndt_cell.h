@@ -21,7 +21,7 @@ struct CellMoments {
   [[nodiscard]] Eigen::Matrix3d covariance() const;
 };
 
-// The same sums in single precision, half as large, for maps of many cells: with the points within
+// The same sums in single precision, half as large, for maps of many cells. With the points within
 // a cell of its centre, variances come out to 1e-5 of the cell's squared edge after 1e5 points.
 struct StoredMoments {
   float n = 0.0F;

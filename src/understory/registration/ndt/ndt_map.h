@@ -17,7 +17,7 @@ namespace understory {
 struct NdtMapConfig {
   double cell_size_m = 1.0;  // edge of a cell
   int min_points = 5;        // cells with fewer have no distribution
-  // A cell's distribution is worked out again once its points have grown by this share: what a few
+  // A cell's distribution is worked out again once its points have grown by this share. What a few
   // more among many tell is not worth the time, and grows with the time spent at a place. 0:
   // always.
   double growth = 0.1;
@@ -30,9 +30,9 @@ struct NdtMapConfig {
   // With a viewpoint: where the further lidars of a scan of several are.
   std::vector<Eigen::Vector3d> further_viewpoints_in_source = {};
   // With a viewpoint: what a cell shows lies before its middle, towards wherever it is seen from,
-  // by this share of the spread along its second axis, 0..2; of a stem (a single view of a cylinder
-  // would give 1.36, and cells hold many views), and of what is neither surface nor line. See
-  // NdtCell::near_side_m.
+  // by this share of the spread along its second axis, 0..2. This holds for a stem, and for what is
+  // neither surface nor line. A single view of a cylinder would give 1.36, and cells hold many
+  // views. See NdtCell::near_side_m.
   double near_side_line = 1.0;
   double near_side_volume = 0.25;
   // With a viewpoint: what looks like a surface and was seen exactly edge-on is taken for what it
@@ -42,17 +42,17 @@ struct NdtMapConfig {
 
 // What a cell tells about a point in it. The information of its normal distribution (P4 (40)) is
 // kept as rows: information = sum over rows of row * row^T, where row = eigenvector / sigma.
-// Directions in which the cell says nothing have no row: along a surface or a stem, where the
-// spread of the points is that of the cell's box, not of the world; and along the ground for what
-// one or two rings of the lidar left on it.
+// Directions in which the cell says nothing have no row. One is along a surface or a stem, where
+// the spread of the points is that of the cell's box, not of the world. Another is along the ground
+// for what one or two rings of the lidar left on it.
 struct alignas(64) NdtCell {           // a cache line
   Eigen::Vector3f mean;                // from the centre of the cell, metres
   std::uint32_t count = 0;             // points
   int rows = 0;                        // 0 to 2; 0: the cell matches but does not constrain
   std::array<Eigen::Vector3f, 2> row;  // 1/m, most certain first
-  // A lidar sees the near side of a stem or a crown, and the near side goes along with it: seen
-  // along the unit ray u, the points are expected around mean + mean_near_side - near_side_m * u,
-  // where mean_near_side is near_side_m times the mean ray of the cell's own points (map axes). 0
+  // A lidar sees the near side of a stem or a crown, and the near side goes along with it. Seen
+  // along the unit ray u, the points are expected around mean + mean_near_side - near_side_m * u.
+  // Here mean_near_side is near_side_m times the mean ray of the cell's own points (map axes). 0
   // for surfaces, and where the viewpoint is unknown.
   float near_side_m = 0.0F;
   Eigen::Vector3f mean_near_side = Eigen::Vector3f::Zero();

@@ -217,7 +217,7 @@ TEST(Ndt, StandsAThirdOfOutliers) {
 
 // Steps used to be accepted by the cost, which is lowest where rings lie on rings: it held the
 // answer back by centimetres. The rings of one scan must not be matched to the rings of the scan
-// before (field notes): the map is one VLP-16 scan over smooth ground with a few stems, and the
+// before (field notes). The map is one VLP-16 scan over smooth ground with a few stems, and the
 // sensor has moved by 0.3 m.
 TEST(Ndt, FollowsTheStemsAndNotTheRingsOnTheGround) {
   Stand stand;
@@ -239,7 +239,7 @@ TEST(Ndt, FollowsTheStemsAndNotTheRingsOnTheGround) {
   }
 }
 
-// With nothing but smooth ground, moves along it and turns about its normal are undetermined; the
+// With nothing but smooth ground, moves along it and turns about its normal are undetermined. The
 // pose stays where the guess was along them, though every ring of the map pulls.
 TEST(Ndt, SmoothGroundAloneLeavesItsPlaneUndetermined) {
   const Stand stand;
@@ -418,7 +418,7 @@ TEST(Ndt, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(results[0].fitness_m2, results[1].fitness_m2);
 }
 
-// How far a match falls back along the way, in the mean of some places of some stands: the map is
+// How far a match falls back along the way, in the mean of some places of some stands. The map is
 // made of scans at true poses behind the one that is matched, from its true pose.
 double fallen_back_mm(bool reckon) {
   double sum_mm = 0.0;

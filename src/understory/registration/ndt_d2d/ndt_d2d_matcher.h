@@ -12,7 +12,7 @@
 namespace understory {
 
 // NDT from distribution to distribution (Stoyanov et al., Fast and accurate scan registration
-// through minimization of the distance between compact 3D NDT representations, 2012, (5)): source
+// through minimization of the distance between compact 3D NDT representations, 2012, (5)). Source
 // and target are grids of normal distributions, P4 (40), and each of the source meets the nearest
 // of the target.
 struct NdtD2dMatcherConfig {

@@ -103,8 +103,9 @@ void GoIcpBounds::in_plane(const GoIcpBox& box) {
 }
 
 // A tilt moves points up and down, and sideways only by their height above the sensor and by how
-// far they have been moved up or down already: what a box of tilts can do is bounded apart for the
-// plane, where it is little, and for the height. The distance in the plane bounds that in space.
+// far they have been moved up or down already. So what a box of tilts can do is bounded apart for
+// the plane, where it is little, and for the height. The distance in the plane bounds that in
+// space.
 void GoIcpBounds::in_space(const GoIcpBox& box) {
   const auto& middle = box.middle;
   const Eigen::Matrix3d turn = box.turn().toRotationMatrix();

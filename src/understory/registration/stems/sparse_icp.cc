@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "understory/geometry/best_rotation.h"
-#include "understory/geometry/delaunay.h"
+#include "understory/geometry/plane/delaunay.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/registration/icp/nearest_pairs.h"
 #include "understory/registration/registration_constants.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/geometry/pose.h"
 #include "understory/util/config/config.h"
 

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "understory/geometry/plane_grid.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/geometry/pose.h"
 
 namespace understory::testing {

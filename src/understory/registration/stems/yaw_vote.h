@@ -7,8 +7,8 @@
 
 namespace understory {
 
-// Coarse search over yaw and horizontal translation for levelled sparse clouds: for every yaw each
-// pair of points votes for the shift that would bring it together, and the fullest cells are first
+// Coarse search over yaw and horizontal translation for levelled sparse clouds. For every yaw each
+// pair of points votes for the shift that would bring it together. The fullest cells are first
 // guesses for ICP. Step and cell come from L0, so nothing is tuned to the density of a stand.
 struct YawVoteConfig {
   double yaw_range_deg = 180.0;     // around the guess

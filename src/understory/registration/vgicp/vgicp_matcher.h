@@ -13,7 +13,7 @@
 namespace understory {
 
 // Voxelised generalised ICP (Koide et al., Voxelized GICP for Fast and Accurate 3D Point Cloud
-// Registration, 2021, (13)): a point meets the mean of the points of its voxel, without a search,
+// Registration, 2021, (13)). A point meets the mean of the points of its voxel, without a search,
 // in the metric of its own surface and of the mean of theirs.
 struct VgicpMatcherConfig {
   static constexpr const char* kName = "vgicp";

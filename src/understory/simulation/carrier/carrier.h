@@ -50,10 +50,11 @@ struct CarrierPlan {
   std::vector<double> shocks_s;  // when a falling stem or a jolt shakes the carrier, in order
 };
 
-// The motion along a route: a walker with a pole (gait, sway, quick turns), a harvester (work
-// stops, cabin swings, rocking), a UAV (hover, tilt with the acceleration) or a sleigh (jolts,
-// halts, near tumbles), or one that stands still for ever. config.duration_s cuts it or lengthens
-// it by standing still. A harvester that thins fells trees of the stand, whose ids must differ.
+// The motion along a route. A walker with a pole has gait, sway and quick turns; a harvester has
+// work stops, cabin swings and rocking. A UAV hovers and tilts with the acceleration, a sleigh
+// jolts, halts and nearly tumbles. Or the carrier stands still for ever. config.duration_s cuts it
+// or lengthens it by standing still. A harvester that thins fells trees of the stand, whose ids
+// must differ.
 [[nodiscard]] CarrierPlan plan_carrier(const SiteConfig& config, const Route& route,
                                        const Terrain& terrain, const Stand& stand);
 

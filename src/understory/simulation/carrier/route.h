@@ -15,7 +15,7 @@ class Route {
  public:
   // A loop: a closed curve of config.length_m that winds config.laps times around the middle of the
   // stand, and that config.rounds times on the same way. A strip road: of config.length_m if it is
-  // driven one way, else of half that length; beside it the other roads of the stand, on which
+  // driven one way, else of half that length. Beside it the other roads of the stand, on which
   // nobody drives today. Roads of even numbers are driven westwards.
   Route(const CarrierConfig& config, std::uint64_t seed);
 

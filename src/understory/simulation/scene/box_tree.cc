@@ -144,9 +144,9 @@ class Halves {
   std::vector<Part> parts_;
 };
 
-// Which parts become the children of which nodes: of all ways to join the halves to nodes of eight
-// the one whose areas have the least sum, after Ylitie, Karras, Laine, Efficient incoherent ray
-// traversal on GPUs through compressed wide BVHs (2017), section 3.1.
+// Which parts become the children of which nodes. Of all ways to join the halves to nodes of eight
+// it is the one whose areas have the least sum. After Ylitie, Karras, Laine, Efficient incoherent
+// ray traversal on GPUs through compressed wide BVHs (2017), section 3.1.
 class Joined {
  public:
   explicit Joined(const Halves& halves) : halves_(halves), ways_(halves.size()) {

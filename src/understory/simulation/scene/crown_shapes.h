@@ -18,7 +18,7 @@ struct GrownCrown {
 };
 
 // What the trees and plants of a stand are instances of: for each species five heights of crown
-// that begin at four heights each; three variants of each kind of plant, kind by kind.
+// that begin at four heights each. Three variants of each kind of plant, kind by kind.
 struct GrownShapes {
   std::vector<GrownCrown> crowns;
   std::vector<Shape> plants;

@@ -18,7 +18,7 @@ struct RayLanes {
   bool one_origin = false;  // all begin at the same place
 };
 
-// All rays of a beam at once, for one tree of boxes: at each range they are within a box whose
+// All rays of a beam at once, for one tree of boxes. At each range they are within a box whose
 // sides move at the speed of the fastest and of the slowest ray along each axis. A box of the tree
 // is met only if at some range the two overlap, so no ray that meets it is lost.
 class FatRay {
@@ -93,10 +93,10 @@ struct Entered {
   std::array<float, kLanes> ranges;
 };
 
-// Goes through a tree along a beam, the nearer boxes first, and calls leaf(place in order(), range
-// from which on it is met) for those that it meets between `near` and `far`; leaf may lower `far`.
-// fetch(place) comes some time before and may bring near what leaf will need.
-// What of the root is met may be known before.
+// Goes through a tree along a beam, the nearer boxes first. It calls leaf(place in order(), range
+// from which on it is met) for those that it meets between `near` and `far`, and leaf may lower
+// `far`. fetch(place) comes some time before and may bring near what leaf will need. What of the
+// root is met may be known before.
 template <class Fetch, class Leaf>
 void walk(const BoxTree& tree, const FatRay& beam, float near, const float& far, Fetch&& fetch,
           Leaf&& leaf, const Entered* entered = nullptr) {

@@ -20,7 +20,7 @@ class ObjectField {
   void move(std::uint32_t object, const Placement& world_from_shape);
   void show(std::uint32_t object, bool present);
   // Makes the above hold. What the field looks like depends on where its objects are, not on where
-  // they were; how fast it is depends on where they were at the first commit.
+  // they were. How fast it is depends on where they were at the first commit.
   void commit();
 
   // As RayShape::cast; struck.object is the number of what was met.

@@ -12,7 +12,7 @@
 namespace understory {
 
 // Keeps what the beams of each scan of one site and seed measured (ranges in steps, intensities,
-// returns of stems) in one file, so that a site is cast only once: about a fifth of a megabyte a
+// returns of stems) in one file. So a site is cast only once, for about a fifth of a megabyte a
 // scan of an OS0-128. What comes back is bit for bit what went in.
 //
 // Several processes may use one file: the first one writes, the others read what was there when

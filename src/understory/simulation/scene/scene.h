@@ -47,7 +47,7 @@ struct Hit {
   Surface surface = Surface::kNone;
 };
 
-// Terrain and stand as Embree geometry: stems are round cones one by one; crowns and plants are
+// Terrain and stand as Embree geometry: stems are round cones one by one. Crowns and plants are
 // instances of a few grown shapes, so that memory hardly grows with the number of trees. Casting is
 // thread-safe; results depend on the rays and on the moment of the scene alone.
 class ForestScene {
@@ -60,19 +60,19 @@ class ForestScene {
   ForestScene(const ForestScene&) = delete;
   ForestScene& operator=(const ForestScene&) = delete;
 
-  // Brings the scene to a moment (seconds since the path's zero): stems and crowns are where the
-  // wind has them at wind_s, what was felled by stand_s is gone and what fell by then lies there;
-  // before the first call all stand at rest. What a moment looks like does not depend on those
+  // Brings the scene to a moment (seconds since the path's zero). Stems and crowns are where the
+  // wind has them at wind_s. What was felled by stand_s is gone, and what fell by then lies there.
+  // Before the first call all stand at rest. What a moment looks like does not depend on those
   // before it. Not while others cast.
   void arrange(double wind_s, double stand_s);
   // When the harvest changes the scene, in order.
   [[nodiscard]] const std::vector<double>& changes() const;
 
   // The first thing each ray meets within [near_m, far_m]. Neighbouring rays should lie beside each
-  // other: sixteen at a time go through the scene together; in a scene for bundles, those of a beam
-  // do, of which each has `rays_per_beam`. Between the moment of the scene and its
-  // own a ray sees what it hits moved on by the wind, to first order: surfaces move along the beam
-  // and across it, their outlines stay.
+  // other: sixteen at a time go through the scene together. In a scene for bundles, those of a beam
+  // do, of which each has `rays_per_beam`. Between the moment of the scene and its own a ray sees
+  // what it hits moved on by the wind, to first order: surfaces move along the beam and across it,
+  // their outlines stay.
   void cast(const Ray* rays, std::size_t count, float near_m, float far_m, Hit* hits,
             std::size_t rays_per_beam = 1) const;
 

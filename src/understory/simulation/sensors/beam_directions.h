@@ -9,7 +9,7 @@
 namespace understory {
 
 // Directions of the beams of one firing at azimuth 0 of the head, and level ones to the left of
-// each; unit vectors in the lidar's frame.
+// each. Unit vectors in the lidar's frame.
 struct BeamDirections {
   BeamDirections() = default;
   // `time_ns`: of the firing, since the first revolution. `higher_rad`: by which all look higher.

@@ -10,10 +10,10 @@
 
 namespace understory {
 
-// Writes what a field computer keeps of a VLP-16 and a GNSS receiver: a capture (.pcap) with the
-// scanner's data packets (strongest return) and position packets, and the receiver's NMEA sentences
-// (GGA, GSA, RMC, and PASHR of a second antenna) in a log beside it. The scanner's cable points
-// forwards, so that its azimuth 0, where drivers cut the scans, lies behind; a capture holds no
+// Writes what a field computer keeps of a VLP-16 and a GNSS receiver. The scanner's data packets
+// (strongest return) and position packets go to a capture (.pcap). The receiver's NMEA sentences
+// (GGA, GSA, RMC, and PASHR of a second antenna) go to a log beside it. The scanner's cable points
+// forwards, so that its azimuth 0, where drivers cut the scans, lies behind. A capture holds no
 // extrinsics, so those that belong to it are written beside it, for `--extrinsics`.
 //
 // Files: NAME.pcap, NAME.nmea, NAME.extrinsics.yaml. Events come in the order of time; IMU and

@@ -14,10 +14,10 @@ namespace understory {
 
 // The IMU: samples of the true motion at its own place with scale errors, biases, vibration, shocks
 // and white noise. A bias is the sum of its value at the start, a random walk, a bias instability
-// (flicker noise: four first-order processes whose time constants are a factor of ten apart, which
-// keep the Allan deviation level from 3 s to 300 s) and a drift with the sensor's temperature.
-// Samples come one after another; the biases are those of the last one. The turning of the earth is
-// left out.
+// and a drift with the sensor's temperature. The instability is flicker noise: four first-order
+// processes whose time constants are a factor of ten apart, which keep the Allan deviation level
+// from 3 s to 300 s. Samples come one after another; the biases are those of the last one. The
+// turning of the earth is left out.
 class InertialSensor {
  public:
   // `path` must outlive the sensor. `start` is the time of the path's zero; `shocks_s` are the

@@ -17,8 +17,8 @@ struct Beam {
   std::uint16_t ring = 0;           // from the lowest up
 };
 
-// When and where a spinning lidar measures: firings follow each other without pause, each with all
-// beams in the order in which they fire; the head turns clockwise (seen from above) and begins its
+// When and where a spinning lidar measures. Firings follow each other without pause, each with all
+// beams in the order in which they fire. The head turns clockwise (seen from above) and begins its
 // revolutions facing backwards.
 struct LidarModel {
   std::vector<Beam> beams;

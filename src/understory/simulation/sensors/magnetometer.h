@@ -9,7 +9,7 @@
 namespace understory {
 
 // A magnetometer at the IMU's place: the earth's field, bent by soft iron, plus the constant field
-// of the carrier's hard iron, plus white noise; tesla, in the frame of the IMU.
+// of the carrier's hard iron, plus white noise. Tesla, in the frame of the IMU.
 class Magnetometer {
  public:
   // `path` must outlive the sensor. `start` is the time of the path's zero.

@@ -19,11 +19,11 @@ struct PrismSample {
 [[nodiscard]] Eigen::Vector3d prism_in_world(const TotalStationConfig& config,
                                              const CarrierPath& path, double time_s);
 
-// The reference of P4 section 4.1.5: a total station on the road behind the route's start follows
-// the prism, where nothing stands in its line of sight, at its own rate and with its own errors of
-// set-up, distance, angle and clock; lost from sight, it needs a while to find it again. Samples of
-// [0, until_s) of the path, in order; `start` is the time of the path's zero. Leaves the scene at
-// another moment than before. Empty if the site has none.
+// The reference of P4 section 4.1.5. A total station on the road behind the route's start follows
+// the prism, where nothing stands in its line of sight. It has its own rate and its own errors of
+// set-up, distance, angle and clock. Lost from sight, it needs a while to find the prism again.
+// Samples of [0, until_s) of the path, in order; `start` is the time of the path's zero. Leaves the
+// scene at another moment than before. Empty if the site has none.
 [[nodiscard]] std::vector<PrismSample> track_prism(SimulatedWorld& world, TimeNs start,
                                                    double until_s);
 

@@ -19,9 +19,10 @@ struct LookingBeam {
   Eigen::Vector3f direction = Eigen::Vector3f::UnitX();  // world frame, unit length
 };
 
-// What winter does to a lidar (P3, "Lessons learned" and figure 6 II): snow that falls, snow that a
-// branch lets go, spurious ranges of a lidar too cold for its rating, and those of beams that look
-// into the low sun. A function of beam and time alone: any order of calls gives the same readings.
+// What winter does to a lidar (P3, "Lessons learned" and figure 6 II). There is snow that falls,
+// and snow that a branch lets go. There are spurious ranges of a lidar too cold for its rating, and
+// those of beams that look into the low sun. A function of beam and time alone: any order of calls
+// gives the same readings.
 class LidarWeather {
  public:
   LidarWeather() = default;

@@ -121,12 +121,12 @@ struct Stand {
 [[nodiscard]] Stand grow_stand(const StandConfig& config, const CarrierConfig& carrier,
                                const Terrain& terrain, const Route& route, std::uint64_t seed);
 
-// Reads a list of trees: a CSV with a head line of column names. Needed: x, y (metres in the world
-// frame) and dbh_m; used where given and not empty: id, height_m, lean_deg, species (pine, spruce,
-// birch), cloud (file of a scanned tree, beside the list if its path is relative, stretched to
-// height_m where that is given); others are passed over, z too: trees stand on the terrain. What
-// the list leaves open is drawn as for random trees. Throws InputError with file, line and what was
-// expected.
+// Reads a list of trees: a CSV with a head line of column names. Needed are x, y (metres in the
+// world frame) and dbh_m. Used where given and not empty: id, height_m, lean_deg, species (pine,
+// spruce, birch), cloud. A cloud is the file of a scanned tree, beside the list if its path is
+// relative, stretched to height_m where that is given. Others are passed over, z too: trees stand
+// on the terrain. What the list leaves open is drawn as for random trees. Throws InputError with
+// file, line and what was expected.
 [[nodiscard]] std::vector<GrownTree> read_trees(const std::string& path, const StandConfig& config,
                                                 const Terrain& terrain, std::uint64_t seed);
 // Paths of the clouds that a list of trees names in its column `cloud`, each once; none if there is

@@ -108,7 +108,7 @@ TEST(Trees, ForkInTwoAndBreakOff) {
 }
 
 // Pines of one height differ in where their branches begin, and the shape that stands for a tree's
-// crown begins there too; the lowest branches are thinner than those above.
+// crown begins there too. The lowest branches are thinner than those above.
 TEST(Trees, CrownsBeginAtTheirHeightsAndFrayOut) {
   StandConfig config;
   const GrownShapes grown = grow_shapes(config, 1);

@@ -20,10 +20,11 @@ struct TreeCloud {
 };
 
 // Reads the cloud of one tree alone (.las, .laz, .pcd, .ply; metres, z up) and makes a disc of each
-// point: its normal is that of the plane through the ten nearest points, its radius reaches to the
-// fourth. Points nearer than 7 mm to one that was taken are left out. The stem is followed upwards
-// from its foot in slices of a quarter of a metre; dbh_m is that of the tree in the file. Throws
-// InputError if the file cannot be read or holds no tree (fewer than 100 points, lower than 1.5 m).
+// point. Its normal is that of the plane through the ten nearest points, and its radius reaches to
+// the fourth. Points nearer than 7 mm to one that was taken are left out. The stem is followed
+// upwards from its foot in slices of a quarter of a metre; dbh_m is that of the tree in the file.
+// Throws InputError if the file cannot be read or holds no tree (fewer than 100 points, lower than
+// 1.5 m).
 [[nodiscard]] TreeCloud read_tree_cloud(const std::string& path, double dbh_m);
 
 }  // namespace understory

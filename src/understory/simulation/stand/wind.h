@@ -7,10 +7,10 @@
 
 namespace understory {
 
-// Wind that sways trees. Each swings at its own pace, the natural frequency of a conifer of its
+// Wind that sways trees. Each swings at its own pace, mostly along the wind, and leans with the
+// gusts, which travel through the stand. The pace is the natural frequency of a conifer of its
 // diameter and height (Moore and Maguire 2004, Trees 18: 0.0948 + 3.4317 dbh / height^2 hertz, cm
-// and m), mostly along the wind, and leans with the gusts, which travel through the stand. A
-// function of the time alone; thread-safe.
+// and m). A function of the time alone; thread-safe.
 class Wind {
  public:
   // sway_m: standard deviation along the wind of the top of a tree of 15 m; others sway in

@@ -28,7 +28,7 @@ class AtomicFile {
   std::unique_ptr<Impl> impl_;
 };
 
-// Text gathered into large writes; gzip-compressed where the path ends in .gz (with no time in its
+// Text gathered into large writes. Gzip-compressed where the path ends in .gz (with no time in its
 // header, so that the same rows give the same bytes).
 class AtomicTextFile {
  public:

@@ -35,7 +35,7 @@ void refuse_folder_in_file(const std::filesystem::path& folder);
 [[nodiscard]] std::filesystem::path place_of_file(const std::filesystem::path& path,
                                                   bool overwrite);
 
-// Makes a folder and those above it that are missing; the destructor removes those that were made,
+// Makes a folder and those above it that are missing. The destructor removes those that were made,
 // as far as they are empty, unless `keep` was called. Throws OutputError; what was made until then
 // is removed.
 class MadeFolders {

@@ -11,7 +11,7 @@
 namespace understory {
 
 // A file that another part of the program writes from front to back under a name of its own, and
-// that appears whole or not at all: `part` is where to write it, `commit` syncs it to the disk and
+// that appears whole or not at all. `part` is where to write it, `commit` syncs it to the disk and
 // renames it, the destructor drops it otherwise. One process at a time writes it. Not thread-safe.
 class StagedFile {
  public:

@@ -10,8 +10,8 @@ Placement place_by_terrain(const GeoreferenceRequest& request, const MovableRun&
                            Log& /*log*/) {
   if (!request.start && !run.origin)
     throw InputError(request.run.string(), "",
-                     "expected a run that was laid on a GNSS path, or --start: where it lies on "
-                     "the terrain model is not known (0 0 0 if its frame is that of the model)");
+                     "where the run lies on the terrain model is not known. Lay it on a GNSS path "
+                     "first, or give --start (0 0 0 if its frame is that of the model)");
   Pose placed = run.enu_from_world;
   Placement placement;
   if (request.start) {

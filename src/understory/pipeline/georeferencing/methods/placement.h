@@ -32,7 +32,7 @@ struct Placement {
   // the method does not tell it.
   Matrix6d covariance = Matrix6d::Constant(std::numeric_limits<double>::quiet_NaN());
   // Error of a place on the path that the covariance makes one expect, root mean square over the
-  // poses, metres; NaN where it is not known.
+  // poses, metres. NaN where it is not known.
   double expected_error_m = std::numeric_limits<double>::quiet_NaN();
   std::vector<PlacementResidual> residuals;  // of things other than fixes
   std::optional<GeodeticPlace> origin;       // of the target frame, where that is east, north, up

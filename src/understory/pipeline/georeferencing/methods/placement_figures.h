@@ -7,9 +7,9 @@
 
 namespace understory {
 
-// Adds to the figures of a placement what every method can tell: its motion, and from its
-// covariance one standard deviation of each degree of freedom (turns about the east, north and up
-// axes through the middle of the path, degrees; shifts, metres) and the expected error. Sets
+// Adds to the figures of a placement what every method can tell: its motion, the expected error,
+// and one standard deviation of each degree of freedom. These come from its covariance (turns about
+// the east, north and up axes through the middle of the path, degrees; shifts, metres). Sets
 // `expected_error_m` where the method has not.
 void tell_placement(const Trajectory& trajectory, Placement& placement);
 

@@ -178,9 +178,8 @@ Placement placement_of(const GeoreferenceRequest& request, const MovableRun& run
   if (fit.headings) warn_of_headings(*fit.headings, log);
   placement.gnss = rows_of(fit.fixes, "far off the others, or of another time");
   placement.summary = fmt::format(
-      "{}: {} fixes at times of the path, {:.2f} m off it in the plane (root mean square); they "
-      "know the place as {:.0f} independent ones do\nexpected error {:.2f} m over the path; one "
-      "standard deviation: {}",
+      "{}: {} fixes at times of the path, {:.2f} m off it in the plane (root mean square), worth "
+      "{:.0f} independent ones\nexpected error {:.2f} m over the path; one standard deviation: {}",
       method, fit.fixes_in_time, fit.plane_rms_m, fit.independent_fixes, fit.expected_error_m,
       precision_of(placement));
   if (request.gnss.empty())

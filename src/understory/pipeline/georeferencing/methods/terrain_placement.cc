@@ -100,9 +100,9 @@ void tell_levelled(const GeoreferenceRequest& request, const LevelledRun& levell
       {"terrain_place_sd_m", fit.place_sd_m},
       {"terrain_yaw_sd_deg", fit.yaw_sd_deg}});
   placement.summary += fmt::format(
-      "{} of {} points on the ground used; heights above the terrain {:.2f} m before (mean off), "
-      "{:.2f} m after, {:.2f} m in the median; up turned by {:.2f} degrees",
-      fit.used, fit.points, fit.rms_before_m, fit.rms_m, fit.median_m, fit.tilt_deg);
+      "{} of {} points on the ground used; vertical turned by {:.2f} degrees\nheights above the "
+      "terrain {:.2f} m before (without their mean), {:.2f} m after, {:.2f} m in the median",
+      fit.used, fit.points, fit.tilt_deg, fit.rms_before_m, fit.rms_m, fit.median_m);
   if (2 * fit.used < fit.points)
     placement.doubt(fmt::format("only {} of {} points on the ground agree with the terrain model",
                                 fit.used, fit.points));

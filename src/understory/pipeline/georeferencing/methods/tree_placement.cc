@@ -89,9 +89,8 @@ bool likelier(const TreeMatch& one, const TreeMatch& other) {
 std::string summary_of(const FoundTrees& found) {
   const TreeMatch& match = found.match;
   std::string text = fmt::format(
-      "{} of {} {} have a partner in the map, by chance {:.0f} would; pairs {:.2f} m apart "
-      "(root "
-      "mean square); place to {:.2f} m, heading to {:.2f} degrees (one standard deviation)",
+      "{} of {} {} have a partner in the map, by chance {:.0f} would; pairs {:.2f} m apart (root "
+      "mean square)\nplace to {:.2f} m, heading to {:.2f} degrees (one standard deviation)",
       match.pairs.size(), found.trees_of_run, found.by_tops ? "tops of the canopy" : "trees",
       match.expected_by_chance, match.apart_rms_m,
       std::sqrt(match.covariance(1, 1) + match.covariance(2, 2)),

@@ -11,7 +11,7 @@
 #include "understory/calibration/lidar_imu/clock_check.h"
 #include "understory/calibration/lidar_imu/online_calibration.h"
 #include "understory/georeference/satellites/satellite_belief.h"
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/map/scan_clouds.h"
 #include "understory/odometry/dense/dense_odometry.h"
 #include "understory/odometry/dense/recovery.h"

@@ -7,7 +7,7 @@
 #include "understory/forest/inventory.h"
 #include "understory/forest/obstacles.h"
 #include "understory/georeference/satellites/satellite_belief.h"
-#include "understory/map/keyframe_map.h"
+#include "understory/map/keyframes/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/odometry/dense/dense_odometry.h"
 #include "understory/pipeline/georeferencing/gnss_in_graph.h"

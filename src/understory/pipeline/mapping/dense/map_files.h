@@ -10,7 +10,7 @@
 namespace understory {
 
 // Writes map.laz, map.copc.laz where it is wanted, trees.csv, trees.gpkg, dtm.tif, chm.tif,
-// map.qgs, and obstacles where they are wanted, into the folder of results; draws the map into
+// map.qgs, and obstacles where they are wanted, into the folder of results. Draws the map into
 // `picture`. Returns the number of points of the map. Throws OutputError.
 [[nodiscard]] std::uint64_t write_map(const ReadRecording& recording,
                                       const DenseMappingConfig& config, DenseProducts& made,

@@ -46,8 +46,8 @@ std::vector<PositionedScan> SparseFrontEnd::on_scan(const ScanPtr& scan, const R
   const ScopedTimer timer(times_, "scan");
   if (scans_ == 0 && !rig.further_lidars.empty() && !all_have_level_rings(*scan, rig)) {
     throw InputError(rig.lidar_model.empty() ? "the lidar" : rig.lidar_model, "",
-                     "its lines sweep over the whole field of view, so that no stem can be cut "
-                     "from a single scan, and several lidars are not gathered over time: name one "
+                     "its lines sweep over the whole field of view, so single scans show no cut of "
+                     "a stem. Scans of several lidars are not gathered over time. Name one lidar "
                      "with --lidar-topic, or use --front-end dense");
   }
   ++scans_;

@@ -73,8 +73,8 @@ CorrectionInput correction_input(SparseFrontEnd& front_end, const ReadRecording&
 std::string SparseFrontEnd::why_no_map(const Recording& source) const {
   if (counted_.scans > 0)
     return fmt::format(
-        "no stems in any of its {} scans: expected upright stems in scans with ring numbers, and a "
-        "lidar whose rings are level within 25 degrees, upright or upside down",
+        "no stems in any of its {} scans. Expected upright stems in scans with ring numbers, by a "
+        "lidar with its rings level within 25 degrees (also upside down)",
         counted_.scans);
   std::string topics;
   for (const TopicReport& topic : source.topics())

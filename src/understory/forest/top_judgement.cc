@@ -1,0 +1,112 @@
+#include "understory/forest/top_judgement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "understory/forest/forest_constants.h"
+#include "understory/forest/inventory.h"
+#include "understory/forest/trees/occupied_space.h"
+#include "understory/forest/trees/tree_heights.h"
+#include "understory/forest/trees/view_limit.h"
+#include "understory/util/parallel.h"
+
+namespace understory {
+namespace {
+
+using namespace forest_constants::top_judgement;
+
+// On the stem, `height_m` above the ground, world frame.
+Eigen::Vector3d place_on(const InventoryResult& result, const StemFit& stem, double height_m) {
+  Eigen::Vector3d place = result.origin;
+  place.head<2>() += stem_place_at(stem, height_m);
+  place.z() = result.ground.terrain.interpolate(place.x(), place.y()) + height_m;
+  return place;
+}
+
+PlaceAbove above_ground(const InventoryResult& result, const Eigen::Vector3d& place) {
+  const double ground = result.ground.terrain.interpolate(place.x(), place.y());
+  return {(place - result.origin).head<2>(),
+          std::isfinite(ground) ? place.z() - ground : kScannerHeight};
+}
+
+// How well a height of a stem was seen.
+double view_at(const SightLines& sight, const InventoryResult& result, const StemFit& stem,
+               double height_m, const Lookouts& lookouts) {
+  const Eigen::Vector3d place = place_on(result, stem, height_m);
+  const std::vector<Eigen::Vector3d> all = lookouts(place);
+  const std::size_t step = all.size() / kMostLookouts + 1;  // evenly chosen
+  std::vector<PlaceAbove> from;
+  for (std::size_t i = 0; i < all.size(); i += step)
+    from.push_back(above_ground(result, all[i]));
+  const double chosen = static_cast<double>(std::max<std::size_t>(1, from.size()));
+  return sight.view_of(above_ground(result, place), from) * static_cast<double>(all.size()) /
+         chosen;
+}
+
+// Which trees would show too few points above their top.
+std::vector<char> out_of_sight(const StemTops& tops, const Lookouts& lookouts,
+                               const InventoryResult& result) {
+  const SightLines sight(tops.space);
+  std::vector<char> hidden(result.stems.size(), 0);
+  parallel_for(hidden.size(), 16, [&](std::size_t i) {
+    const double height = result.trees[i].height_m;
+    if (!std::isfinite(height)) return;
+    const StemFit& stem = result.stems[i];
+    const double below = view_at(sight, result, stem, height - kBeside, lookouts);
+    const double above = view_at(sight, result, stem, height + kBeside, lookouts);
+    const double expected = below > 0.0 ? tops.top_metre_points[i] * above / below : 0.0;
+    hidden[i] = expected < kLeastExpected ? 1 : 0;
+  });
+  return hidden;
+}
+
+// Distance from the path, or what grows with it.
+double farness_of(const InventoryResult& result, std::size_t tree,
+                  const std::vector<Eigen::Vector3d>& scanner) {
+  if (scanner.empty())
+    return -static_cast<double>(result.stems[tree].returns) / result.trees[tree].dbh_m;
+  const Eigen::Vector2d place(result.trees[tree].x, result.trees[tree].y);
+  double least = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& from : scanner)
+    least = std::min(least, (from.head<2>() - place).squaredNorm());
+  return std::sqrt(least);
+}
+
+std::vector<char> cut_by_view(const StemTops& tops, const std::vector<Eigen::Vector3d>& scanner,
+                              const InventoryResult& result) {
+  std::vector<TreeInView> trees;
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    // Of trees without a height, too: their tops tell where the view ends.
+    trees.push_back({tops.top_m[i], result.trees[i].dbh_m, farness_of(result, i, scanner)});
+  }
+  return ends_with_the_view(trees);
+}
+
+}  // namespace
+
+double listed_height(const InventoryResult& result, const StemFit& stem, double top_m,
+                     const Lookouts& lookouts) {
+  if (!lookouts || !std::isfinite(top_m)) return top_m;
+  const bool in_view = !lookouts(place_on(result, stem, top_m + kMargin)).empty();
+  return in_view ? top_m : std::numeric_limits<double>::quiet_NaN();
+}
+
+void judge_tops(const StemTops& tops, const Lookouts& lookouts,
+                const std::vector<Eigen::Vector3d>& scanner, InventoryResult& result) {
+  std::vector<char> hidden(result.stems.size(), 0);
+  std::vector<char> cut = hidden;
+  if (lookouts) hidden = out_of_sight(tops, lookouts, result);
+  if (!result.from_above) cut = cut_by_view(tops, scanner, result);
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    Tree& tree = result.trees[i];
+    if (std::isnan(tree.height_m)) continue;
+    const bool seen = tops.top_points[i] >= kTopPoints && hidden[i] == 0 && cut[i] == 0;
+    tree.height_is_lower_bound = seen ? 0.0 : 1.0;
+    tree.height_sd_m = seen ? kHeightSd : kBoundSd;
+  }
+}
+
+}  // namespace understory

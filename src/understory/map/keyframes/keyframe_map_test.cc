@@ -1,0 +1,106 @@
+// Which scans become keyframes, and what the edges between keyframes know.
+#include "understory/map/keyframes/keyframe_map.h"
+
+#include <gtest/gtest.h>
+
+#include "understory/util/files/folder_test_support.h"
+#include "understory/util/random.h"
+
+namespace understory {
+namespace {
+
+// Points within 10 m of the body. What they are like does not matter here.
+FeaturePoints some_points() {
+  Random random(1);
+  FeaturePoints features;
+  for (int i = 0; i < 500; ++i) {
+    features.points.push_back(Eigen::Vector3d(random.uniform(-10.0, 10.0),
+                                              random.uniform(-10.0, 10.0), random.uniform(-2, 8))
+                                  .cast<float>());
+  }
+  return features;
+}
+
+// A map with one keyframe at the origin.
+struct Begun {
+  explicit Begun(const KeyframeMap::Config& config) : map(config, folder.path(), times, log) {
+    map.start();
+    (void)map.add(TimeNs{0}, {}, some_points());
+  }
+
+  test::TemporaryFolder folder;
+  StageTimes times;
+  Log log;
+  KeyframeMap map;
+};
+
+KeyframeOffer at(double x) {
+  return {.world_from_body = Pose(Eigen::Quaterniond::Identity(), {x, 0.0, 0.0})};
+}
+
+TEST(KeyframeChoice, TheFirstScanIsOneHoweverItMatched) {
+  KeyframeMap::Config config;
+  config.keyframe.max_fitness_m2 = 0.01;
+  const test::TemporaryFolder folder;
+  StageTimes times;
+  Log log;
+  KeyframeMap map(config, folder.path(), times, log);
+  map.start();
+  KeyframeOffer offer = at(0.0);
+  offer.fitness_m2 = 1.0;
+  EXPECT_TRUE(map.wants(offer));
+}
+
+TEST(KeyframeChoice, DistanceAloneDecidesByDefault) {
+  const Begun begun({});
+  KeyframeOffer offer = at(0.4);
+  offer.fitness_m2 = 50.0;
+  offer.found_share = 0.1;
+  EXPECT_FALSE(begun.map.wants(offer));
+  offer.world_from_body = at(0.6).world_from_body;
+  EXPECT_TRUE(begun.map.wants(offer));
+}
+
+TEST(KeyframeChoice, AScanThatTheMapExplainsBadlyBecomesOneWhereAsked) {
+  KeyframeMap::Config config;
+  config.keyframe.above_fitness_m2 = 0.04;
+  config.keyframe.below_found_share = 0.75;
+  const Begun begun(config);
+  KeyframeOffer offer = at(0.1);
+  offer.fitness_m2 = 0.03;
+  EXPECT_FALSE(begun.map.wants(offer));
+  offer.fitness_m2 = 0.05;
+  EXPECT_TRUE(begun.map.wants(offer));
+  offer.fitness_m2 = 0.0;
+  offer.found_share = 0.7;
+  EXPECT_TRUE(begun.map.wants(offer));
+}
+
+TEST(KeyframeChoice, ABadMatchBecomesNoneWhereAsked) {
+  KeyframeMap::Config config;
+  config.keyframe.max_fitness_m2 = 0.04;
+  const Begun begun(config);
+  KeyframeOffer offer = at(2.0);
+  offer.fitness_m2 = 0.05;
+  EXPECT_FALSE(begun.map.wants(offer));
+  offer.fitness_m2 = 0.03;
+  EXPECT_TRUE(begun.map.wants(offer));
+}
+
+// The match left one direction open: there the edge is weak, and nowhere else.
+TEST(KeyframeEdges, AreWeakWhereTheMatchKnewNothing) {
+  Begun begun({});
+  (void)begun.map.add(TimeNs{1}, at(1.0), some_points());
+  KeyframeOffer open = at(2.0);
+  open.covariance(4, 4) = 0.25;
+  (void)begun.map.add(TimeNs{2}, open, some_points());
+  const std::vector<PoseEdge> edges = begun.map.graph().odometry;
+  ASSERT_EQ(edges.size(), 2U);
+  Matrix6d added = edges[1].covariance - edges[0].covariance;
+  EXPECT_NEAR(added(4, 4), 0.25, 1e-12);
+  added(4, 4) = 0.0;
+  EXPECT_LT(added.cwiseAbs().maxCoeff(), 1e-12);
+}
+
+}  // namespace
+}  // namespace understory
