@@ -50,6 +50,7 @@ inline constexpr double kThinnest = 3.0;
 inline constexpr double kThinnestShare = 0.02;
 // degrees: no ground of a level cloud slopes more; hardly any forest stands on more than 45
 // [bound: forests]
+inline constexpr double kSteepestDeg = 50.0;
 // degrees between z and the direction of the stems: less may be a slope's stand [real clouds,
 // docs/method/forest.md]
 inline constexpr double kLeastLeanDeg = 12.0;
