@@ -38,7 +38,8 @@ TEST(SeenGround, StemsBeyondItDoNotCarryTheTerrain) {
   for (int row = 0; row < 40; ++row) {
     for (int column = 35; column < 60; ++column) {
       float& z = raster.values[raster.index(column, row)];
-      z = (row + column) % 3 == 0 && column > 37 ? z + 0.1F * static_cast<float>(column - 33) : kNan;
+      z = (row + column) % 3 == 0 && column > 37 ? z + 0.1F * static_cast<float>(column - 33)
+                                                 : kNan;
     }
   }
   drop_unseen_ground(raster);
