@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # lock-python.sh: writes the exact versions and hashes of the Python packages that tests and benchmarks
 # compare with, one file for each list and each Python of a Debian release. Versions stay as they are
-# where they can; --upgrade takes the newest. A list of benchmarks/peers/newcomers has no file for a
+# where they can; --upgrade takes the newest. A list of benchmarks/peers has no file for a
 # Python that its peer has no wheel for.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -10,7 +10,7 @@ room=$(mktemp -d)
 trap 'rm -rf "$room"' EXIT
 python3 -m venv "$room/env"
 "$room/env/bin/python" -m pip install -q --disable-pip-version-check uv
-for list in benchmarks/peers/newcomers/*.txt tests/recording/hands.txt; do
+for list in benchmarks/peers/newcomers/*.txt benchmarks/peers/inventory/*.txt tests/recording/hands.txt; do
   for version in 3.11 3.13; do
     say "locking $list for Python $version"
     # glibc 2.36 is that of Debian 12.

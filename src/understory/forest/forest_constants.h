@@ -137,6 +137,29 @@ inline constexpr float kStrayDepth = 0.8F;
 inline constexpr double kBumpCells = 0.3;
 }  // namespace ground
 
+namespace seen_ground {  // forest/ground/seen_ground.cc
+// Cells to each side whose share tells whether ground was seen [tuned on random seeds 4, 9, 16]
+inline constexpr int kShareReach = 3;
+// Of the median share: cells with more are ground [tuned on random seeds 4, 9, 16]
+inline constexpr float kSureShare = 0.8F;
+// Cells to each side that the plane under a cell is laid through [tuned on random seeds 4, 9, 16]
+inline constexpr int kPlaneReach = 4;
+// Cells of ground that make a plane [chosen]
+inline constexpr double kLeastCells = 8.0;
+// Square cells: the plane's gradient is drawn to the wide one as by so much variance [chosen]
+inline constexpr double kPlaneRidge = 4.0;
+// Cells to each side that the wide gradient is taken from [chosen]
+inline constexpr int kSlopeReach = 16;
+// Square cells: the wide gradient is drawn to level ground as by so much variance [chosen]
+inline constexpr double kSlopeRidge = 2.0;
+// m: ground lies at most so far above the plane [tuned on random seeds 4, 9, 16]
+inline constexpr double kAbove = 0.15;
+// m more per metre from the nearest ground [tuned on random seeds 4, 9, 16]
+inline constexpr double kAbovePerMetre = 0.05;
+// Steps of two cells that ground grows outwards [bound: time]
+inline constexpr int kMostRounds = 60;
+}  // namespace seen_ground
+
 namespace low_noise {  // forest/ground/low_noise.cc
 // m: edge of a cell whose layers are counted [chosen]
 inline constexpr double kCell = 2.0;

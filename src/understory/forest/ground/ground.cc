@@ -9,6 +9,7 @@
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/ground/cloth.h"
 #include "understory/forest/ground/low_noise.h"
+#include "understory/forest/ground/seen_ground.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -264,6 +265,7 @@ GroundModel estimate_ground(const PointBlocks& unasked, const GroundConfig& conf
   }
   drop_bumps(terrain, static_cast<float>(kBumpCells * config.cell_m));
   drop_bumps(terrain, static_cast<float>(kBumpCells * config.cell_m));
+  drop_unseen_ground(terrain);
   fill_gaps(terrain, static_cast<int>(std::ceil(config.max_gap_m / config.cell_m)));
   model.measured_share = refine(cloud, config, terrain);
   return model;
