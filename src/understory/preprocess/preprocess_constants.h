@@ -37,7 +37,7 @@ inline constexpr double kDropM = 0.35;
 inline constexpr double kSteep = 0.25;
 }  // namespace carried_returns
 
-namespace event_orderer {  // preprocess/event_orderer.cc
+namespace event_orderer {  // preprocess/streams/event_orderer.cc
 // Messages of a stream while no other has any: it cannot be compared then [not recorded]
 inline constexpr std::size_t kMostSuspects = 1000;
 // Scans of the lidar while no other stream has a message: the same [not recorded]

@@ -3,7 +3,7 @@
 #include "understory/odometry/motion/motion_model.h"
 #include "understory/pipeline/judgement/imu_usage.h"
 #include "understory/pipeline/judgement/run_evidence.h"
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 

@@ -15,7 +15,7 @@
 #include "understory/pipeline/mapping/run_facts.h"
 #include "understory/pipeline/mapping/run_state.h"
 #include "understory/pipeline/source.h"
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 
 namespace understory {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 
 namespace understory {
 

@@ -11,7 +11,7 @@
 #include "understory/pipeline/run_folder/checkpoint.h"
 #include "understory/pipeline/run_folder/resumable.h"
 #include "understory/pipeline/run_folder/run_folder.h"
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 
 namespace understory {
 

@@ -14,7 +14,7 @@
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/run_folder/checkpoint.h"
 #include "understory/preprocess/carried_returns.h"
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 #include "understory/recording/messages/event_bytes.h"
 #include "understory/recording/messages/fix_joiner.h"
 #include "understory/recording/messages/topic_statistics.h"

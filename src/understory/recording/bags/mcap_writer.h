@@ -43,7 +43,7 @@ class McapWriter {
 
   void write(const Event& event);  // a fix goes to /gnss/quality and /gnss
   // `log_time`: when the event was recorded, where a recording is copied. The order of arrival
-  // tells how the clocks of the sensors run (preprocess/stream_offset.h).
+  // tells how the clocks of the sensors run (preprocess/streams/stream_offset.h).
   void write(const Event& event, TimeNs log_time);
 
   // A scan of a second lidar, on /lidar_2 in the frame lidar_2; the rig has its place.

@@ -1,8 +1,8 @@
-#include "understory/preprocess/event_content.h"
+#include "understory/preprocess/streams/event_content.h"
 
 #include <gtest/gtest.h>
 
-#include "understory/preprocess/test_streams.h"
+#include "understory/preprocess/streams/test_streams.h"
 
 namespace understory {
 namespace {

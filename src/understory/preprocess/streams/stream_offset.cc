@@ -1,4 +1,4 @@
-#include "understory/preprocess/stream_offset.h"
+#include "understory/preprocess/streams/stream_offset.h"
 
 #include <algorithm>
 #include <cstdlib>

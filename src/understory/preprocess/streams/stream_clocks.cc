@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "understory/preprocess/event_orderer.h"
-#include "understory/preprocess/event_stamp.h"
+#include "understory/preprocess/streams/event_orderer.h"
+#include "understory/preprocess/streams/event_stamp.h"
 
 // EventOrderer: constant offsets between the clocks of streams.
 namespace understory {

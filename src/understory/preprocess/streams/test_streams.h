@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 
 namespace understory {
 

@@ -1,4 +1,4 @@
-#include "understory/preprocess/event_content.h"
+#include "understory/preprocess/streams/event_content.h"
 
 #include <bit>
 #include <initializer_list>

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "understory/preprocess/event_orderer.h"
-#include "understory/preprocess/test_streams.h"
+#include "understory/preprocess/streams/event_orderer.h"
+#include "understory/preprocess/streams/test_streams.h"
 
 namespace understory {
 namespace {

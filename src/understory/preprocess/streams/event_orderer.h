@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/preprocess/stream_offset.h"
+#include "understory/preprocess/streams/stream_offset.h"
 #include "understory/recording/recording.h"
 #include "understory/util/config/config.h"
 #include "understory/util/files/binary_io.h"

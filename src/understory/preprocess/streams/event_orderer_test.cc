@@ -1,11 +1,11 @@
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
 
-#include "understory/preprocess/test_streams.h"
+#include "understory/preprocess/streams/test_streams.h"
 #include "understory/util/random.h"
 
 namespace understory {

@@ -1,12 +1,12 @@
-#include "understory/preprocess/event_orderer.h"
+#include "understory/preprocess/streams/event_orderer.h"
 
 #include <algorithm>
 #include <cstdlib>
 #include <tuple>
 
-#include "understory/preprocess/event_content.h"
-#include "understory/preprocess/event_stamp.h"
 #include "understory/preprocess/preprocess_constants.h"
+#include "understory/preprocess/streams/event_content.h"
+#include "understory/preprocess/streams/event_stamp.h"
 #include "understory/recording/messages/event_bytes.h"
 #include "understory/util/error.h"
 
