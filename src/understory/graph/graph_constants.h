@@ -80,6 +80,9 @@ inline constexpr double kStepShiftShare = 0.01;
 namespace stem_loops {  // graph/loops/stem_loops.cc
 // L0: stems of neighbouring views nearer than that are one [chosen]
 inline constexpr double kMergeL0 = 0.2;
+// Of the views around that lie near enough to see a stem: fewer see what is none [tuned on the
+// spoilt copies of Wild-Places V-03]
+inline constexpr double kSeenShare = 0.25;
 // views around a place, to each side, among which the nearest one is looked for [chosen]
 inline constexpr int kNeighbourhood = 30;
 // Factor on the covariance of ICP [not recorded]

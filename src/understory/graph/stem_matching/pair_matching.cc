@@ -136,7 +136,7 @@ SparsePoints gather_views(const std::vector<SparsePoints>& views,
   const Pose centre_from_world = world_from_view[at(centre)].inverse();
   SparsePoints sums;
   std::vector<int> sights;
-  int gathered = 0;
+  SparsePoints places;  // of the views
   const int begin = centre - (centre - first) / stride * stride;
   for (int k = begin; k <= last; k += stride) {
     const Pose centre_from_view = centre_from_world * world_from_view[at(k)];
@@ -159,12 +159,18 @@ SparsePoints gather_views(const std::vector<SparsePoints>& views,
         ++sights[at(found.index)];
       }
     }
-    ++gathered;
+    places.push_back(centre_from_view.translation());
   }
   SparsePoints result;
   for (std::size_t t = 0; t < sums.size(); ++t) {
-    if (gathered >= 3 && sights[t] < 2) continue;
-    result.push_back(sums[t] / sights[t]);
+    const Eigen::Vector3d mean = sums[t] / sights[t];
+    const auto near =
+        std::count_if(places.begin(), places.end(), [&](const Eigen::Vector3d& place) {
+          return (mean - place).head<2>().norm() <= gathering.radius_m;
+        });
+    if (places.size() >= 3 && sights[t] < 2) continue;
+    if (sights[t] < gathering.least_share * static_cast<double>(near)) continue;
+    result.push_back(mean);
   }
   return result;
 }

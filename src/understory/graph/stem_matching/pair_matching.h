@@ -43,6 +43,8 @@ struct Gathering {
   int max_views = 0;      // to each side, evenly over the reach
   double merge_m = 0.0;   // stems of different views nearer than that are one
   double radius_m = 0.0;  // in the plane, of the stems that are kept; 0: all
+  // Of the views within `radius_m` of a stem, so many see it, 0..1: what fewer see is no stem.
+  double least_share = 0.0;
 };
 
 // Views around one, laid together in its frame by their poses: stems seen in several views are
