@@ -206,7 +206,7 @@ TEST(Report, TellsWhatTheDistanceOfMatchedPointsIs) {
     scan.fitness_m2 = 0.04F;
   input.map_cell_m = 0.5;
   EXPECT_NE(report_html(input).find("mean place for each cube of 50 cm"), std::string::npos);
-  EXPECT_NE(report_html(input).find("16 to 23 cm are usual"), std::string::npos);
+  EXPECT_NE(report_html(input).find("Usual are 16 to 23 cm"), std::string::npos);
   input.map_cell_m = 0.0;
   EXPECT_NE(report_html(input).find("from the nearest surface of the map"), std::string::npos);
   EXPECT_EQ(report_html(input).find("for each cube"), std::string::npos);
