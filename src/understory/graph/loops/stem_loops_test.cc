@@ -113,6 +113,27 @@ TEST(StemLoops, FindsTheWayBackWhereViewsFaceOppositeWays) {
   EXPECT_LE(loops_of_the_way_back(walk, alone).verified, 5);
 }
 
+// Adds points that are no stems, other ones in each view.
+void clutter(Walk& walk) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (SparsePoints& view : walk.views) {
+    const std::size_t stems = view.size();
+    for (std::size_t i = 0; i < stems; ++i) {
+      const double range = 25.0 * std::sqrt(unit(random));
+      const double angle = 2.0 * M_PI * unit(random);
+      view.emplace_back(range * std::cos(angle), range * std::sin(angle), 0.0);
+    }
+  }
+}
+
+// Over many views such points lie near each other by chance: two sights make no stem.
+TEST(StemLoops, FindsTheWayBackAmongMuchThatIsNoStem) {
+  Walk walk = walk_there_and_back(60);
+  clutter(walk);
+  EXPECT_GE(loops_of_the_way_back(walk, {}).verified, 40);
+}
+
 // Where the odometry errs, the motion within what was laid together is as wrong: the covariance
 // grows with it.
 TEST(StemLoops, WhatIsLaidTogetherCarriesTheErrorsOfTheSteps) {
