@@ -265,8 +265,15 @@ GroundModel estimate_ground(const PointBlocks& unasked, const GroundConfig& conf
   }
   drop_bumps(terrain, static_cast<float>(kBumpCells * config.cell_m));
   drop_bumps(terrain, static_cast<float>(kBumpCells * config.cell_m));
+  const int gap = static_cast<int>(std::ceil(config.max_gap_m / config.cell_m));
+  Raster reached = terrain;
+  fill_gaps(reached, gap);
   drop_unseen_ground(terrain);
-  fill_gaps(terrain, static_cast<int>(std::ceil(config.max_gap_m / config.cell_m)));
+  // What was dropped leaves no hole: terrain reaches as far as with it.
+  fill_gaps(terrain, kDroppedGaps * gap);
+  for (std::size_t i = 0; i < terrain.values.size(); ++i) {
+    if (std::isnan(reached.values[i])) terrain.values[i] = kNan;
+  }
   model.measured_share = refine(cloud, config, terrain);
   return model;
 }
