@@ -135,8 +135,6 @@ inline constexpr float kNear = 0.4F;
 inline constexpr float kStrayDepth = 0.8F;
 // Cells: a touched place that sticks out by more is no ground [not recorded]
 inline constexpr double kBumpCells = 0.3;
-// GroundConfig::max_gap_m: how far terrain is filled in where ground was dropped [chosen]
-inline constexpr int kDroppedGaps = 4;
 }  // namespace ground
 
 namespace seen_ground {  // forest/ground/seen_ground.cc

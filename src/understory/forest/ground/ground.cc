@@ -80,10 +80,40 @@ std::vector<float> floor_heights(const Raster& grid, const std::vector<LowCell>&
   return result;
 }
 
-// Heights of unknown cells from the known ones around, ring by ring up to `rings` cells away: the
+// 1 for the cells at most `rings` cells away from a known one, also across corners.
+std::vector<char> cells_around_known(const Raster& grid, int rings) {
+  std::vector<char> beside(grid.values.size(), 0);
+  std::vector<char> around(grid.values.size(), 0);
+  // Along a line of cells: marks those that have a marked one so near before or behind them.
+  const auto spread = [rings](int count, const auto& marked, const auto& mark) {
+    for (const int step : {1, -1}) {
+      int since = rings + 1;
+      for (int i = step > 0 ? 0 : count - 1; i >= 0 && i < count; i += step) {
+        since = marked(i) ? 0 : since + 1;
+        if (since <= rings) mark(i);
+      }
+    }
+  };
+  for (int row = 0; row < grid.rows; ++row) {
+    spread(
+        grid.columns,
+        [&](int column) { return std::isfinite(grid.values[grid.index(column, row)]); },
+        [&](int column) { beside[grid.index(column, row)] = 1; });
+  }
+  for (int column = 0; column < grid.columns; ++column) {
+    spread(
+        grid.rows, [&](int row) { return beside[grid.index(column, row)] != 0; },
+        [&](int row) { around[grid.index(column, row)] = 1; });
+  }
+  return around;
+}
+
+// Heights of the `wanted` cells from the known ones around, ring by ring until none is left: the
 // mean of a plane's worth of neighbours weighted by distance. Then a light smoothing of the filled
-// cells only.
-void fill_gaps(Raster& grid, int rings) {
+// cells only, for gaps of `rings` cells. `no_higher`: the lowest return of cells that have no
+// ground, NaN elsewhere.
+void fill_gaps(Raster& grid, int rings, const std::vector<char>& wanted,
+               const std::vector<float>& no_higher) {
   std::vector<char> known(grid.values.size());
   for (std::size_t i = 0; i < known.size(); ++i)
     known[i] = std::isfinite(grid.values[i]) ? 1 : 0;
@@ -109,16 +139,26 @@ void fill_gaps(Raster& grid, int rings) {
       const int row = static_cast<int>(r);
       for (int column = 0; column < grid.columns; ++column) {
         const std::size_t i = grid.index(column, row);
-        if (known[i] != 0 || (!only_unknown && filled[i] == 0)) continue;
+        if (wanted[i] == 0 || known[i] != 0 || (!only_unknown && filled[i] == 0)) continue;
         if (only_unknown && std::isfinite(grid.values[i])) continue;
         next[i] = mean_around(column, row);
+        if (next[i] > no_higher[i]) next[i] = no_higher[i];  // not where either is unknown
         if (std::isfinite(next[i])) filled[i] = 1;
       }
     });
     grid.values = next;
   };
-  for (int ring = 0; ring < rings; ++ring)
+  const auto left = [&] {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < wanted.size(); ++i)
+      count += wanted[i] != 0 && !std::isfinite(grid.values[i]) ? 1 : 0;
+    return count;
+  };
+  for (std::size_t before = left(), now = 0; before > 0; before = now) {
     sweep(true);
+    now = left();
+    if (now == before) break;
+  }
   for (int i = 0; i < 4 * rings; ++i)
     sweep(false);
 }
@@ -265,15 +305,15 @@ GroundModel estimate_ground(const PointBlocks& unasked, const GroundConfig& conf
   }
   drop_bumps(terrain, static_cast<float>(kBumpCells * config.cell_m));
   drop_bumps(terrain, static_cast<float>(kBumpCells * config.cell_m));
+  // What is dropped leaves no hole: terrain reaches as far as with it.
   const int gap = static_cast<int>(std::ceil(config.max_gap_m / config.cell_m));
-  Raster reached = terrain;
-  fill_gaps(reached, gap);
+  const std::vector<char> reached = cells_around_known(terrain, gap);
+  std::vector<float> dropped = terrain.values;
   drop_unseen_ground(terrain);
-  // What was dropped leaves no hole: terrain reaches as far as with it.
-  fill_gaps(terrain, kDroppedGaps * gap);
-  for (std::size_t i = 0; i < terrain.values.size(); ++i) {
-    if (std::isnan(reached.values[i])) terrain.values[i] = kNan;
+  for (std::size_t i = 0; i < dropped.size(); ++i) {
+    if (std::isfinite(terrain.values[i])) dropped[i] = kNan;
   }
+  fill_gaps(terrain, gap, reached, dropped);
   model.measured_share = refine(cloud, config, terrain);
   return model;
 }

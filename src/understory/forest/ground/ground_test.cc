@@ -83,5 +83,35 @@ TEST(Ground, NothingIsInventedFarFromTheGround) {
   EXPECT_TRUE(std::isnan(estimate_ground(blocks_of({}), {}).height_above({0.0, 0.0, 0.0})));
 }
 
+// Ground to x = 30 m. Behind it only stems are seen, whose lowest points rise above the ground.
+TestPlot stems_behind_an_edge(double slope_x) {
+  TestPlot plot(6);
+  plot.slope_x = slope_x;
+  plot.add_ground(30.0, 40);
+  for (double x = 31.0; x < 60.0; x += 1.5) {
+    for (double y = 0.5; y < 30.0; y += 1.5)
+      plot.cloud.emplace_back(x, y, plot.ground(x, y) + 0.25 * (x - 29.0));
+  }
+  return plot;
+}
+
+TEST(Ground, DoesNotRiseToStemsBehindAnEdge) {
+  const TestPlot plot = stems_behind_an_edge(0.0);
+  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
+  for (double x = 31.0; x < 59.0; x += 1.0)
+    EXPECT_NEAR(model.terrain.interpolate(x, 15.0), plot.ground(x, 15.0), 0.5) << x;
+}
+
+// Filled in level, the terrain would lie above them.
+TEST(Ground, HasNoHoleBehindAnEdgeAndLiesBelowAllThatIsSeen) {
+  const TestPlot plot = stems_behind_an_edge(-0.3);
+  const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
+  for (double x = 31.0; x < 59.0; x += 1.0) {
+    const double z = model.terrain.interpolate(x, 15.0);
+    ASSERT_TRUE(std::isfinite(z)) << x;
+    EXPECT_LT(z, plot.ground(x, 15.0) + 0.25 * (x - 29.0) + 0.2) << x;
+  }
+}
+
 }  // namespace
 }  // namespace understory
