@@ -21,31 +21,22 @@ std::optional<ClockCheckResult> checked(const SimulatedWalk& walk,
   LidarImuClockCheck check = fresh;
   Random tilting(17, 0);
   const Eigen::Quaterniond lidar_from_imu = walk.lidar_from_imu.rotation() * turned;
-  const auto samples =
-      walk.imu.samples(walk.world_from_lidar.front().stamp, walk.world_from_lidar.back().stamp);
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < walk.world_from_lidar.size(); ++i) {
-    const StampedPose& pose = walk.world_from_lidar[i];
-    for (; next < samples.size() && samples[next].stamp <= pose.stamp; ++next) {
-      ImuSample sample;
-      sample.stamp = samples[next].stamp;
-      sample.angular_rate = samples[next].angular_rate();
-      sample.specific_force = samples[next].specific_force();
-      check.add_sample(sample);
-    }
+  const auto on_scan = [&](std::size_t i, const StampedPose& pose) {
     // Stems hardly tell the tilt.
     const double degrees = about_up ? 1.0 : 0.0;
     const Eigen::Vector3d tilt(tilting.normal(), tilting.normal(), 0.0);
     check.add_scan(pose.stamp, pose.stamp,
                    so3_exp(degrees * kDegree * tilt) * pose.world_from_body.rotation(),
                    lidar_from_imu);
-    if (i + 1 != save_at) continue;
+    if (i + 1 != save_at) return;
     BinaryWriter writer;
     check.save(writer);
     BinaryReader reader(writer.bytes(), "saved");
     check = fresh;
     check.load(reader);
-  }
+  };
+  replay(
+      walk, [&](const ImuSample& sample) { check.add_sample(sample); }, on_scan);
   return check.result();
 }
 

@@ -68,8 +68,12 @@ void OnlineImuCalibration::add_scan(const StampedPose& world_from_body_at_middle
                                     const Pose& given) {
   given_ = given;
   window_.push_back(world_from_body_at_middle);
-  if (to_seconds(window_.back().stamp - window_.front().stamp) >= kFitWindowS + kMarginS)
-    end_window();
+  const auto is_long = [this] {
+    return !window_.empty() &&
+           to_seconds(window_.back().stamp - window_.front().stamp) >= kFitWindowS + kMarginS;
+  };
+  if (is_long()) end_window();
+  if (is_long()) window_.clear();  // an IMU that has stopped
 }
 
 void OnlineImuCalibration::move_world(const Pose& new_world_from_old_world) {

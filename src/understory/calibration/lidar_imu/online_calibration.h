@@ -19,8 +19,8 @@ struct OnlineImuEstimate {
   Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
   double duration_s = 0.0;  // of the path in the windows
   std::size_t windows = 0;  // that told something
-  // Whether lateness, rotation or place are so far from what is given that chance does not explain
-  // it (three standard deviations in a direction) and that it matters (0.5 ms, 0.05 degrees, 1 cm).
+  // Whether lateness, rotation or place differ from what is given. Chance does not explain it: they
+  // are three standard deviations off in a direction. It matters: 0.5 ms, 0.05 degrees or 1 cm.
   bool differs = false;
 };
 

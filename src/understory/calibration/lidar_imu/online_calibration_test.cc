@@ -16,33 +16,42 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 OnlineImuCalibration over(const SimulatedWalk& walk, const Pose& given, std::size_t save_at = 0,
                           std::size_t break_at = 0) {
   OnlineImuCalibration online;
-  const auto samples =
-      walk.imu.samples(walk.world_from_lidar.front().stamp, walk.world_from_lidar.back().stamp);
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < walk.world_from_lidar.size(); ++i) {
-    const StampedPose& pose = walk.world_from_lidar[i];
-    for (; next < samples.size() && samples[next].stamp <= pose.stamp; ++next) {
-      ImuSample sample;
-      sample.stamp = samples[next].stamp;
-      sample.angular_rate = samples[next].angular_rate();
-      sample.specific_force = samples[next].specific_force();
-      online.add_sample(sample);
-    }
+  const auto on_scan = [&](std::size_t i, const StampedPose& pose) {
     online.add_scan(pose, given);
     if (i + 1 == break_at) online.break_off();
-    if (i + 1 != save_at) continue;
+    if (i + 1 != save_at) return;
     BinaryWriter writer;
     online.save(writer);
     BinaryReader reader(writer.bytes(), "saved");
     online = OnlineImuCalibration();
     online.load(reader);
-  }
+  };
+  replay(
+      walk, [&](const ImuSample& sample) { online.add_sample(sample); }, on_scan);
   return online;
 }
 
 Pose put_wrong(const Pose& truth, double turn_deg, double shift_m) {
   return Pose(truth.rotation() * so3_exp(turn_deg * kDegree * Eigen::Vector3d(0.6, -0.64, 0.48)),
               truth.translation() + shift_m * Eigen::Vector3d(0.8, 0.0, -0.6));
+}
+
+// The poses that wait for samples must not grow with the run.
+TEST(OnlineImuCalibration, AnImuThatStopsLeavesNoMoreThanAWindow) {
+  OnlineImuCalibration online;
+  const auto size_after = [&](int first, int last) {
+    for (int i = first; i < last; ++i) {
+      StampedPose pose;
+      pose.stamp = from_seconds(0.1 * i);
+      online.add_scan(pose, Pose());
+    }
+    BinaryWriter writer;
+    online.save(writer);
+    return writer.bytes().size();
+  };
+  const std::size_t a_window = size_after(0, 200);
+  EXPECT_LE(size_after(200, 5000), 2 * a_window);
+  EXPECT_FALSE(online.finished());
 }
 
 TEST(OnlineImuCalibration, FindsClockAndPlaceThatAreWrong) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -78,6 +79,25 @@ inline SimulatedWalk simulated_walk(int seed, double duration_s, double late_s,
     walk.world_from_lidar.push_back({from_seconds(t), estimate * noise});
   }
   return walk;
+}
+
+// Calls on_sample(ImuSample) and on_scan(number of the scan, its pose) in the order of a recording.
+template <typename OnSample, typename OnScan>
+void replay(const SimulatedWalk& walk, const OnSample& on_sample, const OnScan& on_scan) {
+  const auto samples =
+      walk.imu.samples(walk.world_from_lidar.front().stamp, walk.world_from_lidar.back().stamp);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < walk.world_from_lidar.size(); ++i) {
+    const StampedPose& pose = walk.world_from_lidar[i];
+    for (; next < samples.size() && samples[next].stamp <= pose.stamp; ++next) {
+      ImuSample sample;
+      sample.stamp = samples[next].stamp;
+      sample.angular_rate = samples[next].angular_rate();
+      sample.specific_force = samples[next].specific_force();
+      on_sample(sample);
+    }
+    on_scan(i, pose);
+  }
 }
 
 }  // namespace understory
