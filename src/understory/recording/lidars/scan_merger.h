@@ -14,9 +14,9 @@ namespace understory {
 
 // Cuts the points of several lidars into common scans. Each lidar turns at its own rate. A common
 // scan begins where a scan of the first lidar does. While that is silent, scans follow each other
-// after the same time as before. A common scan holds all points of its time, in the frame of the
-// first lidar, in order of time where each lidar gives them so. Rings of lidar i count from i
-// times kRingsALidar. Not thread-safe.
+// after the same time as before. A common scan holds all points of its time in the frame of the
+// first lidar. They are in order of time where each lidar gives them so. Rings of lidar i count
+// from i times kRingsALidar. Not thread-safe.
 class ScanMerger {
  public:
   explicit ScanMerger(std::size_t lidars) : lidars_(lidars) {}
