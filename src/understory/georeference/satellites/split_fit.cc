@@ -86,7 +86,7 @@ NoisyTimes stated(const std::vector<SatellitePair>& pairs, bool plane, double mo
 }
 
 // The residual of each pair that lies far off the others, both as it is and over what the receiver
-// states of it; 0 for the others.
+// states. 0 for the others.
 VectorXd far_off_m(const VectorXd& off_m, const VectorXd& scale, double median) {
   const VectorXd relative = off_m.cwiseQuotient(scale);
   const auto sd_of = [&](const VectorXd& all) {

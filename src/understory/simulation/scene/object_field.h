@@ -36,8 +36,8 @@ class ObjectField {
     bool present;
   };
 
-  // The boxes of the first parts of an object's tree in the world, as those of a node: what meets
-  // none of them need not be turned into the shape's frame.
+  // The boxes of the first parts of an object's tree in the world, as those of a node. A ray that
+  // meets none of them need not be turned into the shape's frame.
   struct Parts {
     std::array<std::array<float, kLanes>, 6> planes;
   };

@@ -13,8 +13,8 @@
 // thing lies within [near, range], notes its number there and says whether it did.
 namespace understory {
 
-// What rays met so far, ray by ray: the range (at first the limit), and as bits the numbers of the
-// primitive and of the object.
+// What rays met so far, ray by ray: the range, which is at first the limit. As bits, also the
+// numbers of the primitive and of the object.
 struct Struck {
   Lanes range;
   Lanes primitive;
@@ -147,10 +147,10 @@ struct RoundCone {
   float cosine2 = 1.0F;
 
  private:
-  // A line enters a convex body once: where it first enters one of the balls or, between their
-  // circles, the cone; and leaves it where it last leaves one of these. With a = height along the
-  // axis above the foot, r = foot_radius, s = sine and c = cosine of half the cone's angle, the
-  // cone is where c^2 (|w|^2 - a^2) = (r - a s)^2 for places w from the foot.
+  // A line enters a convex body once, where it first enters one of the balls or, between their
+  // circles, the cone. It leaves where it last leaves one of these. With a = height along the axis
+  // above the foot, r = foot_radius, s = sine and c = cosine of half the cone's angle, for places w
+  // from the foot: the cone is where c^2 (|w|^2 - a^2) = (r - a s)^2.
   template <bool kEnter>
   [[nodiscard]] Lanes pass(const RayLanes& rays) const {
     const Lanes3& d = rays.direction;

@@ -96,8 +96,8 @@ TEST(FatRay, MeetsEveryBoxThatOneOfItsRaysMeets) {
   EXPECT_LT(met, 300U * 400U);  // it does leave out most of them
 }
 
-// A place's distance outside of the convex hull of two balls, in twice the digits: least over the
-// balls between, along which it has one minimum.
+// A place's distance outside of the convex hull of two balls, in twice the digits. It is the least
+// over the balls between, along which it has one minimum.
 double outside(const RoundCone& cone, const Eigen::Vector3d& place) {
   const auto off = [&](double u) {
     const Eigen::Vector3d centre =

@@ -12,7 +12,7 @@ namespace understory {
 namespace {
 
 // Time constants of the parts of the bias instability, and the standard deviation of each for an
-// instability of 1: together they give an Allan deviation of 0.664 (within 3 % from 3 to 300 s).
+// instability of 1. Together they give an Allan deviation of 0.664 (within 3 % from 3 to 300 s).
 constexpr double kFlickerSeconds[] = {2.0, 20.0, 200.0, 2000.0};
 constexpr double kFlickerShare = 0.882;
 
@@ -128,8 +128,8 @@ Eigen::Vector3d InertialSensor::overtones(double time_s) const {
   return sum;
 }
 
-// What is left of the blows of the last half second: ringing of the frame at some tens of hertz, in
-// a direction of its own each time.
+// What is left of the blows of the last half second. The frame rings at some tens of hertz, in a
+// direction of its own each time.
 void InertialSensor::shake(double time_s, ImuSample& sample) const {
   const auto after = std::upper_bound(shocks_s_.begin(), shocks_s_.end(), time_s);
   for (auto shock = after; shock != shocks_s_.begin();) {

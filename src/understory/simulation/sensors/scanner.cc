@@ -320,7 +320,7 @@ void Scanner::cast_block(double moment_s, Block& block) const {
   block.let_go_of_rays();
 }
 
-// Readings that nothing stands for: glaring echoes repeat in the beam's neighbours of the firings
+// Readings that nothing stands for. Glaring echoes repeat in the beam's neighbours of the firings
 // before and after (within a group), and other sensors' pulses give any range.
 void Scanner::add_ghosts(Block& block) const {
   const std::size_t beams = model_.beams.size();
