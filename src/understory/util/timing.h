@@ -34,8 +34,8 @@ struct Distribution {
 [[nodiscard]] Distribution distribution_of(std::vector<double> values);
 
 // Wall and CPU milliseconds of each run of each named stage. Thread-safe. Values are kept as
-// floats: memory does not grow over a working day because each stage keeps at most 65,536 of them,
-// thinned evenly once it is full.
+// floats. Memory does not grow over a working day: each stage keeps at most 65,536 of them, thinned
+// evenly once it is full.
 class StageTimes {
  public:
   struct Sample {
@@ -58,8 +58,8 @@ class StageTimes {
   std::map<std::string, Series> series_;
 };
 
-// CPU time of work that runs beside the scan loop on a thread of its own, counted while it runs:
-// what the process used less this is what the loop used. One thread at a time may work; any may
+// CPU time of work that runs beside the scan loop on a thread of its own, counted while it runs.
+// What the process used less this is what the loop used. One thread at a time may work; any may
 // read.
 class SideWork {
  public:

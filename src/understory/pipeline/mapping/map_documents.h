@@ -8,8 +8,9 @@
 
 namespace understory {
 
-// run.json and report.html of a run of `understory map`, with what both front ends share:
-// configuration, inputs, title, and how far it kept up with its sensors. `times` must outlive it.
+// run.json and report.html of a run of `understory map`, with what both front ends share. That is
+// configuration, inputs, title, and how far the run kept up with its sensors. `times` must outlive
+// it.
 [[nodiscard]] RunDocuments map_documents(const ReadRecording& recording, const StageTimes& times);
 
 // Figures of the check of the IMU's clock, and a warning where clock or axes seem to be others than

@@ -149,8 +149,8 @@ struct RoundCone {
  private:
   // A line enters a convex body once, where it first enters one of the balls or, between their
   // circles, the cone. It leaves where it last leaves one of these. With a = height along the axis
-  // above the foot, r = foot_radius, s = sine and c = cosine of half the cone's angle, for places w
-  // from the foot: the cone is where c^2 (|w|^2 - a^2) = (r - a s)^2.
+  // above the foot, r = foot_radius, s = sine and c = cosine of half the cone's angle. Places w
+  // from the foot lie on the cone where c^2 (|w|^2 - a^2) = (r - a s)^2.
   template <bool kEnter>
   [[nodiscard]] Lanes pass(const RayLanes& rays) const {
     const Lanes3& d = rays.direction;

@@ -8,9 +8,9 @@
 namespace understory {
 
 // What of a stem is not round: an oval and lobed section that turns slowly with height, swellings
-// at branches, and the relief of its bark. It depends on the place on the bark alone and has the
-// mean zero around and along the stem. So the mean diameter (girth / pi) is the tree's. A value
-// type; calls are thread-safe.
+// at branches, and bark. It depends on the place on the bark alone and has the mean zero around and
+// along the stem. So the mean diameter (girth / pi) is the tree's. A value type; calls are
+// thread-safe.
 class StemSurface {
  public:
   StemSurface() = default;  // round and smooth

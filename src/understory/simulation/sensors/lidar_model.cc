@@ -79,8 +79,8 @@ LidarModel vlp_16(const LidarConfig& config) {
 }
 
 // 32 lasers a degree apart, from the highest down. The first fires 6 us after the block's time,
-// then one every 1.512 us, 50 us a sequence (PandarXT User Manual, "Channel Distribution" and
-// "Absolute Time of Point Cloud Data").
+// then one every 1.512 us, 50 us a sequence. Source: PandarXT User Manual, "Channel Distribution"
+// and "Absolute Time of Point Cloud Data".
 LidarModel xt_32(const LidarConfig& config) {
   LidarModel model;
   for (int i = 0; i < 32; ++i)
