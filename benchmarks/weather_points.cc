@@ -1,10 +1,9 @@
 // How many of the returns that are weather the filters of preprocess/ drop, and how many others.
 //   weather_points APART SCANS SITE KEY=VALUE ...   simulates the site and prints one line of
 //   counts
-// APART, SCANS: settings preprocess.weather.apart and .scans.
-// weather, of these dropped, others, of these dropped, of these by drop_isolated (which is always
-// on): returns of all scans but the first second, in which no scans before tell. The poses are the
-// true ones.
+// APART, SCANS: settings preprocess.weather.apart and .scans. Prints: weather, of these dropped,
+// others, of these dropped, of these by drop_isolated (which is always on). Returns of the first
+// second do not count: no scans before them tell. The poses are the true ones.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>

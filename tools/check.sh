@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # check.sh [BASE]: what a change has to pass beside the tests: layers, names, functions, docstrings,
-# format, and clang-tidy on the .cc files that differ from BASE (default: where this branch left
-# main; on main the last commit).
+# comments and format. clang-tidy looks at the .cc files that differ from BASE (default: where this
+# branch left main; on main the last commit).
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$top"
