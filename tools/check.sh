@@ -29,6 +29,9 @@ python3 tools/check_functions_test.py || failed+=("the functions script's own te
 say "docstrings"
 python3 tools/check_docstrings.py || failed+=(docstrings)
 python3 tools/check_docstrings_test.py || failed+=("the docstrings script's own test")
+say "comments"
+python3 tools/check_comments.py || failed+=(comments)
+python3 tools/check_comments_test.py || failed+=("the comments script's own test")
 say "format"
 tools/format.sh --check || failed+=(format)
 say "clang-tidy on changed files"
