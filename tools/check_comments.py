@@ -72,10 +72,10 @@ def docstrings_of(text):
         if not isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) or not ast.get_docstring(node):
             continue
         lines = node.body[0].value.value.splitlines()
-        base = min([len(line) - len(line.lstrip()) for line in lines[1:] if line.strip()], default=0)
+        first, column = node.body[0].lineno, node.body[0].col_offset
         found = []
-        for number, line in enumerate(lines, node.body[0].lineno):
-            line = line if number == node.body[0].lineno else line[base:]
+        for number, line in enumerate(lines, first):
+            line = line if number == first else line[column:]
             is_example = line.startswith("  ")
             found.append((number, None, "") if is_example else (number, 0, line))
         yield from gathered(found)
