@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Fails where a sentence of a comment has more than 25 words.
+"""Fails where a sentence of a comment or of a message has more than 25 words.
 
-It reads the comments of all C++, Python, shell and CMake, and the docstrings of Python. Lines that
+It reads the comments of all C++, Python, shell and CMake, and the docstrings of Python. Messages are the
+strings of the program's C++, but for those of its tests. Tags and the parts of a format are no words. Lines that
 follow each other at one column are one text. A sentence ends at a full stop, exclamation or question
 mark, and at an empty line or an item of a list. So it does where an indented line begins, such as a
 parameter or an example of a command. Of a line with columns, the last one counts.
@@ -21,6 +22,8 @@ FOLDERS = ("src", "benchmarks", "fuzz", "tests", "tools", "packaging", "cmake", 
 MARKS = {".h": "//", ".cc": "//", ".py": "#", ".sh": "#", ".cmake": "#", ".txt": "#", "": "#"}
 
 STRING = r'"(?:\\.|[^"\\])*"|(?<![0-9A-Za-z_])\'(?:\\.|[^\'\\])*\''  # its marks begin no comment
+TEXTS = re.compile(r"//[^\n]*|/\*.*?\*/|R\"([^(\s]*)\(.*?\)\1\"|'(?:\\.|[^'\\\n])'"
+                   r'|(?P<text>(?:"(?:\\.|[^"\\\n])*"\s*)+)', re.DOTALL)
 ITEM = re.compile(r"[-*] |\d+[.)] |\|")
 INDENTED = 3  # spaces
 ENDED = re.compile(r"(?<=[.!?])[)\"']*\s+|(?<=\S)\s+(?=\[[^\[\]]*\]$)")
@@ -81,6 +84,17 @@ def docstrings_of(text):
         yield from gathered(found)
 
 
+def messages_of(text):
+    """(first line, last line, text) of each line of a message of C++; adjacent strings are one."""
+    for found in TEXTS.finditer(text):
+        if found["text"] is None:
+            continue
+        first, last = (text.count("\n", 0, place) + 1 for place in (found.start(), found.end()))
+        whole = "".join(re.findall(r'"((?:\\.|[^"\\\n])*)"', found["text"]))
+        for line in re.split(r"\\n|<[^>]*>", whole):
+            yield first, last, re.sub(r"\{[^{}]*\}", "0", line)
+
+
 def words_of(sentence):
     plain = re.sub(r"`[^`]*`", "x", sentence)
     return [word for word in plain.split() if re.search(r"[A-Za-z]", word)]
@@ -110,6 +124,8 @@ def check(tree):
         found = list(comments_of(text.splitlines(), MARKS[path.suffix]))
         if path.suffix == ".py":
             found += docstrings_of(text)
+        if path.is_relative_to(tree / "src") and path.suffix in (".h", ".cc") and "test" not in path.stem:
+            found += messages_of(text)
         for first, last, paragraph in found:
             for sentence in long_sentences(paragraph):
                 yield path, first, last, paragraph, sentence
@@ -123,7 +139,7 @@ def main():
         return 2
     found = [f"{path.relative_to(tree)}:{first}: {len(words_of(sentence))} words: {sentence}"
              for path, first, _, _, sentence in check(tree)]
-    print("\n".join(found) if found else f"comments: no sentence has more than {MOST_WORDS} words")
+    print("\n".join(found) if found else f"comments and messages: no sentence has more than {MOST_WORDS} words")
     return 1 if found else 0
 
 

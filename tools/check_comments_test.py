@@ -55,7 +55,7 @@ class CheckComments(unittest.TestCase):
         self.assertEqual(findings(f"// {THIRTEEN} [{THIRTEEN}] and\n"), [(1, 1, 27)])
 
     def test_strings_are_no_comments(self):
-        self.assertEqual(findings(f'auto a = "a // {THIRTEEN} {THIRTEEN}";\n'), [])
+        self.assertEqual(findings(f'auto a = "a // {THIRTEEN} {THIRTEEN}";\n', "tests/a.cc"), [])
         self.assertEqual(findings(f'auto a = "\\"";  // {THIRTEEN} {THIRTEEN}\n'), [(1, 1, 26)])
 
     def test_python_has_docstrings_too(self):
@@ -65,6 +65,18 @@ class CheckComments(unittest.TestCase):
         self.assertEqual(findings(inner, "tests/b/a.py"), [(3, 4, 26)])
         example = f'"""{THIRTEEN}:\n\n  a.py {THIRTEEN} {THIRTEEN}\n"""\n'
         self.assertEqual(findings(example, "benchmarks/a.py"), [])
+
+    def test_strings_of_the_program_are_messages(self):
+        name = "src/understory/a/one.cc"
+        text = f'f("{THIRTEEN} "\n  "{THIRTEEN}");\n'
+        self.assertEqual(findings(text, name), [(1, 2, 26)])
+        self.assertEqual(findings(text, "src/understory/a/one_test.cc"), [])
+        self.assertEqual(findings(text, "benchmarks/one.cc"), [])
+        for end in (". ", "\\n", "<p>", '", "'):
+            self.assertEqual(findings(f'f("{THIRTEEN}{end}{THIRTEEN}");\n', name), [], end)
+        self.assertEqual(findings(f'f("{THIRTEEN} {TWELVE} {{:.1f}} {{name}}");\n', name), [])
+        self.assertEqual(findings(f"""char a = '"'; f("{THIRTEEN} \\" {THIRTEEN}");\n""", name), [(1, 1, 26)])
+        self.assertEqual(findings(f'auto a = R"({THIRTEEN} {THIRTEEN})";\n', name), [])
 
     def test_shell_and_cmake_have_their_mark(self):
         for name in ("run", ".ci/run", "tools/a.sh", "cmake/A.cmake", "src/understory/CMakeLists.txt"):

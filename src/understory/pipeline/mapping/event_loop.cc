@@ -255,8 +255,8 @@ bool EventLoop::start_over_for_refined_imu() {
   if (!found) return false;
   log_.forget_all_but("");
   log_.info(
-      fmt::format("the recording is mapped again from its beginning, with place and clock of the "
-                  "IMU as it tells them itself (its stamps are {:.1f} ms late)",
+      fmt::format("the recording is mapped again from its beginning, with the refined place and "
+                  "clock of the IMU. Its stamps are {:.1f} ms late",
                   1e3 * found->late_s));
   ++conditions.imu_refinements;
   conditions.imu_refined = found;
