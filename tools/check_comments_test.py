@@ -72,7 +72,7 @@ class CheckComments(unittest.TestCase):
         self.assertEqual(findings(text, name), [(1, 2, 26)])
         self.assertEqual(findings(text, "src/understory/a/one_test.cc"), [])
         self.assertEqual(findings(text, "benchmarks/one.cc"), [])
-        for end in (". ", "\\n", "<p>", '", "'):
+        for end in (". ", "\\n", " <p> ", '", "'):
             self.assertEqual(findings(f'f("{THIRTEEN}{end}{THIRTEEN}");\n', name), [], end)
         self.assertEqual(findings(f'f("{THIRTEEN} {TWELVE} {{:.1f}} {{name}}");\n', name), [])
         self.assertEqual(findings(f"""char a = '"'; f("{THIRTEEN} \\" {THIRTEEN}");\n""", name), [(1, 1, 26)])
