@@ -66,7 +66,7 @@ void run(const WeatherFilterConfig& config, const std::string& site,
          const std::vector<std::string>& settings) {
   Simulator simulator(load_site(site, settings));
   std::vector<TruePoint> truth;
-  simulator.tell_points([&](const std::vector<TruePoint>& points) { truth = points; });
+  simulator.set_point_sink([&](const std::vector<TruePoint>& points) { truth = points; });
   WeatherFilter filter(config);
   Counts counts;
   TimeNs first = 0;

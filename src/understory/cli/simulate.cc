@@ -142,7 +142,7 @@ std::unique_ptr<LasWriter> write_points(const std::string& folder, Simulator& si
   LasOptions options;
   options.trees = true;
   auto writer = std::make_unique<LasWriter>(std::filesystem::path(folder) / "points.laz", options);
-  simulator.tell_points([&las = *writer](const std::vector<TruePoint>& points) {
+  simulator.set_point_sink([&las = *writer](const std::vector<TruePoint>& points) {
     for (const TruePoint& point : points) {
       LasRecord record;
       record.x = point.place.x();

@@ -55,7 +55,7 @@ class CarriedReturns {
   [[nodiscard]] std::uint32_t voxel_of(const ScanPoint& point) const;
   void add(const ScanPoint& point, std::uint32_t voxel);
   // Half of its sums: what was there before counts for less.
-  static void fade(Voxel& voxel);
+  static void halve_sums(Voxel& voxel);
   // Its share as of the scan before `scan`, if no scan has hit it since `last`.
   [[nodiscard]] float share_before(const Voxel& voxel, std::uint32_t scan) const;
   [[nodiscard]] bool is_above_others(std::uint32_t voxel, const Eigen::Vector3d& up) const;

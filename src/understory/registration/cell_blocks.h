@@ -106,7 +106,7 @@ class CellBlocks {
   Block& find_or_add(const Place& block);
   void remove(std::uint32_t number);
   // Has the blocks beside one know its number.
-  void introduce(std::uint32_t number);
+  void link_neighbours(std::uint32_t number);
   // Blocks with a change in them or beside them.
   [[nodiscard]] const std::vector<std::uint32_t>& touched();
 

@@ -50,7 +50,7 @@ class Simulator : public Recording {
 
   // From now on hands over the points of each scan that is cast, at their true places. Not
   // together with a folder of casts, which does not keep what gave an echo.
-  void tell_points(std::function<void(const std::vector<TruePoint>&)> sink);
+  void set_point_sink(std::function<void(const std::vector<TruePoint>&)> sink);
 
   [[nodiscard]] const SiteConfig& site() const;
   [[nodiscard]] double duration_s() const;

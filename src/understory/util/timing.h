@@ -19,9 +19,9 @@ namespace understory {
 [[nodiscard]] double resident_memory_mb();
 // Hands memory that has been freed back to the system where the C library would keep it. For the
 // end of a stage that needed much: it takes some milliseconds.
-void give_free_memory_back();
+void return_freed_memory();
 // From now on what is freed goes back sooner, for a few per cent of the time.
-void give_back_what_is_freed();
+void return_freed_memory_sooner();
 
 // Mean, percentiles (nearest rank) and largest of a set of values; zeros for an empty set.
 struct Distribution {

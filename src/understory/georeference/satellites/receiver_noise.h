@@ -90,7 +90,7 @@ double whiten(const NoisyTimes& times, const ReceiverNoise& noise, Eigen::Matrix
 // Of each pair the length of its residual (a column an axis) beside the slow and the steady errors
 // that the residuals make probable. It is 0 where it is not over four standard deviations of the
 // fast error. Pairs in time; metres.
-[[nodiscard]] Eigen::VectorXd runaways_m(const NoisyTimes& times, const ReceiverNoise& noise,
+[[nodiscard]] Eigen::VectorXd outliers_m(const NoisyTimes& times, const ReceiverNoise& noise,
                                          const Eigen::MatrixXd& residuals);
 
 // How the noise is looked for.

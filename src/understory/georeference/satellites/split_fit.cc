@@ -164,10 +164,10 @@ class Splitter {
     if (!config_.robust) return;
     const Eigen::Matrix3Xd off = residuals();
     fit_.plane_times.extra_sd_m =
-        runaways_m(fit_.plane_times, *plane_search_.near, off.topRows<2>().transpose());
+        outliers_m(fit_.plane_times, *plane_search_.near, off.topRows<2>().transpose());
     if (fit_.height_known)
       fit_.height_times.extra_sd_m =
-          runaways_m(fit_.height_times, *height_search_.near, off.row(2).transpose());
+          outliers_m(fit_.height_times, *height_search_.near, off.row(2).transpose());
   }
 
   [[nodiscard]] Eigen::Matrix3Xd residuals() const {

@@ -56,7 +56,7 @@ void EventLoop::begin() {
   expect_imu();
   if (const auto* dense = std::get_if<DenseMappingConfig>(&asked_))
     expect_memory(*dense, request_.traits);
-  state_.forget_former();
+  state_.forget_unfinished_run();
   adapt_to_recording();
   save_state();  // makes the run resumable from the start
 }

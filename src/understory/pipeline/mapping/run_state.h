@@ -40,7 +40,7 @@ class RunState {
 
   // Forgets the state of an unfinished run that this one replaces. It comes after the recording is
   // opened: one that cannot be read costs no unfinished run.
-  void forget_former() const { folder_.forget_state(); }
+  void forget_unfinished_run() const { folder_.forget_state(); }
 
   [[nodiscard]] const RunFolder& folder() const { return folder_; }
   [[nodiscard]] std::filesystem::path work() const { return folder_.work(); }

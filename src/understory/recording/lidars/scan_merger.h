@@ -26,7 +26,7 @@ class ScanMerger {
   // A scan of a lidar, on the common clock.
   void add(std::size_t lidar, ScanPtr scan);
   // All points of the lidar before `until` have been added.
-  void hear(std::size_t lidar, TimeNs until);
+  void set_complete_until(std::size_t lidar, TimeNs until);
 
   // What comes next: a scan, or the lidar of which more has to be known first, or the end.
   struct Step {

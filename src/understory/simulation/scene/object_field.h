@@ -24,7 +24,7 @@ class ObjectField {
   void commit();
 
   // As RayShape::cast; struck.object is the number of what was met.
-  void cast(const RayLanes& rays, LaneMask active, float near, Struck& struck) const;
+  void cast(const RayLanes& rays, LaneMask active, float near, RayHits& struck) const;
 
   [[nodiscard]] Eigen::Vector3f normal(std::uint32_t object, std::uint32_t primitive,
                                        const Eigen::Vector3f& place_in_world) const;

@@ -15,7 +15,7 @@ namespace understory {
 
 // What rays met so far, ray by ray: the range, which is at first the limit. As bits, also the
 // numbers of the primitive and of the object.
-struct Struck {
+struct RayHits {
   Lanes range;
   Lanes primitive;
   Lanes object;
@@ -45,7 +45,7 @@ struct Triangle {
     return rows.row(0).head<3>();
   }
 
-  bool meet(const RayLanes& rays, float near, std::uint32_t number, Struck& struck) const {
+  bool meet(const RayLanes& rays, float near, std::uint32_t number, RayHits& struck) const {
     constexpr float kSeam = 1e-5F;  // of an edge: what lies side by side leaves no gap
     const Lanes3& d = rays.direction;
     const Lanes3& o = rays.origin;
@@ -87,7 +87,7 @@ struct Disc {
     return {centre - reach, centre + reach};
   }
 
-  bool meet(const RayLanes& rays, float near, std::uint32_t number, Struck& struck) const {
+  bool meet(const RayLanes& rays, float near, std::uint32_t number, RayHits& struck) const {
     const Lanes3& d = rays.direction;
     const Lanes3 to = {Lanes(centre.x()) - rays.origin.x, Lanes(centre.y()) - rays.origin.y,
                        Lanes(centre.z()) - rays.origin.z};
@@ -130,7 +130,7 @@ struct RoundCone {
   }
 
   // Where rays enter the body, or, where that lies before `near`, leave it.
-  bool meet(const RayLanes& rays, float near, std::uint32_t number, Struck& struck) const {
+  bool meet(const RayLanes& rays, float near, std::uint32_t number, RayHits& struck) const {
     Lanes at = pass<true>(rays);
     const LaneMask before = at < Lanes(near);
     if (before.bits() != 0) at = select(before, pass<false>(rays), at);

@@ -115,7 +115,7 @@ bool InertialSensor::lost() {
 }
 
 // Harmonics of the carrier's main tone, ever weaker.
-Eigen::Vector3d InertialSensor::overtones(double time_s) const {
+Eigen::Vector3d InertialSensor::vibration_harmonics(double time_s) const {
   const double strength = config_.vibration_m_s2 * (1.0 + 0.5 * std::sin(kTau * 0.21 * time_s));
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (int i = 2; i <= config_.vibration_tones; ++i) {
@@ -184,7 +184,7 @@ ImuSample InertialSensor::next() {
                         config_.gyro_noise * root * normal3(noise);
   sample.specific_force = accel_scale_ * (imu_from_body * force_in_body) + accel_bias_ + vibration +
                           config_.accel_noise * root * normal3(noise);
-  if (config_.vibration_tones > 1) sample.specific_force += overtones(time);
+  if (config_.vibration_tones > 1) sample.specific_force += vibration_harmonics(time);
   if (config_.shock_m_s2 > 0.0 || config_.shock_rad_s > 0.0) shake(time, sample);
   saturate(sample);
   sample.stamp += from_seconds(config_.time_offset_s);

@@ -41,7 +41,7 @@ class InertialSensor {
 
   void walk_biases();
   void drift();
-  [[nodiscard]] Eigen::Vector3d overtones(double time_s) const;
+  [[nodiscard]] Eigen::Vector3d vibration_harmonics(double time_s) const;
   void shake(double time_s, ImuSample& sample) const;
   void saturate(ImuSample& sample) const;
 

@@ -60,6 +60,6 @@ class StagedFolder {
 
 // A message with the names of files that the user asked for in place of those that they are
 // written under.
-[[nodiscard]] std::string with_names_asked_for(std::string message);
+[[nodiscard]] std::string with_final_names(std::string message);
 
 }  // namespace understory

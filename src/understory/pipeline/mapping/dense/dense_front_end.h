@@ -157,7 +157,7 @@ class DenseFrontEnd : public FrontEnd {
 
   void refuse_imu(const std::string& reason);
   void take(const Event& event, const Rig& rig);
-  void put_fixes_away();
+  void store_fixes();
   void make_odometry(const Rig& rig);
   void tell_of_imu(TimeNs now);
   void make_satellites();
@@ -172,7 +172,7 @@ class DenseFrontEnd : public FrontEnd {
   void predict_at(TimeNs stamp);
   void match_parts(const Scan& scan);
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
-  void begin_again(const AssumedMotion& motion);
+  void repeat_opening(const AssumedMotion& motion);
   void leave_out_first();
   void on_scan(const Scan& scan);
   [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);
