@@ -81,7 +81,7 @@ inline constexpr double kCube = 3.0;
 inline constexpr std::size_t kLeastColumns = 4;
 // Share of the points at each end of an axis that do not count for the extent [not recorded]
 inline constexpr double kOutliers = 0.002;
-// The upper end of that range [not recorded]
+// The upper end of that range [bound: 1 - kOutliers]
 inline constexpr double kUpperEnd = 0.998;
 // Quantile of the heights in a cell that is its ground [not recorded]
 inline constexpr double kLowQuantile = 0.01;
