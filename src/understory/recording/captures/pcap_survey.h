@@ -71,8 +71,8 @@ struct PcapSurvey {
   [[nodiscard]] bool trust_checksums() const { return good_checksums > 10 * bad_checksums; }
   // What lidars there are whose packets are not read; empty: none.
   [[nodiscard]] std::string unread() const;
-  // Of a stream. It has the address where other lidars send to the same port, and that of the link
-  // layer where they share the address.
+  // The name of a stream. It has the address where other lidars send to the same port, and that of
+  // the link layer where they share the address.
   [[nodiscard]] std::string name_of(const UdpStream& key) const;
   // For messages: "1500 frames: udp 7502: 192 x 8448 bytes, ..."
   [[nodiscard]] std::string list() const;

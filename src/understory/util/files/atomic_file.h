@@ -49,8 +49,8 @@ class AtomicTextFile {
   std::unique_ptr<Gzip> gzip_;
 };
 
-// For files that other programs write by themselves (GDAL). One gives a temporary path beside
-// `path`, one syncs and renames to it, on the disk in the end. Throws OutputError.
+// For files that other programs write by themselves (GDAL). part_path gives a temporary path beside
+// `path`. sync_and_rename syncs the file, renames it, and syncs its folder. Throws OutputError.
 [[nodiscard]] std::filesystem::path part_path(const std::filesystem::path& path);
 void sync_and_rename(const std::filesystem::path& from, const std::filesystem::path& to);
 

@@ -36,8 +36,8 @@ class StagedFile {
 // The same for a folder of files.
 class StagedFolder {
  public:
-  // A folder that is there already is refused unless it is empty or may be replaced. `may_replace`
-  // holds for the names of all files in it, and they go with `commit`. Throws OutputError.
+  // A folder that is there already is refused unless it is empty, or `may_replace` holds for the
+  // names of all files in it. Those go with `commit`. Throws OutputError.
   using NameTest = std::function<bool(const std::string& name)>;
   explicit StagedFolder(const std::filesystem::path& path, const NameTest& may_replace = {});
   ~StagedFolder();
